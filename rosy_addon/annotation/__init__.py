@@ -1,1 +1,1 @@
-"""Annotation: what explains a picture, drawn over it: singularities and their indices, arrowheads, keys."""
+"""Annotation: what is drawn over a picture to explain it, such as singularities, arrowheads and keys."""

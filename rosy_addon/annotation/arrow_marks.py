@@ -1,11 +1,12 @@
-"""Arrowheads over the lines of a field in a picture, if lines have a direction.
+"""Arrowheads in a picture of a field in which directions have no opposite direction, such as a vector field.
 
-Arrowheads are at places of the surface that do not depend on the view, so a moving camera sees the same
-places. The places are ordered in levels: the distance between places decreases from level to level, and
-the first places of the order are spread evenly over the surface. A picture takes the places in this order,
-if they are visible and not too near to a place that was taken before. In a close view, the places of the
-finest level are too far apart. Then points of `progressive_samples` follow after them. Around
-each place, a field of N directions has N arrowheads.
+Arrowheads are drawn at points of the surface, called places, that do not depend on the view. So a moving
+camera sees arrowheads at the same places. The places are ordered in levels: the distance between places
+decreases from level to level, and the places of the first levels are spread evenly over the surface. A
+picture takes places in this order, if they are visible and not too near to a place that was taken before. In
+a close view, the places of the finest level are too far apart. Then points of
+`progressive_samples` are taken after them. Around each place, a field of N directions has N
+arrowheads.
 """
 
 from __future__ import annotations
@@ -37,37 +38,40 @@ from .progressive_samples import (
 #: Colors of arrowheads and of their outlines.
 FILL_COLOR, OUTLINE_COLOR = "#141414", "#ffffff"
 
-#: Width of an arrowhead, depth of the notch at its back, and width of its outline, in lengths.
+#: Width of an arrowhead, depth of the notch at its back, and width of its outline, as fractions of its
+#: length.
 WIDTH, NOTCH, OUTLINE = 0.78, 0.24, 0.1
 
-#: Least width of the outline, pixels.
+#: Smallest width of the outline, pixels.
 MIN_OUTLINE = 1.0
 
-#: Most arrowheads of a picture, about: more are drawn farther apart.
+#: Approximate limit for the number of arrowheads in a picture. The spacing is increased to meet it.
 MAX_COUNT = 1 << 16
 
-#: Directions that are shortened to less than this fraction have no arrowhead.
+#: A direction has no arrowhead if it is foreshortened to less than this fraction of its length.
 MIN_FORESHORTENING = 0.3
 
-#: Least cosine of the angle between the normal of the surface and the direction to the eye at places with one
-#: arrowhead and with several, so that none reaches far beyond a silhouette.
+#: Smallest cosine of the angle between the normal of the surface and the direction to the eye, at places with
+#: one arrowhead and at places with several. With these limits, no arrowhead reaches far beyond a silhouette.
 MIN_FACING, MIN_FACING_OF_SEVERAL = 0.15, 0.35
 
-#: Least distance between places on the surface, in spacings. On screen, most are nearer to each other.
+#: Smallest distance between places on the surface, in spacings. On screen, distances may be smaller.
 NEAREST_PLACES = 0.75
 
-#: Distance from a place to the middles of its arrowheads, in lengths, if there are several, and the least distance
-#: between neighbors, in widths.
+#: Distance from a place to the middles of its arrowheads, in lengths of an arrowhead, if there are several,
+#: and the smallest distance between neighboring arrowheads of a place, in widths of an arrowhead.
 REACH, MIN_GAP = 1.15, 1.2
 
-#: A place counts as hidden if another one, next to it in the picture, is nearer by more spacings than this.
+#: A place counts as hidden if another place, next to it in the picture, is nearer to the camera by more than
+#: this, in spacings.
 HIDDEN_SPACINGS = 4.0
 
 #: Number of levels over which the distance between places halves, and number of the finest level, which has
 #: about 7000 places.
 LEVELS_PER_OCTAVE, MAX_LEVEL = 3, 20
 
-#: Random points among which the places of a level are chosen, for each square of the distance of the level.
+#: Number of random points from which the places of a level are chosen, for each square whose side is the
+#: distance between places of the level.
 CANDIDATES_PER_PLACE = 6
 
 
@@ -78,13 +82,13 @@ class ArrowMarks:
     Attributes
     ----------
     anchor : (K, 3) float64 ndarray
-        Places on surfaces, in world space.
+        Point of the surface at which each arrowhead is drawn, in world space.
     place : (K, 2) float64 ndarray
-        Places in the picture, pixels from the lower left.
+        The same point in the picture, pixels from the lower left.
     position : (K, 2) float64 ndarray
-        Middles of the arrowheads, pixels from the lower left.
+        Middle of each arrowhead in the picture, pixels from the lower left.
     direction : (K, 2) float64 ndarray
-        Unit vectors in the picture.
+        Unit vector in the picture in which each arrowhead points.
     size : float
         Length of an arrowhead, pixels.
     """
@@ -100,12 +104,15 @@ class ArrowMarks:
 
     @property
     def outline(self) -> float:
-        """Width of the outlines, pixels."""
+        """Width of the outlines of arrowheads, pixels."""
         return max(OUTLINE * self.size, MIN_OUTLINE)
 
 
 def has_arrows(instance: MeshInstance) -> bool:
-    """Return whether the lines of the field of an instance have a direction."""
+    """Return whether an instance has a field that arrowheads can show.
+
+    In such a field, directions have no opposite direction at the same point, as in a vector field.
+    """
     return instance.field is not None and not field_symmetry(instance.field).has_opposites
 
 
@@ -120,26 +127,27 @@ def arrow_marks(
     cache: Cache | None = None,
     is_exact: bool = True,
 ) -> ArrowMarks:
-    """Find the places and directions of arrowheads in a view.
+    """Find the positions and directions of arrowheads in a view.
 
     Parameters
     ----------
     instances : sequence of MeshInstance
-        Instances without a field, or whose lines have no direction, only hide arrowheads.
+        Arrowheads are drawn on the instances for which `has_arrows` is true. All others only hide arrowheads.
     camera : Camera
         Camera of the picture.
     spacing : float
-        Least distance between the places of arrowheads, pixels.
+        Smallest distance, in pixels, between the points at which arrowheads are drawn. It is increased if
+        arrowheads would overlap or be too many.
     size : float
         Length of an arrowhead, pixels.
     display : {"smooth", "flat"}
-        As for `projection.project.project`.
+        Whether the field is interpolated, or constant on each face; see `projection.project.project`.
     clip_planes : (6, 4) float64 ndarray, optional
-        World space. The negative side of each plane is cut away.
+        Planes in world space. The negative side of each plane is cut away.
     cache : Cache, optional
-        Stores the places, and corner fields.
+        Cache for points of surfaces at which arrowheads are drawn, and for corner fields.
     is_exact : bool
-        Remove all hidden places. If false, most of them are removed, which is faster.
+        Whether all hidden arrowheads are removed. If false, most of them are removed, which is faster.
 
     Returns
     -------
@@ -165,7 +173,7 @@ def arrow_marks(
         is_usable &= ~_seems_hidden(projected, gbuffer, spacing)
     usable = np.flatnonzero(is_usable)
     chosen = usable[spaced_points(projected.position[usable], spacing)]
-    # The arrowheads of a place are one after the other.
+    # The arrowheads at the same place are consecutive.
     place, member = np.nonzero(np.abs(directions[chosen]) >= MIN_FORESHORTENING)
     place = chosen[place]
     unit = directions[place, member] / np.abs(directions[place, member])
@@ -178,10 +186,11 @@ def arrow_marks(
 def _places_in_order(
     instances: Sequence[MeshInstance], camera: Camera, spacing: float, cache: Cache
 ) -> SurfacePoints:
-    """Return the candidates for places of arrowheads on all surfaces, in the order of preference.
+    """Return candidates for the points at which arrowheads are drawn on all surfaces, in order of preference.
 
-    They are places that do not depend on the view, the largest distances first, and then points between
-    them where the view is so near that it needs more.
+    The first candidates are the points of `surface_places`, which do not depend on the view, from the largest
+    distance between points to the smallest. In views so near that these are too far apart, points between
+    them follow.
     """
     parts = [SurfacePoints.of(0, np.empty(0, np.int32), np.empty((0, 3)))]
     keys = [np.empty((2, 0))]
@@ -203,7 +212,7 @@ def _places_in_order(
             kept = np.flatnonzero(needed < places.finest * scale)
             parts.append(points.part(kept))
             keys.append(np.stack([rank[kept], np.ones(len(kept))]))
-    # By the distance of places, then by the rank of the points between them.
+    # Sort places by their distance, and the points between them, which are last, by their rank.
     order = np.lexsort(np.concatenate(keys, axis=1))
     return SurfacePoints.concatenate(parts).part(order)
 
@@ -211,7 +220,10 @@ def _places_in_order(
 def _needed_distances(
     instance: MeshInstance, camera: Camera, points: SurfacePoints, spacing: float
 ) -> np.ndarray:
-    """Return (P,) float64: least distances between points, in Blender units; infinite behind the eye."""
+    """Return (P,) float64: the smallest distance between arrowheads near each point, in Blender units.
+
+    It is infinite behind the eye.
+    """
     world = instance.points_in_triangles(points.triangle, points.barycentric)
     result = np.full(len(world), NEAREST_PLACES * spacing / camera.pixels_per_unit)
     if camera.is_perspective:
@@ -223,7 +235,7 @@ def _needed_distances(
 def _smallest_pixel(instance: MeshInstance, camera: Camera) -> float:
     """Return the size of a pixel at the nearest point of an instance, in Blender units.
 
-    0 if the instance reaches behind the eye.
+    It is 0 if the instance reaches behind the eye.
     """
     pixel = 1 / camera.pixels_per_unit
     if not camera.is_perspective:
@@ -232,16 +244,19 @@ def _smallest_pixel(instance: MeshInstance, camera: Camera) -> float:
 
 
 def _reach(degree: int, size: float) -> float:
-    """Return the distance from a place to the middles of its N arrowheads, pixels."""
+    """Return the distance, in pixels, from a point with N arrowheads to their middles.
+
+    N is `degree`, and `size` the length of an arrowhead in pixels. The distance is 0 for one arrowhead.
+    """
     if degree <= 1:
         return 0.0
     return max(REACH, MIN_GAP * WIDTH / (2 * np.sin(np.pi / degree))) * size
 
 
 def _screen_directions(gbuffer: GBuffer) -> np.ndarray:
-    """Return (P, M) complex128: the foreshortened directions of the field on screen.
+    """Return (P, M) complex128: the directions of the field at P points, foreshortened, on screen.
 
-    M is the largest degree. A point with fewer directions has zeros.
+    M is the largest degree of all fields. A point with fewer than M directions has zeros in their place.
     """
     jacobian = screen_jacobians(gbuffer).astype(np.complex128)
     degree = np.asarray(gbuffer.instance_degrees)[gbuffer.instance_id]
@@ -266,16 +281,17 @@ def _screen_directions(gbuffer: GBuffer) -> np.ndarray:
 
 
 def _faces_camera(gbuffer: GBuffer) -> np.ndarray:
-    """Return (P,) bool: whether the surface is not too slanted for arrowheads."""
+    """Return (P,) bool: whether the surface faces the camera enough for arrowheads; see `MIN_FACING`."""
     degree = np.asarray(gbuffer.instance_degrees)[gbuffer.instance_id]
     limit = np.where(degree == 1, MIN_FACING, MIN_FACING_OF_SEVERAL)
     return dot(gbuffer.geometric_normal, gbuffer.view_direction) >= limit
 
 
 def _seems_hidden(projected: ProjectedPoints, gbuffer: GBuffer, spacing: float) -> np.ndarray:
-    """Return (P,) bool: whether a nearer point is next to a point in the picture.
+    """Return (P,) bool: whether points are probably hidden, judged only from the depths of the points around.
 
-    A point on a back side also counts as hidden if it is behind a point on a front side.
+    A point counts as hidden if a point next to it in the picture is nearer to the camera by more than
+    `HIDDEN_SPACINGS`. A point on a back side also counts as hidden if it is behind a point on a front side.
     """
     column, row = (projected.position / spacing).astype(np.intp).T + 1
     shape = int(row.max(initial=0)) + 2, int(column.max(initial=0)) + 2
@@ -299,18 +315,20 @@ def _seems_hidden(projected: ProjectedPoints, gbuffer: GBuffer, spacing: float) 
 
 @dataclass(frozen=True, eq=False)
 class SurfacePlaces:
-    """P places on a surface, from coarse levels to fine ones.
+    """P evenly spread points of a surface, ordered in levels from coarse to fine.
 
     Attributes
     ----------
     triangle : (P,) int32 ndarray
+        Triangle of each point.
     barycentric : (P, 3) float64 ndarray
+        Barycentric coordinates of the point in this triangle.
     distance : (P,) float64 ndarray
-        Least distance to the places before, in Blender units of the rest shape.
+        Smallest distance to the points before it, in Blender units of the rest shape.
     level : int
-        The last level; -1 if there is none.
+        Number of the finest level; -1 if there are no points.
     extent : float
-        The distance of level 0: the side of a square of the area of the surface.
+        Distance between the points of level 0: the side of a square that has the area of the surface.
     """
 
     triangle: np.ndarray
@@ -321,30 +339,31 @@ class SurfacePlaces:
 
     @property
     def finest(self) -> float:
-        """The distance of the last level. No point of the surface is much farther from the nearest place."""
+        """Distance between the points of the finest level, in Blender units of the rest shape."""
         return level_distance(self.extent, self.level)
 
 
 def level_distance(extent: float, level: int) -> float:
-    """Return the least distance between the places of a level, given the distance `extent` of level 0."""
+    """Return the smallest distance between the points of a level, given the distance `extent` of level 0."""
     return extent * 2 ** (-level / LEVELS_PER_OCTAVE)
 
 
 def surface_places(surface: Surface, distance: float, cache: Cache) -> SurfacePlaces:
-    """Find places on a surface, up to the first level whose distance is at most `distance`.
+    """Find evenly spread points of a surface, on levels from coarse to fine.
 
     Parameters
     ----------
     surface : Surface
     distance : float
-        In Blender units of the rest shape.
+        Distance between points, in Blender units of the rest shape. The result has all levels up to the first
+        one with at most this distance, but none after `MAX_LEVEL`.
     cache : Cache
-        Stores the places. All deformations of a mesh have the same places.
+        Cache for the points. All deformations of a mesh have the same points.
 
     Returns
     -------
     SurfacePlaces
-        May have further levels, but none after `MAX_LEVEL`.
+        It may have finer levels than requested, from earlier calls.
     """
     key = "places", surface.rest_shape_key
     places = cache.get(key)
@@ -369,7 +388,10 @@ def surface_places(surface: Surface, distance: float, cache: Cache) -> SurfacePl
 
 
 def _wanted_level(extent: float, distance: float) -> int:
-    """Return the first level with a distance, or the finest; -1 if the surface has no area."""
+    """Return the first level whose points are at most `distance` apart, or `MAX_LEVEL` if none are.
+
+    The result is -1 if the surface has no area, that is, if `extent` is 0.
+    """
     if not extent:
         return -1
     levels = level_distance(extent, np.arange(MAX_LEVEL + 1))
@@ -379,7 +401,10 @@ def _wanted_level(extent: float, distance: float) -> int:
 def _with_level(
     surface: Surface, places: SurfacePlaces, triangle: np.ndarray, barycentric: np.ndarray
 ) -> SurfacePlaces:
-    """Return places with one level more, chosen among points of triangles."""
+    """Return `places` with one more level, whose points are chosen from candidates.
+
+    `triangle` and `barycentric` are the triangles and barycentric coordinates of the candidates.
+    """
     level = places.level + 1
     finest = level_distance(places.extent, level)
     distance = np.concatenate([places.distance, np.full(len(triangle), finest)])
@@ -393,24 +418,25 @@ def _with_level(
 
 
 def spaced_points(position: np.ndarray, spacing: float) -> np.ndarray:
-    """Choose points greedily, with at least a distance between any two.
+    """Choose points greedily, so that no two chosen points are nearer to each other than a spacing.
 
     Parameters
     ----------
     position : (n, d) float64 ndarray
-        In order of preference.
+        Points in d dimensions, in order of preference.
     spacing : float
+        Smallest distance between chosen points.
 
     Returns
     -------
     (K,) intp ndarray
-        The chosen points, in ascending order.
+        Indices of the chosen points, in ascending order.
 
     Notes
     -----
-    The diagonal of a cell of the grid is the spacing, so a cell has at most one chosen point. In each round, all
-    points that come first in the 5^d cells around them are chosen, and the points near them are removed. The
-    result is the same as if one point after the other were chosen.
+    Points are sorted into a grid. The diagonal of a cell is the spacing, so a cell has at most one chosen
+    point. In each round, all points that are the first of the 5^d cells around them are chosen, and the
+    points near them are removed. The result is the same as if points were chosen one by one.
     """
     count, dimension = position.shape
     if not count:
@@ -442,14 +468,14 @@ def spaced_points(position: np.ndarray, spacing: float) -> np.ndarray:
 
 
 def _cells(position: np.ndarray, side: float) -> tuple[np.ndarray, np.ndarray]:
-    """Sort points into cells of a grid.
+    """Sort points in d dimensions into the cells of a grid. Only the C cells with points are numbered.
 
     Returns
     -------
     cell : (n,) intp ndarray
-        The cell of each point, among the C cells that have points.
+        Cell of each point, from 0 to C - 1.
     around : (5^d, C) intp ndarray
-        The cells around each of them, itself first; C where there is none.
+        The 5^d cells around each cell; the first is the cell itself. C stands for cells without points.
     """
     index = ((position - position.min(axis=0)) / side).astype(np.int64) + 2
     stride = np.cumprod([1, *(index.max(axis=0) + 3)])[:-1]

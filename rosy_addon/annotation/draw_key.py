@@ -1,4 +1,4 @@
-"""Draw a key over a picture, by its layout."""
+"""Draw a key (color bar, legend, scale bar and caption) over a picture, according to its layout."""
 
 from __future__ import annotations
 
@@ -13,26 +13,28 @@ from .draw_marks import draw_dot, draw_over, window
 from .key_contents import ColorScale
 from .key_layout import Box, KeyLayout
 
-#: Exponent of the transparency of dark text at the edges of letters. Colors are mixed in linear light, in which
-#: thin dark letters would look too light.
+#: Exponent that is applied to the transparency of dark text. Colors are mixed in linear light, in
+#: which thin dark letters would look too light without it.
 DARK_TEXT_EXPONENT = 2.0
 
-#: Scan lines of a row of pixels in a text. Along a scan line the coverage is exact.
+#: Number of scan lines in each row of pixels, for the coverage of pixels by text. Along a scan line, it is
+#: exact.
 SCAN_LINES = 8
 
-#: Radius of the corners of plates, in text sizes.
+#: Radius of the corners of plates (background rectangles), as a multiple of the text size.
 CORNER_RADIUS = 0.35
 
 
 @dataclass(frozen=True)
 class KeyColors:
-    """The colors of a key.
+    """The colors of a key: of its text and of the rectangles behind it.
 
     Attributes
     ----------
     text, plate : str
-        Display colors ``#rrggbb``.
+        Display colors ``#rrggbb`` of the text and of the background rectangles.
     plate_opacity : float
+        Opacity of the background rectangles, 0 to 1.
     """
 
     text: str
@@ -40,7 +42,8 @@ class KeyColors:
     plate_opacity: float
 
 
-#: Colors that are legible on any background. Each looks best on a background like its plate.
+#: Colors that are legible over any picture. The first look best over light pictures, the second over dark
+#: ones.
 LIGHT_PLATES = KeyColors("#141414", "#ffffff", 0.85)
 DARK_PLATES = KeyColors("#f5f5f5", "#141414", 0.88)
 
@@ -52,17 +55,18 @@ def draw_key(
     text_triangles: Callable[[str], np.ndarray],
     colors: KeyColors = LIGHT_PLATES,
 ) -> None:
-    """Draw a key over a picture, in place.
+    """Draw a key (color bar, legend, scale bar and caption) over a picture, in place.
 
     Parameters
     ----------
     rgba : (H, W, 4) float32 ndarray
-        Linear, not premultiplied, rows from the bottom.
+        Picture: linear, not premultiplied, rows from the bottom.
     layout : KeyLayout
     color_scale : ColorScale or None
-        Contents of the color bar, if there is one.
+        Colors of the color bar; not used if the layout has none.
     text_triangles : callable
-        Returns the (n, 3, 2) triangles of a line of text, in text sizes from its left end and baseline.
+        Function that returns a line of text as (n, 3, 2) corners of triangles. Their unit is the text size,
+        and their origin the left end of the baseline.
     colors : KeyColors
     """
     text, plate = (to_linear(from_hex(code)) for code in (colors.text, colors.plate))
@@ -83,7 +87,7 @@ def draw_key(
 def _draw_plate(
     rgba: np.ndarray, box: Box, radius: float, color: np.ndarray, opacity: float
 ) -> None:
-    """Draw a rectangle with round corners."""
+    """Draw a rectangle with round corners of the given radius, in place."""
     low, high = np.array(box[:2]), np.array(box[2:])
     part, x, y = window(rgba, low, high)
     center, half = (low + high) / 2, (high - low) / 2 - radius
@@ -95,7 +99,7 @@ def _draw_plate(
 
 
 def _draw_color_bar(rgba: np.ndarray, box: Box, color_scale: ColorScale) -> None:
-    """Draw a color map from the bottom to the top of a box of whole pixels."""
+    """Fill a box of whole pixels with the colors of a color map, from bottom to top, in place."""
     left, bottom, right, top = (round(value) for value in box)
     bar = rgba[bottom:top, left:right]
     bar[..., :3] = to_linear(color_scale.colors(top - bottom))[:, None]
@@ -103,7 +107,7 @@ def _draw_color_bar(rgba: np.ndarray, box: Box, color_scale: ColorScale) -> None
 
 
 def _draw_rectangle(rgba: np.ndarray, box: Box, color: np.ndarray) -> None:
-    """Draw a rectangle."""
+    """Draw an opaque rectangle with antialiased edges, in place."""
     part, x, y = window(rgba, np.array(box[:2]), np.array(box[2:]))
     left, bottom, right, top = box
     across = np.minimum(x + 0.5, right) - np.maximum(x - 0.5, left)
@@ -114,7 +118,10 @@ def _draw_rectangle(rgba: np.ndarray, box: Box, color: np.ndarray) -> None:
 def _draw_triangles(
     rgba: np.ndarray, triangles: np.ndarray, color: np.ndarray, exponent: float
 ) -> None:
-    """Draw triangles that do not overlap, with an exponent of the transparency."""
+    """Draw triangles that do not overlap, with antialiased edges, in place.
+
+    `triangles` are (n, 3, 2) corners in pixels. The opacity is 1 - (1 - coverage of the pixel)^exponent.
+    """
     if not len(triangles):
         return
     low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
@@ -126,15 +133,16 @@ def _draw_triangles(
 
 
 def triangle_coverage(triangles: np.ndarray, width: int, height: int) -> np.ndarray:
-    """Return the fraction of each pixel that triangles cover.
+    """Return the fraction of each pixel that is covered by triangles.
 
-    Each scan line crosses a triangle in an interval. The coverage of all intervals is summed by their
-    ends: an end adds to all pixels to its right, in part to its own.
+    A scan line crosses a triangle in an interval. The coverage along the line is a cumulative sum over the
+    ends of intervals: the left end adds 1 to all pixels to its right, and the right end subtracts it again.
+    The pixel that contains the end gets a part of this.
 
     Parameters
     ----------
     triangles : (n, 3, 2) float ndarray
-        Corners in pixels from the lower left, y up, in any order. They do not overlap.
+        Corners in pixels from the lower left, y up, in any order. The triangles must not overlap.
     width, height : int
         Size of the window in pixels. Triangles are clipped to it.
 
@@ -172,7 +180,11 @@ def triangle_coverage(triangles: np.ndarray, width: int, height: int) -> np.ndar
 def _crossing(
     x: np.ndarray, y: np.ndarray, first: np.ndarray, last: np.ndarray | int, level: np.ndarray
 ) -> np.ndarray:
-    """Return the x of points between the corners `first` and `last` of triangles, at a level of y."""
+    """Return (n,) x coordinates at which edges of triangles cross horizontal lines.
+
+    The edge is from the corner `first` to the corner `last` of each triangle, whose coordinates are `x` and
+    `y`, (n, 3). `level`, (n,), is the y coordinate of the line.
+    """
     rows = np.arange(len(x))
     x0, y0 = x[rows, first], y[rows, first]
     rise = y[rows, last] - y0

@@ -1,4 +1,4 @@
-"""Draw arrowheads, and the dots and labels of singularities, over a picture, in linear light."""
+"""Draw arrowheads, and the dots and labels of singularities, over a picture in linear light."""
 
 from __future__ import annotations
 
@@ -20,14 +20,19 @@ from .singularity_marks import (
     SingularityMarks,
 )
 
-#: Dots that are drawn between two reports, and pixels of arrowheads that are drawn at once.
+#: Number of dots that are drawn between two reports of the progress, and number of pixels of arrowheads that
+#: are drawn at once.
 DOTS_PER_BLOCK, PIXELS_PER_BLOCK = 256, 1 << 19
 
 
 def window(
     rgba: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the part of a picture between two corners, which may be empty, and x and y of its pixels."""
+    """Return the part of a picture between two corners, and the x and y coordinates of its pixel centers.
+
+    `low` and `high` are the lower left and the upper right corner in pixels. The part is a view of the
+    picture. It is empty if the corners are outside of the picture.
+    """
     size = rgba.shape[1::-1]
     left, bottom = np.floor(np.clip(low, 0, size)).astype(int)
     right, top = np.ceil(np.clip(high, 0, size)).astype(int)
@@ -36,7 +41,7 @@ def window(
 
 
 def draw_over(part: np.ndarray, color: np.ndarray, opacity: np.ndarray) -> None:
-    """Draw a color over a part of a picture, in place."""
+    """Composite a linear color, with an opacity for each pixel, over a part of a picture, in place."""
     opacity = opacity.astype(np.float32)
     below = part[..., 3] * (1 - opacity)
     alpha = opacity + below
@@ -46,17 +51,18 @@ def draw_over(part: np.ndarray, color: np.ndarray, opacity: np.ndarray) -> None:
 
 
 def draw_marks(rgba: np.ndarray, marks: SingularityMarks) -> np.ndarray:
-    """Draw dots and their labels over a picture.
+    """Draw the dots of singularities and their labels over a picture.
 
     Parameters
     ----------
     rgba : (H, W, 4) float32 ndarray
-        Linear, not premultiplied, rows from the bottom. Not changed.
+        Picture: linear, not premultiplied, rows from the bottom. It is not changed.
     marks : SingularityMarks
 
     Returns
     -------
     (H, W, 4) float32 ndarray
+        The picture with dots and labels.
     """
     rgba = rgba.copy()
     marks = marks.in_drawing_order()
@@ -85,13 +91,13 @@ def draw_dot(
     Parameters
     ----------
     rgba : (H, W, 4) float32 ndarray
-        Linear, not premultiplied, rows from the bottom.
+        Picture: linear, not premultiplied, rows from the bottom.
     center : (2,) float ndarray
-        Pixels from the lower left.
+        Center of the dot, pixels from the lower left.
     radius, outline : float
         Radius without the outline, and width of the outline, pixels.
     index : int
-        Its sign decides the color.
+        Index of the singularity. Its sign sets the color.
     opacity : float
     """
     outer = radius + outline
@@ -105,12 +111,15 @@ def draw_dot(
 
 @lru_cache(maxsize=8)
 def _linear_color(code: str) -> np.ndarray:
-    """Return the (3,) linear values of a color ``#rrggbb``; not to be changed."""
+    """Return (3,) float32: a color ``#rrggbb`` in linear light. Do not change the array, as it is cached."""
     return to_linear(from_hex(code))
 
 
 def _draw_label(rgba: np.ndarray, label: Label, size: float) -> None:
-    """Draw a label and the halo around it, in place."""
+    """Draw the label of a singularity and the halo around it, in place.
+
+    `size` is the diameter, in pixels, of a dot of index 1 / N.
+    """
     segments = label.segments()
     width = stroke_width(size) / 2
     reach = width + HALO * size + 1
@@ -121,7 +130,11 @@ def _draw_label(rgba: np.ndarray, label: Label, size: float) -> None:
 
 
 def _distance_to_segments(x: np.ndarray, y: np.ndarray, segments: np.ndarray) -> np.ndarray:
-    """Return the distances of points to the nearest of (n, 2, 2) segments, in the shape of x and y."""
+    """Return the distance from each point to the nearest of n segments.
+
+    `x` and `y` are the coordinates of the points, in any shape, which is also the shape of the result.
+    `segments` holds the (n, 2, 2) ends of the segments.
+    """
     nearest = np.full(x.shape, np.inf)
     for (ax, ay), (bx, by) in segments.tolist():
         dx, dy = bx - ax, by - ay
@@ -135,17 +148,18 @@ def _distance_to_segments(x: np.ndarray, y: np.ndarray, segments: np.ndarray) ->
 
 
 def draw_arrows(rgba: np.ndarray, marks: ArrowMarks) -> np.ndarray:
-    """Draw arrowheads over a picture, with one outline around those that overlap.
+    """Draw arrowheads over a picture. Arrowheads that overlap have a common outline.
 
     Parameters
     ----------
     rgba : (H, W, 4) float32 ndarray
-        Linear, not premultiplied, rows from the bottom. Not changed.
+        Picture: linear, not premultiplied, rows from the bottom. It is not changed.
     marks : ArrowMarks
 
     Returns
     -------
     (H, W, 4) float32 ndarray
+        The picture with arrowheads.
     """
     rgba = rgba.copy()
     height, width = rgba.shape[:2]
@@ -177,21 +191,21 @@ def draw_arrows(rgba: np.ndarray, marks: ArrowMarks) -> np.ndarray:
 
 
 def head_distance(x: np.ndarray, y: np.ndarray, direction: np.ndarray, size: float) -> np.ndarray:
-    """Return the distances of points to an arrowhead, negative inside.
+    """Return the signed distances from points to the outlines of arrowheads.
 
     Parameters
     ----------
     x, y : (n,) float64 ndarray
-        Relative to the middle of the arrowhead, pixels.
+        Each point, relative to the middle of its arrowhead, in pixels.
     direction : (n, 2) float64 ndarray
-        Unit vectors.
+        Unit vector in which the arrowhead of each point points.
     size : float
-        Length, pixels.
+        Length of an arrowhead, pixels.
 
     Returns
     -------
     (n,) float64 ndarray
-        Pixels.
+        Distances in pixels; negative inside the arrowhead.
     """
     along = x * direction[:, 0] + y * direction[:, 1]
     across = np.abs(y * direction[:, 0] - x * direction[:, 1])
@@ -203,14 +217,20 @@ def head_distance(x: np.ndarray, y: np.ndarray, direction: np.ndarray, size: flo
 
 
 def head_outline(size: float) -> np.ndarray:
-    """Return (3, 2): the tip, the left barb and the notch of an arrowhead, forward and to the left."""
+    """Return (3, 2) float64: the tip, the left barb and the notch of an arrowhead of a length.
+
+    The first coordinate is forward and the second to the left, from the middle of the arrowhead.
+    """
     return size * np.array([[0.5, 0.0], [-0.5, 0.5 * WIDTH], [NOTCH - 0.5, 0.0]])
 
 
 def _edge_distance(
     along: np.ndarray, across: np.ndarray, start: np.ndarray, end: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the distances of points to an edge, and whether they are on its left side or on it."""
+    """Return the distances from points to an edge, and whether points are to its left or on it.
+
+    `along` and `across` are the two coordinates of the points, `start` and `end` the ends of the edge.
+    """
     dx, dy = end - start
     px, py = along - start[0], across - start[1]
     share = np.clip((px * dx + py * dy) / (dx * dx + dy * dy), 0, 1)

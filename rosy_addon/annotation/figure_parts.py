@@ -1,4 +1,7 @@
-"""What a figure consists of: rows of panels with their keys. `external.matplotlib_figure` draws them."""
+"""The data of a figure: rows of panels with pictures, and their keys.
+
+`external.matplotlib_figure` draws figures.
+"""
 
 from __future__ import annotations
 
@@ -12,23 +15,23 @@ from .singularity_marks import SingularityMarks
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """A picture with a title.
+    """A picture in a figure, with a title and with marks over it.
 
     Attributes
     ----------
     title : str
     picture : (H, W, 4) uint8 ndarray
-        sRGB, the top row first.
+        Display values (sRGB) and opacity, the top row first.
     dots : SingularityMarks or None
-        Filled dots, in pixels of the picture.
+        Singularities that are drawn as filled dots.
     rings : SingularityMarks or None
-        Drawn as open circles.
-    links : (n, 2, 2) float64 ndarray
-        Ends of lines that connect pairs, in pixels from the lower left.
+        Singularities that are drawn as open circles.
+    links : (n, 2, 2) float64 ndarray or None
+        Ends of lines that connect pairs of singularities, in pixels from the lower left.
     cross : (2,) float64 ndarray or None
-        Where a cross is drawn, in pixels from the lower left.
+        Position of a cross, in pixels from the lower left; None: no cross.
     note : str
-        Below the picture.
+        Text below the picture.
     """
 
     title: str
@@ -42,15 +45,15 @@ class Panel:
 
 @dataclass(frozen=True, eq=False)
 class ColorBar:
-    """The key of a color map.
+    """A color bar, which explains the colors of pictures.
 
     Attributes
     ----------
     label : str
     low, high : float
-        The numbers at its ends.
+        Values at its lower and its upper end.
     stops : (n, 3) float64 ndarray
-        Display values at even distances from the lower end.
+        Colors (sRGB display values) at evenly spaced positions, from the lower to the upper end.
     """
 
     label: str
@@ -61,15 +64,15 @@ class ColorBar:
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """Panels with one key.
+    """A row of panels in a figure, with one color bar and one legend.
 
     Attributes
     ----------
     panels : sequence of Panel or None
-        None for an empty place.
+        Panels from left to right. None leaves a position empty.
     color_bar : ColorBar or None
     legend : str
-        Shown in the first empty place.
+        Text that is shown in the first empty position.
     """
 
     panels: Sequence[Panel | None]
@@ -78,5 +81,5 @@ class Row:
 
     @property
     def drawn(self) -> list[Panel]:
-        """The panels without the empty places."""
+        """Panels of the row without the empty positions."""
         return [panel for panel in self.panels if panel is not None]

@@ -1,4 +1,7 @@
-"""The indices of singularities as labels, drawn with lines and no font, so that they are the same everywhere."""
+"""Place the indices of singularities as labels beside their dots.
+
+The letters are made of line segments. No font is needed, so that labels look the same on all systems.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +16,8 @@ from .singularity_marks import OUTLINE, SingularityMarks, dot_diameters
 #: Display colors of labels, and of the halo around them.
 LABEL_COLOR, HALO_COLOR = "#141414", "#ffffff"
 
-#: Height of a label, width of its lines and of its halo, in diameters of a dot of index 1 / N; distance of
-#: letters, in heights.
+#: Height of a label, width of its lines and width of its halo, as multiples of the diameter of a dot of index
+#: 1 / N; then the distance between letters, as a multiple of their height.
 LABEL_HEIGHT, STROKE_WIDTH, HALO, LETTER_SPACING = 1.1, 0.17, 0.16, 0.3
 
 #: Smallest width of the lines of labels, pixels.
@@ -24,19 +27,19 @@ MIN_STROKE_WIDTH = 1.0
 MAX_LABELS = 250
 
 
-#: Places of a label beside its dot, in the order of preference: right or left, above or below.
+#: Positions of a label relative to its dot, in order of preference: (1, 1) is to the right and above.
 SIDES = ((1, 1), (-1, 1), (1, -1), (-1, -1))
 
 
 @dataclass(frozen=True)
 class Label:
-    """The index of a singularity, beside its dot.
+    """The index of a singularity as a text, which is drawn beside its dot.
 
     Attributes
     ----------
     text : str
     left, bottom, height : float
-        Position and height of the letters, pixels.
+        Lower left corner and height of the letters, pixels.
     """
 
     text: str
@@ -45,12 +48,14 @@ class Label:
     height: float
 
     def segments(self) -> np.ndarray:
-        """Return the (n, 2, 2) ends of the lines of the letters, pixels."""
+        """Return the (n, 2, 2) ends of the line segments of which the letters are made, in pixels."""
         return text_segments(self.text) * self.height + (self.left, self.bottom)
 
 
 def placed_labels(marks: SingularityMarks) -> list[Label]:
-    """Place a label beside each visible dot that has room for it, the nearest dots first.
+    """Place a label beside each visible dot if there is room for it.
+
+    The dots nearest to the camera are handled first.
 
     Parameters
     ----------
@@ -59,7 +64,7 @@ def placed_labels(marks: SingularityMarks) -> list[Label]:
     Returns
     -------
     list of Label
-        Empty if the marks have no labels, or if there would be more than `MAX_LABELS`.
+        Empty if `marks.has_labels` is false, or if more than `MAX_LABELS` dots are visible.
     """
     visible = np.flatnonzero(marks.is_visible)
     if not marks.has_labels or len(visible) > MAX_LABELS:
@@ -87,25 +92,27 @@ def place_indices(
     label_size: Callable[[str], tuple[float, float]],
     frame: tuple[int, int],
 ) -> list[tuple[str, float, float]]:
-    """Place the index of each singularity beside its dot if there is room, the first ones first.
+    """Place the index of each singularity beside its dot if there is room for it.
+
+    Singularities are handled in the given order.
 
     Parameters
     ----------
     position : (K, 2) ndarray
         Centers of the dots, pixels.
     index, degree : (K,) int ndarray
-        Indices in units of 1 / N, and N.
+        Indices of the singularities in units of 1 / N, and N.
     size : float
         Diameter of a dot of index 1 / N, pixels.
     label_size : callable
-        Returns the width and the height of the label with a text, pixels.
+        Function that returns the width and the height, in pixels, of the label with a text.
     frame : (int, int)
         Width and height of the picture, pixels.
 
     Returns
     -------
     list of (str, float, float)
-        The text of each label that has a place, and its lower left corner.
+        The text and the lower left corner, in pixels, of each label that was placed.
     """
     if not len(index):
         return []
@@ -128,7 +135,9 @@ def stroke_width(size: float) -> float:
 def place_labels(
     dots: np.ndarray, sizes: np.ndarray, radius: np.ndarray | float, frame: tuple[int, int]
 ) -> np.ndarray:
-    """Choose a place beside its dot for each label, the first labels first.
+    """Choose a position beside its dot for each label, so that labels cover neither dots nor each other.
+
+    Labels are handled in the given order.
 
     Parameters
     ----------
@@ -144,7 +153,7 @@ def place_labels(
     Returns
     -------
     (K, 2) float64 ndarray
-        Lower left corners of the labels; NaN for those that have no place.
+        Lower left corners of the labels in pixels; NaN for labels for which there is no room.
     """
     dots, sizes = np.asarray(dots, dtype=np.float64), np.asarray(sizes, dtype=np.float64)
     corners = np.full(dots.shape, np.nan)
@@ -166,13 +175,16 @@ def place_labels(
 
 
 def text_width(text: str) -> float:
-    """Return the width of a text, in heights of its letters."""
+    """Return the width of a text, as a multiple of the height of its letters."""
     widths = [_letter(letter)[1] for letter in text]
     return sum(widths) + LETTER_SPACING * (len(widths) - 1)
 
 
 def text_segments(text: str) -> np.ndarray:
-    """Return the (n, 2, 2) ends of the lines of a text, in heights of its letters, from the lower left."""
+    """Return the (n, 2, 2) ends of the line segments of which a text is made.
+
+    The unit is the height of the letters, and the origin the lower left corner.
+    """
     parts, left = [], 0.0
     for letter in text:
         segments, width = _letter(letter)
@@ -182,7 +194,7 @@ def text_segments(text: str) -> np.ndarray:
 
 
 def _letter(letter: str) -> tuple[np.ndarray, float]:
-    """Return the (n, 2, 2) ends of the lines of a letter of height 1, and its width."""
+    """Return the (n, 2, 2) ends of the line segments of a letter of height 1, and the width of the letter."""
     lines = [np.array(line) for line in LETTERS[letter]]
     width = max(line[:, 0].max() for line in lines)
     return np.concatenate([np.stack([line[:-1], line[1:]], axis=1) for line in lines]), float(width)
@@ -191,13 +203,13 @@ def _letter(letter: str) -> tuple[np.ndarray, float]:
 def _arc(
     center: tuple[float, float], radii: tuple[float, float], first: float, last: float
 ) -> list[tuple[float, float]]:
-    """Return points of an arc of an ellipse between two angles in degrees."""
+    """Return points on an arc of an ellipse, from the angle `first` to the angle `last` in degrees."""
     angles = np.radians(np.linspace(first, last, max(int(abs(last - first) / 20), 2)))
     x, y = center[0] + radii[0] * np.cos(angles), center[1] + radii[1] * np.sin(angles)
     return list(zip(x.tolist(), y.tolist(), strict=True))
 
 
-#: The lines of each letter that an index may have, of height 1.
+#: For each letter that an index may contain, the polylines of which it is made. Its height is 1.
 LETTERS: dict[str, list[list[tuple[float, float]]]] = {
     "0": [_arc((0.28, 0.5), (0.28, 0.5), 0, 360)],
     "1": [[(0.0, 0.75), (0.25, 1.0), (0.25, 0.0)]],

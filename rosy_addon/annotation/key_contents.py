@@ -1,4 +1,4 @@
-"""The contents of the key of a picture."""
+"""The contents of the key of a picture: its color scale, and the indices of its singularities."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ class ColorScale:
     title : str
         Name of the quantity.
     color_map : str
-        As in `color.map_colors`.
+        Name of the color map; see `color.map_colors`.
     low, high : float or None
-        Values with the first and with the last color; the larger one is at the top of the color bar. None
-        if there is not one such value: it differs between frames, or between fields.
+        Values that have the first and the last color. None if the value is not the same in all frames or for
+        all fields. The larger value is at the top of the color bar.
     """
 
     title: str
@@ -32,7 +32,7 @@ class ColorScale:
     high: float | None
 
     def colors(self, count: int) -> np.ndarray:
-        """Return (count, 3) float32 display values of the color bar, from the bottom."""
+        """Return (count, 3) float32: colors of the color bar as sRGB display values, from the bottom up."""
         positions = (np.arange(count) + 0.5) / count
         is_inverted = self.low is not None and self.high is not None and self.low > self.high
         return map_colors(positions[::-1] if is_inverted else positions, self.color_map)
@@ -40,16 +40,16 @@ class ColorScale:
 
 @dataclass(frozen=True)
 class IndexCount:
-    """A kind of singularities.
+    """A singularity index that occurs in a picture, with the number of singularities that have it.
 
     Attributes
     ----------
     index : int
-        In units of 1 / N.
+        The index in units of 1 / N.
     degree : int
-        N.
+        Degree N of the field.
     count : int or None
-        How many are visible. None if that is not known, as for all frames of an animation.
+        Number of visible singularities with this index. None if it is not known, as for an animation.
     """
 
     index: int
@@ -59,14 +59,14 @@ class IndexCount:
 
 @dataclass(frozen=True)
 class PictureKey:
-    """The contents of the key of a picture.
+    """The contents of the key of a picture: its color scale, and the indices of its singularities.
 
     Attributes
     ----------
     color_scale : ColorScale or None
-        None if the picture has no color map.
+        Colors and their values; None if the picture has no color map.
     indices : tuple of IndexCount
-        The indices of its singularities, the largest first. Empty if it has no dots.
+        The indices of the singularities in the picture, the largest first. Empty if it has no dots.
     dot_size : float
         Diameter of a dot of index 1 / N, in pixels of the picture.
     """
@@ -76,12 +76,12 @@ class PictureKey:
     dot_size: float = 0.0
 
     def to_json(self) -> str:
-        """Return the key as text, for `from_json`."""
+        """Return the key as JSON text, which `from_json` reads."""
         return json.dumps(asdict(self))
 
     @classmethod
     def from_json(cls, text: str) -> PictureKey:
-        """Return the key that `to_json` has written. It is empty if the text is from another version."""
+        """Return the key of a text from `to_json`; an empty key if another version wrote the text."""
         try:
             values = json.loads(text)
             scale = values["color_scale"]
@@ -95,13 +95,17 @@ class PictureKey:
 
 
 def count_indices(marks: SingularityMarks) -> tuple[IndexCount, ...]:
-    """Return the indices that occur among visible singularities, the largest first."""
+    """Return the indices of the visible singularities with their counts, the largest index first."""
     kinds = np.stack([marks.index, marks.degree], axis=1)[marks.is_visible]
     return sorted_indices(kinds, has_counts=True)
 
 
 def sorted_indices(kinds: np.ndarray, *, has_counts: bool) -> tuple[IndexCount, ...]:
-    """Return the distinct rows of (K, 2) indices and degrees, the largest index first."""
+    """Return each distinct index among K singularities once, the largest index first.
+
+    `kinds`, (K, 2), holds the index in units of 1 / N and the degree N of each singularity. If `has_counts`,
+    the results have the number of singularities with each index.
+    """
     distinct, counts = np.unique(kinds.reshape(-1, 2), axis=0, return_counts=True)
     entries = [
         IndexCount(index, degree, count if has_counts else None)

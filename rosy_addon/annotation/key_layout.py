@@ -1,8 +1,9 @@
 """The layout of a key in the frame of a picture: a color bar, a legend, a scale bar and a caption.
 
 The color bar is at the right edge, the legend in the lower right corner, the scale bar in the lower left
-corner, and the caption at the bottom. Each has a plate of its own. If they do not fit, all are drawn
-smaller. Coordinates are pixels from the lower left corner of the frame.
+corner, and the caption at the bottom. Each is drawn on a plate of its own, a rectangle that hides the picture
+behind it. If the plates do not fit, all parts are drawn smaller. Coordinates are pixels from the lower left
+corner of the frame.
 """
 
 from __future__ import annotations
@@ -17,66 +18,69 @@ from .key_contents import ColorScale, IndexCount
 from .round_numbers import MINUS, tick_labels
 from .singularity_marks import OUTLINE, dot_diameters
 
-#: Text size if none is given, as a fraction of the smaller side of the frame, and its least value in pixels.
+#: Text size if none is given, as a fraction of the smaller side of the frame. It is at least `MIN_TEXT_SIZE`
+#: pixels.
 TEXT_SIZE, MIN_TEXT_SIZE = 0.022, 9.0
 
-#: Factor by which everything is made smaller until it fits, and text size in pixels at which this ends.
+#: While the parts do not fit, the text size is multiplied by `SHRINK`, until it is at most `END_TEXT_SIZE`
+#: pixels.
 SHRINK, END_TEXT_SIZE = 0.94, 2.0
 
-#: Distance of plates from the edges of the frame, as a fraction of its smaller side.
+#: Distance of plates (background rectangles) from the edges of the frame, as a fraction of its smaller side.
 MARGIN = 0.025
 
-# All lengths below are in text sizes.
+# All lengths below are multiples of the text size, except fractions of the frame.
 
-#: Height of capitals and digits, depth of letters below the baseline, and distance of baselines.
+#: Height of capitals and digits, depth of letters below the baseline, and distance between baselines.
 CAP_HEIGHT, DESCENT, LINE = 0.7, 0.23, 1.3
 
-#: Distance of the contents of a plate from its edges, and of plates from one another.
+#: Distance between the contents of a plate and its edges, and distance between plates.
 PADDING, PLATE_GAP = 0.6, 0.6
 
-#: Width of the color bar, length of its ticks, distance of labels from them, and of the title from the bar.
+#: Width of the color bar, length of its ticks, distance from ticks to labels, and from the bar to its title.
 BAR_WIDTH, TICK_LENGTH, LABEL_GAP, TITLE_GAP = 0.9, 0.35, 0.35, 1.0
 
-#: Largest and smallest length of the color bar, and the largest as a fraction of the height of the frame.
+#: Largest and smallest length of the color bar. It is also at most `MAX_BAR_FRACTION` of the height of the
+#: frame.
 MAX_BAR, MIN_BAR, MAX_BAR_FRACTION = 20.0, 5.0, 0.5
 
-#: Least distance of the labels of the color bar, and width at which its title is wrapped.
+#: Smallest distance between the labels of the color bar, and width at which its title is wrapped.
 TICK_DISTANCE, TITLE_WIDTH = 2.0, 9.0
 
-#: Distance of the rows of the legend, and of the labels from the dots.
+#: Distance between rows of the legend, and distance from dots to labels.
 ROW_GAP, DOT_GAP = 0.6, 0.5
 
-#: Height of the ends of the scale bar, and its distance from the text.
+#: Height of the ticks at both ends of the scale bar, and distance from the bar to its label.
 SCALE_END, SCALE_GAP = 0.5, 0.3
 
-#: Width of lines.
+#: Thickness of drawn lines.
 STROKE = 0.07
 
-#: Width of the caption, as a fraction of the width of the frame.
+#: Largest width of the caption, as a fraction of the width of the frame.
 CAPTION_WIDTH = 0.8
 
-#: Left, bottom, right and top.
+#: Left, bottom, right and top of a rectangle, pixels.
 Box = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
 class KeyParts:
-    """What a key shows.
+    """Contents of a key: color bar, legend of singularities, scale bar and caption.
 
     Attributes
     ----------
     color_scale : ColorScale or None
-        Its title may have several lines.
+        Values and title of the color bar; None: no color bar. The title may have several lines.
     indices : sequence of IndexCount
-        The rows of the legend.
+        Singularity indices, one for each row of the legend; empty: no legend.
     dot_size : float
-        Diameter of a dot of index 1 / N, pixels.
+        Diameter in pixels of the dot for the index 1 / N.
     has_counts : bool
         Whether rows of the legend say how many singularities are visible.
     scale : (float, str) or None
-        Length of the scale bar in pixels, and its label.
+        Length of the scale bar in pixels, and its label; None: no scale bar.
     caption : str
-        May have several lines.
+        Text of one or several lines; empty: no caption.
     """
 
     color_scale: ColorScale | None = None
@@ -89,7 +93,7 @@ class KeyParts:
 
 @dataclass(frozen=True)
 class PlacedText:
-    """A line of text: its left end and its baseline."""
+    """A line of text with the coordinates, in pixels, of its left end (x) and its baseline (y)."""
 
     text: str
     left: float
@@ -98,7 +102,7 @@ class PlacedText:
 
 @dataclass(frozen=True)
 class PlacedDot:
-    """The dot of a singularity: its center, its radius, and the width of its outline."""
+    """A dot of the legend: center, radius and outline width in pixels, and its singularity index times N."""
 
     x: float
     y: float
@@ -109,19 +113,22 @@ class PlacedDot:
 
 @dataclass
 class KeyLayout:
-    """Where the parts of a key are.
+    """Positions of all parts of a key, in pixels from the lower left corner of the frame.
 
     Attributes
     ----------
     text_size : float
-        Pixels.
+        Size of the text, pixels.
     plates : list of Box
+        Background rectangles of the parts.
     texts : list of PlacedText
+        Lines of text.
     strokes : list of Box
-        Rectangles in the color of the text.
+        Lines, as thin rectangles, in the color of the text.
     dots : list of PlacedDot
+        Dots of the legend.
     color_bar : Box or None
-        The first color is at its bottom.
+        Rectangle of the colors, with the first color at the bottom; None: no color bar.
     """
 
     text_size: float
@@ -133,7 +140,7 @@ class KeyLayout:
 
     @property
     def stroke(self) -> float:
-        """Width of lines, whole pixels."""
+        """Thickness of lines in whole pixels."""
         return max(round(STROKE * self.text_size), 1)
 
 
@@ -151,13 +158,14 @@ def lay_out_key(
     frame : (int, int)
         Width and height of the picture in pixels.
     text_width : callable
-        Returns the width of a line of text, in text sizes.
+        Function that returns the width of a line of text, as a multiple of the text size.
     text_size : float
-        Pixels. 0: `TEXT_SIZE` of the frame. The size that fits may be smaller.
+        Text size in pixels. It is reduced until the parts fit. 0: the fraction `TEXT_SIZE` of the frame.
 
     Returns
     -------
     KeyLayout
+        Without any part if they do not fit at the smallest text size.
     """
     size = first_size = text_size or max(TEXT_SIZE * min(frame), MIN_TEXT_SIZE)
     while True:
@@ -168,9 +176,9 @@ def lay_out_key(
 
 
 def wrapped(text: str, width: float, text_width: Callable[[str], float]) -> list[str]:
-    """Return the lines of a text, broken at spaces where they are wider than a width.
+    """Return the lines of a text, broken at spaces so that they are not wider than `width`.
 
-    A word that is wider has a line of its own.
+    A single word that is wider is on a line of its own. `text_width` returns the width of a string.
     """
     lines: list[str] = []
     for paragraph in text.strip().splitlines():
@@ -187,7 +195,7 @@ def wrapped(text: str, width: float, text_width: Callable[[str], float]) -> list
 
 @dataclass
 class _Arrangement:
-    """Places the parts of a key for one text size. `layout` returns None if they do not fit."""
+    """The arrangement of the parts of a key at one text size, `size`. Dots are scaled by `dot_scale`."""
 
     parts: KeyParts
     frame: tuple[int, int]
@@ -200,7 +208,7 @@ class _Arrangement:
         self.result = KeyLayout(self.size)
 
     def layout(self) -> KeyLayout | None:
-        """Place everything."""
+        """Return the layout of all parts, or None if they do not fit into the frame."""
         parts = self.parts
         if parts.caption.strip():
             self._caption()
@@ -214,17 +222,21 @@ class _Arrangement:
         return self.result if self._fits() else None
 
     def _fits(self) -> bool:
-        """Return whether all plates are inside the frame and none overlap."""
+        """Return whether all background rectangles are inside the frame and no two of them overlap."""
         low, high = np.array(self.result.plates).reshape(-1, 2, 2).transpose(1, 0, 2)
         meets = ((low[:, None] < high[None]) & (high[:, None] > low[None])).all(axis=2)
         return bool((low >= 0).all() and (high <= self.frame).all()) and meets.sum() == len(low)
 
     def _width(self, texts: Sequence[str]) -> float:
-        """Return the width of the widest of some texts, pixels."""
+        """Return the width in pixels of the widest of the texts."""
         return self.size * max((self.text_width(text) for text in texts), default=0.0)
 
     def _bottom(self, left: float, width: float) -> float:
-        """Return the lowest bottom of a plate with this left side and width: above the caption, or beside it."""
+        """Return the lowest y coordinate, in pixels, for the bottom of a background rectangle.
+
+        `left` and `width` are those of the rectangle. The bottom is above the caption if the rectangle is not
+        beside it, and at the margin of the frame otherwise.
+        """
         gap = PLATE_GAP * self.size
         if self.parts.caption.strip():
             caption_left, _, caption_right, caption_top = self.result.plates[0]
@@ -235,7 +247,11 @@ class _Arrangement:
     def _add_plate(
         self, left: float, bottom: float, width: float, height: float
     ) -> tuple[float, float]:
-        """Add the plate of contents of a size. Return the lower left corner of the contents."""
+        """Add a background rectangle. Return the lower left corner for its contents.
+
+        `left` and `bottom` are coordinates of the rectangle. `width` and `height` are the size of its
+        contents.
+        """
         left, bottom = round(left), round(bottom)
         padding = round(PADDING * self.size)
         self.result.plates.append(
@@ -247,11 +263,11 @@ class _Arrangement:
         self.result.texts.append(PlacedText(text, left, baseline))
 
     def _plate_size(self, length: float) -> float:
-        """Return a side of the plate of contents of a size."""
+        """Return the side of a background rectangle whose contents have the side `length`, in pixels."""
         return round(length) + 2 * round(PADDING * self.size)
 
     def _caption(self) -> None:
-        """Place the caption, before all others."""
+        """Place the caption. It is placed first, as other parts have to avoid it."""
         size, width = self.size, self.frame[0]
         lines = wrapped(self.parts.caption, CAPTION_WIDTH * width / size, self.text_width)
         text_width = self._width(lines)
@@ -265,7 +281,7 @@ class _Arrangement:
             self._add_text(line, left + indent, baseline)
 
     def _scale_bar(self, length: float, label: str) -> None:
-        """Place the scale bar."""
+        """Place the scale bar, `length` pixels long, and its label."""
         size, stroke = self.size, self.result.stroke
         label_width = self._width([label])
         width = max(length, label_width)
@@ -284,7 +300,7 @@ class _Arrangement:
         self._add_text(label, left + (width - label_width) / 2, bottom + end + SCALE_GAP * size)
 
     def _legend(self) -> float:
-        """Place the legend of the singularities, and return its top."""
+        """Place the legend of the singularities, and return the y coordinate of its top in pixels."""
         parts, size = self.parts, self.size
         labels = [_index_label(entry, parts.has_counts) for entry in parts.indices]
         outline = OUTLINE * parts.dot_size * self.dot_scale
@@ -309,11 +325,11 @@ class _Arrangement:
         return self.result.plates[-1][3]
 
     def _color_bar(self, scale: ColorScale, lowest: float) -> bool:
-        """Place the color bar above `lowest`. Return whether there is room."""
+        """Place the color bar above the y coordinate `lowest`. Return whether there is room for it."""
         size, stroke = self.size, self.result.stroke
         width, height = self.frame
         title = wrapped(scale.title, TITLE_WIDTH, self.text_width)
-        # Half a label is below the bar, and half a label or the title above it.
+        # Half of the lowest label is below the bar, and half of the highest label or the title is above it.
         above = CAP_HEIGHT / 2 * size
         if title:
             above = (TITLE_GAP + CAP_HEIGHT + LINE * (len(title) - 1)) * size
@@ -352,7 +368,10 @@ class _Arrangement:
 
 
 def _ticks(scale: ColorScale, max_steps: int, gap: float) -> list[tuple[float, str]]:
-    """Return the ticks of a color bar: their places from 0 to 1, and their labels."""
+    """Return the ticks of a color bar, at most `max_steps` + 1: positions from 0 to 1 along it, and labels.
+
+    `gap` is the smallest distance between two labels, as a fraction of the length of the bar.
+    """
     if scale.high is None:
         low = "min" if scale.low is None else tick_labels(scale.low, scale.low, 1, 0.0)[0][1]
         return [(0.0, low), (1.0, "max")]
@@ -363,7 +382,7 @@ def _ticks(scale: ColorScale, max_steps: int, gap: float) -> list[tuple[float, s
 
 
 def _frame_strokes(box: Box, width: float) -> list[Box]:
-    """Return the four lines around a box, outside of it."""
+    """Return four rectangles that frame a box: lines of the given width just outside its edges."""
     left, bottom, right, top = box
     return [
         (left - width, bottom - width, right + width, bottom),
@@ -374,6 +393,6 @@ def _frame_strokes(box: Box, width: float) -> list[Box]:
 
 
 def _index_label(entry: IndexCount, has_count: bool) -> str:
-    """Return the label of a row of the legend."""
+    """Return the label of a row of the legend: a singularity index and, if `has_count`, its count."""
     label = format_index(entry.index, entry.degree).replace("-", MINUS)
     return f"{label} ({entry.count})" if has_count and entry.count is not None else label

@@ -9,7 +9,7 @@ import numpy as np
 #: Mantissas of round numbers.
 MANTISSAS = (1, 2, 5)
 
-#: Exponents of 10 of numbers that are written without one.
+#: Numbers with these decimal exponents are written without a power of ten.
 PLAIN_EXPONENTS = range(-4, 6)
 
 #: The minus sign, and digits as exponents.
@@ -18,31 +18,31 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def round_below(largest: float) -> float:
-    """Return the largest of 1, 2 and 5 times a power of ten that is not above a positive number."""
+    """Return the largest round number (1, 2 or 5 times a power of ten) not above a positive number."""
     return max(value for value in _round_near(largest) if value <= largest * (1 + 1e-9))
 
 
 def round_above(least: float) -> float:
-    """Return the least of 1, 2 and 5 times a power of ten that is not below a positive number."""
+    """Return the smallest round number (1, 2 or 5 times a power of ten) not below a positive number."""
     return min(value for value in _round_near(least) if value >= least * (1 - 1e-9))
 
 
 def _round_near(number: float) -> list[float]:
-    """Return the floats that are nearest to 1, 2 and 5 times some powers of ten, around a number."""
+    """Return the round numbers (1, 2 or 5 times a power of ten) around a positive number."""
     exponent = math.floor(math.log10(number))
     powers = (exponent - 1, exponent, exponent + 1)
     return [float(f"{mantissa}e{power}") for power in powers for mantissa in MANTISSAS]
 
 
 def tick_values(low: float, high: float, max_steps: int) -> np.ndarray:
-    """Return the multiples of a round step in a range.
+    """Return the multiples of a round step between `low` and `high`.
 
     Parameters
     ----------
     low, high : float
-        `low` is below `high`.
+        Ends of the range; `low` must be below `high`.
     max_steps : int
-        The range has at most this number of steps.
+        Largest number of steps in the range. The step is the smallest round number that meets this limit.
 
     Returns
     -------
@@ -54,21 +54,22 @@ def tick_values(low: float, high: float, max_steps: int) -> np.ndarray:
 
 
 def tick_labels(low: float, high: float, max_steps: int, gap: float) -> list[tuple[float, str]]:
-    """Return the ticks of a range: both ends, and round numbers between them.
+    """Return the ticks of a range, at both ends and at round numbers between them.
 
     Parameters
     ----------
     low, high : float
-        `low` is not above `high`.
+        Ends of the range; `low` must not be above `high`. If they are equal, there is one tick.
     max_steps : int
-        As in `tick_values`.
+        Largest number of steps between round numbers, as in `tick_values`.
     gap : float
-        Smallest distance of a round number from the ends, as a fraction of the range.
+        Smallest distance between a round number and the ends, as a fraction of the range.
 
     Returns
     -------
     list of (float, str)
-        Values and their labels, ascending. The ends have three digits.
+        Values of the ticks, in ascending order, and their labels. Labels of the ends have three significant
+        digits.
     """
     if not low < high:
         return [(low, format_number(low))]
@@ -91,9 +92,9 @@ def tick_labels(low: float, high: float, max_steps: int, gap: float) -> list[tup
 
 
 def format_number(value: float, digits: int = 3) -> str:
-    """Return a number with a number of significant digits, without zeros at its end.
+    """Return a value as text with the given number of significant digits, without trailing zeros.
 
-    Very large and very small ones are written with a power of ten.
+    Very large and very small values are written with a power of ten.
     """
     mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
     power = int(exponent)

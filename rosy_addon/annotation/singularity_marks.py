@@ -1,7 +1,7 @@
-"""The singularities of fields in a picture, and the style of their dots.
+"""Find the singularities of fields in a picture, and define the style of their dots.
 
-The area of a dot is proportional to its index. Its color shows the sign: orange and blue differ for all
-kinds of color vision.
+The area of a dot is proportional to the index. Its color shows the sign of the index. The colors, orange and
+blue, can be told apart with all types of color vision.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from ..projection.pixel_blocks import part_of
 from ..projection.visible_vertices import project_vertices
 from .singularity_settings import shows_hidden_singularities, shows_indices
 
-#: Display colors by the sign of the index, and of the outline of dots.
+#: Display colors of dots by the sign of the index, and display color of their outlines.
 COLOR_BY_SIGN, OUTLINE_COLOR = {1: "#eb5a14", -1: "#2864eb"}, "#141414"
 
-#: Width of the outline of a dot, in diameters of a dot of index 1 / N.
+#: Width of the outline of a dot, as a multiple of the diameter of a dot of index 1 / N.
 OUTLINE = 0.2
 
 #: Opacity of the dots of hidden singularities.
@@ -34,24 +34,25 @@ HIDDEN_OPACITY = 0.3
 
 @dataclass(frozen=True, eq=False)
 class SingularityMarks:
-    """K singularities in a picture.
+    """K singularities in a picture, which are drawn as dots.
 
     Attributes
     ----------
     position : (K, 2) float64 ndarray
-        Pixels from the lower left.
+        Positions in the picture, pixels from the lower left.
     index : (K,) int ndarray
-        In units of 1 / N.
+        Singularity indices in units of 1 / N.
     degree : (K,) int ndarray
-        N.
+        Degrees N of their fields.
     depth : (K,) float64 ndarray
-        Nearer dots are drawn over farther ones.
+        Depths from the camera. Near dots are drawn over far ones.
     is_visible : (K,) bool ndarray
-        Hidden dots are drawn faded, below all others and without labels.
+        Whether the camera sees the singularity. Dots of hidden singularities are fainter, below all others
+        and without labels.
     frame : (int, int)
         Width and height of the picture, pixels.
     size : float
-        Diameter of a dot of index 1 / N, pixels.
+        Diameter of the dot of an index of 1 / N, pixels.
     has_labels : bool
         Whether indices are written beside dots.
     """
@@ -69,16 +70,16 @@ class SingularityMarks:
         return len(self.index)
 
     def part(self, chosen: np.ndarray) -> SingularityMarks:
-        """Return the marks that a mask or indices choose."""
+        """Return the singularities that a bool mask or an array of indices selects."""
         return part_of(self, chosen)
 
     def in_drawing_order(self) -> SingularityMarks:
-        """Return the marks in the order in which they are drawn."""
+        """Return the singularities in the order in which their dots are drawn: hidden and far ones first."""
         return self.part(np.lexsort((-self.depth, self.is_visible)))
 
     @property
     def radius(self) -> np.ndarray:
-        """(K,) radii without outlines, pixels."""
+        """(K,) float64: radii of the dots without their outlines, pixels."""
         return dot_diameters(self.index, self.size) / 2
 
 
@@ -88,7 +89,7 @@ def dot_diameters(index: np.ndarray, size: float) -> np.ndarray:
     Parameters
     ----------
     index : (K,) int ndarray
-        In units of 1 / N.
+        Singularity indices in units of 1 / N.
     size : float
         Diameter of the dot of an index of 1 / N.
     """
@@ -102,19 +103,20 @@ def singularity_marks(
     clip_planes: np.ndarray | None = None,
     cache: Cache | None = None,
 ) -> SingularityMarks:
-    """Find the singularities of fields in a view.
+    """Find the singularities of the fields of mesh instances in the view of a camera.
 
     Parameters
     ----------
     instances : sequence of MeshInstance
-        Instances without a field only hide singularities.
+        Instances without a field can only hide singularities.
     camera : Camera
     settings : Look or StrokeStyle
-        Which singularities are drawn, and how. Only the settings of `singularity_settings` are read.
+        Settings that select the singularities and the style of their dots. Only those of
+        `singularity_settings` are read.
     clip_planes : (6, 4) float64 ndarray, optional
-        World space. The negative side of each plane is cut away.
+        Planes in world space. The negative side of each plane is cut away.
     cache : Cache, optional
-        Stores the singularities of fields.
+        Cache for the singularities of fields.
 
     Returns
     -------
@@ -148,9 +150,10 @@ def singularity_marks(
 
 
 def cached_singularities(instance: MeshInstance, cache: Cache) -> tuple[np.ndarray, np.ndarray]:
-    """Find the singularities of an instance with a field, or return them from the cache.
+    """Return the vertices and the indices of the singularities of an instance, from the cache if possible.
 
-    All deformations of a mesh have the same singularities. See `field.singularities.find_singularities`.
+    The instance must have a field. All deformations of a mesh have the same singularities. The values are
+    those of `field.singularities.find_singularities`.
     """
     surface, field = instance.surface, instance.field
     return cache.get_or_create(

@@ -1,4 +1,4 @@
-"""The settings of singularities in pictures and in drawings, for their classes of settings."""
+"""The settings of singularities, which the settings classes `Look` and `StrokeStyle` share."""
 
 from __future__ import annotations
 
@@ -8,12 +8,15 @@ from ..core.settings import choice, number
 
 
 def shows_singularities(settings: Any) -> bool:
-    """Return whether singularities are drawn: of a look or a stroke style, or their properties."""
+    """Return whether singularities are drawn.
+
+    `settings` is a look, a stroke style, or a group of properties in Blender with the same names.
+    """
     return settings.singularity_dots != "none"
 
 
 def shows_hidden_singularities(settings: Any) -> bool:
-    """Return whether singularities that the camera does not see have dots as well."""
+    """Return whether dots are also drawn for singularities that the camera does not see."""
     return settings.singularity_dots.startswith("all")
 
 
@@ -23,7 +26,7 @@ def shows_indices(settings: Any) -> bool:
 
 
 def singularity_dots_choice(**place: Any) -> Any:
-    """Return the setting `singularity_dots`; `place` is its stage and its panel."""
+    """Return a dataclass field for the setting `singularity_dots`; `place` holds its stage and its panel."""
     return choice(
         "none",
         "Which singularities have dots: orange for positive index, blue for negative index. The "
@@ -46,7 +49,7 @@ def singularity_dots_choice(**place: Any) -> Any:
 
 
 def singularity_size_number(**place: Any) -> Any:
-    """Return the setting `singularity_size`."""
+    """Return a dataclass field for the setting `singularity_size`; `place` holds its stage and its panel."""
     return number(
         9.0,
         1.0,

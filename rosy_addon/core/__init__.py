@@ -1,1 +1,1 @@
-"""Basics that every room may import: errors, progress, settings of looks, files, memory, color."""
+"""Basics that every room (subpackage) may import: errors, progress, settings, cache, files, memory, color."""

@@ -1,6 +1,6 @@
-"""A cache of results, keyed by all inputs that a result depends on.
+"""A cache of results. The key of a result consists of all inputs on which it depends.
 
-Cached results cannot be out of date, because the key contains every input: settings by value,
+So cached results cannot be out of date. Settings are in the key by value,
 arrays by `content_hash`, and immutable objects (meshes, fields, G-buffers) by identity.
 """
 
@@ -16,12 +16,12 @@ import numpy as np
 
 Result = TypeVar("Result")
 
-#: Default size limit of a cache, in bytes. Baking a character at 1920 x 1080 takes a third.
+#: Default size limit of a cache, in bytes. Baking a character at 1920 x 1080 pixels takes a third of it.
 MAX_BYTES = 1 << 29
 
 
 class Cache:
-    """A least-recently-used cache of results by their keys, with a limit in bytes.
+    """A least-recently-used cache of results by their keys, with a size limit in bytes.
 
     A key may contain objects that compare by identity, such as instances of frozen dataclasses with
     ``eq=False``. The cache keeps them alive, so that no other object can have the same identity.
@@ -31,7 +31,7 @@ class Cache:
     Parameters
     ----------
     max_bytes : int
-        Limit that `evict_over_limit` applies: bytes of all arrays in keys and results.
+        Limit for the total size of all arrays in keys and results, in bytes. `evict_over_limit` enforces it.
     """
 
     def __init__(self, max_bytes: int = MAX_BYTES) -> None:
@@ -40,7 +40,7 @@ class Cache:
         self._used: set[Hashable] = set()
 
     def get(self, key: Hashable) -> Any | None:
-        """Return the result of a key, or None if there is none."""
+        """Return the result of a key, or None if the cache does not have it."""
         if key not in self._entries:
             return None
         self._entries.move_to_end(key)
@@ -54,18 +54,18 @@ class Cache:
         return result
 
     def get_or_create(self, key: Hashable, create: Callable[[], Result]) -> Result:
-        """Return the result of a key. If there is none, create and store it.
+        """Return the result of a key. If the cache does not have it, call `create` and store what it returns.
 
-        `create` must not return None: that result would be created again at every call.
+        `create` must not return None, as None would be created again at every call.
         """
         cached = self.get(key)
         return self.put(key, create()) if cached is None else cached
 
     def evict_over_limit(self) -> None:
-        """Evict least recently used entries until the rest is within the limit.
+        """Remove the least recently used results until the others are within the size limit.
 
-        The size of an entry is the size of all arrays in its key and its result. Arrays that several
-        entries share count once.
+        The size of a result is the size of all arrays in its key and in the result itself. Arrays that
+        several results share are counted once.
         """
         visited: set[int] = set()
         total = 0
@@ -76,13 +76,13 @@ class Cache:
                 self._used.discard(key)
 
     def evict_unused(self) -> None:
-        """Evict entries that were neither stored nor returned since the last call."""
+        """Remove the results that were neither stored nor returned since the last call of this method."""
         for key in [key for key in self._entries if key not in self._used]:
             del self._entries[key]
         self._used.clear()
 
     def clear(self) -> None:
-        """Evict all entries."""
+        """Remove all results."""
         self._entries.clear()
         self._used.clear()
 
@@ -108,10 +108,10 @@ def content_hash(*parts: object) -> bytes:
 
 
 def _array_bytes(obj: object, visited: set[int]) -> int:
-    """Return the size of all arrays in an object in bytes, without those visited before.
+    """Return the size of all arrays in an object in bytes. Objects that were visited before are not counted.
 
-    `visited` holds the ids of visited objects and is updated. A view counts as the array that it
-    views.
+    `visited` holds the ids of visited objects and is updated. For a view of an array, the size of the whole
+    array is counted.
     """
     if id(obj) in visited:
         return 0

@@ -27,8 +27,9 @@ def map_colors(values: np.ndarray, name: str) -> np.ndarray:
     Parameters
     ----------
     values : (P,) ndarray
-        Clamped to 0 to 1.
+        Values from 0 to 1. Others are clamped to this range.
     name : {"viridis", "magma", "gray"}
+        Name of the color map.
 
     Returns
     -------
@@ -42,27 +43,27 @@ def map_colors(values: np.ndarray, name: str) -> np.ndarray:
 
 
 def color_stops(name: str) -> np.ndarray:
-    """Return the (n, 3) float64 display values of a color map at evenly spaced values from 0 to 1.
+    """Return (n, 3) float64: the colors of a color map at n evenly spaced values from 0 to 1.
 
-    Between them the map is linear.
+    They are sRGB display values. Between them, the map is interpolated linearly.
     """
     return np.array([list(bytes.fromhex(code)) for code in _COLOR_MAPS[name].split()]) / 255
 
 
 def from_hex(code: str) -> np.ndarray:
-    """Return the (3,) float32 display values of a color ``#rrggbb`` or ``#rrggbbaa``."""
+    """Return (3,) float32: the sRGB display values, 0 to 1, of a color ``#rrggbb`` or ``#rrggbbaa``."""
     return np.array(list(bytes.fromhex(code[1:7])), dtype=np.float32) / 255
 
 
 def alpha_from_hex(code: str) -> float:
-    """Return the opacity of a color ``#rrggbb`` or ``#rrggbbaa``, 0 to 1."""
+    """Return the opacity, 0 to 1, of a color ``#rrggbb`` or ``#rrggbbaa``. It is 1 without ``aa``."""
     return int(code[7:] or "ff", 16) / 255
 
 
 def to_hex(display: Sequence[float]) -> str:
-    """Return the code of three display values and perhaps an opacity, clamped to 0 to 1.
+    """Return the hex code of a color: ``#rrggbb``, or ``#rrggbbaa`` if its opacity is below 1.
 
-    It is ``#rrggbb``, or ``#rrggbbaa`` if the opacity is below 1.
+    `display` holds three sRGB display values and optionally the opacity. All are clamped to 0 to 1.
     """
     code = "#" + bytes(round(255 * min(max(value, 0), 1)) for value in display).hex()
     return code[:7] if code[7:] == "ff" else code
@@ -83,8 +84,8 @@ def to_display(linear: np.ndarray) -> np.ndarray:
 
 
 def luminance(rgba: np.ndarray) -> np.ndarray:
-    """Return the (H, W) luminance of a linear (H, W, 4) picture over a white background.
+    """Return (H, W): the luminance of a linear (H, W, 4) picture over a white background.
 
-    Alpha is straight, not premultiplied.
+    Colors are not premultiplied with alpha.
     """
     return rgba[..., 3] * (rgba[..., :3] @ LUMINANCE_WEIGHTS - 1) + 1

@@ -1,18 +1,18 @@
 """Trigonometric functions in single precision, with bit-identical results on all machines.
 
-numpy's own functions call the system's math library or vector code for the processor, and these
-round differently. A streamline could then step into another pixel. The functions here evaluate
-polynomials. They use only sums, products, quotients and square roots, whose rounding IEEE 754
-defines.
+numpy's own functions call the system's math library or vector code for the processor. Their results are
+rounded differently on different machines, and a streamline could step into another pixel. The functions here
+evaluate polynomials. They use only sums, products, quotients and square roots, whose rounding is defined by
+IEEE 754.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-# Coefficients of the polynomials that interpolate at Chebyshev nodes, highest power first:
-# atan(a) / a in a^2 from 0 to 1, sin(x) / x and cos(x) in x^2 from 0 to (pi / 2)^2.
-# Their errors are below 1e-8, 1e-10 and 1e-9.
+# Coefficients of three polynomials, highest power first. They interpolate, at Chebyshev nodes, atan(a) / a as
+# a function of a^2 from 0 to 1, and sin(x) / x and cos(x) as functions of x^2 from 0 to (pi / 2)^2. Their
+# errors are below 1e-8, 1e-10 and 1e-9.
 _ATAN_COEFFICIENTS = (
     0.00276628, -0.01573125, 0.04213762, -0.07456855, 0.10618371, -0.14197798, 0.19991872,
     -0.33333037, 0.99999998,
@@ -31,17 +31,17 @@ _COS_COEFFICIENTS = (
 
 
 def vector_angle(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the angle of each vector (x, y) to the x axis, as ``arctan2(y, x)``.
+    """Return the angle of each vector (x, y) to the x axis, like ``arctan2(y, x)``.
 
     Parameters
     ----------
     x, y : float32 ndarray
-        Components, of equal shape.
+        Components of the vectors, of equal shape.
 
     Returns
     -------
     float32 ndarray
-        Radians, from -pi to pi. The error is below 5e-7. 0 for the zero vector.
+        Angles in radians, from -pi to pi; 0 for the zero vector. The error is below 5e-7.
     """
     abs_x, abs_y = np.abs(x), np.abs(y)
     larger = np.maximum(abs_x, abs_y)
@@ -61,12 +61,12 @@ def cos_sin(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Parameters
     ----------
     angle : float32 ndarray
-        Radians, from -pi / 2 to pi / 2.
+        Angles in radians, from -pi / 2 to pi / 2.
 
     Returns
     -------
     cosine, sine : float32 ndarray
-        The error is below 3e-7.
+        Their errors are below 3e-7.
     """
     square = angle * angle
     sine = _horner(_SIN_COEFFICIENTS, square)
@@ -75,17 +75,17 @@ def cos_sin(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def unit_phasor(angle: np.ndarray) -> np.ndarray:
-    """Return exp(i angle) of angles of any size.
+    """Return exp(i angle) for angles of any size.
 
     Parameters
     ----------
     angle : float64 ndarray
-        Radians. The error bound holds for angles of up to a million turns.
+        Angles in radians.
 
     Returns
     -------
     complex64 ndarray
-        The error is below 4e-7.
+        The error is below 4e-7 for angles of up to a million full rotations.
     """
     half_turns = angle * (1 / np.pi)
     nearest = np.rint(half_turns)

@@ -1,19 +1,19 @@
-"""Exceptions whose messages are shown to the user, and the grammar of messages."""
+"""Exceptions whose messages are shown to the user, and functions that word messages."""
 
 import re
 
-#: Characters that terminals act on: control characters except tab and newline, and those that
-#: change the direction of text. Names in files may contain them.
+#: Characters that could change how a terminal shows a message: control characters except tab and newline, and
+#: characters that change the direction of text. Names in files may contain them.
 UNSAFE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069]")
 
-#: Names in messages, and a word of the language at the beginning of a message: no name of a file, a
-#: setting or an attribute.
+#: Patterns of a quoted name in a message, and of a message that begins with an English word, not with the
+#: name of a file, a setting or an attribute.
 QUOTED = re.compile("'[^']*'")
 FIRST_WORD = re.compile(r"[a-z-]+(?![\w.])")
 
 
 def escape_unsafe(text: str) -> str:
-    """Return a text with escapes, such as ``\\x1b``, for `UNSAFE` characters."""
+    """Return a text in which `UNSAFE` characters are replaced by escapes, such as ``\\x1b``."""
     return UNSAFE.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
@@ -21,8 +21,8 @@ class RosyError(ValueError):
     """An error that the user can correct, with a message of one line.
 
     The message says where the error is (object, attribute, file or line), what was found and what
-    was expected. Operators report it. The command line prints it and exits with status 2. Line
-    breaks and other control characters, which names may have, are escaped.
+    was expected. Operators report it in Blender. The command line prints it and exits with status 2. Line
+    breaks and other control characters, which may occur in names, are escaped.
     """
 
     def __init__(self, message: str) -> None:
@@ -30,23 +30,23 @@ class RosyError(ValueError):
 
 
 class RosyWarning(UserWarning):
-    """Something that the user should know about a result, in one line."""
+    """A warning about a result, with a message of one line for the user."""
 
 
 class NothingInViewError(RosyError):
-    """No object with a field is visible from the camera."""
+    """The error that no object with a field is visible from the camera."""
 
 
 class NoFeaturesError(RosyError):
-    """A mesh has no edges that a field can follow."""
+    """The error that a mesh has no edges that a field can follow."""
 
 
 class DeviceError(RosyError):
-    """There is no usable graphics card, or the shaders do not compile on it."""
+    """The error that there is no usable graphics card, or that the shaders do not compile on it."""
 
 
 def counted(count: int, singular: str, plural: str = "") -> str:
-    """Return a number with its noun, for messages.
+    """Return a count with its noun, in singular or plural, for messages.
 
     Examples
     --------
@@ -57,10 +57,10 @@ def counted(count: int, singular: str, plural: str = "") -> str:
 
 
 def as_sentence(message: str) -> str:
-    """Return a message as the interface shows it: with a capital.
+    """Return a message as the interface of Blender shows it: with a capital letter at the beginning.
 
-    Messages begin with a small letter, as they follow ``rosy: error:`` on the command line. A path
-    or a name at the beginning stays as it is.
+    Messages begin with a small letter, because they follow ``rosy: error:`` on the command line. A path
+    or a name at the beginning is not changed.
 
     Examples
     --------
@@ -79,7 +79,10 @@ REPORTED_ERRORS = (RosyError, MemoryError)
 
 
 def error_text(error: Exception) -> str:
-    """Return the message of one line to the user, for one of `REPORTED_ERRORS` or a fault of RoSy."""
+    """Return the message of one line that is shown to the user for an exception.
+
+    Exceptions other than `REPORTED_ERRORS` are described as a fault of RoSy.
+    """
     if isinstance(error, MemoryError):
         return "there is not enough memory: choose a smaller size or a smaller mesh"
     if isinstance(error, RosyError):

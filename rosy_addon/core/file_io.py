@@ -1,4 +1,4 @@
-"""Reading and atomic writing of whole files, with errors as `RosyError`."""
+"""Read whole files and write them atomically. All errors are raised as `RosyError`."""
 
 from __future__ import annotations
 
@@ -17,17 +17,18 @@ from typing import BinaryIO
 from .errors import RosyError
 from .memory import check_memory, format_bytes
 
-#: Bytes at the beginning of a file that show whether it is binary.
+#: A file counts as binary if one of this number of bytes at its beginning is zero.
 HEAD_BYTES = 4096
 
-#: Bytes at the beginning of a text file in which words and lines are counted, and bytes of memory
-#: that each takes while the file is parsed.
+#: Number of bytes at the beginning of a text file in which words and lines are counted, and memory in bytes
+#: that each word and each line takes while the file is parsed.
 COUNTED_BYTES, WORD_MEMORY, LINE_MEMORY = 1 << 16, 110, 200
 
-#: Names of temporary files: the machine and the process that writes them, and a random number.
+#: Pattern of the names of temporary files. They contain a hash of the name of the machine, the id of the
+#: process that writes the file, and a random number.
 TEMPORARY_NAME = re.compile(r"\.rosy-(?P<host>[0-9a-f]{8})-(?P<pid>\d{1,10})-[0-9a-f]{16}(\.\w+)?$")
 
-#: Age in seconds of a temporary file that nothing writes to any more.
+#: Age in seconds above which a temporary file counts as abandoned.
 LEFTOVER_SECONDS = 24 * 3600
 
 
@@ -40,9 +41,9 @@ def read_bytes(
     ----------
     path : path-like
     reject_binary : bool
-        Raise an error if the first `HEAD_BYTES` contain a zero byte. The rest is then not read.
+        Raise an error if the first `HEAD_BYTES` bytes contain a zero byte. The rest is then not read.
     max_bytes : int, optional
-        Largest permitted size of the file. At most one byte more is read.
+        Largest permitted size of the file. Of a larger file, only one byte more is read.
 
     Raises
     ------
@@ -64,7 +65,7 @@ def read_bytes(
 
 @contextmanager
 def open_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
-    """Open a file for reading. A pipe or a device, which may never end, is not opened.
+    """Context manager: open a file for reading. A pipe or a device, which may never end, is refused.
 
     Raises
     ------
@@ -80,7 +81,10 @@ def open_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
 
 @contextmanager
 def _system_errors(path: str | os.PathLike[str], what: str) -> Iterator[None]:
-    """Raise the errors of the system in a ``with`` block as `RosyError`, which says what fails."""
+    """Context manager: raise errors of the operating system as `RosyError`.
+
+    The message consists of the path, what went wrong (`what`, for example "cannot be read") and the reason.
+    """
     try:
         yield
     except RosyError:
@@ -90,30 +94,32 @@ def _system_errors(path: str | os.PathLike[str], what: str) -> Iterator[None]:
 
 
 def check_readable(path: str | os.PathLike[str]) -> None:
-    """Check that a file can be read, before something that would wait for a pipe opens it.
+    """Check that a file can be read.
+
+    Call this before another library opens the file, as it could wait forever for a pipe.
 
     Raises
     ------
     RosyError
-        As `open_file`.
+        If the file is missing, is not a regular file, or cannot be read.
     """
     with open_file(path):
         pass
 
 
 def check_parsing_memory(path: str | os.PathLike[str], binary_memory: float) -> None:
-    """Check that a file of numbers can take the memory that it needs, by its size.
+    """Check that there is enough memory to parse a file of numbers. The need is estimated from its size.
 
     Parameters
     ----------
     path : path-like
     binary_memory : float
-        Bytes of memory that a byte of the file takes if it is binary.
+        Bytes of memory that are needed for each byte of the file if it is binary.
 
     Raises
     ------
     RosyError
-        If it needs more than `available_memory`.
+        If more memory is needed than `available_memory`.
     """
     head = b""
     with suppress(OSError):  # the error is raised where the file is read
@@ -137,7 +143,7 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
     Raises
     ------
     RosyError
-        If the folder is missing, or the file cannot be written. An existing file stays unchanged.
+        If the folder is missing, or the file cannot be written. An existing file is then not changed.
     """
     with replacing(path) as temporary, open(temporary, "xb") as file:
         file.write(data)
@@ -145,20 +151,20 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
 
 @contextmanager
 def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Replace a file atomically: a reader finds either the old contents or all of the new.
+    """Context manager: replace a file atomically. A reader finds either the old contents or all new contents.
 
     Links are followed. The permissions of an existing file are kept.
 
     Yields
     ------
     Path
-        A temporary path in the same folder, with the same suffix, to write the new contents to. The
-        file replaces the target at the end of the block. If there is an error, it is deleted.
+        A temporary path in the same folder, with the same suffix. The block writes the new contents to it. At
+        the end of the block, the temporary file replaces the target. If there is an error, it is deleted.
 
     Raises
     ------
     RosyError
-        As `check_writable`, or if an `OSError` is raised in the block.
+        If `check_writable` raises it, or if an `OSError` is raised in the block.
     """
     check_writable(path)
     target = Path(os.path.realpath(path))
@@ -178,9 +184,9 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def remove_leftovers(folder: str | os.PathLike[str]) -> None:
-    """Delete the temporary files in a folder whose process was killed while it wrote them.
+    """Delete the temporary files that processes left in a folder because they were killed while writing.
 
-    Those of processes that are running, or may run on another machine, are kept, unless they are
+    Files of processes that are running, or that may be running on another machine, are kept, unless they are
     older than `LEFTOVER_SECONDS`.
     """
     with suppress(OSError), os.scandir(folder) as entries:
@@ -196,14 +202,14 @@ def remove_leftovers(folder: str | os.PathLike[str]) -> None:
 
 
 def _host_token() -> str:
-    """Return a token of this machine."""
+    """Return 8 hexadecimal digits that identify this machine: a hash of its name."""
     return f"{zlib.crc32(platform.node().encode()):08x}"
 
 
 def _is_running(pid: int) -> bool:
-    """Whether a process of this machine is running, or may be."""
+    """Return whether a process of this machine is running. Return True if this is not known."""
     if os.name != "posix":
-        return True  # elsewhere the signal 0 ends a process
+        return True  # on other systems, the signal 0 ends a process
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
@@ -214,13 +220,13 @@ def _is_running(pid: int) -> bool:
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
-    """Check that a file could be written, before long work computes its contents.
+    """Check that a file could be written. Call this before long work that computes its contents.
 
     Raises
     ------
     RosyError
-        If the path is a folder, a device or anything else but a regular file, its name is too long,
-        its folder is missing, or the folder or the file is not writable.
+        If the path exists and is not a regular file, if its name is too long, if its folder is missing, or if
+        the folder or the file is not writable.
     """
     with _system_errors(path, "cannot be written"):
         target = Path(os.path.realpath(path))
@@ -228,7 +234,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
         with suppress(FileNotFoundError, NotADirectoryError):
             os.lstat(target)
         folder = (target if Path(path).is_symlink() else Path(path)).parent
-        if target.is_symlink():  # still, so it leads to itself
+        if target.is_symlink():  # even after it was resolved, so it leads to itself
             raise RosyError(f"{path}: cannot be written: it is a link to itself")
         if target.is_dir():
             raise RosyError(f"{path}: cannot be written: it is a folder")
@@ -241,15 +247,15 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 
 
 def check_folder(folder: str | os.PathLike[str]) -> None:
-    """Check that Blender can store pictures in a folder. It may be missing if it can be created.
+    """Check that Blender can store pictures in a folder. The folder may be missing if it can be created.
 
     Call this before long work.
 
     Raises
     ------
     RosyError
-        If the folder cannot be created or written, or its path has a backslash in the name of a
-        folder, which Blender takes for a separator.
+        If the folder cannot be created or written to, or if a folder name in its path contains a
+        backslash, which Blender takes for a separator.
     """
     if os.sep != "\\" and "\\" in os.path.abspath(folder):
         raise RosyError(
@@ -276,12 +282,12 @@ def make_folder(folder: str | os.PathLike[str]) -> None:
     Raises
     ------
     RosyError
-        If that fails.
+        If a folder cannot be created.
     """
     with _system_errors(folder, "cannot be created"):
         os.makedirs(folder, exist_ok=True)
 
 
 def os_error_text(error: OSError | ValueError) -> str:
-    """Return the reason of an error in lower case, without number and path."""
+    """Return the reason of an error of the operating system in lower case, without its number and path."""
     return (getattr(error, "strerror", None) or str(error)).lower()

@@ -1,4 +1,4 @@
-"""Memory: a bound for pictures, what this process can still take, and refusal of what needs more."""
+"""Estimate the memory that pictures need, find out how much is free, and refuse work that needs more."""
 
 from __future__ import annotations
 
@@ -12,76 +12,78 @@ import numpy as np
 
 from .errors import RosyError
 
-#: Bytes of a process that draws, without any sample: Python with numpy in other processes, the batch of
-#: streamlines of `compositor.fast_lic` (2 Mi steps of 24 bytes), and the noise from which
-#: `compositor.streak_statistics` takes its distributions.
+#: Memory in bytes of a process that draws, apart from its samples: Python with numpy in other processes, the
+#: batch of streamlines of `compositor.fast_lic` (2 Mi steps of 24 bytes), and the noise from which
+#: `compositor.streak_statistics` computes distributions.
 PROCESS_BYTES = 120_000_000
 
-#: Bytes of a pixel of the finished picture: four float32 numbers.
+#: Memory in bytes of each pixel of the finished picture: four float32 numbers.
 PIXEL_BYTES = 16
 
-#: Bytes of a sample: 22 numbers of 4 bytes in the G-buffer (see `projection.gbuffer.GBuffer`), and 6 in
-#: the field in the picture (see `compositor.pixel_field.PixelField`).
+#: Memory in bytes of each sample of the surface: 22 numbers of 4 bytes in the G-buffer (see
+#: `projection.gbuffer.GBuffer`), and 6 in the field in the picture (see `compositor.pixel_field.PixelField`).
 SAMPLE_BYTES = 28 * 4
 
-#: Bytes of each line through a sample, for each image that is kept of it: 6 numbers of 4 bytes. They are
-#: the next sample on the streamline, the noise, two running sums, their count and the image.
+#: Memory in bytes for each sample, line direction of the field and stored LIC image: 6 numbers of 4 bytes.
+#: They are the next sample on the streamline, the noise, two running sums, their count and the image.
 LINE_BYTES = 6 * 4
 
-#: Images of a line if there are several: of the three channels of colored or drifting noise, of the
-#: strokes, breaks and overshoot of hatching, or of the whole picture instead of a strip of it.
+#: Number of images for each line direction if a look needs several: for the three channels of colored or
+#: drifting noise, for the strokes, breaks and overshoot of hatching, or for the whole picture instead of a
+#: strip of it.
 MANY_IMAGES = 3
 
-#: Bytes of a triangle: three corners in clip space, of four float64 numbers each.
+#: Memory in bytes of each triangle: three corners in clip space with four float64 numbers each.
 TRIANGLE_BYTES = 3 * 4 * 8
 
-#: Size in bytes of the array that raises the threshold. The GNU C library raises the threshold for
-#: freed blocks of up to 32 MiB only.
+#: Size in bytes of the array that `raise_mmap_threshold` frees. The GNU C library raises its threshold only
+#: for freed blocks of up to 32 MiB.
 MMAP_THRESHOLD_BYTES = 31 << 20
 
 
 def raise_mmap_threshold() -> None:
     """Make the C library keep freed memory for the next arrays instead of unmapping it.
 
-    A frame allocates and frees its arrays dozens of times. The operating system clears the pages of
-    each new mapping, which takes a fifth of the time of a frame. The GNU C library maps blocks
-    above a threshold separately, and raises this threshold to the size of the largest such block
-    that was freed. This function allocates and frees one large block, without writing to it. It has
-    no effect with other C libraries.
+    While a frame is drawn, arrays are allocated and freed dozens of times. The operating system clears the
+    pages of each new memory mapping, which takes a fifth of the time of a frame. The GNU C library uses a
+    separate mapping for each block above a threshold. It raises this threshold to the size of the largest
+    such block that was freed. So this function allocates and frees one large block, without writing to it. It
+    has no effect with other C libraries.
     """
     np.empty(MMAP_THRESHOLD_BYTES, dtype=np.uint8)
 
 
 def samples_memory(samples: float, lines: int, many_images: bool) -> float:
-    """Return the bytes of samples on the surface, in a picture or a texture.
+    """Return the memory, in bytes, that the samples of the surface in a picture or a texture need.
 
     Parameters
     ----------
     samples : float
+        Number of samples.
     lines : int
-        Lines of the field through a point.
+        Number of line directions of the field at a point.
     many_images : bool
-        Whether the look keeps `MANY_IMAGES` of each line.
+        Whether the look needs `MANY_IMAGES` images for each line direction, and not one.
     """
     return samples * (SAMPLE_BYTES + LINE_BYTES * lines * (MANY_IMAGES if many_images else 1))
 
 
 def check_memory(needed: float, subject: str, advice: str) -> None:
-    """Check that a step can take the memory that it needs, before it takes any.
+    """Check that there is enough memory for a piece of work. Call this before the work begins.
 
     Parameters
     ----------
     needed : float
-        Bytes, from an estimate.
+        Estimate of the memory that the work needs, in bytes.
     subject : str
-        What needs them, for the message, such as "a picture of 800 x 600 pixels".
+        The work, as named in the error message, such as "a picture of 800 x 600 pixels".
     advice : str
-        What the user can do instead, for the message.
+        Advice to the user at the end of the message, such as "choose a smaller size".
 
     Raises
     ------
     RosyError
-        If more is needed than `available_memory`.
+        If more memory is needed than `available_memory`.
     """
     free = available_memory()
     if free is not None and needed > free:
@@ -99,27 +101,27 @@ def format_bytes(count: float) -> str:
 
 
 def available_memory() -> int | None:
-    """Return how many bytes this process can still take. None if that is not known.
+    """Return how many bytes of memory this process can still allocate, or None if that is not known.
 
-    It is the least of what the system has left, including its swap space, and of what the limits of
-    control groups (containers) and of the address space leave. On macOS, which compresses and swaps
-    on demand, it is the total memory. Never raises.
+    It is the smallest of several values: the free memory of the system with its swap space, and the remaining
+    memory under the limits of control groups (containers) and of the address space. On macOS, which
+    compresses and swaps on demand, the total memory is used as free memory. No exception is raised.
     """
     found = []
     for source in (_system_memory, _control_group_memory, _address_space):
-        # A source that the system does not have, or that has another form than expected.
+        # The system may not have this source of information, or its format may differ from the expected one.
         with suppress(Exception):
             found += source()
     return max(min(found), 0) if found else None
 
 
 def _system_memory() -> list[int]:
-    """Return the bytes that the operating system has left."""
+    """Return a list with the free memory of the operating system in bytes; empty if it is not known."""
     if sys.platform == "win32":
         # The structure MEMORYSTATUSEX: its size and the load, then seven amounts.
         status = (ctypes.c_uint64 * 8)(64)
         if ctypes.windll.kernel32.GlobalMemoryStatusEx(ctypes.byref(status)):
-            # Of memory with page files, and of the address space.
+            # The free memory with page files, and the free address space.
             return [min(status[4], status[6])]
         return []
     if sys.platform == "darwin":
@@ -130,11 +132,11 @@ def _system_memory() -> list[int]:
 
 
 def _control_group_memory(root: Path = Path("/")) -> list[int]:
-    """Return the bytes that each control group of this process leaves, under a root directory.
+    """Return the remaining memory, in bytes, under the limit of each control group of this process.
 
-    Read the files of the group and of the groups that contain it. In a container, the path of the group
-    may not exist; the files of the mount are then used.
-    Memory that only caches files is free.
+    The files of the group and of all groups that contain it are read, relative to the directory `root`. In a
+    container, the path of the group may not exist. Then the files at the mount point are used.
+    Memory that only caches files counts as free.
     """
     free = []
     for line in (root / "proc/self/cgroup").read_text().splitlines():
@@ -150,7 +152,7 @@ def _control_group_memory(root: Path = Path("/")) -> list[int]:
             continue
         group = mount / path.lstrip("/")
         for folder in (group, *group.parents):
-            # A group without a limit has no such file, or the limit "max".
+            # A group without a limit does not have the file, or has the text "max" in it.
             with suppress(OSError, ValueError):
                 limit = int((folder / limit_name).read_text())
                 used = int((folder / usage_name).read_text())
@@ -163,7 +165,7 @@ def _control_group_memory(root: Path = Path("/")) -> list[int]:
 
 
 def _address_space() -> list[int]:
-    """Return the bytes that the limit of the address space of this process leaves, if it has one."""
+    """Return a list with the remaining address space of this process in bytes; empty if it has no limit."""
     import resource  # not on Windows
 
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)

@@ -1,8 +1,9 @@
-"""Progress of long functions, reported to a listener.
+"""Progress of long functions, which is reported to a listener.
 
-A function reports its progress with `report`, from 0 to 1. Where it calls others that report, `progress`
-scales their reports to a part of its own. Nobody need listen: then both cost next to nothing. The listener is a
-context variable, so no function passes it on.
+A function reports its progress with `report`, from 0 to 1. If it calls other functions that report, it wraps
+the call in ``with progress(...)``, which scales their reports to a part of its own range. Without a listener,
+both take almost no time. The listener is stored in a context variable, so it is not passed from function to
+function.
 """
 
 from __future__ import annotations
@@ -12,12 +13,16 @@ from contextvars import ContextVar
 from types import TracebackType
 from typing import NamedTuple
 
-#: Is told a fraction from 0 to 1, and what is being done. An exception that it raises ends the work.
+#: A function that is called with the progress, from 0 to 1, and a description of the current work. If it
+#: raises an exception, the work ends.
 Listener = Callable[[float, str], None]
 
 
 class _Part(NamedTuple):
-    """A listener, and the range of its progress that is reported now."""
+    """A listener, the range of its progress to which reports are scaled, and the label of all reports.
+
+    If the label is None, each report has its own label.
+    """
 
     listener: Listener
     start: float
@@ -29,14 +34,14 @@ _current: ContextVar[_Part | None] = ContextVar("rosy_progress", default=None)
 
 
 def report(fraction: float, label: str) -> None:
-    """Tell the listener, if there is one, how far the present part of the work has come.
+    """Report the progress of the current part of the work to the listener, if there is one.
 
     Parameters
     ----------
     fraction : float
-        0 at the start of the part, 1 when it is done.
+        Progress: 0 at the start of the part, 1 when it is done.
     label : str
-        What is being done, for a status bar.
+        Description of the current work for a status bar, such as "tracing strokes".
     """
     part = _current.get()
     if part is not None:
@@ -45,7 +50,7 @@ def report(fraction: float, label: str) -> None:
 
 
 class _Scope:
-    """Sets the current part within a ``with`` block."""
+    """A context manager that sets the current part of the work."""
 
     __slots__ = ("_part", "_token")
 
@@ -65,15 +70,15 @@ class _Scope:
 
 
 def progress(start: float, stop: float | None = None, label: str | None = None) -> _Scope:
-    """Scale what is reported in a ``with`` block to a part of the present work.
+    """Context manager: scale the reports in the block to a part of the current work.
 
     Parameters
     ----------
     start, stop : float
-        Fractions of the present work at which the part begins and ends. By default it ends where it
-        begins: it takes next to no time.
+        Fractions of the current work at which the part begins and ends. By default, `stop` is `start`, for
+        parts that take almost no time.
     label : str, optional
-        Replaces the labels that are reported.
+        Label of all reports in the block, instead of their own labels.
 
     Examples
     --------
@@ -100,9 +105,10 @@ def progress(start: float, stop: float | None = None, label: str | None = None) 
 
 
 def listening(listener: Listener | None) -> _Scope:
-    """Send the reports of a ``with`` block to a listener; with None, to nobody.
+    """Context manager: send the reports in the block to a listener. With None, they are discarded.
 
-    A fraction that is less than one before is told as that one: progress stands still, and never goes back.
+    The progress that the listener receives never decreases: if a report is below an earlier one, the earlier
+    value is sent again.
     """
     if listener is None:
         return _Scope(None)
@@ -117,7 +123,10 @@ def listening(listener: Listener | None) -> _Scope:
 
 
 def current_report() -> Listener:
-    """Return a function that reports to the present part of the work, wherever it is called."""
+    """Return a function like `report` that always reports to the part of the work that is current now.
+
+    It can be called later and elsewhere, when another part of the work, or none, is current.
+    """
     part = _current.get()
 
     def report_there(fraction: float, label: str) -> None:

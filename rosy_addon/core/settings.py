@@ -1,9 +1,9 @@
 """Declarative settings: dataclass fields with a range, a label and a help text.
 
 A settings class is a frozen dataclass whose fields are made by `number`, `numbers`, `choice`,
-`switch` and `color`. Each field has a `Setting`: its default, range, label, help text, place in the panels,
-the stage of rendering that it affects and when it applies. Properties, panels, validation, command
-line options, tables of the documentation and cache keys are derived from these descriptions. Other
+`switch` and `color`. Each field is described by a `Setting`: default, range, label, help text, position in
+the panels, the stage of rendering that it affects, and when it has an effect. Properties, panels, validation,
+command line options, tables of the documentation and cache keys are derived from these descriptions. Other
 fields of the class, such as arrays, have no description.
 """
 
@@ -20,12 +20,15 @@ from typing import Any
 
 from .errors import RosyError
 
-#: Values of switches on the command line.
+#: Texts that are accepted for switches on the command line, and their values.
 SWITCH_VALUES = {"true": True, "on": True, "1": True, "false": False, "off": False, "0": False}
 
 
 class Stage(IntEnum):
-    """Stages of rendering, in their order. A changed setting invalidates its stage and all later."""
+    """The stages of rendering, in their order.
+
+    If a setting changes, the results of its stage and of all later stages have to be computed again.
+    """
 
     GBUFFER = 0  #: the visible pixels
     LIC = 1  #: the images of line integral convolution
@@ -33,34 +36,36 @@ class Stage(IntEnum):
 
 
 def always(_settings: Any) -> bool:
-    """Return True: the predicate of a setting that applies whatever the others are."""
+    """Return True. This is the predicate `Setting.applies` of settings that always have an effect."""
     return True
 
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
-    """The description of one setting.
+    """The description of one setting: its default, its texts in the interface, and when it has an effect.
 
     Attributes
     ----------
     name : str
-        The stored key. `settings_of` fills it in.
+        Name of the dataclass field. `settings_of` sets it.
     default : object
+        Default value.
     text : str
         Help text for the user.
     label : str
-        Name in the interface; made from the key if empty.
+        Name in the interface. If it is empty, `settings_of` makes it from the name of the field.
     panel_label : str
-        A shorter name, for panels in which the label does not fit.
+        Shorter name for panels in which the label does not fit. If it is empty, the label is used.
     panel : str
-        Key of the panel that shows the setting. Empty: the panel for advanced settings.
+        Key of the panel that shows the setting. If it is empty, the panel for advanced settings does.
     panel_before : str
-        Setting above which this one is shown. Empty: panels follow the order of the fields.
+        Name of the setting above which this one is shown. If it is empty, settings are shown in the order of
+        the dataclass fields.
     stage : Stage
         First stage of rendering that has to be repeated when the setting changes.
     applies : callable
-        Whether the setting has an effect, given all settings: an object of the settings class, or
-        Blender's property group of the same names.
+        Function that returns whether the setting has an effect. It is called with all settings: an object of
+        the settings class, or a property group of Blender with the same names.
     """
 
     name: str = ""
@@ -80,12 +85,12 @@ class Setting:
     def parse(self, text: str) -> Any:
         """Convert a text from the command line to a value of this setting.
 
-        Only the type is converted; `check` tells whether the value is allowed.
+        Only the type is converted. `check` then decides whether the value is allowed.
 
         Raises
         ------
         ValueError
-            If the text is not a number where one is expected.
+            If a number is expected and the text is not a number.
         """
         return text
 
@@ -96,22 +101,22 @@ class Setting:
 
 @dataclass(frozen=True, kw_only=True)
 class Number(Setting):
-    """A number: whole if its default is an int.
+    """The description of a setting that is a number. It is a whole number if its default is an int.
 
     Attributes
     ----------
     low, high : float
-        The range, both ends included.
+        Smallest and largest allowed value.
     unit : str
-        "angle" (radians), "length" (Blender units), "size" (fraction of the size of the mesh), "pixels" or
-        "spacings"; empty if it has none.
+        Unit of the value: "angle" (radians), "length" (Blender units), "size" (fraction of the size of the
+        mesh), "pixels" or "spacings" (multiples of the spacing); empty if it has no unit.
     soft_high : float or None
-        Upper end of sliders, if lower than `high`.
+        Upper end of sliders in the interface, if it is lower than `high`.
     is_pixel_length : bool
-        Whether the value is a length that depends on the resolution. Such lengths are multiplied
-        when the frame has more pixels, as with supersampling.
+        Whether the value is a length in pixels that is scaled with the resolution, for example if a frame is
+        supersampled.
     preview_low : float
-        Lower end of the range in previews of reduced resolution, if higher than `low`.
+        Smallest value in previews of reduced resolution, if it is higher than `low`.
     """
 
     low: float = 0.0
@@ -141,12 +146,12 @@ class Number(Setting):
 
 @dataclass(frozen=True, kw_only=True)
 class Numbers(Setting):
-    """Several numbers that belong together, as a tuple.
+    """The description of a setting that is a tuple of several numbers.
 
     Attributes
     ----------
     parts : mapping of str to (float, float)
-        The range of each number, both ends included, by its name in the interface.
+        Smallest and largest allowed value of each number, by the name of the number in the interface.
     """
 
     parts: Mapping[str, tuple[float, float]] = field(default_factory=dict)
@@ -163,20 +168,20 @@ class Numbers(Setting):
                 self._refuse(value, f"{name.lower()} from {low} to {high}")
 
     def parse(self, text: str) -> Any:
-        """Convert numbers with commas between them."""
+        """Convert a text of numbers with commas between them to a tuple."""
         return tuple(float(part) for part in text.split(","))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Choice(Setting):
-    """One of several options.
+    """The description of a setting that is one of several options.
 
     Attributes
     ----------
     options : mapping of str to str
-        Help texts of the options by their stored keys.
+        Help texts of the options by their keys, which are the values of the setting.
     option_labels : mapping of str to str
-        Names in the interface of the options that are not named after their keys.
+        Names of options in the interface by their keys. Names of other options are made from their keys.
     """
 
     options: Mapping[str, str] = field(default_factory=dict)
@@ -190,7 +195,7 @@ class Choice(Setting):
 
 @dataclass(frozen=True, kw_only=True)
 class Switch(Setting):
-    """True or false."""
+    """The description of a setting that is true or false."""
 
     def check(self, value: Any) -> None:
         """Raise a `RosyError` if a value is not a bool."""
@@ -204,12 +209,12 @@ class Switch(Setting):
 
 @dataclass(frozen=True, kw_only=True)
 class Color(Setting):
-    """A color in display values (sRGB), as ``#rrggbb``.
+    """The description of a setting that is a color, written as ``#rrggbb`` in display values (sRGB).
 
     Attributes
     ----------
     has_alpha : bool
-        Whether ``#rrggbbaa`` is allowed as well, with an opacity.
+        Whether a color with an opacity, ``#rrggbbaa``, is allowed as well.
     """
 
     has_alpha: bool = False
@@ -222,7 +227,7 @@ class Color(Setting):
 
 
 def number(default: float, low: float, high: float, text: str, **description: Any) -> Any:
-    """Return a dataclass field for a `Number`."""
+    """Return a dataclass field for a setting that is a number; see `Number` and `Setting`."""
     return _field(Number(default=default, low=low, high=high, text=text, **description))
 
 
@@ -232,22 +237,22 @@ def numbers(
     parts: Mapping[str, tuple[float, float]],
     **description: Any,
 ) -> Any:
-    """Return a dataclass field for `Numbers`."""
+    """Return a dataclass field for a setting that is a tuple of numbers; see `Numbers` and `Setting`."""
     return _field(Numbers(default=default, text=text, parts=parts, **description))
 
 
 def choice(default: str, text: str, options: Mapping[str, str], **description: Any) -> Any:
-    """Return a dataclass field for a `Choice`."""
+    """Return a dataclass field for a setting that is one of several options; see `Choice` and `Setting`."""
     return _field(Choice(default=default, text=text, options=options, **description))
 
 
 def switch(default: bool, text: str, **description: Any) -> Any:
-    """Return a dataclass field for a `Switch`."""
+    """Return a dataclass field for a setting that is true or false; see `Switch` and `Setting`."""
     return _field(Switch(default=default, text=text, **description))
 
 
 def color(default: str, text: str, **description: Any) -> Any:
-    """Return a dataclass field for a `Color`."""
+    """Return a dataclass field for a setting that is a color; see `Color` and `Setting`."""
     return _field(Color(default=default, text=text, **description))
 
 
@@ -257,7 +262,7 @@ def _field(setting: Setting) -> Any:
 
 @cache
 def settings_of(cls: type) -> Mapping[str, Setting]:
-    """Return the descriptions of a settings class by name, in the order of its fields."""
+    """Return the descriptions of all settings in a settings class by name, in the order of its fields."""
     settings = {}
     for entry in fields(cls):
         setting: Setting | None = entry.metadata.get("setting")
@@ -269,12 +274,12 @@ def settings_of(cls: type) -> Mapping[str, Setting]:
 
 
 def title(key: str) -> str:
-    """Return a key as a label of the interface: "ink_color" is "Ink Color"."""
+    """Return the label of the interface for a key: for "ink_color", it is "Ink Color"."""
     return key.replace("_", " ").title()
 
 
 def check_settings(settings: Any) -> None:
-    """Check all values of an object of a settings class.
+    """Check that all values of an object of a settings class are allowed.
 
     Raises
     ------
@@ -286,7 +291,7 @@ def check_settings(settings: Any) -> None:
 
 
 def pixel_lengths(cls: type) -> list[Number]:
-    """Return the settings of a class that are lengths in pixels."""
+    """Return the descriptions of settings that are lengths in pixels; see `Number.is_pixel_length`."""
     described = settings_of(cls).values()
     return [item for item in described if isinstance(item, Number) and item.is_pixel_length]
 

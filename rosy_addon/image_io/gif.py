@@ -1,4 +1,4 @@
-"""Animated GIF files (GIF89a) with a fixed palette of 256 colors and ordered dithering."""
+"""Encode animated GIF files (GIF89a) with a fixed palette of 256 colors and ordered dithering."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core.progress import report
 
-#: Numbers of levels of red, green and blue in the palette of color pictures, 252 colors in all.
+#: Numbers of levels of red, green and blue in the palette of color pictures. It has 252 colors in all.
 PALETTE_LEVELS = (6, 7, 6)
 
 #: (4, 4) thresholds of ordered dithering, between 0 and 1 (Bayer 1973).
@@ -24,14 +24,15 @@ MAX_CODE_BITS = 12
 def gif_bytes(frames: Sequence[np.ndarray], rate: float) -> bytes:
     """Encode frames as an animated GIF file that repeats forever.
 
-    If all frames are gray, the palette has 256 grays and nothing is dithered.
+    If all frames are gray, the palette has 256 grays and frames are not dithered.
 
     Parameters
     ----------
     frames : sequence of (H, W, 3) uint8 ndarray
-        Display values (sRGB), rows from the top. All frames have the same size. At least one.
+        One or more frames of the same size, as display values (sRGB), rows from the top.
     rate : float
-        Frames per second. The duration of a frame is rounded to hundredths of a second, at least 2.
+        Frames per second. The duration of a frame is rounded to hundredths of a second, and is at least 0.02
+        seconds.
 
     Returns
     -------
@@ -64,7 +65,7 @@ _LOOP_EXTENSION = b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00"
 
 
 def lzw_compress(data: bytes) -> bytes:
-    """Compress bytes, at least one, by LZW as in GIF files with 8 bits per pixel.
+    """Compress one or more bytes by LZW, as in GIF files with 8 bits per pixel.
 
     Codes have 9 to 12 bits and are packed from the least significant bit.
     """
@@ -105,14 +106,17 @@ def lzw_compress(data: bytes) -> bytes:
 
 
 def _palette() -> np.ndarray:
-    """Return (256, 3) display values: all combinations of the levels, then black to fill up."""
+    """Return (256, 3) float64: the palette, in display values from 0 to 255.
+
+    It has all combinations of the levels of red, green and blue. The remaining colors are black.
+    """
     red, green, blue = (np.linspace(0, 255, count) for count in PALETTE_LEVELS)
     colors = np.stack(np.meshgrid(red, green, blue, indexing="ij"), axis=-1).reshape(-1, 3)
     return np.rint(np.concatenate([colors, np.zeros((256 - len(colors), 3))]))
 
 
 def _dither(frame: np.ndarray) -> np.ndarray:
-    """Return (H, W) uint8 palette indices of an (H, W, 3) uint8 frame, with ordered dithering."""
+    """Return (H, W) uint8: the palette indices of an (H, W, 3) uint8 frame after ordered dithering."""
     height, width = frame.shape[:2]
     threshold = np.tile(BAYER_MATRIX, (-(-height // 4), -(-width // 4)))[:height, :width]
     index = np.zeros((height, width), dtype=np.int64)

@@ -1,4 +1,4 @@
-"""`ImageData`: the contents of an image of Blender, a PNG file or pixels in single precision."""
+"""`ImageData`: the contents of an image for Blender, as a PNG file or as pixels in single precision."""
 
 from __future__ import annotations
 
@@ -14,16 +14,18 @@ ImageData: TypeAlias = bytes | np.ndarray
 
 
 def image_of_pixels(pixels: np.ndarray, as_float: bool, *, is_color: bool) -> ImageData:
-    """Return the contents of an image with these pixels.
+    """Return the contents of an image for Blender, given its pixels.
 
     Parameters
     ----------
     pixels : (H, W, 4) float32 ndarray
-        Linear, rows from the bottom.
+        Linear values, rows from the bottom.
     as_float : bool
-        Store linear values in single precision.
+        Whether the image has linear values in single precision. Otherwise, it is a PNG file with 8 bits per
+        channel.
     is_color : bool
-        Whether 8-bit values are colors (sRGB), and not data.
+        Whether pixels are colors, which a PNG file stores as sRGB. Otherwise, they are data, which it stores
+        as they are.
     """
     return pixels if as_float else png_bytes(pixels, is_color=is_color)
 

@@ -1,4 +1,4 @@
-"""Reading and writing of PNG files with numpy and zlib."""
+"""Read and write PNG files with numpy and zlib."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from ..core.progress import report
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _BIT_DEPTH, _RGBA_COLOR_TYPE, _PERCEPTUAL_INTENT = 8, 6, 0
 
-#: Compression level of zlib. Streaks are noise: higher levels take five times as long and make
-#: files only a tenth smaller.
+#: Compression level of zlib. Pictures of fields consist of noise, for which higher levels take five times as
+#: long and make files only a tenth smaller.
 ZLIB_LEVEL = 1
 
-#: Rows that are converted to or from display values at once. Bounds memory.
+#: Number of rows that are converted to or from display values at once. It bounds memory.
 BLOCK_ROWS = 64
 
 
@@ -32,7 +32,7 @@ def write_png(path: str | os.PathLike[str], rgba: np.ndarray) -> None:
     ----------
     path : path-like
     rgba : (H, W, 4) float ndarray
-        Linear, not premultiplied, rows from the bottom, as in a `Picture`.
+        Picture: linear, not premultiplied, rows from the bottom.
 
     Raises
     ------
@@ -43,7 +43,7 @@ def write_png(path: str | os.PathLike[str], rgba: np.ndarray) -> None:
 
 
 def to_srgb_uint8(rgba: np.ndarray) -> np.ndarray:
-    """Convert an (H, W, 4) linear picture to uint8 display values (sRGB). Alpha stays linear."""
+    """Convert an (H, W, 4) linear picture to uint8: sRGB display values, and alpha without conversion."""
     display = np.concatenate([to_display(rgba[..., :3]), rgba[..., 3:]], axis=-1)
     return _to_uint8(display)
 
@@ -54,9 +54,9 @@ def _to_uint8(values: np.ndarray) -> np.ndarray:
 
 
 def png_bytes(rgba: np.ndarray, *, is_color: bool = True) -> bytes:
-    """Encode a picture as a PNG file; see `write_png`.
+    """Return the contents of a PNG file with a picture; see `write_png`.
 
-    If it is not a color but data, values are stored as they are.
+    If `is_color` is false, the values are data, such as vectors, and are stored without conversion to sRGB.
     """
     height, width = rgba.shape[:2]
     compressor = zlib.compressobj(ZLIB_LEVEL)
@@ -65,7 +65,7 @@ def png_bytes(rgba: np.ndarray, *, is_color: bool = True) -> bytes:
         report(start / height, "writing the picture")
         block = rgba[::-1][start : start + BLOCK_ROWS]
         block = to_srgb_uint8(block) if is_color else _to_uint8(block)
-        # Each row starts with its filter type. It is 0, none, as filters do not help with noise.
+        # Each row starts with its filter type. It is 0 (no filter), as filters do not help with noise.
         rows = np.zeros((len(block), 1 + width * 4), dtype=np.uint8)
         rows[:, 1:] = block.reshape(len(block), -1)
         compressed.append(compressor.compress(rows.tobytes()))
@@ -85,14 +85,15 @@ def _pack_chunk(kind: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
-#: Channels of a pixel by color type: gray, RGB, palette index, gray and alpha, RGBA.
+#: Number of channels of a pixel by color type: gray, RGB, palette index, gray and alpha, RGBA.
 _CHANNELS_BY_COLOR_TYPE = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
 _PALETTE_COLOR_TYPE = 3
 
-#: The most bytes that a byte of zlib's format can stand for.
+#: Largest possible ratio of the sizes before and after compression by zlib.
 MAX_COMPRESSION = 1032
 
-#: Bytes of a pixel of a picture that has been read, and of each of its bytes while it is decoded.
+#: Memory in bytes of each pixel of a picture that has been read, and of each uncompressed byte of the file
+#: while it is decoded.
 PIXEL_BYTES, DECODING_BYTES = 16, 4
 
 
@@ -106,13 +107,13 @@ def read_png(path: str | os.PathLike[str]) -> np.ndarray:
     Returns
     -------
     (H, W, 4) float32 ndarray
-        Linear, not premultiplied, rows from the bottom.
+        Picture: linear, not premultiplied, rows from the bottom.
 
     Raises
     ------
     RosyError
         If the file cannot be read, is not a valid PNG file, is interlaced, has fewer than 8 bits per
-        channel, or needs more memory than there is.
+        channel, or needs more memory than is free.
     """
     chunks = _read_chunks(path, read_bytes(path))
     invalid_file = RosyError(f"{path}: is damaged, or not a valid .png file")
@@ -131,7 +132,7 @@ def read_png(path: str | os.PathLike[str]) -> np.ndarray:
     row_bytes = 1 + width * bytes_per_pixel
     _check_size(path, width, height, row_bytes, len(chunks.get(b"IDAT", b"")))
     try:
-        # No more is decompressed than the header says.
+        # At most one byte more than the header says is decompressed.
         decompressor = zlib.decompressobj()
         data = decompressor.decompress(chunks[b"IDAT"], height * row_bytes + 1)
         if not decompressor.eof:
@@ -147,12 +148,14 @@ def read_png(path: str | os.PathLike[str]) -> np.ndarray:
 def _check_size(
     path: str | os.PathLike[str], width: int, height: int, row_bytes: int, compressed: int
 ) -> None:
-    """Check the size of a picture in a header against its compressed data and the free memory.
+    """Check that the size of a picture in its header is possible, and that there is enough memory for it.
+
+    `row_bytes` is the size of an uncompressed row, and `compressed` the size of all compressed data.
 
     Raises
     ------
     RosyError
-        If it is 0 or more than the data can hold, or needs more memory than there is.
+        If the size is 0 or more than the compressed data can hold, or if there is not enough memory.
     """
     size = height * row_bytes
     if not width or not height:
@@ -169,7 +172,10 @@ def _check_size(
 
 
 def _read_chunks(path: str | os.PathLike[str], data: bytes) -> dict[bytes, bytes]:
-    """Return the data of the chunks of a file by their type. Chunks of one type are joined."""
+    """Return the data of the chunks of a PNG file by their type. Chunks of the same type are joined.
+
+    `data` is the contents of the file.
+    """
     if data[:8] != _SIGNATURE:
         raise RosyError(f"{path}: is not a .png file")
     chunks: dict[bytes, bytes] = {}
@@ -182,25 +188,27 @@ def _read_chunks(path: str | os.PathLike[str], data: bytes) -> dict[bytes, bytes
 
 
 def _undo_filters(rows: np.ndarray, filter_types: np.ndarray) -> np.ndarray:
-    """Reverse the filters of the rows.
+    """Reverse the filters that a PNG file applies to rows before compression.
 
-    A byte depends on those to the left, above, and above to the left. So all pixels of an
+    A byte depends on the bytes to the left, above, and above to the left. So all pixels of an
     antidiagonal (row + column = constant) are decoded at once, in the order of these sums.
 
     Parameters
     ----------
     rows : (H, W, bytes per pixel) uint8 ndarray
+        Filtered rows.
     filter_types : (H,) uint8 ndarray
         Filter type of each row, 0 to 4.
 
     Returns
     -------
     (H, W, bytes per pixel) uint8 ndarray
+        Rows without filters.
 
     Raises
     ------
     ValueError
-        If there is another filter type.
+        If a filter type is above 4.
     """
     height, width, bytes_per_pixel = rows.shape
     if not filter_types.any():
@@ -228,7 +236,7 @@ def _undo_filters(rows: np.ndarray, filter_types: np.ndarray) -> np.ndarray:
 
 
 def _palette(chunks: dict[bytes, bytes]) -> np.ndarray:
-    """Return the (n, 4) uint8 colors of a palette."""
+    """Return (n, 4) uint8: the RGBA colors of the palette in the chunks of a PNG file."""
     colors = np.frombuffer(chunks[b"PLTE"], dtype=np.uint8).reshape(-1, 3)
     palette = np.full((len(colors), 4), 255, dtype=np.uint8)
     palette[:, :3] = colors
@@ -245,9 +253,11 @@ def _to_linear_rgba(
     Parameters
     ----------
     samples : (H, W, bytes per pixel) uint8 ndarray
-        Gray, gray and alpha, RGB or RGBA display values, or indices of a palette.
+        Bytes of the pixels: gray, gray and alpha, RGB or RGBA display values, or indices into a palette.
     palette : (n, 4) uint8 ndarray or None
+        RGBA colors of the palette; None if pixels have no palette indices.
     bytes_per_sample : {1, 2}
+        Number of bytes per channel.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Arrowheads along strokes, for fields whose lines have a direction."""
+"""Arrowheads along strokes, for fields in which directions have no opposite direction."""
 
 from __future__ import annotations
 
@@ -12,28 +12,29 @@ from .stroke_set import Strokes
 #: Length of the barbs of an arrowhead in spacings, and their angle to the stroke in radians.
 BARB_LENGTH, BARB_ANGLE = 0.55, np.radians(27.0)
 
-#: Least length of a stroke with an arrowhead, in lengths of a barb.
+#: Strokes get arrowheads only if they are longer than this many barbs.
 MIN_LENGTH = 3.0
 
 
 def arrowheads(strokes: Strokes, distance: float, has_direction: np.ndarray) -> Strokes:
-    """Return arrowheads along strokes, in the order of their points: the direction of the field.
+    """Return arrowheads along strokes, as additional strokes.
 
-    Each is a stroke of three points, from barb to tip to barb, in the tangent plane of the surface.
+    They point from the first point of a stroke to its last, which is the direction of the field. Each is a
+    stroke of three points, from barb to tip to barb, in the tangent plane of the surface.
 
     Parameters
     ----------
     strokes : Strokes
     distance : float
-        Distance between the arrowheads of a stroke, in spacings. Every stroke that is long enough has at
+        Distance between the arrowheads of a stroke, in spacings. Every stroke that is long enough gets at
         least one.
     has_direction : (S,) bool ndarray
-        The strokes that get arrowheads.
+        Whether a stroke gets arrowheads, because the directions of its field have no opposite direction.
 
     Returns
     -------
     Strokes
-        With the families of `strokes`.
+        The arrowheads alone. Each has the family of its stroke.
     """
     arc, length = strokes.arc, strokes.length
     middle = (strokes.start[:-1] + strokes.start[1:]) // 2
@@ -43,7 +44,7 @@ def arrowheads(strokes: Strokes, distance: float, has_direction: np.ndarray) -> 
     count[is_long] = np.maximum(np.rint((length / distance)[is_long] / spacing[is_long]), 1)
     stroke = np.repeat(np.arange(len(strokes)), count)
     rank = np.arange(len(stroke)) - np.repeat(np.cumsum(count) - count, count)
-    # The stroke ends of all strokes are at different sums of arc lengths.
+    # Put all strokes one after another on one axis of arc length, for a single search.
     offset = np.concatenate([[0.0], np.cumsum(length + 1.0)[:-1]])
     place = offset[stroke] + (rank + 0.5) / count[stroke] * length[stroke]
     key = offset[strokes.stroke] + arc

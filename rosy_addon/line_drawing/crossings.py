@@ -1,4 +1,4 @@
-"""Crossings of strokes, and gaps in the stroke that passes under another."""
+"""Find crossings of strokes, and cut gaps into the strokes that pass under others."""
 
 from __future__ import annotations
 
@@ -13,20 +13,21 @@ from ..field.blocks import blocks_by_count, concatenated_ranges
 from ..field.frames import dot, normalize
 from .stroke_set import POINT_COLUMNS, Strokes
 
-#: Pairs of segments that are intersected at once. Bounds memory.
+#: Number of pairs of segments that are intersected at once. It bounds memory.
 PAIR_BATCH_SIZE = 1 << 20
 
 #: Sine of the angle between segments below which they count as parallel.
 MIN_SINE = 1e-9
 
 #: Strokes also cross where a segment ends within this fraction of its length before the other stroke.
-#: Where two strokes cross at an edge of a triangle, all four segments end there, but for rounding.
+#: Where two strokes cross at an edge of a triangle, all four segments end at the crossing, up to rounding.
 END_TOLERANCE = 1e-6
 
-#: Crossings of two strokes are the same one if they are nearer than this along both, in spacings.
+#: Two crossings of the same strokes are one crossing if they are nearer than this along both, in spacings.
 SAME_CROSSING = 1e-4
 
-#: Difference of the keys of strips, and the tolerance of positions along them; see `_strip_keys`.
+#: Difference between the sort keys of two successive strips, and tolerance of positions along strips; see
+#: `_strip_keys`.
 STRIP_STRIDE, ROUNDING = 4.0, 1e-6
 
 
@@ -36,7 +37,7 @@ class Crossings(NamedTuple):
     Attributes
     ----------
     stroke : (K, 2) int64 ndarray
-        The two strokes.
+        Indices of the two strokes.
     arc : (K, 2) float64 ndarray
         Arc length along each stroke up to the crossing, in world space.
     """
@@ -46,14 +47,14 @@ class Crossings(NamedTuple):
 
 
 def find_crossings(strokes: Strokes) -> Crossings:
-    """Find where strokes cross.
+    """Find the points at which two strokes cross on the surface.
 
     Only segments in the same triangle are compared.
 
     Parameters
     ----------
     strokes : Strokes
-        As they were traced, before `clip_to_visible`.
+        Strokes as they were traced, before `clip_to_visible`.
     """
     arc, stroke = strokes.arc, strokes.stroke
     segment_end = np.flatnonzero(np.diff(stroke, prepend=-1) == 0)
@@ -74,15 +75,15 @@ def find_crossings(strokes: Strokes) -> Crossings:
 
 
 def _first_of_each(stroke: np.ndarray, arc: np.ndarray, tolerance: np.ndarray) -> np.ndarray:
-    """Return the numbers of crossings, without those that are the same as an earlier one.
+    """Return the indices of m crossings, without repetitions of an earlier crossing.
 
     Parameters
     ----------
     stroke : (m, 2) ndarray of int
     arc : (m, 2) ndarray
-        As in `Crossings`.
+        Strokes and arc lengths, as in `Crossings`.
     tolerance : (m,) ndarray
-        In world space.
+        Difference in arc length, in world space, up to which crossings of the same strokes are one crossing.
     """
     swapped = stroke[:, :1] > stroke[:, 1:]
     stroke = np.where(swapped, stroke[:, ::-1], stroke)
@@ -102,22 +103,22 @@ def _first_of_each(stroke: np.ndarray, arc: np.ndarray, tolerance: np.ndarray) -
 def _close_pairs(
     strokes: Strokes, segment_end: np.ndarray
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield all pairs of segments of a triangle that are close enough to cross, in batches.
+    """Yield, in batches, the pairs of segments of the same triangle that are close enough to cross.
 
     Each triangle is divided into strips as wide as its longest segment, and the segments of a strip
-    are sorted along it. So a segment is compared only with those beside it, in its own strip and in
+    are sorted along it. So a segment is compared only with the segments near it in its own strip and in
     the next one.
 
     Parameters
     ----------
     strokes : Strokes
     segment_end : (m,) ndarray of int
-        Numbers of the end points of the segments, sorted by their triangle.
+        Index of the point at which each segment ends, sorted by the triangle of the segment.
 
     Yields
     ------
     first, second : (k,) int64 ndarray
-        Positions in `segment_end`, first < second.
+        The two segments of each pair, as indices into `segment_end`; first < second.
     """
     if not len(segment_end):
         return
@@ -138,9 +139,10 @@ def _close_pairs(
 
 
 def _strip_keys(strokes: Strokes, segment_end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return sort keys of segments, and how far the keys of segments that cross may differ.
+    """Return (m,) sort keys of segments, and the (m,) largest difference of the keys of two that cross.
 
-    The key is the number of the strip times `STRIP_STRIDE`, plus the position along it, 0 to 1.
+    The key is the number of the strip times `STRIP_STRIDE`, plus the position along the strip, 0 to 1. Strips
+    are described in `_close_pairs`.
     """
     start, end = strokes.points[segment_end - 1], strokes.points[segment_end]
     middle = (start + end) / 2
@@ -156,7 +158,7 @@ def _strip_keys(strokes: Strokes, segment_end: np.ndarray) -> tuple[np.ndarray, 
     _, across, along = np.argsort(extent, axis=1).T
     strip_width = np.maximum(reach, extent[row, across] / size)
     strip_width[strip_width == 0] = 1
-    # One more than are used, so that the last strip of a triangle is empty.
+    # One strip more than needed, so that the last strip of a triangle is empty.
     strip_count = 2 + (extent[row, across] / strip_width).astype(np.int64)
     scale = np.maximum(extent[row, along], reach)
     scale[scale == 0] = 1
@@ -172,14 +174,15 @@ def _strip_keys(strokes: Strokes, segment_end: np.ndarray) -> tuple[np.ndarray, 
 def _intersect_segments(
     points: np.ndarray, stroke: np.ndarray, first: np.ndarray, second: np.ndarray
 ) -> tuple[np.ndarray, ...]:
-    """Return the pairs of segments that cross.
+    """Return the pairs of segments that cross, and where.
 
-    Segments are given by the numbers of their end points. Pairs from one stroke are left out.
+    A segment is given by the index of the point at which it ends. It begins at the point before it. `stroke`
+    is the stroke of each point. Pairs of segments of the same stroke are left out.
 
     Returns
     -------
     first, second : (m,) int64 ndarray
-        The segments of each pair.
+        The two segments of each pair that crosses.
     fraction_first, fraction_second : (m,) float64 ndarray
         Position of the crossing on each segment, from 0 to 1.
     """
@@ -199,12 +202,14 @@ def _intersect_segments(
 
 
 def with_crossing_gaps(strokes: Strokes, gap: float) -> Strokes:
-    """Cut a gap into one of the two strokes at each crossing: strokes pass over and under in turn.
+    """Cut a gap into one of the two strokes at each crossing, as if it passed under the other stroke.
+
+    A stroke passes over and under in turn, as in a woven fabric.
 
     Parameters
     ----------
     strokes : Strokes
-        As they were traced, before `clip_to_visible`.
+        Strokes as they were traced, before `clip_to_visible`.
     gap : float
         Length of the gap in spacings.
     """
@@ -223,9 +228,9 @@ def with_crossing_gaps(strokes: Strokes, gap: float) -> Strokes:
 
 
 def _alternating_under(crossings: Crossings) -> np.ndarray:
-    """Return (K,) int64: 0 or 1, the stroke of each crossing that passes under.
+    """Return (K,) int64: 0 if the first stroke of a crossing passes under the second one, 1 if over it.
 
-    It alternates from crossing to crossing along the first stroke.
+    The value alternates from crossing to crossing along the first stroke.
     """
     order = np.lexsort((crossings.arc[:, 0], crossings.stroke[:, 0]))
     stroke = crossings.stroke[order, 0]
@@ -245,7 +250,7 @@ def cut_intervals(
     ----------
     strokes : Strokes
     stroke : (k,) ndarray of int
-        The stroke of each interval.
+        Index of the stroke from which each interval is removed.
     low, high : (k,) float64 ndarray
         Arc lengths at which the intervals begin and end, in world space. Intervals may overlap and
         may reach beyond the ends of the stroke.
@@ -253,7 +258,7 @@ def cut_intervals(
     Returns
     -------
     Strokes
-        The parts that are left, with new points at the ends of the intervals.
+        The remaining parts of strokes, with new points at the ends of the intervals.
     """
     arc, point_stroke = strokes.arc, strokes.stroke
     stride = 2 * (float(arc.max(initial=0)) + float(np.max(high - low, initial=0))) + 1

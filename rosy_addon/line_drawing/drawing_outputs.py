@@ -1,4 +1,4 @@
-"""Drawings in strokes as files and as curves in world space."""
+"""Draw meshes with strokes, and return the drawing as the contents of a file or as curves in world space."""
 
 from __future__ import annotations
 
@@ -21,25 +21,26 @@ from .style import StrokeStyle
 from .svg import Pen, svg_text
 from .visibility import pixel_size
 
-#: Share of the time after which all strokes are drawn, and label of the progress from then on.
+#: Fraction of the progress at which all strokes are drawn, and label of the progress from then on.
 OUTPUT_START, OUTPUT_LABEL = 0.95, "storing the strokes"
 
-#: Largest tangent of the angle between the normal and the direction to the camera for which the
-#: offset toward the camera grows.
+#: The offset of strokes toward the camera grows with the angle between the normal of the surface and the
+#: direction to the camera, until the tangent of this angle has this value.
 MAX_OFFSET_STEEPNESS = 12.0
 
 
 class SurfaceAttachment(NamedTuple):
-    """Where n points of curves are on a mesh, so that they can follow it when it deforms.
+    """Positions of n points of curves relative to a mesh, so that they can follow it when it deforms.
 
     Attributes
     ----------
     vertices : (n, 3) int32 ndarray
-        Vertices of the triangles.
+        Vertices of the triangle on which each point is.
     weights : (n, 3) float64 ndarray
-        Barycentric coordinates.
+        Barycentric coordinates of the point in this triangle.
     height : (n,) float64 ndarray
-        Height above the triangle along the normals of its vertices, in world space.
+        Height of the point above the triangle, along the interpolated normals of its vertices, in world
+        space.
     """
 
     vertices: np.ndarray
@@ -54,17 +55,17 @@ class StrokeGeometry:
     Attributes
     ----------
     strokes : Strokes
-        Simplified strokes; n points in all.
+        The S strokes, simplified. They have n points in all.
     instance_index : (S,) int32 ndarray
-        As in `StrokeDrawing`.
+        Index of the mesh instance on which each stroke is.
     points : (n, 3) float64 ndarray
         Points of the curves in world space, offset from the surface.
     radius : (n,) float64 ndarray
         Radii in world space.
     colors : list of str
-        The color of each family.
+        The color of each family of strokes.
     attachment : SurfaceAttachment or None
-        Where the points are on their surface, if they are to follow it.
+        Positions of the points relative to the surface that they follow; None if they follow no surface.
     """
 
     strokes: Strokes
@@ -83,15 +84,16 @@ def drawing_file(
     pen: Pen,
     lights: Sequence[LightSource],
 ) -> tuple[StrokeDrawing, bytes]:
-    """Return a drawing of mesh instances in strokes, and the contents of its file.
+    """Draw mesh instances with strokes. Return the drawing and the contents of its file.
 
     Parameters
     ----------
     suffix : str
-        Suffix of the file: .svg, or one of `polyline_file`.
+        Suffix that sets the format of the file: .svg, or a format of `polyline_file`.
     instances, camera, style, lights
-        As for `draw_instances`.
+        Parameters of `draw_instances`.
     pen : Pen
+        Width and colors of the strokes.
     """
     is_svg = suffix == ".svg"
     drawing = _draw(instances, camera, style, lights, clip_to_frame=is_svg)
@@ -110,7 +112,7 @@ def drawing_curves(
     lights: Sequence[LightSource],
     follows: MeshInstance | None,
 ) -> tuple[StrokeDrawing, StrokeGeometry]:
-    """Return a drawing of mesh instances in strokes, and its curves; see `stroke_geometry`."""
+    """Draw mesh instances with strokes. Return the drawing and its curves from `stroke_geometry`."""
     drawing = _draw(instances, camera, style, lights, clip_to_frame=False)
     with progress(OUTPUT_START, 1.0, OUTPUT_LABEL):
         return drawing, stroke_geometry(drawing, camera, pen, follows)
@@ -124,7 +126,7 @@ def _draw(
     *,
     clip_to_frame: bool,
 ) -> StrokeDrawing:
-    """Draw with the cache of bakes of this process."""
+    """Draw mesh instances with strokes, using the cache that all bakes of this process share."""
     with progress(0.0, OUTPUT_START):
         drawing = draw_instances(
             instances, camera, style, lights=lights, clip_to_frame=clip_to_frame, cache=BAKE_CACHE
@@ -136,16 +138,17 @@ def _draw(
 def stroke_geometry(
     drawing: StrokeDrawing, camera: Camera, pen: Pen, follows: MeshInstance | None = None
 ) -> StrokeGeometry:
-    """Return the curves of a drawing.
+    """Return the strokes of a drawing as curves in world space, with radii and colors.
 
     Parameters
     ----------
     drawing : StrokeDrawing
     camera : Camera
     pen : Pen
-        Its width is in pixels of the camera.
+        Width, in pixels of the camera, and colors of the strokes.
     follows : MeshInstance, optional
-        The instance of all strokes, if they are to follow its surface.
+        The instance whose surface all curves follow when it deforms. All strokes must be on it. Without it,
+        the curves follow no surface.
     """
     strokes = simplify_strokes(drawing.strokes, camera)
     # Hidden strokes may face away from the camera. An offset toward it would move them into the
@@ -180,7 +183,7 @@ def offset_toward_camera(strokes: Strokes, camera: Camera, width: float) -> np.n
     Returns
     -------
     (n, 3) float64 ndarray
-        World space.
+        Offset points in world space.
     """
     to_camera = camera.view_directions(strokes.points)
     facing = np.abs(dot(strokes.normal, to_camera))
@@ -190,7 +193,7 @@ def offset_toward_camera(strokes: Strokes, camera: Camera, width: float) -> np.n
 
 
 def attach(strokes: Strokes, height: np.ndarray, instance: MeshInstance) -> SurfaceAttachment:
-    """Return where the points of strokes are on the surface of an instance.
+    """Return the positions of the points of strokes relative to the surface of an instance.
 
     Parameters
     ----------
@@ -204,7 +207,7 @@ def attach(strokes: Strokes, height: np.ndarray, instance: MeshInstance) -> Surf
     corners = surface.triangle_vertex[strokes.triangle]
     a, b, c = instance.world_points()[corners].transpose(1, 0, 2)
     u, v, offset = b - a, c - a, strokes.points - a
-    # Least squares: the nearest point of the plane.
+    # Find the nearest point of the plane by least squares.
     uu, uv, vv, pu, pv = dot(u, u), dot(u, v), dot(v, v), dot(offset, u), dot(offset, v)
     determinant = uu * vv - uv * uv
     is_flat = determinant <= 0

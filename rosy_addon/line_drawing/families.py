@@ -1,9 +1,10 @@
-"""Assign strokes to families: the M lines that the field has at each point.
+"""Assign strokes to families, one for each of the M line directions of the field.
 
-Each family becomes a layer, which can have its own pen and color. Lines of neighboring triangles
-are matched across the edges. A path around a singularity or a handle may connect different lines of
-a triangle. If there is no such path, the families are consistent over the whole surface. Otherwise
-the family depends on the angle between the stroke and a guide direction.
+A line direction is a pair of opposite directions, or a single direction if the field has no opposite ones.
+Each family becomes a layer, which can have its own pen and color. The line directions of neighboring
+triangles are matched across the edges. A path around a singularity or a handle may connect different line
+directions of a triangle. If there is no such path, the families are consistent over the whole surface.
+Otherwise the family depends on the angle between the stroke and a guide direction.
 """
 
 from __future__ import annotations
@@ -23,22 +24,22 @@ GUIDE_AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
 
 
 def label_families(strokes: Strokes, mesh: TangentMesh, right: np.ndarray | None = None) -> Strokes:
-    """Assign strokes to families by the line that they follow at their middle point.
+    """Assign strokes to families by the line direction that they follow at their middle point.
 
     Parameters
     ----------
     strokes : Strokes
-        As they were traced on `mesh`.
+        Strokes as they were traced on `mesh`.
     mesh : TangentMesh
     right : (3,) array_like, optional
-        Guide direction in world space, for example the x axis of a camera. It is used only if no
-        consistent labels exist.
+        Guide direction in world space, for example the x axis of a camera. It is used only if the families
+        cannot be consistent over the surface.
 
     Returns
     -------
     Strokes
-        With `mesh.family_count` families. Family 1 is the one nearest to the guide direction; the
-        others follow counter-clockwise.
+        The same strokes with `mesh.family_count` families. Family 1 is nearest to the guide direction; the
+        other families follow counter-clockwise.
     """
     report(0.0, "matching families")
     family_count = mesh.family_count
@@ -59,25 +60,25 @@ def label_families(strokes: Strokes, mesh: TangentMesh, right: np.ndarray | None
 
 
 def reference_members(mesh: TangentMesh) -> np.ndarray:
-    """Return (T,) complex128: one unit member at the center of each triangle, in its frame.
+    """Return (T,) complex128: one unit member of the field at the center of each triangle, in its frame.
 
-    The member is the nearest one to the x axis of the frame. If the field labels one line consistently
-    (`TangentMesh.family_z`), the member is on this line.
+    It is the member nearest to the x axis of the frame. If the field itself marks the direction of the first
+    family (`TangentMesh.family_z`), it is a member in this direction.
     """
     near = np.ones(len(mesh.z), dtype=np.complex128)
     if _has_family_z(mesh):
-        # The stored member is on the same line everywhere. Count from that line.
+        # The stored member follows the same line direction everywhere. Count from that direction.
         near = np.exp(1j * np.angle(mesh.family_z) * mesh.family_count / mesh.degree)
     return _members_at_centers(mesh, near)
 
 
 def _has_family_z(mesh: TangentMesh) -> bool:
-    """Return whether the field labels one of its lines consistently."""
+    """Return whether the field itself marks one of its line directions consistently (`family_z`)."""
     return mesh.family_z is not None and bool(mesh.family_z.any())
 
 
 def _members_at_centers(mesh: TangentMesh, near: np.ndarray) -> np.ndarray:
-    """Return (T,) complex128: the members at the centers of triangles that are nearest to unit tangents.
+    """Return (T,) complex128: the unit member at the center of each triangle nearest to the tangent `near`.
 
     Where the field is zero, the result is an arbitrary unit tangent.
     """
@@ -86,16 +87,19 @@ def _members_at_centers(mesh: TangentMesh, near: np.ndarray) -> np.ndarray:
 
 
 def member_offset(member: np.ndarray, reference: np.ndarray, degree: int) -> np.ndarray:
-    """Return (n,) int64: the number of members from `reference` counter-clockwise to `member`."""
+    """Return (n,) int64: how many members of the field `member` is counter-clockwise from `reference`.
+
+    The result is from 0 to the degree - 1. Both are members, as complex numbers in the same frame.
+    """
     angle = np.angle(member * reference.conj())
     return np.rint(angle * degree / (2 * np.pi)).astype(np.int64) % degree
 
 
 def global_labels(mesh: TangentMesh) -> np.ndarray | None:
-    """Return (T, M) int: the family of each line in each triangle, if consistent labels exist.
+    """Return (T, M) int: the family of each line direction in each triangle, or None.
 
-    Lines are counted counter-clockwise from `reference_members`. Returns None if different lines of
-    a triangle are connected by a path over the surface.
+    Line directions are counted counter-clockwise from `reference_members`. None is returned if a path over
+    the surface connects different line directions of a triangle, so that no consistent labels exist.
     """
     family_count, count = mesh.family_count, len(mesh.z)
     if _has_family_z(mesh):
@@ -122,22 +126,24 @@ def global_labels(mesh: TangentMesh) -> np.ndarray | None:
 
 
 def _order_labels(mesh: TangentMesh, component: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Number the components of the covering from 0 in each connected part of the surface.
+    """Assign the families 0 to M - 1 to the connected components of line directions.
 
-    The lines of the first triangle of the part are numbered counter-clockwise, beginning with the line
-    nearest to the guide direction.
+    A component consists of the line directions that are matched across edges. In each connected part of the
+    surface, the line directions of its first triangle are numbered counter-clockwise, beginning with the
+    nearest to the guide direction. The number of a line direction is the family of its component.
 
     Parameters
     ----------
     mesh : TangentMesh
     component : (T, M) ndarray of int
-        Connected component of each line in each triangle.
+        Connected component of each line direction in each triangle.
     reference : (T,) complex128 ndarray
-        `reference_members` of the mesh.
+        The `reference_members` of the mesh.
 
     Returns
     -------
     (T, M) int64 ndarray
+        Family of each line direction in each triangle.
     """
     family_count = component.shape[1]
     family = np.full(int(component.max()) + 1, -1, dtype=np.int64)
@@ -156,9 +162,10 @@ def _order_labels(mesh: TangentMesh, component: np.ndarray, reference: np.ndarra
 def _members_near_guide(
     mesh: TangentMesh, reference: np.ndarray, right: np.ndarray | None
 ) -> np.ndarray:
-    """Return (T,) complex128: the members nearest to the guide direction in the triangle planes.
+    """Return (T,) complex128: the unit member of each triangle that is nearest to a guide direction.
 
-    The guide is `right`, or the first of `GUIDE_AXES` that is not almost normal to the triangle.
+    The guide direction is `right`, or the first of `GUIDE_AXES` that is not almost normal to the triangle. It
+    is projected to the plane of the triangle.
     """
     axes = GUIDE_AXES if right is None else np.concatenate([[np.asarray(right, float)], GUIDE_AXES])
     guide = np.zeros_like(mesh.normal)

@@ -1,6 +1,7 @@
-"""Find the strokes beside samples, and the samples that are too near to another stroke.
+"""Find the strokes beside samples of strokes, and the samples that are too near to another stroke.
 
-Only samples of the same family are compared. Distances are measured on the surface.
+Only samples of the same family (line direction of the field) are compared. Distances are measured on the
+surface.
 """
 
 from __future__ import annotations
@@ -15,42 +16,44 @@ from ..field.blocks import row_blocks
 from ..field.frames import dot
 from .samples import SAMPLE_STEP, SEARCH_RADIUS, CoveringPairs, StrokeSamples
 
-#: Largest gap for which a side counts as covered, in spacings.
+#: A side of a sample counts as covered if the gap to the next stroke on that side is smaller, in spacings.
 MAX_COVERED_GAP = 1.5
 
 #: A neighbor is beside a sample if it is at most this far ahead or behind, in spacings.
 LATERAL_WINDOW = 0.36
 
-#: Separation of strokes that meet head on, in spacings.
+#: Smallest distance between the ends of strokes that meet head on, in spacings.
 HEAD_ON_DISTANCE = 0.35
 
-#: Points of one stroke are compared only if they are farther apart along it than this, in spacings.
+#: Two points of the same stroke are compared only if they are farther apart along it than this, in spacings.
 MIN_SELF_ARC = 2.5
 
-#: Points are on different parts of a fold if the cosine between their normals is below the first
-#: value, or the slope between them relative to the mean normal (height over distance) is above the
-#: second.
+#: Two points are on different sides of a fold if the cosine between their normals is below the first value,
+#: or if the slope from one to the other (their distance along the mean normal, over their distance) is above
+#: the second value.
 MIN_NORMAL_COSINE, MAX_SLOPE = 0.1, 0.6
 
-#: Pairs of samples that are compared at once. Surfaces that lie on each other have very many.
+#: Number of pairs of samples that are compared at once. It bounds memory where surfaces lie on each other.
 PAIR_BLOCK = 1 << 20
 
 
 @dataclass(frozen=True)
 class SeparationRules:
-    """Limits on the separation and the length of strokes, in spacings.
+    """Limits on the separation and the length of strokes.
+
+    The unit is the spacing: the required distance between strokes of the same family.
 
     Attributes
     ----------
     min_separation : float
         Strokes end before they come nearer than this to another stroke of their family.
     max_gap : float
-        Strokes end where a gap beside them is wider than this but too narrow for another stroke
-        (see `MAX_COVERED_GAP`).
+        Strokes end where the gap to the next stroke is wider than this but too narrow for another stroke
+        between them (see `MAX_COVERED_GAP`).
     min_length : float
-        Shorter strokes are removed.
+        Strokes that are shorter than this are removed.
     max_length : float
-        Strokes end when they are longer than this.
+        Strokes stop growing when they are longer than this.
     """
 
     min_separation: float = 0.75
@@ -60,18 +63,19 @@ class SeparationRules:
 
 
 class LateralNeighbors(NamedTuple):
-    """The strokes beside n samples. Side 0 is left, side 1 is right.
+    """The strokes beside n samples of strokes. Side 0 is left, side 1 is right.
 
     Attributes
     ----------
     gap : (n, 2) float64 ndarray
         Distance to the nearest stroke on each side, in spacings; infinite if there is none.
     rejected : (n,) bool ndarray
-        Whether the sample is too near to an older one, or has yielded.
+        Whether the sample is too near to an older sample, follows a rejected sample, or has yielded.
     yielded : (n,) bool ndarray
-        Whether a gap beside the sample is too wide for one stroke and too narrow for two.
+        Whether the gap to the next stroke is wider than `SeparationRules.max_gap`, but too narrow for another
+        stroke in it.
     covering : CoveringPairs
-        The accepted samples and the neighbors beside them, at most `MAX_COVERED_GAP` away.
+        Pairs of a sample that is not rejected and a neighbor beside it, less than `MAX_COVERED_GAP` away.
     """
 
     gap: np.ndarray
@@ -81,16 +85,16 @@ class LateralNeighbors(NamedTuple):
 
 
 class _Pairs(NamedTuple):
-    """m pairs of samples that are near each other, of the same family, and on one part of a fold.
+    """m pairs of samples of the same family that are near each other on the surface, not only in space.
 
     Attributes
     ----------
     query : (m,) intp ndarray
-        Index into the samples that are compared.
+        Position of the sample in the array of samples that were given to be compared.
     sample, neighbor : (m,) ndarray of int
-        Numbers of the two samples.
+        Indices of the two samples in `StrokeSamples`.
     sample_frame, neighbor_frame : (m, 4, 3) float64 ndarray
-        As in `StrokeSamples`.
+        Position, normal, direction and member of the two samples, as in `StrokeSamples.frame`.
     offset : (m, 3) float64 ndarray
         Displacement on the surface from the neighbor to the sample.
     """
@@ -110,19 +114,20 @@ def find_lateral_neighbors(
     max_gap: float,
     previous: np.ndarray | None = None,
 ) -> LateralNeighbors:
-    """Compare samples with all nearby samples of the same family.
+    """Find the neighbors beside samples, and reject the samples that are too near to others of their family.
 
     Parameters
     ----------
     samples : StrokeSamples
     sample : (n,) ndarray of int
-        Numbers of the samples that are compared.
+        Indices of the samples that are compared with all others.
     min_separation, max_gap : float
-        In spacings, as in `SeparationRules`.
+        Limits in spacings, as in `SeparationRules`.
     previous : (n,) ndarray of int, optional
-        Only if `sample` are the samples that were added last, sorted by step. Index into `sample` of the
-        sample before it at the same end of a stroke, or -1. A sample is then compared only with samples
-        of the same or an earlier step, and it is rejected if its previous sample is rejected.
+        For each sample, the position in `sample` of the sample before it at the same end of its stroke, or
+        -1. It may only be given if `sample` holds the samples that were added last, sorted by step of growth.
+        A sample is then compared only with samples of the same or an earlier step, and it is rejected if its
+        previous sample is rejected.
     """
     pairs = _comparable_pairs(samples, sample)
     spacing = (samples.spacing[pairs.sample] + samples.spacing[pairs.neighbor]) / 2
@@ -143,7 +148,7 @@ def find_lateral_neighbors(
     side = (_left_component(pairs.offset, pairs.sample_frame) > 0).astype(np.intp)
     neighbor_side = (_left_component(pairs.offset, pairs.neighbor_frame) < 0).astype(np.intp)
     covers = lateral_gap < MAX_COVERED_GAP
-    # Indices of neighbors into `sample`, or -1: all are if the samples are compared one by one.
+    # Positions of neighbors in `sample`, or -1. All are -1 if `previous` is not given.
     first = samples.count
     if previous is not None:
         first = sample.min(initial=first)
@@ -170,23 +175,27 @@ def _judge(
     beside: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
     max_gap: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return `gap`, `yielded` and `rejected` of `LateralNeighbors`, one step after another.
+    """Decide which samples are rejected. Return `gap`, `yielded` and `rejected` of `LateralNeighbors`.
 
-    Samples that follow a rejected one are rejected too, and others are not compared with them.
+    The steps of growth are judged one after another. Samples that follow a rejected sample on their stroke
+    are rejected too, and no other samples are compared with them.
 
     Parameters
     ----------
-    step, previous : (n,) ndarray of int
-        The steps, which ascend, and the samples before; see `find_lateral_neighbors`.
+    step : (n,) ndarray of int
+        Step of growth at which each sample was added, in ascending order.
+    previous : (n,) ndarray of int
+        Previous samples; see `find_lateral_neighbors`.
     near : tuple of (k,) ndarray
-        Samples and their older neighbors that are too near; -1 for a neighbor that is not among the
-        samples.
+        Two columns: samples, and older neighbors that are too near to them. Neighbors that are not among the
+        n samples are -1.
     beside : tuple of (m,) ndarray
-        Samples, neighbors beside them, sides and distances in spacings.
+        Four columns: samples, neighbors beside them, sides and distances in spacings.
     max_gap : float
+        Limit in spacings, as in `SeparationRules`.
     """
     near, beside = _sorted_by_first(near), _sorted_by_first(beside)
-    # The last entry is for number -1.
+    # The last element is for the index -1.
     exists = np.ones(len(step) + 1, dtype=bool)
     gap, yielded = np.full((len(step), 2), np.inf), np.zeros(len(step), dtype=bool)
     starts = np.searchsorted(step, np.arange(step[0], step[-1] + 2)) if len(step) else [0]
@@ -207,19 +216,22 @@ def _judge(
 
 
 def _sorted_by_first(columns: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
-    """Return columns with their rows sorted by the first one."""
+    """Return the columns of a table with its rows sorted by the first column."""
     order = np.argsort(columns[0], kind="stable")
     return tuple(column[order] for column in columns)
 
 
 def _rows_of(columns: tuple[np.ndarray, ...], first: int, end: int) -> tuple[np.ndarray, ...]:
-    """Return the rows of columns whose first column, which is sorted, is from `first` to `end` - 1."""
+    """Return the rows of a table whose values in the first column are from `first` to `end` - 1.
+
+    The first column must be sorted.
+    """
     rows = slice(*np.searchsorted(columns[0], (first, end)))
     return tuple(column[rows] for column in columns)
 
 
 def _comparable_pairs(samples: StrokeSamples, sample: np.ndarray) -> _Pairs:
-    """Return the pairs of a given sample and another of its family that is near on the surface."""
+    """Return all pairs of a given sample and another sample of its family that is near on the surface."""
     radius = SEARCH_RADIUS * samples.spacing[sample]
     query, neighbor = samples.grid.pairs_within(
         samples.position[sample], radius, samples.direction[sample]
@@ -236,7 +248,11 @@ def _comparable_pairs(samples: StrokeSamples, sample: np.ndarray) -> _Pairs:
 def _comparable_block(
     samples: StrokeSamples, sample: np.ndarray, query: np.ndarray, neighbor: np.ndarray
 ) -> _Pairs:
-    """Return `_comparable_pairs`, given pairs of samples that are near each other in space."""
+    """Return the pairs of samples of the same family that are near on the surface.
+
+    The given pairs are near each other in space: `query` is a position in `sample`, and `neighbor` an index
+    of another sample.
+    """
     current = sample[query]
     arc_gap = np.abs(samples.arc.take(current) - samples.arc.take(neighbor))
     keep = samples.stroke.take(current) != samples.stroke.take(neighbor)
@@ -271,9 +287,9 @@ def _comparable_block(
 
 
 def _is_older(samples: StrokeSamples, pairs: _Pairs) -> np.ndarray:
-    """Return (m,) bool: whether the neighbor was added before the sample.
+    """Return (m,) bool: whether the neighbor of each pair is older, which means added in an earlier step.
 
-    If both were added in the same step, the sample of the stroke with the lower number is older.
+    If both were added in the same step, the sample of the stroke with the lower index counts as older.
     """
     step, neighbor_step = samples.step[pairs.sample], samples.step[pairs.neighbor]
     has_lower_stroke = samples.stroke[pairs.neighbor] < samples.stroke[pairs.sample]
@@ -281,5 +297,8 @@ def _is_older(samples: StrokeSamples, pairs: _Pairs) -> np.ndarray:
 
 
 def _left_component(vectors: np.ndarray, frame: np.ndarray) -> np.ndarray:
-    """Return the (n,) components of vectors to the left of the direction of frames."""
+    """Return the (n,) components of vectors along the unit vectors to the left of strokes.
+
+    `frame` holds positions, normals and directions of samples, as in `StrokeSamples.frame`.
+    """
     return dot(vectors, np.cross(frame[:, 1], frame[:, 2]))

@@ -1,11 +1,11 @@
-"""The part of a tangent mesh on which strokes are traced: what is in the frame, and what is visible.
+"""Cut from a tangent mesh the part on which strokes are traced: it is in the frame and visible.
 
 Beyond the frame and behind the camera, the size of a pixel has no lower limit, so the number of strokes
 there would have no upper limit.
 
-Hidden strokes are not traced either: on most models, that is half of them. A stroke keeps its distance only
-from the strokes beside it. So visible strokes are the same as on the whole mesh if tracing continues a
-little beyond the visible triangles.
+Strokes on hidden triangles are not traced either. On most models, these are half of all strokes. A stroke
+keeps its distance only from the strokes beside it. So visible strokes are the same as on the whole mesh if
+tracing continues a little beyond the visible triangles.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from .stroke_set import Strokes
 from .tangent_mesh import TangentMesh, take_triangles, with_corners
 from .visibility import BLOCK_POINTS, DepthBuffer, in_frame, planes_around, project_to_pixels
 
-#: Distance from the frame up to which strokes are traced, in pixels and as a fraction of the frame; the
-#: smaller one counts. Strokes then reach the frame as if the mesh continued.
+#: Distance from the frame up to which strokes are traced: the smaller one of a number of pixels and a
+#: fraction of the frame. With this margin, strokes reach the frame as on the whole mesh.
 MARGIN_PIXELS, MARGIN_RATIO = 64.0, 0.125
 
-#: If the depths in a triangle differ by more than the factor `MAX_DEPTH_RATIO`, triangles are cut at planes of
-#: constant depth, each `DEPTH_STEP` times as far away as the one before. Spacings are interpolated linearly
-#: in triangles, and proportional to the depth.
+#: If the depths in a triangle differ by more than the factor `MAX_DEPTH_RATIO`, triangles are cut at planes
+#: of constant depth, each `DEPTH_STEP` times as far away as the one before. The reason is that spacings are
+#: proportional to the depth in perspective, but interpolated linearly in triangles.
 DEPTH_STEP, MAX_DEPTH_RATIO = 2.0, 4.0
 
 #: Distance from visible triangles up to which strokes are traced, in spacings.
@@ -38,42 +38,45 @@ HIDDEN_MARGIN = 6.0
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """T' triangles that are parts of T triangles.
+    """T' triangles, each of which is a part of one of T whole triangles.
 
     Attributes
     ----------
     triangle : (T',) int32 ndarray
-        The whole triangle of each part.
+        Index of the whole triangle that contains each part.
     weights : (T', 3, 3) float64 ndarray
-        Barycentric coordinates of each corner in that triangle.
+        Barycentric coordinates of the three corners of each part in its whole triangle.
     """
 
     triangle: np.ndarray
     weights: np.ndarray
 
     def corner_values(self, values: np.ndarray) -> np.ndarray:
-        """Return (T', 3, ...) values at the corners, given (T, 3, ...) values of the whole triangles."""
+        """Return (T', 3, ...) values at the corners of the parts.
+
+        They are interpolated from the (T, 3, ...) values at the corners of the whole triangles.
+        """
         return np.einsum("tkj,tj...->tk...", self.weights, values[self.triangle])
 
 
 @dataclass(frozen=True, eq=False)
 class MeshInView(Parts):
-    """A part of a tangent mesh.
+    """A part of a tangent mesh, with the position of its T' triangles in the T triangles of the whole mesh.
 
     Attributes
     ----------
     mesh : TangentMesh
-        The part. `triangle_vertex` holds the vertices of the whole triangles.
+        The part as a mesh. Its `triangle_vertex` holds the vertices of the whole triangles.
     """
 
     mesh: TangentMesh
 
     def take(self, kept: np.ndarray) -> MeshInView:
-        """Return some of the parts; `kept` is (T',) bool."""
+        """Return the mesh of the triangles for which `kept`, (T',) bool, is true."""
         return MeshInView(self.triangle[kept], self.weights[kept], take_triangles(self.mesh, kept))
 
     def on_whole_mesh(self, strokes: Strokes) -> Strokes:
-        """Return strokes that were traced on the part as strokes on the whole mesh."""
+        """Return strokes that were traced on this part, with triangles and weights of the whole mesh."""
         return replace(
             strokes,
             triangle=self.triangle[strokes.triangle],
@@ -82,7 +85,7 @@ class MeshInView(Parts):
 
 
 def mesh_in_view(mesh: TangentMesh, camera: Camera) -> MeshInView:
-    """Return a mesh without what is outside the frame and its margin, or in front of the near plane.
+    """Cut off what is outside the frame and its margin, or in front of the near plane.
 
     Parameters
     ----------
@@ -92,7 +95,7 @@ def mesh_in_view(mesh: TangentMesh, camera: Camera) -> MeshInView:
     Returns
     -------
     MeshInView
-        Has no neighbors across the cut. It may have no triangles.
+        The remaining part of the mesh. Edges at the cut have no neighbors. There may be no triangles.
     """
     report(0.0, "finding the part in view")
     x, y, z, w = _clip_coordinates(mesh.points, camera)
@@ -116,7 +119,7 @@ def mesh_in_view(mesh: TangentMesh, camera: Camera) -> MeshInView:
 
 
 def whole_mesh(mesh: TangentMesh) -> MeshInView:
-    """Return all of a mesh as a `MeshInView`."""
+    """Return a `MeshInView` that contains a mesh without any cut."""
     count = len(mesh.points)
     return MeshInView(
         np.arange(count, dtype=np.int32), np.broadcast_to(np.eye(3), (count, 3, 3)), mesh
@@ -124,13 +127,16 @@ def whole_mesh(mesh: TangentMesh) -> MeshInView:
 
 
 def _clip_coordinates(points: np.ndarray, camera: Camera) -> np.ndarray:
-    """Return (4, T, 3) clip coordinates. Equal points have equal ones."""
+    """Return (4, T, 3): clip coordinates x, y, z, w of corners. They are equal for equal points."""
     matrix = camera.projection @ camera.view
     return np.einsum("ij,tkj->itk", matrix[:, :3], points) + matrix[:, 3, None, None]
 
 
 def _depths_of_cuts(depth: np.ndarray) -> np.ndarray:
-    """Return the depths at which triangles with (T, 3) depths above 0 are cut."""
+    """Return the depths at which triangles are cut, given the (T, 3) depths of their corners.
+
+    The result is empty if no triangle has depths that differ by more than the factor `MAX_DEPTH_RATIO`.
+    """
     low, high = np.maximum(depth.min(axis=1), 1e-300), depth.max(axis=1)
     is_deep = high > MAX_DEPTH_RATIO * low
     if not is_deep.any():
@@ -141,21 +147,21 @@ def _depths_of_cuts(depth: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _Pieces(Parts):
-    """Parts of triangles and their adjacency; see `TangentMesh` for the attributes."""
+    """Parts of triangles and their adjacency, with attributes as in `TangentMesh`."""
 
     neighbor: np.ndarray
     neighbor_edge: np.ndarray
     edge_transport: np.ndarray
 
     def cut(self, distance: np.ndarray, keeps_both: bool) -> _Pieces:
-        """Cut along a plane.
+        """Return the pieces after a cut along a plane.
 
         Parameters
         ----------
         distance : (T, 3) ndarray
             Signed distances of the corners of the whole triangles from the plane, in any unit.
         keeps_both : bool
-            Whether the side with negative distances is kept.
+            Whether the pieces with negative distances are kept as well as the others.
         """
         value = self.corner_values(distance)
         inside = value >= 0
@@ -172,8 +178,9 @@ class _Pieces(Parts):
         on_ab = self._crossing(value, crossed, a, b)
         on_ac = self._crossing(value, crossed, a, c)
         at_a, at_b, at_c = (self.weights[crossed, corner] for corner in (a, b, c))
-        # Edges have the numbers 3 t + k from before the cut. Negative numbers are new edges in a triangle
-        # that is cut: the cut, as an edge of the tip and of the rest, and the diagonal of the rest.
+        # Edges keep their numbers 3 t + k from before the cut. New edges in a triangle that is cut have
+        # negative numbers. The cut is an edge of the tip and of the rest, which is a quadrilateral. The
+        # diagonal is an edge of the two triangles into which the rest is divided.
         edge_a, edge_b, edge_c = (3 * crossed + corner for corner in (a, b, c))
         cut_of_tip, cut_of_rest, diagonal, diagonal_back = (
             -(4 * np.arange(len(crossed)) + number) - 1 for number in range(4)
@@ -197,7 +204,17 @@ class _Pieces(Parts):
     def _crossing(
         self, value: np.ndarray, piece: np.ndarray, first: np.ndarray, second: np.ndarray
     ) -> np.ndarray:
-        """Return the (n, 3) weights of the points with the value 0 on edges between two corners."""
+        """Return (n, 3) barycentric coordinates, in whole triangles, of the zeros of a function on edges.
+
+        Parameters
+        ----------
+        value : (T', 3) ndarray
+            Values at the corners of all pieces. They are interpolated linearly.
+        piece : (n,) ndarray of int
+            Piece to which each edge belongs.
+        first, second : (n,) ndarray of int
+            Corners, 0 to 2, of the pieces at the ends of the edges.
+        """
         start, end = value[piece, first], value[piece, second]
         fraction = (start / (start - end))[:, None]
         return (1 - fraction) * self.weights[piece, first] + fraction * self.weights[piece, second]
@@ -210,22 +227,25 @@ class _Pieces(Parts):
         side: np.ndarray,
         cut_count: int,
     ) -> _Pieces:
-        """Return the pieces after a cut, and find the neighbors of each.
+        """Find the neighbors of m new pieces, and return the new pieces with them.
 
         Parameters
         ----------
         source : (m,) ndarray of int
-            The piece that each new piece is a part of.
+            Index of the old piece that contains each new piece.
         weights : (m, 3, 3) ndarray
+            Barycentric coordinates of the corners of the new pieces, in whole triangles.
         edge : (m, 3) ndarray of int
-            The edges as in `cut`.
+            For each edge of a new piece, the number 3 t + k of the edge of an old piece that contains it.
+            Edges inside old pieces have negative numbers. Two of them are the same edge if their values of
+            ``-edge - 1`` differ only in the last bit.
         side : (m,) bool ndarray
-            The side of the plane.
+            Whether the new piece is on the positive side of the plane.
         cut_count : int
-            The number of pieces that were cut.
+            Number of old pieces that were cut.
         """
         is_inner = edge < 0
-        # Parts of an edge are beside each other if they are on the same side.
+        # Two parts of the same old edge are neighbors if they are on the same side of the plane.
         slot = np.where(is_inner, 0, edge) + 3 * len(self.triangle) * side[:, None]
         new_edge_at = np.full(6 * len(self.triangle), -1)
         new_edge = np.arange(edge.size).reshape(edge.shape)
@@ -239,7 +259,7 @@ class _Pieces(Parts):
         other = np.full(edge.shape, -1)
         row = np.broadcast_to(side[:, None], edge.shape)[has_neighbor]
         other[has_neighbor] = new_edge_at[beside[has_neighbor] + 3 * len(self.triangle) * row]
-        # The other inner edge of a pair differs in the last bit.
+        # The numbers of the two sides of an inner edge differ in the last bit.
         other[is_inner] = inner_edge_at[(-edge[is_inner] - 1) ^ 1]
         transport = np.where(is_inner, 1, self.edge_transport.ravel()[old])
         return _Pieces(
@@ -251,7 +271,7 @@ class _Pieces(Parts):
         )
 
     def apply(self, mesh: TangentMesh) -> MeshInView:
-        """Return the pieces as a mesh."""
+        """Return the pieces as a mesh, with the values of `mesh` interpolated at their corners."""
         per_triangle = {
             name: getattr(mesh, name)[self.triangle]
             for name in ("x", "y", "normal", "face", "triangle_vertex")
@@ -275,20 +295,20 @@ class _Pieces(Parts):
 
 
 def seen_triangles(instance: MeshInstance, index: int, depth_buffer: DepthBuffer) -> np.ndarray:
-    """Find the triangles of an instance that the camera sees.
+    """Return which triangles of an instance the camera sees.
 
     Parameters
     ----------
     instance : MeshInstance
     index : int
-        Number of the instance in the depth buffer.
+        Index of the instance in the depth buffer.
     depth_buffer : DepthBuffer
 
     Returns
     -------
     (T,) bool ndarray
-        Triangles that are nearest at a pixel, or have a corner that is not hidden. A corner out of
-        the frame counts as not hidden.
+        True for triangles that are nearest to the camera at a pixel, or have a corner that is not hidden. A
+        corner outside the frame counts as not hidden.
     """
     triangle_vertex = instance.surface.triangle_vertex
     owner = depth_buffer.triangle[depth_buffer.triangle >= 0]
@@ -304,7 +324,10 @@ def seen_triangles(instance: MeshInstance, index: int, depth_buffer: DepthBuffer
 
 
 def _is_hidden(points: np.ndarray, depth_buffer: DepthBuffer) -> np.ndarray:
-    """Return (n,) bool: which points are in the frame, and behind all triangles around them."""
+    """Return (n,) bool: whether points are in the frame and hidden.
+
+    A point is hidden if the triangles that are visible at all four pixels around it hide it.
+    """
     pixels, _ = project_to_pixels(points, depth_buffer.camera)
     hidden = in_frame(pixels, depth_buffer.camera)
     chosen = np.flatnonzero(hidden)
@@ -314,26 +337,27 @@ def _is_hidden(points: np.ndarray, depth_buffer: DepthBuffer) -> np.ndarray:
 
 
 def triangles_near(mesh: TangentMesh, seen: np.ndarray, spacing: np.ndarray) -> np.ndarray:
-    """Return the triangles that are within `HIDDEN_MARGIN` spacings of visible triangles.
+    """Return which triangles are visible or within `HIDDEN_MARGIN` spacings of a visible triangle.
 
-    Triangles are reached across edges. The distance of a triangle is the straight distance between the
-    edge at which it is entered and the edge at which its path leaves a visible triangle.
+    Hidden triangles are reached from visible ones by paths across edges. The distance of a triangle is the
+    straight distance between two edges: where the path leaves a visible triangle, and where it enters the
+    triangle.
 
     Parameters
     ----------
     mesh : TangentMesh
     seen : (T,) bool ndarray
+        Visible triangles.
     spacing : (T, 3) float64 ndarray
         Spacing at the corners, in world space.
 
     Returns
     -------
     (T,) bool ndarray
-        Includes the visible ones.
     """
     spacing = spacing.mean(axis=1)
     distance = np.where(seen, 0.0, np.inf)
-    # The edge at which the path to each triangle leaves a visible one.
+    # The edge at which the path to each triangle leaves a visible triangle.
     origin = np.zeros((len(seen), 2, 3))
     front = np.flatnonzero(seen)
     while len(front):
@@ -348,7 +372,7 @@ def triangles_near(mesh: TangentMesh, seen: np.ndarray, spacing: np.ndarray) -> 
         start = np.where(seen[source, None, None], entered, origin[source])
         reached = _edge_distance(start, entered) / spacing[target]
         nearer = np.flatnonzero((reached < distance[target]) & (reached <= HIDDEN_MARGIN))
-        # Of several ways to one triangle, the shortest is written last.
+        # If several paths reach a triangle, the shortest one is written last.
         nearer = nearer[np.argsort(-reached[nearer], kind="stable")]
         distance[target[nearer]], origin[target[nearer]] = reached[nearer], start[nearer]
         front = np.unique(target[nearer])
@@ -356,8 +380,11 @@ def triangles_near(mesh: TangentMesh, seen: np.ndarray, spacing: np.ndarray) -> 
 
 
 def _edge_distance(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Return the (n,) distances between (n, 2, 3) edges in one plane that do not cross."""
-    # One end of an edge is nearest to the other edge.
+    """Return the (n,) distances between two (n, 2, 3) edges, which do not cross.
+
+    Distances are measured from the ends of each edge to the other edge.
+    """
+    # The shortest connection starts at an end of one of the two edges.
     point = np.stack([first, second]).transpose(2, 0, 1, 3)
     edge = np.stack([second, first])
     along, offset = edge[:, :, 1] - edge[:, :, 0], point - edge[:, :, 0]

@@ -1,7 +1,7 @@
-"""Outlines of meshes as strokes: silhouettes, creases and borders, and which parts of them are visible.
+"""Outlines of meshes as strokes: silhouettes, creases and borders, and their visible parts.
 
-Outlines lie where surfaces turn away from the camera, so their own surface nearly hides them. They have a
-depth test of their own.
+Silhouettes lie where the surface turns away from the camera, so the surface itself nearly hides them. For
+this reason, outlines have a depth test of their own.
 """
 
 from __future__ import annotations
@@ -28,40 +28,45 @@ from .visibility import (
     visible_runs,
 )
 
-#: `Strokes.names` of an outline: the kind of line of each family.
+#: Names of the families in outlines; see `Strokes.names`.
 OUTLINE_KINDS = ("silhouettes", "creases", "borders")
 
-#: Shortest crease in pixels, and its angle in radians. The shortest length is inversely proportional to the
-#: angle, of which at most a right angle counts.
+#: Creases shorter than `MIN_CREASE_PX` pixels are left out if their angle is `REFERENCE_ANGLE` radians. For
+#: other angles, the limit is inversely proportional to the angle. Angles above a right angle count as right
+#: angles.
 MIN_CREASE_PX, REFERENCE_ANGLE = 12.0, np.radians(60)
 
-#: End points are the same if they differ by less than about this fraction of the extent of all.
+#: End points count as the same if they differ by less than about this fraction of the extent of all points.
 SAME_POINT_RATIO = 1e-7
 
-#: Where more than two segments meet, two are joined if they turn by less than this, in radians.
+#: Where more than two segments meet, two are joined only if the angle by which the line turns from one to the
+#: other is less than this, in radians.
 MAX_JUNCTION_TURN = np.radians(50)
 
-#: A silhouette is also visible if it is visible after a move outward by one of these distances, in pixels:
-#: edges of triangles that lie outside of the smooth surface hide it.
+#: A point of a silhouette is also visible if it is visible after a move outward by one of these distances, in
+#: pixels. Otherwise, edges of triangles that are outside of the smooth silhouette would hide it.
 OUTWARD_STEPS_PX = (1.0, 2.0)
 
-#: A silhouette is not hidden by triangles that share a vertex with its triangle and are in front of it by less
-#: than this fraction of the longest edge of its triangle.
+#: A point of a silhouette in a triangle is not hidden by triangles that share a vertex with this triangle, if
+#: they are in front of it by less than this fraction of the longest edge of the triangle.
 MAX_RING_DEPTH = 1.0
 
-#: Shorter gaps in outlines are closed, and shorter outlines are left out, in pixels.
+#: Gaps in outlines that are shorter than `MAX_GAP_PX` pixels are closed. Visible parts that are shorter than
+#: `MIN_MARK_PX` pixels are left out.
 MAX_GAP_PX, MIN_MARK_PX = 4.0, 6.0
 
 
 class Segments(NamedTuple):
-    """k straight segments of lines on triangles, in world space.
+    """k straight segments on triangles, in world space.
 
     Attributes
     ----------
     ends : (k, 2, 3) float64 ndarray
+        End points.
     normals : (k, 2, 3) float64 ndarray
         Unit shading normals at the ends.
     triangle : (k,) int64 ndarray
+        Triangle on which each segment lies.
     """
 
     ends: np.ndarray
@@ -70,7 +75,7 @@ class Segments(NamedTuple):
 
 
 class _Corners(NamedTuple):
-    """The (T, 3, 3) corners and shading normals of triangles, and the (T, 3) normals of triangles."""
+    """Corners of triangles, (T, 3, 3), shading normals there, (T, 3, 3), and flat normals, (T, 3)."""
 
     points: np.ndarray
     normals: np.ndarray
@@ -88,12 +93,14 @@ def outline_strokes(instance: MeshInstance, camera: Camera) -> Strokes:
     ----------
     instance : MeshInstance
     camera : Camera
-        Camera of the silhouettes. Creases that are too short and blunt in its pixels are left out.
+        Camera for which the silhouettes are found. Creases that are too short and blunt in its pixels are
+        left out.
 
     Returns
     -------
     Strokes
-        World space; families as in `OUTLINE_KINDS`. Members and spacings are 0, weights are NaN.
+        Strokes in world space, with the families `OUTLINE_KINDS`. Members and spacings are 0, weights are
+        NaN.
     """
     surface = instance.surface
     matrix = np.asarray(instance.matrix, dtype=np.float64)
@@ -128,9 +135,10 @@ def outline_strokes(instance: MeshInstance, camera: Camera) -> Strokes:
 
 
 def _smooth_silhouettes(corners: _Corners, camera: Camera) -> Segments:
-    """Return the zero set of n . w, where w is the direction to the camera.
+    """Return the silhouettes of the smooth surface: the zero set of n . w.
 
-    It has a straight segment in each triangle in which n . w changes its sign.
+    Here n is the interpolated normal, and w the direction to the camera. There is a straight segment in each
+    triangle in which n . w changes its sign.
     """
     facing = dot(corners.normals, camera.view_directions(corners.points))
     front = facing > 0
@@ -149,13 +157,14 @@ def _smooth_silhouettes(corners: _Corners, camera: Camera) -> Segments:
 
 
 def _sharp_silhouettes(corners: _Corners, a: np.ndarray, b: np.ndarray, camera: Camera) -> Segments:
-    """Return the parts of sharp edges on which one side faces the camera and the other does not.
+    """Return the parts of sharp edges on which one side faces the camera and the other side faces away.
 
     Parameters
     ----------
     corners : _Corners
     a, b : (n,) ndarray of int
-        The corners (3 t + k) at which the edges start in the triangles on both sides.
+        Corners at which the edges start, as 3 t + k: `a` in the triangles t on one side, `b` on the other
+        side.
     camera : Camera
     """
     segments = _edge_segments(corners, a)
@@ -189,7 +198,7 @@ def _edge_segments(corners: _Corners, starts: np.ndarray) -> Segments:
 
 
 def _are_pairs(vertex: np.ndarray, starts: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-    """Return (n,) bool: whether edges of triangles are among pairs of vertices, the smaller first.
+    """Return (n,) bool: whether edges of triangles connect one of the given pairs of vertices.
 
     Parameters
     ----------
@@ -198,6 +207,7 @@ def _are_pairs(vertex: np.ndarray, starts: np.ndarray, pairs: np.ndarray) -> np.
     starts : (n,) ndarray of int
         Corners at which the edges start.
     pairs : (m, 2) ndarray of int
+        Pairs of vertices; the smaller index is first.
     """
     stride = int(vertex.max()) + 1
     following = starts - starts % 3 + (starts + 1) % 3
@@ -206,10 +216,10 @@ def _are_pairs(vertex: np.ndarray, starts: np.ndarray, pairs: np.ndarray) -> np.
 
 
 def _pixel_salience(segments: Segments, angle: np.ndarray, camera: Camera) -> np.ndarray:
-    """Return (k,) float64: the lengths of creases in pixels, times their sharpness.
+    """Return (k,) float64: the lengths of creases in pixels, times their angle over `REFERENCE_ANGLE`.
 
-    Pixels are measured at the depth of the segment, so that the result does not change when the mesh
-    turns.
+    The length is not foreshortened: it is divided by the size of a pixel at the depth of the segment. So the
+    result hardly changes when the mesh rotates.
     """
     length = np.linalg.norm(segments.ends[:, 1] - segments.ends[:, 0], axis=1)
     length = length / pixel_size(segments.ends.mean(axis=1), camera)
@@ -222,9 +232,10 @@ def _pixel_salience(segments: Segments, angle: np.ndarray, camera: Camera) -> np
 def _strokes(
     segments: Segments, family: int, surface: Surface, salience: np.ndarray | None = None
 ) -> Strokes:
-    """Return the polylines that segments form, as strokes of a family.
+    """Join segments to polylines, and return them as strokes of the given family.
 
-    With (k,) saliences, polylines with a sum of less than `MIN_CREASE_PX` are left out.
+    If `salience`, (k,), is given, a polyline is left out if the sum of the saliences of its segments is below
+    `MIN_CREASE_PX`.
     """
     keys = _point_keys(segments.ends)
     # Where a silhouette passes through a vertex, it has segments without a length in some triangles.
@@ -234,7 +245,7 @@ def _strokes(
     if salience is not None:
         salience = salience[has_length]
         chains = [pair for pair in chains if salience[pair[0][::2] >> 1].sum() >= MIN_CREASE_PX]
-    # Each end of a segment, but the second of two that meet; and the segment that ends there.
+    # The points of chains: one end of each segment, and the last end of the chain. Then the segment at each.
     none = np.empty(0, dtype=np.int64)
     point = np.concatenate([none, *(np.append(chain[::2], chain[-1]) for chain, _ in chains)])
     segment = np.concatenate([none, *(np.append(chain[0], chain[::2]) for chain, _ in chains)]) >> 1
@@ -256,7 +267,7 @@ def _strokes(
 
 
 def _point_keys(ends: np.ndarray) -> np.ndarray:
-    """Return (k, 2) int64 keys of the (k, 2, 3) end points: the same for the same points."""
+    """Return (k, 2) int64 keys of the (k, 2, 3) end points. Points at the same position have the same key."""
     if not len(ends):
         return np.empty((0, 2), dtype=np.int64)
     points = ends.reshape(-1, 3)
@@ -269,20 +280,21 @@ def _point_keys(ends: np.ndarray) -> np.ndarray:
 def _chain_segments(keys: np.ndarray, ends: np.ndarray) -> list[tuple[np.ndarray, bool]]:
     """Join segments into chains.
 
-    Two segments are joined where no others meet. Where others do, the straightest pairs are joined.
+    Where exactly two segments meet, they are joined. Where more segments meet, the straightest pairs are
+    joined.
 
     Parameters
     ----------
     keys : (k, 2) int64 ndarray
-        From `_point_keys`.
+        Keys of the end points, from `_point_keys`.
     ends : (k, 2, 3) ndarray
         End points of the segments.
 
     Returns
     -------
     list of (chain, closed)
-        The chain is an array of ends (2 * segment + side) in the order in which they are passed, two
-        for each segment. Closed chains end where they start.
+        The chain is an array of ends of segments, 2 * segment + (0 or 1), in their order along the chain.
+        Each segment has two ends. A closed chain ends where it starts.
     """
     count = len(keys)
     flat = keys.ravel()
@@ -310,7 +322,17 @@ def _chain_segments(keys: np.ndarray, ends: np.ndarray) -> list[tuple[np.ndarray
 
 
 def _join_at_junction(junction: np.ndarray, outward: np.ndarray, mate: np.ndarray) -> None:
-    """Set the mates of the ends at a point where three or more segments meet."""
+    """Join the straightest pairs of ends at a point where three or more segments meet.
+
+    Parameters
+    ----------
+    junction : (m,) ndarray of int
+        Ends at the point, as 2 * segment + (0 or 1).
+    outward : (2 k, 3) ndarray
+        For each end, the unit direction of its segment toward the end.
+    mate : (2 k,) ndarray of int
+        The end that is joined to each end, or -1. Changed in place.
+    """
     turn = np.arccos(np.clip(-outward[junction] @ outward[junction].T, -1, 1))
     row, column = np.triu_indices(len(junction), 1)
     for pair in np.argsort(turn[row, column], kind="stable").tolist():
@@ -331,8 +353,8 @@ def clip_outline(
 ) -> Strokes:
     """Return the parts of outlines that are in the frame and not hidden.
 
-    The depth test of strokes fails for silhouettes, which lie on triangles that may face away from the
-    camera although the smooth surface does not.
+    Outlines need another depth test than strokes, because silhouettes lie on triangles that may face away
+    from the camera where the smooth surface does not.
 
     Parameters
     ----------
@@ -340,7 +362,7 @@ def clip_outline(
         The `outline_strokes` of an instance.
     instance : MeshInstance
     index : int
-        Number of the instance in the depth buffer.
+        Index of the instance in the depth buffer.
     camera : Camera
     depth_buffer : DepthBuffer or None
         If None, lines are only clipped to the frame.
@@ -348,7 +370,7 @@ def clip_outline(
     Returns
     -------
     Strokes
-        Without marks shorter than `MIN_MARK_PX`.
+        With a depth buffer, visible parts that are shorter than `MIN_MARK_PX` are left out.
     """
     test = None if depth_buffer is None else _OutlineTest(instance, index, depth_buffer).is_visible
     return visible_runs(lines, camera, test, MAX_GAP_PX, MIN_MARK_PX)
@@ -361,11 +383,13 @@ class _OutlineTest:
     ----------
     depth_buffer : DepthBuffer
     first_triangle : int
-        Number of the first triangle of the instance in the depth buffer.
+        Index of the first triangle of the instance in the depth buffer.
     triangle_vertex, triangles : (T, 3) int32 ndarray
-        Vertices and corners of the triangles.
-    points, normals : (n, 3) float64 ndarray
-        Vertices, and shading normals at the corners.
+        Vertices and face corners of the triangles of the instance.
+    points : (V, 3) float64 ndarray
+        Vertices in world space.
+    normals : (C, 3) float64 ndarray
+        Shading normals at the face corners, in world space.
     """
 
     def __init__(self, instance: MeshInstance, index: int, depth_buffer: DepthBuffer) -> None:
@@ -378,7 +402,7 @@ class _OutlineTest:
         self.normals = surface.corner_normal @ cofactor_matrix(matrix[:3, :3]).T
 
     def is_visible(self, block: Strokes, point: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-        """Return (m,) bool: which points are visible; see `visible_runs`."""
+        """Return (m,) bool: whether points of outlines are visible. Parameters are as in `visible_runs`."""
         camera, triangle = self.depth_buffer.camera, block.triangle[point]
         ring_depth = np.full(len(point), -1.0)
         contour = np.flatnonzero(
@@ -400,11 +424,12 @@ class _OutlineTest:
         return visible
 
     def _ring_depth(self, triangle: np.ndarray) -> np.ndarray:
-        """Return (n,) float64: `MAX_RING_DEPTH` as a length, for silhouettes that bend outward.
+        """Return (n,) float64: the depth within which adjacent triangles do not hide a silhouette.
 
-        The radial curvature of the surface is positive there: n . w grows toward the camera. Where
-        it is negative, the surface hides its silhouette. The result is negative there, and for lines
-        on triangles that no silhouette crosses.
+        It is `MAX_RING_DEPTH` times the longest edge of the triangle, in world space, if the surface does not
+        hide its own silhouette. Then its radial curvature is positive: n . w (normal times the direction to
+        the camera) grows toward the camera. Otherwise, and in triangles that no silhouette crosses, the
+        result is negative.
         """
         a, b, c = (self.points[self.triangle_vertex[triangle, k]] for k in range(3))
         to_eye = self.depth_buffer.camera.view_directions((a + b + c) / 3)
@@ -424,7 +449,11 @@ class _OutlineTest:
     def _is_hidden(
         self, points: np.ndarray, pixels: np.ndarray, triangle: np.ndarray, ring_depth: np.ndarray
     ) -> np.ndarray:
-        """Return (n,) bool: which points are behind the planes of all four pixels around them."""
+        """Return (n,) bool: whether points are hidden by the triangles visible at all four pixels around.
+
+        Triangles that share a vertex with the triangle of the point do not hide it if the distance behind
+        them is less than `ring_depth`, (n,).
+        """
         hidden = np.ones(len(points), dtype=bool)
         for plane in planes_around(points, pixels, self.depth_buffer):
             behind = plane.hides.copy()
@@ -434,7 +463,11 @@ class _OutlineTest:
         return hidden
 
     def _shares_vertex(self, triangle: np.ndarray, other: np.ndarray) -> np.ndarray:
-        """Return (n,) bool: whether triangles of the depth buffer touch (n,) triangles of its own."""
+        """Return (n,) bool: whether pairs of triangles share a vertex.
+
+        `triangle` holds triangles of this instance, and `other` triangles of the depth buffer. The result is
+        false if `other` belongs to another instance.
+        """
         local = other - self.first_triangle
         is_own = (local >= 0) & (local < len(self.triangle_vertex))
         vertex = self.triangle_vertex[np.where(is_own, local, 0)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from .surface_particles import SurfaceParticles, TracedPath
 
-#: Two positions along a path are the same if they differ by less than this fraction of a step.
+#: Two positions along a path count as the same if they differ by less than this fraction of a step.
 ARC_EPS = 1e-9
 
 
@@ -19,15 +19,15 @@ class PathSamples(NamedTuple):
     Attributes
     ----------
     particle : (k,) intp ndarray
-        Number of the particle.
+        Index of the particle on whose path the sample is.
     rank : (k,) intp ndarray
-        Number of the sample along the path of its particle, from 0.
+        Position of the sample in the sequence of samples along its path, from 0.
     previous : (k,) intp ndarray
-        The sample before along the same path, or -1.
+        Index of the sample before it on the same path; -1 if it is the first.
     arc : (k,) float64 ndarray
-        Distance from the beginning of the path, in world space.
+        Distance of the sample from the beginning of the path, in world space.
     position : SurfaceParticles
-        The samples, as particles that continue along the path.
+        Particles at the samples, which can continue along the path.
     """
 
     particle: np.ndarray
@@ -37,7 +37,7 @@ class PathSamples(NamedTuple):
     position: SurfaceParticles
 
     def take(self, indices: np.ndarray) -> PathSamples:
-        """Return some samples, which include all samples before each of them."""
+        """Return the samples at `indices`. These must include all samples before them on the same paths."""
         number = np.full(len(self.particle) + 1, -1)
         number[indices] = np.arange(len(indices))
         return PathSamples(
@@ -50,11 +50,12 @@ class PathSamples(NamedTuple):
 
 
 class SampledPath:
-    """The paths of n particles, by distance from their beginning.
+    """The paths of n particles, which can be sampled and cut at distances from their beginnings.
 
     Parameters
     ----------
     path : TracedPath
+        Segments of all paths.
     sign : (n,) ndarray
         Signs of the particles; see `SurfaceParticles`.
     """
@@ -77,17 +78,18 @@ class SampledPath:
         next_step: Callable[[SurfaceParticles, np.ndarray], np.ndarray],
         ended: np.ndarray,
     ) -> PathSamples:
-        """Return samples at steps along the paths.
+        """Return samples along the paths, each one step after the sample before it.
 
-        A path that ended, or is shorter than its first step, has a sample at its end as well.
+        A path that is shorter than its first step has a sample at its end. So has a path whose particle
+        ended.
 
         Parameters
         ----------
         first_step : (n,) ndarray
             Lengths of the first steps, in world space.
         next_step : callable
-            Called as ``next_step(position, particle)`` with samples and the numbers of their paths.
-            Returns the lengths of the steps from there, in world space.
+            Function, called as ``next_step(position, particle)`` with particles at samples and the indices of
+            their paths. It returns the lengths of the steps to the next samples, in world space.
         ended : (n,) bool ndarray
             Whether the particle cannot continue at the end of its path.
         """
@@ -133,7 +135,7 @@ class SampledPath:
         return PathSamples(particle, rank, row, arc, SurfaceParticles(*position))
 
     def cut(self, arc: np.ndarray) -> TracedPath:
-        """Return the paths up to (n,) distances from their beginnings."""
+        """Return the segments of the paths up to the (n,) distances `arc` from their beginnings."""
         path = self.path
         begin = self._end - path.length - self._start[path.particle]
         fraction = (arc[path.particle] - begin) / np.where(path.length > 0, path.length, 1)

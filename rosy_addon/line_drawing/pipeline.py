@@ -1,4 +1,4 @@
-"""Draw strokes on the mesh instances of a scene: spacing, tracing, clipping and overshoot."""
+"""Draw the mesh instances of a scene with strokes: from the spacing over tracing to clipping."""
 
 from __future__ import annotations
 
@@ -54,33 +54,35 @@ from .visibility import (
 #: Width of a tapered stroke at its end, as a fraction of the full width.
 TIP_WIDTH = 0.15
 
-#: If no vertex of a mesh instance is in the frame, its spacings are at least the spacing at this
+#: If no vertex of a mesh instance is in the frame, spacings on it are not smaller than the spacing at this
 #: fraction of its mean distance to the camera.
 OFFSCREEN_DISTANCE_RATIO = 0.1
 
-#: Smallest distance between strokes in a picture, in pixels. Runs of visible points shorter than a few pixels
-#: are artifacts, and finer strokes are hardly longer.
+#: Smallest distance between strokes in a picture, in pixels. Visible runs that are shorter than a few pixels
+#: are removed as artifacts, and strokes at smaller distances would hardly be longer.
 MIN_SPACING_PIXELS = 0.5
 
-#: Bytes that tracing takes at least, and bytes for each family and each square of the surface as wide as the
-#: spacing: the piece of a stroke that crosses it has about 12 points of 16 float64 numbers.
+#: Memory of tracing in bytes: a constant, plus `SQUARE_BYTES` for each family and each square of the surface
+#: whose side is the spacing. The piece of a stroke that crosses the square has about 12 points of 16 float64
+#: numbers.
 TRACING_BYTES, SQUARE_BYTES = 40_000_000, 1500
 
 
 @dataclass(frozen=True, eq=False)
 class StrokeDrawing:
-    """The strokes of several mesh instances.
+    """The strokes of all mesh instances in a drawing.
 
     Attributes
     ----------
     strokes : Strokes
-        Families with the same name are merged across instances. The kinds of outline come last.
+        The S strokes. Families with the same name are merged across instances. The families of outlines are
+        last.
     instance_index : (S,) int32 ndarray
-        The mesh instance of each stroke: an index into the instances that were given.
+        For each stroke, the index of its mesh instance in the sequence that was drawn.
     hidden : bool
         Whether parts that the camera does not see were kept.
     marks : SingularityMarks or None
-        The singularities, if the style shows them.
+        Marks of the singularities; None if the style does not show them.
     """
 
     strokes: Strokes
@@ -91,7 +93,7 @@ class StrokeDrawing:
 
 @dataclass(frozen=True, eq=False)
 class _View:
-    """How all instances of a drawing are seen.
+    """The camera, the style and the depth buffer of a drawing, which are the same for all instances.
 
     Attributes
     ----------
@@ -100,7 +102,7 @@ class _View:
     clips : bool
         Whether strokes are clipped to the frame.
     depth_buffer : DepthBuffer or None
-        Of all instances; None if hidden strokes are kept.
+        Depth buffer of all instances; None if hidden strokes are kept.
     """
 
     camera: Camera
@@ -118,20 +120,21 @@ def draw_instances(
     clip_to_frame: bool = True,
     cache: Cache | None = None,
 ) -> StrokeDrawing:
-    """Cover mesh instances with strokes and remove what the camera does not see.
+    """Cover mesh instances with strokes, and remove the parts that the camera does not see.
 
     Parameters
     ----------
     instances : sequence of MeshInstance
-        Strokes are drawn on instances with a field. All instances occlude.
+        Strokes are drawn on the instances with a field. All instances can hide strokes.
     camera : Camera
-        Its resolution also sets the length of a pixel.
+        Camera of the drawing. Its resolution also sets the length of a pixel.
     style : StrokeStyle
     lights : sequence of LightSource
-        Lights of the tone, in camera space. Without lights, the light is at the camera.
+        Lights in camera space, from which the tone is computed. If there are none, the light is at the
+        camera.
     clip_to_frame : bool
-        Clip strokes to the frame even if `style.hidden` keeps hidden ones. Without `style.hidden`
-        they are always clipped.
+        Whether strokes are clipped to the frame if `style.hidden` is set. If it is not set, they are always
+        clipped.
     cache : Cache, optional
         Cache for corner fields.
 
@@ -205,7 +208,10 @@ def _traced_parts(
     lights: Sequence[LightSource],
     cache: Cache,
 ) -> list[tuple[int, Strokes]]:
-    """Return the number and the strokes of each drawn instance that can be in view."""
+    """Trace strokes on the instances with the indices `drawn`.
+
+    Return pairs of the index of an instance and its strokes. Instances that cannot be in view are left out.
+    """
     parts = []
     for rank, index in enumerate(drawn):
         with progress(0.05 + 0.87 * rank / len(drawn), 0.05 + 0.87 * (rank + 1) / len(drawn)):
@@ -218,16 +224,16 @@ def _traced_parts(
 def _instance_strokes(
     instance: MeshInstance, index: int, view: _View, lights: Sequence[LightSource], cache: Cache
 ) -> Strokes | None:
-    """Return the strokes of a mesh instance, before they are clipped; None if none can be in view.
+    """Return the strokes of a mesh instance before clipping, or None if no stroke can be in view.
 
-    `index` is the number of the instance in the depth buffer.
+    `index` is the index of the instance in the depth buffer.
     """
     style = view.style
     report(0.0, "computing the spacing")
-    # Spacing and tone change at sharp edges, so they are values of fans, not of vertices.
+    # Spacing and tone jump at sharp edges, so they are stored for smooth fans of corners, not for vertices.
     by_fan = with_vertices_of_fans(instance)
     tone = lit_tone(by_fan, view.camera, lights) if style.light != "none" else None
-    # Without changes of the spacing, all of the tone is in the widths.
+    # With a swell of 1, the tone changes only the widths, not the spacing.
     max_ratio = MAX_SPACING_RATIO ** (1 - style.swell)
     factor = np.ones(len(by_fan.surface.vertices))
     if tone is not None:
@@ -253,7 +259,7 @@ def _instance_strokes(
         strokes = part.on_whole_mesh(trace_on_mesh(part.mesh, spacing, surface_name=name))
     strokes = mark_free_boundary_ends(strokes, mesh)
     if style.cross_creases:
-        # Strokes may cross creases, families do not.
+        # Strokes may cross creases. Families are matched on a mesh without connections across creases.
         with progress(0.9, 0.92):
             mesh = build_tangent_mesh(instance, cache=cache)
     with progress(0.92, 0.95):
@@ -265,7 +271,7 @@ def _instance_strokes(
         with progress(0.95, 0.98):
             strokes = with_crossing_gaps(strokes, style.gaps)
     if style.taper:
-        # Strokes reach creases and borders at full width, as they reach silhouettes. Those that will be
+        # Strokes reach creases and borders at full width, as they reach silhouettes. Ends that will be
         # extended are tapered after the extension.
         with progress(0.98, 1.0):
             ends = ~head_on_ends(strokes) & ~strokes.free_end_mask
@@ -276,18 +282,19 @@ def _instance_strokes(
 def _part_to_trace(
     instance: MeshInstance, index: int, mesh: TangentMesh, factor: np.ndarray, view: _View
 ) -> tuple[MeshInView, CornerSpacing] | None:
-    """Return the part of a mesh on which strokes are traced, and the spacing on it.
+    """Return the part of a mesh on which strokes are traced, and the spacing on it, or None.
 
-    If strokes are clipped, it is the part in view. If hidden strokes are removed, it is what is visible of
-    this part, and what is near. None if the field is zero on it.
+    If strokes are clipped, the part is in the frame or near it. If hidden strokes are removed, it consists of
+    the visible triangles and those near them. None is returned if the field is zero everywhere on the part.
 
     Parameters
     ----------
     instance, index
-        As for `_instance_strokes`.
+        Instance, and its index in the depth buffer.
     mesh : TangentMesh
+        Tangent mesh of the instance, with T triangles.
     factor : (T, 3) float64 ndarray
-        Factors of the spacing at corners, by tone and curvature.
+        Factor at each corner by which tone and curvature change the spacing.
     view : _View
     """
     part = mesh_in_view(mesh, view.camera) if view.clips else whole_mesh(mesh)
@@ -305,7 +312,10 @@ def _part_to_trace(
 
 
 def _outline(instance: MeshInstance, index: int, view: _View) -> Strokes:
-    """Return the outline of an instance, clipped like strokes."""
+    """Return the outline of an instance. It is clipped and smoothed if strokes are clipped.
+
+    `index` is the index of the instance in the depth buffer.
+    """
     lines = outline_strokes(instance, view.camera)
     if not view.clips:
         return lines
@@ -324,12 +334,12 @@ def _overshoot(strokes: Strokes, view: _View) -> Strokes:
 
 
 def _check_distance(mesh: TangentMesh, view: _View, surface_name: str) -> None:
-    """Check that strokes at a distance in Blender units are not too fine for a picture.
+    """Check that strokes whose distance is given in Blender units are not too near each other in the picture.
 
     Raises
     ------
     RosyError
-        If they are less than `MIN_SPACING_PIXELS` apart where the surface is nearest.
+        If they are less than `MIN_SPACING_PIXELS` apart where the surface is nearest to the camera.
     """
     nearest = float(pixel_size(mesh.points.reshape(-1, 3), view.camera).min())
     pixels = view.style.distance / nearest
@@ -341,7 +351,7 @@ def _check_distance(mesh: TangentMesh, view: _View, surface_name: str) -> None:
 
 
 def stroke_memory(mesh: TangentMesh, spacing: np.ndarray) -> float:
-    """Return an estimate of the peak memory of the strokes of a mesh, in bytes.
+    """Return an estimate of the peak memory, in bytes, of tracing strokes on a mesh.
 
     Parameters
     ----------
@@ -354,10 +364,10 @@ def stroke_memory(mesh: TangentMesh, spacing: np.ndarray) -> float:
 
 
 def _corner_spacing(mesh: TangentMesh, view: _View) -> CornerSpacing:
-    """Return the spacing at corners, in world space, without tone and curvature.
+    """Return the spacing at the corners of triangles, in world space, without effects of tone and curvature.
 
     If strokes are not clipped, the spacing outside the frame of a perspective camera is not smaller than
-    the smallest spacing inside. Otherwise the number of strokes near the camera plane would be unlimited.
+    the smallest spacing inside the frame. Otherwise the number of strokes near the camera would be unlimited.
     """
     camera, style = view.camera, view.style
     if style.unit == "world":
@@ -377,9 +387,10 @@ def _corner_spacing(mesh: TangentMesh, view: _View) -> CornerSpacing:
 
 
 def _is_in_view(points: np.ndarray, camera: Camera) -> bool:
-    """Return whether a surface with these (n, 3) vertices may be in view.
+    """Return whether a surface with the (n, 3) vertices `points` may be in view.
 
-    It is not if all of them are outside one plane of the view frustum. The far plane is not tested.
+    It is not in view if all vertices are outside of the same plane of the view frustum. The far plane is not
+    tested.
     """
     clip = to_clip(points, camera)
     outside = np.abs(clip[:, :2]) > clip[:, 3:]
@@ -397,7 +408,7 @@ def _no_visible_stroke(camera: Camera) -> RosyError:
 
 
 def _merge_families_by_name(strokes: Strokes) -> Strokes:
-    """Merge families with the same name, and put the kinds of outline last."""
+    """Return strokes in which families of the same name are merged. The families of outlines are last."""
     names = sorted(
         set(strokes.names), key=lambda name: (name in OUTLINE_KINDS, strokes.names.index(name))
     )

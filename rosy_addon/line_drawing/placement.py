@@ -1,21 +1,22 @@
 """Place evenly spaced streamlines on a tangent mesh: they grow from seeds until it is covered.
 
-After Jobard and Lefer, "Creating Evenly-Spaced Streamlines of Arbitrary Density" (1997). A stroke
-starts beside an existing one, at the required spacing, and ends where it comes too near to another.
-The differences are:
+The method is based on Jobard and Lefer, "Creating Evenly-Spaced Streamlines of Arbitrary Density" (1997). A
+stroke starts beside an existing stroke, at the required spacing, and ends where it comes too near to another
+stroke. The differences are:
 
 - Distances are measured on the surface.
-- All strokes grow at the same time, each with two tips. New strokes are seeded beside a stroke that
-  still grows, so fronts spread from few points and meet along few seams.
+- All strokes grow at the same time, each at two ends, its tips. New strokes are seeded beside strokes that
+  still grow. So the covered area grows from few points, and its fronts meet along few seams.
 - A stroke also ends where the gap beside it is wider than the spacing but too narrow for another
-  stroke, as in diverging fields. It yields to strokes that are seeded farther on, which are spaced
-  better.
+  stroke, as in diverging fields. It yields: it leaves this area to strokes that are seeded later, which are
+  spaced better.
 
-Only strokes of the same family keep a distance. Near each other, two strokes are of the same family
-if their members match there. Their members elsewhere do not matter.
+Only strokes of the same family keep a distance. Two strokes near each other are of the same family
+if their members of the field match there. Their members elsewhere do not matter.
 
-An end of a stroke is 0 for the backward half and 1 for the forward half. A side of a stroke is
-numbered 2 * stroke + side, where side is 0 for left and 1 for right.
+The two ends of a stroke are numbered: 0 is the end of the half that was traced backward from the seed, 1 the
+end of the forward half. A side of a stroke has the number 2 * stroke + side, where side is 0 for left and 1
+for right.
 """
 
 from __future__ import annotations
@@ -35,42 +36,45 @@ from .spacing import CornerSpacing
 from .surface_particles import SurfaceParticles, advance
 from .tangent_mesh import TangentMesh
 
-#: If a step is rejected, a tip tries half of it, as long as this fraction of a full step is left.
+#: If a step is rejected, a tip tries half of it, as long as the step is not below this fraction of a full
+#: step.
 MIN_STEP_SCALE = 0.2
 
-#: Largest number of samples by which a tip grows at once after its step was shortened. It is about to
-#: end, and what is traced beyond the end is lost.
+#: Largest number of samples by which a tip grows at once after its step was shortened. Such a tip is about to
+#: end, and tracing beyond its end is wasted time.
 MAX_RETRIED_SAMPLES = 2
 
-#: Largest number of samples along a segment, so that widths and tones at its ends describe it.
+#: Largest number of samples along a segment. Widths and tones are only stored at the ends of segments.
 SAMPLES_PER_SEGMENT = 2
 
-#: Segments that a tip may trace at once: for each sample, and at least.
+#: Number of segments that a tip may trace at once: `SEGMENTS_PER_SAMPLE` for each sample, at least
+#: `MIN_SEGMENTS`.
 SEGMENTS_PER_SAMPLE, MIN_SEGMENTS = 2, 16
 
-#: A tip has moved if its path and the chord of its path are longer than this fraction of the step.
+#: A tip counts as moved only if its path and the chord of its path are longer than this fraction of the step.
 MIN_MOVED_RATIO = 0.02
 
-#: Distance in spacings by which the tips of a parent have to be ahead of a seed beside it.
+#: Distance in spacings by which the tips of a stroke have to be ahead of a new seed beside it.
 PARENT_LEAD = 2.5
 
-#: Samples whose coverage is checked at once. Bounds memory.
+#: Number of samples whose coverage is checked at once. It bounds memory.
 RESCAN_BATCH_SIZE = 1 << 13
 
 
 @dataclass(eq=False)
 class Tips(SurfaceParticles):
-    """The growing ends of strokes, n of them.
+    """The n growing ends of strokes, as particles with further attributes.
 
-    The sign is 1 in the forward half of a stroke and -1 in the backward half.
+    The sign of a particle is 1 in the forward half of a stroke and -1 in the backward half.
 
     Attributes
     ----------
     stroke : (n,) int32 ndarray
+        Index of the stroke.
     arc : (n,) float64 ndarray
-        Signed arc length from the seed, in world space.
+        Signed arc length from the seed of the stroke, in world space.
     step_scale : (n,) float64 ndarray
-        Fraction of a full step to try next.
+        Fraction of a full step that the tip tries next.
     """
 
     stroke: np.ndarray
@@ -79,21 +83,21 @@ class Tips(SurfaceParticles):
 
     @staticmethod
     def at(particles: SurfaceParticles, stroke: np.ndarray, arc: np.ndarray) -> Tips:
-        """Return tips at particles that try full steps."""
+        """Return tips at particles. They try full steps next."""
         return Tips(*particles.columns, stroke.astype(np.int32), arc, np.ones(len(stroke)))
 
     @property
     def particles(self) -> SurfaceParticles:
-        """The positions of the tips, without a copy of the arrays."""
+        """The tips as particles, which share the arrays of the tips."""
         return SurfaceParticles(self.triangle, self.weights, self.member, self.sign)
 
     @property
     def end(self) -> np.ndarray:
-        """(n,) int64: the end of its stroke that each tip is, 0 or 1."""
+        """(n,) int64: 1 if a tip is the forward end of its stroke, 0 if it is the backward end."""
         return np.where(self.sign > 0, 1, 0)
 
 
-#: No tips.
+#: A set of 0 tips.
 NO_TIPS = Tips.at(SurfaceParticles.empty(), np.empty(0), np.empty(0))
 
 
@@ -105,21 +109,22 @@ class GrowingStrokes(ColumnTable):
     The columns, with a row for each stroke:
 
     alive : bool
-        False for strokes that were rejected or dropped.
+        False for strokes that were rejected at their seed or removed later.
     spacing : float64
         Spacing at the seed, in world space.
     parent_side : int64
-        The side of a stroke beside which the stroke was seeded, or -1.
+        Where the stroke was seeded: 2 * s beside the left side of stroke s, 2 * s + 1 beside the right side,
+        or -1 if it was not seeded beside a stroke.
     active_children : (2,) int32
-        Number of growing strokes that were seeded beside the left and the right side.
+        Number of growing strokes that were seeded beside the left and the right side of the stroke.
     seed_sample : int32
-        The sample at the seed. Other samples of the stroke have higher numbers.
+        Index of the sample at the seed. Other samples of the stroke have higher indices.
     tip_count : int32
-        Number of growing tips, 0 to 2.
+        Number of growing ends, 0 to 2.
     min_arc, max_arc : float64
-        Range of the signed arc length.
+        Range of the signed arc length from the seed, in world space.
     end_sample : (2,) int32
-        The samples at both ends.
+        Indices of the samples at the backward and the forward end.
     end_yielded : (2,) bool
         Whether the ends have yielded; see `LateralNeighbors.yielded`.
     end_done : (2,) bool
@@ -139,7 +144,7 @@ class GrowingStrokes(ColumnTable):
     end_done = np.empty((0, 2), bool)
 
     def add(self, parent_side: np.ndarray, spacing: np.ndarray) -> np.ndarray:
-        """Add n strokes with two tips each, and return their numbers."""
+        """Add n strokes with two growing ends each, and return their indices."""
         count = len(parent_side)
         return self.append(
             alive=np.ones(count, dtype=bool),
@@ -154,16 +159,19 @@ class GrowingStrokes(ColumnTable):
         self.end_sample[stroke] = sample[:, None]
 
     def add_active_children(self, parent_side: np.ndarray, change: int) -> None:
-        """Add `change` to the number of active children of each given side; -1 is no side."""
+        """Add `change` to the number of growing strokes seeded beside each given side of a stroke.
+
+        `parent_side` is as in the column of this name. Values of -1 are ignored.
+        """
         parent_side = parent_side[parent_side >= 0]
         np.add.at(self.active_children, (parent_side >> 1, parent_side & 1), change)
 
     def extend(
         self, stroke: np.ndarray, end: np.ndarray, arc: np.ndarray, sample: np.ndarray
     ) -> None:
-        """Extend n ends to new samples at the given signed arc lengths.
+        """Extend ends of strokes by n new samples at the given signed arc lengths.
 
-        The samples of one end are in order, so that the last one is the new end.
+        The samples of the same end are in the order of growth, so that the last one is the new end.
         """
         self.end_sample[stroke, end] = sample
         np.maximum.at(self.max_arc, stroke, arc)
@@ -176,16 +184,17 @@ class GrowingStrokes(ColumnTable):
     def is_clear_of_tips(
         self, stroke: np.ndarray, arc: np.ndarray, distance: np.ndarray
     ) -> np.ndarray:
-        """Return (n,) bool: whether no growing tip of the stroke is within a distance along it.
+        """Return (n,) bool: whether points on strokes are at least `distance` from each growing end.
 
-        All parameters are (n,): strokes, signed arc lengths and distances, in world space.
+        All parameters are (n,): indices of strokes, signed arc lengths of the points, and distances along the
+        stroke, in world space.
         """
         is_clear = (arc <= self.max_arc[stroke] - distance) | self.end_done[stroke, 1]
         is_clear &= (arc >= self.min_arc[stroke] + distance) | self.end_done[stroke, 0]
         return is_clear
 
     def finish_ends(self, stroke: np.ndarray, end: np.ndarray) -> np.ndarray:
-        """End n tips, and return the numbers of strokes that have no tips left."""
+        """Mark n ends as finished. Return the indices of strokes that have no growing end left."""
         self.end_done[stroke, end] = True
         np.subtract.at(self.tip_count, stroke, 1)
         finished = np.unique(stroke)
@@ -194,14 +203,14 @@ class GrowingStrokes(ColumnTable):
         return finished
 
     def resume_yielded_ends(self) -> tuple[np.ndarray, np.ndarray]:
-        """Let ends that have yielded grow again.
+        """Let the ends that have yielded grow again.
 
-        Strokes that had no tips left are no longer counted as children of their parents.
+        Strokes that had no growing end left are no longer counted as children of the stroke beside them.
 
         Returns
         -------
         stroke, end : (k,) int64 ndarray
-            The ends that need a tip.
+            Strokes, and their ends (0 or 1) that have to grow again.
         """
         rows = slice(self.count)
         stroke, end = np.nonzero(
@@ -213,26 +222,29 @@ class GrowingStrokes(ColumnTable):
 
 
 class StreamlinePlacer:
-    """Strokes that grow on a tangent mesh, and the steps that let them grow.
+    """Growing strokes on a tangent mesh, with methods to seed them and to let them grow.
 
     Parameters
     ----------
     mesh : TangentMesh
     spacing : CornerSpacing
+        Required spacing of strokes.
     rules : SeparationRules
 
     Attributes
     ----------
     rules : SeparationRules
-        The rules of the next steps. They may be changed between steps.
+        The rules that the next calls of methods follow. They may be changed between calls.
     samples : StrokeSamples
+        Samples of all strokes.
     strokes : GrowingStrokes
+        Table of all strokes.
     tips : Tips
-        The growing ends.
+        The growing ends of strokes.
     segments : list of tuple of ndarray
-        The segments of all strokes in the order in which they were traced, m for each step: (m,) strokes,
-        (m,) signs of their halves, and `triangle`, `begin_weights`, `end_weights` and `direction` as in
-        `TracedPath`.
+        The segments of all strokes in the order in which they were traced. Each call of `grow` appends a
+        tuple for its m segments: (m,) indices of strokes, (m,) signs of their halves, and `triangle`,
+        `begin_weights`, `end_weights` and `direction` as in `TracedPath`.
 
     Raises
     ------
@@ -241,7 +253,7 @@ class StreamlinePlacer:
 
     See Also
     --------
-    rosy_addon.line_drawing.trace.place_streamlines : Runs the steps in their order.
+    rosy_addon.line_drawing.trace.place_streamlines : Calls these methods until the mesh is covered.
     """
 
     def __init__(self, mesh: TangentMesh, spacing: CornerSpacing, rules: SeparationRules) -> None:
@@ -254,10 +266,10 @@ class StreamlinePlacer:
     # --- growing ----------------------------------------------------------------------------------
 
     def grow(self, sample_count: int) -> None:
-        """Advance all tips by up to `sample_count` samples. Tips that cannot advance end.
+        """Let all tips grow by up to `sample_count` samples. Tips that cannot grow end.
 
-        Samples are accepted as if all tips advanced by one at a time. Tips whose step is shortened
-        advance by at most `MAX_RETRIED_SAMPLES`.
+        Samples are accepted in the same order as if all tips grew by one sample at a time. Tips whose step
+        has been shortened grow by at most `MAX_RETRIED_SAMPLES`.
         """
         samples, strokes, tips = self.samples, self.strokes, self.tips
         path, traced, ended = self._trace_samples(sample_count)
@@ -272,7 +284,7 @@ class StreamlinePlacer:
         yielding = tip[neighbors.yielded]
         strokes.end_yielded[tips.stroke[yielding], tips.end[yielding]] = True
 
-        # Tips go on from their last accepted sample. If the next one was rejected, they try half of
+        # Tips continue from their last accepted sample. If the next sample was rejected, they try half of
         # the step.
         last = np.full(tip_count, -1)
         last[tip[accepted]] = accepted
@@ -293,7 +305,10 @@ class StreamlinePlacer:
         self.tips = tips.take(np.flatnonzero(~ended))
 
     def _compare(self, sample: np.ndarray, previous: np.ndarray | None = None) -> LateralNeighbors:
-        """Compare new samples with others by the rules, and remove those that are rejected."""
+        """Compare new samples with others by the rules, and remove the rejected samples.
+
+        `sample` and `previous` are as in `find_lateral_neighbors`.
+        """
         neighbors = find_lateral_neighbors(
             self.samples, sample, self.rules.min_separation, self.rules.max_gap, previous
         )
@@ -303,13 +318,14 @@ class StreamlinePlacer:
         return neighbors
 
     def _trace_samples(self, sample_count: int) -> tuple[SampledPath, PathSamples, np.ndarray]:
-        """Trace the next samples of all tips, without comparing them with strokes.
+        """Trace the next samples of all n tips, without comparing them with other strokes.
 
         Returns
         -------
         path : SampledPath
+            Paths of the tips.
         traced : PathSamples
-            The particles are the tips.
+            Samples along these paths. `PathSamples.particle` is the index of the tip.
         ended : (n,) bool ndarray
             Whether a tip cannot continue after its last sample.
         """
@@ -353,14 +369,14 @@ class StreamlinePlacer:
         return path, traced, ended
 
     def _finish_tips(self, tips: Tips) -> None:
-        """End tips. Strokes without tips that are too short are dropped."""
+        """End the given tips. Remove strokes that have no tips left and are too short."""
         strokes = self.strokes
         finished = strokes.finish_ends(tips.stroke, tips.end)
         min_length = self.rules.min_length * strokes.spacing[finished]
         dropped = finished[strokes.length(finished) < min_length]
         if len(dropped):
-            # The sides that they covered stay covered until `rescan`. Otherwise the same strokes would
-            # be seeded again.
+            # The sides of other strokes that they covered stay covered until `rescan`. Otherwise the same
+            # strokes would be seeded again.
             strokes.alive[dropped] = False
             first = int(strokes.seed_sample[dropped].min())
             self.samples.remove_strokes(strokes.alive, first)
@@ -375,14 +391,20 @@ class StreamlinePlacer:
         self.tips = self.tips.join(Tips.at(particles, stroke, samples.arc[sample]))
 
     def suspend(self) -> None:
-        """End all tips as if they had yielded. No stroke is seeded beside them before `rescan`."""
+        """End all tips as if they had yielded.
+
+        No stroke is seeded beside existing strokes before `rescan`.
+        """
         tips, self.tips = self.tips, NO_TIPS
         self.strokes.end_yielded[tips.stroke, tips.end] = True
         self._finish_tips(tips)
         self.samples.close_open_sides()
 
     def rescan(self, rules: SeparationRules) -> None:
-        """Change the rules, and open sides again where strokes were dropped or seeds did not fit."""
+        """Change the rules, and allow seeds again where strokes were removed or earlier seeds did not fit.
+
+        Sides of samples that had been treated as covered there are open again if no stroke is beside them.
+        """
         self.rules = rules
         samples = self.samples
         sample = samples.reset_coverage()
@@ -395,15 +417,15 @@ class StreamlinePlacer:
     # --- seeds ------------------------------------------------------------------------------------
 
     def add_seeds(self, particles: SurfaceParticles, parent_side: np.ndarray | None = None) -> int:
-        """Start strokes at the seeds that are far enough from other strokes, and return how many.
+        """Start strokes at the seeds that are far enough from other strokes, and return their number.
 
         Parameters
         ----------
         particles : SurfaceParticles
-            n seeds.
+            The n seeds.
         parent_side : (n,) ndarray of int, optional
-            The side of a stroke that a seed is beside: 2 * stroke, plus 1 for the right side; -1 if
-            there is none.
+            For seeds beside strokes: 2 * stroke if the seed is beside its left side, 2 * stroke + 1 if beside
+            its right side. -1 for other seeds.
         """
         count = len(particles)
         parent_side = np.full(count, -1) if parent_side is None else parent_side
@@ -423,13 +445,13 @@ class StreamlinePlacer:
         return len(accepted)
 
     def seed_neighbors(self) -> int:
-        """Start strokes beside existing ones, and return how many.
+        """Start strokes beside open sides of existing strokes, and return the number of new strokes.
 
-        Each side of a stroke has at most one growing child at a time. Only strokes that have reached
-        the minimum length have children. They are never dropped under the same rules, and every call
-        closes at least one of their open sides. A surface has room for finitely many such strokes, so
-        seeding ends. If shorter strokes had children, a stroke and its child could be dropped and seeded
-        again in turn, without end.
+        A stroke that was seeded beside another one is its child. Each side of a stroke has at most one
+        growing child at a time. Only strokes that have reached the minimum length get children. Such strokes
+        are never removed under the same rules, and every call closes at least one of their open sides. A
+        surface has room for finitely many such strokes, so seeding ends. If shorter strokes had children, a
+        stroke and its child could be removed and seeded again in turn, without end.
         """
         samples, strokes = self.samples, self.strokes
         sample, side = samples.open_sides()

@@ -1,7 +1,7 @@
 """Hashed uniform grids for radius queries, to which points can be added and removed.
 
-Points with very different radii are in grids with cells of different sizes (levels). So no cell holds many
-points, and no query visits many cells.
+Points with very different search radii are stored in different levels: grids whose cells have different
+sizes. So no cell holds many points, and no query visits many cells.
 """
 
 from __future__ import annotations
@@ -16,36 +16,39 @@ from ..field.frames import dot
 _PRIMES = np.array([73856093, 19349663, 83492791], dtype=np.int64)
 _LEVEL_PRIME = np.int64(49979687)
 
-#: Ratio of the cells of two levels. Level 0 holds radii from 1 / 4 to 4 cells.
+#: Ratio of the cell sides of two successive levels. Level 0 is for radii from 1 / 4 to 4 cells.
 LEVEL_RATIO = 16.0
 
 #: Largest radius of a query, in cells.
 MAX_RINGS = 4
 
-#: Points in a block. The points of a cell are a linked list of blocks.
+#: Number of points in a block. The points of a cell are stored in a linked list of blocks.
 BLOCK_SIZE = 16
 
-#: Queries with a direction find all points within the first fraction of their radius. Other points are found
-#: if their distance along the direction is at most the second fraction of the radius.
+#: Queries with a direction find all points within `INNER_RATIO` of their radius. Points farther away are
+#: found only if their offset along the direction is at most `BAND_RATIO` of the radius.
 INNER_RATIO, BAND_RATIO = 0.6, 0.25
 
-#: Number of queries in a block. Its data fit into the caches of a CPU.
+#: Number of queries that are answered at once. Their data fit into the caches of a CPU.
 QUERY_BATCH_SIZE = 1 << 11
 
 
 def grid_levels(radius: np.ndarray, cell: float) -> np.ndarray:
-    """Return the (n,) int64 levels of points with these radii, given the side of a cell of level 0."""
+    """Return (n,) int64: the level in which a point with each search radius is stored.
+
+    Levels are grids with cells of different sizes. `cell` is the side of a cell of level 0.
+    """
     ratio = np.clip(radius / cell, 1e-300, 1e300)
     return np.floor(np.log(ratio) / np.log(LEVEL_RATIO) + 0.5).astype(np.int64)
 
 
 class PointGrid:
-    """Hashed uniform grids of points.
+    """Points in hashed uniform grids, for queries of the points within a radius.
 
     Parameters
     ----------
     cell : float
-        Side of a cell of level 0; best about the radius of most queries.
+        Side of a cell of level 0. Queries are fastest if it is about their typical radius.
     expected_count : int
         Expected number of points. It sets the size of the hash table.
 
@@ -76,18 +79,18 @@ class PointGrid:
         self.point_slot = np.empty(1024, dtype=np.int32)
 
     def add(self, points: np.ndarray, radius: np.ndarray) -> np.ndarray:
-        """Add points.
+        """Add points to the grid.
 
         Parameters
         ----------
         points : (n, 3) ndarray
         radius : (n,) ndarray
-            Radii of queries at these points. They set the levels.
+            Typical radius of queries near each point. It sets the level in which the point is stored.
 
         Returns
         -------
         (n,) int32 ndarray
-            Numbers of the points, which continue the numbers of earlier calls.
+            Indices of the points. They continue the indices of earlier calls.
         """
         level = grid_levels(radius, self.cell)
         self.levels.update(np.unique(level).tolist())
@@ -131,9 +134,9 @@ class PointGrid:
         Parameters
         ----------
         first_new_block, new_blocks : (cells,) ndarray of int
-            First new block of each cell, and the number of new blocks.
+            First new block of each cell, and the number of its new blocks.
         last_block : (cells,) int32 ndarray
-            Previous last block, or -1.
+            Last block of each cell before the call, or -1.
         """
         first = self.block_count
         self.block_count += int(new_blocks.sum())
@@ -145,31 +148,32 @@ class PointGrid:
         self.next_block[first_new_block[grows]] = last_block[grows]
 
     def remove(self, index: np.ndarray) -> None:
-        """Remove points by number. Their numbers are not used again."""
+        """Remove the points with the given indices. Their indices are not used again."""
         block, slot = np.divmod(self.point_slot[index], BLOCK_SIZE)
         self.position[block, :, slot] = np.nan
 
     def pairs_within(
         self, points: np.ndarray, radius: np.ndarray, direction: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Find all pairs of a query and a point of the grid within its radius.
+        """Find the points of the grid within the radius of each query.
 
         Parameters
         ----------
         points : (n, 3) ndarray
             Centers of the queries.
         radius : (n,) ndarray
-            Radii. Points farther than `MAX_RINGS` cells of their level may be missed.
+            Radii of the queries. Points that are farther away than `MAX_RINGS` cells of their level may be
+            missed.
         direction : (n, 3) ndarray, optional
-            Unit directions. They restrict the queries to a small ball and a band perpendicular to them;
-            see `INNER_RATIO`.
+            Unit direction of each query. The query is then restricted to a small ball and a band
+            perpendicular to the direction; see `INNER_RATIO`.
 
         Returns
         -------
         query : (m,) intp ndarray
-            Query of each pair.
+            Index of the query in each pair of a query and a point.
         point : (m,) int32 ndarray
-            Number of the point. A pair may occur twice, because of hash collisions.
+            Index of the point. A pair may occur twice, because of hash collisions.
         """
         pairs = []
         for level in sorted(self.levels):
@@ -195,9 +199,11 @@ class PointGrid:
         rings: int,
         direction: np.ndarray | None,
     ) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Return the pairs of some queries at a level: two arrays for each step along the lists.
+        """Find the points of one level within the radius of some queries.
 
-        `queries` holds the numbers of the queries. They are at most `rings` cells large.
+        The linked lists of all cells are followed at the same time. For each step along the lists, there are
+        two arrays in the result: queries, and points within their radius. `queries` holds the indices of the
+        queries. Their radius is at most `rings` cells.
         """
         cell = self.cell * LEVEL_RATIO**level
         scaled = points.take(queries, axis=0) / cell
@@ -255,17 +261,18 @@ def _ring_offsets(rings: int) -> np.ndarray:
 def _reached_cells(
     position: np.ndarray, radius: np.ndarray, rings: int, direction: np.ndarray | None
 ) -> np.ndarray:
-    """Return (n, cells) bool: the cells of `_ring_offsets` that queries reach.
+    """Return (n, cells) bool: which of the cells of `_ring_offsets` may hold points that queries find.
 
     Parameters
     ----------
     position : (n, 3) ndarray
         Centers of the queries relative to the lowest corner of their cells. The unit is a cell.
     radius : (n,) ndarray
-        In cells.
+        Radii of the queries, in cells.
     rings : int
+        Number of rings of cells around the cell of a query.
     direction : (n, 3) ndarray, optional
-        As for `PointGrid.pairs_within`.
+        Directions of the queries; see `PointGrid.pairs_within`.
     """
     side = np.arange(-rings, rings + 1)
     beyond = np.maximum(side - position[:, :, None], position[:, :, None] - (side + 1))

@@ -1,4 +1,4 @@
-"""Write strokes as polylines in space, for robots, printers and programs of geometry."""
+"""Write strokes as 3D polylines, for robots, printers and geometry software."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from .stroke_set import Strokes
 from .svg import Pen, simplify_mask
 from .visibility import pixel_size
 
-#: Extensions of files of strokes: a picture, and polylines in space.
+#: Extensions of files with strokes: .svg for a picture, the others for 3D polylines.
 DRAWING_SUFFIXES = (".svg", ".ply", ".obj", ".csv")
 
-#: Points that are formatted at once.
+#: Number of points that are formatted at once.
 POINTS_PER_BLOCK = 20_000
 
-#: Largest distance in pixels between a removed point and the simplified stroke, and the number of
-#: pixels that a difference of the full width counts as.
+#: Largest distance in pixels between a removed point and the simplified stroke. Differences in width count as
+#: distances as well: a difference of one full width counts as `WIDTH_WEIGHT_PX` pixels.
 SIMPLIFY_TOLERANCE_PX, WIDTH_WEIGHT_PX = 0.08, 2.0
 
-#: The properties of a vertex of a .ply file. Lengths are 8 bytes, so that no position is rounded.
+#: The properties of a vertex in a .ply file. Coordinates have 8 bytes, so that no position is rounded.
 _PLY_VERTEX = np.dtype(
     [
         *((name, "<f8") for name in ("x", "y", "z")),
@@ -41,20 +41,20 @@ _PLY_TYPE_NAMES = {"f8": "double", "f4": "float", "i4": "int"}
 def polyline_file(
     suffix: str, strokes: Strokes, camera: Camera, pen: Pen, matrix: np.ndarray | None = None
 ) -> bytes:
-    """Return strokes as the contents of a file.
+    """Return the contents of a file with strokes as 3D polylines.
 
     Points on straight lines are left out; see `simplify_strokes`.
 
     Parameters
     ----------
     suffix : {".csv", ".obj", ".ply"}
-        Suffix of the file: a table with a row for each point, a Wavefront file with lines, or a binary
-        Stanford file with vertices and edges.
+        Suffix that sets the format: a table with a row for each point, a Wavefront file with lines, or a
+        binary Stanford file with vertices and edges.
     strokes : Strokes
     camera : Camera
         Camera that sets the length of a pixel.
     pen : Pen
-        Only its width counts.
+        Width of the strokes. Its other attributes are not used.
     matrix : (4, 4) ndarray, optional
         Rotation and translation from world space to the space of the file.
 
@@ -76,7 +76,7 @@ def polyline_file(
 
 
 def simplify_strokes(strokes: Strokes, camera: Camera) -> Strokes:
-    """Remove points without which strokes change by less than `SIMPLIFY_TOLERANCE_PX` pixels.
+    """Remove points if strokes then change by less than `SIMPLIFY_TOLERANCE_PX` pixels.
 
     Parameters
     ----------
@@ -98,12 +98,12 @@ def simplify_strokes(strokes: Strokes, camera: Camera) -> Strokes:
 
 
 def check_drawing_suffix(path: str | os.PathLike[str]) -> str:
-    """Return the extension of a file of strokes, in lower case.
+    """Return the extension of a path in lower case, and check that strokes can be written to such a file.
 
     Raises
     ------
     RosyError
-        If the file is neither a picture nor one of polylines.
+        If the extension is not one of `DRAWING_SUFFIXES`.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in DRAWING_SUFFIXES:
@@ -112,7 +112,10 @@ def check_drawing_suffix(path: str | os.PathLike[str]) -> str:
 
 
 def _csv(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.ndarray) -> bytes:
-    """Return a header, then a row for each point. A closed stroke ends at its first point."""
+    """Return a .csv file: a header, then a row for each point.
+
+    A closed stroke repeats its first point at its end.
+    """
     blocks = [b"stroke,family,x,y,z,nx,ny,nz,width\n"]
     stroke = strokes.stroke
     for rows in row_blocks(len(points), POINTS_PER_BLOCK):
@@ -130,10 +133,10 @@ def _csv(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.nd
 
 
 def _obj(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.ndarray) -> bytes:
-    """Return vertices, then a line for each stroke, in a group for each family.
+    """Return an .obj file: vertices, then a line for each stroke, in a group for each family.
 
-    The format has no normals of lines, so normal n belongs to vertex n. Widths are texture coordinates with
-    one component.
+    In this format, lines cannot refer to normals, so normal n belongs to vertex n. Widths are stored as
+    texture coordinates with one component.
     """
     first_of_closed, kept = _without_repeated_points(strokes)
     rows = np.flatnonzero(kept)
@@ -162,7 +165,7 @@ def _obj(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.nd
 
 
 def _ply(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.ndarray) -> bytes:
-    """Return a binary file with the points as vertices and the segments as edges."""
+    """Return a binary .ply file with the points as vertices and the segments as edges."""
     first_of_closed, kept = _without_repeated_points(strokes)
     stroke = strokes.stroke
     vertex = np.zeros(int(kept.sum()), dtype=_PLY_VERTEX)
@@ -187,9 +190,9 @@ def _ply(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.nd
 
 
 def _without_repeated_points(strokes: Strokes) -> tuple[np.ndarray, np.ndarray]:
-    """Return the numbers of the first points of closed strokes, and which points are not repeated.
+    """Return the indices of the first points of closed strokes, and (n,) bool: which points are kept.
 
-    The last point of a closed stroke is its first one again.
+    All points are kept except for the last points of closed strokes, which repeat their first points.
     """
     kept = np.ones(len(strokes.points), dtype=bool)
     kept[strokes.start[1:][strokes.closed] - 1] = False

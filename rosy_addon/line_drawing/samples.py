@@ -1,7 +1,7 @@
-"""The samples of growing strokes, with a spatial grid, and which of their sides are covered.
+"""A table of samples of growing strokes, with a spatial grid to find them, and the state of their sides.
 
-Strokes are sampled every half spacing. A side of a sample is covered if there is a stroke beside it
-on this side, and open if not. New strokes are seeded at open sides.
+Strokes are sampled every half spacing. The left or right side of a sample is covered if there is another
+stroke beside the sample on this side. Otherwise, the side is open. New strokes are seeded at open sides.
 """
 
 from __future__ import annotations
@@ -28,16 +28,17 @@ SEARCH_RADIUS = 1.6
 #: Largest expected number of samples. It bounds memory and time.
 MAX_EXPECTED_SAMPLES = 5e7
 
-#: Rows for which a new table has memory. It is doubled when the rows do not fit.
+#: Number of rows for which a new table has memory. It is doubled when more rows are needed.
 INITIAL_CAPACITY = 1024
 
 
 class ColumnTable:
-    """A table of growing columns with equal row counts; each column is an attribute.
+    """A table to which rows are appended. Each column is an array and an attribute.
 
-    A subclass declares each column as a class attribute: an array without rows, of its shape and dtype.
+    A subclass declares each column as a class attribute: an array of the shape and dtype of the column, with
+    no rows.
 
-    Columns are longer than `count`; their remaining rows are reserve. When a column grows, it is
+    Arrays are longer than `count`. The rows after it are reserved for later. When a column grows, it is
     replaced by a new array, so do not keep references to columns across `append`.
 
     Attributes
@@ -55,7 +56,7 @@ class ColumnTable:
             setattr(self, name, np.zeros((INITIAL_CAPACITY, *column.shape[1:]), column.dtype))
 
     def append(self, **values: np.ndarray) -> np.ndarray:
-        """Append rows and return their numbers. Columns that are not given are 0 in new rows."""
+        """Append rows with the given columns and return their indices. Other columns are 0 there."""
         row_count = len(next(iter(values.values())))
         first, self.count = self.count, self.count + row_count
         for name in self._column_names:
@@ -74,7 +75,7 @@ class CoveringPairs(NamedTuple):
     Attributes
     ----------
     sample, neighbor : (m,) ndarray of int
-        Numbers of the two samples.
+        Indices of the two samples.
     sample_side : (m,) intp ndarray
         The side of the sample on which the neighbor is: 0 for left and 1 for right.
     neighbor_side : (m,) intp ndarray
@@ -88,19 +89,20 @@ class CoveringPairs(NamedTuple):
 
 
 class StrokeSamples(ColumnTable):
-    """The samples of growing strokes on a tangent mesh, found by number or by position.
+    """The samples of growing strokes on a tangent mesh, which can be found by index or by position.
 
     Parameters
     ----------
     mesh : TangentMesh
     spacing : CornerSpacing
+        Required spacing of strokes.
 
     Attributes
     ----------
     expected_count : float
         Estimate of the final number of samples.
     current_step : int
-        Number of the current step of growth.
+        Number of steps of growth so far. In each step, a growing end of a stroke gets at most one sample.
 
     Raises
     ------
@@ -112,26 +114,27 @@ class StrokeSamples(ColumnTable):
     The columns, with a row for each sample:
 
     frame : (4, 3) float64
-        Position, normal, direction of the stroke and member, in world space. They are together
-        because they are looked up together.
+        Position, unit normal, unit direction of the stroke and unit member of the field, in world space. They
+        are in one column because they are used together.
     spacing : float64
         Required spacing, in world space.
     stroke : int32
+        Index of the stroke.
     arc : float64
-        Signed arc length from the seed, in world space.
+        Signed arc length from the seed of the stroke, in world space.
     step : int32
-        The step at which the sample was added.
+        Step of growth in which the sample was added.
     alive : bool
         False for removed samples.
     covered : (2,) bool
         Whether the left and the right side are covered.
     side_neighbor : (2,) int32
-        The neighbor found last that covers the left and the right side, or -1. If this sample is
-        removed, the neighbor may be open again.
+        Index of the neighbor that covers the left and the right side, or -1. If there are several, it is the
+        one found last. If this sample is removed, the side of the neighbor may be open again.
     triangle, weights : int32, (3,) float64
-        Position as barycentric coordinates.
+        Position as a triangle and barycentric coordinates in it.
     local_member, local_direction : complex128
-        Unit member and direction in the frame of the triangle.
+        Unit member and direction of the stroke, in the frame of the triangle.
     """
 
     frame = np.empty((0, 4, 3))
@@ -160,25 +163,25 @@ class StrokeSamples(ColumnTable):
             1.01 * SEARCH_RADIUS * float(np.median(mean_spacing)), int(self.expected_count)
         )
         self.current_step = 0
-        # Open sides, as 2 * sample + side. Sides that were covered since are dropped by the next
-        # call of `open_sides`.
+        # Open sides, as 2 * sample + side. Some of them may have been covered later. The next call of
+        # `open_sides` removes these.
         self._open_sides = np.empty(0, dtype=np.int64)
         # Arrays of samples whose sides `reset_coverage` resets.
         self._recheck: list[np.ndarray] = []
 
     @property
     def position(self) -> np.ndarray:
-        """The positions, in world space."""
+        """Positions of the samples, in world space."""
         return self.frame[:, 0]
 
     @property
     def normal(self) -> np.ndarray:
-        """The unit shading normals."""
+        """Unit shading normals at the samples, in world space."""
         return self.frame[:, 1]
 
     @property
     def direction(self) -> np.ndarray:
-        """The unit directions of strokes, in world space."""
+        """Unit directions of strokes at the samples, in world space."""
         return self.frame[:, 2]
 
     def spacing_at(self, particles: SurfaceParticles) -> np.ndarray:
@@ -186,14 +189,17 @@ class StrokeSamples(ColumnTable):
         return self.required_spacing.at(particles.triangle, particles.weights, particles.member)
 
     def particles(self, sample: np.ndarray, sign: np.ndarray) -> SurfaceParticles:
-        """Return particles with (n,) signs at samples."""
+        """Return particles at the samples with the given indices. `sign`, (n,), is 1 or -1 for each."""
         columns = self.triangle, self.weights, self.local_member
         return SurfaceParticles(*(column[sample] for column in columns), sign)
 
     # --- adding and removing ----------------------------------------------------------------------
 
     def next_steps(self, step: np.ndarray) -> np.ndarray:
-        """Begin steps of growth, which `step` counts from 0, and return their numbers."""
+        """Begin new steps of growth.
+
+        `step` counts them from 0. The result counts them from the first step of all growth.
+        """
         first = self.current_step + 1
         self.current_step = first + int(step.max(initial=0))
         return first + step
@@ -207,15 +213,16 @@ class StrokeSamples(ColumnTable):
         ----------
         particles : SurfaceParticles
         stroke : (n,) ndarray of int
+            Indices of their strokes.
         arc : (n,) ndarray
-            Signed arc lengths from the seeds.
+            Signed arc lengths from the seeds, in world space.
         step : (n,) ndarray of int
-            The steps of growth at which they are added; see `next_steps`.
+            Steps of growth in which the samples are added; see `next_steps`.
 
         Returns
         -------
         (n,) ndarray of int
-            Their numbers.
+            Indices of the new samples.
         """
         sample = self._append_at(particles, stroke, arc, step)
         self.grid.add(self.position[sample], SEARCH_RADIUS * self.spacing[sample])
@@ -223,10 +230,10 @@ class StrokeSamples(ColumnTable):
 
     @contextmanager
     def probes(self, particles: SurfaceParticles) -> Iterator[np.ndarray]:
-        """Yield the numbers of temporary samples at n particles, for a `with` block.
+        """Context manager: add temporary samples at n particles, and yield their indices.
 
-        They can be compared with other samples, but others do not find them. Do not add samples in
-        the block.
+        They can be compared with other samples, but are not found by comparisons of other samples. Do not add
+        samples in the block.
         """
         count = self.count
         try:
@@ -239,7 +246,7 @@ class StrokeSamples(ColumnTable):
     def _append_at(
         self, particles: SurfaceParticles, stroke: np.ndarray, arc: np.ndarray, step: np.ndarray
     ) -> np.ndarray:
-        """Append rows for particles, without adding them to the grid."""
+        """Append samples at particles to the table, but not to the grid. Return their indices; see `add`."""
         mesh, triangle, weights = self.mesh, particles.triangle, particles.weights
         member = mesh.members_at(triangle, weights, particles.member)
         member = np.where(member == 0, particles.member, member)
@@ -265,21 +272,24 @@ class StrokeSamples(ColumnTable):
         )
 
     def remove(self, sample: np.ndarray) -> None:
-        """Remove samples. The sides that they cover stay covered until `reset_coverage`."""
+        """Remove the samples with the given indices.
+
+        The sides of other samples that they cover stay covered until `reset_coverage`.
+        """
         self.alive[sample] = False
         self.grid.remove(sample)
 
     def remove_strokes(self, stroke_alive: np.ndarray, first: int) -> None:
         """Remove all samples of strokes that are not alive.
 
-        `reset_coverage` then resets the sides of their neighbors.
+        The next call of `reset_coverage` then resets the sides of their neighbors.
 
         Parameters
         ----------
         stroke_alive : ndarray of bool
-            For each stroke.
+            Whether each stroke is alive.
         first : int
-            Number of the first sample that may have to be removed.
+            Index of the first sample that may have to be removed.
         """
         removed = ~stroke_alive[self.stroke[first : self.count]]
         removed &= self.alive[first : self.count]
@@ -291,36 +301,36 @@ class StrokeSamples(ColumnTable):
     # --- coverage of sides ------------------------------------------------------------------------
 
     def mark_covered(self, pairs: CoveringPairs) -> None:
-        """Mark the sides of samples and neighbors that face each other as covered."""
+        """Mark the sides on which the two samples of each pair face each other as covered."""
         self.covered[pairs.sample, pairs.sample_side] = True
         self.covered[pairs.neighbor, pairs.neighbor_side] = True
         self.side_neighbor[pairs.sample, pairs.sample_side] = pairs.neighbor
 
     def add_open_sides(self, sample: np.ndarray) -> None:
-        """Add the uncovered sides of samples to the open sides."""
+        """Add the uncovered sides of the given samples to the list of open sides."""
         covered = self.covered[sample]
         added = np.concatenate([2 * sample[~covered[:, 0]], 2 * sample[~covered[:, 1]] + 1])
         self._open_sides = np.concatenate([self._open_sides, added])
 
     @property
     def coverage(self) -> float:
-        """Fraction of the expected samples that there are, at most 0.99."""
+        """Number of samples over the expected number, at most 0.99."""
         return min(self.count / max(self.expected_count, 1), 0.99)
 
     @property
     def has_open_sides(self) -> bool:
-        """Whether any sides were open at the last call of `open_sides`, or were added since."""
+        """Whether any sides were open at the last call of `open_sides`, or have been added since then."""
         return len(self._open_sides) > 0
 
     def open_sides(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the samples (k,) and sides (k,) that are open: 0 is left, 1 is right."""
+        """Return all open sides: (k,) indices of samples, and (k,) sides. 0 is the left side, 1 the right."""
         sample, side = self._open_sides >> 1, self._open_sides & 1
         keep = self.alive[sample] & ~self.covered[sample, side]
         self._open_sides = self._open_sides[keep]
         return sample[keep], side[keep]
 
     def close_sides(self, sample: np.ndarray, side: np.ndarray) -> None:
-        """Treat sides as covered until `reset_coverage`."""
+        """Treat the given sides of samples as covered until `reset_coverage`. 0 is left, 1 is right."""
         self.covered[sample, side] = True
         self._recheck.append(sample)
 
@@ -330,14 +340,15 @@ class StrokeSamples(ColumnTable):
         self._open_sides = np.empty(0, dtype=np.int64)
 
     def reset_coverage(self) -> np.ndarray:
-        """Mark the sides of samples that have to be checked again as not covered.
+        """Mark both sides of samples as not covered if the samples have to be checked again.
 
-        These are the samples whose neighbors were removed or whose sides were closed.
+        These are the samples whose neighbors were removed or whose sides were closed since the last call.
 
         Returns
         -------
         (k,) ndarray of int
-            Their numbers. The caller marks sides that are covered, then calls `add_open_sides`.
+            Indices of these samples. The caller has to mark their covered sides, and then to call
+            `add_open_sides`.
         """
         sample = np.unique(np.concatenate([np.empty(0, dtype=np.int64), *self._recheck]))
         sample = sample[self.alive[sample]]

@@ -1,13 +1,15 @@
 """Choose seeds of strokes: around singularities, evenly distributed on a mesh, or beside strokes.
 
 Seeds beside strokes follow Jobard and Lefer (1997). Along each side of a stroke only one seed is tried at a
-time, in the middle of the longest open run of samples.
+time, in the middle of the longest open run: consecutive samples of the stroke that have no stroke beside them
+on that side yet.
 
 Around singularities, there is one seed in each sector, all at the same distance. Near a singularity of
-index i, the lines of the field are parallel lines on a cone, which z -> z^(1 - i) unrolls. A line is
-nearest to the apex where its member is perpendicular to the direction from the apex. If the nearest lines
-have the same distance in all sectors, the spacing is consistent all around the singularity. Without these
-seeds, strokes would reach the singularity from elsewhere, at different distances in different sectors.
+index i, the streamlines of the field are parallel lines on a cone, which z -> z^(1 - i) unrolls. A streamline
+is nearest to the apex where its tangent is perpendicular to the direction from the apex. If the nearest
+streamlines have the same distance in all sectors, the spacing is consistent all around the singularity.
+Without these seeds, strokes would reach the singularity from elsewhere, at different distances in different
+sectors.
 """
 
 from __future__ import annotations
@@ -23,34 +25,34 @@ from .samples import SAMPLE_STEP, StrokeSamples
 from .surface_particles import SurfaceParticles, trace_geodesics
 from .tangent_mesh import TangentMesh
 
-#: Candidate seeds per area of one squared spacing.
+#: Points with candidate seeds, per area of one squared spacing.
 CANDIDATE_DENSITY = 0.35
 
-#: After a seed was tried beside a stroke, no other is tried within this distance along the stroke,
+#: After a seed was tried beside a stroke, no other seed is tried within this distance along the stroke,
 #: in spacings.
 RETRY_ARC = 1.0
 
-#: Largest distance between consecutive open samples in one run, in steps between samples.
+#: Largest distance between consecutive open samples in one run, in multiples of `SAMPLE_STEP`.
 MAX_RUN_STEP = 1.6
 
-#: A seed has room if at least this fraction of the distance to it lies on the surface.
+#: A seed has room if the geodesic to it covers at least this fraction of its length before the surface ends.
 MIN_WALKED_RATIO = 0.999
 
-#: Gaps that are wider than this in spacings are divided for two strokes, other gaps for one.
+#: Gaps between strokes that are wider than this, in spacings, get two new strokes; other gaps get one.
 MIN_TWO_STROKE_GAP = 2.5
 
-#: Seeds that are compared with samples at once. Bounds memory.
+#: Number of seeds that are compared with samples at once. It bounds memory.
 SEED_BATCH_SIZE = 1 << 12
 
-#: Geodesic rays that are traced from each singularity.
+#: Number of geodesic rays that are traced from each singularity.
 RAY_COUNT = 72
 
 #: Distance from a singularity, in spacings, at which the strokes on both sides of a separatrix are
-#: one spacing apart. The first is for positive indices, where strokes diverge; the second is for
-#: negative ones.
+#: one spacing apart. The first value is for positive indices, where strokes diverge; the second is for
+#: negative indices, where they converge.
 DIVERGING_DISTANCE, CONVERGING_DISTANCE = 0.8, 1.0
 
-#: Singularities get seeds only if the next one is at least this far away, in spacings.
+#: A singularity gets seeds only if the nearest other one is at least this far away, in spacings.
 MIN_ISOLATION = 6.0
 
 #: A triangle can have a singularity only if its three values z span a triangle in the complex plane whose
@@ -67,13 +69,16 @@ def singularities(mesh: TangentMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray
     Returns
     -------
     triangle : (n,) int32 ndarray
+        Triangles that contain a zero.
     weights : (n, 3) float64 ndarray
-        Barycentric coordinates of the zero.
+        Barycentric coordinates of the zeros.
     index : (n,) float64 ndarray
-        Singularity index, 1/N or -1/N: the turns of a member around the zero.
+        Singularity index, 1/N or -1/N: how many times a member of the field rotates on a path around the
+        zero.
     """
     z = mesh.z
-    # 0 divides the triangle of the three values z into three; these are twice their signed areas.
+    # The point 0 divides the triangle of the three values z into three triangles. These are twice their
+    # signed areas.
     sub_area = (z[:, [1, 2, 0]].conj() * z[:, [2, 0, 1]]).imag
     area = sub_area.sum(axis=1)
     is_turning = np.abs(area) > MIN_TURN_RATIO * (z.real**2 + z.imag**2).sum(axis=1)
@@ -83,7 +88,7 @@ def singularities(mesh: TangentMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 
 def seeds_around_singularities(mesh: TangentMesh, spacing: np.ndarray) -> SurfaceParticles:
-    """Return seeds around the singularities that are far from others.
+    """Return seeds around the singularities that are far from all other singularities.
 
     Parameters
     ----------
@@ -114,8 +119,8 @@ def seeds_around_singularities(mesh: TangentMesh, spacing: np.ndarray) -> Surfac
     deviation = np.angle(arrived.member * tangential.conj())
     deviation[(walked < 0.999 * distance) | (arrived.member == 0)] = np.nan
     deviation = deviation.reshape(-1, RAY_COUNT)
-    # Around the singularity, the angle from the tangent of the circle to the member decreases.
-    # Seeds are where it is zero.
+    # On the circle around the singularity, the angle from the tangent of the circle to the member decreases.
+    # Seeds are at the points where this angle is zero.
     next_deviation = np.roll(deviation, -1, axis=1)
     is_seed = (deviation > 0) & (next_deviation <= 0)
     is_seed &= deviation - next_deviation < np.pi / mesh.degree
@@ -125,8 +130,9 @@ def seeds_around_singularities(mesh: TangentMesh, spacing: np.ndarray) -> Surfac
 def seed_distance(index: np.ndarray) -> np.ndarray:
     """Return (n,) float64: the distance from a singularity to the strokes around it, in spacings.
 
-    On the cone, the strokes are half a line distance from the apex. If the index is 1/2 or more,
-    they are a full line distance from it, with another stroke on the single separatrix.
+    Near a singularity, streamlines are parallel lines on a cone. The nearest lines pass the apex at half the
+    distance between two lines. If the index is 1/2 or more, they pass it at the full distance between two
+    lines, because another stroke then lies on the only separatrix.
     """
     ratio = np.where(index < 0.5, 0.5, 1.0)
     separation_distance = np.where(index > 0, DIVERGING_DISTANCE, CONVERGING_DISTANCE)
@@ -134,7 +140,7 @@ def seed_distance(index: np.ndarray) -> np.ndarray:
 
 
 def _is_isolated(points: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """Return (n,) bool: whether no other point is within the (n,) radius."""
+    """Return (n,) bool: whether each point is isolated. No other point is within its `radius`, (n,), then."""
     if not len(points):
         return np.zeros(0, dtype=bool)
     grid = PointGrid(float(np.median(radius)), len(points))
@@ -149,7 +155,9 @@ def _is_isolated(points: np.ndarray, radius: np.ndarray) -> np.ndarray:
 
 
 def candidate_seeds(mesh: TangentMesh, corner_spacing: np.ndarray) -> SurfaceParticles:
-    """Return seeds at evenly distributed points of the mesh, one for each line at each point.
+    """Return seeds at evenly distributed points of the mesh.
+
+    Each point has a seed for each of the M different directions in which a streamline runs through it.
 
     Parameters
     ----------
@@ -180,7 +188,7 @@ def candidate_seeds(mesh: TangentMesh, corner_spacing: np.ndarray) -> SurfacePar
 
 
 def uncovered_seeds(samples: StrokeSamples, seeds: SurfaceParticles) -> SurfaceParticles:
-    """Return the seeds that are not near a stroke of their family."""
+    """Return the seeds that are not near a stroke of their family (one of the M line directions)."""
     is_uncovered = np.zeros(len(seeds), dtype=bool)
     for batch in row_blocks(len(seeds), SEED_BATCH_SIZE):
         report(samples.coverage, "looking for gaps")
@@ -193,19 +201,19 @@ def uncovered_seeds(samples: StrokeSamples, seeds: SurfaceParticles) -> SurfaceP
 def thinned_seeds(
     mesh: TangentMesh, seeds: SurfaceParticles, cell_size: float, spacing_ratio: np.ndarray
 ) -> SurfaceParticles:
-    """Return the seeds at points that are about `cell_size` apart in world space.
+    """Return fewer seeds: all those at points that are chosen about `cell_size` apart in world space.
 
-    All seeds at a chosen point are returned, one for each line.
+    Each point has a seed for each line direction of the field. All seeds at a chosen point are returned.
 
     Parameters
     ----------
     mesh : TangentMesh
     seeds : SurfaceParticles
     cell_size : float
-        For the spacing that `spacing_ratio` is relative to.
+        Distance of the points where `spacing_ratio` is 1.
     spacing_ratio : (n,) ndarray
-        Relative spacing at the seeds. Where it is very different from 1, the points are farther
-        apart or nearer accordingly; see `point_grid.grid_levels`.
+        Spacing of strokes at the seeds, relative to their usual spacing. Where it is very different from 1,
+        the chosen points are farther apart or nearer accordingly; see `point_grid.grid_levels`.
     """
     position = mesh.points_at(seeds.triangle, seeds.weights)
     level = grid_levels(spacing_ratio, 1.0)
@@ -218,9 +226,12 @@ def thinned_seeds(
 
 
 def _is_nearest_to_cell_center(position: np.ndarray, cell_size: float) -> np.ndarray:
-    """Return (n,) bool: whether a point is at the position nearest to the center of its cell."""
+    """Return (n,) bool: whether a point is chosen as the nearest to the center of its grid cell.
+
+    The bounding box of all points is divided into a grid of cells of at most `cell_size`. One point of each
+    cell is chosen, and with it all points at exactly the same position.
+    """
     low, extent = position.min(axis=0), np.ptp(position, axis=0)
-    # Divide the bounding box into cells, and choose the point nearest to the center of each cell.
     cell_counts = np.maximum(np.ceil(extent / cell_size), 1)
     grid_position = (position - low) * cell_counts / np.maximum(extent, 1e-300)
     cell = np.minimum(np.floor(grid_position), cell_counts - 1)
@@ -241,19 +252,22 @@ def longest_open_runs(
 ) -> tuple[np.ndarray, ...]:
     """Find the middle of the longest open run on each side of each stroke.
 
+    An open run consists of consecutive samples of a stroke that have no other stroke beside them on this
+    side.
+
     Parameters
     ----------
     samples : StrokeSamples
     sample, side : (n,) ndarray of int
-        Samples and their open sides: 0 is left, 1 is right.
+        Samples of strokes, each with a side on which it is open: 0 is left, 1 is right.
 
     Returns
     -------
     sample, side : (k,) ndarray of int
-        The middle of each run.
+        The sample in the middle of each longest run, and its open side.
     nearby, nearby_side : (m,) ndarray of int
-        All open sides within `RETRY_ARC` of a middle. If a seed does not fit there, one beside
-        it rarely does.
+        All given samples and sides within `RETRY_ARC` of a middle on the same side of the same stroke. If a
+        seed does not fit at the middle, a seed at these samples rarely does.
     """
     arc, key = samples.arc[sample], 2 * samples.stroke[sample].astype(np.int64) + side
     order = np.lexsort((arc, key))
@@ -276,21 +290,21 @@ def longest_open_runs(
 def lateral_seeds(
     samples: StrokeSamples, sample: np.ndarray, side: np.ndarray
 ) -> tuple[SurfaceParticles, np.ndarray]:
-    """Return seeds beside samples.
+    """Return seeds for new strokes, one beside each of n samples.
 
-    A seed is one spacing away. If there is a stroke on the other side of the gap, the seed divides
-    the gap evenly for one or two strokes.
+    A seed is one spacing away from its sample. If there is a stroke on the other side of the gap, the seed is
+    at half of the gap, or at a third of it if two new strokes fit.
 
     Parameters
     ----------
     samples : StrokeSamples
     sample, side : (n,) ndarray of int
-        Samples and sides: 0 is left, 1 is right.
+        Samples, and the side on which each gets a seed: 0 is left, 1 is right.
 
     Returns
     -------
     seeds : SurfaceParticles
-        n seeds.
+        The n seeds.
     has_room : (n,) bool ndarray
         False if the surface ends before the seed, or the field is zero there.
     """
@@ -309,7 +323,11 @@ def lateral_seeds(
 def _lateral_points(
     samples: StrokeSamples, sample: np.ndarray, side: np.ndarray, distance: np.ndarray
 ) -> tuple[SurfaceParticles, np.ndarray]:
-    """Return the points at (n,) distances beside samples, in spacings; see `lateral_seeds`."""
+    """Return points beside samples, and (n,) bool: whether the surface and the field extend to the point.
+
+    `distance`, (n,), is the distance of the point from its sample in spacings. `side` is as in
+    `lateral_seeds`.
+    """
     particles = samples.particles(sample, np.ones(len(sample)))
     direction = samples.local_direction[sample] * np.where(side == 0, 1j, -1j)
     length = distance * samples.spacing[sample]
@@ -320,9 +338,9 @@ def _lateral_points(
 def _free_gap(
     samples: StrokeSamples, sample: np.ndarray, seeds: SurfaceParticles, has_room: np.ndarray
 ) -> np.ndarray:
-    """Return (n,) gaps from seeds to the next stroke on the side away from the sample.
+    """Return (n,) float64: the distances from seeds to the next stroke on the side away from their sample.
 
-    Gaps are in spacings. They are infinite if there is no stroke or no room for the seed.
+    They are in spacings, and infinite if there is no such stroke or no room for the seed.
     """
     free_gap = np.full(len(sample), np.inf)
     indices = np.flatnonzero(has_room)

@@ -6,8 +6,8 @@ Placement compares samples that are half a spacing apart. This misses some pairs
   neighbors may also be of different families at one sample and of the same family at the next.
 - At folds, the distance in space is smaller than along the surface.
 
-After placement, strokes are compared more finely at such points and near their ends. Of two strokes
-that are too near, the shorter one is cut.
+After placement, strokes are compared at smaller steps near such points and near their ends. Of two strokes
+that are too near to each other, the shorter one is cut.
 """
 
 from __future__ import annotations
@@ -24,49 +24,50 @@ from .point_grid import PointGrid
 from .stroke_set import Strokes
 from .tangent_mesh import TangentMesh
 
-#: Minimum separation in spacings. It is a little more than the guaranteed half spacing, to allow
-#: for the parts between the points that are compared.
+#: Minimum separation in spacings. It is a little more than half a spacing, which is guaranteed, because
+#: strokes may be nearer to each other between the points that are compared.
 MIN_SEPARATION = 0.52
 
-#: Tolerance in radians that is added to the largest angle between members of one family.
+#: Tolerance in radians that is added to the largest angle between members of the same family.
 FAMILY_TOLERANCE = np.radians(10)
 
 #: Distance between the points that are compared, in spacings.
 REFINED_STEP = 0.1
 
-#: Strokes are compared finely where they or the field turn by more than this within a spacing, in radians.
+#: Strokes are compared at steps of `REFINED_STEP` where they or the field rotate by more than this within a
+#: spacing, in radians. The points at which this is so are called suspect.
 MAX_TURN = np.radians(18)
 
-#: Strokes are also compared finely where the normals of the surface turn by more than the first angle within
-#: a spacing, and at ends of strokes where they turn by more than the second.
+#: Points are also suspect where the normals of the surface rotate by more than `FOLD_ANGLE` within a spacing.
+#: For ends of strokes, the limit is `END_FOLD_ANGLE`.
 FOLD_ANGLE, END_FOLD_ANGLE = np.radians(40), np.radians(12)
 
-#: Points that are examined at once, to bound memory.
+#: Number of points that are examined at once. It bounds memory.
 BLOCK_POINTS = 1 << 14
 
-#: Radius around such points in which strokes are subdivided, in spacings.
+#: Radius around suspect points in which strokes are subdivided, in spacings.
 CHECK_RADIUS = 1.0
 
 
 def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -> Strokes:
-    """Remove the parts of strokes that are nearer than `MIN_SEPARATION` to another of their family.
+    """Remove the parts of strokes that are nearer than `MIN_SEPARATION` to a stroke of the same family.
 
-    Two strokes are of the same family at a point if the angle between their directions is less than
-    half the angle between two lines of the field.
+    Two strokes are of the same family where the angle between their directions is less than half the angle
+    between two line directions of the field.
 
     Parameters
     ----------
     mesh : TangentMesh
         The mesh on which the strokes were traced.
     strokes : Strokes
-        Strokes before `label_families`: all are in one family.
+        Strokes before `label_families`, with the same value of `Strokes.family`.
     min_length : float
         Remaining parts of cut strokes that are shorter than this are removed, in spacings.
 
     Returns
     -------
     Strokes
-        Strokes that were not cut, then the remaining parts.
+        The strokes that were not cut, followed by the remaining parts of the others.
     """
     with progress(0.0, 0.3):
         suspect = _suspect_points(mesh, strokes)
@@ -102,7 +103,7 @@ def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -
 
 
 def _suspect_points(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
-    """Return (n,) bool: the points near which strokes may be closer than the minimum separation."""
+    """Return (n,) bool: whether strokes may be closer than the minimum separation near a point."""
     surface_turn = np.empty(len(strokes.points))
     suspect = _stroke_turn_per_spacing(strokes) > MAX_TURN
     for block in row_blocks(len(suspect), BLOCK_POINTS):
@@ -120,9 +121,10 @@ def _suspect_points(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
 
 
 def _surface_turn_per_spacing(mesh: TangentMesh, strokes: Strokes, block: slice) -> np.ndarray:
-    """Return radians by which the shading normal turns within a spacing, at a block of points.
+    """Return the angle, in radians, by which the shading normal rotates within a spacing.
 
-    It is the norm of the derivatives in two perpendicular directions.
+    The result has a value for each of the points in `block`. It is the norm of the derivatives in two
+    perpendicular directions, times the spacing.
     """
     triangle = strokes.triangle[block]
     gradient, normal = mesh.gradient[triangle], mesh.corner_normal[triangle]
@@ -134,7 +136,10 @@ def _surface_turn_per_spacing(mesh: TangentMesh, strokes: Strokes, block: slice)
 
 
 def _stroke_turn_per_spacing(strokes: Strokes) -> np.ndarray:
-    """Return (n,) radians by which strokes turn in space within half a spacing on either side."""
+    """Return (n,) angles, in radians, by which strokes turn within a spacing around each point.
+
+    The directions of a stroke half a spacing before and after the point are compared.
+    """
     arc, stroke = strokes.arc, strokes.stroke
     stride = 2 * (float(arc.max(initial=0)) + float(strokes.spacing.max(initial=0)))
     key = stroke * stride + arc
@@ -147,9 +152,10 @@ def _stroke_turn_per_spacing(strokes: Strokes) -> np.ndarray:
 
 
 def _field_turn_per_spacing(mesh: TangentMesh, strokes: Strokes, block: slice) -> np.ndarray:
-    """Return radians by which the field turns within a spacing, at a block of points.
+    """Return the angle, in radians, by which the field rotates within a spacing.
 
-    The direction in which it turns most counts.
+    The result has a value for each of the points in `block`. It is measured in the direction in which the
+    field rotates most.
     """
     triangle = strokes.triangle[block]
     z, gradient = mesh.z[triangle], mesh.gradient[triangle]
@@ -161,9 +167,9 @@ def _field_turn_per_spacing(mesh: TangentMesh, strokes: Strokes, block: slice) -
 
 
 def _points_near(strokes: Strokes, suspect: np.ndarray) -> np.ndarray:
-    """Return the numbers of all points within `CHECK_RADIUS` spacings of suspect points.
+    """Return the indices of all points within `CHECK_RADIUS` spacings of suspect points.
 
-    The test is by grid cells, so it includes some points that are farther away.
+    `suspect` is (n,) bool. Whole grid cells are selected, so some points that are farther away are included.
     """
     cell = CHECK_RADIUS * float(strokes.spacing.max())
     cells = np.floor((strokes.points - strokes.points.min(axis=0)) / cell).astype(np.int64) + 1
@@ -176,19 +182,20 @@ def _points_near(strokes: Strokes, suspect: np.ndarray) -> np.ndarray:
 
 
 def _refine(strokes: Strokes, near_suspect: np.ndarray) -> tuple[Strokes, np.ndarray]:
-    """Subdivide strokes to steps of at most `REFINED_STEP` spacings at some points.
+    """Divide segments of strokes into parts of at most `REFINED_STEP` spacings next to some points.
 
     Parameters
     ----------
     strokes : Strokes
     near_suspect : (n,) bool ndarray
-        The points next to which segments are subdivided.
+        Whether the segments next to a point are divided.
 
     Returns
     -------
     refined : Strokes
+        The strokes after division, with m points.
     source : (m,) int64 ndarray
-        For each new point, the original point at or after it.
+        For each point of `refined`, the index of the original point at or after it.
     """
     step = np.diff(strokes.arc, prepend=0)
     step[strokes.start[:-1]] = 0
@@ -200,15 +207,15 @@ def _refine(strokes: Strokes, near_suspect: np.ndarray) -> tuple[Strokes, np.nda
 def _too_close(
     mesh: TangentMesh, refined: Strokes, suspect: np.ndarray, length: np.ndarray
 ) -> np.ndarray:
-    """Return (m,) bool: the points of refined strokes to remove.
+    """Return (m,) bool: which points of refined strokes to remove, as they are too near to another stroke.
 
     Parameters
     ----------
     mesh : TangentMesh
     refined : Strokes
-        m points in all.
+        Strokes with m points in all.
     suspect : (m,) bool ndarray
-        The points that are compared with all others.
+        Whether a point is compared with all others.
     length : (S,) float64 ndarray
         Lengths of the strokes, in world space.
     """
@@ -241,7 +248,10 @@ def _too_close(
 def _pairs_of_one_family(
     mesh: TangentMesh, refined: Strokes, point: np.ndarray, other: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the pairs of points that are of the same family and on the same side of a fold."""
+    """Return the pairs of points that are of the same family and on the same side of a fold.
+
+    `point` and `other` are the indices of the two points of each pair.
+    """
     normal_a, normal_b = refined.normal[point], refined.normal[other]
     normal_sum, delta = normal_a + normal_b, refined.points[point] - refined.points[other]
     same_family = dot(normal_a, normal_b) > MIN_NORMAL_COSINE
@@ -264,20 +274,16 @@ def _pairs_of_one_family(
 
 
 def _dilate(refined: Strokes, removed: np.ndarray) -> np.ndarray:
-    """Widen the removed stretches to a minimum length.
+    """Return (m,) bool: `removed`, with each run of removed points widened to a minimum length.
 
-    Otherwise the parts of a stroke on both sides of a stretch could be too near to each other.
-
-    Returns
-    -------
-    (m,) bool ndarray
+    Otherwise the remaining parts of a stroke on both sides of a run could be too near to each other.
     """
     arc, stroke = refined.arc, refined.stroke
     stride = 2 * (float(arc.max()) + float(refined.spacing.max()))
     key = stroke * stride + arc
     transitions = np.diff(np.concatenate([[0], (removed * (stroke + 1)), [0]]))
     changes = np.flatnonzero(transitions)
-    # A stretch at the end of a stroke and one at the start of the next share one change.
+    # A run at the end of a stroke and a run at the start of the next stroke share one change.
     first = changes[removed[np.minimum(changes, len(removed) - 1)] & (changes < len(removed))]
     last = changes[(changes > 0) & removed[np.maximum(changes - 1, 0)]] - 1
     min_extent = (MIN_SEPARATION + 2 * REFINED_STEP) * refined.spacing[first]

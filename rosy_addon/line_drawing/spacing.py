@@ -1,8 +1,8 @@
-"""The spacing of strokes: even in the picture or on the surface, and changed by tone and curvature.
+"""Compute the spacing of strokes: even in the picture or on the surface, and changed by tone and curvature.
 
 Where a surface turns away from the camera, it is foreshortened in one direction. In the picture, strokes
 along this direction keep their distance, but strokes across it, along the silhouette, come nearer. So the
-spacing depends on the direction of strokes: they do not crowd at silhouettes.
+spacing depends on the direction of strokes, so that they do not crowd at silhouettes.
 """
 
 from __future__ import annotations
@@ -43,7 +43,11 @@ MIN_FACING_COSINE = 1 / 3
 
 
 def foreshortening_factor(cosine: np.ndarray | float) -> np.ndarray:
-    """Return the factor of the spacing that keeps the density even; see `spacing_in_picture`."""
+    """Return the factor of the spacing that keeps the density of strokes in the picture even.
+
+    `cosine` is the cosine between the normal of the surface and the direction to the camera. See
+    `spacing_in_picture`.
+    """
     return (1 + cosine) / (2 * cosine)
 
 
@@ -51,10 +55,10 @@ def foreshortening_factor(cosine: np.ndarray | float) -> np.ndarray:
 #: foreshortened direction at `MIN_FACING_COSINE`.
 MIN_PICTURE_RATIO = foreshortening_factor(MIN_FACING_COSINE) * MIN_FACING_COSINE
 
-#: The spacing does not grow further where the cosine between the normal and the direction to the camera is below
-#: a limit. The limit is between `MIN_COSINES`. Between these, it is chosen such that the band with smaller
-#: cosines is `SILHOUETTE_SPACINGS` wide in the picture. Otherwise, lines that approach a silhouette at an angle
-#: would end before they reach it.
+#: Limit for the cosine between the normal and the direction to the camera: where the cosine is smaller, the
+#: spacing does not grow further. Otherwise, strokes that approach a silhouette at an angle would end before
+#: they reach it. The limit is chosen such that the band with smaller cosines is `SILHOUETTE_SPACINGS` wide in
+#: the picture. It is clipped to the range `MIN_COSINES`.
 MIN_COSINES, SILHOUETTE_SPACINGS = (0.03, 0.2), 2.0
 
 
@@ -63,16 +67,18 @@ class CornerSpacing:
     """The spacing of strokes at the corners of T triangles, in world space.
 
     Let d be the unit direction of a stroke in the frame of its triangle. The spacing is `values` times
-    the square root of mean - Re(conj(double) d^2), or times 1 if this is less.
+    a factor for the direction: the square root of mean - Re(conj(double) d^2), but at least 1.
 
     Attributes
     ----------
     values : (T, 3) float64 ndarray
+        Spacing without the factor for the direction.
     mean : (T, 3) float64 ndarray or None
     double : (T, 3) complex128 ndarray or None
-        None if the spacing does not depend on the direction.
+        Coefficients of the factor; None if the spacing does not depend on the direction.
     is_directional : (T,) bool ndarray or None
-        Whether the factor may be above 1.
+        Whether the factor is above 1 for some direction; None if the spacing does not depend on the
+        direction.
     """
 
     values: np.ndarray
@@ -81,12 +87,16 @@ class CornerSpacing:
     is_directional: np.ndarray | None = None
 
     def take(self, kept: np.ndarray) -> CornerSpacing:
-        """Return the spacing on some triangles; `kept` is (T,) bool."""
+        """Return the spacing on the triangles for which `kept`, (T,) bool, is true."""
         columns = vars(self).values()
         return CornerSpacing(*(None if column is None else column[kept] for column in columns))
 
     def at(self, triangle: np.ndarray, weights: np.ndarray, direction: np.ndarray) -> np.ndarray:
-        """Return (n,) float64: the spacing at barycentric coordinates, for unit directions."""
+        """Return (n,) float64: the spacing at points of triangles, for strokes in given directions.
+
+        `weights` are (n, 3) barycentric coordinates, and `direction` (n,) complex unit tangents in the frames
+        of the triangles.
+        """
         spacing = np.einsum("nk,nk->n", weights, self.values[triangle])
         if self.is_directional is None:
             return spacing
@@ -101,23 +111,23 @@ class CornerSpacing:
 
 
 def spacing_in_picture(mesh: TangentMesh, camera: Camera, pixels: float) -> CornerSpacing:
-    """Return the spacing in world space of strokes that are some pixels apart in the picture.
+    """Return the spacing, in world space, of strokes that are about `pixels` pixels apart in the picture.
 
     Let c be the cosine between the normal and the direction to the camera. The visible area of the
     surface is c times its area. Lines on it appear between c and 1 times as long, and (1 + c) / 2
     times on average over their directions. So the spacing grows by (1 + c) / (2 c), to keep the
     density even.
 
-    It grows more for strokes that would crowd. Let p be the angle between a stroke and the foreshortened
-    direction. Strokes at a distance s on the surface are s / sqrt(cos^2 p + sin^2 p / c^2) apart in the
-    picture.
+    It grows more for strokes across the foreshortened direction, which would crowd. Let p be the angle
+    between a stroke and the foreshortened direction. Strokes at a distance s on the surface are
+    s / sqrt(cos^2 p + sin^2 p / c^2) apart in the picture.
 
     Parameters
     ----------
     mesh : TangentMesh
     camera : Camera
     pixels : float
-        Spacing for a surface that faces the camera.
+        Spacing, in pixels, on a surface that faces the camera.
     """
     to_eye = camera.view_directions(mesh.points)
     cosine = np.abs(dot(mesh.corner_normal, to_eye))
@@ -137,7 +147,10 @@ def spacing_in_picture(mesh: TangentMesh, camera: Camera, pixels: float) -> Corn
 
 
 def _curvature(mesh: TangentMesh) -> np.ndarray:
-    """Return (T,) float64: the largest change of the normal along an edge, over its length."""
+    """Return (T,) float64: the curvature of triangles, estimated from the shading normals.
+
+    It is the largest difference between the normals at both ends of an edge, over the length of the edge.
+    """
     curvature = np.zeros(len(mesh.points))
     for first, second in ((0, 1), (1, 2), (2, 0)):
         turn = mesh.corner_normal[:, first] - mesh.corner_normal[:, second]
@@ -175,15 +188,17 @@ class LightSource(Protocol):
 
 
 def with_vertices_of_fans(instance: MeshInstance) -> MeshInstance:
-    """Return a mesh instance with a vertex for each smooth fan, so that vertices have one normal.
+    """Return a mesh instance with a vertex for each smooth fan, so that each vertex has one normal.
 
-    At a sharp edge, either side has its own spacing and tone. With the vertices of the original they would be
-    averaged: a dark face would be lighter beside its edges, and a light face darker.
+    A smooth fan is the set of corners around a vertex that are not separated by sharp edges. In the result,
+    the two sides of a sharp edge have different vertices, and so can have different spacings and tones. With
+    the original vertices, these would be averaged: a dark face would become lighter near its edges, and a
+    light face darker.
 
     Returns
     -------
     MeshInstance
-        Vertex k is fan k; faces, corners and triangles are the same.
+        Vertex k is at the vertex of fan k. Faces, corners and triangles are the same.
     """
     surface = instance.surface
     split = surface.with_parts(
@@ -195,7 +210,7 @@ def with_vertices_of_fans(instance: MeshInstance) -> MeshInstance:
 
 
 def fan_vertices(surface: Surface) -> np.ndarray:
-    """Return (K,) int32: the vertex of each smooth fan."""
+    """Return (K,) int32: the vertex of each of the K smooth fans of a surface."""
     vertex = np.zeros(int(surface.corner_fan.max()) + 1, dtype=np.int32)
     vertex[surface.corner_fan] = surface.corner_vertex
     return vertex
@@ -204,9 +219,10 @@ def fan_vertices(surface: Surface) -> np.ndarray:
 def spacing_by_tone(
     spacing: np.ndarray | float, tone: np.ndarray, max_ratio: float = MAX_SPACING_RATIO
 ) -> np.ndarray:
-    """Divide the spacing by the darkness, 1 - tone.
+    """Return the spacing for a tone: the spacing for black over the darkness, 1 - tone.
 
-    The fraction of the paper that is covered with ink is the width of strokes over their spacing.
+    The fraction of the paper that is covered with ink, the width of strokes over their spacing, is then
+    proportional to the darkness.
 
     Parameters
     ----------
@@ -220,7 +236,7 @@ def spacing_by_tone(
     Returns
     -------
     ndarray
-        As many spacings as tones.
+        A spacing for each tone.
     """
     ink = np.maximum(1 - np.clip(tone, 0, 1), 1 / max_ratio)
     return np.asarray(spacing) / ink
@@ -229,19 +245,23 @@ def spacing_by_tone(
 def spacing_by_curvature(
     surface: Surface, spacing: np.ndarray | float, exponent: float = 0.5
 ) -> np.ndarray:
-    """Divide the spacing by a power of the curvature, relative to its median.
+    """Return spacings that are smaller where the surface is more curved.
+
+    The spacing is divided by a power of the ratio of the curvature to its median. The factor by which it
+    changes is limited to the range from `MIN_SPACING_RATIO` to `MAX_SPACING_RATIO`.
 
     Parameters
     ----------
     surface : Surface
     spacing : float or (V,) ndarray
+        Spacing at the median curvature.
     exponent : float
         The power. 0 changes nothing; with 1 the spacing is proportional to the radius of curvature.
-        The factor is limited to `MIN_SPACING_RATIO` and `MAX_SPACING_RATIO`.
 
     Returns
     -------
     (V,) float64 ndarray
+        Spacing at each vertex.
     """
     curvature = face_magnitude(surface, "curvature")
     corner = surface.corner_vertex
@@ -260,14 +280,14 @@ def lit_tone(instance: MeshInstance, camera: Camera, lights: Sequence[LightSourc
     ----------
     instance : MeshInstance
     camera : Camera
-        Camera whose space the lights are in.
+        Camera. The lights are in its space.
     lights : sequence of LightSource
-        Without lights, the light is at the camera.
+        If there are none, the light is at the camera.
 
     Returns
     -------
     (V,) float64 ndarray
-        From 0 to 1.
+        Tones at the vertices, from 0 (black) to 1 (white).
     """
     if not lights:
         return lambert_tone(instance, camera.view_directions(instance.world_points()))
@@ -285,7 +305,7 @@ def lit_tone(instance: MeshInstance, camera: Camera, lights: Sequence[LightSourc
 
 
 def lambert_tone(instance: MeshInstance, to_light: np.ndarray) -> np.ndarray:
-    """Return the (V,) tones of a matte surface: the cosines between normals and light, 0 to 1.
+    """Return (V,) tones of a matte surface: the cosines between normals and the light, clipped to 0 to 1.
 
     Parameters
     ----------
@@ -305,26 +325,28 @@ def lambert_tone(instance: MeshInstance, to_light: np.ndarray) -> np.ndarray:
 def weight_by_tone(
     strokes: Strokes, tone: np.ndarray, layering: float, max_ratio: float = MAX_SPACING_RATIO
 ) -> Strokes:
-    """Fade in families one after another as the tone gets darker; remove strokes in the lightest.
+    """Reduce the width of strokes in light areas, and remove strokes in the lightest areas.
 
-    The width of the first family begins to fall at the tone at which `spacing_by_tone` reaches its
-    largest factor. So the ink coverage falls continuously to zero.
+    As the tone gets darker, the families begin one after another. In lighter and lighter areas, the width of
+    the first family begins to fall where `spacing_by_tone` reaches its largest factor. So the ink coverage
+    falls continuously to zero.
 
     Parameters
     ----------
     strokes : Strokes
-        As they were traced.
+        Strokes as they were traced.
     tone : (n,) ndarray
         Tones at the points of strokes, from 0 to 1; see `values_at_points`.
     layering : float
-        Difference in darkness between the beginnings of successive families.
+        Difference in darkness between the tones at which successive families begin.
     max_ratio : float
-        As in `spacing_by_tone`.
+        Largest factor of the spacing, as in `spacing_by_tone`.
 
     Returns
     -------
     Strokes
-        With smaller widths, cut where these fall to `MIN_STROKE_WIDTH`. Ends at cuts are free.
+        The strokes with smaller widths. They are cut where the width falls to `MIN_STROKE_WIDTH`. Ends at
+        cuts are free ends.
     """
     darkness = 1 - np.clip(tone, 0, 1) - layering * strokes.family[strokes.stroke]
     weight = np.clip(darkness * max_ratio, 0, 1)
@@ -335,7 +357,8 @@ def weight_by_tone(
 def values_at_points(strokes: Strokes, surface: Surface, values: np.ndarray) -> np.ndarray:
     """Interpolate (V,) values at vertices to the (n,) points of strokes.
 
-    The strokes need barycentric weights at all points. `clip_to_visible` adds points without them.
+    All points must have barycentric weights. `clip_to_visible` adds points without weights, so call this
+    function before it.
     """
     vertex = surface.triangle_vertex[strokes.triangle]
     return np.einsum("nk,nk->n", strokes.weights, np.asarray(values, dtype=np.float64)[vertex])

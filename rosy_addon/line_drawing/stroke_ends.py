@@ -1,7 +1,7 @@
-"""The ends of strokes: which are free, how free ends are extended, and which ends meet head on.
+"""Find the free ends of strokes and extend them, and find the ends of strokes that meet head on.
 
-Extensions beyond occluding edges, borders and the ends of shaded areas (overshoot) imitate quick drawings
-by hand, in which lines continue a little too far.
+A free end is at an occluding edge, at a border or at the end of a shaded area. Strokes that are extended
+beyond it (overshoot) imitate quick drawings by hand, in which lines continue a little too far.
 """
 
 from __future__ import annotations
@@ -26,38 +26,38 @@ from .visibility import (
     project_to_pixels,
 )
 
-#: Shortest extension of an end, as a fraction of the longest.
+#: Shortest extension of an end, as a fraction of the longest extension.
 MIN_EXTENSION_RATIO = 0.3
 
-#: Distance in pixels before an end at which the extension leaves the stroke, and largest distance as a
-#: fraction of the length of the stroke. The direction of the extension is measured over the same length.
+#: An extension leaves its stroke `BACKTRACK_PX` pixels before the end, or `MAX_BACKTRACK_RATIO` of the length
+#: of the stroke if that is less. The direction of the extension is measured over the same length.
 BACKTRACK_PX, MAX_BACKTRACK_RATIO = 6.0, 0.25
 
 #: Longest extension of an end, as a fraction of the length of the stroke.
 MAX_EXTENSION_RATIO = 0.5
 
-#: A point is on an edge if a barycentric coordinate is below this.
+#: A point is on an edge of a triangle if one of its barycentric coordinates is below this.
 EDGE_EPS = 1e-9
 
-#: Region around an end in which the end of another stroke meets it: largest distances ahead, to the
-#: side and behind, in spacings.
+#: An end meets the end of another stroke if the latter is at most this far ahead, to the side and behind, in
+#: spacings.
 MAX_FORWARD, MAX_LATERAL, MAX_BACKWARD = 1.2, 0.8, 0.6
 
 #: Largest cosine between the outward directions of two ends that meet, and smallest cosine between
 #: their normals.
 MAX_DIRECTION_COSINE, MIN_NORMAL_COSINE = -0.8, 0.5
 
-#: Ends that are compared with others at once.
+#: Number of ends that are compared with others at once. It bounds memory.
 BLOCK_ENDS = 1 << 12
 
 
 def mark_free_boundary_ends(strokes: Strokes, mesh: TangentMesh) -> Strokes:
-    """Set `Strokes.free_ends` to the ends that are on a boundary of the mesh.
+    """Return strokes whose `free_ends` are the ends on a boundary of the mesh.
 
     Parameters
     ----------
     strokes : Strokes
-        As they were traced, with barycentric weights at their ends.
+        Strokes as they were traced, with barycentric weights at their ends.
     mesh : TangentMesh
         The mesh on which they were traced. Its boundaries are the borders of the surface and the
         creases that strokes do not cross.
@@ -71,32 +71,32 @@ def mark_free_boundary_ends(strokes: Strokes, mesh: TangentMesh) -> Strokes:
 def extend_free_ends(
     strokes: Strokes, camera: Camera, max_pixels: float, depth_buffer: DepthBuffer | None
 ) -> Strokes:
-    """Extend free ends in a straight line, by pseudorandom lengths.
+    """Extend the free ends of strokes in straight lines of pseudorandom lengths.
 
-    Lines that follow no member of the field, such as outlines, are not extended.
+    Outlines, which do not follow the field, are not extended.
 
     Parameters
     ----------
     strokes : Strokes
-        As `clip_to_visible` returns them.
+        Strokes as `clip_to_visible` returns them.
     camera : Camera
     max_pixels : float
         Longest extension in pixels. The shortest is `MIN_EXTENSION_RATIO` of it.
     depth_buffer : DepthBuffer or None
         If given, extensions are straight in the picture. They are at the depth of the end, or on
-        the visible surface where it is nearer or continues at about that depth.
-        If not given, extensions are straight in world space.
+        the visible surface where the surface is nearer or at about the same depth.
+        If None, extensions are straight in world space.
 
     Returns
     -------
     Strokes
-        Points of extensions are at most `SAMPLE_STEP_PX` pixels apart. Extensions are not clipped
-        to the frame.
+        The strokes with their extensions. Points of extensions are at most `SAMPLE_STEP_PX` pixels apart.
+        Extensions are not clipped to the frame.
 
     See Also
     --------
-    mark_free_boundary_ends : Marks the ends at borders.
-    Strokes.runs_where : Marks the ends at removed points.
+    mark_free_boundary_ends : Marks the ends at borders as free.
+    Strokes.runs_where : Marks the ends at removed points as free.
     """
     report(0.0, "extending strokes")
     if depth_buffer is None:
@@ -130,10 +130,10 @@ def extend_free_ends(
 def _extension_in_picture(
     strokes: Strokes, arc: np.ndarray, end: np.ndarray, backtrack: np.ndarray, camera: Camera
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the lines along which (k,) ends are extended, if they are straight in the picture.
+    """Return the lines along which k ends are extended, for extensions that are straight in the picture.
 
-    The lines lie in the plane through the end that is parallel to the image plane. They leave the stroke
-    `backtrack` pixels before its end, because strokes bend along the silhouette close to it.
+    Each line lies in the plane through the end of the stroke that is parallel to the image plane. It leaves
+    the stroke `backtrack` pixels before its end, because strokes close to a silhouette bend along it.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def _extension_in_picture(
     arc : (n,) float64 ndarray
         Arc lengths of points, in pixels.
     end : (k,) int64 ndarray
-        Numbers of the end points.
+        Indices of the end points.
     backtrack : (k,) float64 ndarray
         Length in pixels before the end over which the direction is measured.
     camera : Camera
@@ -149,11 +149,11 @@ def _extension_in_picture(
     Returns
     -------
     start_point : (k,) int64 ndarray
-        Points at which the extensions leave the strokes.
+        Indices of the points at which the extensions leave the strokes.
     origin : (k, 3) float64 ndarray
-        Origins of the extensions, in world space.
+        Start of each line, in world space.
     step : (k, 3) float64 ndarray
-        Steps of one pixel, in world space.
+        Step of one pixel along each line, in world space.
     """
     start_point = _point_before_end(arc, strokes, end, backtrack)
     before = _point_before_end(arc, strokes, end, backtrack + np.abs(arc[end] - arc[start_point]))
@@ -168,9 +168,10 @@ def _extension_in_picture(
 def _point_before_end(
     arc: np.ndarray, strokes: Strokes, end: np.ndarray, distance: np.ndarray
 ) -> np.ndarray:
-    """Return (k,) numbers of the points nearest to ends that are at least `distance` from them.
+    """Return (k,) indices of points: for each end, the nearest point that is at least `distance` away.
 
-    The distance is in the unit of `arc`, along the stroke.
+    The distance is measured along the stroke, in the unit of the arc lengths `arc`. `end` holds the indices
+    of the end points.
     """
     stroke = strokes.stroke[end]
     first, last = strokes.start[stroke], strokes.start[stroke + 1] - 1
@@ -201,9 +202,9 @@ def _pixel_steps_to_world(pixel_steps: np.ndarray, depth: np.ndarray, camera: Ca
 
 
 def _extension_ratios(count: int) -> np.ndarray:
-    """Return (count, 2) float64 pseudorandom ratios from `MIN_EXTENSION_RATIO` to 1.
+    """Return (count, 2) float64: a pseudorandom ratio, `MIN_EXTENSION_RATIO` to 1, for each end of strokes.
 
-    Each ratio is a hash of the number of the end.
+    Each ratio is a hash of the index of the end.
     """
     bits = np.arange(1, 2 * count + 1, dtype=np.uint64)
     for shift, factor in ((32, 0x9E3779B97F4A7C15), (29, 0xBF58476D1CE4E5B9), (32, 1)):
@@ -220,27 +221,28 @@ def _append_extensions(
     step: np.ndarray,
     length: np.ndarray,
 ) -> tuple[Strokes, np.ndarray]:
-    """Replace the ends of strokes by k straight lines.
+    """Replace k ends of strokes by straight lines.
 
     Parameters
     ----------
     strokes : Strokes
     start_point : (k,) int64 ndarray
-        Numbers of the points at which they leave the strokes.
+        Indices of the points at which the lines leave their strokes.
     side : (k,) int64 ndarray
-        0 for the first point of a stroke, 1 for the last one.
+        0 if the line is at the first point of its stroke, 1 if at the last point.
     origin : (k, 3) float64 ndarray
-        Origin in world space: the start point, or a point at the same position in the picture.
+        Start of the line in world space: the start point, or a point at the same position in the picture.
     step : (k, 3) float64 ndarray
-        Step of one pixel, in world space.
+        Step of one pixel along the line, in world space.
     length : (k,) float64 ndarray
-        Length in pixels.
+        Length of the line in pixels.
 
     Returns
     -------
     extended : Strokes
+        The strokes with the lines, n points in all.
     distance : (n,) float64 ndarray
-        Distance in pixels of each point from the origin of its extension; 0 for original points.
+        Distance in pixels of each point from the start of its line; 0 for original points of strokes.
     """
     low, high = strokes.start[:-1].copy(), strokes.start[1:] - 1
     owner, at_start = strokes.stroke[start_point], side == 0
@@ -271,7 +273,8 @@ def _drop_onto_surfaces(
 ) -> Strokes:
     """Move points of extensions along their view rays onto the visible surface.
 
-    Points are moved if the surface is in front of them, or behind them by less than a tolerance.
+    Points are moved only if the surface is in front of them, or behind them by less than a tolerance.
+    `distance`, (n,), is above 0 for points of extensions; see `_append_extensions`.
     """
     extended = np.flatnonzero(distance > 0)
     points = strokes.points[extended]
@@ -297,7 +300,7 @@ def head_on_ends(strokes: Strokes) -> np.ndarray:
     """Return which ends of strokes meet the end of another stroke head on.
 
     Strokes that grow toward each other are rarely aligned, so both end where they meet. If these ends
-    were tapered like others, a light band would appear along the front.
+    were tapered like others, a light band would appear where the strokes from both sides meet.
 
     Parameters
     ----------
@@ -306,7 +309,7 @@ def head_on_ends(strokes: Strokes) -> np.ndarray:
     Returns
     -------
     (S, 2) bool ndarray
-        For the first and the last point of each stroke.
+        Values for the first and the last point of each stroke.
     """
     ends = np.stack([strokes.start[:-1], strokes.start[1:] - 1], axis=1).ravel()
     next_to_end = np.stack([strokes.start[:-1] + 1, strokes.start[1:] - 2], axis=1).ravel()

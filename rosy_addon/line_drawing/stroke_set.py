@@ -1,4 +1,4 @@
-"""`Strokes`: polylines on a surface as flat arrays; selection, cutting, tapering, subdivision."""
+"""`Strokes`: polylines on a surface as flat arrays, with methods to select, cut, taper and divide them."""
 
 from __future__ import annotations
 
@@ -34,23 +34,25 @@ class Strokes:
     Attributes
     ----------
     points : (n, 3) float64 ndarray
+        Points of all strokes, one stroke after another.
     start : (S + 1,) int64 ndarray
-        Number of the first point of each stroke, then n.
+        Index of the first point of each stroke, then n.
     family : (S,) int32 ndarray
-        Family of each stroke, from 0. Families are the lines that a field has at a point; for
-        `outline_strokes` they are the kinds of line.
+        Family of each stroke, from 0. There is one family for each line direction of the field. In
+        `outline_strokes`, the families are silhouettes, creases and borders.
     names : tuple of str
         Names of the families.
     face : (n,) int32 ndarray
-        Face of the segment that ends at each point; for a first point, of the segment after it.
+        Face in which the segment that ends at each point lies. The first point of a stroke has the face of
+        the segment that starts there.
     triangle : (n,) int32 ndarray
-        Triangle of the surface in which the same segment lies.
+        Triangle of the surface in which this segment lies.
     weights : (n, 3) float64 ndarray
-        Barycentric coordinates in this triangle; NaN at points that were added later.
+        Barycentric coordinates of the points in these triangles; NaN at points that were added after tracing.
     normal : (n, 3) float64 ndarray
         Unit shading normals.
     member : (n, 3) float64 ndarray
-        Unit direction of the stroke along the field; zero for lines that do not follow a field.
+        Unit direction of the stroke along the field; zero for outlines, which do not follow a field.
     spacing : (n,) float64 ndarray
         Required spacing, in world space.
     width : (n,) float64 ndarray
@@ -58,8 +60,8 @@ class Strokes:
     closed : (S,) bool ndarray
         Whether the last point is the same as the first.
     free_ends : (S, 2) bool ndarray or None
-        Whether the line could continue at its first and last point: it is occluded there, its
-        surface ends, or the tone ends it. None is the same as all false.
+        Whether the first and the last point are free ends, at which the stroke may be extended: it is
+        occluded there, or its surface or the shade ends. None means that no end is free.
     """
 
     points: np.ndarray
@@ -82,7 +84,7 @@ class Strokes:
 
     @property
     def stroke(self) -> np.ndarray:
-        """(n,) int64: the stroke of each point."""
+        """(n,) int64: index of the stroke to which each point belongs."""
         return np.repeat(np.arange(len(self)), np.diff(self.start))
 
     @property
@@ -101,7 +103,10 @@ class Strokes:
         return np.zeros((len(self), 2), dtype=bool) if self.free_ends is None else self.free_ends
 
     def select(self, selection: np.ndarray) -> Strokes:
-        """Return some strokes, selected by number, in that order, or by an (S,) bool mask."""
+        """Return some of the strokes.
+
+        `selection` is an array of indices of strokes, whose order is kept, or an (S,) bool mask.
+        """
         selection = np.asarray(selection)
         selection = np.flatnonzero(selection) if selection.dtype == bool else selection
         count = np.diff(self.start)[selection]
@@ -114,14 +119,18 @@ class Strokes:
         )
 
     def take_points(self, point: np.ndarray) -> Strokes:
-        """Return a copy with some points, by number. The caller has to replace `start` and what depends on it."""
+        """Return a copy with the points of the indices `point`.
+
+        Attributes for each stroke, such as `start`, are not changed. The caller has to replace them.
+        """
         return replace(self, **{name: getattr(self, name)[point] for name in POINT_COLUMNS})
 
     def between(self, after: np.ndarray, fraction: np.ndarray) -> Strokes:
-        """Return a copy with (m,) points on segments: from the point before each of `after` to that point.
+        """Return a copy with m interpolated points on segments; see `take_points`.
 
-        `fraction` is (m,), from 0 to 1. Normals are not of unit length. The weights of points before the end
-        of a segment are NaN: those of its two ends may be in different triangles.
+        The segments end at the points with the indices `after`, (m,). `fraction`, (m,), is the position of
+        the new point on its segment, from 0 to 1. Interpolated normals are not of unit length. Weights are
+        NaN where the fraction is below 1, as the two ends of a segment may be in different triangles.
         """
         before = np.maximum(after - 1, 0)
         result = self.take_points(after)
@@ -144,16 +153,17 @@ class Strokes:
         Parameters
         ----------
         kept : (n,) bool ndarray
+            Points that are kept.
         split_labels : (n,) ndarray, optional
             Strokes are also split between points with different labels.
         free_at_removed : bool or (n,) bool ndarray
-            Whether the ends of runs next to a removed point are free: one value for all, or one for
-            each removed point.
+            Whether the ends of runs next to a removed point become free ends: one value for all, or one value
+            for each removed point.
 
         Returns
         -------
         Strokes
-            Runs of a closed stroke are open unless all of it is kept.
+            A stroke for each run. A closed stroke stays closed only if all of it is kept.
         """
         stroke = self.stroke
         starts_run = kept.copy()
@@ -192,11 +202,11 @@ class Strokes:
         Parameters
         ----------
         length : float
-            Length of the taper in spacings, at most half of the stroke.
+            Length of the taper in spacings. It is limited to half of the length of the stroke.
         min_width : float
-            Factor of the width at the ends, from 0 to 1.
+            Factor by which the width at the very ends is multiplied, from 0 to 1.
         ends : (S, 2) bool ndarray, optional
-            The ends to taper; by default all.
+            Whether the first and the last end of each stroke is tapered; by default, all ends are.
         """
         arc, stroke = self.arc, self.stroke
         total = self.length[stroke]
@@ -211,19 +221,20 @@ class Strokes:
         return replace(self, width=self.width * (min_width + (1 - min_width) * smooth))
 
     def subdivided(self, counts: np.ndarray, first: int = 0, stop: int | None = None) -> Strokes:
-        """Divide the segment that ends at each point into equal parts.
+        """Divide segments of strokes into parts of equal length.
 
         Parameters
         ----------
         counts : (n,) ndarray
-            Number of parts for each point; values at first points are ignored.
+            For each point, the number of parts of the segment that ends there. Values at the first points of
+            strokes are ignored.
         first, stop : int
-            Return only these strokes, by default all.
+            Return only the strokes ``first .. stop - 1``; by default, all strokes are returned.
 
         Returns
         -------
         Strokes
-            Added points have NaN as weights.
+            The weights of added points are NaN.
         """
         stop = len(self) if stop is None else stop
         start = self.start[first : stop + 1]
@@ -252,7 +263,7 @@ class Strokes:
         spacing: np.ndarray,
         closed: bool = False,
     ) -> Strokes:
-        """Return strokes that were traced on a mesh, in one family.
+        """Make strokes from points that were traced on a mesh. All strokes are in one family.
 
         Parameters
         ----------
@@ -263,8 +274,9 @@ class Strokes:
             Triangles and barycentric coordinates of the points, and unit directions of the strokes in
             the frames of the triangles.
         spacing : (n,) ndarray
+            Required spacing at the points, in world space.
         closed : bool
-            Whether all of them are.
+            Whether all strokes are closed, or none.
         """
         return Strokes(
             points=mesh.points_at(triangle, weights),
@@ -283,7 +295,7 @@ class Strokes:
 
     @staticmethod
     def join(blocks: Sequence[Strokes]) -> Strokes:
-        """Return all strokes of blocks with the same families."""
+        """Return the strokes of several sets with the same families, one set after another."""
         offsets = np.cumsum([0, *(len(block.points) for block in blocks)])
         columns = {
             name: np.concatenate([getattr(block, name) for block in blocks])
@@ -299,19 +311,20 @@ class Strokes:
 
     @staticmethod
     def concatenate(first: Strokes, second: Strokes) -> Strokes:
-        """Return both sets. The families of the second follow the families of the first."""
+        """Return the strokes of both sets, with the families of the second set after those of the first."""
         renumbered = replace(second, family=second.family + np.int32(len(first.names)))
         return replace(Strokes.join([first, renumbered]), names=first.names + second.names)
 
 
 def arc_lengths(points: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """Return (n,) float64: the lengths of polylines up to each point.
+    """Return (n,) float64: the length of the polyline from its first point to each of its points.
 
     Parameters
     ----------
     points : (n, 3) or (n, 2) ndarray
+        Points of all polylines, one after another.
     start : (S + 1,) ndarray of int
-        As in `Strokes`.
+        Index of the first point of each polyline, then n.
     """
     step = np.zeros(len(points))
     delta = np.diff(points, axis=0)

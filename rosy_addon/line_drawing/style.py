@@ -15,7 +15,8 @@ from ..core.settings import check_settings, choice, number, switch
 class StrokeStyle:
     """The settings of strokes, as shown in the panel and accepted on the command line.
 
-    To add a setting, add a field here. `rosy_addon.core.settings` says what is derived from a field.
+    To add a setting, add a dataclass field here. `rosy_addon.core.settings` describes what is derived from
+    it.
 
     Raises
     ------

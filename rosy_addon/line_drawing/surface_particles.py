@@ -1,8 +1,8 @@
-"""Particles on a tangent mesh: trace many streamlines or geodesics at once.
+"""Particles on a tangent mesh, which trace many streamlines or geodesics at once.
 
 A particle moves in straight segments, each within one triangle. At an edge, its direction and its
-member are transported to the next triangle by unfolding. A segment has the direction of the field
-at its midpoint (the midpoint rule) and is short enough that the field turns little along it.
+member of the field are transported to the next triangle by unfolding. A segment has the direction of the
+field at its midpoint (the midpoint rule) and is short enough that the field rotates little along it.
 """
 
 from __future__ import annotations
@@ -15,22 +15,23 @@ import numpy as np
 
 from .tangent_mesh import ZERO_FIELD_RATIO, TangentMesh, nearest_member
 
-#: Largest turn of the field along a segment, in radians, as estimated at its start.
+#: Largest angle by which the field rotates along a segment, in radians, as estimated at the start of the
+#: segment.
 MAX_TURN_PER_SEGMENT = np.radians(1.0)
 
-#: Largest angle in radians between a segment and the field at its ends, and how often a segment is
-#: tried, each time shorter, to meet this limit.
+#: Largest angle in radians between a segment and the field at its ends. A segment that exceeds it is tried
+#: again with half the length, up to `MAX_HALVINGS` tries in all.
 MAX_DIRECTION_ERROR, MAX_HALVINGS = np.radians(0.9), 5
 
-#: Segments that a particle may trace in one call of `advance`.
+#: Largest number of segments that a particle traces in one call of `advance`, by default.
 MAX_SEGMENTS = 32
 
-#: A particle is stuck if the turn of the field limits a segment to less than this fraction of the
+#: A particle is stuck if the rotation of the field limits a segment to less than this fraction of the
 #: largest length of a segment.
 MIN_SEGMENT_RATIO = 0.002
 
-#: A direction is parallel to an edge if the slope of its barycentric coordinate is below this
-#: fraction of the largest slope.
+#: A direction counts as parallel to an edge if the derivative of the barycentric coordinate that is 0 on the
+#: edge, along the direction, is below this fraction of the largest such derivative.
 PARALLEL_EPS = 1e-9
 
 
@@ -41,10 +42,11 @@ class SurfaceParticles:
     Attributes
     ----------
     triangle : (n,) int32 ndarray
+        Triangle in which each particle is.
     weights : (n, 3) float64 ndarray
         Barycentric coordinates in the triangle.
     member : (n,) complex128 ndarray
-        Unit member that the particle follows, in the frame of the triangle.
+        Unit member of the field that the particle follows, in the frame of the triangle.
     sign : (n,) float64 ndarray
         1 to move along the direction of the member, -1 to move against it.
     """
@@ -56,7 +58,7 @@ class SurfaceParticles:
 
     @staticmethod
     def empty() -> SurfaceParticles:
-        """Return no particles."""
+        """Return a set of 0 particles."""
         return SurfaceParticles(
             np.empty(0, np.int32), np.empty((0, 3)), np.empty(0, complex), np.empty(0)
         )
@@ -65,12 +67,12 @@ class SurfaceParticles:
         return len(self.triangle)
 
     def take(self, indices: np.ndarray) -> Self:
-        """Return a copy of some particles."""
+        """Return a copy of the particles with the given indices."""
         return type(self)(*(column[indices] for column in self.columns))
 
     @property
     def columns(self) -> tuple[np.ndarray, ...]:
-        """The arrays, in the order of the attributes."""
+        """All attributes, which are arrays with a row for each particle, in their order."""
         return tuple(vars(self).values())
 
     def assign(self, indices: np.ndarray, source: SurfaceParticles) -> None:
@@ -79,26 +81,27 @@ class SurfaceParticles:
             column[indices] = values
 
     def join(self, other: Self) -> Self:
-        """Return both sets, one after the other."""
+        """Return the particles of both sets, those of `other` last."""
         pairs = zip(self.columns, other.columns, strict=True)
         return type(self)(*(np.concatenate(pair) for pair in pairs))
 
 
 class TracedPath(NamedTuple):
-    """The m segments that particles have traced, in the order in which they were traced.
+    """The m straight segments that particles have traced, in the order in which they were traced.
 
     Attributes
     ----------
     particle : (m,) intp ndarray
-        Number of the particle.
+        Index of the particle that traced each segment.
     triangle : (m,) int32 ndarray
-        Triangle of the segment.
+        Triangle in which the segment lies.
     begin_weights, end_weights : (m, 3) float64 ndarray
-        Barycentric coordinates of its ends in this triangle.
+        Barycentric coordinates of the ends of the segment in this triangle.
     direction, member : (m,) complex128 ndarray
-        Unit direction, and the unit member that it follows, in the frame of this triangle.
+        Unit direction of the segment, and the unit member of the field that it follows, in the frame of the
+        triangle.
     length : (m,) float64 ndarray
-        In world space.
+        Length of the segment in world space.
     """
 
     particle: np.ndarray
@@ -110,7 +113,7 @@ class TracedPath(NamedTuple):
     length: np.ndarray
 
     def take(self, indices: np.ndarray) -> TracedPath:
-        """Return some of the segments."""
+        """Return the segments with the given indices."""
         return TracedPath(*(column[indices] for column in self))
 
     @staticmethod
@@ -127,7 +130,7 @@ def advance(
     max_segment_length: np.ndarray | None = None,
     max_segments: int = MAX_SEGMENTS,
 ) -> tuple[SurfaceParticles, np.ndarray, np.ndarray, TracedPath]:
-    """Move particles along the field.
+    """Move particles along the field, and return them with the path that they traced.
 
     Parameters
     ----------
@@ -140,17 +143,20 @@ def advance(
     max_segment_length : (n,) float64 ndarray, optional
         Largest length of a segment, in world space.
     max_segments : int
-        Largest number of segments of a particle.
+        Largest number of segments that a particle traces.
 
     Returns
     -------
     particles : SurfaceParticles
         The particles after the move.
     walked : (n,) float64 ndarray
-        Length that was moved. It is less than requested if a particle ended, or after `max_segments`.
+        Length that was moved. It is less than requested if the particle ended, or after `max_segments`
+        segments.
     ended : (n,) bool ndarray
-        Whether the particle cannot continue: at a border, at a crease or at a zero of the field.
+        Whether the particle cannot continue, because it is at a border, at a crease or at a zero of the
+        field.
     path : TracedPath
+        Segments that were traced.
     """
     result = particles.take(np.arange(len(particles)))
     remaining = length.astype(np.float64)
@@ -186,14 +192,14 @@ def advance(
 def trace_geodesics(
     mesh: TangentMesh, particles: SurfaceParticles, direction: np.ndarray, length: np.ndarray
 ) -> tuple[SurfaceParticles, np.ndarray, np.ndarray]:
-    """Move particles along straight geodesics, and transport their members.
+    """Move particles along straight geodesics, and transport their members of the field.
 
     Parameters
     ----------
     mesh : TangentMesh
     particles : SurfaceParticles
     direction : (n,) complex128 ndarray
-        Unit directions in the frames of their triangles.
+        Unit directions of the geodesics, in the frames of the triangles of the particles.
     length : (n,) float64 ndarray
         Length to move, in world space.
 
@@ -203,7 +209,7 @@ def trace_geodesics(
         The particles after the move. Each has the member of the field that is nearest to its transported
         member, or 0 where the field is zero.
     direction : (n,) complex128 ndarray
-        The directions after the move.
+        Directions of the geodesics after the move, in the frames of the triangles there.
     walked : (n,) float64 ndarray
         Length that was moved. It is less than requested at borders and creases.
     """
@@ -236,24 +242,24 @@ def _next_segment(
     usual_length: np.ndarray,
     rotation: np.ndarray,
 ) -> tuple[np.ndarray, ...]:
-    """Compute one segment for each particle, with the direction of the field at its midpoint.
+    """Compute the next segment of each particle. It has the direction of the field at its midpoint.
 
-    A segment is at most `length` long. Particles are stuck if the field turns so fast that a segment
-    would be much shorter than `usual_length`. `rotation`, (n,) complex128, turns the member into the
-    direction of motion.
+    A segment is at most `length` long. Particles are stuck if the field rotates so fast that a segment
+    would be much shorter than `usual_length`. `rotation`, (n,) complex128, is the factor that rotates the
+    direction of the field to the direction of motion.
 
     Returns
     -------
     new_weights : (n, 3) float64 ndarray
         Barycentric coordinates of the end of the segment.
     direction, member : (n,) complex128 ndarray
-        Direction of the segment, and the member at its midpoint.
+        Unit direction of the segment, and unit member of the field at its midpoint.
     edge : (n,) int64 ndarray
-        The edge that was reached, or -1.
+        Edge, 0 to 2, at which the segment ends; -1 if it ends inside the triangle.
     step : (n,) float64 ndarray
         Length of the segment, in world space.
     stuck : (n,) bool ndarray
-        Whether there is no segment, as the field is zero or turns too fast.
+        Whether there is no segment, because the field is zero or rotates too fast.
     """
     corner_z = mesh.z[particles.triangle]
     z = np.einsum("nk,nk->n", particles.weights, corner_z)
@@ -293,7 +299,7 @@ def _next_segment(
         pending = pending[~is_straight]
         if not len(pending):
             break
-        # The field turns more than estimated. Try a shorter segment.
+        # The field rotates more than estimated. Try a shorter segment.
         max_step[pending] = 0.5 * trial[-1][~is_straight]
     stuck[pending] = True
     return *segments, stuck
@@ -306,25 +312,26 @@ def _midpoint_segments(
     rotation: np.ndarray,
     allowed: np.ndarray,
 ) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
-    """Return segments by the midpoint rule, and whether the field turns little along them.
+    """Return segments by the midpoint rule, and whether the field rotates little along them.
 
     Parameters
     ----------
     mesh : TangentMesh
     start : SurfaceParticles
-        With the members of the field at their positions.
+        Particles at the start of the segments, with members of the field there.
     midpoint : (n, 3) float64 ndarray
-        Barycentric coordinates of estimated midpoints.
+        Barycentric coordinates of the estimated midpoints of the segments.
     rotation : (n,) complex128 ndarray
-        As in `_next_segment`.
+        Factor from the direction of the field to the direction of motion, as in `_next_segment`.
     allowed : (n,) float64 ndarray
-        Largest lengths, in world space.
+        Largest lengths of the segments, in world space.
 
     Returns
     -------
     segments : tuple of ndarray
-        `new_weights`, `direction`, `member`, `edge` and `step` of `_next_segment`.
+        The values `new_weights`, `direction`, `member`, `edge` and `step` of `_next_segment`.
     is_straight : (n,) bool ndarray
+        Whether the angle between the segment and the field at its ends is at most `MAX_DIRECTION_ERROR`.
     """
     z = mesh.z[start.triangle]
     member = nearest_member(start.member, np.einsum("nk,nk->n", midpoint, z), mesh.degree)
@@ -348,14 +355,21 @@ def _barycentric_slopes(
 
 
 def _distance_to_edge(weights: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the (n,) distances to the boundary of the triangle, and the (n,) edges there."""
+    """Return the (n,) distances from points to the boundary of their triangle, and the (n,) edges there.
+
+    `weights`, (n, 3), are the barycentric coordinates of the points, and `slope`, (n, 3), their derivatives
+    along the direction in which the distance is measured.
+    """
     decreasing = slope < -PARALLEL_EPS * np.abs(slope).max(axis=1, keepdims=True)
     distances = np.where(decreasing, weights / np.where(decreasing, -slope, 1), np.inf)
     return np.minimum.reduce(distances, axis=1), np.argmin(distances, axis=1)
 
 
 def _moved_weights(weights: np.ndarray, slope: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """Return the (n, 3) barycentric coordinates after a step, kept within the triangle."""
+    """Return the (n, 3) barycentric coordinates after steps of the (n,) lengths `step`.
+
+    `slope` holds the derivatives of the coordinates along the steps. The result is kept inside the triangle.
+    """
     weights = np.maximum(weights + slope * step[:, None], 0)
     return weights / weights.sum(axis=1, keepdims=True)
 
@@ -373,14 +387,15 @@ def _cross_edges(
     mesh : TangentMesh
     particles : SurfaceParticles
     edge : (n,) ndarray of int
-        The edge that each particle has reached, or -1.
+        Edge, 0 to 2, that each particle has reached, or -1.
     rotation : (n,) complex128 ndarray, optional
-        Set to the transport across the edge for particles that cross one.
+        Changed in place: for particles that cross an edge, it is set to the factor that transports tangents
+        across the edge.
 
     Returns
     -------
     (n,) bool ndarray
-        Whether the particle is stopped at a border or a crease.
+        Whether the particle is stopped by a border or a crease at its edge.
     """
     reached = np.flatnonzero(edge >= 0)
     stopped = np.zeros(len(edge), dtype=bool)

@@ -1,4 +1,4 @@
-"""Write strokes to an .svg file for browsers, plotters, and Inkscape with one layer per family."""
+"""Write strokes as SVG documents for browsers, plotters and Inkscape, in which each family is a layer."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from .outline import OUTLINE_KINDS
 from .stroke_set import Strokes
 from .visibility import project_to_pixels
 
-#: Widths that differ by less than this fraction of the full width are drawn as constant.
+#: A stroke is drawn with a constant width if its widths differ by less than this fraction of the full width.
 WIDTH_TOLERANCE = 0.02
 
 _COLOR_NAMES = """
@@ -48,15 +48,15 @@ _COLOR_NAMES = """
     slategrey snow springgreen steelblue tan teal thistle tomato turquoise violet wheat white
     whitesmoke yellow yellowgreen
 """
-#: The names of colors in SVG 1.1.
+#: The color names of SVG 1.1.
 COLOR_NAMES = frozenset(_COLOR_NAMES.split())
-#: A color as a code.
+#: A color written as ``#rgb`` or ``#rrggbb``.
 _COLOR_CODE = re.compile("#(?:[0-9a-f]{3}){1,2}", re.IGNORECASE)
 
-#: Largest distance of the outline of a stroke from its center line at a bend, in half widths.
+#: Largest distance of the contour of a stroke from its center line at a bend, in half widths.
 MAX_MITER = 1.25
 
-#: Strokes that are written, or ordered for a plotter, between two reports.
+#: Number of strokes that are written, or ordered for a plotter, between two reports of the progress.
 PATHS_PER_REPORT = 1000
 
 #: Largest distance in pixels between a removed point and the simplified polyline.
@@ -65,28 +65,28 @@ SIMPLIFY_TOLERANCE_PX = 0.06
 
 @dataclass(frozen=True)
 class Pen:
-    """How strokes are drawn: width, colors and page.
+    """A description of how strokes are drawn: width, colors and page.
 
     Attributes
     ----------
     width : float
         Full width of a stroke, in pixels of the camera.
     colors : sequence of str
-        Colors of the families in turn: ``#rgb``, ``#rrggbb`` or a name of SVG, such as ``navy``. They
-        repeat if there are more families.
+        Colors of the families, in order: ``#rgb``, ``#rrggbb`` or a color name of SVG, such as ``navy``. They
+        repeat if there are more families than colors.
     paper : str or None
         Color of the background; None for no background.
     millimeters : float or None
         Width of the page in millimeters. If None, the size of the page is in pixels.
     plotter : bool
-        Draw lines of constant width, in an order that keeps the travel of the pen short.
+        Whether strokes are drawn with constant width, in an order that keeps the travel of the pen short.
     outline : str or None
         Color of silhouettes, creases and borders. If None, they take colors from `colors`.
 
     Raises
     ------
     RosyError
-        If a width is not above 0, there is no color, or a color has no such form.
+        If a width is not above 0, there is no color, or a color is not written as described.
     """
 
     width: float = 1.0
@@ -107,7 +107,7 @@ class Pen:
                 raise RosyError(f"{color!r} is not a color: use #rrggbb or a name of SVG")
 
     def family_colors(self, names: Sequence[str]) -> list[str]:
-        """Return the color of each family, given `Strokes.names`."""
+        """Return the color of each family, given the names of the families (`Strokes.names`)."""
         return [
             self.colors[index % len(self.colors)]
             if self.outline is None or name not in OUTLINE_KINDS
@@ -126,16 +126,16 @@ def svg_text(
     Parameters
     ----------
     strokes : Strokes
-        All points in front of the camera.
+        Strokes whose points are all in front of the camera.
     camera : Camera
     pen : Pen, optional
     marks : SingularityMarks, optional
-        Singularities in this camera.
+        Singularities in the view of the camera; they are drawn over the strokes.
 
     Returns
     -------
     str
-        SVG 1.1. Each family is a group that is a layer in Inkscape, and so are the paper and the
+        A document of SVG 1.1. Each family is a group, which is a layer in Inkscape. So are the paper and the
         singularities. Each stroke is one path.
     """
     pen = pen or Pen()
@@ -185,7 +185,10 @@ def svg_text(
 
 
 def _singularity_layer(marks: SingularityMarks, height: int) -> list[str]:
-    """Return the lines of a group of dots and labels, in a picture of a height in pixels."""
+    """Return the SVG lines of a layer with the dots and labels of singularities.
+
+    `height` is the height of the picture in pixels.
+    """
     marks = marks.in_drawing_order()
     outline = OUTLINE * marks.size
     lines = [
@@ -215,7 +218,7 @@ def _singularity_layer(marks: SingularityMarks, height: int) -> list[str]:
 
 
 def _plotter_paths(pixels: np.ndarray, strokes: Strokes) -> list[str]:
-    """Return one path per stroke, in the order of `plotter_order`."""
+    """Return an SVG path for each stroke, in the order of `plotter_order`. `pixels` are the (n, 2) points."""
     first, last = pixels[strokes.start[:-1]], pixels[strokes.start[1:] - 1]
     with progress(0.0, 0.5):
         order, is_reversed = plotter_order(first, last)
@@ -233,7 +236,7 @@ def _plotter_paths(pixels: np.ndarray, strokes: Strokes) -> list[str]:
 
 
 def _stroke_paths(pixels: np.ndarray, strokes: Strokes, width: float, color: str) -> list[str]:
-    """Return one path per stroke: a line if its width is constant, otherwise a filled outline."""
+    """Return an SVG path for each stroke: a line if its width is constant, otherwise a filled contour."""
     radius = np.clip(strokes.width, 0, 1) * width / 2
     with progress(0.1, 0.5):
         features = np.column_stack([pixels, radius])
@@ -265,7 +268,17 @@ def _stroke_paths(pixels: np.ndarray, strokes: Strokes, width: float, color: str
 def _offset_sides(
     points: np.ndarray, radius: np.ndarray, start: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return (n, 2) points to the left and the right of polylines, at a distance of `radius`."""
+    """Return (n, 2) points to the left of polylines and (n, 2) points to the right.
+
+    Parameters
+    ----------
+    points : (n, 2) ndarray
+        Points of all polylines.
+    radius : (n,) ndarray
+        Distance from each point to the points on its left and right.
+    start : (S + 1,) ndarray of int
+        Index of the first point of each polyline, then n.
+    """
     forward = np.zeros_like(points)
     forward[:-1] = points[1:] - points[:-1]
     length = np.hypot(*forward.T)
@@ -286,7 +299,10 @@ def _offset_sides(
 
 
 def _tapered_path(left: np.ndarray, right: np.ndarray, end_radii: np.ndarray) -> str:
-    """Return the path data of a closed outline with round caps of the radii at both ends."""
+    """Return the SVG path data of a closed contour along points on both sides of a stroke.
+
+    It has round caps at both ends of the stroke, with the two radii `end_radii`.
+    """
     reversed_right = right[::-1]
     return (
         f"M{_format_points(left)} "
@@ -297,12 +313,12 @@ def _tapered_path(left: np.ndarray, right: np.ndarray, end_radii: np.ndarray) ->
 
 
 def _end_cap(radius: float) -> str:
-    """Return the path command of a clockwise half circle, or of a line if the radius is tiny."""
+    """Return the SVG path command of a clockwise half circle, or of a line if the radius is below 0.05."""
     return f"A{radius:.2f},{radius:.2f} 0 0 1 " if radius >= 0.05 else "L"
 
 
 def _line_path(points: np.ndarray, closed: bool) -> str:
-    """Return the path data of a polyline. The repeated last point of a closed one is left out."""
+    """Return the SVG path data of a polyline. If it is closed, its repeated last point is left out."""
     return f"M{_format_points(points[:-1])}Z" if closed else f"M{_format_points(points)}"
 
 
@@ -312,22 +328,23 @@ def _format_points(points: np.ndarray) -> str:
 
 
 def simplify_mask(points: np.ndarray, start: np.ndarray, tolerance: float) -> np.ndarray:
-    """Choose the points of simplified polylines.
+    """Choose the points to keep when polylines are simplified.
 
     This is the Ramer-Douglas-Peucker algorithm, for all polylines at once.
 
     Parameters
     ----------
     points : (n, k) ndarray
+        Points of all polylines, in k dimensions.
     start : (S + 1,) ndarray of int
-        As in `Strokes`.
+        Index of the first point of each polyline, then n.
     tolerance : float
         Largest distance of a removed point from the simplified polyline.
 
     Returns
     -------
     (n,) bool ndarray
-        Which points to keep.
+        Whether each point is kept.
     """
     kept = np.zeros(len(points), dtype=bool)
     first, last = start[:-1].astype(np.int64), start[1:].astype(np.int64) - 1
@@ -360,18 +377,19 @@ def simplify_mask(points: np.ndarray, start: np.ndarray, tolerance: float) -> np
 
 
 def plotter_order(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Order and reverse strokes so that the pen travels little between them.
+    """Find an order and orientations of strokes for which the pen travels little between them.
 
-    The next stroke is always the one with the nearest end (greedy). A grid speeds up the search.
+    The next stroke is always the stroke with the nearest end (greedy). A grid speeds up the search.
 
     Parameters
     ----------
     first, last : (S, 2) ndarray
-        Ends of the strokes.
+        First and last points of the strokes.
 
     Returns
     -------
     order : (S,) int64 ndarray
+        Indices of the strokes in the new order.
     is_reversed : (S,) bool ndarray
         Whether each stroke is drawn backward, in the new order.
     """
@@ -413,7 +431,11 @@ def _nearest_end(
     cell_count: int,
     cell_size: float,
 ) -> int:
-    """Return the end in the grid that is nearest to the current position, ring by ring."""
+    """Return the index of the end that is nearest to the position `current`.
+
+    `grid` holds the indices of the remaining ends in each cell, and `positions` the positions of all ends.
+    Rings of cells around `current_cell` are searched until no nearer end is possible.
+    """
     best, best_distance = -1, np.inf
     for ring in range(cell_count + 1):
         if best >= 0 and best_distance <= (max(ring - 1, 0) * cell_size) ** 2:
@@ -428,7 +450,7 @@ def _nearest_end(
 
 
 def _ring_cells(center: tuple[int, int], radius: int) -> list[tuple[int, int]]:
-    """Return the cells on the square ring of the given radius around a cell."""
+    """Return the grid cells on a square ring around a cell. The radius of the ring is in cells."""
     x, y = center
     if not radius:
         return [center]

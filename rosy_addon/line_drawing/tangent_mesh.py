@@ -25,20 +25,20 @@ from ..projection.corner_field import cached_corner_field
 from ..projection.field_channel import REPRESENTATION, rotation_order
 from ..projection.gbuffer import MeshInstance
 
-#: An edge across which normals are not interpolated is a crease if the normals of its triangles
+#: An edge across which normals are not interpolated counts as a crease if the normals of its two triangles
 #: differ by at least this angle, in radians.
 CREASE_ANGLE = np.radians(30)
 
-#: The area of a triangle is set to 0 if it is below this fraction of its squared longest edge; the
-#: edges at the first corner are compared.
+#: The area of a triangle is set to 0 if it is at most this fraction of the squared length of the longer of
+#: its two edges at the first corner.
 MIN_AREA_RATIO = 1e-9
 
 #: The representation counts as zero where its magnitude is below this fraction of the largest one
 #: at the corners of the triangle.
 ZERO_FIELD_RATIO = 1e-4
 
-#: Largest angle in radians between the normal of a triangle and the shading normals in it. If they
-#: are steeper, strokes beside each other count as on different parts of a fold.
+#: Largest angle in radians between the normal of a triangle and the shading normals in it. With a larger
+#: angle, strokes beside each other would be taken for strokes on two different sides of a fold.
 MAX_TILT = 0.6
 
 
@@ -46,43 +46,44 @@ MAX_TILT = 0.6
 class TangentMesh:
     """T triangles in world space and the field on them.
 
-    Edge k of a triangle is opposite to its corner k. The frame of a triangle is x and
-    y = normal cross x.
+    Edge k of a triangle is opposite to its corner k. The frame of a triangle consists of the unit tangents
+    x and y = normal cross x. Tangents are complex numbers in it.
 
     Attributes
     ----------
     degree : int
         N of the field.
     family_count : int
-        Number of lines M through a point: N, or N/2 if each direction has an opposite one.
+        Number M of different streamlines through a point: N, or N/2 if each direction of the field has an
+        opposite one, which is on the same streamline.
     points : (T, 3, 3) float64 ndarray
-        Corners.
+        Corners of the triangles.
     x, y, normal : (T, 3) float64 ndarray
-        Unit tangent frames, and unit normals from the order of the corners.
+        Unit tangents of the frames, and unit normals; corners are counter-clockwise around the normal.
     corner_normal : (T, 3, 3) float64 ndarray
         Shading normals at the corners.
     face : (T,) int32 ndarray
-        Face of the surface.
+        Face of the surface to which each triangle belongs.
     gradient : (T, 3) complex128 ndarray
-        Gradients of the barycentric coordinates, in the frame.
+        Gradients of the barycentric coordinates, in the frame of the triangle.
     z : (T, 3) complex128 ndarray
-        Representation of the field at the corners, in the frame.
+        Representation (N-th power of a direction) of the field at the corners, in the frame of the triangle.
     harmonics : tuple of (int, (T, 3) complex128 ndarray)
-        For fields of free directions: pairs of j and C_j (see `field.directional_field`). Empty for
-        a RoSy field.
+        For fields whose directions are not at equal angles: pairs of j and C_j (see
+        `field.directional_field`). Empty for a RoSy field.
     family_z : (T,) complex128 ndarray or None
-        For fields whose stored member is on the same line everywhere: the representation of that
-        line, of degree N / M. None for other fields.
+        For fields that mark one of the M directions of streamlines consistently: the representation, of
+        degree N / M, of this direction. None for other fields.
     neighbor : (T, 3) int32 ndarray
-        Triangle across edge k; -1 where strokes stop.
+        Triangle on the other side of edge k; -1 where strokes stop at the edge.
     neighbor_edge : (T, 3) int8 ndarray
-        The number of that edge in the neighbor.
+        Number k that the edge has in the neighbor.
     edge_transport : (T, 3) complex128 ndarray
         Unit factors that transport tangents from the frame of the triangle to the frame of the neighbor.
     area : (T,) float64 ndarray
-        World space; 0 for degenerate triangles.
+        Areas in world space; 0 for degenerate triangles.
     triangle_vertex : (T, 3) int32 ndarray
-        Vertices of the surface.
+        Indices of the corners into the vertices of the surface.
     """
 
     degree: int
@@ -105,11 +106,11 @@ class TangentMesh:
 
     @property
     def is_directed(self) -> bool:
-        """Whether opposite members are on different lines, although N is even."""
+        """Whether opposite members of the field belong to different streamlines, although N is even."""
         return self.degree % 2 == 0 and self.family_count == self.degree
 
     def points_at(self, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Return the (n, 3) points at (n, 3) barycentric coordinates."""
+        """Return the (n, 3) points at (n, 3) barycentric coordinates in triangles."""
         return np.einsum("nk,nki->ni", weights, self.points[triangle])
 
     def weights_at(self, triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -125,11 +126,14 @@ class TangentMesh:
         return weights / weights.sum(axis=1, keepdims=True)
 
     def shading_normals_at(self, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Return the (n, 3) interpolated unit normals."""
+        """Return the (n, 3) unit shading normals, interpolated at (n, 3) barycentric coordinates."""
         return normalize(np.einsum("nk,nki->ni", weights, self.corner_normal[triangle]))
 
     def limited_normals_at(self, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Return the shading normals, turned to at most `MAX_TILT` from the normals of the triangles."""
+        """Return the (n, 3) unit shading normals, limited to an angle to the normal of the triangle.
+
+        A shading normal whose angle is larger than `MAX_TILT` is rotated until the angle is `MAX_TILT`.
+        """
         shading = self.shading_normals_at(triangle, weights)
         flat = self.normal[triangle]
         cosine = dot(shading, flat)
@@ -147,13 +151,16 @@ class TangentMesh:
         return dot(vectors, self.x[triangle]) + 1j * dot(vectors, self.y[triangle])
 
     def z_at(self, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Return (n,) complex128: the interpolated representation of the field."""
+        """Return (n,) complex128: the representation of the field, interpolated at points of triangles."""
         return np.einsum("nk,nk->n", weights, self.z[triangle])
 
     def members_at(
         self, triangle: np.ndarray, weights: np.ndarray, reference: np.ndarray
     ) -> np.ndarray:
-        """Return (n,) complex128: the unit member nearest to a unit tangent; 0 where z is 0."""
+        """Return (n,) complex128: the unit member of the field nearest to a unit tangent `reference`.
+
+        It is 0 where the field is zero.
+        """
         return nearest_member(reference, self.z_at(triangle, weights), self.degree)
 
     def is_same_family(
@@ -164,10 +171,11 @@ class TangentMesh:
         normal_b: np.ndarray,
         tolerance: float = 0.0,
     ) -> np.ndarray:
-        """Return (n,) bool: whether members at two points belong to the same line.
+        """Return (n,) bool: whether members of the field at two points belong to the same family.
 
-        One member is transported to the normal of the other. They belong to the same line if the
-        angle between them is less than half the angle between two lines, plus a tolerance.
+        A family is one of the M directions of streamlines through a point. One member is transported to the
+        normal of the other. They belong to the same family if the angle between them is less than half the
+        angle between two families, plus a tolerance.
 
         Parameters
         ----------
@@ -176,7 +184,7 @@ class TangentMesh:
         normal_a, normal_b : (n, 3) ndarray
             Unit normals, perpendicular to the members.
         tolerance : float
-            In radians.
+            Tolerance in radians.
         """
         cosine = dot(member_a, member_b) - dot(member_a, normal_b) * dot(
             normal_a, member_b
@@ -188,7 +196,11 @@ class TangentMesh:
     def directions_at(
         self, triangle: np.ndarray, weights: np.ndarray, member: np.ndarray
     ) -> np.ndarray:
-        """Return (n,) complex128: the unit direction of a member. For a RoSy it is the member."""
+        """Return (n,) complex128: the unit direction of the field that corresponds to a member.
+
+        The N members are at equal angles. In a RoSy field, they are the directions of the field. In other
+        fields, the directions deviate from the members by the harmonics.
+        """
         if not self.harmonics:
             return member
         harmonics = [
@@ -198,14 +210,14 @@ class TangentMesh:
 
 
 class SharedEdges(NamedTuple):
-    """Edges that two triangles share, each once.
+    """The n edges that two triangles share; each edge is listed once.
 
     Attributes
     ----------
     triangle, neighbor : (n,) intp ndarray
-        The two triangles.
+        The two triangles of the edge.
     edge, neighbor_edge : (n,) intp ndarray
-        The numbers of the edge in them.
+        Number, 0 to 2, of the edge in `triangle` and in `neighbor`.
     """
 
     triangle: np.ndarray
@@ -214,7 +226,10 @@ class SharedEdges(NamedTuple):
     neighbor_edge: np.ndarray
 
     def ends(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return, for each end of the edges, the (n, 2) corners 3 t + k of both triangles there."""
+        """Return the corners at the first ends of the edges and at the second ends: two (n, 2) arrays.
+
+        Each row has the corners, as 3 t + k, of the two triangles t that share the edge.
+        """
         first, second = (
             np.stack(
                 [
@@ -236,13 +251,19 @@ def shared_edges(mesh: TangentMesh) -> SharedEdges:
 
 
 def unit(values: np.ndarray, out: np.ndarray) -> np.ndarray:
-    """Return (n,) complex numbers with the modulus 1; `out` holds those to return for zeros."""
+    """Return (n,) complex numbers divided by their moduli.
+
+    Where a number is zero, the value that `out` has there is returned. The result is written to `out`.
+    """
     norm = np.abs(values)
     return np.divide(values, norm, out=out, where=norm > 0)
 
 
 def nearest_member(reference: np.ndarray, z: np.ndarray, degree: int) -> np.ndarray:
-    """Return (n,) complex128: the unit member of z nearest to a unit tangent; 0 where z is 0."""
+    """Return (n,) complex128: the unit member of a field that is nearest to the unit tangent `reference`.
+
+    Members are the N-th roots of z, where N is the degree. The result is 0 where z is 0.
+    """
     angle = np.angle(z * power(reference, degree).conj()) / degree
     return np.where(z != 0, reference * np.exp(1j * angle), 0)
 
@@ -260,7 +281,7 @@ def build_tangent_mesh(
     Parameters
     ----------
     instance : MeshInstance
-        With a field.
+        Instance with a field.
     display : {"smooth", "flat"}
         Whether the field is interpolated, or constant on each face.
     cross_creases : bool
@@ -277,8 +298,8 @@ def build_tangent_mesh(
     Raises
     ------
     RosyError
-        If there is no field, the field has another number of faces, or it is zero on all triangles
-        with an area.
+        If there is no field, if it has vectors for another number of faces than the mesh has, or if it is
+        zero on all triangles whose area is not zero.
     """
     surface, field = instance.surface, instance.field
     if field is None:
@@ -333,7 +354,10 @@ def build_tangent_mesh(
 
 
 def take_triangles(mesh: TangentMesh, kept: np.ndarray) -> TangentMesh:
-    """Return some triangles of a mesh; `kept` is (T,) bool. Strokes stop where there is no other."""
+    """Return the mesh of the triangles for which `kept`, (T,) bool, is true.
+
+    Strokes stop at edges to triangles that are not kept.
+    """
     number = np.where(kept, np.cumsum(kept, dtype=np.int32) - np.int32(1), np.int32(-1))
     kept_arrays = {
         name: values[kept] for name, values in vars(mesh).items() if isinstance(values, np.ndarray)
@@ -348,9 +372,10 @@ def take_triangles(mesh: TangentMesh, kept: np.ndarray) -> TangentMesh:
 
 
 def with_corners(mesh: TangentMesh, points: np.ndarray) -> TangentMesh:
-    """Return a mesh with other corners, (T, 3, 3), in the planes of its triangles.
+    """Return a copy of a mesh in which the corners of the triangles are moved to `points`, (T, 3, 3).
 
-    Strokes stop at triangles that have no area.
+    The new corners must be in the planes of their triangles. Frames and the values of the field at the
+    corners are kept. Where a new triangle has no area, the field is zero, and strokes stop at its edges.
     """
     _, _, _, area = _triangle_frames(points)
     is_flat = area == 0
@@ -382,7 +407,7 @@ def _triangle_frames(points: np.ndarray) -> tuple[np.ndarray, ...]:
 def _barycentric_gradients(
     points: np.ndarray, x: np.ndarray, y: np.ndarray, area: np.ndarray
 ) -> np.ndarray:
-    """Return the (T, 3) complex gradients of barycentric coordinates; 0 if there is no area."""
+    """Return the (T, 3) complex gradients of the barycentric coordinates; 0 in triangles without area."""
     delta = points - points[:, :1]
     planar = dot(delta, x[:, None]) + 1j * dot(delta, y[:, None])
     # The edge opposite to corner k, rotated inward by 90 degrees, over twice the area.
@@ -394,12 +419,12 @@ def _barycentric_gradients(
 def _rotations_to_planes(
     axis: np.ndarray, corner_normal: np.ndarray, normal: np.ndarray, x: np.ndarray, y: np.ndarray
 ) -> np.ndarray:
-    """Return (T, 3) complex128: the reference tangents of corner values, in the triangle's frame.
+    """Return (T, 3) complex128: the reference tangent of the value at each corner, in the triangle's frame.
 
-    `CornerField` stores the values of all corners relative to one tangent at the first corner, to
-    which they were transported. This is undone: the tangent is transported from the first corner to
-    the corner of the value, and from there directly to the plane of the triangle. Then the values
-    along an edge depend only on its two ends.
+    `CornerField` transports the values of all three corners to the first corner, and stores them relative
+    to one reference tangent there. This function undoes that transport: the reference tangent is transported
+    from the first corner to the corner of the value, and from there directly to the plane of the triangle.
+    Then the values along an edge depend only on its two ends.
 
     Parameters
     ----------
@@ -407,7 +432,7 @@ def _rotations_to_planes(
         Unit reference tangent at the first corner.
     corner_normal : (T, 3, 3) ndarray
     normal, x, y : (T, 3) ndarray
-        As in `TangentMesh`.
+        Normals and frames, as in `TangentMesh`.
     """
     rotations = np.empty((len(axis), 3), dtype=np.complex128)
     for k in range(3):
@@ -419,7 +444,7 @@ def _rotations_to_planes(
 
 
 def _connect(mesh: TangentMesh, surface: Surface, crease_angle: float | None) -> None:
-    """Fill `TangentMesh.neighbor`, `neighbor_edge` and `edge_transport`.
+    """Fill the arrays `neighbor`, `neighbor_edge` and `edge_transport` of a tangent mesh, in place.
 
     Strokes stop at triangles on which the field is zero and, unless `crease_angle` is None, at creases.
     """
@@ -436,7 +461,7 @@ def _connect(mesh: TangentMesh, surface: Surface, crease_angle: float | None) ->
         passable &= ~(is_sharp_edge(surface, a, b) & is_bent)
     a, b = a[passable], b[passable]
     triangle_a, triangle_b = a // 3, b // 3
-    # The edge from corner c to the next is opposite to the corner before c.
+    # The edge from corner c to the next corner is opposite to the corner before c.
     edge_a, edge_b = (a + 2) % 3, (b + 2) % 3
     along = mesh.points[triangle_a, (a + 1) % 3] - mesh.points[triangle_a, a % 3]
     edge_in_a = mesh.to_frame(triangle_a, along)
@@ -451,13 +476,16 @@ def _connect(mesh: TangentMesh, surface: Surface, crease_angle: float | None) ->
 
 
 def is_sharp_edge(surface: Surface, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return (n,) bool: whether normals are not interpolated across edges between triangles.
+    """Return (n,) bool: whether edges between two triangles are sharp.
+
+    Shading normals are not interpolated across a sharp edge.
 
     Parameters
     ----------
     surface : Surface
     a, b : (n,) ndarray of int
-        The corners (3 t + k) at which the edge starts in the triangles on both sides.
+        Corners at which the edge starts, as 3 t + k: `a` in the triangle t on one side, `b` in the triangle
+        on the other side.
     """
     fan = surface.corner_fan[surface.triangles].ravel()
     next_a, next_b = a - a % 3 + (a + 1) % 3, b - b % 3 + (b + 1) % 3

@@ -1,4 +1,4 @@
-"""Trace evenly spaced strokes on a tangent mesh, and close those that return to their first point."""
+"""Trace evenly spaced strokes on a tangent mesh, and close the strokes that return to their first point."""
 
 from __future__ import annotations
 
@@ -26,36 +26,37 @@ from .tangent_mesh import TangentMesh
 #: Label of the progress.
 TRACING = "tracing strokes"
 
-#: Samples by which tips grow between two attempts to seed beside strokes.
+#: Number of samples by which the ends of strokes grow between two attempts to seed beside strokes.
 SAMPLES_PER_SEEDING = 8
 
-#: Distances in spacings between seeds that are added at once, from round to round.
+#: Distances, in spacings, between the seeds of the first, second and third round of seeding.
 SEED_SPACINGS = (96.0, 24.0, 6.0)
 
-#: A phase ends when fewer tips are left than this fraction of their largest number.
+#: A phase of growth ends when the number of growing ends falls below this fraction of its maximum in the
+#: phase.
 STRAGGLER_RATIO = 0.1
 
-#: Factors of the minimum length of strokes in the first phase and in those after it, and factor of
+#: Factors of the minimum length of strokes in the first phase and in later phases, and factor of
 #: the minimum separation for the strokes that fill the last gaps.
 FIRST_LENGTH_FACTOR, SECOND_LENGTH_FACTOR, FILL_SEPARATION_FACTOR = 3.3, 1.7, 0.85
 
-#: Strokes around singularities grow before all others, so that the ends of the others do not form a
-#: ring around them: by these numbers of samples at once. At first they have another minimum separation,
-#: in spacings.
+#: Strokes around singularities grow before all others, so that the ends of others do not form a ring around
+#: the singularity. They first grow by the numbers of samples `FIRST_WARMUP`, with a minimum separation of
+#: `WARMUP_SEPARATION` spacings, and then by `SECOND_WARMUP` with the usual one.
 FIRST_WARMUP, SECOND_WARMUP, WARMUP_SEPARATION = (3, 3), (2, 2, 2, 2, 2), 0.6
 
 #: Largest angle in radians between the field and a stroke that is traced again to close.
 MAX_CLOSING_ANGLE = np.radians(0.09)
 
-#: Largest distances between the ends of a stroke that can be closed, along and across the stroke,
+#: A stroke can be closed only if the distance between its ends is at most this, along and across the stroke,
 #: in spacings.
 MAX_FORWARD_GAP, MAX_LATERAL_GAP = 1.5, 0.4
 
 #: Minimum length of a loop in spacings.
 MIN_LOOP_LENGTH = 6.0
 
-#: Maximum number of secant iterations, and the largest distance in spacings by which the end of a
-#: loop may miss its first point after them.
+#: Maximum number of iterations of the secant method, and largest distance in spacings between the end of a
+#: loop and its first point after them.
 MAX_ITERATIONS, CLOSING_TOLERANCE = 4, 1e-3
 
 #: Step of a particle in spacings, and the number of steps between two reports.
@@ -74,15 +75,16 @@ def trace_on_mesh(
     ----------
     mesh : TangentMesh
     spacing : CornerSpacing
-        Spacing between strokes of a family.
+        Spacing between strokes of the same family.
     rules : SeparationRules, optional
     surface_name : str
-        For error messages.
+        Name of the surface in error messages.
 
     Returns
     -------
     Strokes
-        World space. All are in one family; see `label_families`.
+        Strokes in world space, all with the same value of `Strokes.family`. `label_families` then assigns
+        families.
 
     Raises
     ------
@@ -110,7 +112,7 @@ def place_streamlines(placer: StreamlinePlacer) -> None:
     1. Start strokes around singularities.
     2. Add seeds in a few rounds, from coarse to fine, with a long minimum length.
     3. Seed again beside strokes, with a shorter minimum length.
-    4. Let strokes that yielded at wide gaps continue, with a smaller separation.
+    4. Let strokes that yielded (ended at wide gaps) continue, with a smaller separation.
     5. Fill the remaining gaps, with the minimum length of the rules.
     """
     rules = placer.rules
@@ -140,7 +142,7 @@ def place_streamlines(placer: StreamlinePlacer) -> None:
     _grow_until(placer, STRAGGLER_RATIO)
     placer.rescan(fill_rules)
     _grow_until(placer)
-    # There may be gaps that are not beside a stroke, where all were too short for the phases before.
+    # There may be gaps without a stroke beside them, where all strokes were too short for the earlier phases.
     _add_uncovered_seeds(placer, candidates)
     _grow_until(placer)
 
@@ -148,9 +150,9 @@ def place_streamlines(placer: StreamlinePlacer) -> None:
 def _add_uncovered_seeds(
     placer: StreamlinePlacer, candidates: SurfaceParticles, seed_spacing: float = 0.0
 ) -> None:
-    """Start strokes at those candidates that are not near a stroke of their family.
+    """Start strokes at candidate seeds that are not near a stroke of their family.
 
-    The points of the seeds are about `seed_spacing` apart, in spacings; all are tried if it is 0.
+    Seeds are chosen about `seed_spacing` spacings apart. If it is 0, all candidates are tried.
     """
     seeds = uncovered_seeds(placer.samples, candidates)
     if seed_spacing and len(seeds):
@@ -161,9 +163,9 @@ def _add_uncovered_seeds(
 
 
 def _grow_until(placer: StreamlinePlacer, straggler_ratio: float = 0.0) -> None:
-    """Alternate between steps and seeding beside strokes.
+    """Alternate between growing strokes and seeding new ones beside them, until few or none grow.
 
-    It ends when fewer tips are left than `straggler_ratio` times their largest number, or when
+    It ends when the number of growing ends falls below `straggler_ratio` times its maximum so far, or when
     nothing grows any more.
     """
     max_tips = 0
@@ -173,7 +175,7 @@ def _grow_until(placer: StreamlinePlacer, straggler_ratio: float = 0.0) -> None:
         if not seeded and not len(placer.tips):
             if not placer.samples.has_open_sides:
                 return
-            # Each call closes the sides that it tried. Try others twice more.
+            # Each call closes the sides that it tried. Try the remaining sides twice more.
             if not placer.seed_neighbors() and not placer.seed_neighbors():
                 return
         tip_count = len(placer.tips)
@@ -185,7 +187,7 @@ def _grow_until(placer: StreamlinePlacer, straggler_ratio: float = 0.0) -> None:
 
 
 def collect(placer: StreamlinePlacer) -> Strokes:
-    """Return the strokes of a placer. They are all in one family; see `label_families`."""
+    """Return the strokes of a placer, all with the same value of `Strokes.family`."""
     report(0.0, "collecting strokes")
     samples = placer.samples
     columns = [np.concatenate(column) for column in zip(*placer.segments, strict=True)]
@@ -229,25 +231,25 @@ def collect(placer: StreamlinePlacer) -> Strokes:
 
 
 def close_loops(mesh: TangentMesh, strokes: Strokes, spacing: CornerSpacing) -> Strokes:
-    """Close the strokes whose ends almost meet.
+    """Close strokes whose two ends almost meet.
 
-    A stroke around a tube stops when it comes near its own other end. If its ends almost meet, it is
+    A stroke around a tube stops growing when it comes near its own other end. If its ends almost meet, it is
     traced again from its first point, at a small constant angle to the field. The secant method finds
-    the angle at which the stroke arrives at its first point. Strokes for which it does not converge, or
-    for which the angle is larger than `MAX_CLOSING_ANGLE`, stay open.
+    the angle at which the stroke arrives at its first point. A stroke stays open if the method does not
+    converge, or if the angle is larger than `MAX_CLOSING_ANGLE`.
 
     Parameters
     ----------
     mesh : TangentMesh
         The mesh on which the strokes were traced.
     strokes : Strokes
-        Strokes before `label_families`: all are in one family.
+        Strokes before `label_families`, with the same value of `Strokes.family`.
     spacing : CornerSpacing
 
     Returns
     -------
     Strokes
-        The open strokes, then the loops.
+        The open strokes, followed by the closed ones.
     """
     candidates = _candidates(strokes)
     if not len(candidates):
@@ -296,9 +298,10 @@ def close_loops(mesh: TangentMesh, strokes: Strokes, spacing: CornerSpacing) -> 
 
 
 def _left_offset(strokes: Strokes, first: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return the (n,) signed distances of points to the left of the first points of strokes.
+    """Return (n,) float64: how far points are to the left of the first points of strokes.
 
-    `first` holds the numbers of the first points. Left is relative to the direction of the stroke
+    Distances to the right are negative.
+    `first` holds the indices of the first points. Left is relative to the direction of the stroke
     there, seen from outside the surface.
     """
     left = np.cross(strokes.normal[first], strokes.member[first])
@@ -306,7 +309,7 @@ def _left_offset(strokes: Strokes, first: np.ndarray, points: np.ndarray) -> np.
 
 
 def _candidates(strokes: Strokes) -> np.ndarray:
-    """Return the numbers of open strokes whose last point is near their first point."""
+    """Return the indices of open strokes whose last point is near their first point."""
     first, last = strokes.start[:-1], strokes.start[1:] - 1
     spacing, length = strokes.spacing[first], strokes.length
     gap = strokes.points[first] - strokes.points[last]
@@ -322,18 +325,25 @@ def _candidates(strokes: Strokes) -> np.ndarray:
 def _trace_loops(
     mesh: TangentMesh, strokes: Strokes, candidates: np.ndarray, angle: np.ndarray
 ) -> tuple[TracedPath, np.ndarray, np.ndarray]:
-    """Trace n candidates from their first points until they pass these points again or miss them.
+    """Trace n strokes from their first points until they pass these points again or miss them.
 
-    `angle` is the (n,) angle in radians to the left of the field.
+    Parameters
+    ----------
+    mesh : TangentMesh
+    strokes : Strokes
+    candidates : (n,) ndarray of int
+        Indices of the strokes that are traced.
+    angle : (n,) ndarray
+        Angle between the traced direction and the field, in radians, to the left of the field.
 
     Returns
     -------
     path : TracedPath
-        The particles are the candidates.
+        Segments of the traced strokes. `TracedPath.particle` is the position in `candidates`.
     left_offset : (n,) float64 ndarray
-        Signed distance to the left of the first point at which a particle passed it, in world space.
+        Signed distance, to the left of the first point, at which the stroke passed it, in world space.
     passed : (n,) bool ndarray
-        Whether the particle passed its first point.
+        Whether the stroke passed its first point.
     """
     first = strokes.start[:-1][candidates]
     origin, tangent = strokes.points[first], strokes.member[first]
@@ -371,7 +381,7 @@ def _trace_loops(
 
 
 def _particles_at_start(mesh: TangentMesh, strokes: Strokes, first: np.ndarray) -> SurfaceParticles:
-    """Return particles at the first points of strokes that move along the strokes."""
+    """Return particles at the points with the indices `first`, which move along their strokes."""
     triangle, weights = strokes.triangle[first], strokes.weights[first]
     reference = mesh.to_frame(triangle, strokes.member[first])
     member = mesh.members_at(triangle, weights, reference)

@@ -1,4 +1,4 @@
-"""Strokes in the picture: projection to pixels, clipping by the frame and a depth buffer, smoothing."""
+"""Project strokes to pixels, clip them to the frame and to their visible parts, and smooth them."""
 
 from __future__ import annotations
 
@@ -20,38 +20,41 @@ from .stroke_set import Strokes, arc_lengths
 #: Largest distance between the points of strokes at which visibility is tested, in pixels.
 SAMPLE_STEP_PX = 1.0
 
-#: Points of strokes that are clipped at once, to bound memory.
+#: Number of points of strokes that are clipped at once. It bounds memory.
 BLOCK_POINTS = 1 << 16
 
-#: Pixels whose depth is computed at once.
+#: Number of pixels whose depth is computed at once. It bounds memory.
 BLOCK_PIXELS = 1 << 20
 
-#: Visible runs, and gaps between them, that are shorter than this in pixels are artifacts of
-#: rasterization.
+#: Visible runs of points, and hidden runs between them, count as artifacts of rasterization if they are
+#: shorter than this, in pixels.
 MIN_RUN_PX = 2.5
 
-#: A surface hides a point only if it is in front of it by more than this many pixels, as a length
-#: in world space at the depth of the point.
+#: A surface hides a point only if it is in front of the point by more than this many pixels, measured as a
+#: length in world space at the depth of the point.
 DEPTH_BIAS_PX = 1.5
 
-#: Largest amount that the steepness of the surface adds to this bias, in pixels. Steepness is the
+#: Largest value that the steepness of the surface adds to this bias, in pixels. Steepness is the
 #: tangent of the angle between the normal and the direction to the camera.
 MAX_BIAS_STEEPNESS = 4.0
 
-#: Standard deviation of the binomial filter in pixels. It moves a corner of 20 degrees by half a pixel,
-#: and an arc with a radius of 20 pixels by a fifth.
+#: Standard deviation, in pixels, of the binomial filter that smooths strokes. The filter moves a corner of 20
+#: degrees by half a pixel, and an arc with a radius of 20 pixels by a fifth of a pixel.
 FILTER_PX = 3.0
 
-#: Largest standard deviation in spacings: strokes that are near each other bend more.
+#: Largest standard deviation of the filter, in spacings. Strokes at small spacings are filtered less, as they
+#: bend more.
 FILTER_SPACINGS = 0.3
 
-#: Turns in the picture that are sharper than this are corners and stay, in outlines and in strokes, in radians.
+#: Corners that turn by more than this in the picture are not smoothed, in outlines and in strokes, in
+#: radians.
 MAX_OUTLINE_TURN, MAX_STROKE_TURN = np.radians(45), np.radians(100)
 
-#: Rounds of the filter (1, 2, 1) / 4, whose variance is half a squared distance between points.
+#: Number of times that the filter (1, 2, 1) / 4 is applied. Its variance is half of the squared distance
+#: between points.
 ROUNDS = round(2 * (FILTER_PX / SAMPLE_STEP_PX) ** 2)
 
-#: Points of strokes that are smoothed at once.
+#: Number of points of strokes that are smoothed at once. It bounds memory.
 SMOOTHED_POINTS = 1 << 15
 
 
@@ -61,7 +64,7 @@ def project_to_pixels(points: np.ndarray, camera: Camera) -> tuple[np.ndarray, n
     Parameters
     ----------
     points : (n, 3) ndarray
-        World space.
+        Points in world space.
     camera : Camera
 
     Returns
@@ -81,9 +84,9 @@ def project_to_pixels(points: np.ndarray, camera: Camera) -> tuple[np.ndarray, n
 
 
 def pixel_size(points: np.ndarray, camera: Camera) -> np.ndarray:
-    """Return (n,) float64: the size of a pixel at points, in world space.
+    """Return (n,) float64: the side of a pixel in world space, at the depth of each point.
 
-    It is measured perpendicular to the axis of the camera, at the depth of the point.
+    It is measured perpendicular to the axis of the camera.
     """
     if not camera.is_perspective:
         return np.full(len(points), 1 / camera.pixels_per_unit)
@@ -99,21 +102,22 @@ def clip_to_visible(strokes: Strokes, camera: Camera, depth_buffer: DepthBuffer 
     strokes : Strokes
     camera : Camera
     depth_buffer : DepthBuffer or None
-        Of all occluders. If None, strokes are only clipped to the frame.
+        Depth buffer of all surfaces that can hide strokes. If None, strokes are only clipped to the frame.
 
     Returns
     -------
     Strokes
-        With points at most `SAMPLE_STEP_PX` pixels apart. Ends at occluding edges are free, ends at
-        the frame are not.
+        The visible parts, with points at most `SAMPLE_STEP_PX` pixels apart. Ends at occluding edges are free
+        ends (see `Strokes`), ends at the frame are not.
 
     Notes
     -----
     A point is compared with the triangles that are visible at the four pixel centers around it. It
-    is hidden if the planes of all four are in front of it by more than a bias: `DEPTH_BIAS_PX` plus
+    is hidden if the planes of all four triangles are in front of it by more than a bias: `DEPTH_BIAS_PX` plus
     the steepness of the plane, in pixels. Planes are used because the depth at a pixel center
-    differs from the depth at the point, by the slope times up to half a pixel. A point is also hidden if
-    it is behind only one of them, but one of the two faces the camera and the other faces away.
+    differs from the depth at the point, by the slope times up to half a pixel. A point is also hidden by a
+    single triangle in front of it if the triangle faces the camera and the surface at the point faces away,
+    or the reverse.
     """
     if depth_buffer is None:
         return visible_runs(strokes, camera, None, 0.0, 0.0)
@@ -131,7 +135,7 @@ def visible_runs(
     max_gap: float,
     min_run: float,
 ) -> Strokes:
-    """Cut strokes into their visible runs.
+    """Cut strokes into runs of visible points inside the frame.
 
     Runs of closed strokes continue over their first point.
 
@@ -140,11 +144,18 @@ def visible_runs(
     strokes : Strokes
     camera : Camera
     is_visible : function or None
-        Returns (m,) bool for the points of a part of the strokes that are in the frame, given this part,
-        with points at most `SAMPLE_STEP_PX` pixels apart, the (m,) numbers of these points, and their
-        (m, 2) pixels. If None, all of them are visible.
+        Function, called as ``is_visible(block, point, pixels)``, that returns (m,) bool: whether points in
+        the frame are visible. `block` is a part of the strokes, with points at most `SAMPLE_STEP_PX` pixels
+        apart. `point` holds the (m,) indices of its points in the frame, and `pixels` their (m, 2) pixel
+        coordinates. If None, all points in the frame are visible.
     max_gap, min_run : float
-        Lengths in pixels below which hidden runs are filled and visible runs are removed.
+        Hidden runs shorter than `max_gap` become visible, then visible runs shorter than `min_run` are
+        removed. Both are lengths in pixels.
+
+    Returns
+    -------
+    Strokes
+        A stroke for each run.
     """
     if not len(strokes):
         return strokes
@@ -166,15 +177,19 @@ def visible_runs(
 
 
 def _stroke_blocks(point_count: np.ndarray, size: int) -> Iterator[tuple[int, int]]:
-    """Return the first and last strokes of blocks, given the number of points up to each stroke.
+    """Return the ranges ``(first, stop)`` of consecutive strokes that have about `size` points together.
 
-    Each block ends with the stroke that reaches the next multiple of its size.
+    `point_count` is the number of points up to the end of each stroke. Each block ends before the stroke
+    whose points reach the next multiple of `size`.
     """
     return pairwise([0, *np.flatnonzero(np.diff(point_count // size)) + 1, len(point_count)])
 
 
 def _from_hidden_points(strokes: Strokes, visible: np.ndarray) -> np.ndarray:
-    """Return the order of points in which closed strokes start at a hidden point, if they have one."""
+    """Return indices that reorder points such that closed strokes start at a hidden point, if they have one.
+
+    `visible` is (n,) bool. The points of other strokes keep their order.
+    """
     order = np.arange(len(visible))
     for stroke in np.flatnonzero(strokes.closed & visible[strokes.start[:-1]]):
         first, last = strokes.start[stroke], strokes.start[stroke + 1] - 1
@@ -189,15 +204,16 @@ def _from_hidden_points(strokes: Strokes, visible: np.ndarray) -> np.ndarray:
 
 
 def in_frame(pixels: np.ndarray, camera: Camera) -> np.ndarray:
-    """Return (n,) bool: which of the (n, 2) pixels of `project_to_pixels` are in the frame."""
+    """Return (n,) bool: whether (n, 2) pixel coordinates from `project_to_pixels` are in the frame."""
     with np.errstate(invalid="ignore"):
         return ((pixels >= 0) & (pixels <= (camera.width, camera.height))).all(axis=1)
 
 
 def pixel_counts(strokes: Strokes, camera: Camera) -> np.ndarray:
-    """Return (n,) int64: how many parts of at most `SAMPLE_STEP_PX` pixels the segment before a point has.
+    """Return (n,) int64: into how many parts to divide the segment that ends at each point.
 
-    They are the counts of `Strokes.subdivided`. A segment that is partly behind the camera is not divided.
+    Parts are then at most `SAMPLE_STEP_PX` pixels long. A segment that is partly behind the camera is not
+    divided. `Strokes.subdivided` takes these counts.
     """
     pixels, _ = project_to_pixels(strokes.points, camera)
     pixel_distance = np.zeros(len(pixels))
@@ -215,15 +231,15 @@ class DepthBuffer:
     ----------
     camera : Camera
     start : tuple of int
-        Number of the first triangle of each mesh instance, then T.
+        Index of the first triangle of each mesh instance, then T.
     triangle : (height, width) int32 ndarray
-        Visible triangle, -1 if there is none. Row 0 is at the bottom.
+        Index of the visible triangle at each pixel; -1 if there is none. Row 0 is at the bottom.
     depth : (height, width) float64 ndarray
         Depth along the axis of the camera; infinite if there is no triangle.
     normal : (T, 3) float64 ndarray
-        Unit normals of the triangles, from the order of their corners.
+        Unit normals of the triangles; corners are counter-clockwise around the normal.
     offset : (T,) float64 ndarray
-        Distances of their planes from the origin along the normals.
+        Distance of the plane of each triangle from the origin, along its normal.
     """
 
     camera: Camera
@@ -264,49 +280,48 @@ def to_clip(points: np.ndarray, camera: Camera) -> np.ndarray:
 def _is_hidden(
     strokes: Strokes, point: np.ndarray, pixels: np.ndarray, depth_buffer: DepthBuffer
 ) -> np.ndarray:
-    """Return which points of strokes are hidden; see the notes of `clip_to_visible`.
+    """Return (m,) bool: whether points of strokes are hidden.
+
+    The notes of `clip_to_visible` describe the test.
 
     Parameters
     ----------
     strokes : Strokes
     point : (m,) ndarray of int
-        Numbers of points in the frame.
+        Indices of points in the frame.
     pixels : (m, 2) float64 ndarray
-        Their pixel coordinates.
+        Pixel coordinates of these points.
     depth_buffer : DepthBuffer
-
-    Returns
-    -------
-    (m,) bool ndarray
     """
     camera, points = depth_buffer.camera, strokes.points[point]
     eye = _to_eye(_to_camera_space(points, camera), camera)
     normals = strokes.normal[point] @ camera.view[:3, :3].T
-    # Outlines do not follow a member. They face neither toward the camera nor away from it.
+    # Outlines have no member of the field. They count as facing neither toward the camera nor away from it.
     facing = np.sign(dot(normals, eye)) * strokes.member[point].any(axis=1)
     hidden, behind_front = np.ones(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
     for plane in planes_around(points, pixels, depth_buffer):
         faces_away = np.sign(plane.facing) * facing < 0
         hidden &= plane.hides
-        # At a silhouette, a point that faces away is behind a triangle that does not, or the reverse. Then
-        # one of the four pixels is enough, without a bias.
+        # At a silhouette, a point that faces away is behind a triangle that faces the camera, or the reverse.
+        # Then a single triangle of the four is enough, without a bias.
         behind_front |= (plane.triangle >= 0) & faces_away & (plane.distance > 0)
     return hidden | behind_front
 
 
 class PlanesAround(NamedTuple):
-    """The planes of the triangles that are visible at one of the pixels around n points.
+    """For each of n points, the plane of the triangle that is visible at one of the four pixels around it.
 
     Attributes
     ----------
     triangle : (n,) int32 ndarray
-        -1 if there is none.
+        Index of the triangle; -1 if there is none.
     facing : (n,) float64 ndarray
         Positive if the triangle faces the camera, negative if it faces away.
     distance : (n,) float64 ndarray
-        Distance of the points behind the planes, along the ray of the camera.
+        Distance from the plane back to the point, along the ray from the camera; negative if the point is in
+        front.
     hides : (n,) bool ndarray
-        Whether the distance is larger than the bias up to which a plane does not hide a point.
+        Whether the plane hides the point: the distance is larger than a bias.
     """
 
     triangle: np.ndarray
@@ -318,14 +333,14 @@ class PlanesAround(NamedTuple):
 def planes_around(
     points: np.ndarray, pixels: np.ndarray, depth_buffer: DepthBuffer
 ) -> Iterator[PlanesAround]:
-    """Yield the planes at the four pixel centers around points.
+    """Yield, for each of the four pixels around points, the planes of the triangles visible there.
 
     Parameters
     ----------
     points : (n, 3) float64 ndarray
-        World space.
+        Points in world space.
     pixels : (n, 2) float64 ndarray
-        Their pixel coordinates.
+        Pixel coordinates of these points.
     depth_buffer : DepthBuffer
     """
     camera = depth_buffer.camera
@@ -353,12 +368,15 @@ def planes_around(
 
 
 def _to_camera_space(points: np.ndarray, camera: Camera) -> np.ndarray:
-    """Return (n, 3) points of world space in camera space."""
+    """Convert (n, 3) points from world space to camera space."""
     return points @ camera.view[:3, :3].T + camera.view[:3, 3]
 
 
 def _to_eye(points: np.ndarray, camera: Camera) -> np.ndarray:
-    """Return (n, 3) vectors from points to the camera, in camera space."""
+    """Return (n, 3) vectors from points to the camera, in camera space.
+
+    For parallel projection, they are unit vectors in the direction to the camera.
+    """
     return -points if camera.is_perspective else np.broadcast_to((0.0, 0.0, 1.0), points.shape)
 
 
@@ -372,16 +390,21 @@ def _camera_triangles(instance: MeshInstance, camera: Camera) -> np.ndarray:
 def clean_runs(
     visible: np.ndarray, pixels: np.ndarray, start: np.ndarray, max_gap: float, min_run: float
 ) -> np.ndarray:
-    """Fill short hidden runs of points, then remove short visible runs.
+    """Return (n,) bool: the visibility of points of strokes, without short runs.
+
+    Hidden runs shorter than `max_gap` become visible. After that, visible runs shorter than `min_run` become
+    hidden.
 
     Parameters
     ----------
     visible : (n,) bool ndarray
+        Whether each point is visible.
     pixels : (n, 2) ndarray
+        Pixel coordinates of the points.
     start : (S + 1,) ndarray of int
-        As in `Strokes`.
+        Index of the first point of each stroke, then n.
     max_gap, min_run : float
-        Lengths in pixels below which hidden runs are filled and visible runs are removed.
+        Lengths in pixels.
     """
     arc = arc_lengths(np.nan_to_num(pixels), start)
     for value, min_length in ((False, max_gap), (True, min_run)):
@@ -404,18 +427,19 @@ def clean_runs(
 
 
 def smooth(strokes: Strokes, camera: Camera) -> Strokes:
-    """Filter the points of lines, so that they do not have corners where the mesh has edges.
+    """Smooth strokes and outlines, so that they do not have corners where they cross edges of the mesh.
 
     Parameters
     ----------
     strokes : Strokes
-        As `clip_to_visible` returns them, with points at most `SAMPLE_STEP_PX` pixels apart.
+        Strokes as `clip_to_visible` returns them, with points at most `SAMPLE_STEP_PX` pixels apart.
     camera : Camera
 
     Returns
     -------
     Strokes
-        Ends and sharp corners are where they were. The lines leave the surface by a fraction of a pixel.
+        The smoothed strokes. Ends and sharp corners are not moved. Other points may leave the surface by a
+        fraction of a pixel.
     """
     points = strokes.points.copy()
     for first, stop in _stroke_blocks(strokes.start[1:], SMOOTHED_POINTS):
@@ -426,7 +450,7 @@ def smooth(strokes: Strokes, camera: Camera) -> Strokes:
 
 
 def _smoothed_points(strokes: Strokes, camera: Camera) -> np.ndarray:
-    """Return the (n, 3) filtered points of strokes."""
+    """Return (n, 3) float64: the points of strokes after smoothing by a binomial filter."""
     points = strokes.points
     before, after = np.arange(len(points)) - 1, np.arange(len(points)) + 1
     first, last = strokes.start[:-1], strokes.start[1:] - 1

@@ -1,4 +1,4 @@
-"""Preview pictures of looks: a trefoil knot, the same for all looks."""
+"""Draw preview pictures of looks. They all show the same trefoil knot."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ BACKGROUND = "#292929"
 
 
 def draw_preview(look: Look) -> np.ndarray:
-    """Draw a trefoil knot in a look, with a field along its principal curvatures.
+    """Draw the preview picture of a look: a trefoil knot with a field along its principal curvatures.
 
-    Its tone is the light, and the numbers that are colored run from left to right: a look has none.
-    This takes about a second for any look, because expensive settings are reduced.
+    The tone is that of the light, whatever the look takes it from. The values for the color map increase from
+    left to right. A preview takes about a second for any look, because expensive settings are reduced.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def draw_preview(look: Look) -> np.ndarray:
     Returns
     -------
     (PREVIEW_SIZE, PREVIEW_SIZE, 4) float32 ndarray
-        Linear, opaque, rows from the bottom.
+        Picture: linear, opaque, rows from the bottom.
     """
     look = _fast_look(look)
     surface, field = _trefoil_mesh()
@@ -52,11 +52,11 @@ def draw_preview(look: Look) -> np.ndarray:
 
 
 def _fast_look(look: Look) -> Look:
-    """Reduce settings that take long and are hardly visible in a small picture, or need a scene.
+    """Return a look that is drawn fast and without a scene, and looks nearly the same in a small picture.
 
-    Brute force is replaced by the method "sheets", which follows the same streamlines. The method
+    The LIC method "brute" is replaced by the method "sheets", which follows the same streamlines. The method
     "members" is drawn without supersampling, as its cost is proportional to the number of samples.
-    Lengths are limited to fractions of the size of the preview.
+    Lengths are limited to fractions of the size of the preview. Settings that refer to a scene are replaced.
     """
     return look.with_settings(
         {
@@ -74,7 +74,7 @@ def _fast_look(look: Look) -> Look:
 
 
 def _over_background(rgba: np.ndarray, look: Look) -> np.ndarray:
-    """Composite an (H, W, 4) linear picture over the paper of the look, or over `BACKGROUND`."""
+    """Composite an (H, W, 4) linear picture over the color of the paper, or `BACKGROUND` without hatching."""
     background = to_linear(from_hex(look.paper_color if is_hatched(look) else BACKGROUND))
     alpha = rgba[..., 3:]
     opaque = np.ones_like(rgba)
@@ -86,7 +86,7 @@ def _over_background(rgba: np.ndarray, look: Look) -> np.ndarray:
 def _trefoil_mesh(
     tube_radius: float = 0.66, segments: int = 300, sides: int = 40
 ) -> tuple[Surface, RosyField]:
-    """Build a thick tube around a trefoil knot, and its field of principal curvatures (degree 4).
+    """Build a thick tube around a trefoil knot, and its field of principal curvature directions (degree 4).
 
     The tube has positive and negative curvature, occludes itself, and has normals in all
     directions.
@@ -110,7 +110,7 @@ def _trefoil_mesh(
 
 
 def _trefoil_curve(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (n, 3) points of the trefoil knot at (n,) parameters, and (n, 3) unit tangents."""
+    """Return (n, 3) points of a trefoil knot at (n,) curve parameters, and (n, 3) unit tangents there."""
     radius, height = 2 + np.cos(3 * t), 1.1
     curve = np.stack(
         [radius * np.cos(2 * t), radius * np.sin(2 * t), height * np.sin(3 * t)], axis=1

@@ -24,7 +24,7 @@ from ..core.settings import settings_of
 from ..image_io.png import write_png
 from .preview import draw_preview
 
-#: Key of the preset with the default look.
+#: Key (stem of the file name) of the preset with the default look.
 DEFAULT_KEY = "default"
 
 _PRESET_FOLDERS = [folder / "presets" for folder in Path(__file__).resolve().parents[1:3]]
@@ -46,14 +46,14 @@ WINDOWS_DEVICE_NAMES = {"con", "prn", "aux", "nul"} | {
 
 
 class Preset(NamedTuple):
-    """A look with a name.
+    """A saved look with a name and a description.
 
     Attributes
     ----------
     name : str
-        The name that users see. One line of at most `MAX_NAME_LENGTH` characters.
+        The name that users see: one line of at most `MAX_NAME_LENGTH` characters.
     description : str
-        One line of at most `MAX_DESCRIPTION_LENGTH` characters.
+        A description of one line of at most `MAX_DESCRIPTION_LENGTH` characters.
     look : Look
     """
 
@@ -63,10 +63,10 @@ class Preset(NamedTuple):
 
 
 def default_user_folder() -> Path:
-    """Return the folder of a user's own presets outside Blender.
+    """Return the folder of a user's own presets when RoSy is used outside Blender.
 
-    It is the environment variable ROSY_PRESETS or, by default, ``rosy/presets`` in the folder of
-    user data of the operating system.
+    The environment variable ROSY_PRESETS holds its path. If it is not set, the folder is ``rosy/presets`` in
+    the user data folder of the operating system.
     """
     if os.environ.get("ROSY_PRESETS"):
         return Path(os.environ["ROSY_PRESETS"])
@@ -81,18 +81,18 @@ def default_user_folder() -> Path:
 
 
 def preset_files(user_folder: Path | None = None) -> dict[str, Path]:
-    """List the files of all presets.
+    """Return the files of all presets, shipped ones and the user's own, by their keys.
 
     Parameters
     ----------
     user_folder : Path, optional
-        Folder of the user's own presets. They replace shipped presets with the same key. A folder
-        that cannot be read has none; see `user_preset_files`.
+        Folder of the user's own presets. They replace shipped presets with the same key. If the folder
+        cannot be read, only the shipped presets are listed.
 
     Returns
     -------
     dict of str to Path
-        Files by their keys; see `merge_preset_files`.
+        Files by their keys, in the order of `merge_preset_files`.
     """
     with suppress(RosyError):
         return merge_preset_files(user_preset_files(user_folder))
@@ -100,10 +100,10 @@ def preset_files(user_folder: Path | None = None) -> dict[str, Path]:
 
 
 def merge_preset_files(user_files: dict[str, Path]) -> dict[str, Path]:
-    """Return the files of all presets by their keys (see `preset_key`).
+    """Return the files of the shipped presets and of the user's own presets by their keys (see `preset_key`).
 
-    The default comes first, then the other shipped presets, then `user_files`, which replace
-    shipped presets with the same key. Both are in alphabetical order.
+    The default preset comes first, then the other shipped presets in alphabetical order, then `user_files`.
+    These replace shipped presets with the same key.
     """
     shipped = {path.stem: path for path in sorted(SHIPPED_FOLDER.glob("*.json"))}
     files = {DEFAULT_KEY: shipped.pop(DEFAULT_KEY), **shipped}
@@ -111,7 +111,9 @@ def merge_preset_files(user_files: dict[str, Path]) -> dict[str, Path]:
 
 
 def user_preset_files(user_folder: Path | None) -> dict[str, Path]:
-    """List the files of the user's own presets by their keys, in alphabetical order.
+    """Return the files of the user's own presets by their keys, in alphabetical order.
+
+    The result is empty if the folder is None or does not exist.
 
     Raises
     ------
@@ -131,17 +133,17 @@ def user_preset_files(user_folder: Path | None) -> dict[str, Path]:
 
 
 def preset_keys(user_folder: Path | None = None) -> list[str]:
-    """List the keys of all presets, in the order of `preset_files`."""
+    """Return the keys of all presets, in the order of `preset_files`."""
     return list(preset_files(user_folder))
 
 
 def find_preset_file(preset: str | Path, user_folder: Path | None = None) -> Path:
-    """Find the file of a preset.
+    """Return the file of a preset, given its key, its name or its path.
 
     Parameters
     ----------
     preset : str or Path
-        A key of a preset, its name, or the path of a .json file. A path is returned unchanged.
+        The key of a preset, its name, or the path of a .json file. A path is returned unchanged.
     user_folder : Path, optional
         Folder of the user's own presets.
 
@@ -160,7 +162,7 @@ def find_preset_file(preset: str | Path, user_folder: Path | None = None) -> Pat
         with suppress(RosyError):
             if preset_key(str(preset)) in (key, preset_key(read_preset(path).name)):
                 return path
-    user_preset_files(user_folder)  # If it cannot be read, this is the reason.
+    user_preset_files(user_folder)  # Raise the error of a folder that cannot be read.
     raise RosyError(f"there is no preset '{preset}': choose {', '.join(files)}")
 
 
@@ -175,8 +177,8 @@ def read_preset(path: str | os.PathLike[str]) -> Preset:
     Parameters
     ----------
     path : path-like
-        A JSON file with an object of `name`, `description` and `look`. The look is an object of
-        the settings that differ from the default.
+        A JSON file. It contains an object with the keys `name`, `description` and `look`. The look is an
+        object with the settings that differ from the default look.
 
     Raises
     ------
@@ -210,7 +212,7 @@ def write_preset(path: str | os.PathLike[str], preset: Preset) -> None:
     Raises
     ------
     RosyError
-        If its name or description is not allowed, or the file cannot be written.
+        If the name or the description of the preset is not allowed, or if the file cannot be written.
     """
     _validated(preset)
     data = preset._asdict() | {"look": changed_settings(preset.look)}
@@ -219,7 +221,7 @@ def write_preset(path: str | os.PathLike[str], preset: Preset) -> None:
 
 
 def changed_settings(look: Look) -> dict[str, Any]:
-    """Return the settings in which a look differs from the default, in the order of `Look`."""
+    """Return the settings in which a look differs from the default look, in the order of `Look`."""
     values = {name: getattr(look, name) for name in settings_of(Look)}
     return {name: value for name, value in values.items() if value != getattr(Look, name)}
 
@@ -230,15 +232,15 @@ def preview_path(path: Path) -> Path:
 
 
 def preset_key(name: str) -> str:
-    """Return the key of a preset, which is also the stem of its file name, for its name.
+    """Return the key of a preset with a given name. The key is also the stem of its file name.
 
-    The key has the letters and digits of the name in lower case, with dashes between words.
-    Reserved names of Windows get the suffix "-preset".
+    It consists of the letters and digits of the name in lower case, with dashes between words.
+    If Windows reserves this file name, the suffix "-preset" is added.
 
     Raises
     ------
     RosyError
-        If there is no letter or digit in the name.
+        If the name contains neither a letter nor a digit.
     """
     normalized = unicodedata.normalize("NFC", name).lower()
     words = "".join(character if character.isalnum() else " " for character in normalized).split()
@@ -267,8 +269,8 @@ def save_preset(preset: Preset, user_folder: Path, *, replace: bool = False) -> 
     Raises
     ------
     RosyError
-        If the name or the description is not allowed, a shipped preset or, unless
-        `replace` is set, another preset of the user has the name, or if a file cannot be written.
+        If the name or the description is not allowed, if a shipped preset has the name, if another preset of
+        the user has it and `replace` is not set, or if a file cannot be written.
     """
     path = _target_path(_validated(preset), user_folder, replace)
     make_folder(user_folder)
@@ -283,9 +285,9 @@ def rename_preset(key: str, name: str, description: str, user_folder: Path) -> s
     Parameters
     ----------
     key : str
-        Present key of the preset.
+        Current key of the preset.
     name, description : str
-        New values, which may be the present ones.
+        New name and description. They may be the same as before.
     user_folder : Path
         Folder of the user's own presets.
 
@@ -297,8 +299,8 @@ def rename_preset(key: str, name: str, description: str, user_folder: Path) -> s
     Raises
     ------
     RosyError
-        If the preset is not the user's own, or the name or the description is not allowed, or the
-        name is taken.
+        If the preset is not the user's own, if the name or the description is not allowed, or if another
+        preset has the name.
     """
     path = _user_file(key, user_folder)
     preset = _validated(read_preset(path)._replace(name=name, description=description))
@@ -346,7 +348,10 @@ def _validated(preset: Preset) -> Preset:
 
 
 def _target_path(preset: Preset, user_folder: Path, replace: bool) -> Path:
-    """Return the path to save a user's preset at. Raise RosyError if its name is taken."""
+    """Return the path at which to save a user's preset.
+
+    Raise RosyError if a shipped preset has its name, or if the file exists and `replace` is false.
+    """
     key = preset_key(preset.name)
     if key in {*preset_keys(), *(preset_key(load_preset(name).name) for name in preset_keys())}:
         raise RosyError(f"'{preset.name}' is the name of a preset of RoSy: choose another name")
@@ -357,7 +362,7 @@ def _target_path(preset: Preset, user_folder: Path, replace: bool) -> Path:
 
 
 def _user_file(key: str, user_folder: Path) -> Path:
-    """Return the file of one of the user's own presets. Raise RosyError if there is none with this key."""
+    """Return the file of one of the user's own presets. Raise RosyError if none of them has this key."""
     path = preset_files(user_folder).get(key)
     if path is None or path.parent != user_folder:
         raise RosyError(f"'{key}' is not one of your presets")
@@ -365,7 +370,7 @@ def _user_file(key: str, user_folder: Path) -> Path:
 
 
 def _delete_file(path: Path) -> None:
-    """Delete a file if it exists. Raise RosyError if that fails."""
+    """Delete a file if it exists. Raise RosyError if it cannot be deleted."""
     try:
         path.unlink(missing_ok=True)
     except OSError as reason:
@@ -373,7 +378,7 @@ def _delete_file(path: Path) -> None:
 
 
 def _read_json_object(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Read a file with one JSON object. Raise RosyError if it is anything else."""
+    """Read a file that contains one JSON object. Raise RosyError if it contains anything else."""
     data = read_bytes(path, reject_binary=True, max_bytes=MAX_FILE_BYTES)
     try:
         parsed = json.loads(data.decode("utf-8-sig"), object_pairs_hook=_reject_duplicate_keys)
@@ -393,7 +398,7 @@ def _read_json_object(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def _reject_duplicate_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return the entries of a JSON object as a dict. Raise RosyError if a key appears twice."""
+    """Return the (key, value) pairs of a JSON object as a dict. Raise RosyError if a key appears twice."""
     result = dict(pairs)
     if len(result) < len(pairs):
         names = [name for name, _ in pairs]

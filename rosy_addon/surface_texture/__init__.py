@@ -1,1 +1,1 @@
-"""Textures of the surface: the field drawn in a UV map, without seams."""
+"""Surface textures: pictures of a field in a UV map, without visible seams."""

@@ -1,12 +1,12 @@
-"""The charts of a UV map: the triangles of a tangent mesh in it, and frames that turn little in it.
+"""The charts of a UV map, maps between tangents of the surface and the UV plane, and frames for texels.
 
 A chart is a part of the surface whose triangles are connected in the UV map. Tangents of the surface
 are complex numbers in the frame of their triangle (see `line_drawing.tangent_mesh`). The map from
-them to displacements in the UV map is linear: w becomes a w + b conj(w).
+tangents to displacements in the UV map is linear: w becomes a w + b conj(w).
 
-The angles of the field are compared from texel to texel, so they need frames that turn no more than
-the surface requires. Such a frame is the direction that the UV map rotates to its u axis, averaged at
-the corners over each smooth fan and interpolated like the field.
+The angles of the field are compared from texel to texel, relative to frames. For this, frames must rotate as
+little from texel to texel as the surface allows. The frame used is the direction that the UV map rotates to
+its u axis. It is averaged at the corners over each smooth fan and interpolated like the field.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from ..field.frames import dot, transport
 from ..field.surface import Surface
 from ..line_drawing.tangent_mesh import SharedEdges, TangentMesh, shared_edges, unit
 
-#: Corners are at the same point of a UV map if their coordinates differ by at most this much.
+#: Two corners are at the same point of a UV map if their coordinates differ by at most this much.
 SAME_UV = 1e-6
 
-#: Largest coordinate in a UV map. Beyond it, single texels can no longer be told apart.
+#: Largest coordinate in a UV map. For larger ones, rounding errors exceed single texels.
 MAX_COORDINATE = 1000.0
 
 #: Label of the progress.
@@ -34,20 +34,20 @@ LABEL = "reading the UV map"
 
 @dataclass(frozen=True, eq=False)
 class UvCharts:
-    """T triangles in a UV map. Lengths are in the side of the map.
+    """T triangles of a surface in a UV map. The unit of length in the map is its side.
 
     Attributes
     ----------
     uv : (T, 3) complex128 ndarray
-        u + i v of the corners.
+        Positions of the corners in the UV map, u + i v.
     linear, conjugate : (T,) complex128 ndarray
-        The map from tangents, in Blender units, to the UV map; see above.
+        Coefficients a and b of the map from tangents w, in Blender units, to the UV map: a w + b conj(w).
     gradient : (T, 3) complex128 ndarray
         Gradients of the barycentric coordinates in the UV map; 0 for triangles without area there.
     chart : (T,) int32 ndarray
-        Number of the chart.
+        Number of the chart to which each triangle belongs.
     frame : (T, 3) complex128 ndarray
-        Unit tangents at the corners, in the frame of the triangle.
+        Unit tangents at the corners, in the frame of the triangle. Angles at texels are measured from them.
     """
 
     uv: np.ndarray
@@ -59,27 +59,36 @@ class UvCharts:
 
     @property
     def density(self) -> np.ndarray:
-        """The (T,) area in the UV map of a square Blender unit; negative for mirrored triangles."""
+        """(T,) float64: area in the UV map of one square Blender unit; negative for mirrored triangles."""
         return np.abs(self.linear) ** 2 - np.abs(self.conjugate) ** 2
 
     def to_uv(self, triangle: np.ndarray, tangent: np.ndarray) -> np.ndarray:
-        """Map (n,) complex tangents to the UV map."""
+        """Map (n,) complex tangents in triangles to displacements in the UV map."""
         return self.linear[triangle] * tangent + self.conjugate[triangle] * tangent.conj()
 
     def to_surface(self, triangle: np.ndarray, displacement: np.ndarray) -> np.ndarray:
-        """Map (n,) complex displacements in the UV map to tangents; 0 if there is no area."""
+        """Map (n,) complex displacements in the UV map to tangents in triangles.
+
+        The result is 0 for triangles without area in the UV map.
+        """
         linear, conjugate = self.inverse(triangle)
         return linear * displacement + conjugate * displacement.conj()
 
     def inverse(self, triangle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return (n,) a and b of the map from the UV map to tangents; 0 if there is no area."""
+        """Return the coefficients a and b, each (n,), of the map from the UV map to tangents of triangles.
+
+        They are 0 for triangles without area in the UV map.
+        """
         linear, conjugate = self.linear[triangle], self.conjugate[triangle]
         density = np.abs(linear) ** 2 - np.abs(conjugate) ** 2
         scale = np.divide(1, density, out=np.zeros(len(density)), where=density != 0)
         return linear.conj() * scale, -conjugate * scale
 
     def stretch(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the (T,) largest and smallest length in the UV map of a Blender unit."""
+        """Return the largest and the smallest length in the UV map of tangents of one Blender unit.
+
+        Both are (T,) float64.
+        """
         linear, conjugate = np.abs(self.linear), np.abs(self.conjugate)
         return linear + conjugate, np.abs(linear - conjugate)
 
@@ -91,9 +100,9 @@ def uv_charts(surface: Surface, mesh: TangentMesh, uv: np.ndarray) -> UvCharts:
     ----------
     surface : Surface
     mesh : TangentMesh
-        Tangent mesh of the surface. Charts end where its streamlines stop.
+        Tangent mesh of the surface. Charts also end at edges where its streamlines stop.
     uv : (C, 2) ndarray
-        u and v at the corners of the surface.
+        Coordinates u and v at the face corners of the surface.
 
     Returns
     -------
@@ -124,7 +133,7 @@ def uv_charts(surface: Surface, mesh: TangentMesh, uv: np.ndarray) -> UvCharts:
 
 
 def _checked(surface: Surface, uv: np.ndarray) -> np.ndarray:
-    """Return (C,) complex128 coordinates."""
+    """Return (C,) complex128: u + i v. Raise RosyError if a coordinate is not finite or too large."""
     uv = np.asarray(uv, dtype=np.float64)
     wrong = np.flatnonzero(~(np.abs(uv) <= MAX_COORDINATE).all(axis=1))
     if len(wrong):
@@ -137,7 +146,10 @@ def _checked(surface: Surface, uv: np.ndarray) -> np.ndarray:
 
 
 def _gradients(corner_uv: np.ndarray) -> np.ndarray:
-    """Return (T, 3) complex gradients of the barycentric coordinates; 0 for triangles without area."""
+    """Return (T, 3) complex gradients of the barycentric coordinates in the UV map.
+
+    They are 0 for triangles without area in the UV map.
+    """
     # Edges opposite to the corners. A gradient is perpendicular to its edge.
     edge = corner_uv[:, [2, 0, 1]] - corner_uv[:, [1, 2, 0]]
     double_area = (edge[:, 0].conj() * edge[:, 1]).imag[:, None]
@@ -145,7 +157,10 @@ def _gradients(corner_uv: np.ndarray) -> np.ndarray:
 
 
 def _chart_edges(mesh: TangentMesh, corner_uv: np.ndarray) -> SharedEdges:
-    """Find the edges that two triangles share on the surface and in the UV map."""
+    """Return the edges that two triangles share both on the surface and in the UV map.
+
+    `corner_uv`, (T, 3) complex128, holds the positions of the corners in the UV map.
+    """
     edges = shared_edges(mesh)
     same = np.ones(len(edges.triangle), dtype=bool)
     for corners in edges.ends():
@@ -162,7 +177,7 @@ def uv_tangents(surface: Surface, mesh: TangentMesh, charts: UvCharts) -> np.nda
     Returns
     -------
     (T, 3) complex128 ndarray
-        In the frame of the triangle.
+        Tangents in the frames of the triangles.
     """
     triangle = np.arange(len(charts.linear))
     direction = _unit(charts.to_surface(triangle, np.ones(len(triangle))))
@@ -173,19 +188,21 @@ def uv_tangents(surface: Surface, mesh: TangentMesh, charts: UvCharts) -> np.nda
 def _averaged_at_corners(
     surface: Surface, mesh: TangentMesh, direction: np.ndarray, edges: SharedEdges
 ) -> np.ndarray:
-    """Average directions at the corners of triangles over each smooth fan of a chart.
+    """Average directions of triangles at their corners, over each smooth fan of a chart.
 
     Parameters
     ----------
+    surface : Surface
+    mesh : TangentMesh
     direction : (T,) complex128 ndarray
-        Unit tangents.
+        Unit tangent of each triangle.
     edges : SharedEdges
-        From `_chart_edges`.
+        Edges inside charts, from `_chart_edges`.
 
     Returns
     -------
     (T, 3) complex128 ndarray
-        Unit tangents.
+        Unit tangents at the corners, in the frames of the triangles.
     """
     fan = surface.corner_fan[surface.triangles].ravel()
     pairs = np.concatenate(edges.ends())
@@ -210,5 +227,5 @@ def _averaged_at_corners(
 
 
 def _unit(values: np.ndarray) -> np.ndarray:
-    """Return complex numbers scaled to the modulus 1; 0 stays 0."""
+    """Return complex numbers divided by their moduli; 0 stays 0."""
     return unit(values, np.zeros_like(values))

@@ -1,4 +1,7 @@
-"""Hatching at texels: thresholds of the lines of a field, from which any light makes ink (`ink_thresholds`)."""
+"""Hatching at texels, stored as thresholds: the ink for any light follows from them.
+
+`compositor.ink_thresholds` describes the thresholds.
+"""
 
 from __future__ import annotations
 
@@ -44,14 +47,14 @@ from .line_order import first_line_weights, line_order
 from .texel_field import frames_at, texel_noise
 from .texels import TexelSurface
 
-#: Width of the strip in which two lines swap, in widths of a line.
+#: Width of the strip in which two line directions of the field swap their order, in line widths.
 SWAP_WIDTHS = 8.0
 
-#: Largest number of triangles on which lines are spaced, for each texel. It is reached only if texels on parts
-#: of the surface are much smaller than on average, for example if charts overlap.
+#: Largest number of triangles per texel on which evenly spaced lines are computed. It is reached only if
+#: texels on parts of the surface are much smaller than on average, for example if charts overlap.
 TRIANGLES_PER_TEXEL = 16
 
-#: Least number of spots along the side of a texture where a field has no direction.
+#: Where a field has no direction, spots are drawn: at least this many along the side of a texture.
 MIN_SPOTS = 8
 
 #: Label of the progress.
@@ -61,24 +64,25 @@ LABEL = "drawing hatching"
 def thresholds(
     on: TexelSurface, field: PixelField, look: PixelLook, guiding_angle: float, cache: Cache | None
 ) -> np.ndarray:
-    """Compute the thresholds of hatching at texels.
+    """Compute the thresholds of hatching at P texels.
 
     Parameters
     ----------
     on : TexelSurface
+        The texels, and the surface that they show.
     field : PixelField
-        At the texels.
+        Field at the texels.
     look : PixelLook
-        Of a `sharp_look` with ink, in steps of streamlines.
+        Look with ink, from `sharp_look`. Its lengths are in steps of streamlines.
     guiding_angle : float
-        Direction of the lines that come first; see `line_order`.
+        Angle that the first line direction is near to; see `line_order`.
     cache : Cache or None
-        Stores evenly spaced lines.
+        Cache for evenly spaced lines.
 
     Returns
     -------
     (P, 4) float32 ndarray
-        As `threshold_pixels` returns them.
+        Thresholds as `threshold_pixels` stores them in the channels of pixels.
     """
     with progress(0.0, 0.1):
         order = line_order(on.mesh, guiding_angle, SWAP_WIDTHS * look.line_width * on.step)
@@ -112,22 +116,23 @@ def thresholds(
 def lit_ink(
     on: TexelSurface, pixels: np.ndarray, lights: Sequence[Light], look: Look
 ) -> np.ndarray:
-    """Draw the ink of the diffuse light of lamps, without shadows.
+    """Draw hatching for the diffuse light of lamps, without shadows.
 
     Parameters
     ----------
     on : TexelSurface
+        The P texels, and the surface that they show.
     pixels : (P, 4) float32 ndarray
-        From `thresholds`.
+        Thresholds of the hatching, from `thresholds`.
     lights : sequence of Light
-        In world space.
+        Lamps in world space.
     look : Look
-        The settings of the ink, the strength of the shading, and the tone curve.
+        Look with the settings of the ink, the strength of the shading, and the tone curve.
 
     Returns
     -------
     (P, 4) float32 ndarray
-        Linear color and opacity, not premultiplied.
+        Linear color and opacity of the texels, not premultiplied.
     """
     inks = inks_of(look)
     colors = np.ones_like(pixels)
@@ -157,7 +162,9 @@ def _lines(
     wobble_angle: np.ndarray | None,
     cache: Cache | None,
 ) -> HatchedLines:
-    """Draw the streaks or the even lines of a field, and what makes them uneven."""
+    """Return the streaks or the evenly spaced lines of a field at the texels, with what makes them uneven:
+    breaks, paper grain, and spots where the field is undefined.
+    """
     is_spaced, is_broken = is_even(look), has_breaks(look)
     undefined = not field.representation.all()
     even_lines = noise = undirected = paper_grain = None
@@ -177,7 +184,7 @@ def _lines(
     if undefined:
         texels_per_unit = np.sqrt(np.abs(on.charts.density[on.texels.triangle]))
         size = on.texels.frame.size
-        # Spots have one size in texels: the median width of lines.
+        # All spots have the same size in texels: the median of the line width.
         spot = look.line_width * on.step * float(np.median(texels_per_unit)) * size
         spot = min(spot, size / MIN_SPOTS)
         seen_noise = unconvolved_noise(noise, look)
@@ -196,7 +203,10 @@ def _lines(
 
 
 def _paper_grain(on: TexelSurface, field: PixelField, look: PixelLook) -> np.ndarray:
-    """Return the (M, P) heights of the paper for each line, with mean 0 and standard deviation 1."""
+    """Return (M, P): heights of the paper grain at P texels for each of the M line directions.
+
+    Their mean is 0 and their standard deviation 1.
+    """
     noise = texel_noise(on, **surface_paper_grain_args(look))
     noise -= np.float32(NOISE_MEAN)
     noise /= np.float32(look_streak_statistics(look).paper_grain_std)
@@ -204,7 +214,7 @@ def _paper_grain(on: TexelSurface, field: PixelField, look: PixelLook) -> np.nda
 
 
 def _wobble_angle(on: TexelSurface, look: PixelLook) -> np.ndarray:
-    """Return the (P,) float32 angles between lines and field at `Look.wobble` 1."""
+    """Return (P,) float32: the angles, in radians, by which lines deviate from the field if `wobble` is 1."""
     rest = rest_positions(on.instance.surface).astype(np.float32)
     line_width = look.line_width * on.step / matrix_scale(on.instance.matrix)
     angle = np.empty(len(on.texels), dtype=np.float32)
@@ -222,7 +232,7 @@ def _even_lines(
     wobble_angle: np.ndarray | None,
     cache: Cache | None,
 ) -> EvenLines:
-    """Evaluate evenly spaced lines at the texels."""
+    """Return evenly spaced lines along the field, evaluated at the texels."""
     instance, texels = on.instance, on.texels
     spacing = look.line_distance * on.step
     max_triangles = min(MAX_TRIANGLES, TRIANGLES_PER_TEXEL * len(texels))

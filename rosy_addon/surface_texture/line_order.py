@@ -1,24 +1,27 @@
-"""The order of the lines of a field on a surface, and maps of the direction of its first line.
+"""The order of the line directions of a field on a surface, and maps of its first line direction.
 
-The first line is drawn in light tones, the others join in darker ones. In a picture, the line nearest to the
-guiding angle comes first. Where the field turns, another line
-becomes the nearest, and the hatching changes its direction there. On a surface the first line can
-continue instead, as far as the field allows. Around singularities it cannot: somewhere, two lines
-have to swap.
+A line direction is a pair of opposite directions of a field, or a single direction if the field has no
+opposite ones. In hatching, the first line direction is drawn in light tones, and the others are added in
+darker tones. In a picture, the line direction nearest to the guiding angle comes first. Where the field
+rotates, another direction becomes the nearest, and the hatching changes its direction there. On a surface the
+first line direction can be continuous instead, as far as the field allows. Around singularities it cannot:
+somewhere, two line directions have to swap.
 
-The order is found by threshold dynamics: each point takes the line nearest to the guide, the lines are
-averaged over a length, and so again with shorter lengths. The curves where lines swap then shrink. The
-last average is over a few widths of lines, and blends the lines where they swap.
+The order is found by threshold dynamics. At each point, the line direction nearest to the guide is chosen;
+the chosen directions are averaged over a neighborhood, and the average is the next guide. This is repeated
+with smaller and smaller neighborhoods, and the curves where directions swap shrink. The last neighborhood is
+a few line widths large. Its average blends the directions where they swap.
 
-Renderers read the direction of the first line from an anisotropy map of glTF or a flow map. An anisotropy map
-has the components along the tangent, which is the direction of u, and the bitangent. Opposite directions mean
-the same in it, but a filter must not average them: the directions are combed. A flow map has the components
-along u and v, in which a shader moves a texture.
+Renderers read the first line direction from an anisotropy map of glTF or from a flow map. An anisotropy map
+stores the components of a direction along the tangent (the direction of u) and the bitangent. Opposite
+directions have the same meaning, but texture filters must not average them to zero. So the directions are
+combed: neighboring ones point the same way. A flow map stores the components along u and v, along which a
+shader moves a texture.
 
 References
 ----------
-The Khronos Group, "KHR_materials_anisotropy", 2023. Flow maps: Vlachos, "Water Flow in Portal 2", SIGGRAPH 2010
-course "Advances in Real-Time Rendering".
+The Khronos Group, "KHR_materials_anisotropy", 2023. Flow maps: Vlachos, "Water Flow in Portal 2", SIGGRAPH
+2010 course "Advances in Real-Time Rendering".
 """
 
 from __future__ import annotations
@@ -48,17 +51,17 @@ from ..projection.pixel_blocks import pixel_blocks
 from .charts import uv_tangents
 from .texels import TexelSurface
 
-#: Longest edge of the triangles on which the order is computed, as a fraction of the side of a square
-#: as large as the surface; and the most triangles, unless the mesh has more.
+#: The mesh is refined until no edge is longer than `MAX_EDGE` or there are `MAX_TRIANGLES` triangles. Edges
+#: are measured in sides of a square that has the area of the surface. Larger meshes are not refined.
 MAX_EDGE, MAX_TRIANGLES = 1 / 100, 200_000
 
-#: Lengths of the averages, as fractions of that side.
+#: Lengths over which directions are averaged, one after the other, in sides of the same square.
 AVERAGE_LENGTHS = (0.4, 0.2, 0.1, 0.05, 0.025)
 
-#: Weight of the x axis as a guide on triangles that are nearly horizontal.
+#: Weight of the direction relative to the x axis, which is the guide on nearly horizontal triangles.
 X_AXIS_WEIGHT = 0.01
 
-#: Sharpness of the choice between lines. Those whose weight is below `MIN_WEIGHT` are not drawn.
+#: Sharpness of the choice between line directions. Those whose weight is below `MIN_WEIGHT` are not drawn.
 SHARPNESS, MIN_WEIGHT = 6.0, 0.02
 
 #: Labels of the progress.
@@ -67,17 +70,18 @@ LABEL, MAP_LABEL = "ordering lines", "drawing directions"
 
 @dataclass(frozen=True, eq=False)
 class LineOrder:
-    """The first line at the points of a surface.
+    """Which line direction of a field comes first, as a function on a surface.
 
     Attributes
     ----------
     degree : int
-        Degree of the representation of a line: 1 if opposite directions are on different lines, else 2.
+        Degree of the representation of a line direction: 2 if opposite directions are the same, else 1.
     tree : BisectionTree
-        The triangles of the tangent mesh, and the L smaller ones in them.
+        The triangles of the tangent mesh, refined into L smaller triangles.
     first : (L, 3) complex64 ndarray
-        Representation of the first line at their corners, in the frame of the triangle of the mesh. The
-        modulus is 1, and less where lines swap.
+        Representation of the first line direction (its power `degree`) at the corners of the smaller
+        triangles, in the frame of the triangle of the tangent mesh. The modulus is 1, and less where
+        directions swap.
     """
 
     degree: int
@@ -85,13 +89,13 @@ class LineOrder:
     first: np.ndarray
 
     def first_at(self, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Return (n,) complex64 representations of the first line.
+        """Return (n,) complex64: representations of the first line direction at points of the tangent mesh.
 
         Parameters
         ----------
         triangle : (n,) ndarray of int
         weights : (n, 3) float32 ndarray
-            Barycentric coordinates.
+            Barycentric coordinates of the points in their triangles.
         """
         leaf, weights = self.tree.locate(triangle, weights)
         return sum(
@@ -101,26 +105,27 @@ class LineOrder:
 
 @dataclass(frozen=True, eq=False)
 class CombedDirections:
-    """One direction of the first line at the points of a surface.
+    """The first line direction on a surface, as a direction that is continuous where possible.
 
     Attributes
     ----------
     line : LineOrder
+        Which line direction comes first.
     sense : LineOrder
-        Of degree 1: which of the two opposite directions of a line is chosen. Where the choice changes, the
-        line continues.
+        A smooth direction, of degree 1. Of the two opposite directions of `line`, the one nearer to it is
+        chosen.
     """
 
     line: LineOrder
     sense: LineOrder
 
     def directions_at(self, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Return (n,) unit tangents near to the directions of the field.
+        """Return (n,) complex unit tangents at points of the tangent mesh, near to directions of the field.
 
         Parameters
         ----------
         triangle, weights
-            As for `LineOrder.first_at`.
+            Triangles and barycentric coordinates, as in `LineOrder.first_at`.
         """
         direction = _unit_root(self.line.first_at(triangle, weights), self.line.degree)
         is_opposite = (direction * self.sense.first_at(triangle, weights).conj()).real < 0
@@ -128,16 +133,18 @@ class CombedDirections:
 
 
 def first_line_weights(first: np.ndarray, members: np.ndarray, degree: int) -> np.ndarray:
-    """Return (M, n) float32: how much each line comes first; the sum is 1.
+    """Return (M, n) float32: the weight with which each line direction is the first; weights sum to 1.
+
+    The weight of the first direction is nearly 1. Where directions swap, weights change smoothly.
 
     Parameters
     ----------
     first : (n,) complex ndarray
-        From `LineOrder.first_at`.
+        Representation of the first line direction, from `LineOrder.first_at`.
     members : (M, n) complex ndarray
-        Unit directions of the lines, in the same frames.
+        The M line directions as unit tangents, in the same frames.
     degree : int
-        Of `first`.
+        Degree of `first`.
     """
     count = len(members)
     if count == 1:
@@ -152,16 +159,16 @@ def first_line_weights(first: np.ndarray, members: np.ndarray, degree: int) -> n
 
 
 def line_order(mesh: TangentMesh, guiding_angle: float, blend: float) -> LineOrder:
-    """Find the order of the lines of a field.
+    """Choose at each point of a mesh which line direction of the field comes first.
 
     Parameters
     ----------
     mesh : TangentMesh
     guiding_angle : float
-        Direction that the first line is near to: the angle from the horizontal direction, in radians,
-        counter-clockwise as seen from outside.
+        Angle, in radians, that the first line direction is near to. It is measured from the horizontal
+        direction, counter-clockwise as seen from outside.
     blend : float
-        Width of the strip in which two lines swap, in Blender units.
+        Width of the strip in which two line directions swap, in Blender units.
 
     Returns
     -------
@@ -180,14 +187,15 @@ def line_order(mesh: TangentMesh, guiding_angle: float, blend: float) -> LineOrd
 
 
 def combed_directions(mesh: TangentMesh, guiding_angle: float) -> CombedDirections:
-    """Choose one direction of a field at each point: a direction of the first line.
+    """Choose one of the N directions of a field at each point of a mesh, as continuous as possible.
 
-    Opposite directions of that line meet only where they must.
+    It is one of the two opposite directions of the first line direction. The choice jumps between these two
+    only where the topology of the field requires it.
 
     Parameters
     ----------
     mesh, guiding_angle
-        As for `line_order`.
+        Tangent mesh with the field, and angle that the directions are near to, as in `line_order`.
 
     Returns
     -------
@@ -208,9 +216,9 @@ def combed_directions(mesh: TangentMesh, guiding_angle: float) -> CombedDirectio
 
 
 class _RefinedMesh(NamedTuple):
-    """A mesh of small triangles, on which representations are averaged.
+    """A mesh of small triangles, on which representations of directions are averaged.
 
-    Lengths are fractions of the side of a square as large as the surface.
+    Lengths are in units of `side`: the side, in world space, of a square that has the area of the surface.
     """
 
     tree: BisectionTree
@@ -219,12 +227,12 @@ class _RefinedMesh(NamedTuple):
 
 
 def _refined(mesh: TangentMesh) -> _RefinedMesh:
-    """Refine a mesh."""
+    """Divide the triangles of a mesh into smaller ones, and prepare averages on them."""
     report(0.0, LABEL)
     side = float(np.sqrt(mesh.area.sum()))
     with progress(0.0, 0.2):
         points, triangle_vertex = _welded(mesh)
-    # No number is very large or small.
+    # Scale coordinates so that none is very large or small.
     points = (points - points.mean(axis=0)) / side
     max_triangles = max(MAX_TRIANGLES, len(triangle_vertex))
     report(0.2, LABEL)
@@ -242,7 +250,11 @@ def _refined(mesh: TangentMesh) -> _RefinedMesh:
 def _first_lines(
     mesh: TangentMesh, refined: _RefinedMesh, guiding_angle: float, blend: float
 ) -> LineOrder:
-    """Find the first line; see `line_order`."""
+    """Choose for each refined triangle which line direction comes first.
+
+    It is the direction that is near to the guiding angle. If the field itself marks one of its line
+    directions (`TangentMesh.family_z`), it is this direction. The parameters are as in `line_order`.
+    """
     degree = mesh.degree // mesh.family_count
     tree = refined.tree
     z = np.einsum(
@@ -250,7 +262,7 @@ def _first_lines(
     )
     if mesh.family_z is None:
         first, lengths = _guide(mesh, guiding_angle, degree)[tree.leaf_root], AVERAGE_LENGTHS
-    else:  # the field distinguishes its lines
+    else:  # the field marks its first line direction
         first, lengths = mesh.family_z[tree.leaf_root], ()
     lengths = (*lengths, blend / refined.side)
     return _aligned(refined, z, mesh.degree, first, degree, lengths)
@@ -264,17 +276,18 @@ def _aligned(
     degree: int,
     lengths: Sequence[float],
 ) -> LineOrder:
-    """Align a guide with a field by threshold dynamics.
+    """Align a guiding direction with a field by threshold dynamics: choose and average in turns.
 
     Parameters
     ----------
     refined : _RefinedMesh
+        Mesh of L triangles.
     z : (L,) complex ndarray
         Representation of the field, of the degree `z_degree`.
     first : (L,) complex ndarray
-        Representation of the guide, of the degree `degree`.
+        Representation of the guiding direction, of the degree `degree`.
     lengths : sequence of float
-        Lengths of the averages.
+        Lengths over which directions are averaged, one after the other, in units of `refined.side`.
     """
     averages = refined.averages
     connection = averages.connection
@@ -292,29 +305,31 @@ def _aligned(
 
 
 def _unit_root(values: np.ndarray, degree: int) -> np.ndarray:
-    """Return (n,) unit directions of representations."""
+    """Return (n,) complex: a unit tangent of each representation, its root of the given degree."""
     return np.exp(1j * np.angle(values) / degree)
 
 
 def _guide(mesh: TangentMesh, guiding_angle: float, degree: int) -> np.ndarray:
-    """Return (T,) representations of the direction at an angle to the horizontal direction.
+    """Return (T,) complex: representations of the guiding direction on the triangles of a mesh.
 
-    The modulus decreases toward horizontal triangles, on which the x axis is the guide.
+    It is at `guiding_angle` to the horizontal direction of the triangle. The modulus decreases toward
+    horizontal triangles. On these, the angle is measured from the x axis instead.
     """
     x, _, z = (mesh.x + 1j * mesh.y).T
     turn = np.exp(1j * guiding_angle)
-    # Seen from outside, the direction to the right is a quarter turn clockwise from the z axis.
+    # Seen from outside, the horizontal direction to the right is 90 degrees clockwise from the z axis.
     return power(-1j * turn * z, degree) + X_AXIS_WEIGHT * power(turn * x, degree)
 
 
 def _welded(mesh: TangentMesh) -> tuple[np.ndarray, np.ndarray]:
-    """Join the corners of triangles between which streamlines can cross.
+    """Return the triangles as an indexed mesh that is connected where streamlines can cross.
 
     Returns
     -------
     points : (n, 3) float64 ndarray
+        Vertices in world space.
     triangle_vertex : (T, 3) int32 ndarray
-        Indices of the corners into the points.
+        Indices of the corners of triangles into `points`.
     """
     pairs = np.concatenate(shared_edges(mesh).ends())
     with progress(0.0, 1.0):
@@ -335,13 +350,13 @@ def direction_map(on: TexelSurface, content: str, guiding_angle: float) -> np.nd
     on : TexelSurface
     content : {"anisotropy", "flow"}
     guiding_angle : float
-        Direction that the direction of the map is near to; see `line_order`.
+        Angle that the directions in the map are near to; see `line_order`.
 
     Returns
     -------
     (P, 4) float32 ndarray
-        As stored in the file, 0 to 1: the components of a unit vector, from -1 to 1, in red and green. Blue is
-        1, and 0 where the field is undefined. Alpha is 1.
+        RGBA of the P texels as stored in the file, 0 to 1. Red and green are the components of a unit vector,
+        scaled from [-1, 1] to [0, 1]. Blue is 0 where the field is undefined, and 1 elsewhere. Alpha is 1.
     """
     mesh, charts, texels = on.mesh, on.charts, on.texels
     with progress(0.0, 0.7):
@@ -371,14 +386,14 @@ def direction_map(on: TexelSurface, content: str, guiding_angle: float) -> np.nd
 
 
 def corner_tangents(surface: Surface, field: RosyField, guiding_angle: float) -> np.ndarray:
-    """Compute one direction of a field on each corner of a surface.
+    """Compute one direction of a field at each face corner of a surface, as continuous as possible.
 
     Parameters
     ----------
     surface : Surface
     field : RosyField
     guiding_angle : float
-        Direction that it is near to; see `line_order`.
+        Angle that the directions are near to; see `line_order`.
 
     Returns
     -------
@@ -402,6 +417,9 @@ def corner_tangents(surface: Surface, field: RosyField, guiding_angle: float) ->
 def _directions_at(
     mesh: TangentMesh, combed: CombedDirections, triangle: np.ndarray, weights: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return (n,) unit tangents at points, the nearest to the combed ones, and whether they are defined."""
+    """Return (n,) unit tangents at points, and (n,) bool: whether the field is defined there.
+
+    A tangent is the direction of the field that is nearest to the combed direction.
+    """
     member = mesh.members_at(triangle, weights, combed.directions_at(triangle, weights))
     return mesh.directions_at(triangle, weights, member), member != 0

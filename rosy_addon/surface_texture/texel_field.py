@@ -1,10 +1,10 @@
-"""The field and the noise at the texels of a UV map, and the steps from texel to texel on the surface.
+"""Compute the field and the noise at the texels of a UV map, and steps between texels on the surface.
 
 Inside a chart, a streamline steps to neighboring texels. Across a seam, and across the border of a tile, a
-step is a straight line on the surface: it is unfolded over the edges between the triangles, and leads to the
+step is a straight line on the surface. It is unfolded over the edges between triangles, and leads to the
 texel in which it ends.
 
-The noise belongs to the surface. Its cells have one size in Blender units.
+The noise is fixed to the surface. Its cells have the same size, in Blender units, everywhere.
 """
 
 from __future__ import annotations
@@ -28,34 +28,36 @@ from ..projection.rest_coordinates import RestCoordinates, matrix_scale, rest_po
 from .charts import UvCharts
 from .texels import TexelSurface, neighbor_places
 
-#: Neighboring texels are also neighbors on the surface if their distance there is at most this many
-#: times what the UV map stretches their distance to.
+#: Neighboring texels count as neighbors on the surface if their distance there is at most this many
+#: times the distance that follows from the stretch of the UV map.
 MAX_STRETCHED_STEP = 2.0
 
-#: A step across a seam arrives if it covers at least this fraction of its length.
+#: A step across a seam reaches its target only if it covers at least this fraction of its length on the
+#: surface.
 MIN_WALKED_RATIO = 0.999
 
 #: Largest factor by which a step across a seam stretches displacements. Streamlines end where triangles
 #: have nearly no area in the UV map.
 MAX_SEAM_STRETCH = 64.0
 
-#: Texels whose steps across seams are traced at once.
+#: Number of steps across seams that are traced at once. It bounds memory.
 SEAM_BLOCK = 1 << 14
 
-#: Smallest side of a cell of the noise, in texels of the coarser direction.
+#: Smallest side of a cell of the noise, in texels, in the direction in which texels are larger on the
+#: surface.
 MIN_CELL_TEXELS = 1.0
 
-#: Most points on each side of the grid of local means, which a high pass subtracts.
+#: Largest number of points along each side of the grid of local means, which a high pass subtracts.
 MAX_GRID_SIDE = 256
 
-#: Side of a cell of that grid, in standard deviations of the blur. Values are spread to the corners of
-#: their cell and interpolated from them, both linearly.
+#: Side of a cell of that grid, in standard deviations of the blur. Values at texels are added to the corners
+#: of their cell with linear weights, and means are interpolated linearly from the corners.
 GRID_CELL_SIGMAS = 3**0.5
 
-#: One in this number of texels is spread over the grid.
+#: Only one of this number of texels is added to the grid.
 SAMPLE_STRIDE = 3
 
-#: Texels that are spread over the grid at once.
+#: Number of texels that are handled at once for the grid. It bounds memory.
 GRID_BLOCK = 1 << 18
 
 #: Label of the progress.
@@ -63,20 +65,20 @@ LABEL = "following the surface across seams"
 
 
 def texel_field(on: TexelSurface, crease_angle: float | None) -> PixelField:
-    """Compute the field at texels.
+    """Compute the field at texels, in the form in which streamlines are traced in pictures.
 
     Parameters
     ----------
     on : TexelSurface
     crease_angle : float or None
         Streamlines end where the normals of neighboring texels differ by more than this angle, in
-        radians. None if they cross creases.
+        radians. If None, streamlines cross creases.
 
     Returns
     -------
     PixelField
-        Its `screen_jacobian` maps unit tangents to steps in texels, which are foreshortened where the
-        UV map is coarse.
+        Its pixels are the texels. Its `screen_jacobian` maps unit tangents to steps in texels. These are
+        foreshortened where the UV map is coarse.
     """
     mesh, charts, texels = on.mesh, on.charts, on.texels
     count, degree = len(texels), mesh.degree
@@ -105,7 +107,7 @@ def texel_field(on: TexelSurface, crease_angle: float | None) -> PixelField:
         if mesh.family_z is not None:
             turn = signed_power(frame.conj(), rotation_order(family, degree))
             channels[family][block] = mesh.family_z[triangle] * turn
-    # The texel at each place of the frame, or -1; also at place -1.
+    # The texel at each flat index of the frame, or -1. The last element is for the index -1.
     entry = np.full(texels.frame.width * texels.frame.height + 1, -1, dtype=np.int32)
     entry[texels.index] = np.arange(count, dtype=np.int32)
     with progress(0.3, 0.7):
@@ -126,7 +128,7 @@ def texel_field(on: TexelSurface, crease_angle: float | None) -> PixelField:
 
 
 def _interpolated(weights: np.ndarray, corners: np.ndarray, triangle: np.ndarray) -> np.ndarray:
-    """Return (n,) values at (n, 3) barycentric coordinates, given the (T, 3) values at corners."""
+    """Interpolate (T, 3) values at corners to (n,) values at (n, 3) barycentric coordinates in triangles."""
     a, b, c = corners.take(triangle, axis=0).T
     return weights[:, 0] * a + weights[:, 1] * b + weights[:, 2] * c
 
@@ -141,13 +143,15 @@ def frames_at(charts: UvCharts, triangle: np.ndarray, weights: np.ndarray) -> np
 def _neighbor_masks(
     on: TexelSurface, entry: np.ndarray, defined: np.ndarray, crease_angle: float | None
 ) -> np.ndarray:
-    """Return (P,) uint16 `PixelField.neighbor_mask`: neighbors in the same chart, near on the surface.
+    """Return (P,) uint16: `PixelField.neighbor_mask`, with a bit for each linked neighbor of a texel.
 
-    `entry`, (H W + 1,) int32, holds the texel at each place of the frame.
+    A neighboring texel is linked if it is in the same chart and near on the surface. `entry`, (H W + 1,)
+    int32, holds the texel at each flat index of the frame, or -1. `defined`, (P,) bool, is true where the
+    field is not zero.
     """
     mesh, charts, texels = on.mesh, on.charts, on.texels
     masks = defined.astype(np.uint16) << np.uint16(NEIGHBOR_OFFSETS.index((0, 0)))
-    # Squared length on the surface that a texel is stretched to at most.
+    # Squared limit for the distance of neighbors on the surface, for each triangle.
     stretch = charts.stretch()[1] * texels.frame.size
     reach = np.divide(MAX_STRETCHED_STEP, stretch, out=np.zeros(len(stretch)), where=stretch > 0)
     reach_squared = (reach * reach).astype(np.float32)
@@ -187,7 +191,10 @@ def _neighbor_masks(
 def _find_seam_steps(
     on: TexelSurface, entry: np.ndarray, mask: np.ndarray, defined: np.ndarray
 ) -> SeamSteps:
-    """Trace the steps that `mask` does not have along the surface."""
+    """Trace the steps to neighbors that are not linked in `mask`, as straight lines on the surface.
+
+    `entry`, `mask` and `defined` are as in `_neighbor_masks`.
+    """
     border = np.flatnonzero(defined & (mask != 0b111_111_111))
     source, bit = np.nonzero(mask[border, None] >> np.arange(9, dtype=np.uint16) & 1 == 0)
     source, bit = border[source].astype(np.int32), bit.astype(np.uint8)
@@ -208,14 +215,21 @@ def _seam_steps(
     bit: np.ndarray,
     offset: np.ndarray,
 ) -> SeamSteps:
-    """Trace n steps, and return the steps that lead to a texel.
+    """Trace n steps as straight lines on the surface, and return the steps that lead to a texel.
 
     Parameters
     ----------
-    source, bit, offset : (n,) ndarrays
-        Texels, and the steps from them, also as complex numbers in texels.
+    on : TexelSurface
+    defined : (P,) bool ndarray
+        Whether the field is not zero at each texel.
     entry : (H W + 1,) int32 ndarray
-        The texel at each place of the frame, or -1.
+        The texel at each flat index of the frame, or -1.
+    source : (n,) int32 ndarray
+        Texel at which each step starts.
+    bit : (n,) uint8 ndarray
+        Index of the step in `NEIGHBOR_OFFSETS`.
+    offset : (n,) complex128 ndarray
+        The step as a complex number, in texels.
     """
     mesh, charts, texels = on.mesh, on.charts, on.texels
     size = texels.frame.size
@@ -254,21 +268,24 @@ def _seam_steps(
 def _nearest_texels(
     on: TexelSurface, entry: np.ndarray, triangle: np.ndarray, uv: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find the texel of the same chart that is nearest to each point of the UV plane.
+    """Find the nearest texel of the same chart for each point of the UV plane.
 
     Parameters
     ----------
+    on : TexelSurface
+    entry : (H W + 1,) int32 ndarray
+        The texel at each flat index of the frame, or -1.
     triangle : (n,) int32 ndarray
-        Triangles of the points.
+        Triangle of the surface that contains each point.
     uv : (n,) complex128 ndarray
-        The points, in texels.
+        Points of the UV plane, in texels.
 
     Returns
     -------
     texel : (n,) int32 ndarray
-        -1 if none of the nine texels around the point is in the chart.
+        Nearest texel; -1 if none of the nine texels around the point is in the chart.
     offset : (n,) complex128 ndarray
-        The point, relative to the center of that texel.
+        Position of the point relative to the center of that texel, in texels.
     """
     column, row = np.floor(uv.real).astype(np.intp), np.floor(uv.imag).astype(np.intp)
     chart, best = on.charts.chart, np.full(len(uv), np.inf)
@@ -290,24 +307,26 @@ def _nearest_texels(
 def texel_noise(
     on: TexelSurface, cell: float, seed: int, channels: int, density: float, high_pass: float
 ) -> np.ndarray:
-    """Make noise that is anchored to the surface, at its texels.
+    """Make noise at texels that is fixed to the surface.
 
     Parameters
     ----------
     on : TexelSurface
-    cell, high_pass : float
-        Size of a cell of the noise, and the width above which variations are removed, in steps of
-        streamlines.
+        The P texels, and the surface that they show.
+    cell : float
+        Size of a cell of the noise, in steps of streamlines.
     seed, channels, density
-        See `surface_noise`.
+        Seed, number of channels K and density of the noise; see `surface_noise`.
+    high_pass : float
+        Variations wider than this are removed, in steps of streamlines; 0: none are.
 
     Returns
     -------
     (P, K) float32 ndarray
-        With the mean `NOISE_MEAN`.
+        Noise with the mean `NOISE_MEAN`.
     """
     surface, charts, texels, step = on.instance.surface, on.charts, on.texels, on.step
-    # Blender units of the world in one of object space.
+    # Length in world space of one Blender unit of object space.
     scale = matrix_scale(on.instance.matrix)
     rest = rest_positions(surface).astype(np.float32)
     triangle_vertex = surface.triangle_vertex
@@ -345,15 +364,18 @@ def texel_noise(
 def _subtract_local_means(
     on: TexelSurface, rest: np.ndarray, channels: np.ndarray, sigma: float
 ) -> None:
-    """Subtract a blur over the surface from (K, P) values at texels, in place.
+    """Subtract local means over the surface from values at texels, in place.
 
-    The blur is three-dimensional: values are spread over a grid in space and interpolated from it. So it
-    does not depend on the charts.
+    The means are a blur in three dimensions: values are added to a grid in space, and means are interpolated
+    from it. So they do not depend on the charts.
 
     Parameters
     ----------
+    on : TexelSurface
     rest : (V, 3) float32 ndarray
-        `rest_positions` of the surface.
+        The `rest_positions` of the surface.
+    channels : (K, P) float32 ndarray
+        Values at the texels, which are changed.
     sigma : float
         Standard deviation of the blur, in Blender units of rest space.
     """
@@ -369,7 +391,10 @@ def _subtract_local_means(
     blocks = [slice(start, start + GRID_BLOCK) for start in range(0, count, GRID_BLOCK)]
 
     def cells(block: slice) -> tuple[np.ndarray, np.ndarray]:
-        """Return the (n,) lowest points of the cells of texels, and (n, 3) places in the cells."""
+        """Return the grid cells of texels and the positions in them.
+
+        A cell is given by the index of its lowest grid point, (n,). Positions are (n, 3), from 0 to 1.
+        """
         position = (on.interpolated(rest, block) - low) / np.float32(side)
         cell = np.clip(position.astype(np.intp), 0, shape - 2)
         return cell @ stride, np.clip(position - cell, 0, 1).astype(np.float32)
@@ -395,9 +420,10 @@ def _subtract_local_means(
 
 
 def _corner_shares(place: np.ndarray, stride: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
-    """Iterate over the corners of a cell in the grid: their offsets, and (n,) weights of linear interpolation.
+    """Iterate over the eight corners of grid cells: their index offsets, and (n,) linear weights.
 
-    `place` is (n, 3), from 0 to 1.
+    `place`, (n, 3), holds positions in cells, from 0 to 1. `stride` holds the index differences of grid
+    points that are neighbors along each axis.
     """
     x, y, z = np.stack([1 - place, place]).transpose(2, 0, 1)
     return ((int(np.dot((i, j, k), stride)), x[i] * y[j] * z[k]) for i, j, k in np.ndindex(2, 2, 2))

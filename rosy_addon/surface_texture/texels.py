@@ -1,12 +1,12 @@
-"""The texels of a UV map, the points of the surface that they show, and the margin around charts.
+"""Find the texels of a UV map, the points of the surface that they show, and the margin around charts.
 
-A map may have several tiles, which are unit squares of the UV plane. The texels of all tiles are one
-frame: the tiles of a UDIM texture are stacked. Other textures repeat, so all their tiles are at the same
-place.
+A map may have several tiles, which are unit squares of the UV plane. The texels of all tiles are in one
+frame, an array of rows and columns. The tiles of a UDIM texture are stacked in it. Other textures repeat, so
+all their tiles are in the same part of the frame.
 
-The margin makes filters of the texture find colors of the surface around charts. The texels next to a chart
-show the surface beyond the seam, so that no seam is visible where they are interpolated. Farther texels
-repeat the nearest one. They are visible only in smaller versions of the texture.
+Filters of the texture also read texels around charts: the margin. The texels next to a chart
+show the surface beyond the seam, so that no seam is visible where texels are interpolated. Farther texels
+repeat the nearest color. They are visible only in smaller mipmap levels of the texture.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from ..projection.gbuffer import MeshInstance
 from ..projection.rasterizer import rasterize
 from .charts import UvCharts
 
-#: Most tiles of a UV map.
+#: Largest number of tiles of a UV map.
 MAX_TILES = 100
 
-#: Number of the tile at the origin, and tiles in a row, in the numbering of UDIM.
+#: In the numbering of UDIM, the number of the tile at the origin, and the number of tiles in a row.
 FIRST_TILE, TILES_PER_ROW = 1001, 10
 
 #: Label of the progress.
@@ -37,16 +37,16 @@ LABEL = "finding texels"
 
 @dataclass(frozen=True)
 class TextureFrame:
-    """The frame of all texels of a texture.
+    """The array of rows and columns that holds all texels of a texture.
 
     Attributes
     ----------
     size : int
-        Texels on each side of a tile.
+        Number of texels on each side of a tile.
     tiles : tuple of (int, int)
-        u and v of the lower left corners of the tiles that have a chart.
+        Coordinates u and v of the lower left corners of the tiles that contain a part of a chart.
     is_udim : bool
-        Whether each tile is a picture of its own. Otherwise, all show the same picture.
+        Whether each tile has its own picture (UDIM). Otherwise, all tiles show the same picture.
     """
 
     size: int
@@ -55,12 +55,12 @@ class TextureFrame:
 
     @property
     def width(self) -> int:
-        """Texels in a row."""
+        """Number of texels in a row."""
         return self.size
 
     @property
     def height(self) -> int:
-        """Rows of texels."""
+        """Number of rows of texels."""
         return self.size * len(self.tiles) if self.is_udim else self.size
 
     def tile_names(self) -> list[int]:
@@ -68,16 +68,16 @@ class TextureFrame:
         return [FIRST_TILE + u + TILES_PER_ROW * v for u, v in self.tiles]
 
     def first_row(self, tile: int) -> int:
-        """Return the first row of a tile, by its place in `tiles`."""
+        """Return the first row of a tile in the frame. `tile` is an index into `tiles`."""
         return self.size * tile if self.is_udim else 0
 
     def flat_indices(self, column: np.ndarray, row: np.ndarray) -> np.ndarray:
-        """Return the (n,) intp indices in the frame of texels of the UV plane; -1 outside of all tiles.
+        """Return (n,) intp: the flat indices in the frame of texels of the UV plane; -1 outside of all tiles.
 
         Parameters
         ----------
         column, row : (n,) ndarray of int
-            From the origin of the UV plane.
+            Position of each texel, counted from the origin of the UV plane.
         """
         tile_u, in_column = np.divmod(column, self.size)
         tile_v, in_row = np.divmod(row, self.size)
@@ -99,9 +99,11 @@ class Texels:
     index : (P,) int32 ndarray
         Flat index into the frame, row by row from the lower left.
     triangle : (P,) int32 ndarray
+        Triangle of the surface at the center of each texel.
     barycentric : (P, 3) float32 ndarray
+        Barycentric coordinates of the center in this triangle.
     overlap : float
-        Fraction of the area of all charts that lies under other charts.
+        Fraction of the area of all charts that is not shown because other charts overlap it.
     """
 
     frame: TextureFrame
@@ -115,7 +117,7 @@ class Texels:
 
 
 class TexelSurface(NamedTuple):
-    """A mesh instance and the texels of its UV map, with streamlines in steps of one length.
+    """A mesh instance, the texels of its UV map, and the length of the steps of streamlines on it.
 
     Attributes
     ----------
@@ -124,7 +126,7 @@ class TexelSurface(NamedTuple):
     charts : UvCharts
     texels : Texels
     step : float
-        In Blender units.
+        Length of a step of streamlines, in Blender units.
     """
 
     instance: MeshInstance
@@ -134,7 +136,7 @@ class TexelSurface(NamedTuple):
     step: float
 
     def interpolated(self, vertex_values: np.ndarray, block: slice) -> np.ndarray:
-        """Interpolate (V, K) values of vertices at some of the texels: (n, K) float32."""
+        """Interpolate (V, K) values at vertices to the n texels of a block. The result is (n, K) float32."""
         corners = self.instance.surface.triangle_vertex.take(self.texels.triangle[block], axis=0).T
         total = np.zeros((corners.shape[1], vertex_values.shape[1]), dtype=np.float32)
         for corner, weight in zip(corners, self.texels.barycentric[block].T, strict=True):
@@ -143,25 +145,26 @@ class TexelSurface(NamedTuple):
 
 
 def texture_frame(charts: UvCharts, size: int, name: str, is_udim: bool = False) -> TextureFrame:
-    """Find the tiles of a UV map.
+    """Find the tiles that a UV map uses, and return the frame of their texels.
 
     Parameters
     ----------
     charts : UvCharts
     size : int
-        Texels on each side of a tile.
+        Number of texels on each side of a tile.
     name : str
-        Name of the mesh, for messages.
+        Name of the mesh in error messages.
     is_udim : bool
+        Whether each tile has its own picture.
 
     Raises
     ------
     RosyError
-        If there are more than `MAX_TILES`, or tiles that UDIM cannot number.
+        If there are more than `MAX_TILES` tiles or, for UDIM, tiles outside of its numbering.
     """
     used = charts.gradient.any(axis=1)
     uv = charts.uv[used]
-    # A border between two tiles belongs to the one that has the triangle.
+    # Corners on the border between two tiles belong to the tile that contains the triangle.
     low_u, low_v = (np.floor(part.min(axis=1) + 1e-9).astype(int) for part in (uv.real, uv.imag))
     high_u, high_v = (
         np.maximum(np.ceil(part.max(axis=1) - 1e-9).astype(int) - 1, low)
@@ -188,14 +191,15 @@ def texture_frame(charts: UvCharts, size: int, name: str, is_udim: bool = False)
 
 
 def rasterize_charts(charts: UvCharts, frame: TextureFrame, name: str) -> Texels:
-    """Find the texels whose centers are on the surface.
+    """Find the texels whose centers are on the surface, and the point of the surface at each of them.
 
-    Where charts overlap, a texel shows the triangle with the smallest index of the first tile.
+    Where charts overlap, a texel shows the triangle with the smallest index. Where tiles overlap, it shows
+    the first tile. `name` is the name of the mesh in error messages.
 
     Raises
     ------
     RosyError
-        If there is none.
+        If there is no such texel.
     """
     corners = charts.uv.ravel()
     triangles = np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
@@ -232,7 +236,7 @@ def rasterize_charts(charts: UvCharts, frame: TextureFrame, name: str) -> Texels
 
 
 def _reaches_tile(corners: np.ndarray) -> np.ndarray:
-    """Return the numbers of triangles that may reach the square from -1 to 1, given (T, 3, 2) corners."""
+    """Return the indices of triangles that may overlap the square from -1 to 1, given (T, 3, 2) corners."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     return np.flatnonzero(((low < 1) & (high > -1)).all(axis=1))
 
@@ -248,24 +252,26 @@ def fill_margin(
     *,
     crosses_seams: bool = True,
 ) -> np.ndarray:
-    """Draw the texels of charts and their margin into the frame.
+    """Return the picture of a texture: the colors of texels, with a margin around charts.
 
     Parameters
     ----------
     frame : TextureFrame
     field : PixelField
-        At the P texels of the charts.
+        Field at the P texels of the charts. It holds the links between texels.
     color : (P, K) float32 ndarray
+        Colors of the texels, with K channels.
     margin : int
         Width of the margin, in texels.
     crosses_seams : bool
-        Whether colors have the same meaning in all charts, so that the colors beyond a seam continue a
-        chart.
+        Whether colors have the same meaning in all charts. Then the texels next to a chart get the colors of
+        the surface beyond the seam.
 
     Returns
     -------
     (H, W, K) float32 ndarray
-        The mean of the colors where there is neither chart nor margin.
+        Colors of all texels of the frame. Texels that are neither in a chart nor in a margin have the mean
+        color.
     """
     height, width, channels = frame.height, frame.width, color.shape[1]
     image = np.empty((height, width, channels), dtype=np.float32)
@@ -291,13 +297,21 @@ def fill_margin(
 def _beyond_seams(
     frame: TextureFrame, field: PixelField, color: np.ndarray, filled: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find the empty texels beside the charts, and the colors of the surface that continues there.
+    """Find the empty texels next to charts, and the colors of the surface beyond the seam there.
+
+    Parameters
+    ----------
+    frame, field, color
+        Parameters of `fill_margin`.
+    filled : (H W,) bool ndarray
+        Whether each texel of the frame has a color.
 
     Returns
     -------
     outer : (n,) intp ndarray
-        Flat indices into the frame.
+        Flat indices of the empty texels in the frame.
     values : (n, K) float32 ndarray
+        Colors for these texels.
     """
     steps = field.seam_steps
     kept = np.flatnonzero(np.isin(steps.bit, (1, 3, 5, 7)))
@@ -314,7 +328,10 @@ def _beyond_seams(
 def _color_at(
     field: PixelField, color: np.ndarray, texel: np.ndarray, offset: np.ndarray
 ) -> np.ndarray:
-    """Return (n, K) colors at offsets from the centers of texels, interpolated between linked neighbors."""
+    """Return (n, K) float32: colors at positions near texels, interpolated linearly between linked neighbors.
+
+    `texel` holds texels, and `offset` the positions relative to their centers, as complex numbers in texels.
+    """
     column, row = np.sign(offset.real).astype(np.intp), np.sign(offset.imag).astype(np.intp)
     x, y = np.minimum(np.abs(offset.real), 1), np.minimum(np.abs(offset.imag), 1)
     mask = field.neighbor_mask.take(texel)
@@ -338,20 +355,22 @@ def _color_at(
 def _dilate(
     frame: TextureFrame, flat: np.ndarray, filled: np.ndarray, ring: np.ndarray
 ) -> np.ndarray:
-    """Fill the empty texels beside a ring of filled ones with the mean of those, in place.
+    """Fill empty texels next to filled ones with the mean color of their filled neighbors, in place.
 
     Parameters
     ----------
     frame : TextureFrame
     flat : (H W, K) float32 ndarray
+        Colors of all texels of the frame.
     filled : (H W,) bool ndarray
+        Whether each texel has a color.
     ring : (n,) ndarray of int
-        Flat indices into the frame.
+        Flat indices of filled texels whose empty neighbors are filled.
 
     Returns
     -------
     (m,) intp ndarray
-        The texels that were filled.
+        Flat indices of the texels that were filled.
     """
     found = []
     for offset in ((1, 0), (-1, 0), (0, 1), (0, -1)):
@@ -376,7 +395,10 @@ def _dilate(
 
 
 def neighbor_places(frame: TextureFrame, index: np.ndarray, dx: int, dy: int) -> np.ndarray:
-    """Return the (n,) intp places of neighbors in the frame; -1 outside of the tile."""
+    """Return (n,) intp: flat indices of the neighbors of texels at an offset of (dx, dy) texels.
+
+    `index` holds flat indices of texels in the frame. The result is -1 for neighbors outside of the tile.
+    """
     row, column = np.divmod(index.astype(np.intp), frame.width)
     column += dx
     row %= frame.size

@@ -100,7 +100,7 @@ def store_record(
     frame_range: str = "",
     is_texture: bool = False,
 ) -> None:
-    """Store the record of a picture, image sequence or texture. It replaces the earlier one of the same source.
+    """Store the record of a picture, sequence or texture. It replaces an earlier record of the same source.
 
     Parameters
     ----------
@@ -234,7 +234,10 @@ def _view_from_json(text: str) -> Camera:
 
 
 def _is_recorded(datablock: bpy.types.ID | None) -> bool:
-    """Return whether any record uses an image or material. Copies of a scene have records of the same images."""
+    """Return whether any record uses an image or material.
+
+    Copies of a scene have records of the same images.
+    """
     return any(
         datablock in (record.image, record.material)
         for scene in bpy.data.scenes
@@ -423,7 +426,7 @@ def _remove_records(scene: bpy.types.Scene) -> int:
 
 @contextmanager
 def _object_mode(objects: Sequence[bpy.types.Object]) -> Iterator[None]:
-    """Context manager: leave edit mode, if an object in edit mode has an applied picture, and return at the end."""
+    """Context manager: leave edit mode during a block if an edited object has an applied picture."""
     is_editing = bpy.context.mode == "EDIT_MESH" and any(
         obj.mode == "EDIT" and has_applied_picture(obj.data) for obj in objects
     )

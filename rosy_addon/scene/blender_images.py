@@ -129,7 +129,7 @@ def _load_tiles(
 
 
 def frame_path(stem: Path, frame: int, as_float: bool) -> Path:
-    """Return the path of one frame of an image sequence: the stem, the frame number in 4 digits, the suffix."""
+    """Return the path of a frame of an image sequence: stem, frame number in at least 4 digits, suffix."""
     return stem.with_name(f"{stem.name}_{frame:04d}{'.exr' if as_float else '.png'}")
 
 

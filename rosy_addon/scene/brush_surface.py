@@ -18,7 +18,8 @@ from ..field.surface import Surface
 from .meshes import evaluated_mesh, vertex_positions
 from .singularity_points import mesh_of_own_vertices
 
-#: Largest number of faces on which dashes are drawn. Length of a dash, relative to the square root of twice the
+#: Largest number of faces on which dashes are drawn. Length of a dash, relative to the square root of twice
+#: the
 #: area of the first triangle of its face.
 MAX_DASH_FACES, DASH_LENGTH = 1500, 0.7
 
@@ -54,9 +55,9 @@ class BrushSurface:
     def cast_ray(self, origin: Vector, direction: Vector) -> np.ndarray | None:
         """Return the point of the original mesh under a ray, (3,) float32 in object space; None for a miss.
 
-        The ray is in world space, and is intersected with the evaluated mesh. The hit is mapped to the original
-        mesh by its barycentric coordinates in a triangle. If modifiers change the faces, that is the triangle of
-        the original mesh, with the vertices moved by the modifiers, that is closest to the hit.
+        The ray is in world space, and is intersected with the evaluated mesh. The hit is mapped to the
+        original mesh by its barycentric coordinates in a triangle. If modifiers change the faces, that is the
+        triangle of the original mesh, with the vertices moved by the modifiers, that is closest to the hit.
         """
         to_object = self._obj.matrix_world.inverted_safe()
         is_hit, location, _, face = self._evaluated.ray_cast(
@@ -74,7 +75,8 @@ class BrushSurface:
                 )
             location, _, index, _ = self._shown_tree.find_nearest(location)
             triangle = np.array([index])
-        # Of the triangles of the face, choose the one whose smallest barycentric coordinate is largest: the point
+        # Of the triangles of the face, choose the one whose smallest barycentric coordinate is largest: the
+        # point
         # lies in it.
         weights = [
             _barycentric(self._shown[vertex[index]], np.array(location)) for index in triangle
@@ -87,8 +89,8 @@ class BrushSurface:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return dashes (short line segments) along a field around a point, on the evaluated mesh.
 
-        For an even degree there is one dash for each pair of opposite members, centered on the face. For an odd
-        degree there is one for each member, from the center of the face.
+        For an even degree there is one dash for each pair of opposite members, centered on the face. For an
+        odd degree there is one for each member, from the center of the face.
 
         Parameters
         ----------

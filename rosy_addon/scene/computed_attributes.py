@@ -123,8 +123,8 @@ def store_difference(
     ----------
     mesh : bpy.types.Mesh
     other : str
-        Name of the attribute with the other field. It is read with the degree of the mesh's field. If the name
-        is empty, the only attribute of `other_field_names` is used.
+        Name of the attribute with the other field. It is read with the degree of the mesh's field. If the
+        name is empty, the only attribute of `other_field_names` is used.
     name : str
         Name of the attribute in which the angles are stored, in degrees.
 

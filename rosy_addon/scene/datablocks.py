@@ -1,7 +1,7 @@
 """Datablocks: find out which ones RoSy created, and which are linked, missing or editable.
 
-Datablocks that RoSy creates have a custom property, by which they are recognized and deleted. If the library of
-a linked object is missing, Blender keeps a placeholder in its place.
+Datablocks that RoSy creates have a custom property, by which they are recognized and deleted. If the library
+of a linked object is missing, Blender keeps a placeholder in its place.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from ..core.errors import RosyError
 #: Custom property on every datablock that RoSy created.
 OWNED_TAG = "rosy_made"
 
-#: Custom property on node groups that move strokes with a surface. Their modifiers are removed with the strokes,
+#: Custom property on node groups that move strokes with a surface. Their modifiers are removed with the
+#: strokes,
 #: not with the pictures.
 STROKES_TAG = "rosy_surface_strokes"
 
@@ -52,7 +53,8 @@ def user_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
 def rollback_on_error() -> Iterator[list[bpy.types.ID]]:
     """Context manager: yield a list to which the caller appends new datablocks.
 
-    At the end of the block they are tagged as created by RoSy. If the block raises an error, they are deleted.
+    At the end of the block they are tagged as created by RoSy. If the block raises an error, they are
+    deleted.
     """
     created: list[bpy.types.ID] = []
     try:

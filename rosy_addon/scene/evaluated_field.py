@@ -35,7 +35,8 @@ from .field_attributes import (
 from .mesh_fields import read_mesh_field
 from .meshes import mesh_surface, read_attribute
 
-#: Attribute that exists only while a scene is read: the normal of each original face, to which the vectors of the
+#: Attribute that exists only while a scene is read: the normal of each original face, to which the vectors of
+#: the
 #: field are perpendicular. Modifiers copy it to the evaluated mesh.
 FACE_NORMAL_ATTRIBUTE = "rosy_face_normal"
 
@@ -75,7 +76,10 @@ class FieldLayout:
         return [self.name, *(f"{self.name}_{index}" for index in indices)]
 
     def is_on(self, mesh: bpy.types.Mesh) -> bool:
-        """Return whether an evaluated mesh has all attributes of the layout. Modifiers may have dropped some."""
+        """Return whether an evaluated mesh has all attributes of the layout.
+
+        Modifiers may have dropped some.
+        """
         return all(name in mesh.attributes for name in self.attribute_names)
 
 
@@ -107,11 +111,11 @@ def read_evaluated_field(
 ) -> RosyField:
     """Read the field of an evaluated mesh, whose faces may differ from those of the original mesh.
 
-    When modifiers divide a face, they copy its vector unchanged to the new faces. A new face may lie in another
-    plane than the original face, even in the rest shape (`Surface.rest_vertices`), for example if the original
-    polygon was not planar. If the mesh has the normals of the original faces (`FACE_NORMAL_ATTRIBUTE`), each
-    vector is rotated by the smallest rotation from the original normal to the new one. Otherwise it is projected
-    to the plane of the new face.
+    When modifiers divide a face, they copy its vector unchanged to the new faces. A new face may lie in
+    another plane than the original face, even in the rest shape (`Surface.rest_vertices`), for example if the
+    original polygon was not planar. If the mesh has the normals of the original faces
+    (`FACE_NORMAL_ATTRIBUTE`), each vector is rotated by the smallest rotation from the original normal to the
+    new one. Otherwise it is projected to the plane of the new face.
 
     Parameters
     ----------
@@ -188,10 +192,11 @@ def temp_attributes(
     cache: Cache,
     errors: Errors,
 ) -> Iterator[dict[bpy.types.Object, FieldLayout]]:
-    """Context manager: add temporary attributes that modifiers copy to evaluated meshes, and remove them at the end.
+    """Context manager: add temporary attributes, which modifiers copy to evaluated meshes.
 
-    The attributes are the rest positions, the normals of the original faces, and the fields as vectors on faces
-    if they are stored in another form. All fields are checked on the original meshes.
+    Remove them at exit.
+    The attributes are the rest positions, the normals of the original faces, and the fields as vectors on
+    faces if they are stored in another form. All fields are checked on the original meshes.
 
     Inside another such context with the same objects, nothing is added again. Around many calls of
     `read_scene`, keep one context open.

@@ -48,8 +48,8 @@ def read_face_vectors(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
 def read_face_scalars(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
     """Read an attribute or a vertex group as one scalar per face.
 
-    The attribute may have floats, integers, booleans or colors (of which the linear luminance is taken). Values
-    on points or corners are averaged over each face.
+    The attribute may have floats, integers, booleans or colors (of which the linear luminance is taken).
+    Values on points or corners are averaged over each face.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The mesh attributes that hold fields: their names, forms and values, and the rest shape that is stored with them.
+"""The mesh attributes that hold fields: their names, forms and values, and the rest shape stored with them.
 
 The standard form is a vector attribute (FLOAT_VECTOR) on faces. It holds one member vector of the field per
 face, in object space. The length of the vector is the magnitude of the field; it is zero where the field is
@@ -11,11 +11,11 @@ undefined. The name of the attribute and the degree are in ``mesh.rosy``. These 
   counterclockwise about the normal. The magnitude is 1. NaN is an error, or means undefined, as the parameter
   `nonfinite` of the reading function says.
 
-Blender moves the vertices of a mesh when a transform or a modifier is applied, when objects are joined, and in
-edit mode, but it does not rotate the vectors of attributes. So two hidden attributes record the shape of the mesh
-at the time when a field was stored: the positions of the vertices, and a checksum of each vector. The checksum
-shows whether the vector has been changed since. When the field is read, unchanged vectors are rotated with their
-faces.
+Blender moves the vertices of a mesh when a transform or a modifier is applied, when objects are joined, and
+in edit mode, but it does not rotate the vectors of attributes. So two hidden attributes record the shape of
+the mesh at the time when a field was stored: the positions of the vertices, and a checksum of each vector.
+The checksum shows whether the vector has been changed since. When the field is read, unchanged vectors are
+rotated with their faces.
 """
 
 from __future__ import annotations
@@ -161,13 +161,14 @@ def cached_field(
 def surface_key(surface: Surface, *key_parts: object) -> Hashable:
     """Return the cache key of a result that depends on a surface and on other values.
 
-    The key contains the id of the surface. So the cached result must keep a reference to the surface: no other
-    object can then have the same id.
+    The key contains the id of the surface. So the cached result must keep a reference to the surface: no
+    other object can then have the same id.
     """
     return "field", id(surface), content_hash(*key_parts)
 
 
-#: Coefficients of the checksum of a vector, which is a linear combination of its components. As it is linear, it
+#: Coefficients of the checksum of a vector, which is a linear combination of its components. As it is linear,
+#: it
 #: stays right when Blender interpolates attributes.
 CHECK_COEFFICIENTS = np.array([1.0, 1.618034, 2.718282])
 
@@ -175,7 +176,8 @@ CHECK_COEFFICIENTS = np.array([1.0, 1.618034, 2.718282])
 #: component of the vector.
 CHECK_TOLERANCE = 1e-4
 
-#: Positions of the vertices, (V, 3), and checksums of the vectors of the faces, (F,), when a field was stored.
+#: Positions of the vertices, (V, 3), and checksums of the vectors of the faces, (F,), when a field was
+#: stored.
 RestShape = tuple[np.ndarray, np.ndarray]
 
 
@@ -187,8 +189,8 @@ def _attribute_names(name: str) -> tuple[str, str]:
 def store_rest_shape(mesh: bpy.types.Mesh, name: str) -> None:
     """Store the present shape of a mesh for an attribute of vectors on faces.
 
-    Nothing is stored if Blender does not allow the names of the hidden attributes. The vectors then do not follow
-    later changes of the mesh.
+    Nothing is stored if Blender does not allow the names of the hidden attributes. The vectors then do not
+    follow later changes of the mesh.
     """
     rest_name, check_name = _attribute_names(name)
     vectors = read_attribute(mesh, name, np.float32, 3)
@@ -236,8 +238,8 @@ def follow_mesh(rest_shape: RestShape | None, vectors: np.ndarray, surface: Surf
     Returns
     -------
     ndarray
-        `vectors` itself if no vertex has moved. A vector that does not fit its checksum, because it was changed
-        since, for example by a script, is not rotated. `carried_vectors` lists further exceptions.
+        `vectors` itself if no vertex has moved. A vector that does not fit its checksum, because it was
+        changed since, for example by a script, is not rotated. `carried_vectors` lists further exceptions.
     """
     if rest_shape is None:
         return vectors

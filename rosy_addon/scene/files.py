@@ -55,7 +55,8 @@ def _one_line(error: RuntimeError) -> str:
     return "; ".join(line for line in lines if line)
 
 
-#: Largest number of bytes of the stem of a file name. File systems allow 255 for the whole name, which also has a
+#: Largest number of bytes of the stem of a file name. File systems allow 255 for the whole name, which also
+#: has a
 #: hash, a frame number and suffixes.
 MAX_STEM_BYTES = 180
 
@@ -69,10 +70,10 @@ def picture_stem(name: str, kind: str = "camera") -> str:
     `name` is that of a camera, of a scene or (for a texture) of an object. For a texture, `kind` is its kind,
     which ends the stem.
 
-    Characters that file systems do not allow become underscores, and long names are cut. Two names may then have
-    the same stem, perhaps except for case, which some file systems ignore. In that case the first of them has the
-    plain stem, and the stems of the others end in a hash. The order depends only on the names in the .blend file,
-    so all processes agree.
+    Characters that file systems do not allow become underscores, and long names are cut. Two names may then
+    have the same stem, perhaps except for case, which some file systems ignore. In that case the first of
+    them has the plain stem, and the stems of the others end in a hash. The order depends only on the names in
+    the .blend file, so all processes agree.
     """
     siblings = {("camera", obj.name) for obj in bpy.data.objects if obj.type == "CAMERA"}
     siblings |= {("scene", scene.name) for scene in bpy.data.scenes}

@@ -101,8 +101,8 @@ def guide_strokes_and_empties(
 def annotation_strokes(scene: bpy.types.Scene, owner: bpy.types.Object) -> list[np.ndarray]:
     """Read the annotations of a scene as strokes, in the space of an object.
 
-    The strokes of the current frame of visible layers are read. Strokes that are placed on the view instead of in
-    the scene, and rulers, are left out.
+    The strokes of the current frame of visible layers are read. Strokes that are placed on the view instead
+    of in the scene, and rulers, are left out.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 """The node group *RoSy Hatching*, which draws hatching of a given tone from an image of thresholds.
 
-A tone requires that each of up to three layers of hatching lines covers a part of the paper. The group compares
-the thresholds of the layers (`compositor.ink_from_thresholds`) with these coverages. It computes the same
-formulas as `compositor.hatching`, so it draws what a picture in the same light shows. All of its nodes are
-Blender's own, so it works where RoSy is not installed.
+A tone requires that each of up to three layers of hatching lines covers a part of the paper. The group
+compares the thresholds of the layers (`compositor.ink_from_thresholds`) with these coverages. It computes the
+same formulas as `compositor.hatching`, so it draws what a picture in the same light shows. All of its nodes
+are Blender's own, so it works where RoSy is not installed.
 """
 
 from __future__ import annotations

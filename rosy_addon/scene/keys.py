@@ -170,7 +170,7 @@ def round_length(largest: float, units: bpy.types.UnitSettings) -> tuple[float, 
 
 
 def _key_colors(scene: bpy.types.Scene) -> KeyColors:
-    """Return the colors of a key: light text on dark panels if the background is known to be dark, else the reverse."""
+    """Return the colors of a key: dark panels if the background is known to be dark, light ones otherwise."""
     look = read_look(scene.rosy)
     if scene.rosy.backdrop and is_hatched(look):
         background = to_linear(from_hex(look.paper_color))
@@ -228,7 +228,10 @@ class FontShapes:
         self._shapes: dict[str, np.ndarray] = {}
 
     def triangles(self, text: str) -> np.ndarray:
-        """Return (n, 3, 2) triangles of a text of font size 1. Its left end and baseline are at the origin."""
+        """Return (n, 3, 2) triangles of a text of font size 1.
+
+        Its left end and baseline are at the origin.
+        """
         if text not in self._shapes:
             self._shapes[text] = _text_triangles(text)
         return self._shapes[text]

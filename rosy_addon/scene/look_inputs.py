@@ -1,7 +1,8 @@
 """Read the inputs of a look other than fields: tones, values for the color map, and reference renders.
 
 A `ReadRequest` says which of them a look needs from the meshes. Tones are read from mesh attributes or from
-images that are mapped to meshes, values for the color map from mesh attributes, and reference renders from files.
+images that are mapped to meshes, values for the color map from mesh attributes, and reference renders from
+files.
 """
 
 from __future__ import annotations
@@ -68,7 +69,7 @@ FIELDS_ONLY = ReadRequest()
 
 
 def read_request(scene: bpy.types.Scene, look: Look) -> ReadRequest:
-    """Return what has to be read from the meshes of a scene to draw a look, with the settings of the scene."""
+    """Return what to read from the meshes of a scene to draw a look, with the settings of the scene."""
     tone = None
     if look.tone == "attribute":
         tone = ToneRequest("attribute", scene.rosy.tone_attribute)
@@ -83,7 +84,7 @@ def nonfinite_policy(scene: bpy.types.Scene) -> str:
 
 
 def color_attribute_of(scene: bpy.types.Scene, look: Look) -> str | None:
-    """Return the name of the attribute with the values for the color map; None if the look does not use them."""
+    """Return the name of the attribute with values for the color map; None if the look does not use it."""
     return scene.rosy.color_attribute if colors_values(look) else None
 
 
@@ -159,7 +160,7 @@ def tone_digest(
 
 
 def tone_image_key(owner: bpy.types.Object, tone_request: ToneRequest | None) -> tuple[str, ...]:
-    """Return a cache key for the tone image and the UV map of an object; empty if the tone is not an image."""
+    """Return a cache key for the tone image and UV map of an object; empty if the tone is not an image."""
     if tone_request is None or tone_request.kind != "image" or not has_rosy_properties():
         return ()
     image = owner.rosy.tone_image
@@ -223,8 +224,8 @@ def check_sources(
 ) -> None:
     """Check that the requested tones and values for the color map were found on some mesh with a field.
 
-    At least one mesh must have a tone, if tones are requested. At least one mesh must have values for the color
-    map, if these are requested.
+    At least one mesh must have a tone, if tones are requested. At least one mesh must have values for the
+    color map, if these are requested.
 
     Parameters
     ----------
@@ -285,7 +286,8 @@ def _attribute_listing(owners: Sequence[bpy.types.Object], types: Sequence[str])
 def reference_path(scene: bpy.types.Scene) -> Path:
     """Return the path of the reference render for the current frame of a scene.
 
-    In the path that the user has chosen, a run of ``#`` is replaced by the frame number, padded with zeros to its length.
+    In the path that the user has chosen, a run of ``#`` is replaced by the frame number, padded with zeros to
+    its length.
 
     Raises
     ------
@@ -322,7 +324,8 @@ def load_reference(
     Raises
     ------
     RosyError
-        If no file is chosen, the file cannot be read, or the picture does not have the aspect ratio of renders.
+        If no file is chosen, the file cannot be read, or the picture does not have the aspect ratio of
+        renders.
     """
     if look.tone != "picture":
         return None

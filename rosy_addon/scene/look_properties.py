@@ -53,7 +53,10 @@ def matches_look(settings: Any, look: Look) -> bool:
 
 
 def _is_equal(one: Any, other: Any) -> bool:
-    """Return whether two values of a setting are equal. Case of text, and small rounding errors, are ignored."""
+    """Return whether two values of a setting are equal.
+
+    Case of text, and small rounding errors, are ignored.
+    """
     if isinstance(one, str):
         return one == other.lower()
     if isinstance(one, tuple):

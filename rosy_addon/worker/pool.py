@@ -1,4 +1,4 @@
-"""`Pool`: helper processes that share the strips of a large picture."""
+"""`Pool`: helper processes that share function calls, such as drawing the strips of a large picture."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from typing import Any
 from ..core.progress import current_report, listening
 from .helper import Helper, HelperLostError
 
-#: Environment of the helpers. Each has one core.
+#: Environment variables of the helper processes, with which numpy uses one core in each.
 ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
-#: Seconds between two polls of helpers that send nothing.
+#: Longest wait for messages of helper processes, in seconds. Progress is reported after each wait.
 WAIT_SECONDS = 0.5
 
 
@@ -27,7 +27,7 @@ def core_count() -> int:
 
 
 class Pool:
-    """Helper processes, which are started when they are first needed and reused for later calls.
+    """A pool of helper processes. They are started when they are first needed, and reused later.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Pool:
     ) -> list[Any]:
         """Call a function with each of several tuples of arguments, in several processes.
 
-        This process is one of them, and makes the calls of helpers that are lost.
+        This process is one of them. If a helper process is lost, another process repeats its call.
 
         Parameters
         ----------
@@ -54,9 +54,10 @@ class Pool:
             A function of a module that needs no Blender; see `Helper.submit`.
         arguments : sequence of tuple
         count : int
-            Number of processes; 0 is one for each core.
+            Number of processes. 0 means one per processor core.
         function_here : function, optional
-            Called in this process instead, such as the same with a cache of the caller.
+            Function for the calls in this process, such as the same one with a cache of the caller. By
+            default `function`.
 
         Returns
         -------
@@ -70,14 +71,14 @@ class Pool:
         return _SharedCalls(helpers, function, arguments, function_here or function).make()
 
     def close(self) -> None:
-        """End all helpers."""
+        """End all helper processes."""
         for helper in self.helpers:
             helper.close()
         self.helpers.clear()
 
 
 class _SharedCalls:
-    """Calls that are shared between this process and some helpers."""
+    """Function calls that are shared between this process and some helper processes."""
 
     def __init__(
         self,
@@ -89,7 +90,7 @@ class _SharedCalls:
         self._function, self._arguments = function, arguments
         self._function_here = function_here
         self._results: list[Any] = [None] * len(arguments)
-        #: Numbers of the calls that have not started, and the number of the call of each busy helper.
+        #: Indices of the calls that have not started, and the index of the call of each busy helper process.
         self._waiting = deque(range(len(arguments)))
         self._given: dict[Helper, int] = {}
         self._free = list(helpers)
@@ -114,13 +115,19 @@ class _SharedCalls:
         return self._results
 
     def _hear(self, fraction: float, label: str) -> None:
-        """Report the progress of this process, and serve the helpers."""
+        """Report the total progress, and attend to the helper processes.
+
+        Called when this process reports its own.
+        """
         self._attend_to_helpers()
         done = len(self._arguments) - len(self._waiting) - len(self._given) - 1
         self._report((done + fraction) / len(self._arguments), label)
 
     def _attend_to_helpers(self) -> None:
-        """Take results of helpers and give them waiting calls. The calls of lost helpers wait again."""
+        """Receive results of helper processes, and give free ones waiting calls.
+
+        Calls of lost helpers wait again.
+        """
         for helper, number in list(self._given.items()):
             try:
                 outcome = helper.poll()
@@ -138,5 +145,5 @@ class _SharedCalls:
                 self._given[helper] = self._waiting.popleft()
 
 
-#: The helpers of this process.
+#: The pool of helper processes of this process.
 POOL = Pool()

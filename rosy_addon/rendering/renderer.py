@@ -79,7 +79,7 @@ class ViewportRenderer(Protocol):
         Parameters
         ----------
         texture : texture or None
-            Result of `texture_steps`, of any size. Nothing is drawn for None.
+            Result of `texture_steps`. Its size may differ from that of the 3D view.
         items : sequence
             The draw items of the picture.
         view : ViewInput

@@ -34,10 +34,8 @@ from .timing import peer
 SIZES = ("512x512", "1920x1080", "3840x2160")
 
 #: Milliseconds per frame by degree in Table 1 of the paper (Palacios and Zhang 2011), for its member
-#: decomposition
-#: with 512 x 512 pixels and 12K triangles on `PAPER_CARD`. The paper draws other objects, and does not state
-#: how
-#: much of the picture they cover. Here the ball covers 85 %.
+#: decomposition with 512 x 512 pixels and 12K triangles on `PAPER_CARD`. The paper draws other objects, and
+#: does not state how much of the picture they cover. Here the ball covers 85 %.
 PAPER_MILLISECONDS = {2: 17, 3: 46, 4: 32, 6: 46}
 PAPER_CARD = "NVIDIA GeForce 8600 GTS"
 

@@ -39,8 +39,7 @@ CASES: dict[str, tuple[int, int, dict[str, object]]] = {
 }
 
 #: Pictures whose memory is compared with its estimate: preset, degree N, thousands of triangles, and other
-#: settings.
-#: The names begin with the size.
+#: settings. The names begin with the size.
 ESTIMATED: dict[str, tuple[str, int, int, dict[str, object]]] = {
     **{
         f"{size}, {preset}": (preset, 4, 12, {})

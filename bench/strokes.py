@@ -20,8 +20,7 @@ from .timing import Bench, main
 DEGREE = 4
 
 #: Spacing of strokes in world space, and their maximum length as a multiple of it, as for hatching. They give
-#: about
-#: 20,000 strokes.
+#: about 20,000 strokes.
 SPACING, MAX_LENGTH = 0.0102, 12.0
 
 #: Maximum time of tracing in seconds.
@@ -29,7 +28,7 @@ MAX_SECONDS = 30.0
 
 
 def measure(bench: Bench) -> None:
-    """Time tracing relative to the smoothest field, and drawing without hidden strokes relative to with them."""
+    """Time tracing relative to the smoothest field, and drawing without and with hidden strokes."""
     surface = cases.ball(200_000)
     instance = MeshInstance(surface, np.eye(4), smoothest_field(surface, DEGREE))
     rules = SeparationRules(max_length=MAX_LENGTH)

@@ -21,8 +21,7 @@ DEGREE = 4
 LOOK = replace(cases.LOOK, length=20)
 
 #: Side of the large picture in pixels, and texts about its size by the samples along each side of a pixel.
-#: VTK always
-#: has one sample per pixel.
+#: VTK always has one sample per pixel.
 LARGE_SIZE = 1080
 SAMPLES_LABEL = {1: "", 2: ", 1080 x 1080, 2 x 2 samples a pixel"}
 

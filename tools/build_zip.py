@@ -18,8 +18,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 
 #: Modification time of all files in the zip, in seconds since 1970. The files in the wheel have the same
-#: time. The
-#: environment variable SOURCE_DATE_EPOCH sets another one for both.
+#: time. The environment variable SOURCE_DATE_EPOCH sets another one for both.
 DEFAULT_TIME = 1580601600
 
 #: Permissions of all files in the zip: a regular file that its owner can write.

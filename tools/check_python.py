@@ -10,8 +10,7 @@ from pathlib import Path
 OLDEST_VERSION = (3, 11)
 
 #: Versions of Python by the first version of Blender's module (bpy) that needs them, newest first. PyPI has
-#: each
-#: version of bpy for only one version of Python.
+#: each version of bpy for only one version of Python.
 BPY_VERSIONS = {(5, 1): (3, 13), (4, 2): (3, 11)}
 
 

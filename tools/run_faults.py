@@ -24,8 +24,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 
 #: The environment whose Python runs the tests of each lane. Those of lane "blender" build a zip and run it in
-#: a full
-#: Blender.
+#: a full Blender.
 PYTHON = {"unit": ".venv", "bpy42": ".venv-bpy42", "blender": ".venv-bpy42"}
 
 #: Seconds after which the tests of a fault are stopped; the fault then counts as missed.

@@ -135,8 +135,7 @@ def bake_animation(
     sequences: dict[str, list[_Frame]] = {}
     scene_data, warnings = None, {}
     # The temporary attributes are added once. To add them for each frame would take two more evaluations of
-    # the
-    # scene: up to half of the time of reading.
+    # the scene: up to half of the time of reading.
     attributes = temp_attributes(depsgraph, targets, nonfinite_policy(scene), cache, {})
     with _restored_frame(scene), attributes:
         for index, frame in enumerate(frames):

@@ -22,10 +22,8 @@ from ..projection.gbuffer import MeshInstance
 from .view_input import ViewInput
 
 #: Length of an arrowhead, relative to the least distance between positions with arrowheads. At a position
-#: there is
-#: one arrowhead per direction. With up to five directions, they and their outlines reach 1.75 lengths from
-#: it. So
-#: half a length stays free between the arrowheads of neighboring positions.
+#: there is one arrowhead per direction. With up to five directions, they and their outlines reach 1.75
+#: lengths from it. So half a length stays free between the arrowheads of neighboring positions.
 ARROW_LENGTH = 0.25
 
 #: Least length of an arrowhead in pixels. In a smaller one, the outline would cover the whole fill.

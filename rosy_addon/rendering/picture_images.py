@@ -12,8 +12,8 @@ from .draw import bake_picture
 from .view_input import ViewInput
 
 #: Number of pixels by which colors are extended past the border of the covered area. The silhouette in a
-#: render may
-#: differ slightly (other subdivision, filtering). There the render then still shows colors of the picture.
+#: render may differ slightly (other subdivision, filtering). There the render then still shows colors of the
+#: picture.
 BLEED_PIXELS = 4
 
 #: Number of rows of pixels that are converted at once.

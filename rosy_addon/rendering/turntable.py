@@ -40,8 +40,7 @@ Encoder = Callable[[Path, int, tuple[int, int], float, Path], None]
 NO_ENCODER = "an .mp4 needs ffmpeg or Blender; a .gif needs neither"
 
 #: Memory per pixel of all pictures of a .gif, in bytes: 3 for colors, which are kept until the end, and an
-#: estimate of
-#: the compressed data.
+#: estimate of the compressed data.
 GIF_BYTES = 4.5
 
 #: Number of points on each circle of `_swept_hull`.

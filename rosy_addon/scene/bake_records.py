@@ -386,7 +386,7 @@ def _reached_objects(scene: bpy.types.Scene) -> set[bpy.types.Object]:
 
 
 def remove_bakes(scene: bpy.types.Scene) -> RemovalCounts:
-    """Remove baked pictures, their backdrops and their keys from a scene. Fields and saved files are kept."""
+    """Remove baked pictures, backdrops and keys (legends) from a scene. Fields and saved files are kept."""
     objects = baked_objects(scene)
     with _object_mode(objects):
         for obj in objects:
@@ -401,7 +401,7 @@ def remove_bakes(scene: bpy.types.Scene) -> RemovalCounts:
 
 
 def _clean_unused_meshes() -> None:
-    """Remove applied pictures from meshes that no object uses: such a mesh keeps the materials in use."""
+    """Remove applied pictures from meshes that no object uses, as the meshes would keep the materials."""
     used_data = {obj.data for obj in bpy.data.objects}
     for mesh in bpy.data.meshes:
         if mesh not in used_data:

@@ -19,8 +19,7 @@ from .meshes import evaluated_mesh, vertex_positions
 from .singularity_points import mesh_of_own_vertices
 
 #: Largest number of faces on which dashes are drawn. Length of a dash, relative to the square root of twice
-#: the
-#: area of the first triangle of its face.
+#: the area of the first triangle of its face.
 MAX_DASH_FACES, DASH_LENGTH = 1500, 0.7
 
 #: Finds the (n,) faces closest to (n, 3) points.
@@ -76,8 +75,7 @@ class BrushSurface:
             location, _, index, _ = self._shown_tree.find_nearest(location)
             triangle = np.array([index])
         # Of the triangles of the face, choose the one whose smallest barycentric coordinate is largest: the
-        # point
-        # lies in it.
+        # point lies in it.
         weights = [
             _barycentric(self._shown[vertex[index]], np.array(location)) for index in triangle
         ]

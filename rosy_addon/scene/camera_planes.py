@@ -86,7 +86,7 @@ def add_camera_plane(
         Corners of the plane in camera space, counter-clockwise.
     material : bpy.types.Material
     created : list of bpy.types.ID
-        Gets the new datablocks; see `datablocks.rollback_on_error`.
+        The new datablocks are appended; see `datablocks.rollback_on_error`.
     """
     mesh = bpy.data.meshes.new(name)
     created.append(mesh)
@@ -145,8 +145,8 @@ OVERSIZE = 1.5
 def update_backdrops(scene: bpy.types.Scene) -> None:
     """Replace the backdrops of a scene by the ones that its settings ask for.
 
-    If backdrops are switched on and the look draws lines on paper, every camera with a picture gets a
-    backdrop in the color of the paper. For an animation, the active camera of the scene gets one.
+    If backdrops are switched on and the look is hatching (lines of ink on paper), a backdrop in the color of
+    the paper is added for each of `pictured_cameras`.
     """
     remove_camera_planes(scene, BACKDROP_TAG)
     look = read_look(scene.rosy)

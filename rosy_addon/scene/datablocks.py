@@ -18,8 +18,7 @@ from ..core.errors import RosyError
 OWNED_TAG = "rosy_made"
 
 #: Custom property on node groups that move strokes with a surface. Their modifiers are removed with the
-#: strokes,
-#: not with the pictures.
+#: strokes, not with the pictures.
 STROKES_TAG = "rosy_surface_strokes"
 
 #: Custom property on the objects and materials of keys (legends). Their images are not pictures of a field.

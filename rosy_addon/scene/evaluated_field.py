@@ -36,8 +36,7 @@ from .mesh_fields import read_mesh_field
 from .meshes import mesh_surface, read_attribute
 
 #: Attribute that exists only while a scene is read: the normal of each original face, to which the vectors of
-#: the
-#: field are perpendicular. Modifiers copy it to the evaluated mesh.
+#: the field are perpendicular. Modifiers copy it to the evaluated mesh.
 FACE_NORMAL_ATTRIBUTE = "rosy_face_normal"
 
 #: Attribute that exists only while a scene is read: the field as vectors on faces, if it is stored in another
@@ -194,9 +193,9 @@ def temp_attributes(
 ) -> Iterator[dict[bpy.types.Object, FieldLayout]]:
     """Context manager: add temporary attributes, which modifiers copy to evaluated meshes.
 
-    Remove them at exit.
-    The attributes are the rest positions, the normals of the original faces, and the fields as vectors on
-    faces if they are stored in another form. All fields are checked on the original meshes.
+    They are removed at the end of the block. The attributes are the rest positions, the normals of the
+    original faces, and the fields as vectors on faces if they are stored in another form. All fields are
+    checked on the original meshes.
 
     Inside another such context with the same objects, nothing is added again. Around many calls of
     `read_scene`, keep one context open.

@@ -168,8 +168,7 @@ def surface_key(surface: Surface, *key_parts: object) -> Hashable:
 
 
 #: Coefficients of the checksum of a vector, which is a linear combination of its components. As it is linear,
-#: it
-#: stays right when Blender interpolates attributes.
+#: it stays right when Blender interpolates attributes.
 CHECK_COEFFICIENTS = np.array([1.0, 1.618034, 2.718282])
 
 #: Largest difference between the checksum of an unchanged vector and the stored one, relative to the largest

@@ -56,8 +56,7 @@ def _one_line(error: RuntimeError) -> str:
 
 
 #: Largest number of bytes of the stem of a file name. File systems allow 255 for the whole name, which also
-#: has a
-#: hash, a frame number and suffixes.
+#: has a hash, a frame number and suffixes.
 MAX_STEM_BYTES = 180
 
 #: Kinds of pictures whose file names do not mention the kind.

@@ -41,8 +41,7 @@ from .field_attributes import (
 from .meshes import flush_edit_mode, mesh_label, mesh_surface, read_attribute
 
 #: Largest angle between a vector on a face corner and the plane of the face, in degrees. It is large because
-#: such
-#: vectors may be tangent to the smooth surface rather than to the face.
+#: such vectors may be tangent to the smooth surface rather than to the face.
 CORNER_TOLERANCE_DEGREES = 30.0
 
 

@@ -26,8 +26,7 @@ MODIFIER_NAME = "RoSy"
 CLIP_ATTRIBUTE = "rosy_projection"
 
 #: Name of a face attribute: the material index of each face before the modifier. It is restored if the user
-#: applies
-#: the modifier and then removes the picture.
+#: applies the modifier and then removes the picture.
 MATERIAL_ATTRIBUTE = "rosy_material"
 
 _OUTSIDE_COLOR = (NEUTRAL_GRAY, NEUTRAL_GRAY, NEUTRAL_GRAY, 1.0)
@@ -279,8 +278,7 @@ def remove_applied_picture(data: bpy.types.ID | None) -> None:
             data.materials.pop(index=index)
     if not getattr(data, "materials", True):
         # After `pop` of the last material, objects still have an empty slot, and Blender (4.3, 5.2) crashes
-        # when
-        # another object is joined to them.
+        # when another object is joined to them.
         data.materials.clear()
     for name in _applied_attributes(data):
         data.attributes.remove(data.attributes[name])

@@ -51,8 +51,7 @@ from .visible_objects import Instances, field_objects, rendered_instances
 _INSTANCES_KEY = "instances of the last reading"
 
 #: Number of calls of `SceneReader.resolve_topologies` in a row after which an object that still needs one is
-#: given
-#: up: its modifiers make other faces at each evaluation.
+#: given up: its modifiers make other faces at each evaluation.
 MAX_ATTEMPTS = 4
 
 
@@ -216,8 +215,7 @@ class SceneReader:
         self._deadline = math.inf
         self._has_read_any = False
         # Keys: the full name of the object, the pointer of its mesh, `tone_image_key`, and whether its field
-        # is
-        # drawn. None: the mesh has no faces.
+        # is drawn. None: the mesh has no faces.
         self._meshes: dict[tuple, _MeshData | None] = {}
         # The results of `resolve_topologies`. An error is kept until its object changes.
         self._topologies: dict[_TopologyKey, _Topology | Exception] = {}

@@ -12,8 +12,7 @@ import bpy
 from .picture_state import MeshStates, PictureState, SceneState, settings_key
 
 #: Least time between two readings of a scene, as a multiple of the time that a reading takes. So panels spend
-#: at
-#: most a tenth of the time on readings, and playback and sculpting stay fluent.
+#: at most a tenth of the time on readings, and playback and sculpting stay fluent.
 TTL_READINGS = 10.0
 
 #: Names of the lists in `bpy.app.handlers` whose handlers Blender calls when objects may have changed.

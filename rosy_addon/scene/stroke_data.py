@@ -51,8 +51,7 @@ def new_curves(
     set_attribute(data, "radius", "FLOAT", "POINT", geometry.radius)
     set_attribute(data, "curve_type", "INT8", "CURVE", np.full(len(strokes), POLY_CURVE_TYPE))
     # Blender caches the number of curves of each type when curves are added. With outdated counts it writes
-    # past
-    # the end of its arrays. To add no curves updates the counts.
+    # past the end of its arrays. To add no curves updates the counts.
     data.add_curves([])
     set_attribute(data, "family", "INT", "CURVE", strokes.family)
     set_attribute(data, "object", "INT", "CURVE", geometry.instance_index)
@@ -83,8 +82,7 @@ def set_attribute(data: Any, name: str, data_type: str, domain: str, values: np.
 OUTLINE_LAYER = "Outline"
 
 #: Before Blender 4.3, a stroke of Grease Pencil has an integer line width. First: the line width of a radius
-#: of
-#: one Blender unit. Second: the largest line width.
+#: of one Blender unit. Second: the largest line width.
 LEGACY_WIDTH_PER_UNIT = 2000
 MAX_LEGACY_WIDTH = 1000
 

@@ -260,9 +260,7 @@ def _digest_parts(data: bpy.types.ID) -> list[object]:
 def _attribute_parts(attributes: Any, offsets: Any) -> list[object]:
     """Return the values of `STROKE_ATTRIBUTES`, and the index of the first point of each stroke."""
     position = attributes.get("position")
-    if position is None or not len(
-        position.data
-    ):  # Blender cannot read the offsets of an empty drawing
+    if position is None or not len(position.data):  # the offsets of an empty drawing are unreadable
         return []
     parts: list[object] = [read_collection(offsets, "value", np.float32)]
     for name in STROKE_ATTRIBUTES:

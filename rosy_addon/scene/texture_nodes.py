@@ -90,15 +90,13 @@ def hatching_shader(
     """
     look, image_color = hatching.look, image_node.outputs["Color"]
     # This node has no visible effect. Blender's glTF exporter takes the color of the first emission node that
-    # it
-    # finds, and follows all links to it. Through the node group of hatching that would take long.
+    # it finds, and follows all links to it. Through the node group of hatching that would take long.
     exported = build("ShaderNodeEmission", {"Color": image_color}, label="For Exporters")
     white = build("ShaderNodeBsdfDiffuse", {"Color": (1.0, 1.0, 1.0, 1.0)})
     light = build("ShaderNodeShaderToRGB", {"Shader": white.outputs["BSDF"]})
     luminance = build("ShaderNodeRGBToBW", {"Color": light.outputs["Color"]})
     # The factor of the mix is the alpha of the light. It is 1 in EEVEE. Cycles ignores the node of the light
-    # and
-    # takes the value of the unconnected socket, which is 0.
+    # and takes the value of the unconnected socket, which is 0.
     occlusion = build("ShaderNodeAmbientOcclusion")
     tone = build.mix("FLOAT", 0.0, occlusion.outputs["AO"], luminance.outputs["Val"])
     build.connect(light.outputs["Alpha"], tone.node.inputs["Factor"])
@@ -138,8 +136,7 @@ def brushed_metal_shader(
     tangent = build("ShaderNodeTangent", direction_type="UV_MAP", uv_map=uv_map).outputs["Tangent"]
     angle = build.math("ARCTAN2", _along_bitangent(build, decoded, tangent, uv_map), x)
     # The shader stretches highlights along its tangent. On brushed metal they stretch across the strokes of
-    # the
-    # brush, hence the quarter turn.
+    # the brush, hence the quarter turn.
     rotation = build.math("ADD", angle, np.pi / 2)
     rotation.node.label = "Rotation"
     strength = build.math("MULTIPLY", length, ANISOTROPY)

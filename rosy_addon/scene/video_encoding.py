@@ -39,9 +39,7 @@ def encode_video(folder: Path, count: int, size: tuple[int, int], fps: float, pa
         strips = editor.strips if hasattr(editor, "strips") else editor.sequences
         strip = strips.new_image("video", str(folder / "00000.png"), channel=1, frame_start=1)
         for index in range(1, count):
-            strip.elements.append(
-                f"{index:05d}.png"
-            )  # each element makes the strip one frame longer
+            strip.elements.append(f"{index:05d}.png")  # this makes the strip a frame longer
         render = scene.render
         render.resolution_x, render.resolution_y = size
         render.resolution_percentage = 100

@@ -36,8 +36,7 @@ def field_objects(
 
 
 #: Iterator over instances of meshes, each with whether its field is drawn. An instance is valid until the
-#: next one
-#: is taken.
+#: next one is taken.
 Instances = Iterator[tuple[bpy.types.DepsgraphObjectInstance, bool]]
 
 

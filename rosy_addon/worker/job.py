@@ -59,8 +59,7 @@ class Step(NamedTuple):
 
 
 #: A running job: a generator that yields calls and pauses, and to which the results of calls are sent. To
-#: close the
-#: generator cancels the job.
+#: close the generator cancels the job.
 Steps = Generator[Call | Step, Any, Result]
 
 

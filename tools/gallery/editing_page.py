@@ -45,8 +45,7 @@ STROKES = (
 RADIUS = 0.14
 
 #: Positions of singularities on a torus, as fractions of the picture from the top left, and their indices in
-#: units of
-#: 1/4.
+#: units of 1/4.
 RING_PLACES = ((0.20, 0.58), (0.38, 0.68), (0.64, 0.66), (0.80, 0.55))
 RING_INDEX = (1, -1, 1, -1)
 

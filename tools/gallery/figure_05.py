@@ -18,8 +18,7 @@ from .sheet import Panel, gray, inset, magnified, outlined
 DEGREE, SUPERSAMPLING = 3, 2
 
 #: Side of the square in which the field is drawn, and of the large and small pictures that are cut out of it,
-#: in
-#: pixels. So streamlines do not end at the borders of the pictures.
+#: in pixels. So streamlines do not end at the borders of the pictures.
 FIELD_SIZE, LARGE, SMALL = 480, 400, 256
 
 LOOK = enlarged(MEASURED, SUPERSAMPLING)

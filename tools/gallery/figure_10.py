@@ -14,8 +14,7 @@ from .plane import channel, compose_field, draw_field, singularity
 from .sheet import Panel, chart
 
 #: Sides of a picture and of the windows of a spectrum in pixels, number of seeds of the noise, and number of
-#: bins of a
-#: spectrum.
+#: bins of a spectrum.
 SIZE, SIDE, SEEDS, BINS = 400, 64, 2, 60
 
 

@@ -34,8 +34,7 @@ FOLDER = ROOT / "docs" / "listing"
 SIZE = (1920, 1080)
 
 #: Vertical bands of the featured picture, from the left: preset, color behind the model, and position of the
-#: right edge
-#: at half the height of the picture, as a fraction of its width.
+#: right edge at half the height of the picture, as a fraction of its width.
 BANDS = (
     ("engraving", "#f6efdf", 0.39),
     ("plaid", "#b4c3c9", 0.58),

@@ -15,8 +15,7 @@ from .plane import compose_field, points, singularity
 DRAWN, LOGO, FAVICON = 512, 128, 48
 
 #: Degree of the field, and index of its singularity in units of 1/4. The streaks are broad, to be legible in
-#: a
-#: favicon.
+#: a favicon.
 DEGREE, INDEX = 4, -1
 LOOK = Look(length=400, line_width=26.0, density=0.15, high_pass=70.0, gain=3.0, seed=2)
 

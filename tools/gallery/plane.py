@@ -12,8 +12,7 @@ from tests.harness.planar import PlanarPicture, compose_planar
 from .sheet import display
 
 #: A planar field of degree N: a function from points x + i y, in pixels from the center of the picture, to
-#: the N-th
-#: power z of a member as a complex number.
+#: the N-th power z of a member as a complex number.
 PlanarField = Callable[[np.ndarray], np.ndarray]
 
 

@@ -11,8 +11,7 @@ from rosy_addon.preset_files.store import preset_files, preview_path, read_prese
 from .sheet import display
 
 #: Numbers of palette colors: for pictures in tones of one hue, with colors for the magnitude, and with noise
-#: of many
-#: hues. At the size of previews the palettes are not visible. They reduce the files to a quarter.
+#: of many hues. At the size of previews the palettes are not visible. They reduce the files to a quarter.
 TONES, MAGNITUDE_COLORS, NOISE_COLORS = 16, 32, 64
 
 

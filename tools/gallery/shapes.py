@@ -48,8 +48,7 @@ def knot(tube: float = 0.34, around: int = 384, across: int = 36) -> Surface:
     curve, tangent = _trefoil(t), _trefoil(t + 1e-4) - _trefoil(t - 1e-4)
     tangent /= np.linalg.norm(tangent, axis=1)[:, None]
     # The knot winds around a torus. The normal of the torus is never parallel to the knot, so it spans a
-    # frame
-    # with it.
+    # frame with it.
     torus_center = np.stack([np.cos(2 * t), np.sin(2 * t), 0 * t], axis=1) * 2
     outward = curve - torus_center
     outward -= np.sum(outward * tangent, axis=1)[:, None] * tangent

@@ -39,8 +39,7 @@ LOG, STATUS = "log.txt", "status.txt"
 INPUT, INPUTS = r"@([\w.-]+)", "inputs"
 
 #: Environments in which cases run: `numpy` is plain Python, `bpy` is Blender's Python module, `card` is a
-#: full
-#: Blender with a graphics card.
+#: full Blender with a graphics card.
 LANES = ("numpy", "bpy", "card")
 
 

@@ -19,14 +19,12 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 #: Attributes of tags with an address that is loaded with the page. The address of a `link` tag is loaded only
-#: for
-#: the relations below.
+#: for the relations below.
 LOADED = {"src", "srcset", "poster", "data", "background"}
 LOADED_RELATIONS = {"stylesheet", "icon", "preload", "modulepreload", "preconnect", "dns-prefetch"}
 
 #: Addresses in the scripts of the theme that are allowed: some are only names, others are loaded only for
-#: pages with
-#: a diagram or a repository, or in old browsers.
+#: pages with a diagram or a repository, or in old browsers.
 DORMANT_IN_SCRIPTS = re.compile(
     r"http://www\.w3\.org/|https://(clipboardjs\.com|unpkg\.com/(mermaid|resize-observer-polyfill)"
     r"|api\.github\.com|bit\.ly/2s3ChXG|\$\{e\}/api/v4|github\.com/squidfunk|squidfunk\.github\.io)"

@@ -20,8 +20,8 @@ from ..worker.job import Call, Steps
 class CombStroke:
     """A brush stroke that combs the field of a mesh while the user draws it.
 
-    The stroke adds guides, which are directions that the field has to follow. After each extension the field
-    near the stroke is solved again, and can be shown; `settle` solves it everywhere.
+    The stroke changes guides, which are directions that the field has to follow. After each extension the
+    field near the stroke is computed again, and can be shown. `settle` computes it everywhere.
 
     Parameters
     ----------

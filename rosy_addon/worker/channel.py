@@ -56,10 +56,7 @@ class Channel:
         self._message: tuple[list[int], bytes, list[np.ndarray]] | None = None
 
     def poll(self, timeout: float = 0.0) -> bool:
-        """Wait up to `timeout` seconds.
-
-        Return whether there is a message to receive or the connection has ended.
-        """
+        """Return whether a message arrives, or the connection ends, within `timeout` seconds."""
         return self.connection.poll(timeout)
 
     def has_received(self, seconds: float) -> bool:

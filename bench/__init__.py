@@ -1,4 +1,4 @@
-"""Benchmarks, each a script: ``python -m bench.NAME``. `bench/run.py` runs all of them."""
+"""Benchmarks. Each module is a script: ``python -m bench.NAME``. `bench/run.py` runs all of them."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Time of a bake in Blender after a change of one setting of the look, relative to a first bake."""
+"""Measure how long a bake in Blender takes after a change of one setting, relative to a first bake."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 from . import cases
 from .timing import Bench, main, peer
 
-#: Settings that a user changes, with the two values between which each alternates.
+#: Settings that are changed, each with the two values between which it alternates.
 CHANGES: dict[str, tuple[object, ...]] = {
     "gain": (3.0, 3.5),
     "shading": (0.5, 0.6),
@@ -24,8 +24,8 @@ CHANGES: dict[str, tuple[object, ...]] = {
 
 
 def measure(bench: Bench) -> None:
-    """Time bakes of the ball as a mesh of Blender."""
-    peer("mathutils")  # of Blender
+    """Time first and later bakes of the ball (`cases.ball`) in Blender."""
+    peer("mathutils")  # there only with Blender
     from rosy_addon.core.cache import BAKE_CACHE
     from rosy_addon.jobs.bake import bake
 

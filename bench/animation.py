@@ -1,4 +1,4 @@
-"""Time of an animation of the command line with one process, relative to two."""
+"""Measure how long the command line takes for an animation with one process, relative to two processes."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ import numpy as np
 from . import cases
 from .timing import Bench, main, peer
 
-#: Triangles of the ball, and frames of 640 x 480 pixels that the processes share.
+#: Number of triangles of the ball, and number of frames of 640 x 480 pixels.
 TRIANGLES, FRAMES = 50_000, 80
 
 
 def measure(bench: Bench) -> None:
-    """Time the frames of a ball that changes its shape, with all that a command does."""
-    peer("mathutils")  # of Blender
+    """Time the whole command, with its start, for frames of a ball that changes its shape."""
+    peer("mathutils")  # there only with Blender
     import bpy
 
     scene = cases.ball_scene(TRIANGLES)

@@ -1,4 +1,4 @@
-"""Test cases: a planar field with singularities, and bumpy spheres of any number of triangles."""
+"""Inputs of benchmarks: a planar field with singularities, and surfaces with any number of triangles."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from rosy_addon.projection.camera import Camera, look_at, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 
-#: Side of the frame in Table 1 of the paper, in pixels.
+#: Side of the picture in Table 1 of the paper (Palacios and Zhang 2011), in pixels.
 SIZE = 512
 
-#: The settings of the original program: 40 steps in each direction, noise cells of 1.5 pixels.
+#: Settings of the paper's program: streamlines of 40 steps in each direction, noise cells of 1.5 pixels.
 LOOK = Look(length=40, line_width=1.5)
 
 
@@ -38,7 +38,7 @@ def plane(degree: int, size: int = SIZE) -> tuple[PixelField, np.ndarray]:
 
 
 def compose_lic(method: str, degree: int, look: Look = LOOK, size: int = SIZE) -> None:
-    """Run the LIC stage: from a planar field and noise to the images of its members."""
+    """Run the LIC stage alone: compute the LIC images of the members of the field of `plane`."""
     field, noise = plane(degree, size)
     lic(field, replace(look, method=method), noise)
 
@@ -69,7 +69,7 @@ def torus(triangles: int, tube: float = 0.45) -> Surface:
 
 
 def _surface(name: str, point: np.ndarray) -> Surface:
-    """Return a surface of triangles between rings of points, from top to bottom."""
+    """Return a triangulated surface through (R, C, 3) points: R rings of C points, from top to bottom."""
     rows, columns = point.shape[0] - 1, point.shape[1]
     upper_left = np.arange(rows)[:, None] * columns + np.arange(columns)
     upper_right = np.roll(upper_left, -1, axis=1)
@@ -83,28 +83,28 @@ def _surface(name: str, point: np.ndarray) -> Surface:
     return build_surface(points, corners.ravel(), starts, name=f"{name} {len(corners)}")
 
 
-#: Cache of corner fields, which frames reuse when only the camera has moved.
+#: Cache of fields that are averaged at corners. Frames in which only the camera has moved reuse them.
 CORNER_FIELDS = Cache()
 
 
 @lru_cache(maxsize=16)
 def instance(triangles: int, degree: int) -> MeshInstance:
-    """Return the ball with a field."""
+    """Return the ball with a field of a degree."""
     surface = ball(triangles)
     return MeshInstance(surface, np.eye(4), axis_field(surface, degree, (0.3, 0.2, 1.0)))
 
 
 def camera(width: int = SIZE, height: int | None = None, azimuth: float = 0.0) -> Camera:
-    """Return a camera in whose square frame the ball covers 85 %."""
+    """Return a camera at which the ball covers 85 % of a square picture."""
     eye = 2.33 * np.array([np.sin(azimuth), -np.cos(azimuth), 0.35])
     view = look_at(eye, (0, 0, 0), (0, 0, 1))
     return perspective_camera(view, width, width if height is None else height, fov=0.8)
 
 
 def first_frame(triangles: int, degree: int, look: Look = LOOK, size: int = SIZE) -> np.ndarray:
-    """Draw a mesh for the first time, including the work that does not depend on the camera."""
+    """Draw the ball as if for the first time, including the work that does not depend on the camera."""
     cached = instance(triangles, degree)
-    # A copy without cached results.
+    # A copy of the surface has no cached results.
     gbuffer = project([replace(cached, surface=replace(cached.surface))], camera(size))
     return compose(gbuffer, look).rgba
 
@@ -112,7 +112,7 @@ def first_frame(triangles: int, degree: int, look: Look = LOOK, size: int = SIZE
 def frame(
     triangles: int, degree: int, look: Look = LOOK, size: int = SIZE, azimuth: float = 0.0
 ) -> np.ndarray:
-    """Draw a mesh with a field: the work after the camera has moved."""
+    """Draw the ball again, with only the work that is necessary after the camera has moved."""
     eye = camera(size, azimuth=azimuth)
     instances = [instance(triangles, degree)]
     gbuffer = project(instances, eye, look.display, CORNER_FIELDS, look.supersampling)
@@ -120,7 +120,7 @@ def frame(
 
 
 def ball_scene(triangles: int) -> object:
-    """Open a scene of Blender that contains only the ball, with a field of degree 4, and return it."""
+    """Open a new file of Blender with only the ball and its field of degree 4. Return the scene."""
     import bpy
 
     from rosy_addon.scene.mesh_fields import write_mesh_field

@@ -1,4 +1,4 @@
-"""Time of the smoothest field relative to SciPy's sparse LU, and how it grows with the mesh."""
+"""Measure how long the smoothest field takes, relative to SciPy's sparse LU and to other mesh sizes."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from .timing import Bench, main, peer
 
 DEGREE = 4
 
-#: Steps of inverse iteration, enough for the energy to converge to a thousandth.
+#: Steps of inverse iteration with SciPy, enough for the energy to converge to a thousandth.
 ITERATIONS = 20
 
 
 def measure(bench: Bench) -> None:
-    """Time both solvers, starting from the same connection of the mesh."""
+    """Time both solvers, which start from the same discrete connection of the mesh."""
     sparse, linalg = peer("scipy.sparse"), peer("scipy.sparse.linalg")
     connection = build_connection(cases.ball(200_000))
     rosy = laplacian(connection, DEGREE)

@@ -1,9 +1,9 @@
-"""Times of the shaders on this graphics card in milliseconds, next to those of the paper.
+"""Measure how long the shaders take on this graphics card, in milliseconds, next to the times in the paper.
 
-A frame is the work after the camera has moved: from triangles and fields on the card to the picture
-on the card. Nothing is uploaded or read back, and a frame ends when the card is done. The card's own
-time is that between its first and its last command, by its timer. It contains that of Python, which sends
-the commands, only where the card waits for them. Needs numpy, moderngl and a driver with EGL, but neither
+A frame is the work after the camera has moved: from triangles and fields on the card to the picture on the
+card. Nothing is uploaded or read back, and a frame ends when the card is done. The time of the card itself
+runs from its first to its last command, measured by its own timer. Python sends the commands; its time only
+counts while the card waits for them. This script needs numpy, moderngl and a driver with EGL, but neither
 Blender nor a display.
 """
 
@@ -33,18 +33,18 @@ from .timing import peer
 
 SIZES = ("512x512", "1920x1080", "3840x2160")
 
-#: Milliseconds by degree in Table 1 of the paper: its decomposition, 512 x 512 pixels and 12K
-#: triangles, on `PAPER_CARD`. Its objects are different, and it does not state how much of the frame
-#: they cover; here it is 85 %.
+#: Milliseconds per frame by degree in Table 1 of the paper (Palacios and Zhang 2011), for its member
+#: decomposition with 512 x 512 pixels and 12K triangles on `PAPER_CARD`. The paper draws other objects, and
+#: does not state how much of the picture they cover. Here the ball covers 85 %.
 PAPER_MILLISECONDS = {2: 17, 3: 46, 4: 32, 6: 46}
 PAPER_CARD = "NVIDIA GeForce 8600 GTS"
 
 TRIANGLES, DEGREE = 12_000, 4
 
-#: Number of frames of a median, and the maximum of their total time in seconds.
+#: Number of frames of which the median is taken, and maximum of their total time in seconds.
 FRAMES, SECONDS = 21, 6.0
 
-#: Seconds of drawing before the timing (at least one frame), to compile shaders and raise clocks.
+#: Seconds of drawing before the timing (at least one frame), so that shaders are compiled and clocks are up.
 WARM_UP = 1.0
 
 #: Rotation of the camera between frames, in radians.
@@ -52,7 +52,7 @@ AZIMUTH_STEP = 0.01
 
 
 def open_device() -> Any:
-    """Return a device; end the program and say so if none can be opened."""
+    """Return a device to draw on. If none can be opened, end the program with a message."""
     peer("moderngl")
     from harness.egl_device import EglDevice
 
@@ -71,14 +71,17 @@ def draw_texture(
     look: Any,
     drift: Drift = NO_DRIFT,
 ) -> Any:
-    """Draw a picture and leave it on the card."""
+    """Draw a picture without reading it back, and return its texture."""
     return run(renderer.texture_steps(items, ViewInput((), camera, look, drift=drift)))
 
 
 def frame_times(
     device: Any, size: tuple[int, int], degree: int, look: Look, frames: int
 ) -> np.ndarray:
-    """Return (F, 2) milliseconds of frames, and of the card itself; fewer if they take long."""
+    """Return (F, 2) milliseconds per frame: in total, and of the card itself.
+
+    F is `frames`, or less if the frames take long in total.
+    """
     renderer = GpuRenderer(device)
     items = renderer.upload([cases.instance(TRIANGLES, degree)], "smooth")
     number = 0
@@ -106,7 +109,7 @@ def frame_times(
 
 
 def looks(options: argparse.Namespace) -> Iterator[tuple[str, int, Look]]:
-    """Yield the name, the degree and the look of each row of a size."""
+    """Yield name, degree and look of each row of the table for one picture size."""
     if options.presets:
         for preset in preset_keys():
             for samples in (1, 2):

@@ -1,6 +1,6 @@
-"""Time of a frame of a cross field by the shaders, relative to VTK's surface LIC.
+"""Measure how long the shaders take for a frame of a cross field, relative to VTK's surface LIC.
 
-VTK draws one vector field. Both use the same driver (Mesa's llvmpipe if there is no graphics card)
+VTK draws only one vector field. Both use the same driver (Mesa's llvmpipe if there is no graphics card)
 with all cores, the same mesh, camera and coverage, and 41 samples per streamline. A frame is the work
 after the camera has moved, until the driver is done; neither picture is read back.
 """
@@ -20,7 +20,7 @@ from .timing import Bench, main
 
 
 def measure(bench: Bench) -> None:
-    """Time a small and a large mesh. Each has its own context: VTK makes that of its window current."""
+    """Time a small and a large mesh. RoSy and VTK have separate OpenGL contexts."""
     for triangles in (12_000, 200_000):
         draw_next, read_pixels, vtk_name = vtk_renderer(triangles)
         device = open_device()
@@ -35,7 +35,7 @@ def measure(bench: Bench) -> None:
         azimuths = iter(np.arange(1, 10_000) * AZIMUTH_STEP)
 
         def draw_frame(device=device, renderer=renderer, items=items, azimuths=azimuths) -> None:
-            # VTK makes its own context current in every frame.
+            # VTK has made its own context current in the frame before.
             with device.context:
                 draw_texture(renderer, items, cases.camera(azimuth=next(azimuths)), LOOK)
                 device.finish()

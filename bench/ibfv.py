@@ -1,6 +1,7 @@
-"""Time of image based flow visualization relative to streaks of the method sheets: pictures and frames.
+"""Measure how long the method "ibfv" (image based flow visualization) takes, relative to the method "sheets".
 
-A frame of an animation is one after others of the same mesh and camera, whose streaks drift.
+Both are timed for a single picture, and for a frame of an animation in which mesh and camera stay and the
+streaks drift.
 """
 
 from __future__ import annotations
@@ -34,12 +35,12 @@ def measure(bench: Bench) -> None:
 
 
 def _picture(gbuffer: GBuffer, method: str) -> Callable[[], object]:
-    """Return the work of a picture: from the G-buffer, with nothing in a cache."""
+    """Return a function that composes a picture from a G-buffer, without a cache."""
     return lambda: compose(gbuffer, replace(cases.LOOK, method=method))
 
 
 def _next_frame(gbuffer: GBuffer, method: str) -> Callable[[], object]:
-    """Return the work of a frame after others, in which streaks drift by a pixel."""
+    """Return a function that composes the next frame of an animation, with streaks a pixel further."""
     look, cache, numbers = replace(cases.LOOK, method=method, flow=1.0), Cache(), itertools.count()
 
     def draw() -> None:

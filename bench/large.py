@@ -1,4 +1,4 @@
-"""Pictures at the sizes people use: presets, and worker processes."""
+"""Measure pictures at the sizes that users draw: presets, sizes, and several processes."""
 
 from __future__ import annotations
 
@@ -16,20 +16,23 @@ from .timing import Bench, main
 
 DEGREE, TRIANGLES = 4, 12_000
 
-#: Keeps what does not depend on the camera.
+#: Cache of results that do not depend on the camera.
 CACHE = Cache()
 
 
 @lru_cache
 def view(preset: str, width: int, height: int, samples: int) -> ViewInput:
-    """Return the view of the ball, which covers 98 % of the picture."""
+    """Return the input for a picture of the ball with a preset.
+
+    `samples` of 0 is the preset's supersampling.
+    """
     look = load_preset(preset).look
     look = replace(look, supersampling=samples or look.supersampling)
     return ViewInput((cases.instance(TRIANGLES, DEGREE),), cases.camera(width, height), look)
 
 
 def draw(preset: str, width: int, height: int, *, workers: int = 1, samples: int = 0) -> None:
-    """Draw a picture after the camera has moved. Without `samples`, it has those of the preset."""
+    """Draw the ball with only the work that is necessary after the camera has moved; see `view`."""
     picture_view = view(preset, width, height, samples)
     draw_picture(picture_view, CACHE, keep_gbuffers=False, workers=workers)
 

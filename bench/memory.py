@@ -1,7 +1,8 @@
-"""Peak memory of pictures and meshes, each in its own process: relative to a limit, and to the bound.
+"""Measure the peak memory of pictures, each in its own process: relative to a limit, and to the estimate.
 
-The bound is compared with the resident memory that a picture takes beyond what the process holds
-when the drawing begins, up to the writing of the file.
+`picture_memory` estimates the memory of a picture before it is drawn. The estimate is compared with the
+resident memory that is taken from the beginning of the drawing up to the writing of the file, beyond what the
+process held before.
 """
 
 from __future__ import annotations
@@ -24,10 +25,11 @@ from .timing import Bench, main, peer
 
 ROOT = Path(__file__).resolve().parents[1]
 
-#: Allowed memory in gigabytes.
+#: Limit of the peak memory of `CASES`, in gigabytes.
 ALLOWED = 8.0
 
-#: Triangles, N, and settings of the look, of pictures whose peak is compared with the allowed memory.
+#: Pictures whose peak memory is compared with the limit: number of triangles, degree N, and settings of the
+#: look.
 CASES: dict[str, tuple[int, int, dict[str, object]]] = {
     "3840 x 2160, N = 4": (12_000, 4, {}),
     "3840 x 2160, N = 7, color noise": (12_000, 7, {"hue": "noise"}),
@@ -36,8 +38,8 @@ CASES: dict[str, tuple[int, int, dict[str, object]]] = {
     "10M triangles, 3840 x 2160, N = 4": (10_000_000, 4, {}),
 }
 
-#: Preset, N, triangles in thousands and other settings, of pictures whose bound is compared with what they
-#: take, after the size.
+#: Pictures whose memory is compared with its estimate: preset, degree N, thousands of triangles, and other
+#: settings. The names begin with the size.
 ESTIMATED: dict[str, tuple[str, int, int, dict[str, object]]] = {
     **{
         f"{size}, {preset}": (preset, 4, 12, {})
@@ -67,7 +69,7 @@ ESTIMATED: dict[str, tuple[str, int, int, dict[str, object]]] = {
 
 def measure(bench: Bench) -> None:
     """Measure each case once, because memory does not vary between runs."""
-    peer("resource")  # of the systems that tell the peak memory of a process
+    peer("resource")  # exists on systems that tell the peak memory of a process
     for name in CASES:
         (peak,) = _run("--draw", name)
         amounts = peak, ALLOWED
@@ -79,21 +81,21 @@ def measure(bench: Bench) -> None:
 
 
 def _run(*options: str) -> list[float]:
-    """Return the numbers that this module prints in another process."""
+    """Run this module in another process, and return the numbers that it prints."""
     command = [sys.executable, "-m", "bench.memory", *options]
     completed = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True)
     return [float(word) for word in completed.stdout.split()]
 
 
 def estimate_and_draw(name: str) -> tuple[float, float]:
-    """Return the memory of a case on Linux, in gigabytes: the bound, and what all processes take."""
+    """Return the memory of a case of `ESTIMATED` on Linux, in gigabytes: the estimate, and what is taken."""
     preset, degree, thousands, settings = ESTIMATED[name]
     width, height = (int(side) for side in name.split(",")[0].split(" x "))
     workers = 2 if "two processes" in name else 1
     look = replace(load_preset(preset).look, **settings)
     ball = cases.instance(1000 * thousands, degree)
     view = ViewInput((ball,), cases.camera(width, height), look)
-    # Memory that is free in the heap since the mesh was made counts neither as held nor as taken.
+    # Free memory in the heap, left over from making the mesh, goes back to the system, so it is not counted.
     ctypes.CDLL(None).malloc_trim(0)
     Path("/proc/self/clear_refs").write_text("5")  # resets the peak
     held = _resident_bytes("VmRSS")
@@ -112,7 +114,7 @@ def _resident_bytes(kind: str, process: int | str = "self") -> int:
 
 
 def draw(name: str) -> float:
-    """Draw a case, including its mesh, and return the peak memory of this process in gigabytes."""
+    """Make the mesh of a case of `CASES` and draw it. Return the peak memory of this process in gigabytes."""
     triangles, degree, settings = CASES[name]
     look = replace(cases.LOOK, **settings)
     draw_picture(ViewInput((cases.instance(triangles, degree),), cases.camera(3840, 2160), look))

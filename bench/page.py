@@ -2,9 +2,10 @@
 
     python -m bench.page CASES.json ...
 
-The files are those that benchmarks write with --json. A table is between ``<!-- cases: PATTERN -->`` and
-``<!-- end -->``. It lists the cases whose names match the regular expression. If that has the groups `row` and
-`column`, the table has these, and shows the ratios with their targets in parentheses.
+Benchmarks write the files with --json. In a page, a table stands between ``<!-- cases: PATTERN -->`` and
+``<!-- end -->``. PATTERN is a regular expression, and the table lists the cases whose names match it. If
+PATTERN has the groups `row` and `column`, their texts are the rows and columns of the table, and its cells
+are the ratios, with targets in parentheses.
 """
 
 from __future__ import annotations
@@ -21,14 +22,14 @@ TABLE = re.compile(r"(<!-- cases: (?P<pattern>.*?) -->\n).*?(<!-- end -->)", re.
 
 
 def main() -> None:
-    """Rewrite all tables for which the files have cases."""
+    """Rewrite the tables of all pages. A table without any case in the files stays as it is."""
     entries = [entry for path in sys.argv[1:] for entry in json.loads(Path(path).read_text())]
     for page in PAGES:
         page.write_text(filled(page.read_text(encoding="utf-8"), entries), encoding="utf-8")
 
 
 def filled(text: str, entries: list[dict]) -> str:
-    """Return a page with its tables of cases."""
+    """Return the text of a page with its tables rewritten."""
 
     def fill_table(table: re.Match[str]) -> str:
         pattern = re.compile(table["pattern"])
@@ -43,7 +44,7 @@ def filled(text: str, entries: list[dict]) -> str:
 
 
 def _list(entries: list[dict]) -> list[list[str]]:
-    """Return a row for each case."""
+    """Return the rows of a table with one row per case, after the header."""
     rows = [["case", "ratio", "target", "amounts"]]
     for entry in entries:
         ratio, amounts = f"{entry['ratio']:.2f}", (_short(amount) for amount in entry["amounts"])
@@ -55,7 +56,7 @@ def _list(entries: list[dict]) -> list[list[str]]:
 
 
 def _grid(entries: list[dict], pattern: re.Pattern[str]) -> list[list[str]]:
-    """Return the ratios by the groups `row` and `column` of the names."""
+    """Return the rows of a table of ratios, arranged by the groups `row` and `column` of the names."""
     cells: dict[str, dict[str, str]] = {}
     for entry in entries:
         found, target = pattern.search(entry["name"]), _target(entry)

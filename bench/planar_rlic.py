@@ -1,4 +1,4 @@
-"""Time of a planar cross field relative to the four images of `rlic` that it replaces."""
+"""Measure how long a picture of a planar cross field takes, relative to four LIC images by `rlic`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LOOK = replace(cases.LOOK, length=20)
 
 
 def measure(bench: Bench) -> None:
-    """Time the picture from angles, and the images of the members from noise."""
+    """Time the picture from the angles of the field, and four `rlic` images, one per member, from noise."""
     rlic = peer("rlic")
     use_cores(1)
     field, noise = cases.plane(DEGREE)

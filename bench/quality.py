@@ -1,8 +1,8 @@
-"""Compare the quality of the pictures of the method sheets with brute force.
+"""Compare the quality of LIC images of the method "sheets" with those of brute force.
 
-Measures are the ratio of the larger to the smaller standard deviation, the same for sharpness, and the
-largest difference of autocorrelations. Meshes and fields of others are read from a folder:
---data FOLDER.
+Three measures are compared: the standard deviation and the sharpness (as the ratio of the larger to the
+smaller value), and the autocorrelation (as the largest difference). With --data FOLDER, downloaded meshes and
+fields are compared, too.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ from .timing import Bench, main
 #: Lags of the autocorrelation along and across the field, in pixels.
 ALONG, ACROSS = (1, 2, 4, 8, 16, 32), (1, 2, 3, 4, 6)
 
-#: Width of the border in pixels that is left out, because windows would extend over it.
+#: Width of the border of images that is left out, in pixels, because windows would extend past it.
 BORDER = 34
 
-#: Seeds of the noise, and the angle of a uniform field in radians for each.
+#: Seeds of the noise, and for each seed the angle of the uniform field in radians.
 SEEDS, ANGLES = (0, 1, 2, 3), (0.05, 0.37, 0.8, 1.1)
 
-#: White noise with half of the cells bright, as in the paper, which is the harder test.
+#: Looks that are compared. White noise with half of the cells bright, as in the paper, is the harder test.
 LOOKS = {
     "paper's noise": replace(cases.LOOK, density=0.5, high_pass=0.0),
     "default noise": cases.LOOK,
@@ -50,18 +50,19 @@ LOOKS = {
 
 @dataclass(frozen=True)
 class Measurements:
-    """The measurements of the images of one method.
+    """Measurements of the LIC images of one method.
 
     Attributes
     ----------
     deviation : (2,) ndarray
-        Standard deviations of the images of members and of their blend.
+        Standard deviation of the images of members, and that of their blend.
     along, across : ndarray
-        Autocorrelations of the images of members.
+        Autocorrelations of the images of members along and across the members, at the lags `ALONG` and
+        `ACROSS`.
     sharpness : float
-        In a uniform field, the mean height of the peaks of the orientation spectrum of the blend,
-        whose mean is 1. In other fields, the fraction of the variance of the gradients of members'
-        images that is perpendicular to the members.
+        For a uniform field, the orientation spectrum of the blend is scaled to a mean of 1, and the mean
+        height of its peaks is taken. For other fields, it is the fraction of the variance of the gradients of
+        members' images that is perpendicular to the members.
     """
 
     deviation: np.ndarray
@@ -97,7 +98,7 @@ def _compare_methods(bench: Bench, name: str, sheets: Measurements, brute: Measu
 
 
 def _measure_fields(pixel_fields: Sequence[PixelField], look: Look) -> Measurements:
-    """Return means over several seeds, or over several fields with one seed each."""
+    """Return mean measurements: of one field with several seeds, or of several fields with one seed each."""
     repeated = pixel_fields * len(SEEDS) if len(pixel_fields) == 1 else pixel_fields
     measurements = []
     for seed, field in zip(SEEDS, repeated, strict=True):
@@ -131,7 +132,7 @@ def _measure_images(field: PixelField, images: LicImages) -> Measurements:
 
 
 def _peak_height(field: PixelField, images: LicImages, orientation: float) -> float:
-    """Return the mean height of the spectrum of a uniform field at its members."""
+    """Return the mean of the orientation spectrum of the blend at the directions of a uniform field."""
     blend = _frame(images.blend[:, 0], field)[BORDER:-BORDER, BORDER:-BORDER]
     lines = field.degree if field.degree % 2 else field.degree // 2
     spectrum = ndimage.gaussian_filter1d(mean_spectrum(blend, 256), 1.0, mode="wrap")
@@ -140,27 +141,27 @@ def _peak_height(field: PixelField, images: LicImages, orientation: float) -> fl
 
 
 def _on_screen(field: PixelField, member: np.ndarray) -> np.ndarray:
-    """Return (P,) complex: the unit directions on the screen of members in the view plane."""
+    """Return the (P,) complex unit directions of members on the screen, given members in the view plane."""
     member = field.screen_jacobian[:, 0] * member.real + field.screen_jacobian[:, 1] * member.imag
     return member / np.maximum(np.abs(member), 1e-12)
 
 
 def _frame(values: np.ndarray, field: PixelField) -> np.ndarray:
-    """Return (H, W) values of the pixels of a field, 0 elsewhere."""
+    """Return the (P,) values of the pixels of a field as an (H, W) image, 0 elsewhere."""
     frame = np.zeros(field.height * field.width, dtype=values.dtype)
     frame[field.pixel] = values
     return frame.reshape(field.height, field.width)
 
 
 def _seen(surface: Surface, field: RosyField) -> PixelField:
-    """Return a field as a camera sees it."""
+    """Return a field of a surface in the pixels of a camera."""
     camera = orbit_camera(surface.vertices, 30, 25, cases.SIZE, cases.SIZE, margin=0.02)
     gbuffer = project([MeshInstance(surface, np.eye(4), field)], camera)
     return surface_pixel_field(gbuffer, field.degree, cases.LOOK.crease_angle)
 
 
 def _fields(data: Path | None) -> dict[str, Callable[[], list[PixelField]]]:
-    """Return functions that make the fields, by name."""
+    """Return functions that make the fields to compare, by name."""
     made: dict[str, Callable[[], list[PixelField]]] = {}
     shape = cases.SIZE, cases.SIZE
     for n in (2, 3, 4, 6):

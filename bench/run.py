@@ -1,7 +1,7 @@
 """Run all benchmarks, each in its own process; --quick runs only Table 1 of the paper.
 
-A ratio is the median over alternating runs, printed with the smallest and the largest. --json FILE
-writes all cases to a file, as a list of objects.
+Two functions run in turn several times. The median ratio of their times is printed, with the smallest and the
+largest. --json FILE writes all cases to a file, as a list of objects.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def main() -> None:
 
 
 def _run(name: str, arguments: list[str]) -> list[dict[str, object]]:
-    """Run one script and return its entries; none if it lacks what it compares with."""
+    """Run one script and return its cases; none if a package that it compares with is missing."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "cases.json"
         command = [sys.executable, "-m", f"bench.{name}", "--json", str(file), *arguments]

@@ -1,4 +1,4 @@
-"""How time grows with the length of streamlines, the degree, the pixels, the samples and the triangles."""
+"""Measure how time grows with streamline length, degree, and numbers of pixels, samples and triangles."""
 
 from __future__ import annotations
 

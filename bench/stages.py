@@ -1,4 +1,4 @@
-"""Time of each stage of a frame, relative to the frame."""
+"""Measure how long each stage of a frame takes, relative to the whole frame."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def measure(bench: Bench) -> None:
 
 
 def _stages(triangles: int) -> dict[str, Callable[[], object]]:
-    """Return the stages of a frame, each on the results of the earlier ones."""
+    """Return functions that run one stage of a frame each, on results of the earlier stages, by label."""
     look, camera, instance = cases.LOOK, cases.camera(), cases.instance(triangles, DEGREE)
     cache = Cache()
     gbuffer = project([instance], camera, look.display, cache)

@@ -1,4 +1,4 @@
-"""Time to trace 20,000 strokes on 200,000 triangles, and to draw those that a camera sees."""
+"""Measure how long it takes to trace 20,000 strokes on 200,000 triangles, and to draw those a camera sees."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from .timing import Bench, main
 
 DEGREE = 4
 
-#: Spacing in world space and maximum length in spacings, as for hatching. They give about 20,000
-#: strokes.
+#: Spacing of strokes in world space, and their maximum length as a multiple of it, as for hatching. They give
+#: about 20,000 strokes.
 SPACING, MAX_LENGTH = 0.0102, 12.0
 
-#: Maximum time in seconds.
+#: Maximum time of tracing in seconds.
 MAX_SECONDS = 30.0
 
 
 def measure(bench: Bench) -> None:
-    """Time tracing beside the smoothest field, and drawing without and with hidden strokes."""
+    """Time tracing relative to the smoothest field, and drawing without and with hidden strokes."""
     surface = cases.ball(200_000)
     instance = MeshInstance(surface, np.eye(4), smoothest_field(surface, DEGREE))
     rules = SeparationRules(max_length=MAX_LENGTH)

@@ -1,7 +1,7 @@
-"""Time of a frame of a cross field relative to one vector field by VTK's surface LIC.
+"""Measure how long a frame of a cross field takes, relative to one vector field by VTK's surface LIC.
 
-Both use one core, the same mesh, camera and coverage, and 41 samples per streamline. VTK draws with
-Mesa's llvmpipe unless the system has a graphics card; the name of its renderer is printed.
+Both use one core, the same mesh and camera, the same part of the picture, and 41 samples per streamline. VTK
+draws with Mesa's llvmpipe unless the system has a graphics card. The name of its renderer is printed.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ DEGREE = 4
 #: Look with 41 samples per streamline.
 LOOK = replace(cases.LOOK, length=20)
 
-#: Side of the large frame in pixels, and what its label says of its samples. VTK has one in each
-#: pixel.
+#: Side of the large picture in pixels, and texts about its size by the samples along each side of a pixel.
+#: VTK always has one sample per pixel.
 LARGE_SIZE = 1080
 SAMPLES_LABEL = {1: "", 2: ", 1080 x 1080, 2 x 2 samples a pixel"}
 
@@ -53,7 +53,7 @@ def measure(bench: Bench) -> None:
 
 
 def print_coverage(name: str, vtk_pixels: np.ndarray, rgba: np.ndarray) -> None:
-    """Print how much of the frame both cover, for a check that they draw the same."""
+    """Print which fraction of the picture VTK and RoSy cover, as a check that they draw the same."""
     vtk_coverage, coverage = (vtk_pixels.min(axis=1) < 255).mean(), (rgba[..., 3] > 0).mean()
     print(f"{name}; covered: {vtk_coverage:.1%} by VTK, {coverage:.1%} by RoSy", flush=True)
 
@@ -68,7 +68,7 @@ def vtk_renderer(
     draw_next : function
         Rotates the camera, draws, and waits until the picture is done.
     read_pixels : function
-        Returns the picture as (P, 3) uint8.
+        Returns the pixels of the picture, (P, 3) uint8.
     name : str
         Name of the renderer that the driver reports.
     """
@@ -81,7 +81,7 @@ def vtk_renderer(
     settings = mapper.GetLICInterface()
     settings.SetNumberOfSteps(LOOK.length)
     settings.SetStepSize(1.0)
-    settings.EnhancedLICOff()  # a second pass, which would double its samples
+    settings.EnhancedLICOff()  # without a second LIC pass, which would double the samples
     actor = vtk.vtkActor()
     actor.SetMapper(mapper)
     scene = vtk.vtkRenderer()
@@ -111,7 +111,7 @@ def vtk_renderer(
 
 
 def _set_camera(scene: Any) -> Any:
-    """Place VTK's camera as that of `cases`, and return it."""
+    """Place VTK's camera like the camera of `cases`, and return it."""
     rosy_camera = cases.camera()
     camera = scene.GetActiveCamera()
     camera.SetPosition(*(-rosy_camera.view[:3, :3].T @ rosy_camera.view[:3, 3]))
@@ -123,7 +123,7 @@ def _set_camera(scene: Any) -> Any:
 
 
 def _poly_data(vtk: Any, triangles: int) -> Any:
-    """Return the ball with one member of the field, averaged at its points."""
+    """Return the ball as VTK's data, with one member of the field averaged at the vertices."""
     from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
 
     instance = cases.instance(triangles, DEGREE)

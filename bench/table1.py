@@ -1,4 +1,4 @@
-"""Table 1 of the paper: the method sheets relative to members and brute force, by degree."""
+"""Measure Table 1 of the paper: the method "sheets" relative to "members" and "brute", by degree."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from . import cases
 from .timing import Bench, main
 
-#: Target ratios by degree: of the LIC stage, and of frames of a small and of a large mesh.
+#: Target ratios by degree: for the LIC stage, and for frames of a small and a large mesh (by triangles).
 LIC = {2: 4.0, 3: 8.0, 4: 12.0, 6: 16.0}
 FRAMES = {
     12_000: {2: 2.5, 3: 5.0, 4: 7.0, 6: 10.0},
@@ -20,7 +20,7 @@ BRUTE, MEMBERS = (replace(cases.LOOK, method=method) for method in ("brute", "me
 
 
 def measure(bench: Bench, quick: bool) -> None:
-    """Time all rows; if `quick`, only those in which the camera has moved, without a first run."""
+    """Time all rows. If `quick`, only rows in which the camera has moved are timed, without a first run."""
     for degree, target in LIC.items():
         bench.compare(
             f"brute / sheets, LIC stage, N = {degree}",

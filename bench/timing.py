@@ -1,4 +1,7 @@
-"""Ratios of alternating timings, which the load of the machine affects equally; command line of a benchmark."""
+"""Measure ratios of times, and run a benchmark from the command line.
+
+The two functions of a ratio run in turn, so the load of the machine affects both equally.
+"""
 
 from __future__ import annotations
 
@@ -17,21 +20,21 @@ from typing import Any
 
 import numpy as np
 
-#: Runs of each function. The ratio is the median over them.
+#: Default number of runs of each function. The median ratio of the runs is reported.
 RUNS = 7
 
 
 class Bench:
-    """Measures cases, prints each, and keeps them.
+    """Measures cases, prints them, and keeps them.
 
     Attributes
     ----------
     runs : int
-        Runs of each function.
+        Number of runs of each function.
     cases : list of dict
-        Ratios of two times or amounts: `name`; `ratio`, the median over the runs, with `low` and `high`; the
-        required ratio, `target`, the least one if `higher_is_better`; the medians of both `amounts`, with
-        their `unit`; and the `machine`.
+        The cases so far. Each compares two times or other amounts. Keys: `name`; `ratio` (the median of all
+        runs), `low` and `high`; `target` (the required ratio or None: the least one if `higher_is_better`,
+        else the largest); `amounts` (the medians of both) and their `unit`; `machine`.
     """
 
     def __init__(self, runs: int = RUNS) -> None:
@@ -49,7 +52,7 @@ class Bench:
         runs: int | None = None,
         cold: bool = False,
     ) -> dict[str, Any]:
-        """Time two functions in turn, after each has run once, and return the case.
+        """Time two functions in turn, after a first run of each, and return the case.
 
         Parameters
         ----------
@@ -57,11 +60,11 @@ class Bench:
         one, other : function
             The ratio is the time of `one` over that of `other`.
         at_least, at_most : float, optional
-            Required ratio.
+            Required ratio: a lower or an upper bound.
         runs : int, optional
             Largest number of runs of each function, not counting the first.
         cold : bool
-            Time the first run of `one` as well, because it is slow and leaves no cached results.
+            Whether the first run of `one` is timed too. For slow functions that leave nothing in a cache.
         """
         if not cold:
             one()
@@ -80,7 +83,7 @@ class Bench:
         at_least: float | None = None,
         at_most: float | None = None,
     ) -> dict[str, Any]:
-        """Print, keep and return a case with the ratios of its runs."""
+        """Print, keep and return a case, given the ratios of all runs; see `cases`."""
         ratio, low, high = map(float, (np.median(ratios), np.min(ratios), np.max(ratios)))
         first, second = amounts = [float(amount) for amount in amounts]
         verdict, target = "", at_most if at_least is None else at_least
@@ -97,7 +100,7 @@ class Bench:
         return case
 
     def write(self, path: Path) -> None:
-        """Write the cases as JSON."""
+        """Write the cases to a JSON file."""
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(self.cases, indent=1) + "\n", encoding="utf-8")
 
@@ -114,11 +117,11 @@ def main(about: str | None, measure: Callable[..., None], **options: dict[str, A
     Parameters
     ----------
     about : str
-        Text of its help.
+        Description of the program in its help.
     measure : function
-        Measures the cases with a `Bench`.
+        Function that measures the cases. Its arguments are a `Bench` and the values of `options`.
     **options
-        Further options of the command line, with their settings for argparse. `measure` gets their values.
+        Further options of the command line: arguments of `ArgumentParser.add_argument` by name.
     """
     parser = argparse.ArgumentParser(description=about)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the cases to a file")
@@ -134,7 +137,7 @@ def main(about: str | None, measure: Callable[..., None], **options: dict[str, A
 
 
 def peer(module: str) -> Any:
-    """Import what a benchmark needs or compares with; without it, end the program and say so."""
+    """Import and return a module that a benchmark needs. If it is missing, end the program with a message."""
     try:
         return importlib.import_module(module)
     except ImportError:
@@ -143,7 +146,7 @@ def peer(module: str) -> Any:
 
 @cache
 def machine() -> str:
-    """Describe the machine: processor, cores, threads in use, versions."""
+    """Return a description of the machine: processor, cores, threads in use, versions of packages."""
     versions = [f"Python {platform.python_version()}"]
     for package in ("numpy", "rlic", "vtk", "bpy"):
         try:
@@ -157,7 +160,7 @@ def machine() -> str:
 def use_cores(count: int) -> None:
     """Limit this process, and those that it starts, to a number of cores.
 
-    Call it before VTK is imported: Mesa's llvmpipe then uses as many threads.
+    Call it before VTK is imported, so that Mesa's llvmpipe uses the same number of threads.
     """
     os.environ["LP_NUM_THREADS"] = str(count) if count > 1 else "0"
     if hasattr(os, "sched_setaffinity"):

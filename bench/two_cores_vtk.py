@@ -1,6 +1,6 @@
-"""Time of a frame of a cross field relative to one vector field by VTK, each on two cores.
+"""Measure how long a frame of a cross field takes, relative to one vector field by VTK, each on two cores.
 
-As in `surface_vtk`, but RoSy draws with two processes, and VTK's driver with two threads.
+The comparison is that of `surface_vtk`, but RoSy draws with two processes, and VTK's driver with two threads.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ TRIANGLES, SAMPLES, CORES = 12_000, 2, 2
 
 
 def measure(bench: Bench) -> None:
-    """Time the large frame."""
+    """Time the large picture."""
     use_cores(CORES)
     draw_next, read_pixels, name = vtk_renderer(TRIANGLES, LARGE_SIZE)
     print(name, flush=True)

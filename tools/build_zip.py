@@ -1,6 +1,6 @@
-"""Build the extension into a folder, with the builder that comes with bpy, and validate it.
+"""Build the zip of the extension into a folder, with the builder that comes with bpy, and validate it.
 
-The builder stores the times and permissions of the files, in the order of the file system. They are
+The builder stores the files in the order of the file system, with their times and permissions. All three are
 replaced, so that the same files give the same bytes.
 """
 
@@ -17,8 +17,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 
-#: Time of all files in the zip, in seconds since 1970: that of the files in the wheel, unless the
-#: variable SOURCE_DATE_EPOCH sets another one for both.
+#: Modification time of all files in the zip, in seconds since 1970. The files in the wheel have the same
+#: time. The environment variable SOURCE_DATE_EPOCH sets another one for both.
 DEFAULT_TIME = 1580601600
 
 #: Permissions of all files in the zip: a regular file that its owner can write.
@@ -41,7 +41,7 @@ def main() -> int:
 
 
 def make_reproducible(path: Path) -> None:
-    """Rewrite a zip with its files in the order of their names, at one time, without folders."""
+    """Rewrite a zip with its files in the order of their names, with equal times, without folders."""
     with zipfile.ZipFile(path) as zipped:
         files = {name: zipped.read(name) for name in zipped.namelist() if not name.endswith("/")}
     seconds = int(os.environ.get("SOURCE_DATE_EPOCH", DEFAULT_TIME))
@@ -49,7 +49,7 @@ def make_reproducible(path: Path) -> None:
     with zipfile.ZipFile(path, "w") as zipped:
         for name in sorted(files):
             entry = zipfile.ZipInfo(name, date)
-            entry.create_system = 3  # Unix, whose permissions follow
+            entry.create_system = 3  # Unix: its permissions are in the next line
             entry.external_attr = PERMISSIONS << 16
             zipped.writestr(entry, files[name], zipfile.ZIP_DEFLATED, compresslevel=9)
 
@@ -60,7 +60,7 @@ def _run(*arguments: str) -> int:
 
 
 def _builder() -> str:
-    """Return the path of the script behind `blender --command extension`, in the module bpy."""
+    """Return the path of the script in the module bpy that runs `blender --command extension`."""
     spec = importlib.util.find_spec("bpy")
     folders = list(spec.submodule_search_locations or []) if spec else []
     for folder in folders:

@@ -1,4 +1,4 @@
-"""Check that a Python can be used for an environment, and print why not in one line."""
+"""Check that a Python interpreter can be used for an environment. If not, print the reason in one line."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import re
 import sys
 from pathlib import Path
 
-#: Oldest version.
+#: Oldest version of Python that RoSy supports.
 OLDEST_VERSION = (3, 11)
 
-#: The first version of Blender's module for each version of Python, newest first. PyPI has each version
-#: of the module for one version of Python.
+#: Versions of Python by the first version of Blender's module (bpy) that needs them, newest first. PyPI has
+#: each version of bpy for only one version of Python.
 BPY_VERSIONS = {(5, 1): (3, 13), (4, 2): (3, 11)}
 
 
@@ -35,7 +35,7 @@ def main() -> int:
 
 
 def _version_for_bpy(requirements: str) -> tuple[int, int] | None:
-    """Return the version of Python that the required bpy is for; None if there is none."""
+    """Return the version of Python that the required version of bpy needs; None if bpy is not required."""
     match = re.search(r"^bpy==(\d+)\.(\d+)", requirements, re.MULTILINE)
     if match is None:
         return None

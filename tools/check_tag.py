@@ -1,4 +1,4 @@
-"""Check that a release is tagged with its version and has a date, and print why not in one line.
+"""Check that a release is tagged with its version and has a date. If not, print the reason in one line.
 
 tools/check_tag.py vVERSION
 """
@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def main() -> int:
-    """Check the tag of the command line. The exit status is 0 only if it can be released."""
+    """Check the tag in the command line. The exit status is 0 only if the tag can be released."""
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
     changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     fault = fault_of(sys.argv[1], manifest["version"], changes)
@@ -24,15 +24,16 @@ def main() -> int:
 
 
 def fault_of(tag: str, version: str, changes: str) -> str:
-    """Return what is wrong with a tag, or nothing.
+    """Return what is wrong with a tag; empty if it is right.
 
     Parameters
     ----------
     tag : str
+        The tag, which has to be ``v`` and the version.
     version : str
         The version in blender_manifest.toml.
     changes : str
-        The text of CHANGELOG.md, whose first section is of this version.
+        The text of CHANGELOG.md. Its first section has to be about this version.
     """
     if tag != f"v{version}":
         return f"the tag is {tag}, but blender_manifest.toml has the version {version}"

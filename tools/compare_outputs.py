@@ -3,20 +3,20 @@
     .venv-bpy42/bin/python tools/compare_outputs.py OLD [NEW] [--only TEXT] [--keep DIR] [--data DIR]
     .venv-bpy42/bin/python tools/compare_outputs.py OLD --blender "COMMAND"
 
-OLD and NEW are git revisions. NEW is the working tree if it is not given. Each revision is copied to a
-temporary folder, and every case of `tools/outputs/cases.toml` runs there in a child process that imports
-that copy alone. The exit status is 0 only if all cases ran and gave the same files. A revision takes 3 to 4
-minutes on two processor cores.
+OLD and NEW are git revisions. If NEW is not given, the working tree is compared. Each revision is copied to a
+temporary folder. Every case (a short program) of `tools/outputs/cases.toml` runs there in a child process
+that imports only this copy. The exit status is 0 only if all cases ran and gave the same files. One revision
+takes 3 to 4 minutes on two processor cores.
 
-Cases use only interfaces that users have: the command line, the Python package, operators and properties.
-A commit in which they had other names runs them with these; `cases.toml` lists what was renamed. Files
-of settings then have to be the same but for these names.
+Cases use only interfaces that users have: the command line, the Python package, operators and properties. In
+an older commit some of them had other names, which `cases.toml` lists. The cases then run with these names,
+and files of settings may differ in them.
 
-Cases run in three lanes: `numpy` (plain Python), `bpy` (Blender's Python module, if this Python has it)
-and `card` (a full Blender that draws on the graphics card, only with --blender; COMMAND starts it without
-a window when arguments are appended, such as "blender -b").
+Each case runs in one of three environments, called lanes: `numpy` (plain Python), `bpy` (Blender's Python
+module, if this Python has it) and `card` (a full Blender that draws on the graphics card, only with
+--blender). COMMAND starts Blender without a window, and arguments are appended to it, as to "blender -b".
 
-Outputs of commits are cached in build/compare/SHA/DIGEST, where DIGEST stands for the cases, their inputs and
+Outputs of commits are cached in build/compare/SHA/DIGEST. DIGEST is computed from the cases, their inputs and
 the versions of Python and numpy.
 """
 
@@ -60,27 +60,28 @@ from outputs.run_cases import (
 ROOT = Path(__file__).resolve().parents[1]
 CACHE = ROOT / "build" / "compare"
 
-#: Cases that one child process runs, and seconds after which the process is stopped.
+#: Number of cases that one child process runs, and seconds after which the process is stopped.
 BATCH_SIZE, BATCH_TIMEOUT = 12, 900
 
-#: Ends of names of files that are not compared. The last are notes beside the frames of animations.
+#: Endings of the names of files that are not compared: logs, and the sidecar files of frames of animations.
 NOT_COMPARED = (LOG, ".rosy.txt")
 
-#: An input file that does not exist.
+#: Name of an input file that must not exist, for cases with a missing file.
 MISSING = "missing.off"
 
 
 @dataclass(frozen=True)
 class Revision:
-    """A revision and its folders.
+    """A git revision or the working tree, with the folders for its comparison.
 
     Attributes
     ----------
     label : str
+        Name in messages.
     sha : str
-        Empty for the working tree.
+        Hash of the commit. Empty for the working tree.
     tree : Path
-        Copy of its files, once something has to run.
+        Copy of its files. It exists if cases have to run.
     outputs : Path
         Outputs of this run, with a folder for each case.
     cache : Path
@@ -94,12 +95,15 @@ class Revision:
     cache: Path
 
     def folder(self, case: Case) -> Path:
-        """Return where the outputs of a case are."""
+        """Return the folder with the outputs of a case: of this run, or of an earlier one."""
         new = self.outputs / case.name
         return new if new.is_dir() else self.cache / case.name
 
     def extract(self) -> None:
-        """Copy the files of the commit, or those of the working tree that git does not ignore."""
+        """Copy the files of the revision to `tree`.
+
+        Of the working tree, files that git ignores are left out.
+        """
         self.tree.mkdir()
         if self.sha:
             with tarfile.open(fileobj=io.BytesIO(git("archive", self.sha))) as files:
@@ -113,7 +117,7 @@ class Revision:
 
 
 def git(*arguments: str) -> bytes:
-    """Return what git prints; end the program if it fails. Git prints the reason."""
+    """Run git and return its output. If it fails, it prints the reason, and the program ends."""
     completed = subprocess.run(["git", "-C", ROOT, *arguments], check=False, stdout=subprocess.PIPE)
     if completed.returncode:
         sys.exit(f"git {arguments[0]} failed for {arguments[-1]}")
@@ -121,7 +125,7 @@ def git(*arguments: str) -> bytes:
 
 
 def find_revision(side: str, name: str | None, work: Path, blender: str) -> Revision:
-    """Return the revision that the user means; the working tree if none is given."""
+    """Return the revision `name`, or the working tree if it is None. `side` is "old" or "new"."""
     sha = git("rev-parse", "--verify", f"{name}^{{commit}}").decode().strip() if name else ""
     digest = hashlib.sha256(f"{sys.version} {np.__version__} {platform.platform()}".encode())
     digest.update(f"{blender} {read_cases()}".encode())
@@ -135,14 +139,14 @@ def find_revision(side: str, name: str | None, work: Path, blender: str) -> Revi
 def run_cases(
     revisions: Sequence[Revision], cases: Sequence[Case], blender: str, jobs: int
 ) -> None:
-    """Run the cases whose outputs are not in the cache."""
+    """Run the cases whose outputs are not in the cache, several at once."""
     batches = []
     for revision in revisions:
         missing = [case for case in cases if not revision.folder(case).is_dir()]
         print(f"{revision.label}: {len(cases) - len(missing)} cached, {len(missing)} to run")
         if missing:
             revision.extract()
-        for lane in reversed(LANES):  # those that take longest first
+        for lane in reversed(LANES):  # the lanes that take longest come first
             chosen = [case for case in missing if case.lane == lane]
             starts = range(0, len(chosen), BATCH_SIZE)
             batches += [(revision, chosen[start : start + BATCH_SIZE]) for start in starts]
@@ -152,9 +156,9 @@ def run_cases(
 
 
 def run_batch(revision: Revision, batch: Sequence[Case], blender: str) -> None:
-    """Run cases of one lane in a child process, and cache their outputs if it is a commit's.
+    """Run cases of one lane in a child process. If the revision is a commit, cache their outputs.
 
-    If a case ends the process, it and the next ones are marked as crashed.
+    If a case ends the process, this case and the following ones are marked as crashed.
     """
     printed = run_child(revision, batch, blender)
     for case in batch:
@@ -165,12 +169,12 @@ def run_batch(revision: Revision, batch: Sequence[Case], blender: str) -> None:
             (new / STATUS).write_text("crashed")
         elif revision.sha and (new / STATUS).read_text() == str(case.status):
             revision.cache.mkdir(parents=True, exist_ok=True)
-            with contextlib.suppress(OSError):  # it is there already
+            with contextlib.suppress(OSError):  # another run has cached it already
                 os.replace(new, revision.cache / case.name)
 
 
 def run_child(revision: Revision, cases: Sequence[Case], blender: str) -> str:
-    """Run cases in one process, and return what it printed."""
+    """Run cases in one child process, and return what it printed."""
     work, lane, script = revision.outputs.parent, cases[0].lane, str(FOLDER / "run_cases.py")
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"} | {
         "PYTHONDONTWRITEBYTECODE": "1",
@@ -215,7 +219,7 @@ def report(revisions: Sequence[Revision], cases: Sequence[Case], keep: Path | No
 
 
 def compare(old: Path, new: Path) -> list[str]:
-    """Return what differs between the outputs of a case, a line for each file."""
+    """Return what differs between two folders of outputs of a case, one line per file."""
     first, second = compared_files(old), compared_files(new)
     differences = []
     for name in sorted({*first, *second}):
@@ -229,14 +233,14 @@ def compare(old: Path, new: Path) -> list[str]:
 
 
 def compared_files(folder: Path) -> dict[str, Path]:
-    """Return the files of a case that are compared, by their relative names."""
+    """Return the files in a folder of outputs that are compared, by their relative paths."""
     paths = [path for path in folder.rglob("*") if path.is_file()]
     files = {str(path.relative_to(folder)): path for path in paths}
     return {name: path for name, path in files.items() if not name.endswith(NOT_COMPARED)}
 
 
 def are_renamed(old: Path, new: Path) -> bool:
-    """Return whether two JSON files, with a value in each line, differ only in renamed settings."""
+    """Return whether two JSON files, with one value per line, differ only in renamed settings."""
 
     def settings(path: Path) -> str:
         text = re.sub(r'"(\w+)": "?(.*?)"?,?\n', r"\1=\2\n", path.read_text(encoding="utf-8"))
@@ -247,7 +251,7 @@ def are_renamed(old: Path, new: Path) -> bool:
 
 
 def describe_difference(old: Path, new: Path) -> str:
-    """Describe how two files differ."""
+    """Return a description of how two files differ."""
     if old.suffix in (".npy", ".png"):
         first, second = (
             np.load(path) if path.suffix == ".npy" else 255 * read_png(path) for path in (old, new)
@@ -266,7 +270,7 @@ def describe_difference(old: Path, new: Path) -> str:
 
 
 def read_png(path: Path) -> np.ndarray:
-    """Return the (H, W, 4) display values of a picture."""
+    """Return the (H, W, 4) sRGB values of a PNG file."""
     from rosy_addon.core.color import to_display
     from rosy_addon.image_io.png import read_png
 
@@ -292,7 +296,7 @@ def parse_arguments() -> argparse.Namespace:
 def main() -> int:
     """Compare two revisions and return the exit status."""
     options = parse_arguments()
-    sys.path.append(str(ROOT))  # for the files of pictures
+    sys.path.append(str(ROOT))  # for the package, which reads picture files
     has_blender = importlib.util.find_spec("bpy") is not None
     lanes = {"numpy": True, "bpy": has_blender, "card": bool(options.blender)}
     cases = [case for name, case in read_cases().items() if options.only in name]

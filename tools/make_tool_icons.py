@@ -1,8 +1,9 @@
-"""Make the icons of RoSy's tools in Blender: python tools/make_tool_icons.py
+"""Make the icons of RoSy's tools in Blender: ``python tools/make_tool_icons.py``.
 
-A file has the triangles of a picture of 256 x 256 units, y up: the header ``VCO``, a byte 0, the width and the
-height as one byte each and the origin, then the corners of all triangles, one byte for x and y each, then their
-colors as RGBA. Blender's own icons of tools have this format.
+A file stores the colored triangles of a picture of 256 x 256 units, with y up. It begins with the letters
+``VCO``, a zero byte, and one byte each for the width, the height, and x and y of the origin. Then follow x
+and y of all corners of the triangles, one byte each, and the RGBA colors of the corners. Blender's own icons
+of tools have this format.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ WHITE, ORANGE = (255, 255, 255, 255), (255, 150, 60, 255)
 
 
 def stroke(points: np.ndarray, width: float) -> np.ndarray:
-    """(n, 3, 2) triangles along (m, 2) points."""
+    """Return (n, 3, 2) triangles of a stroke of a width through (m, 2) points."""
     along = np.gradient(points, axis=0)
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
     across *= width / 2 / np.linalg.norm(across, axis=1, keepdims=True)
@@ -28,14 +29,14 @@ def stroke(points: np.ndarray, width: float) -> np.ndarray:
 
 
 def disc(center: tuple[float, float], radius: float, count: int = 24) -> np.ndarray:
-    """(n, 3, 2) triangles."""
+    """Return (count, 3, 2) triangles of a disc."""
     angle = np.linspace(0, 2 * np.pi, count + 1)
     rim = np.array(center) + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     return np.stack([np.broadcast_to(center, rim[1:].shape), rim[:-1], rim[1:]], axis=1)
 
 
 def write_icon(name: str, parts: list[tuple[np.ndarray, tuple[int, ...]]]) -> None:
-    """Write a file of triangles with one color for each part."""
+    """Write an icon file. Each part is a list of triangles and their RGBA color."""
     corners = np.concatenate([triangles for triangles, _ in parts]).reshape(-1, 2)
     colors = np.concatenate([np.tile(color, (3 * len(part), 1)) for part, color in parts])
     header = b"VCO\x00" + bytes([255, 255, 0, 0])
@@ -44,7 +45,7 @@ def write_icon(name: str, parts: list[tuple[np.ndarray, tuple[int, ...]]]) -> No
 
 
 def singularities() -> list[tuple[np.ndarray, tuple[int, ...]]]:
-    """Lines around a singularity of index 1/2: parabolas with the same focus."""
+    """Return the parts of an icon: lines around a singularity of index 1/2, parabolas with the same focus."""
     center = np.array((128.0, 120.0))
     parts = []
     for distance in (26.0, 60.0):
@@ -57,7 +58,7 @@ def singularities() -> list[tuple[np.ndarray, tuple[int, ...]]]:
 
 
 def comb() -> list[tuple[np.ndarray, tuple[int, ...]]]:
-    """Lines that bend along a stroke."""
+    """Return the parts of an icon: three lines that bend in the same way, as if combed."""
     x = np.linspace(-88.0, 88.0, 25)
     parts = []
     for y, color in ((58.0, WHITE), (6.0, ORANGE), (-46.0, WHITE)):

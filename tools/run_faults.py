@@ -2,8 +2,8 @@
 
     python tools/run_faults.py [NAME...] [--jobs N] [--baseline | --check]
 
-The faults are listed in tests/faults.toml. Each is applied in a temporary copy of the working tree,
-and its tests have to fail there. The exit status is 0 only if every fault is caught.
+tests/faults.toml lists the faults. Each fault is applied to a temporary copy of the working tree, where its
+tests have to fail. The exit status is 0 only if every fault is caught.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 
-#: The interpreter of each lane. The tests of lane "blender" run in a full Blender, from a zip.
+#: The environment whose Python runs the tests of each lane. Those of lane "blender" build a zip and run it in
+#: a full Blender.
 PYTHON = {"unit": ".venv", "bpy42": ".venv-bpy42", "blender": ".venv-bpy42"}
 
 #: Seconds after which the tests of a fault are stopped; the fault then counts as missed.
@@ -35,7 +36,7 @@ TESTS_FAILED = 1
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault: the text `find` in `file` becomes `replace`, and `tests` have to fail."""
+    """A deliberate fault: in `file`, the text `find` is replaced by `replace`. Then `tests` have to fail."""
 
     name: str
     room: str
@@ -54,14 +55,17 @@ def read_faults() -> list[Fault]:
 
 
 def broken_text(fault: Fault, root: Path) -> str | None:
-    """Return the file with the fault in it; None unless `find` occurs there exactly once."""
+    """Return the text of the file with the fault; None if `find` does not occur in it exactly once."""
     path = root / fault.file
     text = path.read_text(encoding="utf-8") if path.is_file() else ""
     return text.replace(fault.find, fault.replace) if text.count(fault.find) == 1 else None
 
 
 def copy_tree(folder: Path) -> Path:
-    """Copy the working tree to `folder`/main, with links to what the tests expect around it."""
+    """Copy the working tree to `folder`/main, and link the files that tests expect around it.
+
+    Return the copy.
+    """
     listed = ("git", "ls-files", "-z", "--cached", "--others", "--exclude-standard")
     names = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout
     copy = folder / "main"
@@ -123,7 +127,7 @@ def try_fault(fault: Fault, copies: queue.Queue[Path], baseline: bool) -> bool:
 
 
 def main() -> int:
-    """Run the chosen faults; 0 if all are caught."""
+    """Try the chosen faults. Return the exit status: 0 if all are caught."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help="all faults if not given")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="copies used side by side")

@@ -1,1 +1,1 @@
-"""The jobs: each reads the scene, has a picture or strokes drawn, and applies the result."""
+"""Jobs of the extension. Each reads the scene, has a picture or strokes drawn, and applies the result."""

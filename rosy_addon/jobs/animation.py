@@ -1,11 +1,11 @@
 """The job of animations: read, draw and write each frame that is not up to date.
 
-The picture of a frame is a file in a folder. A sidecar file next to it holds two hashes: of
-everything that the picture was drawn from (the look, the camera, the meshes and fields, and the
-lights), and of the bytes of the picture. A frame is up to date if both are equal. So an interrupted
-job continues where it stopped, after a change only the affected frames are drawn, and damaged
-pictures are drawn again. Both files are written under a temporary name and renamed, and equal inputs
-give equal bytes. Two processes may therefore share one folder; at worst they draw a frame twice.
+The picture of a frame is a file in a folder. A sidecar file next to it holds two hashes. One is a hash of
+everything that the picture was drawn from (look, camera, meshes, fields and lights). The other is a hash of
+the bytes of the picture. A frame is up to date if both still match. So an interrupted job continues where it
+stopped, only frames that a change affects are drawn again, and damaged pictures are replaced. Both files are
+written under a temporary name and then renamed, and equal inputs give equal bytes. So several processes may
+write to one folder; at worst they draw a frame twice.
 """
 
 from __future__ import annotations
@@ -59,14 +59,14 @@ SIDECAR_HEADER = "rosy frame 2"
 
 @dataclass(frozen=True)
 class SequenceResult:
-    """The result of a range of frames from one camera.
+    """The image sequence of one camera, and what was drawn of it.
 
     Attributes
     ----------
     camera : str
-        Name of the camera, or of the scene if the camera may change from frame to frame.
+        Name of the camera. If the camera may change from frame to frame, the name of the scene.
     rendered, skipped : tuple of int
-        Frames that were drawn, and frames that were up to date.
+        Frames that were drawn, and frames that were up to date and kept.
     sequence : ImageSequence
     warnings : tuple of str
         Messages for the user.
@@ -92,32 +92,34 @@ def bake_animation(
     show: bool = True,
     workers: int = 0,
 ) -> Steps[list[SequenceResult]]:
-    """Draw the fields of a scene at a range of frames, and apply the image sequences.
+    """Draw the fields of a scene at several frames, and show the image sequences on the objects.
 
     Parameters
     ----------
     scene : bpy.types.Scene
         Its current frame and camera are restored at the end.
     frames : sequence of int
+        Numbers of the frames.
     cameras : sequence of bpy.types.Object, optional
-        One image sequence for each. By default there is one sequence, from the camera that renders
-        each frame; markers may change it.
+        One image sequence is drawn from each of these cameras. By default one sequence is drawn, each frame
+        from the camera that renders it, which timeline markers may change.
     objects, look, size, workers : optional
-        See `bake`. Settings of the scene's own look may be animated.
+        See `bake`. If `look` is not given, the settings of the scene's look may be animated.
     settings : OutputSettings, optional
-        By default the scene's. Must have a folder.
+        How the pictures are stored and applied, with a folder. By default the settings of the scene.
     show : bool
         Whether the objects get a material that plays the sequence.
 
     Yields
     ------
     Call or Step
-        The label names the frame and the remaining time.
+        The parts of the job. Their label has the frame number and the remaining time.
 
     Raises
     ------
     RosyError
-        See `bake`; the message has the frame number. Also if there is no folder, or a picture cannot be written.
+        For the reasons of `bake` (the message then begins with the frame number), if there is no folder, or
+        if a picture cannot be written.
     """
     settings = _folder_settings(scene, settings)
     frames = list(frames)
@@ -125,14 +127,15 @@ def bake_animation(
     targets = field_objects(depsgraph.view_layer) if objects is None else list(objects)
     if show:
         check_targets(targets, settings)
-    cache = Cache()  # of what was read; `_frame_steps` evicts what a frame has not used
+    cache = Cache()  # meshes and fields; `_frame_steps` removes those that a frame has not used
     draw_frame = partial(
         _frame_steps, scene, cameras, objects, look, size, settings, cache, workers
     )
     start_time, rendered_count = time.monotonic(), 0
     sequences: dict[str, list[_Frame]] = {}
     scene_data, warnings = None, {}
-    # Added for each frame, they would cost two more evaluations of the scene: up to half of the time of reading.
+    # The temporary attributes are added once. To add them for each frame would take two more evaluations of
+    # the scene: up to half of the time of reading.
     attributes = temp_attributes(depsgraph, targets, nonfinite_policy(scene), cache, {})
     with _restored_frame(scene), attributes:
         for index, frame in enumerate(frames):
@@ -148,7 +151,7 @@ def bake_animation(
             warnings |= dict.fromkeys(scene_data.warnings)
             for one in drawn:
                 sequences.setdefault(one.name, []).append(one)
-            # Frames that are up to date take almost no time and do not count.
+            # Frames that are up to date take almost no time, so the estimate leaves them out.
             rendered_count += not all(one.up_to_date for one in drawn)
             if not rendered_count:
                 start_time = time.monotonic()
@@ -170,9 +173,9 @@ def bake_animation(
 
 
 def _folder_settings(scene: bpy.types.Scene, settings: OutputSettings | None) -> OutputSettings:
-    """Return the output settings, by default the scene's, with a folder that can be written to.
+    """Return the output settings (by default the scene's) after a check that their folder can be written to.
 
-    What an interrupted job has left in the folder is removed.
+    Temporary files that an interrupted job has left in the folder are removed.
     """
     settings = read_output_settings(scene) if settings is None else settings
     if settings.folder is None:
@@ -184,12 +187,12 @@ def _folder_settings(scene: bpy.types.Scene, settings: OutputSettings | None) ->
 
 @contextmanager
 def _restored_frame(scene: bpy.types.Scene) -> Iterator[None]:
-    """Restore the frame and the camera of a scene, which markers may change, at the end of a block."""
+    """Context manager: at the end, restore the current frame and the active camera of a scene."""
     frame, camera = scene.frame_current + scene.frame_subframe, scene.camera
     try:
         yield
     finally:
-        # `frame_set` takes no negative subframes, which frames before 0 have.
+        # `frame_set` takes subframes from 0 to 1 only, so a frame before 0 is rounded down.
         whole_frame = math.floor(frame)
         scene.frame_set(whole_frame, subframe=frame - whole_frame)
         scene.camera = camera
@@ -197,7 +200,7 @@ def _restored_frame(scene: bpy.types.Scene) -> Iterator[None]:
 
 @dataclass(frozen=True, eq=False)
 class _Frame:
-    """One frame of a sequence.
+    """The picture of one frame of an image sequence.
 
     Attributes
     ----------
@@ -206,8 +209,9 @@ class _Frame:
     frame : int
     camera : Camera
     up_to_date : bool
-        Whether the picture existed already.
+        Whether the picture was up to date, so that it was not drawn.
     state : PictureState
+        The state of the scene from which it is drawn.
     """
 
     name: str
@@ -223,7 +227,7 @@ def _sequence_result(
     cameras: Sequence[CameraSource] | None,
     warnings: tuple[str, ...],
 ) -> SequenceResult:
-    """Return the result of the frames of a sequence."""
+    """Return the result of an image sequence, given its frames."""
     first, last = drawn[0], drawn[-1]
     path = _path_of_frame(settings, first.name, cameras, first.frame)
     size = last.camera.width, last.camera.height
@@ -246,9 +250,12 @@ def _frame_steps(
     workers: int,
     frame: int,
 ) -> Steps[tuple[SceneData, list[_Frame]]]:
-    """Draw one frame from all cameras."""
+    """Draw one frame from all cameras as part of a job.
+
+    Return what was read, and the frame of each camera.
+    """
     look = read_look(scene.rosy) if look is None else look
-    # The look may be animated, and its method decides which device can draw it.
+    # The look may be animated, and not every device can draw every method, so the device is chosen per frame.
     device = select_device(settings.device, look)
     sources = [frame_camera(scene, frame)] if cameras is None else list(cameras)
     depsgraph = scene_depsgraph(scene)
@@ -280,7 +287,7 @@ def _frame_steps(
         if not up_to_date:
             if sidecar.exists():
                 check_writable(sidecar)
-            # Frames in which only the streaks move share their G-buffer.
+            # The G-buffer is kept if streaks drift, as it may be the same in the next frame.
             steps = image_steps(
                 view, device, settings.as_float, keep_gbuffers=has_flow(look), workers=workers
             )
@@ -296,19 +303,19 @@ def _frame_steps(
 def _path_of_frame(
     settings: OutputSettings, name: str, cameras: Sequence[CameraSource] | None, frame: int
 ) -> Path:
-    """Return the path of a frame of the sequence of a camera, or of a scene if `cameras` is None."""
+    """Return the path of a frame. `name` is that of a camera, or of the scene if `cameras` is None."""
     stem = settings.folder / picture_stem(name, "scene" if cameras is None else "camera")
     return frame_path(stem, frame, settings.as_float)
 
 
 def _sidecar_text(input_hash: bytes, path: Path) -> bytes:
-    """Return the contents of the sidecar file of a picture that is in a file."""
+    """Return the contents of the sidecar file of the picture at `path`."""
     picture_hash = content_hash(np.frombuffer(read_bytes(path), dtype=np.uint8))
     return f"{SIDECAR_HEADER}\n{input_hash.hex()}\n{picture_hash.hex()}\n".encode()
 
 
 def _input_hash(view: ViewInput, device: str, settings: OutputSettings) -> bytes:
-    """Return a digest of everything that a picture is drawn from."""
+    """Return a hash of everything that a picture is drawn from."""
     camera, reference = view.camera, view.reference
     parts: list = [
         view.look,
@@ -340,7 +347,7 @@ def _input_hash(view: ViewInput, device: str, settings: OutputSettings) -> bytes
 
 
 def _time_left(start_time: float, rendered_count: int, remaining_count: int) -> str:
-    """Return the remaining time as text, or "" before the first frame is drawn."""
+    """Return the estimated remaining time as text; empty if no frame has been drawn yet."""
     if not rendered_count:
         return ""
     seconds = (time.monotonic() - start_time) / rendered_count * remaining_count

@@ -43,38 +43,40 @@ def bake(
 ) -> Steps[list[BakeResult]]:
     """Draw the fields of a scene and apply the pictures to the objects.
 
-    The scene is read before the first picture is drawn, and changed after the last one. A job that is
-    cancelled leaves it unchanged.
+    The scene is read before the first picture is drawn, and changed only after the last one is drawn. If the
+    job is cancelled before, the scene is unchanged.
 
     Parameters
     ----------
     scene : bpy.types.Scene
     depsgraph : bpy.types.Depsgraph, optional
-        By default `scene_depsgraph`.
+        Evaluated depsgraph of a view layer of the scene. By default the result of `scene_depsgraph`.
     objects : sequence of bpy.types.Object, optional
-        Objects with fields to draw; by default all that have one. All other objects only occlude.
+        Objects whose fields are drawn. By default all visible objects with a field. All other objects only
+        hide what is behind them.
     cameras : sequence of bpy.types.Object or Camera, optional
-        By default the scene's active camera. A `Camera` keeps its own size, as for a 3D view
-        (`camera_of_view`).
+        The cameras from which pictures are drawn. By default the active camera of the scene. A `Camera` has
+        its own size, which is used instead of `size`; `camera_of_view` makes one from a 3D view.
     look : Look, optional
-        By default the scene's.
+        Settings of the drawing. By default the look of the scene.
     size : (int, int), optional
-        Pixels; by default the size of renders times the scene's percentage for pictures.
+        Width and height in pixels of the pictures. By default the render resolution of the scene, scaled by
+        the percentage for pictures in RoSy's settings (``scene.rosy.percentage``).
     settings : OutputSettings, optional
-        How the pictures are stored and applied; by default the scene's.
+        How the pictures are stored and applied. By default the settings of the scene.
     workers : int
-        Processes that draw large pictures together; 0 is one for each core.
+        Number of processes that draw a large picture together. 0 means one per processor core.
 
     Returns
     -------
     list of BakeResult
-        One per camera. The objects show the picture of the last one.
+        One result per camera. The objects show the picture from the last camera.
 
     Raises
     ------
     RosyError
-        If there is nothing to draw or it cannot be drawn; see `read_views`, `select_device`,
-        `picture_steps` and `check_targets`.
+        If there is nothing to draw, or a picture cannot be drawn or applied; see `read_views`,
+        `select_device`, `picture_steps` and `check_targets`.
     """
     look = read_look(scene.rosy) if look is None else look
     drift = drift_in_scene(scene, look, scene.frame_current_final)

@@ -29,7 +29,7 @@ from ..worker.job import Call, Step, Steps, job
 
 @dataclass(frozen=True, eq=False)
 class TextureResult:
-    """The texture of an object.
+    """The texture that was drawn for an object.
 
     Attributes
     ----------
@@ -55,29 +55,31 @@ def bake_texture(
 ) -> Steps[list[TextureResult]]:
     """Draw the fields of objects as textures for their UV maps, and show them on the objects.
 
-    What the textures show, their size and their margin are set in the scene, and the UV map on the object.
-    The scene is changed when all are drawn. A job that is cancelled leaves it unchanged.
+    The settings of the scene decide what the textures show, their size and their margin. Those of each object
+    decide its UV map. The scene is changed only after all textures are drawn. If the job is cancelled before,
+    the scene is unchanged.
 
     Parameters
     ----------
     scene : bpy.types.Scene
     objects : sequence of bpy.types.Object
-        Meshes with a field.
+        Mesh objects with a field and a UV map.
     depsgraph : bpy.types.Depsgraph, optional
-        By default `scene_depsgraph`.
+        Evaluated depsgraph of a view layer of the scene. By default the result of `scene_depsgraph`.
     look : Look, optional
-        By default the scene's.
+        Settings of the drawing. By default the look of the scene.
     settings : OutputSettings, optional
-        How the textures are stored; by default as the pictures of the scene.
+        How the textures are stored. By default the settings of the scene for pictures.
 
     Returns
     -------
     list of TextureResult
+        One result per object.
 
     Raises
     ------
     RosyError
-        If an object has no field or no UV map, or the texture cannot be drawn or stored.
+        If an object has no field or no UV map, or a texture cannot be drawn or stored.
     """
     look = read_look(scene.rosy) if look is None else look
     content = scene.rosy.texture_content.lower()
@@ -137,7 +139,7 @@ def _lights_to_bake(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> l
     Raises
     ------
     RosyError
-        If there are none.
+        If the scene has no lights.
     """
     lights = read_lights(depsgraph, np.eye(4))
     if not lights:

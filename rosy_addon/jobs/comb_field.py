@@ -1,4 +1,4 @@
-"""The job of combing: read the field and guides of a mesh, change them along a stroke, and store them."""
+"""Combing: read the field and the guides of a mesh, change them along a brush stroke, and store them."""
 
 from __future__ import annotations
 
@@ -18,20 +18,25 @@ from ..worker.job import Call, Steps
 
 
 class CombStroke:
-    """A stroke that is being drawn.
+    """A brush stroke that combs the field of a mesh while the user draws it.
+
+    The stroke changes guides, which are directions that the field has to follow. After each extension the
+    field near the stroke is computed again, and can be shown. `settle` computes it everywhere.
 
     Parameters
     ----------
     mesh : bpy.types.Mesh
+        The mesh whose field and guides are changed.
     brush : GuideBrush
+        Settings of the brush.
     reach : float
-        Distance from the strokes at which the field stays what it is, relative to `Surface.extent`.
+        Distance from the stroke beyond which the field hardly changes, relative to `Surface.extent`.
 
     Raises
     ------
     RosyError
-        If the mesh cannot be changed, its field cannot be read or is not a RoSy, or an attribute with the name
-        of the guides has another type.
+        If the mesh cannot be changed, its field cannot be read or its directions are not rotations of one
+        another by equal angles, or an attribute with the name of the guides has another type.
     """
 
     def __init__(self, mesh: bpy.types.Mesh, brush: GuideBrush, reach: float) -> None:
@@ -51,11 +56,14 @@ class CombStroke:
         BAKE_CACHE.evict_over_limit()
 
     def extend(self, points: np.ndarray, pressure: np.ndarray) -> bool:
-        """Extend the stroke by (n, 3) points of the original mesh with (n,) pressures. Return whether the field changed."""
+        """Extend the stroke by (n, 3) points of the original mesh, with (n,) pressures from 0 to 1.
+
+        Return whether the field has changed.
+        """
         return self._follow(self._stroke.extend(points, pressure))
 
     def lift(self) -> bool:
-        """End the line, so that the next point begins another one. Return whether the field changed."""
+        """End the present line: the next point begins a new one. Return whether the field has changed."""
         return self._follow(self._stroke.finish())
 
     def _follow(self, face: np.ndarray) -> bool:
@@ -63,9 +71,9 @@ class CombStroke:
         return len(face) > 0
 
     def show(self) -> None:
-        """Write the present field to the mesh, without its guides.
+        """Write the present field to the mesh as a preview, without the guides.
 
-        Fields that are not stored as one vector on each face are shown when they are stored.
+        It does nothing if the field is not stored as vectors on faces. Such a field is shown after `store`.
         """
         if not is_face_vector_field(self.mesh):
             return
@@ -74,17 +82,17 @@ class CombStroke:
             self._vectors_before = before
 
     def settle(self) -> Steps[None]:
-        """Solve for the whole field."""
+        """Solve for the field on the whole mesh, as part of a job."""
         self._combing.representations = yield Call(Combing.settle, (self._combing,))
 
     def store(self) -> RosyField:
-        """Store the field and its guides. Return the field."""
+        """Store the field and its guides on the mesh. Return the field."""
         field = RosyField(self._degree, self._combing.vectors)
         assign_fields({self.mesh: field})
         store_combed_guides(self.mesh, self._combing.guide_vectors)
         return field
 
     def restore(self) -> None:
-        """Restore the field as it was before `show`."""
+        """Restore the field that the mesh had before the first call of `show`."""
         if self._vectors_before is not None:
             overwrite_vectors(self.mesh, self._vectors_before)

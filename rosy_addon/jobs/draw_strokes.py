@@ -1,4 +1,4 @@
-"""Draw strokes along the fields of a scene, and store them as an object or a file."""
+"""The job of strokes: draw strokes along the fields of a scene, and store them as an object or a file."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from ..worker.job import Call, Step, Steps, job
 
 @dataclass(frozen=True, eq=False)
 class StrokeResult:
-    """The result of drawing strokes.
+    """The strokes that were drawn, and the object or file that has them.
 
     Attributes
     ----------
@@ -36,11 +36,11 @@ class StrokeResult:
         Name of the camera.
     drawing : StrokeDrawing
     obj : bpy.types.Object or None
-        The object with the strokes, or None for a file.
+        The object with the strokes. None if they were written to a file.
     path : Path or None
-        The file, or None for an object.
+        The file with the strokes. None if they were stored in an object.
     notes : tuple of str
-        Warnings to the user.
+        Warnings for the user.
     """
 
     camera: str
@@ -66,31 +66,34 @@ def draw_strokes(
 ) -> Steps[StrokeResult]:
     """Cover the objects of a scene with strokes along their fields.
 
-    The scene is changed when all are drawn. A job that is cancelled leaves it unchanged.
+    The scene is changed only after all strokes are drawn. If the job is cancelled before, the scene is
+    unchanged.
 
     Parameters
     ----------
     scene : bpy.types.Scene
     depsgraph : bpy.types.Depsgraph, optional
-        By default `scene_depsgraph`.
+        Evaluated depsgraph of a view layer of the scene. By default the result of `scene_depsgraph`.
     kind : {"PENCIL", "CURVES", "FILE"}, optional
         Grease Pencil object, curves object or file. By default ``scene.rosy.strokes.kind``.
     path : Path or str, optional
-        Path of the file: .svg for a picture; .ply, .obj or .csv for polylines in world space, see
-        `polyline_file`. In an .obj file, y points up, as Blender exports it. ``//`` is the folder of
-        the .blend file. By default ``scene.rosy.strokes.filepath``.
+        Path of the file, only for the kind "FILE". An .svg file is a picture. A .ply, .obj or .csv file has
+        polylines in world space (`polyline_file`); in an .obj file y points up, as in Blender's exports.
+        ``//`` stands for the folder of the .blend file. By default ``scene.rosy.strokes.filepath``.
     objects : sequence of bpy.types.Object, optional
-        Objects with fields to draw; by default all that have one. Other objects only occlude.
+        Objects whose fields are drawn. By default all visible objects with a field. All other objects only
+        hide what is behind them.
     camera : bpy.types.Object or Camera, optional
-        By default the camera of renders.
+        The camera that sees the strokes. By default the active camera of the scene.
     collection : bpy.types.Collection, optional
-        The collection of a new object. By default that of the scene.
+        The collection to which a new object is added. By default the collection of the scene.
     style : StrokeStyle, optional
-        By default the settings of the scene.
+        How strokes are placed. By default the settings of the scene.
     pen : Pen, optional
-        By default the settings of the scene.
+        Width and colors of strokes. By default the settings of the scene.
     size : (int, int), optional
-        Resolution of the picture that lengths in pixels refer to. By default that of renders.
+        Width and height in pixels of the picture to which lengths in pixels refer. By default the render
+        resolution of the scene.
 
     Returns
     -------
@@ -99,8 +102,8 @@ def draw_strokes(
     Raises
     ------
     RosyError
-        If there is nothing to draw, or it cannot be drawn; see `read_scene`, `resolve_camera` and
-        `draw_instances`. Also if the file cannot be written.
+        If there is nothing to draw, the strokes cannot be drawn (see `read_scene`, `resolve_camera` and
+        `draw_instances`), or the file cannot be written.
     """
     settings = scene.rosy.strokes
     kind = settings.kind if kind is None else kind
@@ -143,13 +146,13 @@ def draw_strokes(
 
 
 def drawing_path(path: Path | str) -> Path:
-    """Return the absolute path of a file of strokes. ``//`` is the folder of the .blend file.
+    """Return the absolute path of a file of strokes. ``//`` stands for the folder of the .blend file.
 
     Raises
     ------
     RosyError
-        If the path starts with ``//`` and the .blend file is not saved, if there is no such kind of
-        file, or if the file cannot be written.
+        If the path starts with ``//`` and the .blend file was never saved, if the suffix is not supported, or
+        if the file cannot be written.
     """
     if str(path).startswith("//") and not bpy.data.filepath:
         raise RosyError(f"{path}: save the .blend file first, or choose an absolute path")
@@ -160,12 +163,12 @@ def drawing_path(path: Path | str) -> Path:
 
 
 def _followed_instance(scene_data: SceneData) -> MeshInstance:
-    """Return the instance whose surface the strokes follow.
+    """Return the only mesh instance with a field, whose surface the strokes will follow.
 
     Raises
     ------
     RosyError
-        If there are several.
+        If there are several such instances.
     """
     instances = [instance for instance in scene_data.instances if instance.field is not None]
     if len(instances) > 1:
@@ -176,7 +179,7 @@ def _followed_instance(scene_data: SceneData) -> MeshInstance:
 
 
 def _notes(scene: bpy.types.Scene, obj: bpy.types.Object, style: StrokeStyle) -> list[str]:
-    """Return warnings to the user about the new object."""
+    """Return warnings for the user about the object with the strokes."""
     has_depth_pass = any(layer.use_pass_z for layer in scene.view_layers)
     if not style.hidden or obj.type == "CURVES" or has_depth_pass:
         return []

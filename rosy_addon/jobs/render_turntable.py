@@ -1,4 +1,4 @@
-"""The job of turntables: read an object, draw it from all sides, and write a video."""
+"""The job of turntables: read an object, draw it from a camera that orbits it, and write a video."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from ..scene.read_view import read_turntable, scene_depsgraph
 from ..scene.video import encode_video
 from ..worker.job import Call, Step, Steps, job
 
-#: Least samples along each side of a pixel: streaks that move must not flicker.
+#: Least number of samples along each side of a pixel, without which moving streaks flicker.
 MIN_SUPERSAMPLING = 2
 
 
@@ -42,29 +42,30 @@ def render_turntable(
     still: bool = False,
     workers: int = 0,
 ) -> Steps[Path]:
-    """Draw an object with its field from all sides, and write the pictures as a video.
+    """Draw an object with its field from a camera that orbits it, and write the pictures as a video.
 
-    A job that is cancelled leaves no file.
+    If the job is cancelled, no file is written.
 
     Parameters
     ----------
     scene : bpy.types.Scene
-        Its look and its lights are used.
+        The scene of the object, whose look and lights are used.
     obj : bpy.types.Object
+        The object, which has a field.
     path : Path
         The .mp4 or .gif file.
     count : int
-        Pictures in a full turn.
+        Number of pictures in a full turn.
     rate : float
         Pictures per second.
     size : (int, int)
-        Pixels.
+        Width and height in pixels.
     view_angles : (float, float)
-        Azimuth of the first view, and elevation, in degrees.
+        Azimuth of the first view and elevation of all views, in degrees.
     still : bool
-        Whether the camera stays at the first view, so that only streaks drift.
+        Whether the camera stays at the first view. Then only the streaks move.
     workers : int
-        Processes that draw large pictures together; 0 is one for each core.
+        Number of processes that draw a large picture together. 0 means one per processor core.
 
     Returns
     -------
@@ -74,7 +75,8 @@ def render_turntable(
     Raises
     ------
     RosyError
-        If the field cannot be read or drawn, nothing moves, or the video cannot be written.
+        If the field cannot be read or drawn, neither the camera nor the streaks move, or the video cannot be
+        written.
     """
     look = read_look(scene.rosy)
     look = replace(look, supersampling=max(look.supersampling, MIN_SUPERSAMPLING))
@@ -92,7 +94,7 @@ def render_turntable(
 def _frame_steps(
     view: ViewInput, device: str, as_gif: bool, still: bool, workers: int
 ) -> Steps[Any]:
-    """Draw the `video_frame` of a view."""
+    """Draw a view as part of a job, and return its `video_frame`."""
     if device == "cpu":
         return (yield Call(draw_frame, (view, as_gif, still, workers)))
     picture = yield from picture_steps(view, device)

@@ -1,4 +1,7 @@
-"""Draw a picture with numpy: project, then compose. A large picture is drawn by several processes."""
+"""Draw a picture with numpy: project the meshes to a G-buffer, then compose the pixels.
+
+A large picture is divided into strips of rows, which several processes draw.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,7 @@ from ..worker.pool import POOL, core_count
 from .marks import with_marks
 from .view_input import ViewInput
 
-#: Share of the progress bar that projecting takes.
+#: Fraction of the progress at which projecting ends and composing begins.
 PROJECTION_SHARE = 0.4
 
 
@@ -38,16 +41,17 @@ def draw_picture(
     Parameters
     ----------
     view : ViewInput
+        What to draw.
     cache : Cache, optional
-        Keeps results for later pictures. A result is reused while the mesh instances are the same
-        objects, and the camera and the settings that it depends on are unchanged. The owner of the
-        cache evicts its entries. Without a cache nothing is kept.
+        Keeps intermediate results for later pictures. A result is reused while the mesh instances are the
+        same Python objects, and the camera and settings that it depends on are unchanged. The caller evicts
+        entries of the cache. Without a cache nothing is kept.
     keep_gbuffers : bool
-        Whether G-buffers and the results computed from them are kept. If not, as for animations,
-        only results that do not depend on the camera are kept.
+        Whether G-buffers, and results that are computed from them, are kept in the cache. If not, as for
+        animations, only results that do not depend on the camera are kept.
     workers : int
-        Processes that draw large pictures together; 0 is one for each core. The pixels do not depend
-        on it.
+        Number of processes that draw a large picture together. 0 means one per processor core. The pixels do
+        not depend on it.
 
     Returns
     -------
@@ -56,7 +60,8 @@ def draw_picture(
     Raises
     ------
     RosyError
-        If an input is invalid, the tone has no source, or there is not enough memory.
+        If an input is invalid, the tone or the values for the color map are missing, or there is not enough
+        memory.
     NothingInViewError
         If no mesh with a field is visible.
     """
@@ -67,7 +72,7 @@ def draw_picture(
 
 
 def bake_picture(view: ViewInput, keep_gbuffers: bool = True, workers: int = 0) -> Picture:
-    """Draw a picture as `draw_picture`, with the cache of bakes in the process that calls it."""
+    """Draw a picture with `draw_picture` and the cache of the calling process, `BAKE_CACHE`."""
     picture = draw_picture(view, BAKE_CACHE, keep_gbuffers=keep_gbuffers, workers=workers)
     BAKE_CACHE.evict_over_limit()
     return picture
@@ -109,7 +114,7 @@ def _draw_fields(
 
 
 def picture_groups(view: ViewInput, workers: int) -> list[Sequence[Strip]]:
-    """Return the strips of a picture, in the groups that are drawn together; see `group_strips`."""
+    """Divide a picture into strips of rows. Return groups of strips to draw together; see `group_strips`."""
     scene = view.look, view.shaded_camera, view.instances
     strips = divide_into_strips(*scene)
     return [strips] if view.draws_thresholds else group_strips(strips, *scene, workers)
@@ -124,14 +129,15 @@ def draw_rows(
     ----------
     view : ViewInput
     strips : sequence of Strip
-        A group of `group_strips`.
+        A group of neighboring strips; see `group_strips`.
     cache : Cache
-        Keeps what does not depend on the camera. By default the cache of this process.
+        Keeps results that do not depend on the camera. By default the cache of this process, `BAKE_CACHE`.
 
     Returns
     -------
     (h, W, 4) float32 ndarray or None
-        The `drawn_rows` of the strips together. Linear RGBA, not premultiplied. None if nothing is visible.
+        Linear RGBA, not premultiplied, of the rows (`Strip.drawn_rows`) of all strips. None if no mesh with a
+        field is visible in them.
     """
     try:
         picture = _draw_strips(view, strips, cache, None)
@@ -145,7 +151,7 @@ def draw_rows(
 def _draw_strips(
     view: ViewInput, strips: Sequence[Strip], cache: Cache | None, gbuffer_cache: Cache | None
 ) -> Picture:
-    """Draw neighboring strips of a picture."""
+    """Draw neighboring strips, and return them as a picture of their rows. Other rows are only context."""
     camera, look = view.shaded_camera, view.look
     scene = view.instances, camera, look.display
     whole, rows = _whole(strips), None
@@ -172,17 +178,17 @@ def _draw_strips(
 
 
 def _whole(strips: Sequence[Strip]) -> Strip:
-    """Return neighboring strips as one."""
+    """Return one strip with the rows of neighboring strips."""
     return Strip(strips[0].start, strips[-1].stop, strips[0].height)
 
 
 def _check_picture_memory(view: ViewInput, groups: Sequence[Sequence[Strip]], workers: int) -> None:
-    """Check that a picture can take the memory that it needs; see `picture_memory`.
+    """Check that there is enough memory to draw a picture; see `picture_memory`.
 
     Raises
     ------
     RosyError
-        If it needs more than `memory.available_memory`.
+        If the picture may need more than `memory.available_memory`.
     """
     camera, samples = view.camera, view.look.supersampling
     each = f" with {samples} x {samples} samples each" if samples > 1 else ""
@@ -194,16 +200,16 @@ def _check_picture_memory(view: ViewInput, groups: Sequence[Sequence[Strip]], wo
 
 
 def picture_memory(view: ViewInput, groups: Sequence[Sequence[Strip]], workers: int) -> float:
-    """Return the bytes that a picture may take at its peak, beyond those that are taken before.
+    """Return an upper estimate of the memory in bytes that drawing a picture takes, beyond the present use.
 
-    It is the finished picture, and in each process the samples of its strips and all triangles. The
-    surfaces are assumed to fill the picture.
+    It is the sum of the finished picture and, for each process, the samples of its strips and all triangles.
+    The surfaces are assumed to fill the picture.
 
     Parameters
     ----------
     view : ViewInput
     groups : sequence of sequence of Strip
-        The strips that are drawn together.
+        The groups of strips that are drawn together.
     workers : int
         Number of processes.
     """

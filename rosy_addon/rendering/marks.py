@@ -1,4 +1,4 @@
-"""What is drawn over the finished picture of a view: arrowheads, then singularities."""
+"""Draw marks over the finished picture of a view: arrowheads, then singularities."""
 
 from __future__ import annotations
 
@@ -21,16 +21,17 @@ from ..core.progress import progress
 from ..projection.gbuffer import MeshInstance
 from .view_input import ViewInput
 
-#: Length of an arrowhead, relative to the least distance between places. The arrowheads of up to five directions
-#: reach 1.75 lengths from their place, outline included, so half a length stays free between arrowheads of neighbors.
+#: Length of an arrowhead, relative to the least distance between positions with arrowheads. At a position
+#: there is one arrowhead per direction. With up to five directions, they and their outlines reach 1.75
+#: lengths from it. So half a length stays free between the arrowheads of neighboring positions.
 ARROW_LENGTH = 0.25
 
-#: Least length of an arrowhead, pixels. In a smaller one, the outline leaves nothing of the fill.
+#: Least length of an arrowhead in pixels. In a smaller one, the outline would cover the whole fill.
 MIN_ARROW_LENGTH = 3.0
 
 
 def has_marks(look: Look) -> bool:
-    """Return whether a look has arrowheads or shows singularities."""
+    """Return whether a look draws arrowheads or singularities over the picture."""
     return bool(look.arrows) or shows_singularities(look)
 
 
@@ -41,15 +42,15 @@ def with_marks(picture: Picture, view: ViewInput, cache: Cache | None = BAKE_CAC
     ----------
     picture : Picture
     view : ViewInput
-        The view that it was drawn for.
+        The view from which the picture was drawn.
     cache : Cache, optional
-        Stores corner fields, and the singularities of fields. By default the cache of bakes in this process,
-        for helpers.
+        Keeps the fields at corners, and the singularities of fields. By default the cache of this process,
+        `BAKE_CACHE`. None: nothing is kept.
 
     Returns
     -------
     Picture
-        The same if there is nothing to draw, or the picture has thresholds.
+        The same picture if there is nothing to draw, or if it has thresholds of ink instead of colors.
     """
     if view.draws_thresholds:
         return picture
@@ -74,7 +75,7 @@ def with_marks(picture: Picture, view: ViewInput, cache: Cache | None = BAKE_CAC
 def view_arrows(
     view: ViewInput, cache: Cache | None = None, *, is_exact: bool = True
 ) -> ArrowMarks:
-    """Find the arrowheads of a view whose look has them; see `arrow_marks`."""
+    """Return the arrowheads of a view. Its look must draw them (`Look.arrows` above 0); see `arrow_marks`."""
     look = pixel_look(view.look, view.camera, view.instances)
     return arrow_marks(
         view.instances,
@@ -89,15 +90,15 @@ def view_arrows(
 
 
 def sequence_key(instances: Sequence[MeshInstance], look: Look) -> PictureKey:
-    """Find what the key of an animation says.
+    """Return the contents of the key (legend) of an animation.
 
-    It is true of all frames: the range of the colors is known only if the look sets it, and the
-    singularities include the hidden ones.
+    It must be right for all frames. So the key has a range of colors only if the look sets it, and it lists
+    the kinds of all singularities, including hidden ones.
 
     Parameters
     ----------
     instances : sequence of MeshInstance
-        The instances of one of the frames.
+        The mesh instances of one of the frames.
     look : Look
 
     Returns

@@ -1,4 +1,4 @@
-"""The input of a renderer for a mesh that is not in a scene, such as a mesh from a file."""
+"""Make the input of a renderer for a mesh that is not in a scene of Blender, such as a mesh from a file."""
 
 from __future__ import annotations
 
@@ -22,14 +22,18 @@ def mesh_instance(
     tone: SurfaceTone | None = None,
     color_values: np.ndarray | None = None,
 ) -> MeshInstance:
-    """Return a mesh in world space, where z points up.
+    """Return a surface as a mesh instance, rotated so that its upward axis is the z axis of world space.
 
     Parameters
     ----------
     surface : Surface
+        The mesh. `Surface.up` is its upward axis.
     field : RosyField, optional
+        Field on the faces. Without a field the mesh only hides what is behind it.
     tone : SurfaceTone, optional
+        How light or dark the surface is drawn.
     color_values : (C,) float32 ndarray, optional
+        Values for the color map, at the C corners of the mesh.
     """
     return MeshInstance(surface, UP_AXIS_MATRIX[surface.up], field, tone, color_values)
 
@@ -44,21 +48,23 @@ def mesh_view(
     reference_luminance: np.ndarray | None = None,
     reference_name: str = "",
 ) -> ViewInput:
-    """Return the view of one mesh that fills the frame.
+    """Return the input for a picture of one mesh, from a camera in whose frame the mesh just fits.
 
     Parameters
     ----------
     instance : MeshInstance
     look : Look
     view_angles : (float, float)
-        Azimuth and elevation in degrees, see `orbit_camera`.
+        Azimuth and elevation of the camera in degrees; see `orbit_camera`.
     size : (int, int)
-        Pixels.
+        Width and height of the picture in pixels.
     perspective : bool
+        Whether the camera is perspective. If not, it is orthographic.
     reference_luminance : (H, W) ndarray, optional
-        Luminance of a picture from the same view, for the tone "picture".
+        Linear luminance of a picture from the same view. A look with the tone "picture" takes its tone from
+        it.
     reference_name : str
-        Name of this picture, for messages.
+        Name of that picture in messages.
 
     Raises
     ------
@@ -74,14 +80,14 @@ def mesh_view(
 
 
 def check_light(light: str, name: str) -> None:
-    """Check that a mesh outside of a scene is not lit by the lights of a scene.
+    """Check that a look or style does not ask for the lights of a scene, for a mesh that is not in one.
 
     Parameters
     ----------
     light : str
         `Look.light` or `StrokeStyle.light`.
     name : str
-        Name of the mesh, for the message.
+        Name of the mesh in the message.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Pictures converted for images of Blender: their colors extend past the silhouette."""
+"""Convert pictures for images of Blender. Colors are extended past the silhouette of the surfaces."""
 
 from __future__ import annotations
 
@@ -11,17 +11,18 @@ from ..image_io.image_data import ImageData, image_of_pixels
 from .draw import bake_picture
 from .view_input import ViewInput
 
-#: Pixels by which colors are extended past the border of the covered area. A render whose
-#: silhouette differs slightly (other subdivision, filtering) then still samples the picture.
+#: Number of pixels by which colors are extended past the border of the covered area. The silhouette in a
+#: render may differ slightly (other subdivision, filtering). There the render then still shows colors of the
+#: picture.
 BLEED_PIXELS = 4
 
-#: Rows that are converted at once.
+#: Number of rows of pixels that are converted at once.
 BLOCK_ROWS = 64
 
-#: Label of all steps.
+#: Label of the progress of the conversion.
 STEP_LABEL = "converting the picture"
 
-#: Color outside of the picture: the linear value of mid gray on screen.
+#: Color of pixels away from surfaces: the linear value of the sRGB gray 0.5.
 NEUTRAL_GRAY = float(to_linear(np.array(0.5, dtype=np.float32)))
 
 #: Fraction of the progress at which the conversion starts.
@@ -31,7 +32,10 @@ CONVERSION_START = 0.95
 def draw_image(
     view: ViewInput, as_float: bool, keep_gbuffers: bool = True, workers: int = 0
 ) -> tuple[Picture, ImageData]:
-    """Draw a picture with numpy and convert it; see `bake_picture` and `picture_image`."""
+    """Draw a picture with numpy and convert it to an image; see `bake_picture` and `picture_image`.
+
+    Return the picture and the image.
+    """
     with progress(0.0, CONVERSION_START):
         picture = bake_picture(view, keep_gbuffers, workers)
     with progress(CONVERSION_START, 1.0):
@@ -39,18 +43,19 @@ def draw_image(
 
 
 def picture_image(picture: Picture, as_float: bool) -> ImageData:
-    """Convert a picture for a Blender image, with bleed; see `with_bleed`.
+    """Convert a picture for an image of Blender, with colors extended past silhouettes; see `with_bleed`.
 
     Parameters
     ----------
     picture : Picture
-        If it has thresholds of ink, their spread is stored, too.
+        If it has thresholds of ink, their spread is stored as the alpha of the image.
     as_float : bool
-        Store linear values in single precision (.exr) instead of 8-bit sRGB (.png).
+        Whether linear values in single precision are stored (for .exr), instead of 8-bit sRGB (.png).
 
     Returns
     -------
     ImageData
+        The bytes of a PNG file, or an array of pixels if `as_float`.
     """
     with progress(0.0, 0.5):
         pixels = _bleed(picture.rgba)
@@ -59,7 +64,7 @@ def picture_image(picture: Picture, as_float: bool) -> ImageData:
         spread[..., 0] = picture.spread
         with progress(0.5):
             spread = _bleed(spread)
-        # Where nothing was drawn, the ink is a mean tone.
+        # Pixels far from surfaces get thresholds that show a medium tone.
         is_blank = spread[..., 3] == 0
         is_blank &= (pixels[..., :3] == NEUTRAL_GRAY).all(axis=2)
         pixels[..., 3] = spread[..., 0]
@@ -69,7 +74,7 @@ def picture_image(picture: Picture, as_float: bool) -> ImageData:
 
 
 def _bleed(rgba: np.ndarray) -> np.ndarray:
-    """Return `with_bleed` of a picture, a few rows at a time."""
+    """Return the result of `with_bleed` for a whole picture, computed a few rows at a time to save memory."""
     height = len(rgba)
     pixels = np.empty(rgba.shape, dtype=np.float32)
     for start in range(0, height, BLOCK_ROWS):
@@ -81,18 +86,19 @@ def _bleed(rgba: np.ndarray) -> np.ndarray:
 
 
 def with_bleed(rgba: np.ndarray) -> np.ndarray:
-    """Return a picture whose border colors are extended by `BLEED_PIXELS` pixels.
+    """Extend the colors of a picture by `BLEED_PIXELS` pixels past the border of the covered area.
 
-    Pixels farther outside are `NEUTRAL_GRAY`. Alpha is not changed: it is the coverage.
+    Pixels farther outside become `NEUTRAL_GRAY`. Alpha is not changed: it is the coverage of the pixel.
 
     Parameters
     ----------
     rgba : (H, W, 4) float32 ndarray
-        Linear.
+        Linear RGBA, not premultiplied.
 
     Returns
     -------
     (H, W, 4) float32 ndarray
+        The extended picture.
     """
     # Pad by one pixel, so that every pixel of the picture has eight neighbors.
     padded = np.pad(rgba, ((1, 1), (1, 1), (0, 0)))

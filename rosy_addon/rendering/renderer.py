@@ -12,21 +12,22 @@ from .view_input import ViewInput
 
 
 class ViewportRenderer:
-    """Draw pictures that stay on the graphics card, and composite them over a 3D view.
+    """A renderer of pictures that stay on the graphics card and are composited over a 3D view.
 
-    Draw items and textures are opaque handles.
+    Draw items (mesh instances on the card) and textures are opaque handles of the renderer.
 
     Attributes
     ----------
     device : Device
         The graphics context of the 3D views (`gpu.device.Device`).
     downscale_factors : (int, int)
-        View pixels per picture pixel, each way: of a preview, and of the final picture.
+        Pixels of the 3D view per pixel of the picture, in each direction: first for previews, then for the
+        final picture.
     needs_occluders : bool
-        Whether the meshes must include those without a field. Otherwise the view's own depth
-        buffer hides what is occluded.
+        Whether meshes without a field must be given too, as they hide others. If not, the renderer uses the
+        depth buffer of the 3D view.
     stand_ins : mapping of str to str
-        LIC methods that it does not have, and the methods that it draws instead.
+        Names of LIC methods that the renderer lacks, and of the methods with which it draws instead.
     """
 
     device: Any
@@ -35,45 +36,45 @@ class ViewportRenderer:
     stand_ins: Mapping[str, str] = {}
 
     def prepare_steps(self, instances: Sequence[MeshInstance], display: str) -> Steps[Any]:
-        """Do what takes long before a picture: compile shaders, prepare meshes and upload them.
+        """Do the slow work before a picture, step by step: compile shaders, prepare meshes and upload them.
 
-        Each step is named before it begins. There are none if everything is prepared.
+        Each yielded step names the work that comes next. No step is yielded if everything is prepared.
         """
         raise NotImplementedError
 
     def upload(self, instances: Sequence[MeshInstance], display: str) -> list[Any]:
-        """Return draw items of mesh instances. Meshes that are on the card are not sent again.
+        """Return draw items of mesh instances. Meshes that are on the card already are not sent again.
 
         Parameters
         ----------
         instances : sequence of MeshInstance
         display : {"smooth", "flat"}
-            `Look.display` of the views that are drawn with them.
+            `Look.display` of the views for which the draw items are used.
         """
         return list(instances)
 
     def covered_pixels(self, items: Sequence[Any], camera: Camera) -> int:
-        """Return an upper bound of the number of pixels that must be drawn."""
+        """Return an upper bound of the number of pixels of a camera that the meshes cover."""
         return camera.width * camera.height
 
     def texture_steps(
         self, items: Sequence[Any], view: ViewInput, target_key: Hashable = None
     ) -> Steps[Any]:
-        """Draw a picture into a texture. Other pictures may be drawn between two steps.
+        """Draw a picture into a texture, step by step. Other pictures may be drawn between two steps.
 
         Parameters
         ----------
         items : sequence
-            Result of `upload`, for the view's instances.
+            Result of `upload` for the instances of the view.
         view : ViewInput
+            What to draw.
         target_key : hashable
-            Pictures with equal keys and sizes share one texture.
+            Pictures with equal keys and sizes are drawn into the same texture.
 
         Returns
         -------
         texture or None
-            (H, W, 4), linear, of the size of `view.camera`. None if no mesh with a field is
-            visible.
+            Linear RGBA of the size of `view.camera`. None if no mesh with a field is visible.
         """
         raise NotImplementedError
 
@@ -85,16 +86,18 @@ class ViewportRenderer:
         Parameters
         ----------
         texture : texture or None
-            Result of `texture_steps`, of any size.
+            Result of `texture_steps`. Its size may differ from that of the 3D view.
         items : sequence
+            The draw items of the picture.
         view : ViewInput
-            With the camera and the clip planes of the 3D view.
+            Its camera and clip planes are those of the 3D view.
         opacity : float
+            Opacity of the picture, 0 to 1.
         """
         raise NotImplementedError
 
     def finish(self) -> None:
-        """Wait until the device has done all work."""
+        """Wait until the graphics card has done all work."""
 
     def release(self) -> None:
-        """Free all resources."""
+        """Free all resources of the renderer."""

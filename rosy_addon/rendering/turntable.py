@@ -1,4 +1,4 @@
-"""Turntables: pictures of one mesh from all sides, written as a video."""
+"""Turntables: draw a mesh from a camera that orbits it, and write the pictures as a video."""
 
 from __future__ import annotations
 
@@ -29,23 +29,24 @@ from ..worker.start import GuardedFolder
 from .draw import bake_picture, draw_picture
 from .view_input import ViewInput
 
-#: Suffixes of videos that can be written.
+#: Suffixes of the video files that can be written.
 VIDEO_SUFFIXES = (".mp4", ".gif")
 
 #: A function that encodes a video. Its arguments are the folder of pictures, their number and size, the
 #: frames per second, and the file.
 Encoder = Callable[[Path, int, tuple[int, int], float, Path], None]
 
-#: What is wrong with an .mp4 for which there is no encoder.
+#: Message if an .mp4 is to be written and there is no encoder.
 NO_ENCODER = "an .mp4 needs ffmpeg or Blender; a .gif needs neither"
 
-#: Bytes of memory of a pixel of a .gif: its colors until the end, and its compressed data.
+#: Memory per pixel of all pictures of a .gif, in bytes: 3 for colors, which are kept until the end, and an
+#: estimate of the compressed data.
 GIF_BYTES = 4.5
 
-#: Points per circle of the hull that is framed.
+#: Number of points on each circle of `_swept_hull`.
 HULL_SAMPLES = 48
 
-#: Share of the progress bar after which the pictures are encoded.
+#: Fraction of the progress at which all pictures are drawn and encoding begins.
 ENCODING_START = 0.97
 
 
@@ -62,24 +63,26 @@ def turntable_views(
 ) -> list[ViewInput]:
     """Return the views of a camera that orbits a mesh once, counter-clockwise.
 
-    Streaks that drift do so by whole cycles, so that the video is a loop.
+    Moving streaks drift by a whole number of their cycles in the video, so that it can be played as a loop.
 
     Parameters
     ----------
     instance : MeshInstance
-        World space, z up.
+        The mesh, in world space with z up.
     look : Look
+        Settings of the drawing.
     count : int
-        Pictures per revolution.
+        Number of views.
     size : (int, int)
-        Pixels.
+        Width and height in pixels.
     view_angles : (float, float)
-        Azimuth of the first view, and elevation, in degrees.
+        Azimuth of the first view and elevation of all views, in degrees.
     perspective : bool
+        Whether the camera is perspective. If not, it is orthographic.
     lights : sequence of Light
-        World space. The camera moves, the lights do not.
+        In world space. The lights do not move with the camera.
     still : bool
-        Whether the camera stays at the first view, so that only streaks drift.
+        Whether the camera stays at the first view. Then only the streaks move.
     """
     points = instance.face_points() if still else _swept_hull(instance.face_points())
     views = []
@@ -93,7 +96,7 @@ def turntable_views(
 
 
 def draw_next(view: ViewInput, cache: Cache, **options: Any) -> Picture:
-    """Draw a picture as `draw_picture`, and evict from the cache what it has not used."""
+    """Draw a picture with `draw_picture`, and remove from the cache what this picture has not used."""
     picture = draw_picture(view, cache, **options)
     cache.evict_unused()
     return picture
@@ -117,23 +120,24 @@ def turntable(
     encode: Encoder | None = None,
     on_picture: Callable[[int], None] | None = None,
 ) -> Path:
-    """Draw views and write them as a video. No file is written before all pictures are drawn.
+    """Draw views and write them as a video. The file is written after all pictures are drawn.
 
     Parameters
     ----------
     draw : function
-        Draws a view.
+        Function that draws a view.
     views : iterable of ViewInput
-        The result of `turntable_views`, or the views of another video.
+        Result of `turntable_views`, or the views of another video.
     count : int
         Number of views.
     path : Path
-        A .gif needs no encoder; an .mp4 does.
+        The file: a .gif, or an .mp4, which needs `encode`.
     fps : float
         Frames per second.
     encode : Encoder, optional
+        Function that encodes an .mp4.
     on_picture : function, optional
-        Called with the number of each picture, from 1, before it is drawn.
+        Function that is called before each picture is drawn, with its number, from 1.
 
     Returns
     -------
@@ -143,7 +147,7 @@ def turntable(
     Raises
     ------
     RosyError
-        If an .mp4 has no encoder, or the video cannot be encoded or written.
+        If `encode` is missing for an .mp4, or the video cannot be encoded or written.
     """
     if encode is None and not is_gif(path):
         raise RosyError(f"{path}: {NO_ENCODER}")
@@ -172,16 +176,16 @@ def video_steps(
     fps: float,
     encode: Callable[..., Steps[None]],
 ) -> Steps[bytes]:
-    """Draw views as part of a job, and return the contents of a video of them.
+    """Draw views as part of a job, and return the contents of a video file of them.
 
     Parameters
     ----------
     draw : function
-        Returns the steps that draw the `video_frame` of a view.
+        Function that returns, for a view, the steps of a job that draws it and returns its `video_frame`.
     views, count, path, fps
-        See `turntable`. Nothing is written to the path; its suffix is the kind of the video.
+        See `turntable`. Only the suffix of the path is used, for the format. Nothing is written to it.
     encode : function
-        Returns the steps that encode an .mp4, given the arguments of an `Encoder`.
+        Function that returns the steps of a job that encodes an .mp4. It has the arguments of an `Encoder`.
     """
     pictures = []
     with nullcontext("") if is_gif(path) else GuardedFolder() as name:
@@ -210,17 +214,17 @@ def video_steps(
 
 
 def is_gif(path: Path) -> bool:
-    """Return whether a video is a .gif."""
+    """Return whether the suffix of a video file is .gif."""
     return path.suffix.lower() == ".gif"
 
 
 def draw_frame(view: ViewInput, as_gif: bool, keep_gbuffers: bool, workers: int) -> Any:
-    """Draw a picture as `bake_picture`, and return its `video_frame`."""
+    """Draw a picture with `bake_picture`, and return its `video_frame`."""
     return video_frame(bake_picture(view, keep_gbuffers, workers).rgba, as_gif)
 
 
 def check_video_path(path: Path) -> None:
-    """Check that a video can be written under a file name.
+    """Check that a file name has a suffix of a video that can be written.
 
     Raises
     ------
@@ -232,19 +236,20 @@ def check_video_path(path: Path) -> None:
 
 
 def video_frame(rgba: np.ndarray, as_gif: bool) -> Any:
-    """Return a picture on white paper, as a video of it is encoded.
+    """Composite a picture over white, and convert it to what the encoder of a video needs.
 
     Parameters
     ----------
     rgba : (H, W, 4) float32 ndarray
-        As `Picture.rgba`.
+        Pixels as in `Picture.rgba`.
     as_gif : bool
+        Whether the video is a .gif. If not, it is an .mp4.
 
     Returns
     -------
     (H, W, 3) uint8 ndarray or bytes
-        Display values for a .gif, with the top row first. Otherwise a PNG file. An .mp4 needs even sides, so
-        it lacks the last row or column of an odd one.
+        For a .gif, sRGB values with the top row first. For an .mp4, the bytes of a PNG file. The sides of an
+        .mp4 must be even, so a last odd row or column is cut off.
     """
     opaque = np.ones_like(rgba)
     opaque[..., :3] = 1 + rgba[..., 3:] * (rgba[..., :3] - 1)
@@ -254,10 +259,10 @@ def video_frame(rgba: np.ndarray, as_gif: bool) -> Any:
 
 
 def _swept_hull(points: np.ndarray) -> np.ndarray:
-    """Return points around everything that a mesh sweeps when it turns about its vertical axis.
+    """Return points, (n, 3), that enclose all positions of a mesh while it turns about its vertical axis.
 
-    The mesh is cut into 32 horizontal slices. Each is enclosed by a cylinder, whose two rims are
-    sampled.
+    The mesh is cut into 32 horizontal slices. Each slice is enclosed by a cylinder. The points are samples of
+    the two rims of each cylinder.
     """
     center = (points.min(axis=0) + points.max(axis=0)) / 2
     radius = np.hypot(points[:, 0] - center[0], points[:, 1] - center[1])

@@ -17,14 +17,14 @@ from ..projection.gbuffer import MeshInstance
 
 @dataclass(frozen=True)
 class Background:
-    """The color behind everything in a 3D view.
+    """The background color of a rectangle in a 3D view.
 
     Attributes
     ----------
     color : tuple of float
         Linear red, green and blue.
     low_corner, high_corner : (float, float)
-        Lower left and upper right of the part that is filled, in normalized device coordinates.
+        Lower left and upper right corner of the rectangle, in normalized device coordinates.
     """
 
     color: tuple[float, float, float]
@@ -39,21 +39,23 @@ class ViewInput:
     Attributes
     ----------
     instances : tuple of MeshInstance
-        Meshes with their fields, tones and numbers, in world space. Those without a field only occlude.
+        Meshes in world space, with their fields, tones and values for the color map. Meshes without a field
+        only hide what is behind them.
     camera : Camera
-        Its size is the size of the finished picture.
+        The camera. Its size is the size of the finished picture.
     look : Look
+        Settings of the drawing.
     lights : tuple of Light
-        Camera space. Used by the light "scene".
+        In camera space. Only used if `Look.light` is "scene".
     reference : ReferenceRender or None
-        Used by the tone "picture".
+        A render from which the tone is taken. Only used if `Look.tone` is "picture".
     clip_planes : (6, 4) float64 ndarray or None
-        World space. The negative side of each plane is cut away.
+        Plane equations in world space. What is on the negative side of a plane is cut away.
     drift : Drift
-        How far streaks have drifted, if the look has flow.
+        How far streaks have drifted, if they move (`Look.flow`).
     draws_thresholds : bool
-        Whether the picture has the thresholds of its ink; see `compose`. Only numpy draws
-        them.
+        Whether the picture has thresholds of ink instead of colors; see `compose`. Only the numpy renderer
+        can draw them.
     """
 
     instances: tuple[MeshInstance, ...]
@@ -67,15 +69,15 @@ class ViewInput:
 
     @property
     def sample_camera(self) -> Camera:
-        """The camera with a pixel for each sample."""
+        """The camera at the resolution of samples: with supersampling, several per pixel of the picture."""
         return self.camera.scaled(self.look.supersampling)
 
     @property
     def samples_per_side(self) -> int:
-        """Samples along each side of a pixel that numpy shades once; 1 if it shades each."""
+        """Samples along each side of a pixel that share one shading; 1 if every sample is shaded."""
         return self.look.supersampling if is_shaded_by_pixel(self.look) else 1
 
     @property
     def shaded_camera(self) -> Camera:
-        """The camera with a pixel for each point that numpy shades: a pixel of the picture, or a sample."""
+        """The camera at the resolution of shading: one pixel per pixel of the picture, or per sample."""
         return self.camera if self.samples_per_side > 1 else self.sample_camera

@@ -1,7 +1,7 @@
 """Records of baked pictures in ``scene.rosy.bakes``: store, list and remove them.
 
 A record holds the image, the material, the camera, and the state of the scene when the picture was drawn.
-Objects that were appended from another file may show a picture without a record.
+An object that was appended from another file may show a picture for which this file has no record.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ from .staleness import SCENE_STATES, difference
 #: Prefix of the names of RoSy's images and materials. The name of the camera follows.
 NAME_PREFIX = "RoSy "
 
-#: `RosyBake.view` of a texture.
+#: Value of `RosyBake.view` in the records of textures.
 TEXTURE_VIEW = "texture"
 
 
-#: The key of a picture that has nothing to explain.
+#: An empty key: the legend of a picture in which there is nothing to explain.
 NO_KEY = PictureKey()
 
 
@@ -81,7 +81,7 @@ class BakeInfo:
 
 
 class RemovalCounts(NamedTuple):
-    """The number of objects that lost their modifier, and of images that were deleted."""
+    """The number of objects from which pictures were removed, and the number of deleted images."""
 
     objects: int
     images: int
@@ -100,28 +100,29 @@ def store_record(
     frame_range: str = "",
     is_texture: bool = False,
 ) -> None:
-    """Store the record of a picture or sequence. An older picture of the same camera is deleted.
+    """Store the record of a picture, sequence or texture. It replaces an earlier record of the same source.
 
     Parameters
     ----------
     scene : bpy.types.Scene
     name : str
-        Name of the camera, of the scene for a sequence from several cameras, or of the object of a texture.
+        Name of the camera. For a sequence from several cameras it is the name of the scene, and for a texture
+        the name of its object.
     image : bpy.types.Image
     material : bpy.types.Material
     source : bpy.types.Object, Camera or None
         The camera; None for a sequence from the cameras that render the frames. For a texture, the object.
     states : mapping of int or None to PictureState
-        What was drawn, by frame; the only key of a single picture is None. The device is the one that
-        has drawn it.
+        The state of the scene from which each frame was drawn, by frame number. A single picture has one
+        state, with the key None. `PictureState.device` is the device that drew the picture.
     size : (int, int)
         Width and height in pixels.
     key : PictureKey
-        What the key of the picture says.
+        Contents of the key (the legend) of the picture.
     frame_range : str
-        First and last frame of a sequence.
+        First and last frame of a sequence. Empty for a single picture.
     is_texture : bool
-        Whether it is a texture of an object.
+        Whether the picture is the texture of an object.
     """
     record = _find_or_add_record(scene, name, source, is_texture)
     _replace_datablocks(record, image, material)
@@ -141,7 +142,7 @@ def store_record(
 def _find_or_add_record(
     scene: bpy.types.Scene, name: str, source: CameraSource | None, is_texture: bool
 ) -> bpy.types.PropertyGroup:
-    """Return the record of a camera, of the scene or of an object with a texture, with its present name."""
+    """Return the record of a camera, scene or textured object, and create it if missing. Update its name."""
     records = scene.rosy.bakes
     camera, view, record = None, "", None
     if is_texture:
@@ -162,9 +163,9 @@ def _find_or_add_record(
 def _find_texture_record(
     scene: bpy.types.Scene, obj: bpy.types.Object
 ) -> bpy.types.PropertyGroup | None:
-    """Return the record of the texture of an object alone; None if there is none.
+    """Return the record of a texture that only this object shows; None if there is none.
 
-    Copies of an object share its texture, until one of them is baked again.
+    A copy of an object shows the same texture, until the object or the copy is baked again.
     """
     for record in scene.rosy.bakes:
         if record.view == TEXTURE_VIEW:
@@ -175,7 +176,7 @@ def _find_texture_record(
 
 
 def _texture_objects(record: bpy.types.PropertyGroup) -> list[bpy.types.Object]:
-    """Return the objects that can show a texture, sorted by name."""
+    """Return the objects whose modifier has the texture of a record, sorted by name."""
     return sorted(
         (
             obj
@@ -194,7 +195,7 @@ def _texture_objects(record: bpy.types.PropertyGroup) -> list[bpy.types.Object]:
 def _replace_datablocks(
     record: bpy.types.PropertyGroup, image: bpy.types.Image, material: bpy.types.Material
 ) -> None:
-    """Give a record a new image and material. Delete the older ones, unless a record has them."""
+    """Set the image and material of a record. Delete its earlier ones, unless another record uses them."""
     old_datablocks = (record.material, record.image)
     record.image, record.material = image, material
     for old_datablock, new_datablock in zip(old_datablocks, (material, image), strict=True):
@@ -212,7 +213,7 @@ def find_record(scene: bpy.types.Scene, name: str) -> bpy.types.PropertyGroup | 
 def camera_name(record: bpy.types.PropertyGroup) -> str:
     """Return the present name of the camera of a record.
 
-    It is the name of the scene if there are several cameras, and the name of the object for a texture.
+    For a sequence from several cameras it is the name of the scene, and for a texture the name of its object.
     """
     if record.view == FRAME_CAMERAS:
         return record.id_data.name
@@ -233,7 +234,10 @@ def _view_from_json(text: str) -> Camera:
 
 
 def _is_recorded(datablock: bpy.types.ID | None) -> bool:
-    """Return whether a record of any scene uses an image or material. Copies of a scene share them."""
+    """Return whether any record uses an image or material.
+
+    Copies of a scene have records of the same images.
+    """
     return any(
         datablock in (record.image, record.material)
         for scene in bpy.data.scenes
@@ -242,7 +246,7 @@ def _is_recorded(datablock: bpy.types.ID | None) -> bool:
 
 
 def recorded_materials(*, textures: bool = True) -> set[bpy.types.Material]:
-    """Return the materials of all records of all scenes, by default including textures."""
+    """Return the materials of the records of all scenes. Those of textures are included by default."""
     return {
         record.material
         for scene in bpy.data.scenes
@@ -263,11 +267,11 @@ def list_bakes(
     ----------
     scene : bpy.types.Scene
     for_panel : bool
-        Do not read a large scene again if nothing has changed, or if it was read a moment ago; see
+        Whether the state of the scene may be a cached one, as panels are redrawn often; see
         `SceneStateCache`.
     automatic_device : callable, optional
-        Returns the device, "cpu" or "gpu", that draws a look if the scene's device is "auto". By
-        default it is the one that has drawn the picture.
+        Returns the device, "cpu" or "gpu", that would draw a look now if the scene's device is "auto". By
+        default, the device that drew the picture is assumed.
     """
     recorded = [record for record in scene.rosy.bakes if record.image is not None]
     shown = {material for obj in baked_objects(scene) for material in shown_materials(obj)}
@@ -306,7 +310,7 @@ def _present_reason(
     state: SceneState,
     automatic_device: Callable[[Look], str] | None,
 ) -> dict[str, str]:
-    """Return the ``stale_reason`` or the ``unknown_reason`` of a picture, if it has one.
+    """Return the ``stale_reason`` or the ``unknown_reason`` of a picture, as an argument of `BakeInfo`.
 
     `state` is the present state of the scene. See `list_bakes` for the other parameters.
     """
@@ -345,8 +349,8 @@ def _present_reason(
 def has_pictures(scene: bpy.types.Scene) -> bool:
     """Return whether there is anything for `remove_bakes` to remove.
 
-    A picture may have no record, as on appended objects, and a record no image, if the user deleted
-    it.
+    Appended objects may show a picture that has no record. If the user has deleted an image, a record
+    without an image is left.
     """
     return bool(scene.rosy.bakes or baked_objects(scene))
 
@@ -367,7 +371,7 @@ def baked_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 
 def _reached_objects(scene: bpy.types.Scene) -> set[bpy.types.Object]:
-    """Return the objects of a scene, and of the collections that it instances."""
+    """Return the objects of a scene, and those of the collections that its objects instance."""
     reached: set[bpy.types.Object] = set()
 
     def add_objects(collection: bpy.types.Collection) -> None:
@@ -382,7 +386,7 @@ def _reached_objects(scene: bpy.types.Scene) -> set[bpy.types.Object]:
 
 
 def remove_bakes(scene: bpy.types.Scene) -> RemovalCounts:
-    """Remove baked pictures, their backdrops and their keys from a scene. Fields and saved files are kept."""
+    """Remove baked pictures, backdrops and keys (legends) from a scene. Fields and saved files are kept."""
     objects = baked_objects(scene)
     with _object_mode(objects):
         for obj in objects:
@@ -397,7 +401,7 @@ def remove_bakes(scene: bpy.types.Scene) -> RemovalCounts:
 
 
 def _clean_unused_meshes() -> None:
-    """Remove applied pictures from the meshes of deleted objects. They still use the materials."""
+    """Remove applied pictures from meshes that no object uses, as the meshes would keep the materials."""
     used_data = {obj.data for obj in bpy.data.objects}
     for mesh in bpy.data.meshes:
         if mesh not in used_data:
@@ -405,7 +409,7 @@ def _clean_unused_meshes() -> None:
 
 
 def _remove_records(scene: bpy.types.Scene) -> int:
-    """Remove the records. Return the number of deleted images."""
+    """Remove all records of a scene, and their images and materials. Return the number of deleted images."""
     datablocks = [(record.image, record.material, record.camera) for record in scene.rosy.bakes]
     scene.rosy.bakes.clear()
     image_count = 0
@@ -413,7 +417,8 @@ def _remove_records(scene: bpy.types.Scene) -> int:
         if not _is_recorded(material):
             delete_owned(material)
         image_count += 0 if _is_recorded(image) else delete_owned(image)
-        # Only the record kept it after it was deleted. Not every reference counts as a user.
+        # A camera that the user has deleted still exists while a record refers to it. `users` does not
+        # count every reference, so the users are looked up.
         if camera is not None and not bpy.data.user_map(subset={camera})[camera]:
             bpy.data.objects.remove(camera)
     return image_count
@@ -421,7 +426,7 @@ def _remove_records(scene: bpy.types.Scene) -> int:
 
 @contextmanager
 def _object_mode(objects: Sequence[bpy.types.Object]) -> Iterator[None]:
-    """Leave edit mode during a block if the meshes of objects have to be changed."""
+    """Context manager: leave edit mode during a block if an edited object has an applied picture."""
     is_editing = bpy.context.mode == "EDIT_MESH" and any(
         obj.mode == "EDIT" and has_applied_picture(obj.data) for obj in objects
     )

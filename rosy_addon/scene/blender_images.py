@@ -28,13 +28,14 @@ def new_image(
     name : str
         Name of the datablock.
     image_data : ImageData
-        A PNG file for 8 bits, pixels for single precision.
+        The bytes of a PNG file if values have 8 bits; an array of pixels if they have single precision.
     as_float : bool
-        Whether linear values are stored in single precision.
+        Whether the image stores linear values in single precision.
     is_color : bool
-        Whether 8-bit values are colors (sRGB), and not data.
+        Whether 8-bit values are colors (sRGB). Otherwise they are data, which Blender does not convert.
     stem : Path, optional
-        Path to save the image at, without the suffix. By default it is packed into the .blend file.
+        Path of the file that is written, without the suffix. By default the image is packed into the .blend
+        file.
 
     Raises
     ------
@@ -78,8 +79,8 @@ def new_tiled_image(
     tiles : mapping of int to ImageData
         The tiles by their UDIM numbers.
     stem : Path, optional
-        Path to save the tiles at, without their numbers and the suffix. By default they are packed into the
-        .blend file.
+        Path of the files that are written, without the tile number and the suffix. By default the tiles are
+        packed into the .blend file.
 
     Raises
     ------
@@ -120,7 +121,7 @@ def _load_tiles(
     image.alpha_mode = "CHANNEL_PACKED"
     image.colorspace_settings.name = "sRGB" if is_color and not as_float else "Non-Color"
     known = {tile.number for tile in image.tiles}
-    for number in known - paths.keys():  # files of an earlier texture
+    for number in known - paths.keys():  # from files of an earlier texture
         image.tiles.remove(image.tiles.get(number))
     for number in paths.keys() - known:
         image.tiles.new(number)
@@ -128,12 +129,12 @@ def _load_tiles(
 
 
 def frame_path(stem: Path, frame: int, as_float: bool) -> Path:
-    """Return the path of one frame of an image sequence, numbered as Blender expects it."""
+    """Return the path of a frame of an image sequence: stem, frame number in at least 4 digits, suffix."""
     return stem.with_name(f"{stem.name}_{frame:04d}{'.exr' if as_float else '.png'}")
 
 
 def write_frame(path: Path, image_data: ImageData) -> None:
-    """Write a frame of an image sequence or a tile: 8-bit .png, or .exr with half floats.
+    """Write a frame of an image sequence, or a UDIM tile, as an 8-bit .png or as an .exr with half floats.
 
     If writing fails, no partial file is left.
 
@@ -184,9 +185,9 @@ def load_sequence(path: Path, as_float: bool) -> bpy.types.Image:
 
 
 def _save_image(image: bpy.types.Image, png: bytes | None, stem: Path) -> None:
-    """Save an image to a file, and make the image use this file. An older file is replaced.
+    """Save an image to a file, and make the image use this file. An existing file is replaced.
 
-    A .png has the given contents. An .exr file is written by Blender.
+    If `png` is given, it is the contents of the file. Otherwise Blender writes an .exr file.
     """
     path = stem.with_name(stem.name + (".exr" if image.is_float else ".png"))
     make_folder(path.parent)
@@ -207,8 +208,8 @@ def _save_image(image: bpy.types.Image, png: bytes | None, stem: Path) -> None:
 
 
 def _blend_relative(path: Path) -> str:
-    """Return a path relative to the .blend file (``//``) if that is saved and on the same drive."""
+    """Return a path relative to the .blend file (``//``), or the path itself if that is not possible."""
     try:
         return bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
     except ValueError:
-        return str(path)  # another drive
+        return str(path)  # the .blend file is on another drive

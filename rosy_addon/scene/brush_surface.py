@@ -1,4 +1,4 @@
-"""The surface under a brush: from points of the evaluated mesh to points of the original mesh."""
+"""The surface under a brush: maps points of the evaluated mesh to points of the original mesh."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from ..field.surface import Surface
 from .meshes import evaluated_mesh, vertex_positions
 from .singularity_points import mesh_of_own_vertices
 
-#: Largest number of faces that get dashes, and the length of a dash, relative to the size of its face.
+#: Largest number of faces on which dashes are drawn. Length of a dash, relative to the square root of twice
+#: the area of the first triangle of its face.
 MAX_DASH_FACES, DASH_LENGTH = 1500, 0.7
 
 #: Finds the (n,) faces closest to (n, 3) points.
@@ -51,10 +52,11 @@ class BrushSurface:
         self._shown_tree: BVHTree | None = None
 
     def cast_ray(self, origin: Vector, direction: Vector) -> np.ndarray | None:
-        """Return the point of the original mesh that a ray hits, (3,) float32 in object space; None for a miss.
+        """Return the point of the original mesh under a ray, (3,) float32 in object space; None for a miss.
 
-        The ray is in world space and hits the evaluated mesh. If modifiers change the faces, the closest point
-        of the original mesh, deformed, is taken.
+        The ray is in world space, and is intersected with the evaluated mesh. The hit is mapped to the
+        original mesh by its barycentric coordinates in a triangle. If modifiers change the faces, that is the
+        triangle of the original mesh, with the vertices moved by the modifiers, that is closest to the hit.
         """
         to_object = self._obj.matrix_world.inverted_safe()
         is_hit, location, _, face = self._evaluated.ray_cast(
@@ -72,7 +74,8 @@ class BrushSurface:
                 )
             location, _, index, _ = self._shown_tree.find_nearest(location)
             triangle = np.array([index])
-        # The point lies in the triangle with the least negative barycentric coordinate.
+        # Of the triangles of the face, choose the one whose smallest barycentric coordinate is largest: the
+        # point lies in it.
         weights = [
             _barycentric(self._shown[vertex[index]], np.array(location)) for index in triangle
         ]
@@ -82,23 +85,28 @@ class BrushSurface:
     def dashes(
         self, vectors: np.ndarray, degree: int, place: np.ndarray, radius: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return short lines along a field around a point, on the evaluated mesh.
+        """Return dashes (short line segments) along a field around a point, on the evaluated mesh.
+
+        For an even degree there is one dash for each pair of opposite members, centered on the face. For an
+        odd degree there is one for each member, from the center of the face.
 
         Parameters
         ----------
         vectors : (F, 3) ndarray
-            One member of each face of the original mesh.
+            One member vector of the field per face of the original mesh, object space.
         degree : int
+            Degree N of the field.
         place : (3,) ndarray
-            Point of the original mesh, object space.
+            Center of the brush: a point of the original mesh, object space.
         radius : float
+            Radius around `place` in which faces get dashes, object space.
 
         Returns
         -------
         ends : (K, 2, 3) float64 ndarray
-            Object space.
+            Both end points of each dash, object space.
         face : (K,) intp ndarray
-            Face of each line.
+            Face of each dash.
         """
         surface = self._surface
         offset = surface.face_center - place
@@ -112,7 +120,7 @@ class BrushSurface:
         directions = [
             np.cos(angle) * member + np.sin(angle) * np.cross(normal, member) for angle in angles
         ]
-        # A face is deformed like its first triangle.
+        # The deformation of a face is taken from its first triangle.
         vertex = surface.triangle_vertex[np.searchsorted(surface.triangle_face, near)]
         half_length = DASH_LENGTH / 2 * np.sqrt(np.abs(_edge_cross(surface.vertices, vertex)))
         center = self._shown_center[near]
@@ -132,7 +140,7 @@ class BrushSurface:
 
 
 def _edge_cross(points: np.ndarray, vertex: np.ndarray) -> np.ndarray:
-    """Return twice the areas of (n, 3) triangles, (n,)."""
+    """Return twice the areas, (n,), of triangles that are given by (n, 3) vertex indices."""
     a, b, c = (points[column] for column in vertex.T)
     cross = np.cross(b - a, c - a)
     return np.sqrt(dot(cross, cross))
@@ -141,7 +149,10 @@ def _edge_cross(points: np.ndarray, vertex: np.ndarray) -> np.ndarray:
 def _deformed(
     direction: np.ndarray, vertex: np.ndarray, rest: np.ndarray, shown: np.ndarray
 ) -> np.ndarray:
-    """Return directions in the planes of (n, 3) triangles after the triangles were deformed, (n, 3)."""
+    """Map (n, 3) directions in the planes of triangles by the linear maps from `rest` to `shown` positions.
+
+    `vertex` has the (n, 3) vertex indices of the triangles. The result is (n, 3).
+    """
     (a, b), (shown_a, shown_b) = (
         (points[vertex[:, 1]] - points[vertex[:, 0]], points[vertex[:, 2]] - points[vertex[:, 0]])
         for points in (rest, shown)

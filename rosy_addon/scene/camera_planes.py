@@ -1,4 +1,4 @@
-"""Planes in front of cameras, which only camera rays see, and backdrops, which are such planes."""
+"""Planes in front of cameras that only camera rays hit. Backdrops and keys (legends) are such planes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .node_builder import new_emissive_material
 from .picture_nodes import shown_materials
 from .read_view import scene_depsgraph
 
-#: Kinds of rays that do not see a plane. Only camera rays do.
+#: Settings of an object that are switched off on planes: all rays except camera rays pass through them.
 HIDDEN_FROM = (
     "visible_diffuse",
     "visible_glossy",
@@ -27,9 +27,10 @@ HIDDEN_FROM = (
 
 
 def pictured_cameras(scene: bpy.types.Scene) -> dict[bpy.types.Object, bpy.types.PropertyGroup]:
-    """Return the cameras that have pictures, with the record of one picture each.
+    """Return the cameras from which pictures were baked, each with the record of one of its pictures.
 
-    A picture that is shown goes first. An animation counts for the active camera of the scene.
+    If a camera has several pictures, one that objects show is preferred. An animation that is
+    drawn from the cameras of its frames counts as one of the active camera of the scene.
     """
     shown = set[bpy.types.Material]().union(*(shown_materials(obj) for obj in scene.objects))
     cameras: dict[bpy.types.Object, bpy.types.PropertyGroup] = {}
@@ -43,12 +44,12 @@ def pictured_cameras(scene: bpy.types.Scene) -> dict[bpy.types.Object, bpy.types
 
 
 def remove_camera_planes(scene: bpy.types.Scene, tag: str) -> list[bpy.types.Image]:
-    """Remove the planes with a tag from a scene, and their meshes and materials.
+    """Remove the planes that have a tag from a scene, and their meshes and materials.
 
     Returns
     -------
     list of bpy.types.Image
-        The images of these materials, if nothing else uses them.
+        The images of the deleted materials that nothing uses now.
     """
     images = []
     for obj in [obj for obj in scene.objects if obj.get(tag)]:
@@ -80,12 +81,12 @@ def add_camera_plane(
     scene : bpy.types.Scene
     camera : bpy.types.Object
     name, tag : str
-        Name of the object, and custom property that marks it.
+        Name of the new object, and name of the custom property by which it is found again.
     corners : (4, 3) float ndarray
-        In the space of the camera, counter-clockwise.
+        Corners of the plane in camera space, counter-clockwise.
     material : bpy.types.Material
     created : list of bpy.types.ID
-        Gets the new datablocks; see `owned_data.rollback_on_error`.
+        The new datablocks are appended; see `datablocks.rollback_on_error`.
     """
     mesh = bpy.data.meshes.new(name)
     created.append(mesh)
@@ -96,7 +97,7 @@ def add_camera_plane(
     obj[tag] = True
     scene.collection.objects.link(obj)
     obj.parent = camera
-    # The scale of a camera does not change what it sees.
+    # A plane would inherit the scale of the camera, which does not change what the camera sees.
     scale = camera.matrix_world.to_scale()
     obj.matrix_parent_inverse = Matrix.Diagonal((*scale, 1.0)).inverted_safe()
     obj.hide_select = True
@@ -112,14 +113,14 @@ def frame_corners(camera: Camera, distance: float, size: float = 1.0) -> np.ndar
     ----------
     camera : Camera
     distance : float
-        From the camera along its view direction, in Blender units.
+        Distance from the camera along its view direction, in Blender units.
     size : float
-        Scale of the frame about its center.
+        Factor by which the frame is scaled about its center.
 
     Returns
     -------
     (4, 3) float64 ndarray
-        In the space of the camera, which looks along its negative z axis.
+        Camera space. The camera looks along its negative z axis.
     """
     depth = camera.projection @ (0.0, 0.0, -distance, 1.0)
     clip = [
@@ -130,22 +131,22 @@ def frame_corners(camera: Camera, distance: float, size: float = 1.0) -> np.ndar
     return corners[:, :3] / corners[:, 3:]
 
 
-#: Custom property on the objects of backdrops.
+#: Custom property that marks the objects of backdrops.
 BACKDROP_TAG = "rosy_backdrop"
 
-#: Distance of a backdrop from the camera, as a fraction of the end of the clip range.
+#: Distance of a backdrop from the camera, as a fraction of the distance of its far clip plane.
 DISTANCE = 0.99
 
-#: Size of a backdrop relative to the frame, so that it also fills the frame if the lens or the size of
-#: renders changes a little.
+#: Size of a backdrop relative to the frame of the camera. It is larger than the frame, to fill it also after
+#: small changes of the lens or of the render size.
 OVERSIZE = 1.5
 
 
 def update_backdrops(scene: bpy.types.Scene) -> None:
     """Replace the backdrops of a scene by the ones that its settings ask for.
 
-    If backdrops are switched on and the look draws lines on paper, every camera with a picture gets a
-    backdrop in the color of the paper. For an animation, the active camera of the scene gets one.
+    If backdrops are switched on and the look is hatching (lines of ink on paper), a backdrop in the color of
+    the paper is added for each of `pictured_cameras`.
     """
     remove_camera_planes(scene, BACKDROP_TAG)
     look = read_look(scene.rosy)

@@ -1,4 +1,4 @@
-"""Cameras of a Blender scene, and its 3D views, as `Camera`."""
+"""Convert the cameras and 3D views of Blender to `Camera`, and find the cameras of a scene."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .datablocks import check_object_type
 #: Camera name of pictures that are drawn from a 3D view.
 VIEW_NAME = "3D View"
 
-#: In place of the view of a record of pictures: its frames are from the cameras that render them.
+#: Value of `RosyBake.view` for a sequence in which each frame was drawn from the camera that renders it.
 FRAME_CAMERAS = "frame cameras"
 
 #: The camera of a picture: a camera object of the scene, or a `Camera`, for example of a 3D view.
@@ -52,9 +52,8 @@ def render_camera(scene: bpy.types.Scene) -> bpy.types.Object:
 def frame_camera(scene: bpy.types.Scene, frame: int) -> bpy.types.Object:
     """Return the camera that renders a frame.
 
-    This is the camera of the last timeline marker, up to the frame, that is bound to a camera. If
-    all such markers come later, it is the camera of the first one. Without such markers, it is the
-    active camera.
+    Timeline markers may be bound to cameras. The last such marker at or before the frame decides. If all of
+    them are later, the first one decides. Without such markers it is the active camera.
 
     Raises
     ------
@@ -64,7 +63,7 @@ def frame_camera(scene: bpy.types.Scene, frame: int) -> bpy.types.Object:
     bound = [marker for marker in scene.timeline_markers if marker.camera is not None]
     if not bound:
         return render_camera(scene)
-    # Blender makes the same choice.
+    # Blender chooses the camera in the same way.
     earlier = [marker for marker in bound if marker.frame <= frame]
     if earlier:
         return max(earlier, key=lambda marker: marker.frame).camera
@@ -72,17 +71,17 @@ def frame_camera(scene: bpy.types.Scene, frame: int) -> bpy.types.Object:
 
 
 def render_size(scene: bpy.types.Scene, percentage: float | None = None) -> tuple[int, int]:
-    """Return the (width, height) of renders in pixels.
+    """Return the (width, height) in pixels at which Blender renders a scene.
 
     Parameters
     ----------
     scene : bpy.types.Scene
     percentage : float, optional
-        Scale, in percent, on top of the scene's own resolution percentage.
+        The size is scaled by it, in percent, after the resolution percentage of the scene.
     """
     render = scene.render
     scale = render.resolution_percentage / 100 * (1 if percentage is None else percentage / 100)
-    # Blender rounds down.
+    # Round down, as Blender does.
     width, height = int(render.resolution_x * scale), int(render.resolution_y * scale)
     return check_size(max(width, 1), max(height, 1))
 
@@ -99,12 +98,12 @@ def camera_of_object(
     Parameters
     ----------
     scene : bpy.types.Scene
-        Its pixel aspect and, by default, its size of renders are used.
+        Its pixel aspect is used, and by default its render size (`render_size`).
     depsgraph : bpy.types.Depsgraph
     camera_object : bpy.types.Object
-        Perspective or orthographic.
+        A perspective or orthographic camera.
     width, height : int, optional
-        Pixels. By default the size of renders.
+        Pixels. By default `render_size`.
 
     Raises
     ------
@@ -141,16 +140,17 @@ def resolve_camera(
     source: CameraSource,
     size: tuple[int, int] | None = None,
 ) -> Camera:
-    """Return the camera of a picture.
+    """Return the view and projection from which a picture is drawn, as a `Camera`.
 
     Parameters
     ----------
     scene : bpy.types.Scene
     depsgraph : bpy.types.Depsgraph
     source : bpy.types.Object or Camera
-        A `Camera` is returned unchanged, with its own size.
+        A `Camera` is returned unchanged, with its own size. An object is converted by `camera_of_object`.
     size : (int, int), optional
-        Pixels; by default the size of renders times the scene's percentage for pictures.
+        Width and height in pixels. By default `render_size`, scaled by the percentage that the user sets for
+        pictures (``scene.rosy.percentage``).
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""Jobs that compute mesh attributes: tangents, the difference of two fields, ambient occlusion.
+"""Jobs that compute mesh attributes: tangents, the angles between two fields, ambient occlusion.
 
-Each reads meshes, makes the numeric call, and stores the result. If something cannot be stored, an error
-is raised before anything is computed or changed.
+Each job reads meshes, computes the values, and stores them. If an attribute cannot be stored, an error is
+raised before anything is computed or changed.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ from .mesh_fields import check_writable, read_mesh_field
 from .meshes import mesh_label, mesh_surface
 from .scene_reader import SceneData, read_scene
 
-#: Default names of the attributes. The difference is in degrees, and NaN where a field is undefined.
+#: Default names of the attributes. The difference is the angle between two fields in degrees; it is NaN where
+#: one of them is undefined.
 TANGENT_ATTRIBUTE = "rosy_tangent"
 DIFFERENCE_ATTRIBUTE = "Difference"
 OCCLUSION_ATTRIBUTE = "Occlusion"
@@ -42,20 +43,21 @@ OCCLUSION_ATTRIBUTE = "Occlusion"
 
 @job
 def mesh_tangents(mesh: bpy.types.Mesh, guiding_angle: float, name: str = "") -> Steps[np.ndarray]:
-    """Compute one direction of a mesh's field on each corner, for the Tangent input of shaders.
+    """Compute one direction of a mesh's field per corner, for the Tangent input of shaders.
 
     Parameters
     ----------
     mesh : bpy.types.Mesh
     guiding_angle : float
-        Angle from the horizontal direction, in radians, of the line that the direction is near to.
+        Decides which member of the field is stored: one near the direction at this angle from the horizontal,
+        in radians.
     name : str
-        Name of the attribute that will store them; see `assign_tangents`.
+        Name of the attribute in which they will be stored; see `assign_tangents`. Only checked here.
 
     Returns
     -------
     (C, 3) float32 ndarray
-        Unit vectors in object space; 0 where the field is undefined.
+        Unit vectors in object space; zero vectors where the field is undefined.
 
     Raises
     ------
@@ -69,7 +71,7 @@ def mesh_tangents(mesh: bpy.types.Mesh, guiding_angle: float, name: str = "") ->
 
 
 def assign_tangents(tangents: Mapping[bpy.types.Mesh, np.ndarray], name: str = "") -> None:
-    """Store tangents on the corners of meshes, all or none of them.
+    """Store tangents on the corners of meshes: on all of them, or on none if one cannot be changed.
 
     Parameters
     ----------
@@ -100,7 +102,7 @@ def _check_tangents_storable(mesh: bpy.types.Mesh, name: str) -> None:
 
 
 def other_field_names(mesh: bpy.types.Mesh) -> list[str]:
-    """Return the names of the attributes that may hold another field of a mesh."""
+    """Return the names of vector attributes of a mesh that may hold a field other than its own."""
     no_fields = (attribute_name(mesh), "position", GUIDE_ATTRIBUTE, TANGENT_ATTRIBUTE)
     return [
         attribute.name
@@ -115,21 +117,21 @@ def other_field_names(mesh: bpy.types.Mesh) -> list[str]:
 def store_difference(
     mesh: bpy.types.Mesh, other: str, name: str = DIFFERENCE_ATTRIBUTE
 ) -> Steps[tuple[str, int, FieldComparison]]:
-    """Compute the angle between the field of a mesh and another one, and store it on the faces.
+    """Compute the angle between the field of a mesh and another field, and store it on the faces.
 
     Parameters
     ----------
     mesh : bpy.types.Mesh
     other : str
-        Attribute of the other field, which has the degree of the mesh's. If empty, the only one that there
-        is.
+        Name of the attribute with the other field. It is read with the degree of the mesh's field. If the
+        name is empty, the only attribute of `other_field_names` is used.
     name : str
-        Attribute that gets the angles in degrees.
+        Name of the attribute in which the angles are stored, in degrees.
 
     Returns
     -------
     other : str
-        Attribute of the other field.
+        Name of the attribute with the other field.
     degree : int
         Degree of both fields.
     comparison : FieldComparison
@@ -137,7 +139,7 @@ def store_difference(
     Raises
     ------
     RosyError
-        If there is no such field, or the attribute cannot be written.
+        If there is no such field, several could be meant, or the attribute cannot be written.
     """
     check_writable(mesh)
     label = mesh_label(mesh)
@@ -169,11 +171,11 @@ def store_occlusion(
     name: str = OCCLUSION_ATTRIBUTE,
     direction_count: int = DIRECTION_COUNT,
 ) -> Steps[None]:
-    """Compute the ambient occlusion of objects, and store it on their meshes for the tone.
+    """Compute the ambient occlusion of objects, and store it on their meshes, for use as their tone.
 
-    Everything that is visible in renders of the view layer occludes. The evaluated mesh is used if
-    the modifiers keep the faces, the original mesh otherwise. Modifiers then copy the attribute to
-    the evaluated mesh.
+    All objects that are visible in renders of the view layer occlude. If the modifiers of an object keep its
+    faces, occlusion is computed on the evaluated mesh, otherwise on the original mesh. It is stored on the
+    original mesh, from which modifiers copy attributes to the evaluated mesh.
 
     Parameters
     ----------
@@ -181,7 +183,7 @@ def store_occlusion(
     objects : sequence of bpy.types.Object
         Original objects with a field.
     name : str
-        Name of the attribute: a float on corners, from 0 (no sky visible) to 1 (all of it).
+        Name of the attribute, a float on corners: the visible fraction of the sky, from 0 to 1.
     direction_count : int
         Number of light directions.
 
@@ -209,9 +211,9 @@ def store_occlusion(
 def _with_original_faces(
     scene_data: SceneData, obj: bpy.types.Object
 ) -> tuple[list[MeshInstance], int]:
-    """Return the mesh instances of a scene, and the index of an object's instance.
+    """Return the mesh instances of a scene, and the index of the instance of an object.
 
-    The instance gets the object's original surface if its modifiers change the faces.
+    If the modifiers of the object change the faces, its instance has the surface of the original mesh.
     """
     instance_index = scene_data.objects.index(obj)
     instances = list(scene_data.instances)

@@ -1,7 +1,7 @@
-"""Datablocks: which ones RoSy created, and which ones are linked, missing or editable.
+"""Datablocks: find out which ones RoSy created, and which are linked, missing or editable.
 
-Datablocks that RoSy creates have a tag, by which they are recognized and deleted. If a library is missing,
-Blender keeps an empty as a placeholder for each of its objects.
+Datablocks that RoSy creates have a custom property, by which they are recognized and deleted. If the library
+of a linked object is missing, Blender keeps a placeholder in its place.
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ from ..core.errors import RosyError
 #: Custom property on every datablock that RoSy created.
 OWNED_TAG = "rosy_made"
 
-#: Custom property on node groups for strokes. Their modifiers go with the strokes.
+#: Custom property on node groups that move strokes with a surface. Their modifiers are removed with the
+#: strokes, not with the pictures.
 STROKES_TAG = "rosy_surface_strokes"
 
-#: Custom property on the objects and materials of keys. They show an image that is not a picture of a field.
+#: Custom property on the objects and materials of keys (legends). Their images are not pictures of a field.
 KEY_TAG = "rosy_key"
 
 
@@ -49,9 +50,10 @@ def user_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
 
 @contextmanager
 def rollback_on_error() -> Iterator[list[bpy.types.ID]]:
-    """Yield a list to which new datablocks are appended.
+    """Context manager: yield a list to which the caller appends new datablocks.
 
-    At the end they are tagged as created by RoSy. If an error is raised, they are deleted instead.
+    At the end of the block they are tagged as created by RoSy. If the block raises an error, they are
+    deleted.
     """
     created: list[bpy.types.ID] = []
     try:
@@ -65,7 +67,7 @@ def rollback_on_error() -> Iterator[list[bpy.types.ID]]:
 
 
 def delete_owned(datablock: bpy.types.ID | None) -> int:
-    """Delete a datablock that RoSy created. Return the number of deleted datablocks, 0 or 1."""
+    """Delete a datablock if RoSy created it. Return the number of deleted datablocks, 0 or 1."""
     if datablock is None or not datablock.get(OWNED_TAG, True):
         return 0
     bpy.data.batch_remove([datablock])
@@ -77,7 +79,7 @@ def delete_unused() -> int:
 
     Return the number of deleted images.
     """
-    # A geometry group uses its material, and that its image and its shader group.
+    # The order matters: a geometry node group uses a material, which uses an image and a shader node group.
     for name in ("node_groups", "materials", "node_groups", "images"):
         unused = [
             block
@@ -89,12 +91,12 @@ def delete_unused() -> int:
 
 
 def check_object_type(obj: bpy.types.Object, kind: Literal["MESH", "CAMERA"]) -> None:
-    """Check that an object is of a type.
+    """Check that an object has a type, and that it is not a placeholder for a missing one.
 
     Raises
     ------
     RosyError
-        If it is of another type, or is missing in its library.
+        If it has another type, or is missing in its library.
     """
     check_not_missing(obj)
     if obj.type != kind:
@@ -115,13 +117,13 @@ def check_not_missing(obj: bpy.types.Object) -> None:
 
 
 def remedy_for_absence(otherwise: str) -> str:
-    """Return what to do if something is not there: relink libraries that are missing, if any."""
+    """Return advice for a message that something is absent: to relink missing libraries, else `otherwise`."""
     paths = [library.filepath for library in bpy.data.libraries if library.is_missing]
     return f"relink the missing library {', '.join(paths)}" if paths else otherwise
 
 
 def has_rosy_properties() -> bool:
-    """Return whether RoSy's properties are registered. They are while the extension is enabled."""
+    """Return whether RoSy's properties are registered, as they are while the extension is enabled."""
     return hasattr(bpy.types.Scene, "rosy") and hasattr(bpy.types.Mesh, "rosy")
 
 

@@ -35,15 +35,15 @@ from .field_attributes import (
 from .mesh_fields import read_mesh_field
 from .meshes import mesh_surface, read_attribute
 
-#: Temporary attribute while a scene is read: the normals of the original faces, to which the field's vectors
-#: are perpendicular. Modifiers copy it to the evaluated mesh.
+#: Attribute that exists only while a scene is read: the normal of each original face, to which the vectors of
+#: the field are perpendicular. Modifiers copy it to the evaluated mesh.
 FACE_NORMAL_ATTRIBUTE = "rosy_face_normal"
 
-#: Temporary attribute while a scene is read: vectors on faces, for a field that is stored in
-#: another form.
+#: Attribute that exists only while a scene is read: the field as vectors on faces, if it is stored in another
+#: form.
 TEMP_FIELD_ATTRIBUTE = "rosy_stand_in"
 
-#: Why the fields of objects cannot be drawn.
+#: The errors of objects whose fields cannot be drawn.
 Errors = dict[bpy.types.Object, RosyError]
 
 
@@ -54,13 +54,13 @@ class FieldLayout:
     Attributes
     ----------
     name : str
-        Name of the attribute with the member vectors, on faces. The ratio of direction k is in the
-        attribute ``name_k`` if there are deviations.
+        Name of the attribute with one member vector per face. If there are deviations, the attribute
+        ``name_k`` has the k-th of the direction ratios per face.
     degree : int
     has_deviations : bool
-        Whether the field has `RosyField.direction_ratios`.
+        Whether the field has `RosyField.direction_ratios`: its directions deviate from equal angles.
     family_count : int
-        See `RosyField`.
+        `RosyField.family_count`.
     """
 
     name: str
@@ -70,12 +70,15 @@ class FieldLayout:
 
     @property
     def attribute_names(self) -> list[str]:
-        """The names of all attributes: the member vectors, then the direction ratios."""
+        """Names of all attributes: first that of the member vectors, then those of the direction ratios."""
         indices = range(self.degree if self.has_deviations else 0)
         return [self.name, *(f"{self.name}_{index}" for index in indices)]
 
     def is_on(self, mesh: bpy.types.Mesh) -> bool:
-        """Return whether an evaluated mesh has all attributes; modifiers may have lost them."""
+        """Return whether an evaluated mesh has all attributes of the layout.
+
+        Modifiers may have dropped some.
+        """
         return all(name in mesh.attributes for name in self.attribute_names)
 
 
@@ -105,18 +108,18 @@ def read_evaluated_field(
     label: str,
     cache: Cache | None = None,
 ) -> RosyField:
-    """Read the field of an evaluated mesh, which may have new faces.
+    """Read the field of an evaluated mesh, whose faces may differ from those of the original mesh.
 
-    Modifiers copy the vector of an original face unchanged to its new faces. A new face may lie in another
-    plane than the original face even before any deformation (`Surface.rest_vertices`), for example if the
-    polygon was not planar. If the mesh has the original normals
-    (`FACE_NORMAL_ATTRIBUTE`), each vector is transported by the minimal rotation between the two
-    normals. Otherwise it is projected to the tangent plane.
+    When modifiers divide a face, they copy its vector unchanged to the new faces. A new face may lie in
+    another plane than the original face, even in the rest shape (`Surface.rest_vertices`), for example if the
+    original polygon was not planar. If the mesh has the normals of the original faces
+    (`FACE_NORMAL_ATTRIBUTE`), each vector is rotated by the smallest rotation from the original normal to the
+    new one. Otherwise it is projected to the plane of the new face.
 
     Parameters
     ----------
     mesh : bpy.types.Mesh
-        Evaluated.
+        Evaluated mesh.
     layout : FieldLayout
     surface : Surface
         Surface of the mesh.
@@ -130,7 +133,7 @@ def read_evaluated_field(
     Raises
     ------
     RosyError
-        If a value is not finite and the policy is "error".
+        If a value is not finite and `nonfinite` is "error".
     """
     source = f"{label}, attribute '{layout.name}'"
     stored_values = field_values(mesh.attributes[layout.name], source, mesh)
@@ -149,7 +152,7 @@ def read_evaluated_field(
     key_parts = values, original_normals, *deviation_pairs, layout, source, nonfinite
     if cache is None or surface.rest_vertices is None:
         return cached_field(cache, surface, build, "evaluated", *key_parts)
-    # The field depends on the rest shape alone. The deformed shape changes from frame to frame.
+    # The field depends only on the rest shape, so the key leaves out the deformed shape of each frame.
     shape = surface.rest_vertices, surface.corner_vertex, surface.face_start
     return cache.get_or_create(("evaluated field", content_hash(*shape, *key_parts)), build)
 
@@ -170,7 +173,7 @@ def _transport(
     report(0.3, label)
     if original_normals is not None:
         original_normals = normalize(original_normals.astype(np.float64))
-        # A mirrored face has the opposite normal. Only its plane matters.
+        # Mirroring reverses the normal of a face. Only the plane matters, so the sign is made equal.
         original_normals *= np.where(dot(original_normals, normals) < 0, -1.0, 1.0)[:, None]
         report(0.4, label)
         vectors = project_to_tangent(vectors, original_normals, 180.0, source, "face")
@@ -188,18 +191,19 @@ def temp_attributes(
     cache: Cache,
     errors: Errors,
 ) -> Iterator[dict[bpy.types.Object, FieldLayout]]:
-    """Add temporary attributes that modifiers copy to evaluated meshes, and remove them at exit.
+    """Context manager: add temporary attributes, which modifiers copy to evaluated meshes.
 
-    The attributes are the rest positions, the normals of the original faces, and vectors on faces
-    for fields that are stored in another form. All fields are checked on the original meshes.
+    They are removed at the end of the block. The attributes are the rest positions, the normals of the
+    original faces, and the fields as vectors on faces if they are stored in another form. All fields are
+    checked on the original meshes.
 
-    If a context that is already open covers the same objects, nothing is added again. For many
-    calls of `read_scene`, keep one context open around them.
+    Inside another such context with the same objects, nothing is added again. Around many calls of
+    `read_scene`, keep one context open.
 
     Parameters
     ----------
     errors : dict of bpy.types.Object to RosyError
-        Gets the errors of the fields that cannot be read; these objects are left out.
+        The errors of fields that cannot be read are added to it. The result leaves these objects out.
 
     Yields
     ------
@@ -247,7 +251,7 @@ def temp_attributes(
 def _prepare_field(
     obj: bpy.types.Object, nonfinite: str, temp_meshes: list[bpy.types.Mesh], cache: Cache
 ) -> FieldLayout:
-    """Return the layout of a field as vectors on faces. Add them temporarily if missing."""
+    """Return the layout of the field of an object as vectors on faces; add temporary attributes if needed."""
     mesh, label = obj.data, f"object '{obj.name}'"
     name = attribute_name(mesh)
     if mesh.is_editmode and is_face_vector_field(mesh):

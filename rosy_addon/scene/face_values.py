@@ -1,4 +1,4 @@
-"""Read vectors and numbers from mesh attributes, for each face or corner."""
+"""Read mesh attributes as one vector per face, or as one scalar per face or corner."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from ..field.validate import apply_nonfinite_policy
 from .field_attributes import describe_type, field_values
 from .meshes import mesh_label, mesh_surface, polygon_arrays
 
-#: Types of attributes with numbers, with their dtypes, and types of attributes with colors.
+#: Blender's types of scalar attributes, with the dtypes of their values; and its types of color attributes.
 NUMBER_TYPES = {"FLOAT": np.float32, "INT": np.int32, "INT8": np.int32, "BOOLEAN": bool}
 COLOR_TYPES = ("FLOAT_COLOR", "BYTE_COLOR")
 
 
 def read_face_vectors(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
-    """Read a vector attribute on faces, points or corners as one vector for each face.
+    """Read a vector attribute on faces, points or corners as one vector per face.
 
-    Vectors on points or corners are averaged over each face. The vectors need not be tangent.
+    Vectors on points or corners are averaged over each face. They are not projected to its plane.
 
     Returns
     -------
@@ -29,7 +29,7 @@ def read_face_vectors(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
     Raises
     ------
     RosyError
-        If the attribute is of another type, or a value is not finite.
+        If the attribute does not hold vectors, or a value is not finite.
     """
     source = f"{mesh_label(mesh)}, attribute '{name}'"
     attribute = mesh.attributes[name]
@@ -46,10 +46,10 @@ def read_face_vectors(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
 
 
 def read_face_scalars(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
-    """Read an attribute or a vertex group as one number for each face.
+    """Read an attribute or a vertex group as one scalar per face.
 
-    The attribute may be a float, an integer, a boolean or a color (its luminance is taken). Values
-    on points or corners are averaged over each face.
+    The attribute may have floats, integers, booleans or colors (of which the linear luminance is taken).
+    Values on points or corners are averaged over each face.
 
     Returns
     -------
@@ -93,7 +93,7 @@ def read_face_scalars(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
 
 
 def filled_attribute(mesh: bpy.types.Mesh, name: str) -> bpy.types.Attribute | None:
-    """Return an attribute; None if it is missing or unreadable."""
+    """Return an attribute of a mesh; None if it is missing, or empty as in edit mode."""
     attribute = mesh.attributes.get(name)
     # In edit mode, attributes are empty.
     return attribute if attribute is not None and len(attribute.data) else None
@@ -112,7 +112,7 @@ def corner_scalars(attribute: bpy.types.Attribute, mesh: bpy.types.Mesh, source:
     Raises
     ------
     RosyError
-        See `scalar_values`.
+        If the type or domain of the attribute is not supported; see `scalar_values`.
     """
     values = scalar_values(attribute, source)
     corner_vertex, face_start = polygon_arrays(mesh)
@@ -133,12 +133,12 @@ def scalar_values(attribute: bpy.types.Attribute, source: str) -> np.ndarray:
     Returns
     -------
     (n,) float64 ndarray
-        One value for each element of the domain.
+        One value per element of the attribute's domain.
 
     Raises
     ------
     RosyError
-        If the attribute is not on faces, points or corners, or is neither a number nor a color.
+        If the attribute is not on faces, points or corners, or has neither numbers nor colors.
     """
     count, data_type = len(attribute.data), attribute.data_type
     if attribute.domain not in ("FACE", "POINT", "CORNER"):

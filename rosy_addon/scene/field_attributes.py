@@ -1,21 +1,21 @@
-"""The mesh attributes that hold fields: their names, forms and values, and the rest shape beside them.
+"""The mesh attributes that hold fields: their names, forms and values, and the rest shape stored with them.
 
-The standard form is a vector attribute (FLOAT_VECTOR) on faces. It holds one member vector of each
-face in object space. Its length is the magnitude; it is zero where the field is undefined. The name
-of the attribute and the degree are in ``mesh.rosy``. These forms can be read too:
+The standard form is a vector attribute (FLOAT_VECTOR) on faces. It holds one member vector of the field per
+face, in object space. The length of the vector is the magnitude of the field; it is zero where the field is
+undefined. The name of the attribute and the degree are in ``mesh.rosy``. These forms can be read too:
 
 - vectors on points or corners, averaged over each face;
 - ``dir0`` ... ``dir{N-1}``: N directions of each face or point, which need not be rotations of one
   another;
 - a float on faces: the angle in radians between the face's first edge and a member,
-  counterclockwise about the normal. The magnitude is 1. NaN means undefined if the policy for
-  values that are not finite allows it.
+  counterclockwise about the normal. The magnitude is 1. NaN is an error, or means undefined, as the parameter
+  `nonfinite` of the reading function says.
 
-Blender moves the vertices of a mesh when a transform or a modifier is applied, when objects are
-joined, and in edit mode, but it does not rotate the vectors of attributes. Two hidden attributes record
-the rest shape, in which a field was stored: the positions of the vertices, and a check of each vector,
-which shows whether the vector is still the stored one. With them a field follows later changes of its
-mesh.
+Blender moves the vertices of a mesh when a transform or a modifier is applied, when objects are joined, and
+in edit mode, but it does not rotate the vectors of attributes. So two hidden attributes record the shape of
+the mesh at the time when a field was stored: the positions of the vertices, and a checksum of each vector.
+The checksum shows whether the vector has been changed since. When the field is read, unchanged vectors are
+rotated with their faces.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ from .meshes import read_attribute
 DEFAULT_FIELD_NAME = "rosy"
 DEFAULT_DEGREE = 4
 
-#: Longest name of a new attribute. Before Blender 5.2, creating one with a longer name fails, and may
-#: rename another attribute.
+#: Largest length of the name of a new attribute, in bytes. Before Blender 5.2, to create an attribute with a
+#: longer name fails, and may rename another attribute.
 MAX_NAME_BYTES = 67
 
-#: Data types of attributes with vectors and with angles.
+#: Blender's data types of attributes with vectors, and of attributes with angles.
 VECTOR_TYPE, ANGLE_TYPE = "FLOAT_VECTOR", "FLOAT"
 
 
@@ -104,12 +104,12 @@ def describe_type(attribute: bpy.types.Attribute) -> str:
 def check_attribute_type(
     mesh: bpy.types.Mesh, name: str, data_type: str, domain: str = "FACE"
 ) -> None:
-    """Check that an attribute can be written: it has a type and domain, or can be created.
+    """Check that an attribute can be written: it has this type and domain, or can be created with them.
 
     Raises
     ------
     RosyError
-        If there is one of another type or domain, or the name is too long for a new one.
+        If an attribute of this name has another type or domain, or the name is too long for a new one.
     """
     attribute = mesh.attributes.get(name)
     if attribute is None and len(name.encode()) > MAX_NAME_BYTES:
@@ -126,12 +126,12 @@ def check_attribute_type(
 def get_or_create_attribute(
     mesh: bpy.types.Mesh, name: str, data_type: str, domain: str = "FACE"
 ) -> bpy.types.Attribute:
-    """Return the attribute of a name, type and domain, and create it if it is missing.
+    """Return the attribute with this name, type and domain, and create it if it is missing.
 
     Raises
     ------
     RosyError
-        If there is one of another type or domain, or Blender does not allow the name.
+        If an attribute of this name has another type or domain, or Blender does not allow the name.
     """
     check_attribute_type(mesh, name, data_type, domain)
     attribute = mesh.attributes.get(name)
@@ -139,7 +139,7 @@ def get_or_create_attribute(
         old_names = set(mesh.attributes.keys())
         attribute = mesh.attributes.new(name, data_type, domain)
         if attribute is None or attribute.name != name:
-            # Blender may have made one of another name, and not say so.
+            # Blender may have created an attribute with another name without an error.
             for new_name in set(mesh.attributes.keys()) - old_names:
                 mesh.attributes.remove(mesh.attributes[new_name])
             raise RosyError(
@@ -151,7 +151,7 @@ def get_or_create_attribute(
 def cached_field(
     cache: Cache | None, surface: Surface, build_field: Callable[[], RosyField], *key_parts: object
 ) -> RosyField:
-    """Return the cached field for a surface and other inputs, or build it."""
+    """Return the field that is cached for a surface and the other parts of a key, or build and cache it."""
     if cache is None:
         return build_field()
     key = surface_key(surface, *key_parts)
@@ -159,34 +159,37 @@ def cached_field(
 
 
 def surface_key(surface: Surface, *key_parts: object) -> Hashable:
-    """Return the key of a result for a surface and other inputs.
+    """Return the cache key of a result that depends on a surface and on other values.
 
-    The result must contain the surface: while it is alive, no other object can have its id.
+    The key contains the id of the surface. So the cached result must keep a reference to the surface: no
+    other object can then have the same id.
     """
     return "field", id(surface), content_hash(*key_parts)
 
 
-#: Coefficients of a vector's components in its check. The check is linear, so it stays right when Blender
-#: interpolates attributes.
+#: Coefficients of the checksum of a vector, which is a linear combination of its components. As it is linear,
+#: it stays right when Blender interpolates attributes.
 CHECK_COEFFICIENTS = np.array([1.0, 1.618034, 2.718282])
 
-#: Largest difference of a check, relative to the length of the vector.
+#: Largest difference between the checksum of an unchanged vector and the stored one, relative to the largest
+#: component of the vector.
 CHECK_TOLERANCE = 1e-4
 
-#: Positions of the vertices and checks of the faces.
+#: Positions of the vertices, (V, 3), and checksums of the vectors of the faces, (F,), when a field was
+#: stored.
 RestShape = tuple[np.ndarray, np.ndarray]
 
 
 def _attribute_names(name: str) -> tuple[str, str]:
-    """Return the names of the positions and the checks of a field's attribute."""
+    """Return the names of the attributes with the positions and the checksums of a field's attribute."""
     return f".{name}_rest", f".{name}_check"
 
 
 def store_rest_shape(mesh: bpy.types.Mesh, name: str) -> None:
-    """Store the present shape beside an attribute of vectors on faces.
+    """Store the present shape of a mesh for an attribute of vectors on faces.
 
-    Nothing is stored if Blender does not allow the names of the attributes. The field is then read
-    as it is stored.
+    Nothing is stored if Blender does not allow the names of the hidden attributes. The vectors then do not
+    follow later changes of the mesh.
     """
     rest_name, check_name = _attribute_names(name)
     vectors = read_attribute(mesh, name, np.float32, 3)
@@ -196,18 +199,18 @@ def store_rest_shape(mesh: bpy.types.Mesh, name: str) -> None:
         get_or_create_attribute(mesh, check_name, ANGLE_TYPE)
     except RosyError:
         return
-    # Written after both exist: a new attribute may move the others in memory.
+    # Values are written after both attributes exist, as a new attribute may move the others in memory.
     mesh.attributes[rest_name].data.foreach_set("vector", positions.ravel())
     mesh.attributes[check_name].data.foreach_set("value", vector_checks(vectors).astype(np.float32))
 
 
 def read_rest_shape(mesh: bpy.types.Mesh, name: str) -> RestShape | None:
-    """Return the positions (V, 3) and checks (F,) beside an attribute; None if there are none.
+    """Return the positions (V, 3) and checksums (F,) stored for an attribute; None if they are missing.
 
     Parameters
     ----------
     mesh : bpy.types.Mesh
-        Original or evaluated.
+        An original or evaluated mesh.
     name : str
         Name of the attribute that was stored with `store_rest_shape`.
     """
@@ -220,22 +223,22 @@ def read_rest_shape(mesh: bpy.types.Mesh, name: str) -> RestShape | None:
 
 
 def follow_mesh(rest_shape: RestShape | None, vectors: np.ndarray, surface: Surface) -> np.ndarray:
-    """Rotate stored vectors as the faces have been rotated since they were stored.
+    """Rotate vectors with their faces, from the shape in which they were stored to the present one.
 
     Parameters
     ----------
     rest_shape : (ndarray, ndarray) or None
         Result of `read_rest_shape`.
     vectors : (F, 3) or (F, N, 3) ndarray
-        The values of the attribute; or of ``dir0`` ... ``dir{N-1}``, if the attribute is ``dir0``.
+        Values of the attribute. If it is ``dir0``, the values of ``dir0`` ... ``dir{N-1}``.
     surface : Surface
-        The surface of the mesh. If it is deformed, the vectors are rotated to its rest shape.
+        The surface of the mesh. If it has a rest shape, the vectors are rotated to this.
 
     Returns
     -------
     ndarray
-        `vectors` itself if nothing has moved. Vectors that were changed since, for example by a script, stay
-        as they are. See `carried_vectors` for other vectors that stay.
+        `vectors` itself if no vertex has moved. A vector that does not fit its checksum, because it was
+        changed since, for example by a script, is not rotated. `carried_vectors` lists further exceptions.
     """
     if rest_shape is None:
         return vectors
@@ -255,7 +258,7 @@ def follow_mesh(rest_shape: RestShape | None, vectors: np.ndarray, surface: Surf
 
 
 def _has_rest_shape(mesh: bpy.types.Mesh, name: str) -> bool:
-    """Return whether both attributes exist as they were stored. Users can convert them to other types."""
+    """Return whether both hidden attributes exist with their types. Users can convert them to other types."""
     types = ("POINT", VECTOR_TYPE), ("FACE", ANGLE_TYPE)
     attributes = (mesh.attributes.get(hidden) for hidden in _attribute_names(name))
     return all(
@@ -265,5 +268,5 @@ def _has_rest_shape(mesh: bpy.types.Mesh, name: str) -> bool:
 
 
 def vector_checks(vectors: np.ndarray) -> np.ndarray:
-    """Return the checks of (F, 3) vectors, (F,) float64."""
+    """Return the checksums of (F, 3) vectors, (F,) float64."""
     return vectors.astype(np.float64) @ CHECK_COEFFICIENTS

@@ -1,4 +1,4 @@
-"""Files and folders: .blend files, the names of picture files, and the folder of the user's presets."""
+"""Files and folders: open and save .blend files, name picture files, and find the user's folders."""
 
 from __future__ import annotations
 
@@ -50,28 +50,29 @@ def save_blend() -> str:
 
 
 def _one_line(error: RuntimeError) -> str:
-    """Return the message of one of Blender's errors as one line."""
+    """Return the message of an error of Blender as one line."""
     lines = [line.removeprefix("Error:").strip() for line in str(error).splitlines()]
     return "; ".join(line for line in lines if line)
 
 
-#: Largest number of bytes of a stem. File systems allow 255 for a whole name, which also has a hash, a
-#: number and suffixes.
+#: Largest number of bytes of the stem of a file name. File systems allow 255 for the whole name, which also
+#: has a hash, a frame number and suffixes.
 MAX_STEM_BYTES = 180
 
-#: Kinds of pictures that are not named in the stem.
+#: Kinds of pictures whose file names do not mention the kind.
 PLAIN_KINDS = ("camera", "scene")
 
 
 def picture_stem(name: str, kind: str = "camera") -> str:
-    """Return the stem of the picture files of a camera or a scene, such as ``RoSy_Camera``.
+    """Return the stem of the names of picture files, such as ``RoSy_Camera`` or ``RoSy_Cube_texture``.
 
-    For an object it names the kind of texture, such as ``RoSy_Cube_texture``.
+    `name` is that of a camera, of a scene or (for a texture) of an object. For a texture, `kind` is its kind,
+    which ends the stem.
 
-    Characters that file systems do not allow become underscores, and long names are cut. If cameras
-    or scenes would then have the same file, also where file systems ignore case, one of them has
-    the plain name, and the stems of the others end in a hash. Which one depends only on the names
-    in the .blend file, so several processes agree.
+    Characters that file systems do not allow become underscores, and long names are cut. Two names may then
+    have the same stem, perhaps except for case, which some file systems ignore. In that case the first of
+    them has the plain stem, and the stems of the others end in a hash. The order depends only on the names in
+    the .blend file, so all processes agree.
     """
     siblings = {("camera", obj.name) for obj in bpy.data.objects if obj.type == "CAMERA"}
     siblings |= {("scene", scene.name) for scene in bpy.data.scenes}
@@ -87,22 +88,22 @@ def picture_stem(name: str, kind: str = "camera") -> str:
 
 
 def _label(kind: str, name: str) -> tuple[str, str]:
-    """Return the name in a stem, and the text that follows it."""
+    """Return both parts of a stem: a name, and the ending that tells the kind of texture."""
     return name, "" if kind in PLAIN_KINDS else f" {kind}"
 
 
 def _clean_stem(name: str, ending: str) -> str:
-    """Return the stem with underscores for characters that are not allowed, cut to its length."""
+    """Return a stem with underscores for characters that are not allowed. Its name is cut if it is long."""
     stem = bpy.path.clean_name(f"RoSy {name}").encode()[:MAX_STEM_BYTES]
     return stem.decode(errors="ignore") + bpy.path.clean_name(ending)
 
 
 def _file_key(stem: str) -> str:
-    """Return a key that is equal for stems that some file system treats as equal."""
+    """Return a key of a stem. Stems that some file system treats as the same name have equal keys."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", stem).casefold())
 
 
-#: Package name of the extension in Blender. This file is two packages below it.
+#: Package name of the extension in Blender: this module is in the package two levels below it.
 EXTENSION_ID = __package__.rsplit(".", 2)[0]
 
 
@@ -126,19 +127,19 @@ def output_folder(scene: bpy.types.Scene) -> Path:
     Raises
     ------
     RosyError
-        If there is none, or it is relative to the .blend file, and this was never saved.
+        If no folder is set, or it is relative to a .blend file that was never saved.
     """
     directory = scene.rosy.directory
     if not directory.strip():
         raise RosyError(f"scene '{scene.name}' has no folder for pictures: choose one (Output)")
     if directory.startswith("//") and not bpy.data.filepath:
         raise RosyError(f"{directory}: save the .blend file first, or choose an absolute path")
-    # Blender would take a path that is relative to the working directory for another one later.
+    # Made absolute, as Blender would later interpret a path relative to the working directory in another way.
     return Path(bpy.path.abspath(directory)).absolute()
 
 
 def is_beside_blend(folder: Path) -> bool:
-    """Return whether a folder is that of the .blend file, or below it. Links are followed."""
+    """Return whether a folder is the folder of the .blend file, or inside it. Symbolic links are resolved."""
     blend = bpy.data.filepath
     return bool(blend) and Path(os.path.realpath(folder)).is_relative_to(
         os.path.realpath(Path(blend).parent)

@@ -1,8 +1,9 @@
-"""Guides that a field follows: strokes, annotations, empties, UV maps, vectors, and combed guides.
+"""Read the guides that a generated field follows: strokes, annotations, empties, vectors and combed guides.
 
-Combed guides are stored on the mesh. The attribute `GUIDE_ATTRIBUTE` (FLOAT_VECTOR on faces) holds one
-member vector of each face in object space, whose length from 0 to 1 is the firmness of the guide. Beside it
-are its rest shape, as for fields, and a check of the field that was made from the guides.
+Combed guides are drawn with a brush and stored on the mesh. The attribute `GUIDE_ATTRIBUTE` (FLOAT_VECTOR on
+faces) holds one vector per face in object space: a member that the field should have there. The length of the
+vector, from 0 to 1, is the firmness of the guide. Two more things are stored with it: its rest shape, as for
+fields (`field_attributes`), and a checksum of the field that was computed from the guides.
 """
 
 from __future__ import annotations
@@ -33,28 +34,28 @@ from .field_attributes import (
 )
 from .meshes import mesh_label, read_attribute, read_collection
 
-#: Object types that can guide a field: those with strokes, and all.
+#: Types of objects with strokes, and all types of objects that can guide a field.
 STROKE_TYPES = ("GREASEPENCIL", "GPENCIL", "CURVE", "CURVES")
 GUIDE_TYPES = (*STROKE_TYPES, "EMPTY")
 
-#: Points sampled on each segment of a Bézier curve, including both ends.
+#: Number of points that are sampled on each segment of a Bézier curve, including both ends.
 BEZIER_SEGMENT_SAMPLES = 12
 
-#: Position, axis and radius of an empty.
+#: Position, axis and radius of influence of an empty that guides a field.
 EmptyGuide = tuple[np.ndarray, np.ndarray, float]
 
 
 def guide_objects(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
-    """Return the objects that can guide a field."""
+    """Return those of the objects that can guide a field, by their types."""
     return [obj for obj in objects if obj.type in GUIDE_TYPES]
 
 
 def guide_strokes_and_empties(
     objects: Iterable[bpy.types.Object], owner: bpy.types.Object
 ) -> tuple[list[np.ndarray], list[EmptyGuide]]:
-    """Read guide objects as strokes and empties, in the space of another object.
+    """Read guide objects as strokes and empties, in the space of the object whose field they guide.
 
-    Strokes come from Grease Pencil (the current frame of visible layers), curves and hair curves.
+    Strokes are read from Grease Pencil (the current frame of visible layers), curves and hair curves.
     An empty guides the field along its z axis, within its display size.
 
     Parameters
@@ -100,8 +101,8 @@ def guide_strokes_and_empties(
 def annotation_strokes(scene: bpy.types.Scene, owner: bpy.types.Object) -> list[np.ndarray]:
     """Read the annotations of a scene as strokes, in the space of an object.
 
-    They are the strokes of the current frame of visible layers that are placed in the scene. Notes
-    that are placed on the view, and rulers, are left out.
+    The strokes of the current frame of visible layers are read. Strokes that are placed on the view instead
+    of in the scene, and rulers, are left out.
 
     Parameters
     ----------
@@ -132,7 +133,7 @@ def annotation_strokes(scene: bpy.types.Scene, owner: bpy.types.Object) -> list[
         for frame in frames
         if frame is not None
         for stroke in frame.strokes
-        # Blender 4.3 does not tell where a stroke has its coordinates.
+        # Some versions (4.3) do not tell whether a stroke is placed in the scene or on the view.
         if len(stroke.points) > 1 and getattr(stroke, "display_mode", "3DSPACE") == "3DSPACE"
     ]
     strokes = [stroke for stroke in strokes if np.isfinite(stroke).all()]
@@ -154,7 +155,7 @@ def _annotation_frame(layer: Any, number: int) -> Any | None:
 
 
 def _world_to_object(obj: bpy.types.Object) -> np.ndarray:
-    """Return the (4, 4) matrix from the world to the space of an object."""
+    """Return the (4, 4) matrix from world space to the space of an object."""
     try:
         return np.linalg.inv(np.array(obj.matrix_world, dtype=np.float64))
     except np.linalg.LinAlgError:
@@ -162,9 +163,9 @@ def _world_to_object(obj: bpy.types.Object) -> np.ndarray:
 
 
 def guide_vectors(mesh: bpy.types.Mesh, name: str, surface: Surface) -> np.ndarray:
-    """Read a vector attribute as one vector for each face; see `read_face_vectors`.
+    """Read a vector attribute as one guide per face; see `read_face_vectors`.
 
-    Vectors that RoSy has stored are rotated with the faces; see `follow_mesh`.
+    If RoSy has stored the attribute, its vectors have followed later changes of the mesh; see `follow_mesh`.
 
     Parameters
     ----------
@@ -181,7 +182,7 @@ def guide_vectors(mesh: bpy.types.Mesh, name: str, surface: Surface) -> np.ndarr
     Raises
     ------
     RosyError
-        If there is no attribute of this name, it is of another type, or a value is not finite.
+        If there is no attribute of this name, it does not hold vectors, or a value is not finite.
     """
     if not name or name not in mesh.attributes:
         raise RosyError(
@@ -224,13 +225,13 @@ def _split_strokes(attributes, offsets) -> list[np.ndarray]:
         if "position" in attributes
         else ()
     )
-    if not len(points):  # the offsets of an empty drawing cannot be read
+    if not len(points):  # Blender cannot read the offsets of an empty drawing
         return []
     return np.split(points, read_collection(offsets, "value", np.int32)[1:-1])
 
 
 def _spline_points(spline: bpy.types.Spline) -> np.ndarray:
-    """Return the points of a spline, (n, 3). For NURBS these are the control points."""
+    """Return the points of a spline, (n, 3): samples of a Bézier spline, control points of a NURBS."""
     if spline.type != "BEZIER":
         points = _read_coordinates(spline.points, "co", 4)[:, :3]
         return np.concatenate([points, points[:1]]) if spline.use_cyclic_u else points
@@ -252,15 +253,15 @@ def _read_coordinates(collection, key: str, columns: int) -> np.ndarray:
     return read_collection(collection, key, np.float32, columns).astype(np.float64)
 
 
-#: Name of the attribute with the guides, and of the attribute with the checks of the field.
+#: Name of the attribute with the combed guides, and of the attribute with the checksums of the field.
 GUIDE_ATTRIBUTE, FIELD_CHECK_ATTRIBUTE = "rosy_guides", ".rosy_guides_field"
 
-#: Least firmness of the guides of strokes. Guides that only keep the rest of the field have less.
+#: Least firmness of guides that come from strokes. Weaker guides only keep the rest of the field as it was.
 STROKE_FIRMNESS = 0.25
 
 
 def read_combed_guides(mesh: bpy.types.Mesh, surface: Surface) -> np.ndarray:
-    """Read the guides of a mesh.
+    """Read the combed guides of a mesh.
 
     Parameters
     ----------
@@ -271,7 +272,8 @@ def read_combed_guides(mesh: bpy.types.Mesh, surface: Surface) -> np.ndarray:
     Returns
     -------
     (F, 3) float64 ndarray
-        Zero on faces without a guide, and where something else has changed the field since.
+        One vector per face. It is zero on faces without a guide, and where the field was changed by something
+        other than combing since the guides were stored.
     """
     guides = np.zeros((surface.face_count, 3))
     values = read_attribute(mesh, GUIDE_ATTRIBUTE, np.float32, 3)
@@ -296,12 +298,12 @@ def check_guides_storable(mesh: bpy.types.Mesh) -> None:
 
 
 def store_combed_guides(mesh: bpy.types.Mesh, guides: np.ndarray) -> None:
-    """Store (F, 3) guides, after the field that was made from them.
+    """Store (F, 3) combed guides. Call it after the field that was computed from them is stored.
 
     Raises
     ------
     RosyError
-        If the mesh has an attribute of the same name and another type.
+        If the mesh has an attribute with the name of the guides and another type.
     """
     check_guides_storable(mesh)
     attribute = get_or_create_attribute(mesh, GUIDE_ATTRIBUTE, VECTOR_TYPE)

@@ -1,8 +1,9 @@
-"""The node group *RoSy Hatching*, which draws the hatching of a tone from thresholds.
+"""The node group *RoSy Hatching*, which draws hatching of a given tone from an image of thresholds.
 
-It compares the thresholds of up to three lines (`compositor.ink_from_thresholds`) with the coverages that a tone
-requires. Its numbers are those of `compositor.hatching`, so it draws what a picture of the same light
-shows. It has only nodes of Blender, and works where RoSy is not installed.
+A tone requires that each of up to three layers of hatching lines covers a part of the paper. The group
+compares the thresholds of the layers (`compositor.ink_from_thresholds`) with these coverages. It computes the
+same formulas as `compositor.hatching`, so it draws what a picture in the same light shows. All of its nodes
+are Blender's own, so it works where RoSy is not installed.
 """
 
 from __future__ import annotations
@@ -32,12 +33,12 @@ from .node_builder import NodeBuilder, Number
 #: Name of the node group.
 GROUP_NAME = "RoSy Hatching"
 
-#: Names of the inks of the lines, in their order.
+#: Names of the inputs with the ink colors of the three layers of lines, in the order of the layers.
 INK_NAMES = ("Ink", "Second Ink", "Third Ink")
 
 
 class _Input(NamedTuple):
-    """An input of the group."""
+    """An input socket of the node group, with its default and its range."""
 
     name: str
     kind: str
@@ -49,7 +50,7 @@ class _Input(NamedTuple):
 
 _COLOR, _FLOAT, _FACTOR = "NodeSocketColor", "NodeSocketFloat", "FACTOR"
 
-#: The inputs of the group, in the order of its panel.
+#: The inputs of the group, in the order in which the node shows them.
 _INPUTS = (
     _Input("Thresholds", _COLOR, (1.0, 1.0, 1.0, 1.0), "Color of the texture of thresholds"),
     _Input("Spread", _FLOAT, 1.0, "Alpha of the texture of thresholds"),
@@ -71,7 +72,7 @@ _INPUTS = (
 
 
 def hatching_group(created: list[bpy.types.ID]) -> bpy.types.NodeTree:
-    """Return the node group, which is made once for a file. A new one is appended to a list."""
+    """Return the node group of this file. If it is missing, it is created and appended to `created`."""
     for group in bpy.data.node_groups:
         if (
             group.bl_idname == "ShaderNodeTree"
@@ -85,14 +86,14 @@ def hatching_group(created: list[bpy.types.ID]) -> bpy.types.NodeTree:
 
 
 def set_hatching_look(node: bpy.types.Node, look: Look, line_count: int) -> None:
-    """Set the inputs of a node of the group to the settings of a look.
+    """Set the inputs of a node with this group to the settings of a look.
 
     Parameters
     ----------
     node : bpy.types.Node
     look : Look
     line_count : int
-        Number of lines through a point.
+        Number of undirected directions of the field through a point.
     """
     layers, inks = layer_inks(look, line_count)
     ramp = look.ink_color_light if has_tone_inks(look) else look.ink_color
@@ -147,7 +148,7 @@ def _build_hatching(build: NodeBuilder, source: Any) -> None:
 
     tone = _tone(number)
     paper = luminance(source["Paper"])
-    # If the ink is lighter than the paper, both are complemented: lighter tones need more ink.
+    # If the ink is lighter than the paper, lighter tones need more ink. Luminances are then complemented.
     is_light = luminance(source["Ink"]) > paper
 
     def complement_if_light(value: Number) -> Number:
@@ -165,7 +166,7 @@ def _build_hatching(build: NodeBuilder, source: Any) -> None:
         build.mix("RGBA", highlights.socket, source[name], source["Highlight Color"])
         for name in INK_NAMES
     ]
-    # The part of the light that the ink would leave, if it could be black.
+    # For each ink, the fraction of light that black ink would have to leave to give the same tone.
     left = [
         1 - ((1 - required) / (1 - transmittance(ink)).at_least(MIN_TRANSMITTANCE)).at_most(1.0)
         for ink in inks
@@ -184,7 +185,7 @@ def _build_hatching(build: NodeBuilder, source: Any) -> None:
     softness = build.math("POWER", MIN_SOFTNESS / MAX_SOFTNESS, source["Crispness"])
     edge_factor = Number(build, softness) * (DENSITY_FACTOR * MAX_SOFTNESS)
     bare, color, ink_color = None, source["Paper"], inks[-1]
-    # The lines that come first are on top of the others.
+    # The first layer is drawn last, on top of the others.
     for layer, threshold in reversed(list(enumerate(channels))):
         share = begun[layer] / total
         covered = layer_coverage(left[layer], share, threshold, filtered, edge_factor)
@@ -200,12 +201,12 @@ def _build_hatching(build: NodeBuilder, source: Any) -> None:
 
 
 def _tone(number: Any) -> Number:
-    """Apply the strength of the shading and the tone curve."""
+    """Return the input Tone after the strength of the shading and the tone curve."""
     shading = number("Shading")
     tone = 1 - shading + shading * number("Tone")
     black, white = number("Black"), number("White")
     difference = white - black
-    # A range of 0 is replaced by a small one.
+    # If black and white are the same tone, a small range is taken.
     is_small = (difference * difference) > MIN_TONE_RANGE**2
     difference = difference * is_small + (1 - is_small) * MIN_TONE_RANGE
     stretched = ((tone - black) / difference).at_least(0.0)

@@ -1,4 +1,4 @@
-"""Keys, which explain a picture, on a plane in front of its camera: color scale, dots, scale bar, text."""
+"""Keys (legends) on a plane in front of a camera: color scale, kinds of singularities, scale bar, caption."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ from .meshes import read_collection, vertex_positions
 from .node_builder import new_empty_material
 from .read_view import scene_depsgraph
 
-#: Distance of a key from the camera, in the starts of the clip range.
+#: Distance of the plane of a key from the camera, as a multiple of the distance of the near clip plane.
 DISTANCE = 1.02
 
-#: Longest side of the image of a key, pixels. For larger renders it is enlarged.
+#: Longest side of the image of a key, in pixels. For larger renders the image is scaled up.
 MAX_SIDE = 4096
 
 #: Largest length of a scale bar, as a fraction of the width of the frame.
@@ -43,15 +43,15 @@ MAX_SCALE = 0.2
 #: Meters in a foot and in an inch.
 FOOT, INCH = 0.3048, 0.0254
 
-#: Linear luminance below which a background is dark.
+#: Linear luminance below which a background counts as dark.
 DARK_BACKGROUND = 0.18
 
 
 def update_keys(scene: bpy.types.Scene) -> None:
     """Replace the keys of a scene by the ones that its settings ask for.
 
-    If keys are switched on, every camera with a picture gets one. For an animation, the active camera of
-    the scene gets one. A key explains the picture as it was baked.
+    If keys are switched on, a key is added for each of `pictured_cameras`. It explains the picture as it was
+    baked, whatever the settings are now.
     """
     for image in remove_camera_planes(scene, KEY_TAG):
         delete_owned(image)
@@ -62,7 +62,7 @@ def update_keys(scene: bpy.types.Scene) -> None:
         try:
             _add_key(scene, camera, record, fonts)
         except RosyError:
-            continue  # the camera has become a panoramic one since then
+            continue  # the camera was made panoramic after the bake
 
 
 def _add_key(
@@ -71,7 +71,7 @@ def _add_key(
     record: bpy.types.PropertyGroup,
     fonts: FontShapes,
 ) -> None:
-    """Add the plane of a key, parented to a camera, if the key shows anything."""
+    """Add a plane with a key, parented to a camera. Nothing is added if the key would be empty."""
     view = camera_of_object(scene, scene_depsgraph(scene), camera)
     picture = _draw(scene, view, record, fonts)
     if picture is None:
@@ -85,7 +85,7 @@ def _add_key(
         material = _new_material(name, image, scene.rosy.emission or 1.0)
         created.append(material)
         obj = add_camera_plane(scene, camera, name, KEY_TAG, corners, material, created)
-    # Views with Solid shading would show the plane, and not what is behind it.
+    # With Solid shading, 3D views would draw the plane opaque, so only its bounds are drawn.
     obj.display_type = "BOUNDS"
     for probe in ("hide_probe_volume", "hide_probe_sphere", "hide_probe_plane"):
         setattr(obj, probe, True)
@@ -97,7 +97,7 @@ def _draw(
     record: bpy.types.PropertyGroup,
     fonts: FontShapes,
 ) -> Picture | None:
-    """Draw a key as a picture of the size of the frame; None if it shows nothing."""
+    """Draw a key as a picture that fills the frame of the camera. Return None if the key would be empty."""
     settings = scene.rosy
     shrink = min(1.0, MAX_SIDE / max(view.width, view.height))
     width, height = (max(round(side * shrink), 1) for side in (view.width, view.height))
@@ -123,7 +123,7 @@ def _draw(
 
 
 def _lines(text: str) -> str:
-    """Return a text that was typed, with line breaks in place of ``\\n``."""
+    """Return a text with line breaks where the user has typed ``\\n``."""
     return text.replace("\\n", "\n")
 
 
@@ -140,14 +140,14 @@ def _scale_bar(scene: bpy.types.Scene, view: Camera, width: int) -> tuple[float,
 
 
 def round_length(largest: float, units: bpy.types.UnitSettings) -> tuple[float, str]:
-    """Return the largest round length up to a length, and its label in the units of a scene.
+    """Return the largest round length that is at most a given one, and its label in the units of a scene.
 
-    Round are 1, 2 and 5 times a power of ten: of meters, of feet or inches, or of Blender units.
+    Round lengths are 1, 2 and 5 times a power of ten, in meters, feet, inches or Blender units.
 
     Parameters
     ----------
     largest : float
-        Blender units.
+        Largest allowed length in Blender units.
     units : bpy.types.UnitSettings
 
     Returns
@@ -170,7 +170,7 @@ def round_length(largest: float, units: bpy.types.UnitSettings) -> tuple[float, 
 
 
 def _key_colors(scene: bpy.types.Scene) -> KeyColors:
-    """Return the colors of a key: dark plates for a background that is known to be dark."""
+    """Return the colors of a key: dark panels if the background is known to be dark, light ones otherwise."""
     look = read_look(scene.rosy)
     if scene.rosy.backdrop and is_hatched(look):
         background = to_linear(from_hex(look.paper_color))
@@ -183,7 +183,7 @@ def _key_colors(scene: bpy.types.Scene) -> KeyColors:
 
 
 def _world_color(world: bpy.types.World | None) -> np.ndarray | None:
-    """Return the (3,) linear color of a world; None if it has more than one."""
+    """Return the (3,) linear color of a world; None if nodes vary it. Without a world it is black."""
     if world is None:
         return np.zeros(3, dtype=np.float32)
     nodes = world.node_tree.nodes if world.node_tree is not None and world.use_nodes else ()
@@ -197,13 +197,13 @@ def _world_color(world: bpy.types.World | None) -> np.ndarray | None:
 
 
 def _new_material(name: str, image: bpy.types.Image, strength: float) -> bpy.types.Material:
-    """Create a material that emits an image, with its transparency. It is transparent from behind."""
+    """Create a material that emits an image with its alpha. Seen from behind it is fully transparent."""
     material, build = new_empty_material(name)
     material[KEY_TAG] = True
     material.diffuse_color = (1.0, 1.0, 1.0, 0.0)
     material.use_backface_culling = True
     material.surface_render_method = "BLENDED"
-    # A quad without a UV map: its generated coordinates run from corner to corner.
+    # The plane has no UV map, but its generated coordinates run from 0 to 1 between its corners.
     image_node = build.frame_image(image, build("ShaderNodeTexCoord").outputs["Generated"])
     color = image_node.outputs["Color"]
     emission = build("ShaderNodeEmission", {"Color": color, "Strength": strength})
@@ -217,44 +217,47 @@ def _new_material(name: str, image: bpy.types.Image, strength: float) -> bpy.typ
     return material
 
 
-#: Points of each curve of a letter, for large letters too.
+#: Number of points on each curve segment of a letter, enough for large letters.
 CURVE_RESOLUTION = 6
 
 
 class FontShapes:
-    """Lines of text as triangles, in Blender's own font. Each text is read once."""
+    """A cache of texts as triangles, in Blender's built-in font."""
 
     def __init__(self) -> None:
         self._shapes: dict[str, np.ndarray] = {}
 
     def triangles(self, text: str) -> np.ndarray:
-        """Return the (n, 3, 2) triangles of a text of size 1, from its left end and baseline."""
+        """Return (n, 3, 2) triangles of a text of font size 1.
+
+        Its left end and baseline are at the origin.
+        """
         if text not in self._shapes:
             self._shapes[text] = _text_triangles(text)
         return self._shapes[text]
 
     def width(self, text: str) -> float:
-        """Return the width of a text of size 1."""
+        """Return the width of a text of font size 1."""
         triangles = self.triangles(text)
         return float(triangles[..., 0].max()) if len(triangles) else 0.0
 
 
 def _text_triangles(text: str) -> np.ndarray:
-    """Return the (n, 3, 2) triangles of a text, moved so that the least x is 0."""
+    """Return (n, 3, 2) triangles of a text of font size 1, moved so that the smallest x is 0."""
     fonts = set(bpy.data.fonts)
     curve = bpy.data.curves.new("RoSy text", type="FONT")
     created: list[bpy.types.ID] = [curve]
     try:
         curve.body = text
         curve.resolution_u = CURVE_RESOLUTION
-        obj = bpy.data.objects.new(curve.name, curve)  # in no scene
+        obj = bpy.data.objects.new(curve.name, curve)  # not linked to any scene
         created.insert(0, obj)
         mesh = obj.to_mesh()
         mesh.calc_loop_triangles()
         points = vertex_positions(mesh)[:, :2].astype(np.float64)
         triangles = points[read_collection(mesh.loop_triangles, "vertices", np.int32, 3)]
     finally:
-        # The mesh goes with the object. The font may have come with the curve.
+        # Removing the object also frees its mesh. Creating the curve may have loaded the font.
         bpy.data.batch_remove([*created, *(set(bpy.data.fonts) - fonts)])
     if len(triangles):
         triangles[..., 0] -= triangles[..., 0].min()

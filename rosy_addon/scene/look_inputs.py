@@ -1,7 +1,8 @@
-"""What a look draws from besides fields: tones, numbers for the color map, and reference renders.
+"""Read the inputs of a look other than fields: tones, values for the color map, and reference renders.
 
-A `ReadRequest` says what a look needs of the meshes. Tones come from mesh attributes or from images on
-meshes, numbers from mesh attributes, and reference renders from files.
+A `ReadRequest` says which of them a look needs from the meshes. Tones are read from mesh attributes or from
+images that are mapped to meshes, values for the color map from mesh attributes, and reference renders from
+files.
 """
 
 from __future__ import annotations
@@ -30,13 +31,14 @@ from .meshes import read_uvs
 
 @dataclass(frozen=True)
 class ToneRequest:
-    """The source of the surface tones.
+    """Where the tones of surfaces (how light or dark they are drawn) are read from.
 
     Attributes
     ----------
     kind : {"attribute", "image"}
+        Read the tone from a mesh attribute, or from the image that is chosen on each object.
     attribute : str
-        Name of the attribute. If empty, the active color attribute of each mesh.
+        Name of the attribute. If it is empty, the active color attribute of each mesh is read.
     """
 
     kind: str
@@ -45,16 +47,16 @@ class ToneRequest:
 
 @dataclass(frozen=True)
 class ReadRequest:
-    """What a look needs of the meshes of a scene besides their shapes and fields.
+    """What to read from the meshes of a scene besides their shapes and fields.
 
     Attributes
     ----------
     nonfinite : {"error", "zero"}
         Raise an error if a vector is not finite, or treat it as undefined.
     tone : ToneRequest or None
-        The source of the surface tones.
+        Where surface tones are read from. None: no tones are read.
     color_attribute : str or None
-        Name of the attribute with the numbers for the color map.
+        Name of the attribute with the values for the color map. None: no values are read.
     """
 
     nonfinite: str = "error"
@@ -62,12 +64,12 @@ class ReadRequest:
     color_attribute: str | None = None
 
 
-#: Shapes and fields alone.
+#: A request for nothing but shapes and fields.
 FIELDS_ONLY = ReadRequest()
 
 
 def read_request(scene: bpy.types.Scene, look: Look) -> ReadRequest:
-    """Return what a look asks of the meshes of a scene, by the settings of the scene."""
+    """Return what to read from the meshes of a scene to draw a look, with the settings of the scene."""
     tone = None
     if look.tone == "attribute":
         tone = ToneRequest("attribute", scene.rosy.tone_attribute)
@@ -77,16 +79,16 @@ def read_request(scene: bpy.types.Scene, look: Look) -> ReadRequest:
 
 
 def nonfinite_policy(scene: bpy.types.Scene) -> str:
-    """Return the scene's policy for vectors that are not finite: "zero" or "error"."""
+    """Return how vectors that are not finite are treated, by the setting of a scene: "zero" or "error"."""
     return "zero" if scene.rosy.undefined else "error"
 
 
 def color_attribute_of(scene: bpy.types.Scene, look: Look) -> str | None:
-    """Return the name of the attribute with the numbers that a look colors; None if it colors none."""
+    """Return the name of the attribute with values for the color map; None if the look does not use it."""
     return scene.rosy.color_attribute if colors_values(look) else None
 
 
-# --- tones and numbers ------------------------------------------------------------------------------
+# --- tones and values for the color map ---------------------------------------------------------------
 
 
 def read_tone(
@@ -100,7 +102,7 @@ def read_tone(
     Parameters
     ----------
     mesh : bpy.types.Mesh
-        Evaluated.
+        Evaluated mesh.
     owner : bpy.types.Object
         The original object.
     tone_request : ToneRequest or None
@@ -110,7 +112,7 @@ def read_tone(
     Returns
     -------
     SurfaceTone or None
-        None if the mesh has no such attribute, or no image is chosen.
+        None if no tone is requested, the mesh has no such attribute, or no image is chosen on the object.
 
     Raises
     ------
@@ -146,9 +148,9 @@ def read_tone(
 def tone_digest(
     mesh: bpy.types.Mesh, owner: bpy.types.Object, tone_request: ToneRequest | None
 ) -> bytes:
-    """Return a digest of what `read_tone` reads; empty if the mesh has no tone.
+    """Return a digest of the result of `read_tone`; empty if the mesh has no tone.
 
-    If the tone cannot be read, it is the digest of the error.
+    If the tone cannot be read, a digest of the error message is returned.
     """
     try:
         tone = read_tone(mesh, owner, tone_request)
@@ -158,7 +160,7 @@ def tone_digest(
 
 
 def tone_image_key(owner: bpy.types.Object, tone_request: ToneRequest | None) -> tuple[str, ...]:
-    """Return a cache key for the tone image and the UV map that are chosen on an object."""
+    """Return a cache key for the tone image and UV map of an object; empty if the tone is not an image."""
     if tone_request is None or tone_request.kind != "image" or not has_rosy_properties():
         return ()
     image = owner.rosy.tone_image
@@ -171,23 +173,23 @@ def read_color_values(
     label: str,
     cache: Cache | None = None,
 ) -> np.ndarray | None:
-    """Read the numbers of an attribute.
+    """Read the values for the color map from a mesh attribute.
 
     Parameters
     ----------
     mesh : bpy.types.Mesh
-        Evaluated.
+        Evaluated mesh.
     name : str or None
-        Name of the attribute.
+        Name of the attribute. None: nothing is read.
     label : str
-        The object in messages.
+        Name of the object in messages.
     cache : Cache, optional
-        Keeps numbers that have not changed since an earlier call.
+        Keeps values that have not changed since an earlier call.
 
     Returns
     -------
     (C,) float32 ndarray or None
-        At the corners; NaN where a number is not finite. None if the mesh has no such attribute.
+        Values at the corners; NaN where a value is not finite. None if the mesh has no such attribute.
 
     Raises
     ------
@@ -206,9 +208,9 @@ def read_color_values(
 
 
 def color_values_digest(mesh: bpy.types.Mesh, name: str | None) -> bytes:
-    """Return a digest of what `read_color_values` reads; empty if the mesh has no such attribute.
+    """Return a digest of the result of `read_color_values`; empty if the mesh has no such attribute.
 
-    If it cannot be read, it is the digest of the error.
+    If the attribute cannot be read, a digest of the error message is returned.
     """
     try:
         values = read_color_values(mesh, name, mesh.name)
@@ -220,19 +222,22 @@ def color_values_digest(mesh: bpy.types.Mesh, name: str | None) -> bytes:
 def check_sources(
     with_field: Sequence[tuple[MeshInstance, bpy.types.Object]], request: ReadRequest
 ) -> None:
-    """Check that at least one mesh with a field has the requested tone, and one the requested numbers.
+    """Check that the requested tones and values for the color map were found on some mesh with a field.
+
+    At least one mesh must have a tone, if tones are requested. At least one mesh must have values for the
+    color map, if these are requested.
 
     Parameters
     ----------
     with_field : sequence of (MeshInstance, bpy.types.Object)
-        The instances, and their original objects.
+        Each mesh instance with a field, and its original object.
     request : ReadRequest
-        What was read.
+        What was to be read.
 
     Raises
     ------
     RosyError
-        If none has. The message lists the attributes that exist.
+        If no mesh has them. The message lists the attributes that exist.
     """
     tone, numbers = request.tone, request.color_attribute
     owners = list(dict.fromkeys(owner for _, owner in with_field))
@@ -251,7 +256,7 @@ def check_sources(
             f"{names}: there is no attribute '{tone.attribute}' for the tone, only {listing}"
         )
     if numbers is not None and all(instance.color_values is None for instance, _ in with_field):
-        # Booleans are mostly Blender's own.
+        # Boolean attributes are not listed, as most of them are Blender's own.
         listing = _attribute_listing(owners, ("FLOAT", "INT", *COLOR_TYPES))
         if not numbers:
             raise RosyError(
@@ -263,7 +268,7 @@ def check_sources(
 
 
 def _attribute_listing(owners: Sequence[bpy.types.Object], types: Sequence[str]) -> str:
-    """Return the names of the attributes of some types that meshes have, for a message."""
+    """Return a list for a message: the names of all attributes of the meshes that have one of some types."""
     available = dict.fromkeys(
         attribute.name
         for owner in owners
@@ -279,9 +284,10 @@ def _attribute_listing(owners: Sequence[bpy.types.Object], types: Sequence[str])
 
 
 def reference_path(scene: bpy.types.Scene) -> Path:
-    """Return the file of the reference render for the current frame of a scene.
+    """Return the path of the reference render for the current frame of a scene.
 
-    In the path, a run of ``#`` is replaced by the frame number, padded with zeros to its length.
+    In the path that the user has chosen, a run of ``#`` is replaced by the frame number, padded with zeros to
+    its length.
 
     Raises
     ------
@@ -302,23 +308,24 @@ def load_reference(
     look: Look,
     picture_luminance: np.ndarray | None = None,
 ) -> ReferenceRender | None:
-    """Return the reference render for the tone of a look; None if the look does not use one.
+    """Return the reference render from which a look takes its tone; None if the look does not use one.
 
     Parameters
     ----------
     scene : bpy.types.Scene
-        At the frame of the reference render.
+        The scene, at the frame of the reference render.
     depsgraph : bpy.types.Depsgraph
     camera : bpy.types.Object
-        The camera of the reference render.
+        The camera that the reference render was rendered from.
     look : Look
     picture_luminance : (H, W) ndarray, optional
-        The luminance of the reference render, if it has been read already.
+        The luminance of the reference render. By default it is read from the file.
 
     Raises
     ------
     RosyError
-        If no file is chosen, it cannot be read, or it does not have the aspect ratio of renders.
+        If no file is chosen, the file cannot be read, or the picture does not have the aspect ratio of
+        renders.
     """
     if look.tone != "picture":
         return None
@@ -369,7 +376,7 @@ def image_luminance(image: bpy.types.Image) -> np.ndarray:
     rgba = rgba.reshape(height, width, 4)
     alpha = rgba[..., 3:]
     if image.is_float:
-        # Float images are premultiplied.
+        # Float images have premultiplied alpha.
         np.divide(rgba[..., :3], alpha, out=rgba[..., :3], where=alpha > 0)
     elif image.colorspace_settings.name != "Non-Color":
         rgba[..., :3] = to_linear(rgba[..., :3])

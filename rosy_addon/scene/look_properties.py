@@ -15,18 +15,18 @@ if TYPE_CHECKING:
 
 
 def read_look(settings: Any) -> Look:
-    """Return the look that properties hold.
+    """Return the look (settings of a drawing) that Blender properties hold.
 
     Parameters
     ----------
     settings : PropertyGroup
-        ``scene.rosy``, or its ``look``.
+        ``scene.rosy``, or ``scene.rosy.look``.
     """
     return Look(**read_settings(getattr(settings, "look", settings), Look))
 
 
 def apply_look(settings: Any, look: Look) -> None:
-    """Write a look to the properties of ``scene.rosy``, or of its ``look``."""
+    """Write a look to Blender properties: ``scene.rosy`` or ``scene.rosy.look``."""
     group = getattr(settings, "look", settings)
     for name, setting in settings_of(Look).items():
         value = getattr(look, name)
@@ -36,24 +36,27 @@ def apply_look(settings: Any, look: Look) -> None:
 
 
 def color_components(code: str, setting: Color) -> list[float]:
-    """Return a color as the components of its property: three, or four with the opacity."""
+    """Convert a hex color to the components of its property: red, green, blue, and opacity if it has one."""
     color = from_hex(code).tolist()
     return [*color, alpha_from_hex(code)] if setting.has_alpha else color
 
 
 def drift_in_scene(scene: bpy.types.Scene, look: Look, frame: float) -> Drift:
-    """Return how far streaks have drifted at a frame. The frame range of the scene is a loop."""
+    """Return how far moving streaks have drifted at a frame. They loop over the frame range of the scene."""
     return drift_at(look, frame - scene.frame_start, scene.frame_end - scene.frame_start + 1)
 
 
 def matches_look(settings: Any, look: Look) -> bool:
-    """Return whether the properties hold a look, to the precision of Blender's numbers."""
+    """Return whether Blender properties hold a look, up to the single precision of the properties."""
     current = read_look(settings)
     return all(_is_equal(getattr(current, name), getattr(look, name)) for name in settings_of(Look))
 
 
 def _is_equal(one: Any, other: Any) -> bool:
-    """Return whether two values of a setting are equal: text in any case, numbers in single precision."""
+    """Return whether two values of a setting are equal.
+
+    Case of text, and small rounding errors, are ignored.
+    """
     if isinstance(one, str):
         return one == other.lower()
     if isinstance(one, tuple):
@@ -69,7 +72,7 @@ def read_settings(group: Any, cls: type) -> dict[str, Any]:
 
 
 def _from_rna(value: Any, setting: Setting) -> Any:
-    """Convert a property value: a color to hex, floats to 7 digits within the setting's range."""
+    """Convert a property value to a setting: colors to hex; floats rounded to 7 digits, within the range."""
     if isinstance(setting, Color):
         return to_hex(value)
     if isinstance(setting, Numbers):
@@ -80,5 +83,5 @@ def _from_rna(value: Any, setting: Setting) -> Any:
 
 
 def _rounded(value: float, low: float, high: float) -> float:
-    """Return a number with 7 digits, within a range."""
+    """Return a number rounded to 7 significant digits and clamped to a range."""
     return min(max(float(f"{value:.7g}"), low), high)

@@ -40,8 +40,8 @@ from .field_attributes import (
 )
 from .meshes import flush_edit_mode, mesh_label, mesh_surface, read_attribute
 
-#: Largest angle between a vector on a corner and its face, in degrees. Such vectors may be tangent
-#: to the smooth surface rather than to the face.
+#: Largest angle between a vector on a face corner and the plane of the face, in degrees. It is large because
+#: such vectors may be tangent to the smooth surface rather than to the face.
 CORNER_TOLERANCE_DEGREES = 30.0
 
 
@@ -60,7 +60,7 @@ def read_mesh_field(
     Parameters
     ----------
     mesh : bpy.types.Mesh
-        May be in edit mode.
+        A mesh of Blender, which may be in edit mode.
     name : str, optional
         Name of the attribute. By default ``mesh.rosy.attribute``.
     degree : int, optional
@@ -70,15 +70,15 @@ def read_mesh_field(
     nonfinite : {"error", "zero"}
         Raise an error if a value is not finite, or treat it as undefined.
     label : str, optional
-        Name in messages. By default `mesh_label`.
+        Name of the mesh in messages. By default `mesh_label`.
     cache : Cache, optional
         Keeps surfaces and fields that have not changed since an earlier call.
 
     Raises
     ------
     RosyError
-        If there is no such attribute, its type or domain is not supported, or its values are not a
-        field on the mesh (see `validated_field`). The message names the mesh and the attribute.
+        If there is no such attribute, its type or domain is not supported, or its values are not tangent to
+        the mesh or not finite (see `validated_field`). The message names the mesh and the attribute.
 
     See Also
     --------
@@ -123,7 +123,7 @@ def read_mesh_field(
 def _field_from_directions(
     mesh: bpy.types.Mesh, surface: Surface, nonfinite: str, label: str, cache: Cache | None
 ) -> RosyField:
-    """Read a field from ``dir0`` ... ``dir{N-1}``. N is the number of these attributes."""
+    """Read a field from the attributes ``dir0`` ... ``dir{N-1}``. Their number N is the degree."""
     degree = 0
     while f"dir{degree}" in mesh.attributes:
         degree += 1
@@ -164,7 +164,7 @@ def _field_from_directions(
 def _field_from_angles(
     surface: Surface, angles: np.ndarray, degree: int, source: str, nonfinite: str
 ) -> RosyField:
-    """Return a unit field from angles, (F,), to the first edge of each face, in radians."""
+    """Return a field from (F,) angles between its members and the first edges of faces, in radians."""
     x, y = face_frames(surface)
     report(0.5, "reading the field")
     angles = as_float64(angles)
@@ -177,7 +177,7 @@ def _field_from_angles(
 def _field_from_corners(
     surface: Surface, vectors: np.ndarray, degree: int, source: str, nonfinite: str
 ) -> RosyField:
-    """Return a field from vectors on corners: projected to the face, then averaged as RoSys."""
+    """Return a field from vectors on face corners: project them to the face, and average them as RoSys."""
     vectors = as_float64(vectors)
     apply_nonfinite_policy(vectors, source, "corner", nonfinite)
     normal = surface.face_normal
@@ -195,7 +195,7 @@ def _field_from_corners(
 
 
 def _attribute_hint(mesh: bpy.types.Mesh) -> str:
-    """Return a list of the mesh's vector attributes, for a message; empty if there are none."""
+    """Return advice for a message: which vector attribute to choose, or to make a field if there are none."""
     names = [
         f"'{other.name}'"
         for other in mesh.attributes
@@ -206,10 +206,10 @@ def _attribute_hint(mesh: bpy.types.Mesh) -> str:
     return f": choose {' or '.join(names)}" if names else ": make or import a field"
 
 
-#: Name of the attribute of a field that is stored as angles.
+#: Default name of the attribute in which a field is stored as angles.
 DEFAULT_ANGLE_NAME = "rosy_angle"
 
-#: Forms in which a field can be stored: label and description in the user interface.
+#: Forms in which a field can be stored, with their labels and descriptions in the user interface.
 STORAGE_FORMS = {
     "VECTOR": ("One Vector", "One direction on each face, from which the others follow"),
     "DIRECTIONS": ("Directions", "All directions, as dir0, dir1 ... on faces"),
@@ -220,7 +220,7 @@ STORAGE_FORMS = {
 def assign_fields(
     fields: dict[bpy.types.Mesh, RosyField], name: str | None = None, form: str = "VECTOR"
 ) -> None:
-    """Store fields on meshes, all or none of them.
+    """Store fields on meshes: on all of them, or on none if one field cannot be stored.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ def assign_fields(
 
 
 def _default_name(mesh: bpy.types.Mesh, form: str) -> str:
-    """Return the name of the attribute of a mesh's field in a form."""
+    """Return the default name of the attribute in which a field of a mesh is stored in a form."""
     if form == "ANGLE":
         return DEFAULT_ANGLE_NAME
     name = attribute_name(mesh)
@@ -255,31 +255,30 @@ def _default_name(mesh: bpy.types.Mesh, form: str) -> str:
 def write_mesh_field(
     mesh: bpy.types.Mesh, field: RosyField, name: str = DEFAULT_FIELD_NAME, form: str = "VECTOR"
 ) -> bpy.types.Attribute:
-    """Store a field on a mesh. A field with the same name is replaced.
+    """Store a field on a mesh. An existing field in an attribute with the same name is replaced.
 
     Parameters
     ----------
     mesh : bpy.types.Mesh
     field : RosyField
     name : str
-        Name of the attribute. Not used for "DIRECTIONS", whose attributes are ``dir0`` ...
-        ``dir{N-1}``.
+        Name of the attribute. The attributes of the form "DIRECTIONS" are always ``dir0`` ... ``dir{N-1}``.
     form : {"VECTOR", "DIRECTIONS", "ANGLE"}
-        See `STORAGE_FORMS`. A field with free directions is always stored as "DIRECTIONS", and a
-        vector attribute with the name of the field is removed: it would be read instead. A RoSy
-        field stored as "DIRECTIONS" keeps such an attribute.
+        See `STORAGE_FORMS`. A field with free directions (not at equal angles) is always stored as
+        "DIRECTIONS". A vector attribute with the name `name` is removed then, because it would be read
+        instead of the directions. If a RoSy field is stored as "DIRECTIONS", such an attribute is kept.
 
     Returns
     -------
     bpy.types.Attribute
-        The attribute, or the first of several.
+        The attribute of the field; for "DIRECTIONS", the first one.
 
     Raises
     ------
     RosyError
-        If the mesh is linked from a library or in edit mode, its number of faces differs from the
-        field's, an attribute of the name has another type or domain, or the field has free
-        directions and the form is "ANGLE". Nothing is changed in this case.
+        If the mesh is linked from a library or in edit mode, the field has another number of faces, an
+        attribute with the name has another type or domain, or the field has free directions and the form is
+        "ANGLE". Nothing is changed in this case.
 
     See Also
     --------
@@ -291,7 +290,7 @@ def write_mesh_field(
 
 
 def _store(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str) -> bpy.types.Attribute:
-    """Store a field that `_check_storable` has checked. Return the attribute, or the first."""
+    """Store a field that `_check_storable` has checked. Return its attribute, or the first of several."""
     if form == "DIRECTIONS" or field.direction_ratios is not None:
         attribute = _write_directions(mesh, field, name)
     elif form == "ANGLE":
@@ -306,7 +305,7 @@ def _store(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str) -> bpy.
     if attribute.data_type == VECTOR_TYPE:
         stored_name = attribute.name
         store_rest_shape(mesh, stored_name)
-        attribute = mesh.attributes[stored_name]  # new attributes may have moved it
+        attribute = mesh.attributes[stored_name]  # other new attributes may have moved it in memory
     if has_rosy_properties():
         mesh.rosy.degree = field.degree
         if attribute.name == name:
@@ -318,7 +317,7 @@ def _store(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str) -> bpy.
 def overwrite_vectors(mesh: bpy.types.Mesh, vectors: np.ndarray) -> np.ndarray:
     """Replace the vectors of a field that is stored as one vector on each face, without any check.
 
-    For changes that are shown while they are made. `write_mesh_field` stores the result.
+    It is meant for a preview during an edit. `write_mesh_field` stores the final field.
 
     Parameters
     ----------
@@ -328,7 +327,7 @@ def overwrite_vectors(mesh: bpy.types.Mesh, vectors: np.ndarray) -> np.ndarray:
     Returns
     -------
     (F, 3) float32 ndarray
-        The vectors before.
+        The vectors that were stored before.
     """
     name = attribute_name(mesh)
     before = read_attribute(mesh, name, np.float32, 3)
@@ -366,7 +365,10 @@ def _check_storable(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str
 
 
 def _write_directions(mesh: bpy.types.Mesh, field: RosyField, name: str) -> bpy.types.Attribute:
-    """Store all directions of a field as ``dir0`` ... ``dir{N-1}``; remove ``dirN`` and so on."""
+    """Store the N directions of a field as ``dir0`` ... ``dir{N-1}``.
+
+    Remove attributes ``dirN``, ``dir{N+1}`` ...
+    """
     directions = (
         field_directions(mesh_surface(mesh), field)
         if field.source_directions is None

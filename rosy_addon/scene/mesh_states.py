@@ -1,4 +1,4 @@
-"""Digests of evaluated meshes and their fields, which tell whether a picture is out of date.
+"""Compute digests of evaluated meshes and their fields. They tell whether a picture is out of date.
 
 Computing a digest is much faster than reading a surface, and needs no temporary attributes.
 """
@@ -20,15 +20,15 @@ from .meshes import read_attribute, shape_digest, vertex_positions
 
 @dataclass(frozen=True, eq=False)
 class MeshState:
-    """The digest and the bounding box of an evaluated mesh, with its field if it is drawn.
+    """A digest of an evaluated mesh (and of its field, if that is drawn), and its bounding box.
 
     Attributes
     ----------
     digest : str
     bounds : (2, 3) float32 ndarray
-        Object space.
+        Lowest and highest corner of the bounding box, object space.
     lacks_tone : bool
-        Whether the mesh does not have the tone that the look asks for. It is lit instead.
+        Whether the look takes its tone from the mesh, but the mesh has none. The mesh is then lit instead.
     """
 
     digest: str
@@ -36,23 +36,25 @@ class MeshState:
     lacks_tone: bool = False
 
 
-#: What has been read of meshes, by `mesh_state_key`. None: the mesh has no faces.
+#: The states of meshes, by `mesh_state_key`. None: the mesh has no faces.
 MeshStates = dict[tuple, MeshState | None]
 
 
 def mesh_state_key(
     obj: bpy.types.Object, owner: bpy.types.Object, request: ReadRequest | None
 ) -> tuple:
-    """Return the key in `MeshStates` of an evaluated object. Its first part identifies the owner.
+    """Return the key of the mesh of an evaluated object in `MeshStates`.
+
+    Its first item is the owner's session UID.
 
     Parameters
     ----------
     obj : bpy.types.Object
-        Evaluated.
+        Evaluated object.
     owner : bpy.types.Object
         The original object.
     request : ReadRequest or None
-        None: the object only occludes.
+        What is read of the mesh. None: the object has no field to draw, and only hides others.
     """
     return owner.session_uid, obj.data.as_pointer(), request
 
@@ -65,7 +67,7 @@ def read_mesh_state(
     Parameters
     ----------
     mesh : bpy.types.Mesh or None
-        From `evaluated_mesh`.
+        Result of `evaluated_mesh`.
     owner, request
         See `mesh_state_key`.
     """
@@ -80,7 +82,7 @@ def read_mesh_state(
     parts = [shape_digest(mesh), *field_parts(mesh, original), digest_of_tone]
     parts.append(color_values_digest(mesh, request.color_attribute))
     if user_modifiers(owner) or original.shape_keys:
-        # The rest shape and its normals, from which the field is transported.
+        # The evaluated field also depends on the original mesh: on its shape, normals and field.
         parts += [shape_digest(original), *field_parts(original, original)]
     if any(isinstance(part, np.ndarray) and not np.isfinite(part).all() for part in parts):
         parts.append(request.nonfinite)
@@ -89,7 +91,7 @@ def read_mesh_state(
 
 
 def field_parts(mesh: bpy.types.Mesh, original: bpy.types.Mesh) -> list:
-    """Return the domains and values of the attributes that hold a field, and its degree."""
+    """Return what the field of a mesh depends on: degree, and domains and values of its attributes."""
     name = attribute_name(original)
     if name in original.attributes:
         names, parts = [name], [field_degree(original)]
@@ -107,5 +109,5 @@ def field_parts(mesh: bpy.types.Mesh, original: bpy.types.Mesh) -> list:
 
 
 def digest(*parts: object) -> str:
-    """Return a digest as text. It is short, as it is stored in .blend files."""
+    """Return a digest of some values: 16 hex digits, as it is stored in .blend files."""
     return content_hash(*parts).hex()[:16]

@@ -1,4 +1,4 @@
-"""Blender meshes as `Surface`, and their attributes and edges as arrays."""
+"""Convert Blender meshes to `Surface`, and read their attributes and edges as arrays."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from ..core.progress import progress
 from ..field.connectivity import smooth_fans
 from ..field.surface import Surface, build_surface
 
-#: Marks of edges: RNA property, label, and description in the user interface.
+#: Ways to mark edges in Blender: RNA property, label, and description in the user interface.
 EDGE_MARKS = {
     "SELECTED": ("select", "Selected", "Edges that are selected in edit mode"),
     "SHARP": ("use_edge_sharp", "Marked Sharp", "Edges that are marked sharp"),
     "SEAM": ("use_seam", "Seams", "Edges that are marked as seams"),
 }
 
-#: Attribute in which Blender stores the selection of edges.
+#: Attribute in which Blender stores which edges are selected.
 EDGE_SELECTION_ATTRIBUTE = ".select_edge"
 
-#: Attribute that Blender writes for objects with `add_rest_position_attribute`.
+#: Attribute in which Blender stores the undeformed positions, if `Object.add_rest_position_attribute` is set.
 REST_ATTRIBUTE = "rest_position"
 
 
 def mesh_label(mesh: bpy.types.Mesh) -> str:
-    """Return a mesh in messages: an object that has it, a selected one if there is one."""
+    """Return the name of a mesh for messages: that of an object that uses it, preferably a selected one."""
     users = [obj for obj in bpy.data.objects if obj.data == mesh]
     if not users:
         return f"mesh '{mesh.name}'"
@@ -48,11 +48,11 @@ def mesh_surface(
     Parameters
     ----------
     mesh : bpy.types.Mesh
-        Original or evaluated. In edit mode, the current state of editing is read.
+        An original or evaluated mesh. In edit mode, the current state of editing is read.
     name : str, optional
         Name for messages. By default `mesh_label`.
     occluder_only : bool
-        Treat all faces as flat, which is cheaper. For meshes that only occlude others.
+        Treat all faces as flat, which is faster and enough for meshes that only occlude others.
     cache : Cache, optional
         Keeps the surfaces of meshes that have not changed since an earlier call.
 
@@ -81,7 +81,7 @@ def mesh_surface(
 
     def build() -> Surface:
         with progress(0.0, 0.7):
-            # They depend on the topology alone, so a deformation does not change them.
+            # The fans are cached by the topology alone, which a deformation does not change.
             fans = (
                 build_fans()
                 if cache is None
@@ -118,10 +118,10 @@ def shape_digest(mesh: bpy.types.Mesh, *, occluder_only: bool = False) -> bytes:
 
 
 def _read_shape(mesh: bpy.types.Mesh, *, occluder_only: bool) -> dict[str, np.ndarray | None]:
-    """Return the arguments of `build_surface` from which all others follow.
+    """Return those arguments of `build_surface` that determine all others.
 
-    Triangles and normals are left out, as Blender computes them from the rest, unless normals are
-    custom.
+    Triangles and normals are left out, because Blender computes them from the returned arrays. Only custom
+    normals are included.
     """
     flush_edit_mode(mesh)
     corner_vertex, face_start = polygon_arrays(mesh)
@@ -154,7 +154,7 @@ def uv_map_name(mesh: bpy.types.Mesh, name: str, label: str) -> str:
     Raises
     ------
     RosyError
-        If there is no such UV map. `label` is the mesh in the message.
+        If there is no such UV map. `label` is the name of the mesh in the message.
     """
     layer = mesh.uv_layers.get(name) if name else mesh.uv_layers.active
     if layer is not None:
@@ -166,15 +166,15 @@ def uv_map_name(mesh: bpy.types.Mesh, name: str, label: str) -> str:
 
 
 def read_uvs(mesh: bpy.types.Mesh, name: str = "", label: str | None = None) -> np.ndarray:
-    """Return u and v of the corners, (C, 2) float32, from a UV map of a mesh.
+    """Return the UV coordinates of the corners of a mesh, (C, 2) float32.
 
     Parameters
     ----------
     mesh : bpy.types.Mesh
     name : str
-        Name of the UV map. Empty: the active one.
+        Name of the UV map. If it is empty, the active UV map is read.
     label : str, optional
-        The mesh in messages; by default `mesh_label`.
+        Name of the mesh in messages. By default `mesh_label`.
 
     Raises
     ------
@@ -212,7 +212,7 @@ def vertex_positions(mesh: bpy.types.Mesh) -> np.ndarray:
 
 @contextmanager
 def evaluated_mesh(obj: bpy.types.Object) -> Iterator[bpy.types.Mesh | None]:
-    """Yield the temporary mesh of an evaluated object; None if it has no faces."""
+    """Context manager: yield the temporary mesh of an evaluated object; None if it has no faces."""
     mesh = obj.to_mesh()
     try:
         yield mesh if mesh is not None and len(mesh.polygons) else None
@@ -221,7 +221,7 @@ def evaluated_mesh(obj: bpy.types.Object) -> Iterator[bpy.types.Mesh | None]:
 
 
 def marked_edges(mesh: bpy.types.Mesh, mark: str) -> np.ndarray:
-    """Return the vertices of the edges that have a mark.
+    """Return the vertex indices of the edges that are marked in a way.
 
     Parameters
     ----------
@@ -232,6 +232,7 @@ def marked_edges(mesh: bpy.types.Mesh, mark: str) -> np.ndarray:
     Returns
     -------
     (K, 2) int32 ndarray
+        Both vertices of each marked edge.
 
     Raises
     ------
@@ -248,7 +249,7 @@ def marked_edges(mesh: bpy.types.Mesh, mark: str) -> np.ndarray:
 
 
 def flush_edit_mode(mesh: bpy.types.Mesh) -> None:
-    """Update a mesh that is in edit mode from the edit data."""
+    """Write the current state of editing to a mesh that is in edit mode. Do nothing otherwise."""
     if not mesh.is_editmode:
         return
     for obj in bpy.data.objects:
@@ -258,7 +259,7 @@ def flush_edit_mode(mesh: bpy.types.Mesh) -> None:
 
 
 def read_attribute(mesh: bpy.types.Mesh, name: str, dtype: type, columns: int) -> np.ndarray | None:
-    """Return an attribute: (n, columns), or (n,) for one column; None if missing or unreadable."""
+    """Return an attribute as (n, columns), or (n,) for one column; None if it is missing or empty."""
     attribute = mesh.attributes.get(name)
     if attribute is None or not len(attribute.data):  # in edit mode, attributes are empty
         return None
@@ -267,7 +268,7 @@ def read_attribute(mesh: bpy.types.Mesh, name: str, dtype: type, columns: int) -
 
 
 def _triangles(mesh: bpy.types.Mesh) -> dict[str, np.ndarray]:
-    """Return Blender's own triangulation, for the same pictures; empty if there is none yet."""
+    """Return Blender's triangulation as arguments of `build_surface`; empty if it is not computed yet."""
     face_count = len(mesh.polygons)
     if len(mesh.loops) == 3 * face_count:
         face = np.arange(face_count, dtype=np.int32)
@@ -281,19 +282,19 @@ def _triangles(mesh: bpy.types.Mesh) -> dict[str, np.ndarray]:
 
 
 def _edge_vertices(mesh: bpy.types.Mesh) -> np.ndarray:
-    """Return the vertices of all edges, (E, 2) int32."""
+    """Return the vertex indices of all edges, (E, 2) int32."""
     return _attribute_or_collection(mesh, ".edge_verts", mesh.edges, "vertices", np.int32, 2)
 
 
 def _edge_flags(mesh: bpy.types.Mesh, property_name: str) -> np.ndarray:
-    """Return a flag of every edge, (E,) bool, by the name of its RNA property."""
+    """Return a boolean RNA property of all edges, (E,) bool."""
     flags = np.empty(len(mesh.edges), dtype=bool)
     is_selection = property_name == "select"
     attribute = mesh.attributes.get(EDGE_SELECTION_ATTRIBUTE) if is_selection else None
     if attribute is not None and attribute.data_type == "INT32_2D" and len(attribute.data):
-        # Blender 5.0 creates the attribute with this type, but with one byte for each edge, when
-        # all or none of the edges are new (`Mesh.from_pydata`, `Mesh.update(calc_edges=True)`).
-        # `foreach_get` would read past the end of it. All edges have the same value.
+        # If all edges were created at once (`Mesh.from_pydata`, `Mesh.update(calc_edges=True)`), Blender 5.0
+        # creates the attribute with this type, but with only one byte per edge, so `foreach_get` would read
+        # past its end. All edges then have the same value.
         flags[:] = attribute.data[0].value[0] & 0xFF
     else:
         mesh.edges.foreach_get(property_name, flags)
@@ -308,10 +309,10 @@ def _attribute_or_collection(
     dtype: type,
     columns: int = 1,
 ) -> np.ndarray:
-    """Return the values of a collection, from an attribute with the same values if it is readable.
+    """Return the values of a property of a collection, from an attribute with the same values if possible.
 
-    Blender copies attributes as a whole. It reads collections item by item, which is a thousand
-    times slower.
+    Blender copies an attribute as a whole. It reads a collection item by item, which is a thousand times
+    slower.
     """
     values = read_attribute(mesh, attribute, dtype, columns)
     if values is None or len(values) != len(collection):
@@ -322,7 +323,7 @@ def _attribute_or_collection(
 def read_collection(
     collection: bpy.types.bpy_prop_collection, key: str, dtype: type, columns: int = 1
 ):
-    """Return a property of all items: (n, columns), or (n,) for one column."""
+    """Return a property of all items of a collection as (n, columns), or (n,) if `columns` is 1."""
     values = np.empty(len(collection) * columns, dtype=dtype)
     collection.foreach_get(key, values)
     return values.reshape(-1, columns) if columns > 1 else values

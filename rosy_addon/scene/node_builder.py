@@ -1,4 +1,4 @@
-"""`NodeBuilder`: adds nodes to trees of materials and geometry."""
+"""`NodeBuilder`: adds nodes to node trees of materials and of Geometry Nodes."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ import numpy as np
 
 
 class NodeBuilder:
-    """Adds nodes to a tree, laid out in rows from left to right.
+    """A builder that adds nodes to a node tree, laid out in rows from left to right.
 
-    Calling it adds a node of a type, sets its properties, and connects its inputs to sockets or
-    constants. Inputs are given by number, or by name among the inputs that the properties enable.
+    ``build(type, inputs, **properties)`` adds a node, sets its properties, and connects its inputs to sockets
+    or sets them to constants. The keys of `inputs` are indices of input sockets, or their names; a name means
+    the socket with this name that the properties of the node enable.
     """
 
     def __init__(self, tree: bpy.types.NodeTree) -> None:
@@ -56,18 +57,18 @@ class NodeBuilder:
         return self("ShaderNodeVectorMath", inputs, operation="SCALE").outputs[0]
 
     def mix(self, kind: str, factor: Any, a: Any, b: Any) -> bpy.types.NodeSocket:
-        """Add a mix node for a data type, and return its output: a for factor 0, b for factor 1."""
+        """Add a mix node of a data type, and return its output: it is `a` for factor 0, `b` for factor 1."""
         inputs = {"Factor": factor, "A": a, "B": b}
         return enabled_output(self("ShaderNodeMix", inputs, data_type=kind))
 
     def mix_shaders(self, factor: Any, a: Any, b: Any) -> bpy.types.NodeSocket:
-        """Add a node that mixes shaders, and return its output: a for factor 0, b for factor 1."""
+        """Add a node that mixes shaders, and return its output: it is `a` for factor 0, `b` for factor 1."""
         return self("ShaderNodeMixShader", {0: factor, 1: a, 2: b}).outputs["Shader"]
 
     def frame_image(
         self, image: bpy.types.Image, coordinates: bpy.types.NodeSocket
     ) -> bpy.types.Node:
-        """Add the node of an image that fills the coordinates from 0 to 1, without interpolation."""
+        """Add a node with the pixels of an image, not interpolated, mapped to coordinates from 0 to 1."""
         settings = {"image": image, "interpolation": "Closest", "extension": "EXTEND"}
         return self("ShaderNodeTexImage", {"Vector": coordinates}, **settings)
 
@@ -79,13 +80,13 @@ class NodeBuilder:
         domain: str,
         value: bpy.types.NodeSocket,
     ) -> bpy.types.NodeSocket:
-        """Add a node that stores a named attribute, and return the geometry with it."""
+        """Add a node that stores a named attribute, and return the geometry with the attribute."""
         inputs = {"Geometry": geometry, "Name": name, "Value": value}
         kind = "GeometryNodeStoreNamedAttribute"
         return self(kind, inputs, data_type=data_type, domain=domain).outputs["Geometry"]
 
     def transformed(self, point: bpy.types.NodeSocket, rows: np.ndarray) -> bpy.types.NodeSocket:
-        """Add nodes that multiply a point by a (3, 4) matrix, and return the output."""
+        """Add nodes that transform a point by an affine (3, 4) matrix, and return their output."""
         components = {
             axis: self.math("ADD", self.vector_math("DOT_PRODUCT", point, row[:3]), row[3])
             for axis, row in zip("XYZ", rows.tolist(), strict=True)
@@ -94,12 +95,12 @@ class NodeBuilder:
 
 
 def enabled_output(node: bpy.types.Node) -> bpy.types.NodeSocket:
-    """Return the first output of a node that its properties enable."""
+    """Return the first output socket of a node that is enabled by its properties."""
     return next(socket for socket in node.outputs if socket.enabled)
 
 
 class Number:
-    """A number of a node tree. Arithmetic with it adds math nodes.
+    """A number that nodes compute. Arithmetic with it adds math nodes to the tree.
 
     Parameters
     ----------
@@ -139,19 +140,19 @@ class Number:
         return self._math("GREATER_THAN", self, other)
 
     def at_least(self, other: Number | float) -> Number:
-        """Return the larger of two numbers."""
+        """Return the larger of this number and another."""
         return self._math("MAXIMUM", self, other)
 
     def at_most(self, other: Number | float) -> Number:
-        """Return the smaller of two numbers."""
+        """Return the smaller of this number and another."""
         return self._math("MINIMUM", self, other)
 
     def square_root(self) -> Number:
-        """Return the square root of a number of at least 0."""
+        """Return the square root of this number, which must not be negative."""
         return self._math("SQRT", self)
 
     def smoothstep(self, low: Number | float, high: Number | float) -> Number:
-        """Return a smooth step from 0 at `low` to 1 at `high`."""
+        """Return the smoothstep function of this number: 0 up to `low`, 1 from `high`."""
         low, high = (end.socket if isinstance(end, Number) else end for end in (low, high))
         inputs = {"Value": self.socket, "From Min": low, "From Max": high}
         node = self.build("ShaderNodeMapRange", inputs, interpolation_type="SMOOTHSTEP")
@@ -159,7 +160,7 @@ class Number:
 
 
 def new_empty_material(name: str) -> tuple[bpy.types.Material, NodeBuilder]:
-    """Create a material without nodes, and return what adds them."""
+    """Create a material without nodes. Return it with the builder of its node tree."""
     material = bpy.data.materials.new(name)
     if material.node_tree is None:
         material.use_nodes = (
@@ -180,7 +181,10 @@ def new_emissive_material(name: str, color: Any, strength: float = 1.0) -> bpy.t
 
 
 def new_modifier_group(name: str) -> tuple[bpy.types.NodeTree, NodeBuilder, bpy.types.NodeSocket]:
-    """Create a geometry node group for a modifier. Return what adds nodes, and the incoming geometry, too."""
+    """Create a geometry node group for a modifier.
+
+    Return it with its builder and the socket of its input geometry.
+    """
     group = bpy.data.node_groups.new(name, "GeometryNodeTree")
     group.is_modifier = True
     for direction in ("INPUT", "OUTPUT"):

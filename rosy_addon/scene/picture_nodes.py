@@ -1,6 +1,7 @@
-"""Nodes that show a picture: a material per camera, a node group and a modifier per object.
+"""Nodes that show a picture: a material per picture, and per object a modifier with a node group.
 
-If the user has applied the modifier, the mesh of the object itself has the material and the attributes.
+The modifier gives the object the material and an attribute with the projection. If the user has applied the
+modifier, the material and the attributes are on the mesh of the object.
 """
 
 from __future__ import annotations
@@ -20,11 +21,12 @@ from .texture_nodes import Hatching, hatching_shader
 #: Name of the modifier that shows a picture.
 MODIFIER_NAME = "RoSy"
 
-#: Point attribute: the clip-space (x, y, w) of each vertex for the camera of the bake.
+#: Name of a point attribute: the clip-space (x, y, w) of each vertex in the camera from which the picture was
+#: baked.
 CLIP_ATTRIBUTE = "rosy_projection"
 
-#: Face attribute: the material index that each face had. Restored if the user applies the modifier and then
-#: removes the picture.
+#: Name of a face attribute: the material index of each face before the modifier. It is restored if the user
+#: applies the modifier and then removes the picture.
 MATERIAL_ATTRIBUTE = "rosy_material"
 
 _OUTSIDE_COLOR = (NEUTRAL_GRAY, NEUTRAL_GRAY, NEUTRAL_GRAY, 1.0)
@@ -40,30 +42,31 @@ def new_material(
     diffuse: float,
     hatching: Hatching | None = None,
 ) -> bpy.types.Material:
-    """Create a material that shows a picture, the same in Cycles and EEVEE.
+    """Create a material that shows a picture. It looks the same in Cycles and EEVEE.
 
-    Hatching is drawn by the light on the surface; see `hatching_shader`.
+    The attribute `CLIP_ATTRIBUTE` maps the surface to the picture. An object without it, such as one with
+    several instances, is mapped by its current world position. Outside the frame of the picture, the material
+    is neutral gray.
 
-    The attribute `CLIP_ATTRIBUTE` gives the position in the picture. Objects without it, such as
-    those with several instances of one mesh, use their current world position. Outside the frame of
-    the picture, the material is neutral gray.
+    If `hatching` is given, the material draws hatching in the present light on the surface
+    (`hatching_shader`), and `emission` and `diffuse` are not used.
 
     Parameters
     ----------
     image : bpy.types.Image
-        The material gets its name.
+        The picture. The material gets the name of this image.
     camera : Camera
-        From which the picture was drawn.
+        The camera from which the picture was drawn.
     created : list of bpy.types.ID
-        Gets the new datablocks; see `owned_data.rollback_on_error`.
+        The new datablocks are appended; see `datablocks.rollback_on_error`.
     window_coordinates : bool
-        Map the picture to the frame of the current camera instead.
+        Whether the picture fills the frame of the camera that renders, instead of being mapped as above.
     emission : float
-        Strength of the emission.
+        Strength with which the surface emits the picture.
     diffuse : float
-        Factor of the diffuse color.
+        Factor of the picture as a diffuse color.
     hatching : Hatching, optional
-        How hatching is drawn, if the image has thresholds of ink and not colors.
+        How hatching is drawn. Given if the image has thresholds of ink instead of colors.
     """
     material, build = new_empty_material(image.name)
     created.append(material)
@@ -99,7 +102,7 @@ def new_material(
 
 
 def set_sequence_frames(material: bpy.types.Material, first: int, last: int) -> None:
-    """Set the frame range of a material's image sequence. Each file is shown at its own frame."""
+    """Set the frames at which a material plays its image sequence: each file at the frame of its number."""
     for node in material.node_tree.nodes:
         if node.bl_idname == "ShaderNodeTexImage":
             image_user = node.image_user
@@ -109,7 +112,10 @@ def set_sequence_frames(material: bpy.types.Material, first: int, last: int) -> 
 
 
 def _clip_position(build: NodeBuilder, view_projection: np.ndarray) -> bpy.types.Node:
-    """Add a node with the clip-space x, y and w as its outputs X, Y and Z, and return it."""
+    """Add nodes that compute the clip-space position.
+
+    Outputs X, Y and Z of the returned node are x, y and w.
+    """
     baked_clip = build("ShaderNodeAttribute", attribute_name=CLIP_ATTRIBUTE).outputs["Vector"]
     world_position = build("ShaderNodeNewGeometry").outputs["Position"]
     live_clip = build.transformed(world_position, _clip_rows(view_projection))
@@ -123,14 +129,14 @@ def new_group(
 ) -> bpy.types.NodeTree:
     """Create a geometry node group that sets a material and the attribute `CLIP_ATTRIBUTE`.
 
-    The user's mesh, material slots and other modifiers are not changed.
+    It is the node group of RoSy's modifier. The mesh, its material slots and other modifiers stay unchanged.
 
     Parameters
     ----------
     name : str
     material : bpy.types.Material
     matrix : (4, 4) ndarray or None
-        Object to clip space. None for objects with several instances, which get no attribute.
+        Transforms object space to clip space. None for objects with several instances; they get no attribute.
     """
     group, build, geometry = new_modifier_group(name)
     material_index = build("GeometryNodeInputMaterialIndex").outputs[0]
@@ -151,7 +157,7 @@ def new_group(
 def _add_projection(
     group: bpy.types.NodeTree, material: bpy.types.Material, matrix: np.ndarray | None
 ) -> None:
-    """Store how an object shows a picture, for `projections_of_group`."""
+    """Store a picture and the matrix of its projection in a node group; see `projections_of_group`."""
     projection = group.rosy.projections.add()
     projection.material = material
     projection.matrix = (np.zeros(16) if matrix is None else matrix.ravel()).tolist()
@@ -160,15 +166,16 @@ def _add_projection(
 def projections_of_group(
     group: bpy.types.NodeTree,
 ) -> dict[bpy.types.Material, np.ndarray | None]:
-    """Return the pictures that an object can show, by their materials.
+    """Return the projections of the pictures that an object can show, by the materials of the pictures.
 
-    The values are the object-to-clip matrices, (4, 4); None for objects with several instances.
+    The values are (4, 4) object-to-clip matrices, or None if the object has several instances.
     """
     projections = {}
     for projection in group.rosy.projections:
         matrix = np.array(projection.matrix).reshape(4, 4)
         projections[projection.material] = matrix if matrix.any() else None
-    # The user may have deleted a material, and groups of earlier versions have no projections.
+    # Groups of earlier versions have no projections. The user may have deleted a material, which is then
+    # None.
     shown_material = material_of_group(group)
     return {
         material: matrix
@@ -178,7 +185,7 @@ def projections_of_group(
 
 
 def material_of_group(group: bpy.types.NodeTree) -> bpy.types.Material | None:
-    """Return the material that a group of `new_group` sets; None if it sets none."""
+    """Return the material that a node group of `new_group` assigns; None if it assigns none."""
     for node in group.nodes:
         if node.bl_idname == "GeometryNodeSetMaterial":
             return node.inputs["Material"].default_value
@@ -186,13 +193,13 @@ def material_of_group(group: bpy.types.NodeTree) -> bpy.types.Material | None:
 
 
 def image_node(material: bpy.types.Material) -> bpy.types.Node | None:
-    """Return the node of the image of a material of `new_material`; None if there is none."""
+    """Return the image texture node of a material that shows a picture; None if there is none."""
     nodes = material.node_tree.nodes if material.node_tree is not None else ()
     return next((node for node in nodes if node.bl_idname == "ShaderNodeTexImage"), None)
 
 
 def _clip_rows(matrix: np.ndarray) -> np.ndarray:
-    """Return the rows of a (4, 4) matrix for the clip-space x, y and w: (3, 4)."""
+    """Return the (3, 4) rows of a projection matrix that give the clip-space x, y and w."""
     return np.asarray(matrix)[[0, 1, 3]]
 
 
@@ -201,9 +208,10 @@ def set_picture_modifier(
     node_group: bpy.types.NodeTree,
     pictures: Container[bpy.types.Material] = (),
 ) -> None:
-    """Set the node group of RoSy's modifier, and move it to the end of the object's stack.
+    """Set the node group of RoSy's modifier, and move the modifier to the end of the object's stack.
 
-    The new group keeps how the object shows its other pictures, as far as they are in `pictures`.
+    The previous group may have projections of other pictures. Those of materials in `pictures` are copied to
+    the new group, so that the object can show these pictures again.
     """
     existing = [modifier for modifier in obj.modifiers if is_rosy_modifier(modifier)]
     modifier = existing[0] if existing else obj.modifiers.new(MODIFIER_NAME, "NODES")
@@ -224,9 +232,10 @@ def set_picture_modifier(
 
 
 def applied_materials(data: bpy.types.ID | None) -> list[bpy.types.Material]:
-    """Return the pictures in the material slots of a mesh, or of other data of an object.
+    """Return the materials of pictures in the slots of a mesh, or of other object data.
 
-    They are there if the modifier was applied. Empty if the data are linked from a library.
+    There are some if the user has applied RoSy's modifier. Data that are linked from a library are not
+    searched.
     """
     if data is None or not is_editable(data):
         return []
@@ -234,7 +243,7 @@ def applied_materials(data: bpy.types.ID | None) -> list[bpy.types.Material]:
 
 
 def shown_materials(obj: bpy.types.Object) -> set[bpy.types.Material]:
-    """Return the materials of the pictures that an object shows."""
+    """Return the materials of the pictures that an object shows, by a modifier or in its slots."""
     modifiers = [modifier for modifier in obj.modifiers if is_rosy_modifier(modifier)]
     materials = {material_of_group(modifier.node_group) for modifier in modifiers}
     return (materials | set(applied_materials(obj.data))) - {None}
@@ -251,12 +260,15 @@ def _is_picture(material: bpy.types.Material | None) -> bool:
 
 
 def has_applied_picture(data: bpy.types.ID | None) -> bool:
-    """Return whether a mesh, or other data, have the results of `new_group`: the modifier was applied."""
+    """Return whether a mesh, or other object data, has materials or attributes of an applied picture."""
     return bool(applied_materials(data) or _applied_attributes(data))
 
 
 def remove_applied_picture(data: bpy.types.ID | None) -> None:
-    """Remove what the applied modifier has left in a mesh or other data, not in edit mode."""
+    """Remove the materials and attributes of an applied modifier of RoSy.
+
+    The mesh must not be in edit mode.
+    """
     if not has_applied_picture(data):
         return
     if MATERIAL_ATTRIBUTE in _applied_attributes(data):
@@ -265,22 +277,22 @@ def remove_applied_picture(data: bpy.types.ID | None) -> None:
         if _is_picture(data.materials[index]):
             data.materials.pop(index=index)
     if not getattr(data, "materials", True):
-        # To pop the last material leaves a slot in the objects, and Blender crashes if another
-        # object is joined to them (4.3, 5.2).
+        # After `pop` of the last material, objects still have an empty slot, and Blender (4.3, 5.2) crashes
+        # when another object is joined to them.
         data.materials.clear()
     for name in _applied_attributes(data):
         data.attributes.remove(data.attributes[name])
 
 
 def _applied_attributes(data: bpy.types.ID | None) -> list[str]:
-    """Return the names of the attributes of `new_group` that a mesh has."""
+    """Return the names of the attributes of RoSy's modifier that are stored on a mesh."""
     if not isinstance(data, bpy.types.Mesh) or not is_editable(data):
         return []
     return [name for name in (CLIP_ATTRIBUTE, MATERIAL_ATTRIBUTE) if name in data.attributes]
 
 
 def _restore_material_indices(mesh: bpy.types.Mesh) -> None:
-    """Give the faces that show a picture the material that they had before."""
+    """Give the faces that show a picture the material index that they had before."""
     shows_picture = np.array([_is_picture(material) for material in mesh.materials], dtype=bool)
     index = read_attribute(mesh, "material_index", np.int32, 1)
     earlier_index = read_attribute(mesh, MATERIAL_ATTRIBUTE, np.int32, 1)

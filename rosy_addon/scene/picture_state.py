@@ -1,7 +1,7 @@
-"""The state of a scene that a picture depends on: a `PictureState`, which can be compared and stored.
+"""Read the state of a scene that a picture depends on, as a `PictureState`. States are compared and stored.
 
-Nothing is changed in the file, so a state can be read while Blender draws a panel. Meshes are read as
-they are evaluated, without the temporary attributes of `scene_reader`.
+Reading does not change anything in the file, so it is possible while Blender draws a panel. Evaluated meshes
+are read without the temporary attributes that `scene_reader` adds.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from .meshes import evaluated_mesh, polygon_arrays, read_uvs, shape_digest
 from .read_view import rendered_lights
 from .visible_objects import field_objects, rendered_instances
 
-#: Properties of ``scene.rosy`` that change how a picture is stored and shown, but not how it is drawn.
+#: Properties of ``scene.rosy`` that decide how a picture is stored and shown, but not how it is drawn.
 OUTPUT_PROPERTIES = ("placement", "emission", "diffuse", "store", "directory", "image_format")
 
-#: Properties that decide what a texture shows, and how it is stored.
+#: Properties of ``scene.rosy`` that decide what a texture shows, and how it is stored.
 TEXTURE_OUTPUT = (
     *("texture_content", "texture_bake_light", "texture_udim"),
     *("store", "directory", "image_format"),
@@ -47,18 +47,20 @@ class PictureState:
     Attributes
     ----------
     look : dict
-        The settings that apply, by name.
+        Values of the settings of the look, by name. Settings without an effect have their defaults.
     size : list of int
         Width and height in pixels.
     camera : str
-        Digest of the view and the projection. Empty if no picture can be drawn from the camera.
+        Digest of the view and the projection of the camera. Empty if no picture can be drawn from it.
     output : dict
-        Values of `OUTPUT_PROPERTIES`, and whether the picture is relit.
+        Values of `OUTPUT_PROPERTIES`, and whether the material draws hatching in the present light
+        (relighting).
     device : str
-        What draws the picture: "cpu", "gpu" or "auto".
+        Device that draws the picture: "cpu", "gpu" or "auto".
     objects, occluders, lights : dict of str to list of str
-        Two digests by the name of an object: of the transforms of its instances, and of their meshes. Only
-        occluders and lights that may change the picture are included.
+        By the name of an object, two digests: one of the transforms of its instances, and one of their
+        meshes. For a light, one digest per instance. Only occluders and lights that may change the picture
+        are included.
     reference : str
         Digest of the reference render. Empty if the look uses none.
     """
@@ -74,15 +76,15 @@ class PictureState:
     reference: str
 
     def to_json(self) -> str:
-        """Return the state as text."""
+        """Return the state as JSON text."""
         return json.dumps(asdict(self))
 
     @staticmethod
     def from_json(text: str) -> PictureState | None:
-        """Return the state that a text holds; None if it is not one of this version of RoSy."""
+        """Return the state that `to_json` has written; None if it was written by another version of RoSy."""
         try:
             state = PictureState(**json.loads(text))
-            # JSON has lists for the tuples of settings.
+            # JSON turns tuples into lists.
             look = {name: tuple(v) if isinstance(v, list) else v for name, v in state.look.items()}
             return replace(state, look=look)
         except (AttributeError, TypeError, ValueError):
@@ -91,7 +93,7 @@ class PictureState:
 
 @dataclass(eq=False)
 class _Instances:
-    """The instances of one object.
+    """Digests and bounding boxes of the instances of one object.
 
     Attributes
     ----------
@@ -105,12 +107,15 @@ class _Instances:
     corners: list[np.ndarray] = field(default_factory=list)
 
     def digest_pair(self) -> list[str]:
-        """Return a digest of all transforms, and one of all meshes. Their order does not matter."""
+        """Return a digest of all transforms, and one of all meshes.
+
+        The order of instances does not matter.
+        """
         return [digest(*sorted(column)) for column in zip(*self.digests, strict=True)]
 
 
 class SceneState:
-    """The objects and lights of a view layer: what its pictures from all cameras have in common.
+    """The state of the objects and lights of a view layer, which its pictures from all cameras share.
 
     Parameters
     ----------
@@ -118,7 +123,7 @@ class SceneState:
     depsgraph : bpy.types.Depsgraph
         The evaluated depsgraph of a view layer.
     mesh_states : dict, optional
-        States of meshes that have not changed since they were read. New ones are added.
+        Known states of meshes that have not changed. The states of other meshes are read and added.
     """
 
     def __init__(
@@ -165,7 +170,7 @@ class SceneState:
         source: CameraSource,
         is_frame: bool = False,
     ) -> PictureState:
-        """Return the state of the picture from a camera, or of a frame of an animation."""
+        """Return the state of the picture from a camera; if `is_frame`, that of a frame of an animation."""
         camera = _resolved_camera(scene, depsgraph, source)
         look = read_look(scene.rosy)
         is_relit = scene.rosy.relight and is_hatched(look) and not is_frame
@@ -196,7 +201,7 @@ class SceneState:
     def texture_state(
         self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, obj: bpy.types.Object
     ) -> PictureState:
-        """Return the state of the texture of an object, which is read once for the same settings."""
+        """Return the state of the texture of an object. It is cached for equal settings."""
         settings = scene.rosy
         key = (
             *(obj.session_uid, obj.rosy.texture_uv_map, obj.data.uv_layers.active_index),
@@ -211,10 +216,10 @@ class SceneState:
     def _relevant_occluders(
         self, camera: Camera | None, casts_shadows: bool
     ) -> dict[str, _Instances]:
-        """Return the objects without a field that may change the picture.
+        """Return the objects without a field that may change the picture, by name.
 
-        If shadows are drawn, all may. Otherwise the bounding box of an instance must be at least partly in
-        front of the bounding box of an object with a field.
+        If shadows are drawn, all of them may. Otherwise, only objects with a bounding box that may hide a
+        part of the bounding box of an object with a field are returned.
         """
         if casts_shadows or camera is None:
             return self._occluders
@@ -227,13 +232,13 @@ class SceneState:
 
     @staticmethod
     def _boxes(camera: Camera, objects: Iterable[_Instances]) -> list[np.ndarray]:
-        """Return the boxes of instances in a picture, without those outside it."""
+        """Return the boxes of instances in a picture (`_picture_box`), without those outside it."""
         boxes = (_picture_box(camera, corners) for obj in objects for corners in obj.corners)
         return [box for box in boxes if box is not None]
 
 
 def _light_digests(depsgraph: bpy.types.Depsgraph) -> dict[str, list[str]]:
-    """Return the digests of the lights of a scene, by the names of their objects."""
+    """Return the digests of the visible lights of a scene, by the names of their objects."""
     lights: dict[str, list[str]] = {}
     for light, owner in rendered_lights(depsgraph, np.eye(4)):
         lights.setdefault(owner.name_full, []).append(digest(*vars(light).values()))
@@ -247,25 +252,26 @@ def read_picture_states(
     mesh_states: MeshStates,
     is_frame: bool = False,
 ) -> list[PictureState]:
-    """Return the state of the picture from each camera, or of a frame of an animation.
+    """Return the state of the picture from each camera; if `is_frame`, that of a frame of an animation.
 
-    `mesh_states` are the states that were noted when the scene was read (`SceneData.mesh_states`).
+    `mesh_states` are the states of meshes from reading the scene (`SceneData.mesh_states`), so that meshes
+    are not read again.
     """
     scene_state = SceneState(scene, depsgraph, mesh_states)
     return [scene_state.picture_state(scene, depsgraph, source, is_frame) for source in sources]
 
 
 def bakes_light(settings: bpy.types.PropertyGroup, look: Look) -> bool:
-    """Return whether textures have ink in the light of the scene, by the settings of the scene."""
+    """Return whether the hatching of textures is baked in the light of the scene, with its settings."""
     return settings.texture_bake_light and settings.texture_content == "LOOK" and is_hatched(look)
 
 
 def read_texture_state(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, obj: bpy.types.Object
 ) -> PictureState:
-    """Return the state of the texture of an object, with the settings of the scene.
+    """Return the state that the texture of an object depends on, with the present settings of the scene.
 
-    A texture stays up to date when its object moves or deforms, unless the light is baked.
+    It does not depend on movement and deformation of the object, unless light is baked into the texture.
     """
     settings, mesh = scene.rosy, obj.data
     look = read_look(settings)
@@ -309,7 +315,7 @@ def _uses_lights(look: Look) -> bool:
 
 
 def settings_key(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> tuple:
-    """Return the settings on which a `SceneState` depends. Blender reports only some changes."""
+    """Return the settings on which a `SceneState` depends. Blender does not report all changes of them."""
     look = read_look(scene.rosy)
     objects = []
     for obj in field_objects(view_layer):
@@ -322,13 +328,14 @@ def settings_key(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> tup
 
 
 def applied_settings(look: Look, lacks_tone: bool = False) -> dict:
-    """Return the settings of a look by name. Those that do not apply have their defaults.
+    """Return the settings of a look by name. Settings that have no effect get their defaults.
 
     Parameters
     ----------
     look : Look
     lacks_tone : bool
-        Whether a mesh does not have the tone of the look. Then the light falls on it.
+        Whether some mesh has no tone although the look takes its tone from meshes. That mesh is lit, so the
+        settings of the light have an effect.
     """
     drawn_look = replace(look, tone_lit=True) if lacks_tone else look
     return {
@@ -340,7 +347,7 @@ def applied_settings(look: Look, lacks_tone: bool = False) -> dict:
 def _resolved_camera(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, source: CameraSource
 ) -> Camera | None:
-    """Return the camera of a picture; None if no picture can be drawn from it."""
+    """Return the result of `resolve_camera`; None if no picture can be drawn from the camera."""
     try:
         return resolve_camera(scene, depsgraph, source)
     except RosyError:
@@ -348,7 +355,7 @@ def _resolved_camera(
 
 
 def _reference_digest(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> str:
-    """Return a digest of the reference render of a scene: its file, and its camera."""
+    """Return a digest of the file and the camera of the reference render; the error if it cannot be read."""
     try:
         path = reference_path(scene)
         camera = camera_of_object(scene, depsgraph, render_camera(scene), *render_size(scene))
@@ -369,12 +376,13 @@ def _box_corners(bounds: np.ndarray, matrix: np.ndarray) -> np.ndarray:
 
 
 def _picture_box(camera: Camera, corners: np.ndarray) -> np.ndarray | None:
-    """Return the box around some points in a picture; None if it is outside the picture.
+    """Return a box around the projections of points in a picture; None if it is outside the picture.
 
     Returns
     -------
     (2, 3) float64 ndarray or None
-        Lowest and highest x, y (normalized device coordinates) and depth.
+        Lowest and highest x and y (normalized device coordinates) and depth (distance along the view
+        direction).
     """
     points = corners @ camera.view[:3, :3].T + camera.view[:3, 3]
     clip = np.column_stack([points, np.ones(len(points))]) @ camera.projection.T
@@ -391,6 +399,6 @@ def _picture_box(camera: Camera, corners: np.ndarray) -> np.ndarray | None:
 
 
 def _may_hide(box: np.ndarray, other: np.ndarray) -> bool:
-    """Return whether something in a box of `_picture_box` may hide something in another."""
+    """Return whether an object in one box may hide a part of an object in another; see `_picture_box`."""
     overlaps = (box[0, :2] < other[1, :2]).all() and (other[0, :2] < box[1, :2]).all()
     return bool(overlaps and box[0, 2] < other[1, 2])

@@ -63,7 +63,7 @@ from .texture_nodes import (
     new_texture_material,
 )
 
-#: View transforms that do not change the colors of a picture.
+#: View transforms of Blender's color management that do not change the colors of a picture.
 NEUTRAL_VIEW_TRANSFORMS = ("Standard", "Raw")
 
 
@@ -74,18 +74,19 @@ class OutputSettings:
     Attributes
     ----------
     window_coordinates : bool
-        Map the picture by window coordinates instead of the baked projection.
+        Whether the picture fills the frame of the camera that renders (window coordinates), instead of being
+        projected from the camera from which it was baked.
     emission, diffuse : float
-        Strength of the picture as emission, and its factor as a diffuse color.
+        Strength with which surfaces emit the picture, and factor of the picture as a diffuse color.
     as_float : bool
-        Store linear float values instead of 8-bit sRGB.
+        Whether linear float values are stored instead of 8-bit sRGB.
     folder : Path or None
         Folder to save images in. None packs them into the .blend file.
     device : {"cpu", "gpu", "auto"}
         Device that draws the pictures.
     relight : bool
-        Store the thresholds of hatching, so that the material draws it by the light of the scene. The
-        processor draws them.
+        Whether pictures of hatching store its thresholds, from which the material draws hatching in the light
+        of the scene. Such pictures are drawn on the CPU.
     """
 
     window_coordinates: bool = False
@@ -153,12 +154,12 @@ def read_output_settings(scene: bpy.types.Scene, folder: Path | None = None) -> 
     ----------
     scene : bpy.types.Scene
     folder : Path, optional
-        Folder to save images in, instead of the scene's.
+        Folder in which images are saved. By default, the settings of the scene decide.
 
     Raises
     ------
     RosyError
-        See `output_folder`.
+        If images are to be saved and the scene has no valid folder; see `output_folder`.
     """
     properties = scene.rosy
     if folder is None and properties.store == "SAVED":
@@ -175,7 +176,7 @@ def read_output_settings(scene: bpy.types.Scene, folder: Path | None = None) -> 
 
 
 def check_targets(objects: Iterable[bpy.types.Object], settings: OutputSettings) -> None:
-    """Check that pictures can be applied to objects. Call this before a long job.
+    """Check that pictures can be applied to objects. It is called before they are drawn.
 
     Raises
     ------
@@ -204,7 +205,7 @@ def apply_picture(
     source: CameraSource,
     state: PictureState,
 ) -> BakeResult:
-    """Apply a picture to the objects that it shows. An older one from the same camera is replaced.
+    """Apply a picture to the objects that it shows. It replaces an earlier picture from the same camera.
 
     If an error is raised, the scene is not changed.
 
@@ -212,18 +213,18 @@ def apply_picture(
     ----------
     scene : bpy.types.Scene
     scene_data : SceneData
-        The mesh instances that the picture was drawn from, and their objects, of which each passes
+        The mesh instances that the picture was drawn from, and their objects. The objects have passed
         `check_targets`.
     settings : OutputSettings
     view : ViewInput
-        What was drawn.
+        The input that the picture was drawn from.
     picture : Picture
     image_data : ImageData
         The picture, converted for the output settings.
     source : bpy.types.Object or Camera
         The camera that the view was read from.
     state : PictureState
-        What the picture was drawn from.
+        The state of the scene that the picture was drawn from.
 
     Raises
     ------
@@ -277,10 +278,10 @@ def apply_sequence(
     states: Mapping[int, PictureState],
     key: PictureKey,
 ) -> None:
-    """Apply an image sequence to the objects of a scene. An older one of the same name is replaced.
+    """Apply an image sequence to the objects of a scene. It replaces an earlier sequence of the same name.
 
-    The pictures are mapped by window coordinates, so they fill the frame of the rendering camera.
-    Each is shown at its own frame. Any machine that has the files can show them without RoSy.
+    The pictures are mapped by window coordinates, so they fill the frame of the camera that renders. Each
+    picture is shown at its own frame. Blender shows them without RoSy wherever the files are available.
 
     Parameters
     ----------
@@ -290,11 +291,11 @@ def apply_sequence(
     camera : Camera
         The camera of the last frame.
     source : bpy.types.Object, Camera or None
-        The camera of all frames; None if each is from the camera that renders it.
+        The camera of all frames. None: each frame was drawn from the camera that renders it.
     states : mapping of int to PictureState
-        What each frame was drawn from.
+        The state of the scene that each frame was drawn from.
     key : PictureKey
-        What the key of the pictures says.
+        Contents of the key (legend) of the pictures.
     """
     with rollback_on_error() as created:
         image = load_sequence(sequence.path, settings.as_float)
@@ -336,7 +337,7 @@ def apply_texture(
     *,
     is_udim: bool,
 ) -> bpy.types.Image:
-    """Show a texture on its object, and return its image. An older one is replaced.
+    """Show a texture on its object, and return its image. It replaces an earlier texture of the object.
 
     If an error is raised, the scene is not changed.
 
@@ -347,14 +348,14 @@ def apply_texture(
     uv_map : str
         Name of the UV map.
     tiles : mapping of int to ImageData
-        One picture, or UDIM tiles by their numbers.
+        The UDIM tiles by their numbers, or one picture by any number if there are no UDIM tiles.
     settings : OutputSettings
     state : PictureState
-        What the texture was drawn from.
+        The state of the scene that the texture was drawn from.
     content : str
         What the image shows; see `surface_texture.draw.CONTENTS`.
     hatching : Hatching or None
-        How hatching is drawn, if the image has thresholds of ink and not colors.
+        How the material draws hatching, if the image has thresholds of ink. None if it does not.
     is_udim : bool
         Whether the image has UDIM tiles.
 
@@ -388,7 +389,7 @@ def apply_texture(
         node_groups = _new_groups(material, {obj: None}, created)
     size = image_size(first)
     store_record(scene, obj.name, image, material, obj, {None: state}, size=size, is_texture=True)
-    # The object keeps its pictures, but no other texture.
+    # The object can still show its pictures, but no longer an earlier texture.
     _show_on_objects(node_groups, keep_textures=False)
     return image
 
@@ -409,9 +410,9 @@ def _new_groups(
 def _show_on_objects(
     node_groups: Mapping[bpy.types.Object, bpy.types.NodeTree], *, keep_textures: bool = True
 ) -> None:
-    """Show a recorded picture by a node group for each object, and delete older groups.
+    """Show a recorded picture on objects, with one new node group for each, and delete the earlier groups.
 
-    The older groups refer to the new picture by now, so they are replaced as a whole.
+    The earlier groups cannot be kept: `store_record` has made them refer to the new picture.
     """
     materials = recorded_materials(textures=keep_textures)
     for obj, node_group in node_groups.items():
@@ -420,13 +421,13 @@ def _show_on_objects(
 
 
 def show_bake(scene: bpy.types.Scene, camera: str) -> None:
-    """Show the picture that was baked from a camera on its objects.
+    """Let the objects of a picture show it again, if they show another one.
 
     Parameters
     ----------
     scene : bpy.types.Scene
     camera : str
-        Name of a camera, as in `list_bakes`.
+        Name of the camera of the picture, as in `list_bakes`.
 
     Raises
     ------
@@ -453,7 +454,7 @@ def show_bake(scene: bpy.types.Scene, camera: str) -> None:
 def _object_to_clip_matrices(
     scene_data: SceneData, camera: Camera
 ) -> dict[bpy.types.Object, np.ndarray | None]:
-    """Return the (4, 4) object-to-clip matrix of each object; None if it has several instances."""
+    """Return the (4, 4) object-to-clip matrix of each object; None for objects with several instances."""
     matrices: dict[bpy.types.Object, np.ndarray | None] = {}
     for instance, owner in zip(scene_data.instances, scene_data.objects, strict=False):
         is_repeated = owner in matrices
@@ -462,7 +463,7 @@ def _object_to_clip_matrices(
 
 
 def _display_warnings(scene: bpy.types.Scene) -> list[str]:
-    """Return warnings about view settings that change the colors of pictures."""
+    """Return warnings about settings of the scene's color management that change the colors of pictures."""
     transform = scene.view_settings.view_transform
     if transform in NEUTRAL_VIEW_TRANSFORMS:
         return []

@@ -1,4 +1,4 @@
-"""Read a scene as the input of a renderer: one `ViewInput` for each camera, with its lights."""
+"""Read a scene as the input of a renderer: one `ViewInput` per camera, with the lights of the scene."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def read_views(
     reference_camera: bpy.types.Object | None = None,
     cache: Cache | None = None,
 ) -> tuple[tuple[ViewInput, ...], SceneData]:
-    """Read a scene as the input of a renderer, for one or more cameras. Meshes are read once.
+    """Read a scene as the input of a renderer, for one or more cameras. Each mesh is read only once.
 
     Parameters
     ----------
@@ -38,15 +38,16 @@ def read_views(
     depsgraph : bpy.types.Depsgraph
         Depsgraph of a view layer of the scene.
     cameras : sequence of bpy.types.Object or Camera
-        See `resolve_camera`.
+        Cameras from which pictures will be drawn; see `resolve_camera`.
     look : Look
-        Lights, tones, numbers and the reference render are read only if it uses them.
+        Lights, tones, values for the color map, and the reference render are read only if it uses them.
     objects : sequence of bpy.types.Object, optional
-        Objects with fields to draw; by default all that have one. Other objects only occlude.
+        Objects whose fields are drawn. By default all visible objects with a field. All other objects only
+        hide what is behind them.
     size : (int, int), optional
-        Pixels; by default the size of renders times the scene's percentage for pictures.
+        Width and height in pixels; see `resolve_camera`.
     reference_camera : bpy.types.Object, optional
-        The camera of the reference render; by default the scene's active camera.
+        The camera of the reference render. By default the active camera of the scene.
     cache : Cache, optional
         Keeps meshes, fields and tones that have not changed since an earlier reading.
 
@@ -60,7 +61,7 @@ def read_views(
     Raises
     ------
     RosyError
-        If two cameras have the same name; see also `resolve_camera`, `read_scene` and
+        If two cameras have the same name, or for the reasons of `resolve_camera`, `read_scene` and
         `load_reference`.
     """
     resolved_cameras = [resolve_camera(scene, depsgraph, camera, size) for camera in cameras]
@@ -93,7 +94,7 @@ def read_turntable(
     -------
     instance : MeshInstance
     lights : list of Light
-        World space. Empty if the look does not use them.
+        In world space. Empty if the look does not use the lights of the scene.
 
     Raises
     ------
@@ -108,8 +109,8 @@ def read_turntable(
 def scene_depsgraph(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
     """Return the evaluated depsgraph of a scene.
 
-    It belongs to the view layer in the context if that is one of the scene's, otherwise to the
-    scene's first view layer.
+    It is that of the view layer in the context if this belongs to the scene, otherwise that of the first view
+    layer of the scene.
     """
     context = bpy.context
     if context.scene == scene:
@@ -121,15 +122,15 @@ def scene_depsgraph(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
 def read_lights(depsgraph: bpy.types.Depsgraph, view_matrix: np.ndarray) -> list[Light]:
     """Return all lights that are visible in renders, including instances, in camera space.
 
-    A sun with a strength of pi W/m2 gives a white diffuse surface that faces it a radiance of 1. A
-    point light with the power P gives P / (4 pi^2 r^2) at the distance r. Spots and area lights are
-    treated as point lights. An area light gets the factor 4 of its radiance along its axis.
+    A white diffuse surface that faces a sun with a strength of pi W/m2 has a radiance of 1. At the distance r
+    from a point light of power P, it has a radiance of P / (4 pi^2 r^2). Spots and area lights are treated as
+    point lights. Area lights are four times as bright, as they are along their axes.
 
     Parameters
     ----------
     depsgraph : bpy.types.Depsgraph
     view_matrix : (4, 4) ndarray
-        World to camera space.
+        Transforms world space to camera space.
 
     Returns
     -------
@@ -152,7 +153,7 @@ def rendered_lights(
 
 
 def _convert_light(data: bpy.types.Light, matrix: np.ndarray) -> Light:
-    """Convert a Blender light with a local-to-camera matrix."""
+    """Convert a light of Blender to a `Light`. `matrix` transforms its local space to camera space."""
     color = np.array(data.color) * _temperature_color(data)
     energy = data.energy * 2.0 ** getattr(data, "exposure", 0.0)
     if data.type == "SUN":
@@ -163,7 +164,7 @@ def _convert_light(data: bpy.types.Light, matrix: np.ndarray) -> Light:
 
 
 def _temperature_color(data: bpy.types.Light) -> np.ndarray:
-    """Return the RGB factor of a light's color temperature; ones if it is not used."""
+    """Return the RGB factor of the color temperature of a light; ones if the light does not use one."""
     if not getattr(data, "use_temperature", False):
         return np.ones(3)
     return np.array(data.temperature_color)
@@ -177,21 +178,22 @@ def read_texture_input(
     cache: Cache,
     color_attribute: str | None,
 ) -> tuple[MeshInstance, np.ndarray]:
-    """Read an object with a field, and the UV map of its texture, as it is evaluated.
+    """Read an evaluated object with its field, and the UV map of its texture.
 
-    If `color_attribute` is given, the numbers of this attribute are read for the color map.
+    If `color_attribute` is given, this attribute is read as the values for the color map.
 
     Returns
     -------
     instance : MeshInstance
-        With a field, in world space. If the object has several instances, one of them.
+        One instance of the object with its field, in world space.
     uv : (C, 2) float32 ndarray
-        u and v at its corners.
+        UV coordinates of the corners of the mesh.
 
     Raises
     ------
     RosyError
-        If there is no field or no such attribute, or a modifier loses one of them or the UV map.
+        If the evaluated object has no field, no UV map or no such attribute, for example because a modifier
+        removes it.
     """
     request = ReadRequest(nonfinite_policy(scene), color_attribute=color_attribute)
     instance = read_scene(depsgraph, [obj], request, cache).instances[0]

@@ -1,9 +1,10 @@
 """Read a scene as mesh instances: evaluated meshes with their fields, and occluders.
 
-Bakes and live views use the same `SceneReader`. If modifiers only deform an object, its rest positions and its
-field are read from the original mesh, and nothing is changed in the file. If modifiers change the topology, or
-may change the attribute of the field, `SceneReader.resolve_topologies` adds temporary attributes to the mesh
-and reads them from the evaluated mesh.
+Bakes and live views use the same `SceneReader`. If modifiers only deform an object, its rest positions and
+its field are read from the original mesh, and nothing is changed in the file. If modifiers change the
+topology, or may change the attribute of the field, both are read from the evaluated mesh.
+`SceneReader.resolve_topologies` then adds temporary attributes to the original mesh, which modifiers copy to
+the evaluated mesh.
 """
 
 from __future__ import annotations
@@ -46,10 +47,11 @@ from .meshes import (
 )
 from .visible_objects import Instances, field_objects, rendered_instances
 
-#: The mesh instances of the last reading, in the cache.
+#: Cache key of the mesh instances of the last call of `SceneReader.read`.
 _INSTANCES_KEY = "instances of the last reading"
 
-#: Consecutive calls of `SceneReader.resolve_topologies` for an object that may not suffice.
+#: Number of calls of `SceneReader.resolve_topologies` in a row after which an object that still needs one is
+#: given up: its modifiers make other faces at each evaluation.
 MAX_ATTEMPTS = 4
 
 
@@ -60,13 +62,13 @@ class SceneData:
     Attributes
     ----------
     instances : list of MeshInstance
-        World space. Instances with a field come first, then occluders.
+        In world space. Instances with a field come first, then occluders (meshes that only hide others).
     objects : list of bpy.types.Object
         The original object of each instance with a field, in the same order.
     warnings : tuple of str
-        For each object that was left out because its field cannot be drawn: which one, and why.
+        One message for each object that was left out because its field cannot be drawn, with the reason.
     mesh_states : dict
-        What was read, as digests; see `mesh_states`.
+        Digests of the meshes that were read; see the module `mesh_states`.
     """
 
     instances: list[MeshInstance]
@@ -83,18 +85,19 @@ def read_scene(
 ) -> SceneData:
     """Read every mesh that is visible in renders, as arrays.
 
-    Meshes are evaluated: modifiers (with their viewport settings), shape keys and armatures are
-    applied. Each instance is returned as a separate mesh instance. The rest positions of deforming
-    objects with a field are read too.
+    Meshes are evaluated: modifiers (with their viewport settings), shape keys and armatures are applied. Each
+    instance of an object is returned as a separate mesh instance. If an object with a field is deformed, its
+    rest positions are read too.
 
     Parameters
     ----------
     depsgraph : bpy.types.Depsgraph
         The evaluated depsgraph of a view layer.
     objects : sequence of bpy.types.Object, optional
-        Original objects with fields to draw. All other objects only occlude. By default `field_objects`,
-        without objects that have an error.
+        Original objects whose fields are drawn. All other objects only hide what is behind them. By default
+        all of `field_objects`; those whose fields cannot be drawn are then left out with a warning.
     request : ReadRequest
+        What is read of the meshes besides shapes and fields.
     cache : Cache, optional
         Keeps mesh instances that have not changed since an earlier call.
 
@@ -105,8 +108,8 @@ def read_scene(
     Raises
     ------
     RosyError
-        If no object has a field that can be drawn, or no object has the requested tone or numbers. If one of
-        the given objects is hidden, or its field cannot be read or is lost in its modifiers.
+        If no object has a field that can be drawn, or none has the requested tone or values for the color
+        map. If one of `objects` is hidden, its field cannot be read, or its modifiers remove the field.
     """
     targets = field_objects(depsgraph.view_layer) if objects is None else list(objects)
     if not targets:
@@ -137,7 +140,7 @@ def _field_errors(
     entries: Sequence[SceneInstance],
     targets: Sequence[bpy.types.Object],
 ) -> list[RosyError]:
-    """Return the errors of objects with fields; raise any other error."""
+    """Return why fields of `targets` cannot be drawn, one error per object. Raise errors of other objects."""
     names = [obj.name_full for obj in targets]
     for name, error in errors.items():
         if name not in names or not isinstance(error, RosyError):
@@ -156,14 +159,14 @@ def _field_errors(
 
 @dataclass(frozen=True, eq=False)
 class SceneInstance:
-    """One mesh instance of a scene: of an object with a field, or of an occluder.
+    """A mesh instance of a scene, and the objects that it comes from.
 
     Attributes
     ----------
     instance : MeshInstance
-        The same one as in the last reading if nothing has changed.
+        The same Python object as in the last call of `SceneReader.read`, if nothing has changed.
     owner : bpy.types.Object
-        The original object.
+        The original object of the mesh.
     visibility_object : bpy.types.Object
         The original object that decides in which 3D views the instance is visible.
     """
@@ -173,34 +176,34 @@ class SceneInstance:
     visibility_object: bpy.types.Object
 
 
-#: A surface, its field, its tone and its numbers for the color map. Occluders have only the surface.
+#: A surface, its field, its tone and its values for the color map. Occluders have only the surface.
 _MeshData = tuple[Surface, RosyField | None, SurfaceTone | None, np.ndarray | None]
 
-#: The full name of an object, and the `_topology_hash` of one of its evaluated meshes.
+#: The full name (`name_full`) of an object, and the `_topology_hash` of one of its evaluated meshes.
 _TopologyKey = tuple[str, bytes]
 
-#: Rest positions and field of an evaluated mesh that has other faces than the original mesh.
+#: Rest positions and field of an evaluated mesh, which cannot be read from the original mesh.
 _Topology = tuple[np.ndarray | None, RosyField]
 
 
 class SceneReader:
-    """Reads the meshes of one view layer. Later readings read only what has changed.
+    """A reader of the meshes of one view layer. Repeated calls of `read` read only what has changed.
 
     Parameters
     ----------
     cache : Cache, optional
-        Keeps surfaces, fields and mesh instances by their contents.
+        Keeps surfaces, fields and mesh instances. Equal contents give the same object.
     mesh_states : dict, optional
-        Gets a digest of each mesh that is read.
+        The states of meshes that are read are added to it; see the module `mesh_states`.
 
     Attributes
     ----------
     cache : Cache
     mesh_states : dict or None
     errors : dict of str to Exception
-        By the full name of an object: the error for which its field is not drawn, or it does not occlude.
+        By the full name of an object: why its field cannot be drawn, or why it cannot be read at all.
     is_complete : bool
-        Whether the last call of `read` ended before its deadline.
+        Whether the last call of `read` read all objects before its deadline.
     """
 
     def __init__(self, cache: Cache | None = None, mesh_states: MeshStates | None = None) -> None:
@@ -211,25 +214,26 @@ class SceneReader:
         self._request = FIELDS_ONLY
         self._deadline = math.inf
         self._has_read_any = False
-        # By the full name of the object, the pointer of its mesh, `tone_image_key`, and whether its
-        # field is drawn. None: no faces.
+        # Keys: the full name of the object, the pointer of its mesh, `tone_image_key`, and whether its field
+        # is drawn. None: the mesh has no faces.
         self._meshes: dict[tuple, _MeshData | None] = {}
-        # The error of a mesh that could not be read is valid until its object changes.
+        # The results of `resolve_topologies`. An error is kept until its object changes.
         self._topologies: dict[_TopologyKey, _Topology | Exception] = {}
         # Meshes that need `resolve_topologies`.
         self._unresolved: set[_TopologyKey] = set()
-        # By the name of an object: consecutive calls of `resolve_topologies` that did not suffice.
+        # By the name of an object: how often in a row `resolve_topologies` was called for it; see
+        # MAX_ATTEMPTS.
         self._attempts: dict[str, int] = {}
 
     def invalidate(self, names: set[str] | None = None, *, topology_changed: bool = True) -> None:
-        """Mark objects as changed, so that they are read again.
+        """Mark objects as changed, so that the next call of `read` reads them again.
 
         Parameters
         ----------
         names : set of str, optional
-            Full names of the objects. By default all.
+            Full names of the changed objects. By default all objects.
         topology_changed : bool
-            Whether the faces or fields may have changed, not only the positions of the vertices.
+            Whether faces or fields may have changed. False: only positions of vertices have changed.
         """
         for key in [key for key in self._meshes if names is None or key[0] in names]:
             del self._meshes[key]
@@ -246,19 +250,21 @@ class SceneReader:
         request: ReadRequest = FIELDS_ONLY,
         deadline: float = math.inf,
     ) -> list[SceneInstance]:
-        """Return mesh instances in their current state.
+        """Return the mesh instances of a scene in their current state.
 
-        Objects that need `resolve_topologies` first, or that cannot be read, are left out; see
-        `has_unresolved` and `errors`. Nothing is changed in the file.
+        Objects that need `resolve_topologies` first are left out; see `has_unresolved`. Objects that cannot
+        be read are left out too; see `errors`. Nothing is changed in the file.
 
         Parameters
         ----------
         instances : iterator of (bpy.types.DepsgraphObjectInstance, bool)
-            Instances of meshes, and whether their fields are drawn. The others only occlude.
+            Instances of meshes, each with whether its field is drawn. The others only hide what is behind
+            them.
         request : ReadRequest
+            What is read of the meshes besides shapes and fields.
         deadline : float
-            Seconds, monotonic. Meshes that were not read by then, except one, are left for the next
-            call; see `is_complete`.
+            Time in seconds of `time.monotonic`. At least one changed mesh is read. Those that are not read by
+            then are left for the next call; see `is_complete`.
         """
         if self.is_complete:
             self.errors.clear()
@@ -275,7 +281,7 @@ class SceneReader:
             obj, owner = instance.object, instance.object.original
             mesh_data = self._mesh_data(obj, owner, draws_field)
             if mesh_data is None and draws_field and owner.name_full in self.errors:
-                mesh_data = self._mesh_data(obj, owner, False)  # as an occluder
+                mesh_data = self._mesh_data(obj, owner, False)  # without its field
             if mesh_data is None:
                 if draws_field:
                     faceless.add(owner)
@@ -296,24 +302,25 @@ class SceneReader:
             for owner in faceless - {entry.owner for entry in entries}:
                 if owner.name_full not in waiting:
                     self.errors.setdefault(owner.name_full, lost_field_error(owner, None))
-        # The instances of the last call are released only now: while their surfaces are alive, no
-        # new object can have the same id.
+        # The instances of the last call are released only now: the keys have ids of surfaces, and while a
+        # surface is alive, no new object can have its id.
         self.cache.put(_INSTANCES_KEY, mesh_instances)
         self.cache.evict_over_limit()
         return entries
 
     @property
     def has_unresolved(self) -> bool:
-        """Return whether there are objects that need `resolve_topologies`."""
+        """Return whether the last call of `read` left out objects that need `resolve_topologies`."""
         return bool(self._unresolved)
 
     def resolve_topologies(
         self, depsgraph: bpy.types.Depsgraph, deadline: float = math.inf
     ) -> None:
-        """Read the rest positions and fields of meshes whose modifiers change the topology.
+        """Read the rest positions and fields of objects whose modifiers change the topology.
 
-        This adds temporary attributes to the meshes, so it must not be called while Blender draws.
-        Objects that were not read by the deadline, except one, are left for the next call.
+        It adds temporary attributes to the meshes, so it must not be called while Blender draws. At least one
+        object is read. Those that are not read by the deadline (seconds of `time.monotonic`) are left for the
+        next call.
         """
         while self._unresolved:
             names = {name for name, _ in self._unresolved}
@@ -322,7 +329,7 @@ class SceneReader:
                 return
 
     def _resolve(self, depsgraph: bpy.types.Depsgraph, names: set[str]) -> None:
-        """Read the rest positions and fields of the meshes of some objects."""
+        """Read the rest positions and fields of the evaluated meshes of objects with these full names."""
         unresolved = {key for key in self._unresolved if key[0] in names}
         self._unresolved -= unresolved
         for name in names:
@@ -341,9 +348,9 @@ class SceneReader:
         except MemoryError as error:
             problems = dict.fromkeys(problems, error)
         problems |= {obj.name_full: error for obj, error in errors.items()}
-        # Whatever was not read now is not tried again before the object changes.
+        # Meshes that could not be read now are not tried again until their objects change.
         for key in unresolved:
-            if key[0] in problems:  # otherwise the object was deleted
+            if key[0] in problems:  # if not, the object was deleted
                 self._topologies.setdefault(key, problems[key[0]])
 
     def _read_topologies(
@@ -352,7 +359,7 @@ class SceneReader:
         layouts: Mapping[bpy.types.Object, FieldLayout],
         problems: dict[str, Exception],
     ) -> None:
-        """Add the meshes of objects that have their field to `_topologies`, others to `problems`."""
+        """Add rest positions and fields of evaluated meshes to `_topologies`, or errors to `problems`."""
         for instance in depsgraph.object_instances:
             obj, owner = instance.object, instance.object.original
             layout = layouts.get(owner)
@@ -378,7 +385,7 @@ class SceneReader:
     def _mesh_data(
         self, obj: bpy.types.Object, owner: bpy.types.Object, draws_field: bool
     ) -> _MeshData | None:
-        """Return the data of the mesh of an evaluated object; None if it cannot be read now."""
+        """Return the data of an evaluated mesh; None if it has no faces or cannot be read now."""
         pointer, request = obj.data.as_pointer(), self._request
         key = owner.name_full, pointer, tone_image_key(owner, request.tone), draws_field
         if key in self._meshes:
@@ -407,7 +414,7 @@ class SceneReader:
     def _read_mesh(
         self, mesh: bpy.types.Mesh | None, owner: bpy.types.Object, draws_field: bool
     ) -> _MeshData | None:
-        """Read an evaluated mesh; None if there are no faces, or it is unresolved."""
+        """Read an evaluated mesh. Return None if it has no faces, or needs `resolve_topologies` first."""
         if mesh is None:
             return None
         if draws_field:
@@ -416,7 +423,7 @@ class SceneReader:
         return mesh_surface(mesh, label, occluder_only=True, cache=self.cache), None, None, None
 
     def _read_field_mesh(self, mesh: bpy.types.Mesh, owner: bpy.types.Object) -> _MeshData | None:
-        """Read an evaluated mesh with its field; None if it is unresolved."""
+        """Read an evaluated mesh with its field. Return None if it needs `resolve_topologies` first."""
         request, label, original = self._request, f"object '{owner.name}'", owner.data
         surface = mesh_surface(mesh, label, cache=self.cache)
         tone = read_tone(mesh, owner, request.tone, self.cache)
@@ -452,7 +459,7 @@ class SceneReader:
     def _edit_mode_field(
         self, mesh: bpy.types.Mesh, owner: bpy.types.Object, surface: Surface, label: str
     ) -> RosyField:
-        """Return the field of a mesh in edit mode. Only its evaluated mesh can be read."""
+        """Return the field of an object in edit mode. Only its evaluated mesh has attributes then."""
         original = owner.data
         name = attribute_name(original)
         if name in original.attributes and name not in mesh.attributes:
@@ -465,7 +472,7 @@ class SceneReader:
         return read_evaluated_field(mesh, layout, surface, self._request.nonfinite, label)
 
     def _with_rest(self, surface: Surface, rest: np.ndarray | None) -> Surface:
-        """Return a surface with rest positions, if there are any that differ from its own."""
+        """Return a surface with rest positions; the same surface if they are None, or its own positions."""
         if rest is None or np.array_equal(rest, surface.vertices):
             return surface
         rest = np.asarray(rest, dtype=np.float64)
@@ -476,7 +483,7 @@ class SceneReader:
 
 
 def lost_field_error(obj: bpy.types.Object, attribute: str | None) -> RosyError:
-    """Return the error for an object that loses an attribute, or (if None) all faces, in its modifiers."""
+    """Return the error for an object whose modifiers remove an attribute, or all faces if that is None."""
     if attribute is None and not len(obj.data.polygons):
         return no_faces_error(obj.data, f"object '{obj.name}'")
     names = ", ".join(modifier.name for modifier in user_modifiers(obj)) or "none"

@@ -1,4 +1,4 @@
-"""The singularities of an object's field, and point objects that show them in the scene."""
+"""Find the singularities of an object's field, and show them in the scene as point objects."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .meshes import (
 )
 from .scene_reader import read_scene
 
-#: Attributes of the points: the singularity index in units of 1 / N, and the degree N.
+#: Names of attributes of the points: the singularity index in units of 1 / N, and the degree N of the field.
 INDEX_ATTRIBUTE, DEGREE_ATTRIBUTE = "index", "degree"
 
 
@@ -35,15 +35,15 @@ class Singularities:
     Attributes
     ----------
     points : (K, 3) float32 ndarray
-        Object space.
+        Positions, object space.
     normals : (K, 3) float32 ndarray
-        Vertex normals, object space.
+        Vertex normals at the points, object space.
     index : (K,) int32 ndarray
         Singularity index in units of 1 / N.
     degree : int
         Degree N of the field.
     vertex : (K,) int32 ndarray or None
-        Vertices of the original mesh; None for singularities of the evaluated mesh.
+        Their vertices of the original mesh. None if they were found on the evaluated mesh.
     """
 
     points: np.ndarray
@@ -66,7 +66,7 @@ def read_singularities(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) ->
 
     See Also
     --------
-    rosy_addon.field.singularities.find_singularities : The same for a surface and a field.
+    rosy_addon.field.singularities.find_singularities : Finds the singularities of a field on a surface.
     """
     if user_modifiers(obj) or obj.data.shape_keys:
         scene_data = read_scene(depsgraph, [obj], ReadRequest("zero"))
@@ -90,9 +90,9 @@ def _own_field(obj: bpy.types.Object) -> tuple[Surface, RosyField]:
 def read_editable_singularities(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> Singularities:
-    """Find the singularities of the field of an object's original mesh, at their places on the evaluated mesh.
+    """Find the singularities of the field of an object's original mesh, which can be edited.
 
-    These can be edited. The evaluated mesh may have other singularities.
+    Their positions are those of their vertices on the evaluated mesh. The evaluated field may have others.
 
     Raises
     ------
@@ -111,8 +111,8 @@ def read_editable_singularities(
 def mesh_of_own_vertices(obj: bpy.types.Object, evaluated: bpy.types.Mesh | None) -> bpy.types.Mesh:
     """Return the evaluated mesh if its first vertices are the vertices of the original mesh.
 
-    They are if modifiers keep the vertices, or add new ones after them, such as *Armature*, *Subdivision
-    Surface* or *Mirror*. If vertices are lost, the original mesh is returned.
+    That is assumed if it has at least as many vertices: modifiers such as *Armature*, *Subdivision Surface*
+    and *Mirror* keep the vertices, and add new ones after them. Otherwise the original mesh is returned.
     """
     is_lost = evaluated is None or len(evaluated.vertices) < len(obj.data.vertices)
     return obj.data if is_lost else evaluated
@@ -121,17 +121,17 @@ def mesh_of_own_vertices(obj: bpy.types.Object, evaluated: bpy.types.Mesh | None
 def add_singularity_points(
     scene: bpy.types.Scene, obj: bpy.types.Object, singularity_data: Singularities
 ) -> bpy.types.Object:
-    """Create an object with one point for each singularity, and the index as an attribute.
+    """Create a child object of `obj` with a point for each singularity, and its index as an attribute.
 
-    It is a point cloud, or a mesh without edges if scripts cannot create point clouds in this
-    version of Blender. The new object is a child of `obj`. An earlier one for `obj` is deleted.
+    The object is a point cloud, or a mesh without edges if scripts cannot create point clouds in this version
+    of Blender. The earlier point object of `obj` is deleted.
     """
     remove_singularity_points(scene, obj)
     name = f"{obj.name} singularities"
     data = _new_point_cloud(name, len(singularity_data))
     point_object = bpy.data.objects.new(name, data)
     point_object[OWNED_TAG], data[OWNED_TAG] = obj.name, True
-    if len(singularity_data):  # an empty point cloud has no positions
+    if len(singularity_data):  # an empty point cloud lacks the attribute
         data.attributes["position"].data.foreach_set("vector", singularity_data.points.ravel())
     for key, values in (
         (INDEX_ATTRIBUTE, singularity_data.index),
@@ -148,7 +148,7 @@ def add_singularity_points(
 def read_singularity_points(
     scene: bpy.types.Scene, obj: bpy.types.Object, degree: int, name: str = ""
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the vertices of a mesh that are next to points of singularities, and their indices.
+    """Read singularities from point objects: the vertices of a mesh nearest to the points, and indices.
 
     Parameters
     ----------
@@ -156,21 +156,23 @@ def read_singularity_points(
     obj : bpy.types.Object
         The object of the mesh.
     degree : int
-        N of the indices that are returned. The points may be of another degree.
+        Degree N of the returned indices. The points may have indices for another degree, which are converted.
     name : str
-        Name of the object with the points; by default the one of `add_singularity_points` for `obj`.
+        Name of the object with the points. By default the one that `add_singularity_points` created for
+        `obj`.
 
     Returns
     -------
     vertex : (K,) int64 ndarray
-        In ascending order. The indices of points at the same vertex add up.
+        In ascending order, without vertices at which the sum of indices is zero.
     index : (K,) int64 ndarray
-        In units of 1 / N.
+        Sum of the indices of all points nearest to the vertex, in units of 1 / N.
 
     Raises
     ------
     RosyError
-        If there is no such object, its points have no indices, or the degree does not allow them.
+        If there is no such object, its points have no indices, or a field of this degree cannot have one of
+        the indices.
     """
     own_points = next(iter(_point_objects(scene, obj)), None)
     source = scene.objects.get(name) if name else own_points
@@ -215,12 +217,12 @@ def read_singularity_points(
 
 
 def has_points(obj: bpy.types.Object) -> bool:
-    """Return whether an object has points with attributes: a mesh or a point cloud."""
+    """Return whether an object is a mesh or a point cloud, which have points with attributes."""
     return obj.type in ("MESH", "POINTCLOUD")
 
 
 def _point_objects(scene: bpy.types.Scene, obj: bpy.types.Object) -> list[bpy.types.Object]:
-    """Return the point objects of an object."""
+    """Return the objects in a scene that `add_singularity_points` has created for an object."""
     return [
         candidate
         for candidate in scene.objects
@@ -229,7 +231,7 @@ def _point_objects(scene: bpy.types.Scene, obj: bpy.types.Object) -> list[bpy.ty
 
 
 def remove_singularity_points(scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
-    """Delete the point objects of an object."""
+    """Delete the objects that `add_singularity_points` has created for an object."""
     for point_object in _point_objects(scene, obj):
         data = point_object.data
         bpy.data.objects.remove(point_object)
@@ -238,7 +240,7 @@ def remove_singularity_points(scene: bpy.types.Scene, obj: bpy.types.Object) -> 
 
 
 def _new_point_cloud(name: str, count: int) -> bpy.types.ID:
-    """Create a point cloud with a number of points, or a mesh if that is not possible."""
+    """Create a point cloud with `count` points, or a mesh if scripts cannot create point clouds."""
     cloud = bpy.data.pointclouds.new(name)
     if hasattr(cloud, "resize"):
         cloud.resize(count)

@@ -1,4 +1,4 @@
-"""Compare the recorded state of a picture with the present one: is the picture out of date?"""
+"""Find out whether a picture is out of date: compare the recorded state of the scene with the present one."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ import bpy
 
 from .picture_state import MeshStates, PictureState, SceneState, settings_key
 
-#: Least time between two readings of a scene, as a multiple of the time that a reading takes. Panels spend at
-#: most a tenth of the time on readings, so playback and sculpting stay fluent.
+#: Least time between two readings of a scene, as a multiple of the time that a reading takes. So panels spend
+#: at most a tenth of the time on readings, and playback and sculpting stay fluent.
 TTL_READINGS = 10.0
 
-#: Lists of `bpy.app.handlers` that are called when objects may have changed.
+#: Names of the lists in `bpy.app.handlers` whose handlers Blender calls when objects may have changed.
 _WATCHED_EVENTS = ("depsgraph_update_post", "frame_change_post", "undo_post", "redo_post")
 
-#: How reasons call the properties of the output.
+#: Names of properties of the output in messages, where they differ from the identifiers.
 _OUTPUT_LABELS = {
     "texture_content": "content",
     "texture_bake_light": "baked light",
@@ -31,10 +31,10 @@ _OUTPUT_LABELS = {
 
 
 class SceneStateCache:
-    """The present state of a scene, for panels, which ask at every redraw.
+    """A cache of the present state of a scene, for panels, which need it at every redraw.
 
-    Handlers note which objects change, and only their meshes are read again. They exist from the first
-    time that a panel shows a scene with pictures until a file is loaded or `clear` is called.
+    Handlers note which objects change, so that only their meshes are read again. The handlers are added when
+    a panel first shows a scene with pictures. They exist until a file is loaded or `clear` is called.
     """
 
     def __init__(self) -> None:
@@ -45,7 +45,7 @@ class SceneStateCache:
         self._next_reading = 0.0
 
     def get(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> SceneState:
-        """Return the present state of the depsgraph's view layer, or a recent one; see `TTL_READINGS`."""
+        """Return the state of the view layer of a depsgraph. It may be a moment old; see `TTL_READINGS`."""
         view_layer = depsgraph.view_layer
         key = scene.session_uid, view_layer.name, settings_key(scene, view_layer)
         if key != self._key or not self._is_watching():
@@ -63,19 +63,19 @@ class SceneStateCache:
         return self._scene_state
 
     def seconds_to_wait(self) -> float:
-        """Return the seconds after which to ask again; 0 if nothing has changed since the last reading."""
+        """Return the seconds until `get` reads changes that it has not read yet; 0 if there are none."""
         is_behind = self._is_watching() and self._is_outdated
         return max(self._next_reading - time.monotonic(), 0.01) if is_behind else 0.0
 
     def note_changes(self, depsgraph: bpy.types.Depsgraph | None) -> None:
-        """Forget the meshes that have changed. If there is no depsgraph, all may have changed."""
+        """Forget the states of meshes that have changed. If there is no depsgraph, all may have changed."""
         self._is_outdated = True
         if depsgraph is None:
             self._mesh_states.clear()
             return
         for update in depsgraph.updates:
             if isinstance(update.id, bpy.types.Image):
-                self._mesh_states.clear()  # it may be the tone of any of them
+                self._mesh_states.clear()  # the image may be the tone of any mesh
             elif update.is_updated_geometry:
                 changed = update.id.original.session_uid
                 for key in [key for key in self._mesh_states if key[0] == changed]:
@@ -91,23 +91,26 @@ class SceneStateCache:
         atexit.unregister(self.clear)
 
     def _watch(self) -> None:
-        """Add the handlers. Blender's Python module must not have them when Python exits."""
+        """Add the handlers. They are removed when Python exits, as Blender's Python module requires."""
         for name in _WATCHED_EVENTS:
             getattr(bpy.app.handlers, name).append(_note_changes)
         atexit.register(self.clear)
 
     @staticmethod
     def _is_watching() -> bool:
-        """Return whether the handlers exist. Blender drops them when it loads a file."""
+        """Return whether the handlers exist. Blender removes them when it loads a file."""
         return _note_changes in bpy.app.handlers.depsgraph_update_post
 
 
-#: The cache of the panels of one Blender process. Cleared by `unregister`.
+#: The cache that all panels of this Blender process share. It is cleared by `unregister`.
 SCENE_STATES = SceneStateCache()
 
 
 def _note_changes(_scene: Any, depsgraph: bpy.types.Depsgraph | None = None) -> None:
-    """Handler of `_WATCHED_EVENTS`. After an undo there is no depsgraph."""
+    """Note changes of a depsgraph: the handler of all `_WATCHED_EVENTS`.
+
+    After an undo there is no depsgraph.
+    """
     SCENE_STATES.note_changes(depsgraph)
 
 
@@ -117,11 +120,11 @@ def difference(recorded: PictureState, present: PictureState, source: str) -> st
     Parameters
     ----------
     recorded : PictureState
-        What the picture was drawn from.
+        The state that the picture was drawn from.
     present : PictureState
-        What it would be drawn from now.
+        The state that it would be drawn from now.
     source : str
-        The camera, or the UV map of a texture, for the reason.
+        How the reason calls the camera, or the UV map of a texture.
     """
     content = present.output.get("texture_content")
     if recorded.output.get("texture_content") != content:
@@ -154,16 +157,16 @@ def _object_difference(
     kind: str = "",
     of_mesh: str = "",
 ) -> str:
-    """Return how objects or lights have changed; empty if they have not. Their names do not matter.
+    """Return how objects or lights have changed; empty if they have not. Objects may have been renamed.
 
     Parameters
     ----------
     recorded, present : mapping of str to list of str
-        Attributes of `PictureState`.
+        The same attribute of two `PictureState`: digests by the names of objects.
     kind : str
-        What precedes the names. Without it, objects may also have been moved.
+        Text before the names. If it is empty, the result tells moved objects from changed ones.
     of_mesh : str
-        What precedes the name of an object with a changed mesh.
+        Text before the name of an object with a changed mesh.
     """
     if sorted(recorded.values()) == sorted(present.values()):
         return ""
@@ -183,7 +186,7 @@ def _object_difference(
 def _without_renamed(
     recorded: Mapping[str, list[str]], present: Mapping[str, list[str]]
 ) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
-    """Return both, in which objects that were only renamed, moved or changed have their present names."""
+    """Return both with equal names for the same object, if it was renamed and keeps at least one digest."""
     before, after = dict(recorded), dict(present)
     for name in recorded.keys() - present.keys():
         for new_name in after.keys() - before.keys():

@@ -1,6 +1,6 @@
-"""Strokes as data of Blender: Curves with attributes for Geometry Nodes, or Grease Pencil.
+"""Convert strokes to data of Blender: Curves with attributes for Geometry Nodes, or Grease Pencil.
 
-Curves can follow the surface that they were drawn on, by a modifier with a node group.
+A modifier with a node group lets Curves follow the surface that they were drawn on.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from ..line_drawing.outline import OUTLINE_KINDS
 from .datablocks import OWNED_TAG, STROKES_TAG
 from .node_builder import NodeBuilder, enabled_output, new_emissive_material, new_modifier_group
 
-#: Called with each datablock that is created and the name that it should have.
+#: A function that is called with each new datablock and the name that it should have.
 RegisterDatablock = Callable[[bpy.types.ID, str], None]
 
-#: Attribute of the curves: the color of the family, RGBA, linear.
+#: Name of the attribute of curves with the color of their family of strokes, linear RGBA.
 INK_ATTRIBUTE = "ink"
 
 #: Value of Blender's ``curve_type`` attribute for polylines.
@@ -38,7 +38,7 @@ def new_curves(
     name : str
     geometry : StrokeGeometry
     frame : int
-        Not used: curves have no frames. `new_grease_pencil` has the same parameters.
+        Not used, as curves have no frames. It is here because `new_grease_pencil` is called in the same way.
     register : callable
         Called with each new datablock and its name.
     """
@@ -50,8 +50,8 @@ def new_curves(
     set_attribute(data, "position", "FLOAT_VECTOR", "POINT", geometry.points)
     set_attribute(data, "radius", "FLOAT", "POINT", geometry.radius)
     set_attribute(data, "curve_type", "INT8", "CURVE", np.full(len(strokes), POLY_CURVE_TYPE))
-    # Blender caches the number of curves of each type when curves are added. If these counts are
-    # out of date, it writes past the end of its arrays. Adding no curves updates them.
+    # Blender caches the number of curves of each type when curves are added. With outdated counts it writes
+    # past the end of its arrays. To add no curves updates the counts.
     data.add_curves([])
     set_attribute(data, "family", "INT", "CURVE", strokes.family)
     set_attribute(data, "object", "INT", "CURVE", geometry.instance_index)
@@ -71,24 +71,24 @@ def new_curves(
 
 
 def set_attribute(data: Any, name: str, data_type: str, domain: str, values: np.ndarray) -> None:
-    """Write the values of an attribute of Curves or of a drawing, and create it if it is missing."""
+    """Write an attribute of Curves or of a Grease Pencil drawing, and create it if it is missing."""
     attribute = data.attributes.get(name) or data.attributes.new(name, data_type, domain)
     key = {"FLOAT_VECTOR": "vector", "FLOAT_COLOR": "color"}.get(data_type, "value")
     dtype = {"INT": np.int32, "INT8": np.int8}.get(data_type, np.float32)
     attribute.data.foreach_set(key, np.ascontiguousarray(values, dtype=dtype).ravel())
 
 
-#: Name of the layer for outlines: silhouettes, creases and borders.
+#: Name of the Grease Pencil layer for outlines: silhouettes, creases and borders.
 OUTLINE_LAYER = "Outline"
 
-#: Before Blender 4.3, a stroke has an integer line width: its units for one unit of radius, and its
-#: largest value.
+#: Before Blender 4.3, a stroke of Grease Pencil has an integer line width. First: the line width of a radius
+#: of one Blender unit. Second: the largest line width.
 LEGACY_WIDTH_PER_UNIT = 2000
 MAX_LEGACY_WIDTH = 1000
 
 
 def has_grease_pencil_drawings() -> bool:
-    """Return whether Grease Pencil frames hold drawings with attributes (Blender 4.3 and later)."""
+    """Return whether frames of Grease Pencil have drawings with attributes (Blender 4.3 and later)."""
     return hasattr(bpy.types, "GreasePencilDrawing")
 
 
@@ -97,7 +97,7 @@ def new_grease_pencil(
 ) -> bpy.types.ID:
     """Create Grease Pencil data from strokes, with one layer and one material for each family.
 
-    All kinds of outline share one layer.
+    All kinds of outlines (silhouettes, creases, borders) share one layer.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def _add_to_drawing(
     radius: np.ndarray,
     material_index: int,
 ) -> None:
-    """Add strokes to a frame in Blender 4.3 and later."""
+    """Add strokes to a frame of a Grease Pencil layer, in Blender 4.3 and later."""
     drawing = frame.drawing
     drawing.add_strokes(point_counts.tolist())
     set_attribute(drawing, "position", "FLOAT_VECTOR", "POINT", points)
@@ -166,9 +166,10 @@ def _add_to_frame(
     radius: np.ndarray,
     material_index: int,
 ) -> None:
-    """Add strokes to a frame before Blender 4.3.
+    """Add strokes to a frame of a Grease Pencil layer, before Blender 4.3.
 
-    There, the width at a point is the integer width of the stroke times the pressure at the point.
+    In these versions, the width at a point is the integer width of the stroke times the pressure at the
+    point.
     """
     line_width = int(np.clip(np.ceil(LEGACY_WIDTH_PER_UNIT * radius.max()), 1, MAX_LEGACY_WIDTH))
     ends = np.cumsum(point_counts)
@@ -191,16 +192,17 @@ def _new_material(name: str, color: str) -> bpy.types.Material:
     return material
 
 
-#: Name of the modifier.
+#: Name of the modifier with which strokes follow a surface.
 MODIFIER_NAME = "Follow Surface"
 
-#: Attributes of the points: the vertices of their triangles, the weights of these, and the height.
+#: Names of attributes that attach a point to a triangle of the surface: its three vertices, their barycentric
+#: weights, and the height of the point above the triangle.
 VERTEX_ATTRIBUTES = ("surface_vertex_0", "surface_vertex_1", "surface_vertex_2")
 WEIGHTS_ATTRIBUTE, HEIGHT_ATTRIBUTE = "surface_weights", "surface_height"
 
 
 def attribute_values(attachment: SurfaceAttachment) -> dict[str, tuple[str, object]]:
-    """Return the data types and values of the attributes of the points, by their names."""
+    """Return the attributes that attach points to a surface: data types and values, by name."""
     values: dict[str, tuple[str, object]] = {
         name: ("INT", attachment.vertices[:, index]) for index, name in enumerate(VERTEX_ATTRIBUTES)
     }
@@ -210,16 +212,16 @@ def attribute_values(attachment: SurfaceAttachment) -> dict[str, tuple[str, obje
 
 
 def follow_surface(obj: bpy.types.Object, surface: bpy.types.Object, vertex_count: int) -> None:
-    """Let strokes follow the surface of an object by a modifier. An older one is replaced.
+    """Add a modifier to strokes with which they follow the surface of an object. It replaces an earlier one.
 
     Parameters
     ----------
     obj : bpy.types.Object
-        Curves with the attributes of `attribute_values`.
+        The strokes: Curves that have the attributes of `attribute_values`.
     surface : bpy.types.Object
         The object that the strokes were drawn on.
     vertex_count : int
-        Number of vertices of its evaluated mesh. If it changes, the strokes stay where they are.
+        Number of vertices of the evaluated mesh of `surface`. While it is another one, strokes do not follow.
     """
     group = _new_group(f"{obj.name} {MODIFIER_NAME}", surface, vertex_count)
     modifier = _modifier_of(obj)
@@ -254,7 +256,7 @@ def _delete_unused(group: bpy.types.NodeTree | None) -> None:
 
 
 def _new_group(name: str, surface: bpy.types.Object, vertex_count: int) -> bpy.types.NodeTree:
-    """Create the node group, which moves points to their places on the evaluated surface."""
+    """Create a node group that moves the points of strokes to their triangles on the evaluated surface."""
     group, build, strokes = new_modifier_group(name)
     group[OWNED_TAG] = group[STROKES_TAG] = True
     info = build("GeometryNodeObjectInfo", {"Object": surface}, transform_space="RELATIVE")
@@ -282,7 +284,7 @@ def _new_group(name: str, surface: bpy.types.Object, vertex_count: int) -> bpy.t
 
 
 def _named(build: NodeBuilder, name: str, data_type: str) -> bpy.types.NodeSocket:
-    """Add a node that reads an attribute of the points, and return its output."""
+    """Add a node that reads a named attribute, and return its output."""
     kind = "GeometryNodeInputNamedAttribute"
     return enabled_output(build(kind, {"Name": name}, data_type=data_type))
 
@@ -293,7 +295,7 @@ def _weighted_mean(
     value: bpy.types.NodeSocket,
     weights: bpy.types.Node,
 ) -> bpy.types.NodeSocket:
-    """Add nodes that interpolate a vector of the vertices of the triangle of a point."""
+    """Add nodes that interpolate a vector in the triangle of each point, and return their output."""
     terms = []
     for name, weight in zip(VERTEX_ATTRIBUTES, weights.outputs, strict=True):
         inputs = {"Geometry": mesh, "Value": value, "Index": _named(build, name, "INT")}

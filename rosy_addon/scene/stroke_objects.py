@@ -1,8 +1,8 @@
-"""Stroke objects of a scene: create, replace and remove them.
+"""Create, replace and remove the objects with strokes in a scene.
 
-There is at most one object of each kind for each camera. Records in ``scene.rosy.strokes`` identify
-these objects. A copy has no record, so it belongs to the user. When strokes are drawn again, the
-object gets new data, and keeps its modifiers, name and collections.
+For each camera there is at most one Grease Pencil object and one Curves object. Records in
+``scene.rosy.strokes`` identify them. An object that the user has copied has no record and is never changed.
+When strokes are drawn again, the object gets new data, and keeps its modifiers, name and collections.
 """
 
 from __future__ import annotations
@@ -34,19 +34,19 @@ from .stroke_data import (
 )
 from .visible_objects import field_objects
 
-#: The function that creates the data of each kind of object.
+#: Functions that create the data of an object with strokes, by the kind of object.
 DATA_BUILDERS: dict[str, Callable[..., bpy.types.ID]] = {
     "PENCIL": new_grease_pencil,
     "CURVES": new_curves,
 }
 
-#: Attributes that make up a stroke. Others, such as selections, may change without an edit.
+#: Attributes that define strokes. Others, such as the selection, may change although strokes are not edited.
 STROKE_ATTRIBUTES = ("position", "radius", "opacity", "material_index", INK_ATTRIBUTE)
 
-#: Properties of the points of a stroke before Blender 4.3, with their numbers of values.
+#: Properties of the points of a stroke before Blender 4.3, with the number of values of each.
 LEGACY_POINT_PROPERTIES = {"co": 3, "pressure": 1, "strength": 1}
 
-#: Names of the values in the items of attributes, and their numbers, by data type.
+#: Property with the values of an attribute, and number of values per element, by data type.
 _VALUES_BY_TYPE = {"FLOAT_VECTOR": ("vector", 3), "FLOAT_COLOR": ("color", 4)}
 
 
@@ -71,12 +71,14 @@ def read_pen(settings: bpy.types.PropertyGroup) -> Pen:
 def target_objects(
     scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer
 ) -> list[bpy.types.Object] | None:
-    """Return the objects to draw strokes on: the selected ones with a field, or None for all.
+    """Return the objects to draw strokes on: None for all with a field, or only the selected ones.
+
+    The setting *Selected Only* decides.
 
     Raises
     ------
     RosyError
-        If only selected objects are to be drawn, and none of them has a field.
+        If the setting is on and no selected object has a field.
     """
     if not scene.rosy.strokes.selected:
         return None
@@ -97,7 +99,7 @@ def store_strokes(
     collection: bpy.types.Collection | None = None,
     vertex_count: int = 0,
 ) -> bpy.types.Object:
-    """Store strokes in an object. Those of the same kind from the same camera are replaced.
+    """Store strokes in an object. They replace the strokes of the same kind from the same camera.
 
     If an error is raised, the scene is not changed.
 
@@ -110,16 +112,18 @@ def store_strokes(
     camera : str
         Name of the camera.
     owner : bpy.types.Object, optional
-        Parent of the object. The strokes move with it.
+        Parent of the object with strokes, with which they move.
     collection : bpy.types.Collection, optional
-        The collection of a new object. By default, or if it is linked, the collection of the scene.
+        The collection to which a new object is added. By default, or if it is linked from a library, the
+        collection of the scene.
     vertex_count : int
-        Number of vertices of the evaluated mesh of `owner`, if the points of the geometry are attached
-        to it.
+        Number of vertices of the evaluated mesh of `owner`. Only used if the strokes are to follow its
+        surface.
 
     Returns
     -------
     bpy.types.Object
+        The object with the strokes.
     """
     name = f"RoSy Strokes {camera}"
     final_names: dict[bpy.types.ID, str] = {}
@@ -145,7 +149,7 @@ def store_strokes(
         old_data, obj.data = obj.data, data
         _remove_data(old_data)
         for datablock, final_name in final_names.items():
-            datablock.name = final_name  # now free: the old data had this name
+            datablock.name = final_name  # free now, as the old data had this name
     obj.parent = owner
     obj.matrix_parent_inverse = Matrix() if owner is None else owner.matrix_world.inverted_safe()
     obj.matrix_basis = Matrix()
@@ -166,7 +170,7 @@ def stroke_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 def remove_strokes(scene: bpy.types.Scene) -> int:
     """Delete all stroke objects that RoSy created in a scene. Return their number.
 
-    Other scenes that show the same objects lose them, too.
+    They also disappear from other scenes that share the objects.
     """
     objects = stroke_objects(scene)
     for record in scene.rosy.strokes.made:
@@ -177,9 +181,9 @@ def remove_strokes(scene: bpy.types.Scene) -> int:
 
 
 def edited_strokes(scene: bpy.types.Scene, kind: str, camera: str) -> bpy.types.Object | None:
-    """Return the object that `store_strokes` would replace the strokes of, if they were edited.
+    """Return the object whose strokes `store_strokes` would replace, if the user has edited the strokes.
 
-    None if there is no such object, or nobody has edited its strokes since they were drawn.
+    None is returned if there is no such object, or its strokes were not edited since they were drawn.
     """
     record = _find_record(scene, kind, camera)
     if record is None or not record.digest or record.digest == _digest(record.thing.data):
@@ -188,7 +192,7 @@ def edited_strokes(scene: bpy.types.Scene, kind: str, camera: str) -> bpy.types.
 
 
 def _find_record(scene: bpy.types.Scene, kind: str, camera: str) -> bpy.types.PropertyGroup | None:
-    """Return the record of an object; None if the user has deleted it or given it other data."""
+    """Return the record of an object with strokes; None if the user has deleted it or given it other data."""
     for record in scene.rosy.strokes.made:
         if (record.kind, record.name) == (kind, camera) and record.thing in stroke_objects(scene):
             return record if record.thing.data.get(OWNED_TAG) else None
@@ -196,7 +200,7 @@ def _find_record(scene: bpy.types.Scene, kind: str, camera: str) -> bpy.types.Pr
 
 
 def _store_record(scene: bpy.types.Scene, kind: str, camera: str, obj: bpy.types.Object) -> None:
-    """Record an object, and clean up the records of objects that the user has deleted."""
+    """Record an object with strokes, and remove the records of objects that the user has deleted."""
     records = scene.rosy.strokes.made
     for index in reversed(range(len(records))):
         record = records[index]
@@ -212,7 +216,7 @@ def _store_record(scene: bpy.types.Scene, kind: str, camera: str, obj: bpy.types
 
 
 def _delete_object(obj: bpy.types.Object) -> None:
-    """Delete an object. Its data are deleted too if RoSy created them and they have no other user."""
+    """Delete an object with strokes, and its data if RoSy created them and nothing else uses them."""
     data = obj.data
     stop_following(obj)
     bpy.data.objects.remove(obj)
@@ -220,7 +224,7 @@ def _delete_object(obj: bpy.types.Object) -> None:
 
 
 def _remove_data(data: bpy.types.ID) -> None:
-    """Delete data that RoSy created, and their materials, if they have no users."""
+    """Delete data and their materials, as far as RoSy created them and nothing uses them."""
     if data.users or not data.get(OWNED_TAG):
         return
     materials = [material for material in data.materials if material and material.get(OWNED_TAG)]
@@ -231,13 +235,13 @@ def _remove_data(data: bpy.types.ID) -> None:
 def _digest(data: bpy.types.ID) -> str:
     """Return a digest of the strokes in Grease Pencil or Curves data.
 
-    It depends on layers, points, widths and inks, and not on what only Blender itself changes.
+    It depends on layers, points, widths and colors, but not on values that Blender changes without an edit.
     """
     return content_hash(*_digest_parts(data)).hex()
 
 
 def _digest_parts(data: bpy.types.ID) -> list[object]:
-    """Return everything that the digest depends on."""
+    """Return the values from which `_digest` is computed."""
     if isinstance(data, bpy.types.Curves):
         return _attribute_parts(data.attributes, data.curve_offset_data)
     styles = [None if material is None else material.grease_pencil for material in data.materials]
@@ -254,7 +258,7 @@ def _digest_parts(data: bpy.types.ID) -> list[object]:
 
 
 def _attribute_parts(attributes: Any, offsets: Any) -> list[object]:
-    """Return the values of `STROKE_ATTRIBUTES`, and where each stroke starts."""
+    """Return the values of `STROKE_ATTRIBUTES`, and the index of the first point of each stroke."""
     position = attributes.get("position")
     if position is None or not len(position.data):  # the offsets of an empty drawing are unreadable
         return []
@@ -268,7 +272,7 @@ def _attribute_parts(attributes: Any, offsets: Any) -> list[object]:
 
 
 def _legacy_parts(frame: Any) -> list[object]:
-    """Return the strokes of a frame before Blender 4.3."""
+    """Return the values of the strokes of a frame, before Blender 4.3."""
     parts: list[object] = []
     for stroke in frame.strokes:
         parts.append((stroke.line_width, stroke.material_index))

@@ -1,4 +1,4 @@
-"""Materials that show a texture: its color, its hatching by the light of the scene, or its highlights."""
+"""Materials that show a texture: as colors, as hatching in the light of the scene, or as brushed metal."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from ..core.color import alpha_from_hex
 from .hatching_nodes import hatching_group, set_hatching_look
 from .node_builder import NodeBuilder, new_empty_material
 
-#: Strength and roughness of brushed metal.
+#: Strength of the anisotropy, and roughness, of brushed metal.
 ANISOTROPY, BRUSHED_ROUGHNESS = 0.8, 0.3
 
 
 class Hatching(NamedTuple):
-    """The look and the number of lines with which a material draws hatching from thresholds.
+    """Settings with which a material draws hatching from an image of thresholds.
 
     Attributes
     ----------
     look : Look
-        The settings of the ink.
+        Its settings of ink, paper and tone are used.
     line_count : int
-        Number of lines through a point.
+        Number of undirected directions of the field through a point.
     """
 
     look: Look
@@ -47,7 +47,8 @@ def new_texture_material(
     uv_map : str
         Name of the UV map.
     add_shader : callable
-        Adds nodes for the node of the image, and returns the shader, such as `color_shader`.
+        Function that adds nodes after the image texture node and returns their shader, such as
+        `color_shader`.
     """
     material, build = new_empty_material(name)
     coordinates = build("ShaderNodeUVMap", uv_map=uv_map).outputs["UV"]
@@ -57,7 +58,7 @@ def new_texture_material(
 
 
 def color_shader(build: NodeBuilder, image_node: bpy.types.Node) -> bpy.types.NodeSocket:
-    """Add a shader with the colors of an image, lit like any other surface."""
+    """Add a diffuse shader with the colors of an image, and return its output."""
     inputs = {"Base Color": image_node.outputs["Color"], "Roughness": 1.0}
     return build("ShaderNodeBsdfPrincipled", inputs).outputs["BSDF"]
 
@@ -68,33 +69,34 @@ def hatching_shader(
     hatching: Hatching,
     created: list[bpy.types.ID],
 ) -> bpy.types.NodeSocket:
-    """Add nodes that draw hatching from an image of thresholds, as dense as the light asks.
+    """Add nodes that draw hatching from an image of thresholds. The darker the surface, the denser it is.
 
-    In EEVEE, the tone is the diffuse light on the surface. Cycles has no shader that returns the light;
-    there it is the ambient occlusion.
+    In EEVEE, the tone is the diffuse light on the surface. Cycles has no node that returns this light, so the
+    tone is the ambient occlusion there.
 
     Parameters
     ----------
     build : NodeBuilder
     image_node : bpy.types.Node
-        Node of an image of thresholds; see `compositor.ink_thresholds`.
+        Image texture node with the thresholds; see `compositor.ink_thresholds`.
     hatching : Hatching
     created : list of bpy.types.ID
-        Gets the node group of hatching if it is new; see `owned_data.rollback_on_error`.
+        The node group of hatching is appended if it is new; see `datablocks.rollback_on_error`.
 
     Returns
     -------
     bpy.types.NodeSocket
-        The shader.
+        Output of the shader.
     """
     look, image_color = hatching.look, image_node.outputs["Color"]
-    # Has no visible effect. Blender's glTF exporter takes the color of the first emission and follows all links
-    # before it; in the node group that would take long.
+    # This node has no visible effect. Blender's glTF exporter takes the color of the first emission node that
+    # it finds, and follows all links to it. Through the node group of hatching that would take long.
     exported = build("ShaderNodeEmission", {"Color": image_color}, label="For Exporters")
     white = build("ShaderNodeBsdfDiffuse", {"Color": (1.0, 1.0, 1.0, 1.0)})
     light = build("ShaderNodeShaderToRGB", {"Shader": white.outputs["BSDF"]})
     luminance = build("ShaderNodeRGBToBW", {"Color": light.outputs["Color"]})
-    # Alpha is 1. Cycles ignores the node of the light and its links, and takes the value of the socket.
+    # The factor of the mix is the alpha of the light. It is 1 in EEVEE. Cycles ignores the node of the light
+    # and takes the value of the unconnected socket, which is 0.
     occlusion = build("ShaderNodeAmbientOcclusion")
     tone = build.mix("FLOAT", 0.0, occlusion.outputs["AO"], luminance.outputs["Val"])
     build.connect(light.outputs["Alpha"], tone.node.inputs["Factor"])
@@ -115,16 +117,16 @@ def hatching_shader(
 def brushed_metal_shader(
     build: NodeBuilder, image_node: bpy.types.Node, uv_map: str
 ) -> bpy.types.NodeSocket:
-    """Add a metal that is brushed along the directions of an anisotropy map.
+    """Add a metal shader that looks brushed along the directions of an anisotropy map, and return its output.
 
-    The nodes are linked like the ones of Blender's glTF importer, so its exporter recognizes the map. Nodes
+    The nodes are linked as Blender's glTF importer links them, so the exporter recognizes the map. Nodes
     before them mirror the direction where the UV map is mirrored.
 
     Parameters
     ----------
     build : NodeBuilder
     image_node : bpy.types.Node
-        Node of an image from `surface_texture.line_order`.
+        Image texture node with the anisotropy map, which `surface_texture.line_order` makes.
     uv_map : str
         Name of the UV map.
     """
@@ -133,7 +135,8 @@ def brushed_metal_shader(
     x, _, length = build("ShaderNodeSeparateXYZ", {0: decoded}).outputs
     tangent = build("ShaderNodeTangent", direction_type="UV_MAP", uv_map=uv_map).outputs["Tangent"]
     angle = build.math("ARCTAN2", _along_bitangent(build, decoded, tangent, uv_map), x)
-    # Highlights are drawn out along the tangent, and across the strokes of a brush.
+    # The shader stretches highlights along its tangent. On brushed metal they stretch across the strokes of
+    # the brush, hence the quarter turn.
     rotation = build.math("ADD", angle, np.pi / 2)
     rotation.node.label = "Rotation"
     strength = build.math("MULTIPLY", length, ANISOTROPY)
@@ -151,8 +154,11 @@ def brushed_metal_shader(
 def _along_bitangent(
     build: NodeBuilder, decoded: bpy.types.NodeSocket, tangent: bpy.types.NodeSocket, uv_map: str
 ) -> bpy.types.NodeSocket:
-    """Add nodes for the component along the bitangent, mirrored where the UV map is: Blender does not mirror it."""
-    # In the tangent space of the map, this color is the bitangent.
+    """Add nodes for the component along the bitangent, and return their output.
+
+    Where the UV map is mirrored, the component is negated, as Blender does not mirror the bitangent there.
+    """
+    # As a tangent-space normal map, this color is the direction of the bitangent.
     bitangent = build("ShaderNodeNormalMap", {"Color": (0.5, 1.0, 0.5, 1.0)}, uv_map=uv_map)
     normal = build("ShaderNodeNewGeometry").outputs["Normal"]
     left = build.vector_math("CROSS_PRODUCT", normal, tangent)

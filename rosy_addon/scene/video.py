@@ -1,4 +1,4 @@
-"""Encoding a video from image files."""
+"""The job that encodes a video from image files with Blender's encoder."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def encode_video(
 ) -> Steps[None]:
     """Encode the images of a folder with Blender's encoder. See `video_encoding.encode_video`.
 
-    In a window, another Blender does it, which ends if the job is cancelled.
+    If Blender runs with a window, a second Blender process encodes. It is ended if the job is cancelled.
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""Encoding a video from image files, with Blender's own encoder.
+"""Encode a video from image files with Blender's own encoder.
 
-Another Blender runs this file as a script, so it imports nothing of RoSy::
+A second Blender process runs this file as a script, so the file does not import any module of RoSy::
 
     blender -b --factory-startup --python video_encoding.py -- FOLDER COUNT WIDTH HEIGHT FPS VIDEO.mp4
 """
@@ -43,7 +43,7 @@ def encode_video(folder: Path, count: int, size: tuple[int, int], fps: float, pa
         render = scene.render
         render.resolution_x, render.resolution_y = size
         render.resolution_percentage = 100
-        # The frame rate is fps / fps_base.
+        # Blender's frame rate is fps / fps_base, and fps must be an integer.
         render.fps, render.fps_base = max(round(fps), 1), max(round(fps), 1) / fps
         scene.frame_start, scene.frame_end = 1, count
         scene.view_settings.view_transform = "Standard"

@@ -16,7 +16,7 @@ def field_objects(
 ) -> list[bpy.types.Object]:
     """Return the mesh objects with a field that are visible in renders, sorted by name.
 
-    Objects in instanced collections are included. Objects whose field is switched off are not.
+    Objects in instanced collections are included. Objects whose field the user has switched off are left out.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def field_objects(
     Raises
     ------
     RosyError
-        If there is no object with one of the names, or it has no field, is hidden or switched off.
+        If `names` has a name of no object, or of an object that has no field, is hidden, or is switched off.
     """
     candidates = {obj.name: obj for obj in _visible_objects(view_layer) if _draws_field(obj)}
     if names is None:
@@ -35,7 +35,8 @@ def field_objects(
     return [_find_field_object(name, candidates) for name in dict.fromkeys(names)]
 
 
-#: An instance of a mesh, valid until the next one, and whether its field is drawn.
+#: Iterator over instances of meshes, each with whether its field is drawn. An instance is valid until the
+#: next one is taken.
 Instances = Iterator[tuple[bpy.types.DepsgraphObjectInstance, bool]]
 
 
@@ -44,7 +45,7 @@ def rendered_instances(
 ) -> Instances:
     """Return the instances of meshes that are visible in renders.
 
-    `targets` are the original objects with fields to draw. The others only occlude.
+    `targets` are the original objects whose fields are drawn. All other meshes only hide what is behind them.
     """
     visible_objects = set(_visible_objects(depsgraph.view_layer))
     with_field = set(targets)
@@ -56,7 +57,7 @@ def rendered_instances(
 
 
 def shown_instances(depsgraph: bpy.types.Depsgraph, *, include_occluders: bool) -> Instances:
-    """Return the instances of meshes with a field that are visible in 3D views, or of all meshes."""
+    """Return the instances of meshes that are visible in 3D views: all, or only those with a field."""
     meshes = (
         (instance, _draws_field(instance.object.original))
         for instance in depsgraph.object_instances
@@ -74,10 +75,10 @@ def _is_rendered(
 ) -> bool:
     """Return whether an instance is a mesh that is visible in renders."""
     obj = instance.object
-    # The depsgraph lists the meshes of curves, texts, surfaces and metaballs as separate instances.
+    # For curves, texts, surfaces and metaballs, the depsgraph lists separate instances of their meshes.
     if obj.type != "MESH" or not instance.show_self or not obj.visible_camera:
         return False
-    if obj.original.get(OWNED_TAG):  # a stroke object, made a mesh by Geometry Nodes
+    if obj.original.get(OWNED_TAG):  # strokes that Geometry Nodes have turned into a mesh
         return False
     if instance.is_instance:
         instancer = instance.parent
@@ -88,12 +89,12 @@ def _is_rendered(
 
 
 def _draws_field(obj: bpy.types.Object) -> bool:
-    """Return whether an object has a field, and drawing it is switched on."""
+    """Return whether an object has a field that the user has not switched off."""
     return has_field(obj) and (not has_rosy_properties() or obj.rosy.include)
 
 
 def _visible_objects(view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
-    """Return the original objects visible in renders, including those in instanced collections."""
+    """Return the original objects that are visible in renders, including those in instanced collections."""
     visible: dict[bpy.types.Object, None] = {}
 
     def add_object(obj: bpy.types.Object) -> None:
@@ -119,7 +120,7 @@ def _visible_objects(view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
 
 
 def _find_field_object(name: str, candidates: dict[str, bpy.types.Object]) -> bpy.types.Object:
-    """Return a candidate by name, or raise an error that says why there is none."""
+    """Return the candidate with a name, or raise an error that says why there is none."""
     if name in candidates:
         return candidates[name]
     obj = bpy.data.objects.get(name)

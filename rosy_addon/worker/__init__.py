@@ -1,11 +1,11 @@
 """Helper processes: long numeric work beside Blender, and large pictures on several cores.
 
-job            jobs: read, have results computed, apply them
-step_runner    runs the steps of a job one by one
-helper         a process that makes calls: this package, started as a program (`__main__`)
-pool           several helpers that share calls
+job            jobs: generators that read data, yield function calls, and apply their results
+step_runner    runs a job step by step, with its function calls in a helper process
+helper         a helper process, which calls functions: this package as a program (`__main__`)
+pool           several helper processes that share function calls
 channel        messages between processes
 start          starts processes that end with this one
-program        other programs, as parts of jobs
-frame_workers  a command for many frames, in several processes
+program        runs other programs as parts of jobs
+frame_workers  runs a command for many frames in several processes
 """

@@ -1,4 +1,4 @@
-"""The program of a helper process: it makes the calls that are sent to it until the other process ends."""
+"""The program of a helper process: run function calls that the parent process sends, until that ends."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from .channel import Channel
 from .pool import POOL
 from .start import own_end
 
-#: Seconds without a call after which caches are cleared.
+#: Seconds without a function call after which the caches of the helper process are cleared.
 IDLE_SECONDS = 120.0
 
-#: Seconds between two reports. The end of the other process is noticed at one of them.
+#: Seconds between two reports of progress. At each of them the helper checks whether its parent has ended.
 REPORT_SECONDS = 0.05
 
 
 class _Reporter:
-    """Send the progress of a call to the other process, and end this one if the other has ended."""
+    """A listener that sends progress to the parent process, and ends this process if the parent has ended."""
 
     def __init__(self, channel: Channel) -> None:
         self._channel, self._next_time = channel, 0.0
@@ -35,7 +35,7 @@ class _Reporter:
             return
         self._next_time = now + REPORT_SECONDS
         try:
-            has_ended = self._channel.poll()  # while a call runs, nothing comes but the end
+            has_ended = self._channel.poll()  # during a call, the parent sends nothing, but may end
             self._channel.send(("progress", fraction, label))
         except OSError:
             has_ended = True
@@ -44,14 +44,14 @@ class _Reporter:
 
 
 def main(handle: str, package: str) -> None:
-    """Call functions until the other process ends.
+    """Run the function calls that the parent process sends, until the parent ends.
 
     Parameters
     ----------
     handle : str
-        Handle of this end of the connection.
+        Handle of this process's end of the connection to the parent.
     package : str
-        The name of this package in the other process.
+        Name of this package in the parent process.
     """
     channel = Channel(own_end(handle), package)
     reporter = _Reporter(channel)
@@ -77,7 +77,7 @@ def main(handle: str, package: str) -> None:
 def _answer(
     function: Callable[..., Any], arguments: tuple[Any, ...], reporter: _Reporter
 ) -> tuple[Any, ...]:
-    """Call a function, and return the message with its result or error."""
+    """Call a function, and return a message for the parent with its result or its error."""
     try:
         with listening(reporter):
             return "result", function(*arguments)

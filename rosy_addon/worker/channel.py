@@ -1,7 +1,8 @@
-"""Messages between a process and its helper: pickles whose large arrays are not copied.
+"""Messages between a process and its helper process: pickles, with large arrays sent without a copy.
 
-Meshes and fields are sent once. Later messages refer to them by number, so that a picture with another look
-costs a few kilobytes, and caches, which compare meshes by identity, find them again.
+Meshes and fields are sent once. Later messages refer to them by number. So a request for the same meshes with
+another look takes only a few kilobytes. The other process gets the same Python objects again, and finds them
+in its caches, which compare meshes by identity.
 """
 
 from __future__ import annotations
@@ -24,10 +25,10 @@ from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 from .start import PACKAGE
 
-#: Immutable classes of large, reused objects, which the other process keeps.
+#: Classes of large, immutable objects. The other process keeps objects of these classes for later messages.
 KEPT_CLASSES = (GuidedSystem, MeshInstance, ReferenceRender, RosyField, Surface, SurfaceTone)
 
-#: Bytes of an array that are written at a time.
+#: Largest number of bytes of an array that are sent at once.
 CHUNK_BYTES = 1 << 20
 
 
@@ -38,27 +39,30 @@ class Channel:
     ----------
     connection : Connection
     package : str
-        The name of this package in the other process.
+        Name of this package in the other process.
     """
 
     def __init__(self, connection: Connection, package: str) -> None:
         self.connection = connection
         self._package = package
-        #: Objects that the other process keeps, with their numbers there, by id.
+        #: Objects that the other process keeps, by id, each with its number there.
         self._sent: dict[int, tuple[int, Any]] = {}
         self._last_number = 0
-        #: Objects that this process keeps for the other one, by number.
+        #: Objects that this process keeps, as later messages may refer to them, by number.
         self._kept: dict[int, Any] = {}
-        #: The message that is being received, and the message once it is complete.
+        #: The generator that receives the next message in parts; and the message once it is complete, else
+        #: None.
         self._parts = _message_parts(connection)
         self._message: tuple[list[int], bytes, list[np.ndarray]] | None = None
 
     def poll(self, timeout: float = 0.0) -> bool:
-        """Return whether there is a message to receive, or the connection has ended."""
+        """Return whether a message arrives, or the connection ends, within `timeout` seconds."""
         return self.connection.poll(timeout)
 
     def has_received(self, seconds: float) -> bool:
-        """Receive available parts of the next object for some seconds. Return whether it is complete.
+        """Receive parts of the next message that are available, for some seconds.
+
+        Return whether it is complete.
 
         Raises
         ------
@@ -73,7 +77,9 @@ class Channel:
         return self._message is not None
 
     def send(self, message: Any) -> None:
-        """Send an object. Objects of the last message that are not in this one are no longer kept.
+        """Send an object to the other process.
+
+        The other process then keeps only those objects of `KEPT_CLASSES` that this message contains.
 
         Raises
         ------
@@ -94,7 +100,7 @@ class Channel:
         self._sent = {id(kept): (number, kept) for number, kept in pickler.used.items()}
 
     def receive(self) -> Any:
-        """Wait for an object and return it.
+        """Wait for the next object from the other process, and return it.
 
         Raises
         ------
@@ -116,23 +122,23 @@ class Channel:
             self._message, self._parts = end.value, _message_parts(self.connection)
 
     def close(self) -> None:
-        """Close this end. The other process ends."""
+        """Close this end of the connection. The other process notices that and ends."""
         self.connection.close()
 
 
 def _message_parts(
     connection: Connection,
 ) -> Generator[None, None, tuple[list[int], bytes, list[np.ndarray]]]:
-    """Receive a message, and wait for its parts of up to `CHUNK_BYTES` one by one.
+    """Receive a message: a generator that yields before it waits for each part of up to `CHUNK_BYTES`.
 
     Returns
     -------
     forgotten : list of int
-        Numbers of objects that are no longer kept.
+        Numbers of kept objects that this process can drop.
     stream : bytes
-        The pickle.
+        The pickle, without the data of arrays.
     buffers : list of (n,) uint8 ndarray
-        Its arrays.
+        The bytes of the arrays of the pickle.
     """
     forgotten, sizes = connection.recv()
     yield
@@ -147,13 +153,14 @@ def _message_parts(
 
 
 class _Pickler(pickle.Pickler):
-    """Pickle kept objects as numbers, and send the rest.
+    """A pickler that writes objects which the other process keeps as numbers.
 
     Attributes
     ----------
     used : dict of int to object
         Objects of `KEPT_CLASSES` in the message, by number.
     last_number : int
+        The largest number that was given to an object so far.
     """
 
     def __init__(
@@ -168,7 +175,7 @@ class _Pickler(pickle.Pickler):
         self.used: dict[int, Any] = {}
 
     def persistent_id(self, obj: Any) -> int | None:
-        """Return the number of an object that the other process keeps, or else None."""
+        """Return the number of an object that the other process keeps; None for other objects."""
         if not isinstance(obj, KEPT_CLASSES) or id(obj) not in self._sent:
             return None
         number = self._sent[id(obj)][0]
@@ -176,14 +183,14 @@ class _Pickler(pickle.Pickler):
         return number
 
     def _use(self, number: int, obj: Any) -> None:
-        """Record that an object is used, with the kept objects in it."""
+        """Record that the message contains a kept object, and the kept objects in its fields."""
         self.used[number] = obj
         for value in vars(obj).values():
             if isinstance(value, KEPT_CLASSES):
                 self.persistent_id(value)
 
     def reducer_override(self, obj: Any) -> Any:
-        """Send the fields of an object to keep, without cached properties."""
+        """Pickle an object to keep as a new number and its fields, without cached properties."""
         if not isinstance(obj, KEPT_CLASSES):
             return NotImplemented
         self.last_number += 1
@@ -193,7 +200,7 @@ class _Pickler(pickle.Pickler):
 
 
 class _Unpickler(pickle.Unpickler):
-    """Find kept objects, and classes of this package under its name in this process."""
+    """An unpickler that finds kept objects by number, and this package by its name in this process."""
 
     def __init__(
         self, stream: bytes, buffers: list[np.ndarray], kept: dict[int, Any], package: str
@@ -202,11 +209,11 @@ class _Unpickler(pickle.Unpickler):
         self._kept, self._package = kept, package
 
     def persistent_load(self, number: int) -> Any:
-        """Return an object that is kept."""
+        """Return the kept object with a number."""
         return self._kept[number]
 
     def find_class(self, module: str, name: str) -> Any:
-        """Return a class or a function."""
+        """Return a class or function, given its module in the other process and its name."""
         if module == self._package or module.startswith(f"{self._package}."):
             module = PACKAGE + module.removeprefix(self._package)
         found = super().find_class(module, name)
@@ -219,5 +226,8 @@ class _Unpickler(pickle.Unpickler):
 
 
 def _keep(number: int, kind: type, state: dict[str, Any]) -> Any:
-    """Stand in pickles for `_Unpickler._keep`."""
+    """Mark an object to keep in a pickle.
+
+    It is never called: `_Unpickler` calls its method `_keep` instead.
+    """
     raise NotImplementedError

@@ -1,7 +1,7 @@
-"""Frame ranges, and a command for many frames in several processes.
+"""Parse frame ranges, and run a command for many frames in several processes.
 
-Each worker runs the command of the user for some of the frames. The command must allow to be run again,
-or twice at the same time. This module does not depend on what the command does.
+Each process runs the same command for some of the frames. It must be safe to run the command again, or twice
+at the same time. This module does not depend on what the command does.
 """
 
 from __future__ import annotations
@@ -18,23 +18,23 @@ from pathlib import Path
 from ..core.errors import RosyError
 from .start import Guarded, GuardedFolder
 
-#: Largest number of a frame in Blender.
+#: Largest frame number in Blender.
 MAX_FRAME = 1_048_574
 
-#: Seconds between two reads of the output of processes.
+#: Seconds between two looks at the output of the processes.
 POLL_SECONDS = 0.05
 
-#: Seconds that a process has to end before it is killed.
+#: Seconds after `terminate` until a process that still runs is killed.
 STOP_SECONDS = 10.0
 
 
 def parse_frames(text: str) -> Sequence[int]:
-    """Parse frames written as ``A``, ``A-B`` or ``A-B:STEP``, or several of these with commas.
+    """Parse frame numbers written as ``A``, ``A-B`` or ``A-B:STEP``, or several of these with commas between.
 
     Returns
     -------
     sequence of int
-        In ascending order, without duplicates.
+        Frame numbers in ascending order, without duplicates.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def parse_frames(text: str) -> Sequence[int]:
 
 
 def _parse_range(part: str, text: str) -> range:
-    """Parse one ``A``, ``A-B`` or ``A-B:STEP``; `text` is the whole option, for the message."""
+    """Parse one ``A``, ``A-B`` or ``A-B:STEP``. `text` is the whole text of the user, for messages."""
     match = re.fullmatch(r"(?a)(-?\d{1,7})(?:-(-?\d{1,7}))?(?::(\d{1,7}))?", part)
     if match:
         first, last, step = int(match[1]), int(match[2] or match[1]), int(match[3] or 1)
@@ -68,16 +68,17 @@ def _parse_range(part: str, text: str) -> range:
 def run_local(command: Sequence[str], frames: Sequence[int], process_count: int) -> Iterator[str]:
     """Run a command for all frames, in several processes of this machine.
 
-    Process i of n gets the frames i, i + n, i + 2 n and so on, so that slow parts of an animation
-    are shared evenly. If the generator is closed, the processes are terminated.
+    Process i of n gets the frames with the indices i, i + n, i + 2 n and so on, so that slow parts of an
+    animation are shared evenly. If the generator is closed, the processes are terminated.
 
     Parameters
     ----------
     command : sequence of str
-        Without ``--frames``, which is added.
+        The command and its arguments. An argument ``--frames=...`` is added.
     frames : sequence of int
+        Frame numbers.
     process_count : int
-        At most one for each frame is started, and at least one.
+        Number of processes. At least one is started, and no more than there are frames.
 
     Yields
     ------
@@ -100,7 +101,7 @@ def run_local(command: Sequence[str], frames: Sequence[int], process_count: int)
             stack.callback(worker.stop)
         running = list(workers)
         while running:
-            # A process that has ended prints no more, so what it printed is read after that.
+            # Output is read after this check, so the output of an ended process is complete.
             ended = [worker for worker in running if worker.process.poll() is not None]
             for worker in running:
                 yield from worker.new_lines()
@@ -116,16 +117,16 @@ def run_local(command: Sequence[str], frames: Sequence[int], process_count: int)
 
 
 class _Worker:
-    """A process that runs a command for some frames, with its output and errors in a file.
+    """A process that runs a command for some frames, and writes its output and errors to a file.
 
-    Files can be read without waiting on every system. Pipes cannot, and would need threads.
+    A file can be read without blocking on every operating system. Pipes would need threads on some.
 
     Attributes
     ----------
     frames : sequence of int
     process : subprocess.Popen
     lines : list of str
-        The lines that were read.
+        Lines of output that were read so far.
     """
 
     def __init__(self, command: Sequence[str], frames: Sequence[int], log: Path) -> None:
@@ -144,7 +145,7 @@ class _Worker:
     def new_lines(self) -> list[str]:
         """Return the lines that the process has printed since the last call.
 
-        Once the process has ended, this includes a last line without an end.
+        Once the process has ended, this includes a last line without a line break.
         """
         *lines, self._partial_line = (self._partial_line + self._log.read()).split(b"\n")
         if self.process.returncode is not None and self._partial_line:
@@ -176,7 +177,7 @@ def format_frames(frames: Sequence[int]) -> str:
 def error_line(output: Sequence[str]) -> str:
     """Return the error message in the output of a failed command.
 
-    It is the last line that begins with ``rosy:``, else the last line that is not empty.
+    It is the last line that begins with ``rosy:``. If there is none, it is the last line that is not empty.
     """
     lines = [line for line in output if line.strip()]
     error_lines = [line for line in lines if line.startswith("rosy: ")]

@@ -1,4 +1,4 @@
-"""`Helper`: a process that makes long numeric calls for this one."""
+"""`Helper`: a process that runs function calls for this one."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from typing import Any
 from .channel import Channel
 from .start import PACKAGE, STARTED_PACKAGE, start_module
 
-#: Seconds that a helper may take until it is ready.
+#: Seconds after which a helper process that is not ready counts as lost.
 START_SECONDS = 60.0
 
-#: Seconds for which large results are received at a time.
+#: Seconds for which one call of `Helper.poll` receives parts of a large result.
 RECEIVE_SECONDS = 0.03
 
 
 class HelperLostError(Exception):
-    """Raised if a helper has ended before its work was done, or cannot be started.
+    """An error: a helper process has ended before its work was done, or cannot be started.
 
     Attributes
     ----------
     has_started : bool
-        Whether the helper was ready before.
+        Whether the process had started and was ready for calls.
     """
 
     def __init__(self, message: str, has_started: bool) -> None:
@@ -37,27 +37,30 @@ class HelperLostError(Exception):
 
 
 class _RemoteTracebackError(Exception):
-    """The traceback of an error in a helper as text, set as the cause of the error in this process."""
+    """The traceback of an error in a helper process, as text.
+
+    It is the cause of the error that is raised here.
+    """
 
 
 class Helper:
-    """A process that makes calls for this one, one at a time.
+    """A helper process, which runs function calls for this process, one at a time.
 
-    It ends when this object is closed, and when this process ends for any reason.
+    The helper process ends when this object is closed, and when this process ends for any reason.
 
     Parameters
     ----------
     environment : mapping of str to str
-        Added to the environment of the process.
+        Variables that are added to the environment of the helper process.
 
     Attributes
     ----------
     is_usable : bool
-        Whether a process may be started. It is False once that has failed.
+        Whether a helper process may be started. It is set to False if none is wanted, or if that has failed.
     fraction : float
         Progress of the last call, 0 to 1.
     label : str
-        Label of the present step.
+        What the last call is doing, as text for a progress bar.
     """
 
     def __init__(self, environment: Mapping[str, str] | None = None) -> None:
@@ -68,11 +71,11 @@ class Helper:
         self._process: subprocess.Popen[bytes] | None = None
         self._channel: Channel | None = None
         self._is_ready, self._start_time = False, 0.0
-        #: A call that has not been sent.
+        #: The function and arguments of a call that was not sent yet; None if all were sent.
         self._call: tuple[Callable[..., Any], tuple[Any, ...]] | None = None
 
     def start(self) -> None:
-        """Start the process if it does not run, without waiting until it is ready.
+        """Start the helper process if it does not run. Do not wait until it is ready.
 
         Raises
         ------
@@ -94,14 +97,14 @@ class Helper:
         self._is_ready, self._start_time = False, time.monotonic()
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> None:
-        """Send a call of a function of this package to the process.
+        """Let the helper process call a function of this package. `poll` returns the outcome.
 
         Parameters
         ----------
         function : function
             A function of a module that needs no Blender.
         *arguments
-            Anything that can be pickled.
+            Its arguments, which are pickled.
 
         Raises
         ------
@@ -117,12 +120,13 @@ class Helper:
             raise self._lost() from None
 
     def poll(self) -> Callable[[], Any] | None:
-        """Read messages of the process, without waiting.
+        """Read the messages of the helper process, without waiting for them.
 
         Returns
         -------
         callable or None
-            Once the call is done: returns the result of the function, or raises its error.
+            None while the call runs. Once it is done, a function without arguments that returns the result of
+            the call, or raises its error.
 
         Raises
         ------
@@ -145,18 +149,18 @@ class Helper:
         return None
 
     def take(self, user: object) -> bool:
-        """Reserve the process for a user. Return whether it was free, or is already theirs."""
+        """Reserve the helper process for a user. Return whether it is reserved for this user now."""
         if self._user is None:
             self._user = user
         return self._user is user
 
     def release(self, user: object) -> None:
-        """Let others use the process, if a user has it."""
+        """Give up the reservation of the helper process, if it is reserved for this user."""
         if self._user is user:
             self._user = None
 
     def close(self) -> None:
-        """End the process, even during a call."""
+        """End the helper process, even during a call."""
         process, channel = self._process, self._channel
         self._process = self._channel = None
         if process is not None:
@@ -166,22 +170,22 @@ class Helper:
             channel.close()
 
     def wait(self, seconds: float) -> None:
-        """Wait for a message of the process or its end, at most for some seconds."""
+        """Wait for a message of the helper process, or for its end, at most for some seconds."""
         if self.connection is not None:
             wait([self.connection], seconds)
 
     @property
     def connection(self) -> Connection | None:
-        """Connection that becomes readable when the process has sent a message, or has ended."""
+        """Connection to the helper process; readable if it has sent a message or ended. None if none runs."""
         return None if self._channel is None else self._channel.connection
 
     @property
     def pid(self) -> int | None:
-        """ID of the process, if it runs."""
+        """Process ID of the helper process; None if none was started."""
         return None if self._process is None else self._process.pid
 
     def _send_call(self) -> bool:
-        """Send the call once the process is ready. Return whether it has been sent."""
+        """Send the call if the helper process is ready. Return whether it has been sent, now or before."""
         if not self._is_ready and self._channel.poll():
             self._channel.receive()
             self._is_ready = True
@@ -193,7 +197,7 @@ class Helper:
         return self._call is None
 
     def _lost(self) -> HelperLostError:
-        """End the process, and return the error that says why it is lost."""
+        """End the helper process, and return the error that says why it is lost."""
         has_started, process = self._is_ready, self._process
         self.close()
         status = "" if process is None else f" (status {process.returncode})"
@@ -202,11 +206,11 @@ class Helper:
 
 
 def _outcome(kind: str, answer: Any, traceback: str = "") -> Any:
-    """Return a result, or raise an error that has this traceback in the helper."""
+    """Return the result of a call, or raise its error. The traceback in the helper is its cause."""
     if kind == "error":
         raise answer from _RemoteTracebackError(f"\n{traceback}")
     return answer
 
 
-#: The helper of Blender's windows; see `ui.helper_start`.
+#: The helper process that all jobs in Blender's windows share.
 HELPER = Helper()

@@ -1,7 +1,8 @@
-"""Jobs: work that reads data, has results computed, and applies them.
+"""Jobs: generators that read data, have results computed, and apply them.
 
-A job is a generator. It yields each long computation as a `Call` and receives its result. A script makes the
-calls in place (`run`). In a window, a helper process makes them, so that Blender stays responsive.
+A job yields each long computation as a `Call` (a function with arguments) and receives its result. In a
+script, the function is called in the same process (`run`). In Blender's window, a helper process calls it, so
+that Blender stays responsive.
 """
 
 from __future__ import annotations
@@ -17,17 +18,17 @@ Arguments = ParamSpec("Arguments")
 
 
 class Call(NamedTuple):
-    """A call of a function that needs no Blender, as one part of a job.
+    """A function call that a job yields to receive its result. The function must not need Blender.
 
     Attributes
     ----------
     function : function
     arguments : tuple
-        Anything that can be pickled.
+        Arguments of the function, which can be pickled.
     start, stop : float
-        Fractions of the job at which the call begins and ends.
+        Progress of the job when the call begins and when it ends, 0 to 1.
     label : str or None
-        Replaces the labels that the function reports.
+        Label of the progress. None: the labels that the function reports are used.
     """
 
     function: Callable[..., Any]
@@ -37,20 +38,20 @@ class Call(NamedTuple):
     label: str | None = None
 
     def __call__(self) -> Any:
-        """Make the call in this process."""
+        """Call the function in this process, and return its result."""
         with progress(self.start, self.stop, self.label):
             return self.function(*self.arguments)
 
 
 class Step(NamedTuple):
-    """A pause of a job that works in Blender's process, with the graphics card or between frames.
+    """A pause that a job yields while it works in Blender's process: on the graphics card or between frames.
 
     Attributes
     ----------
     fraction : float
         Progress of the job, 0 to 1.
     label : str
-        Label of the next step.
+        What the job does next, as text for a progress bar.
     """
 
     fraction: float
@@ -61,7 +62,8 @@ class Step(NamedTuple):
         report(self.fraction, self.label)
 
 
-#: A job: it yields calls and steps, and results are sent to it. Closing the generator cancels the job.
+#: A running job: a generator that yields calls and pauses, and to which the results of calls are sent. To
+#: close the generator cancels the job.
 Steps = Generator[Call | Step, Any, Result]
 
 
@@ -99,22 +101,22 @@ def run(steps: Steps[Result]) -> Result:
 
 
 def call_steps(function: Callable[..., Result], *arguments: Any) -> Steps[Result]:
-    """Make one call as a job, and return its result."""
+    """Return the steps of a job that consists of one function call and returns its result."""
     return (yield Call(function, arguments))
 
 
 def part(
     steps: Steps[Result], start: float, stop: float, label: str | None = None
 ) -> Steps[Result]:
-    """Run the steps of a job as one part of another.
+    """Run a job as a part of another job (with ``yield from``), and return its result.
 
     Parameters
     ----------
     steps : Steps
     start, stop : float
-        Fractions of the whole job at which the part begins and ends.
+        Progress of the whole job when the part begins and when it ends, 0 to 1.
     label : str, optional
-        Replaces the labels of the steps.
+        Label of all steps of the part. By default they have their own labels.
     """
 
     def scaled(fraction: float) -> float:
@@ -140,7 +142,10 @@ def part(
 
 
 class Job(Generic[Arguments, Result]):
-    """A function that runs a job to its end; `begin` returns the steps instead."""
+    """A function that runs a job to its end and returns its result.
+
+    Its attribute `begin` starts the generator.
+    """
 
     def __init__(self, begin: Callable[Arguments, Steps[Result]]) -> None:
         self.begin = begin
@@ -151,7 +156,7 @@ class Job(Generic[Arguments, Result]):
 
 
 def job(begin: Callable[Arguments, Steps[Result]]) -> Job[Arguments, Result]:
-    """Turn a generator of steps into a function that runs them in place; see `Job`.
+    """Decorator: turn a generator function into a function that runs the job in this process; see `Job`.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""`Pool`: helper processes that share the strips of a large picture."""
+"""`Pool`: helper processes that share function calls, such as drawing the strips of a large picture."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from typing import Any
 from ..core.progress import current_report, listening
 from .helper import Helper, HelperLostError
 
-#: Environment of the helpers. Each has one core.
+#: Environment variables of the helper processes, with which numpy uses one core in each.
 ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
-#: Seconds between two polls of helpers that send nothing.
+#: Longest wait for messages of helper processes, in seconds. Progress is reported after each wait.
 WAIT_SECONDS = 0.5
 
 
@@ -27,7 +27,7 @@ def core_count() -> int:
 
 
 class Pool:
-    """Helper processes, which are started when they are first needed and reused for later calls.
+    """A pool of helper processes. They are started when they are first needed, and reused later.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Pool:
     ) -> list[Any]:
         """Call a function with each of several tuples of arguments, in several processes.
 
-        This process is one of them, and makes the calls of helpers that are lost.
+        This process is one of them. If a helper process is lost, another process repeats its call.
 
         Parameters
         ----------
@@ -54,9 +54,10 @@ class Pool:
             A function of a module that needs no Blender; see `Helper.submit`.
         arguments : sequence of tuple
         count : int
-            Number of processes; 0 is one for each core.
+            Number of processes. 0 means one per processor core.
         function_here : function, optional
-            Called in this process instead, such as the same with a cache of the caller.
+            Function for the calls in this process, such as the same one with a cache of the caller. By
+            default `function`.
 
         Returns
         -------
@@ -114,11 +115,11 @@ class Pool:
         return results
 
     def close(self) -> None:
-        """End all helpers."""
+        """End all helper processes."""
         for helper in self.helpers:
             helper.close()
         self.helpers.clear()
 
 
-#: The helpers of this process.
+#: The pool of helper processes of this process.
 POOL = Pool()

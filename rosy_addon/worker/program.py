@@ -1,4 +1,4 @@
-"""`run_program`: another program as part of a job."""
+"""`run_program`: runs another program as part of a job."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from contextlib import suppress
 from .job import Step, Steps, job
 from .start import Guarded
 
-#: Seconds for which each step waits.
+#: Longest wait for the end of the program in each step of the job, in seconds.
 WAIT_SECONDS = 0.02
 
 
@@ -23,14 +23,14 @@ def run_program(command: Sequence[str], label: str) -> Steps[tuple[int, str]]:
     command : sequence of str
         The program and its arguments.
     label : str
-        For the progress.
+        Text for the progress bar.
 
     Returns
     -------
     status : int
-        Exit status.
+        Exit status of the program.
     output : str
-        Standard output and errors of the program.
+        Standard output and standard error of the program.
     """
     with tempfile.TemporaryFile() as log:
         process = subprocess.Popen(

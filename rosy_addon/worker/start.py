@@ -1,8 +1,8 @@
-"""Processes that end with the process that started them.
+"""Start processes that end when the process that started them ends.
 
-A module of this package is started with one end of a connection, and ends when the connection closes
-(`start_module`). Other programs and temporary folders are guarded: a guard process kills or removes them when
-this process ends for any reason.
+`start_module` starts a module of this package with one end of a connection. The new process ends when the
+connection closes. Other programs and temporary folders are registered with a guard process. It kills or
+removes them when this process ends for any reason.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-#: Name of this package in this process. It differs between Blender, a helper and an installed wheel.
+#: Name of this package in this process. It differs between Blender, a helper process and an installed wheel.
 PACKAGE = __package__.rpartition(".")[0]
 
 #: Name of this package in processes that `start_module` starts.
@@ -35,9 +35,10 @@ def start_module(
     Parameters
     ----------
     module : str
-        Relative to this package.
+        Name of the module, relative to this package.
     *arguments : str
-        Further arguments of the program. The first is the handle of its end of the connection; see `own_end`.
+        Arguments of the program after the first one. The first one is added: the handle of the program's end
+        of the connection, for `own_end`.
     environment : mapping of str to str, optional
         Variables that are added to the environment of this process.
 
@@ -45,14 +46,15 @@ def start_module(
     -------
     process : subprocess.Popen
     connection : Connection
-        The other end.
+        The end of the connection that belongs to this process.
 
     Raises
     ------
     OSError
         If no process can be started.
     """
-    # The program imports what this process imports, in the same order, and this package.
+    # The program searches the same folders for imports as this process, in the same order, and then this
+    # package.
     folders = [*sys.path, str(Path(__file__).parents[2])]
     end, other_end = Pipe()
     options: dict[str, Any] = {}
@@ -80,14 +82,17 @@ def start_module(
 
 
 def own_end(handle: str) -> Connection:
-    """Return this end of the connection of a program that `start_module` has started."""
+    """Return the end of the connection that belongs to this process, which `start_module` has started.
+
+    `handle` is the first argument of the program.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes of a terminal
     kind = connection.PipeConnection if sys.platform == "win32" else connection.Connection
     return kind(int(handle))
 
 
 class Guarded:
-    """A ``with`` block during which a process is killed if this one ends for any reason.
+    """Context manager: during the block, another process is killed if this process ends for any reason.
 
     Parameters
     ----------
@@ -105,7 +110,7 @@ class Guarded:
 
 
 class GuardedFolder(TemporaryDirectory[str]):
-    """A temporary folder that is removed even if this process is killed."""
+    """A temporary folder. It is removed even if this process is killed."""
 
     def __init__(self) -> None:
         super().__init__(prefix="rosy-")
@@ -117,21 +122,24 @@ class GuardedFolder(TemporaryDirectory[str]):
         _tell_guard("leave", self.name)
 
 
-#: The connection to the guard process; None before there is one.
+#: The connection to the guard process; None before the guard process is started.
 _guard: Connection | None = None
 
 
 def _tell_guard(what: str, item: int | str) -> None:
-    """Send a message about a process or a folder to the guard, which is started when it is first needed."""
+    """Tell the guard process to watch a process (by ID) or folder, or to leave it.
+
+    Start the guard if needed.
+    """
     global _guard
-    with suppress(OSError):  # without a guard, signals that can be handled still end what there is
+    with suppress(OSError):  # without a guard, cleanup still works unless this process is killed
         if _guard is None:
             _, _guard = start_module("worker.start")
         _guard.send((what, item))
 
 
 def _watch(guard: Connection) -> None:
-    """Receive processes and folders until the other process ends; then kill and remove what is left."""
+    """Run the guard process: note processes and folders until the parent ends, then kill and remove them."""
     if hasattr(signal, "SIGHUP"):
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
     watched: set[int | str] = set()

@@ -1,4 +1,4 @@
-"""`StepRunner`: runs the steps of a job one by one, with their calls in a helper process."""
+"""`StepRunner`: runs a job step by step, with its function calls in a helper process."""
 
 from __future__ import annotations
 
@@ -12,45 +12,50 @@ from .job import Call, Step, Steps, advance
 
 
 class StepRunner:
-    """Run steps one by one: calls in a helper process, the rest in this process.
+    """Runs a job step by step. Function calls run in a helper process, the rest in this process.
 
-    Several runners may share a helper, which makes one call at a time. A call whose helper is lost is made
-    once more by another one; if none can be started, it is made in this process.
+    Several runners may share a helper process, which runs one call at a time. If the helper process is lost
+    during a call, a new one repeats the call, once. If no helper process can be started, the call runs in
+    this process.
 
     Parameters
     ----------
     steps : Steps
+        The generator of the job.
     helper : Helper
+        The helper process.
 
     Attributes
     ----------
     step : Step or None
-        Progress of the steps; None before the first one.
+        Progress and label of the job; None before the first step.
     helper_seconds : float
-        Seconds of work of the helper so far.
+        Seconds that the helper process has worked for the job so far.
     is_done : bool
-        Whether the steps have ended, with a result or an error.
+        Whether the job has ended, with a result or an error.
     is_in_place : bool
-        Whether the next step makes a call in this process, as there is no helper.
+        Whether the next `advance` runs a function call in this process, as there is no helper process.
     """
 
     def __init__(self, steps: Steps[Any], helper: Helper) -> None:
         self.step: Step | None = None
         self.helper_seconds, self.is_done, self.is_in_place = 0.0, False, False
         self._steps, self._helper = steps, helper
-        #: A call that the steps wait for, and what returns or raises its result.
+        #: The call that the job waits for, and its outcome: a function that returns the result or raises the
+        #: error.
         self._call: Call | None = None
         self._outcome: Callable[[], Any] | None = None
-        #: Whether the helper has the call, since when (seconds, monotonic), and whether it is the second try.
+        #: Whether the helper process has the call, since when (`time.monotonic`), and whether it is the
+        #: second try.
         self._is_submitted, self._call_time, self._is_repeated = False, 0.0, False
 
     @property
     def has_answer(self) -> bool:
-        """Whether the result of a call is there, and the steps have not continued with it."""
+        """Whether the result of a call has arrived, and the job has not continued with it yet."""
         return self._outcome is not None
 
     def poll(self) -> bool:
-        """Return whether the steps can continue. Otherwise the helper is at work."""
+        """Return whether the job can continue. If not, it waits for the helper process."""
         if self._call is None or self._outcome is not None:
             return True
         try:
@@ -79,12 +84,12 @@ class StepRunner:
         return True
 
     def advance(self) -> Step:
-        """Run to the next step and return it. Call it only after `poll` has returned True.
+        """Run the job to its next step, and return that. Call this only after `poll` has returned True.
 
         Raises
         ------
         StopIteration
-            With the result, if the steps are done.
+            If the job has ended. Its value is the result of the job.
         """
         outcome, self._call, self._outcome = self._outcome, None, None
         self.is_in_place = self._is_submitted = self._is_repeated = False
@@ -101,7 +106,7 @@ class StepRunner:
         return self.step
 
     def close(self) -> None:
-        """Stop, and end the helper if it works for these steps."""
+        """Cancel the job, and end the helper process if it works for the job."""
         if self._is_submitted and self._outcome is None:
             self._helper.close()
         self._helper.release(self)

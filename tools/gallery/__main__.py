@@ -1,4 +1,4 @@
-"""Draw the pictures of the documentation and fill the tables of docs/gallery: all, or the named ones."""
+"""Draw the pictures of the documentation, and fill the tables of docs/gallery: all, or the named ones."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import sys
 from .page import FOLDER
 from .sheets import PAGES, write_page
 
-#: Modules that draw what `pictures.toml` does not describe.
+#: Modules that draw the pictures that `pictures.toml` does not describe.
 MODULES = (
     *("figure-02", "figure-05", "figure-06", "figure-07", "figure-09", "figure-10", "figure-11"),
     *("preset-pictures", "hero", "logo", "start-pages", "looks-page", "strokes-page"),
@@ -19,7 +19,7 @@ MODULES = (
 
 
 def main() -> int:
-    """Draw what the arguments name."""
+    """Draw the pictures that the arguments of the command line name; all if there are none."""
     known = list(dict.fromkeys([*MODULES, *PAGES]))
     parser = argparse.ArgumentParser(prog="python -m tools.gallery", description=__doc__)
     parser.add_argument("name", nargs="*", help=", ".join(known))

@@ -1,4 +1,4 @@
-"""The pictures of docs/editing.md: a head whose field is combed, the film of it, and singularities."""
+"""Draw the pictures of docs/editing.md: a combed head, a film of the combing, and moved singularities."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from .solid import compose_view, curve_through, points_on_surface, view
 DEGREE, WIDE, FILM, SIDE = 2, 394, 320, 256
 ANGLES, BALL_ANGLES, RING_ANGLES = (-26, 8), (-26, 30), (20, 40)
 
-#: Strokes on Suzanne: start, middle and end of each, as fractions of the picture from the top left.
+#: Brush strokes on Suzanne: start, middle and end of each, as fractions of the picture from the top left.
 STROKES = (
     ((0.34, 0.37), (0.50, 0.26), (0.67, 0.17)),
     ((0.48, 0.36), (0.58, 0.285), (0.685, 0.35)),
@@ -41,10 +41,11 @@ STROKES = (
     ((0.66, 0.62), (0.665, 0.75), (0.64, 0.88)),
 )
 
-#: Radius of the brush.
+#: Radius of the brush in object space.
 RADIUS = 0.14
 
-#: Singularities on a torus, as fractions of the picture from the top left, and their indices.
+#: Positions of singularities on a torus, as fractions of the picture from the top left, and their indices in
+#: units of 1/4.
 RING_PLACES = ((0.20, 0.58), (0.38, 0.68), (0.64, 0.66), (0.80, 0.55))
 RING_INDEX = (1, -1, 1, -1)
 
@@ -54,10 +55,11 @@ OUT_OF_SIGHT_TEXTS = (
     ("Nine on the face and ears", "Moved behind the head"),
 )
 
-#: Distance of hidden singularities from what is seen, and from others, relative to the size.
+#: Least distances of hidden singularities from visible vertices and from other singularities, relative to
+#: `Surface.extent`.
 HIDDEN_DEPTH, HIDDEN_DISTANCE = 0.12, 0.06
 
-#: Pieces of each stroke in the film, and milliseconds a frame.
+#: Number of pieces in which each stroke is drawn in the film, and milliseconds per frame.
 PIECES, MILLISECONDS = 5, 150
 
 
@@ -85,7 +87,10 @@ def write() -> None:
 def _picture(
     surface: Surface, field: RosyField, angles: tuple[float, float], side: int, **settings: object
 ) -> np.ndarray:
-    """Return an engraving; with `settings`, one as users draw it."""
+    """Draw a field with the preset *engraving*.
+
+    With `settings`, marks such as singularities are drawn too.
+    """
     look = load_preset("engraving").look
     instance = MeshInstance(surface, np.eye(4), field)
     if settings:
@@ -113,7 +118,7 @@ def _out_of_sight() -> list[list[Panel]]:
 
 
 def _two_pairs(ring: Surface) -> tuple[RosyField, RosyField]:
-    """Return a field with two pairs of opposite singularities, and one in which each pair is merged."""
+    """Return a field with two pairs of opposite singularities, and the field after each pair was merged."""
     camera = view(ring, RING_ANGLES, (SIDE, SIDE), 2)
     places = points_on_surface(ring, camera, np.array(RING_PLACES))
     vertex = cKDTree(ring.vertices).query(places)[1]
@@ -127,7 +132,7 @@ def _two_pairs(ring: Surface) -> tuple[RosyField, RosyField]:
 def _moved_out_of_sight(
     surface: Surface, field: RosyField, angles: tuple[float, float]
 ) -> RosyField:
-    """Move each singularity that is seen to a near place that is not seen."""
+    """Move each visible singularity of a field to a near vertex that the camera does not see."""
     camera = view(surface, angles, (SIDE, SIDE), 2)
     points = surface.vertices
     instance = MeshInstance(surface, np.eye(4))
@@ -145,7 +150,7 @@ def _moved_out_of_sight(
 
 
 def _combed(head: Surface) -> Iterator[tuple[RosyField, list[np.ndarray]]]:
-    """Yield the field and the strokes so far, piece by piece."""
+    """Comb the field of the head. Yield the field and the strokes so far, after each piece of a stroke."""
     field = generate(head, "smoothest", DEGREE)
     yield field, []
     system = guided_system(head, DEGREE)

@@ -1,4 +1,4 @@
-"""Figure 2: one direction of a 6-RoSy field, and all six."""
+"""Draw figure 2: one direction of a 6-RoSy field, and all six directions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ DEGREE, SIZE = 6, 400
 
 
 def one_direction(index: int) -> PlanarField:
-    """Return one member of `singularity(index)` as a field, continuous around the center."""
+    """Return one member of `singularity(index)` as a vector field.
+
+    It jumps only across the positive x axis.
+    """
     return lambda p: np.exp(1j * index * (np.angle(p) % (2 * np.pi)) / DEGREE)
 
 

@@ -1,4 +1,4 @@
-"""Figure 5: the steps from a 3-RoSy field to a picture."""
+"""Draw figure 5: the steps from a 3-RoSy field to a picture."""
 
 from __future__ import annotations
 
@@ -17,15 +17,16 @@ from .sheet import Panel, gray, inset, magnified, outlined
 
 DEGREE, SUPERSAMPLING = 3, 2
 
-#: Size of the drawn field, larger than the picture so that streamlines do not end at its border.
+#: Side of the square in which the field is drawn, and of the large and small pictures that are cut out of it,
+#: in pixels. So streamlines do not end at the borders of the pictures.
 FIELD_SIZE, LARGE, SMALL = 480, 400, 256
 
 LOOK = enlarged(MEASURED, SUPERSAMPLING)
 
-#: Contrast of all pictures except the uncorrected blend.
+#: Factor of the contrast of all pictures except the uncorrected blend.
 GAIN = 2.2
 
-#: Side of a closeup, and its magnification.
+#: Side of a closeup in pixels, and its magnification.
 CLOSEUP, TIMES = 52, 3
 
 
@@ -69,7 +70,7 @@ def _layer(angles: np.ndarray, **settings: object) -> DegreeLayer:
 
 
 def _correlations(name: str, tone: np.ndarray, other: np.ndarray) -> list[object]:
-    """Return the correlations in strips on both sides of the singularity, and in the rest."""
+    """Return a table row: correlations of two pictures left and right of the singularity, and in the rest."""
     position = points(FIELD_SIZE)
     in_picture = np.maximum(np.abs(position.real), np.abs(position.imag)) < LARGE / 2
     strip = in_picture & (np.abs(position.imag) < 8.5)
@@ -79,7 +80,7 @@ def _correlations(name: str, tone: np.ndarray, other: np.ndarray) -> list[object
 
 
 def _shown(values: np.ndarray, size: int) -> np.ndarray:
-    """Return the (size, size) center of the (P, 1) values of a picture."""
+    """Return the central (size, size) pixels of a picture with (P, 1) values."""
     middle = slice((FIELD_SIZE - size) // 2, (FIELD_SIZE + size) // 2)
     return averaged(values, FIELD_SIZE, SUPERSAMPLING)[middle, middle]
 
@@ -96,7 +97,11 @@ def _members(layer: DegreeLayer, name: str, guide: int) -> list[Panel]:
 
 
 def _with_closeup(layer: DegreeLayer, side: int) -> np.ndarray:
-    """Return the mean of a set, with a closeup of its breaking points on the left (-1) or right (1)."""
+    """Return the mean of the images of members, with a closeup of its breaking points.
+
+    At breaking points, streaks of the mean are interrupted. `side` is -1 for the left half, 1 for the right
+    half.
+    """
     shown = _contrasted(layer.tone, LARGE)
     left, top = LARGE // 2 + side * 110 - CLOSEUP // 2, LARGE // 2 - CLOSEUP // 2
     closeup = magnified(shown[top : top + CLOSEUP, left : left + CLOSEUP], TIMES)

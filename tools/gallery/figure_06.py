@@ -1,4 +1,4 @@
-"""Figure 6: how blending reduces contrast, and the correction."""
+"""Draw figure 6: how blending reduces contrast, and how that is corrected."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .sheet import Panel, chart, gray
 
 DEGREE, SIZE, FIELD_SIZE = 6, 256, 400
 
-#: The look of the pictures, and of the measurements of several degrees.
+#: Look of the pictures, and look of the measurements for several degrees.
 LOOK, GRAY_LOOK = MEASURED.with_settings({"hue": "noise"}), MEASURED
 
 EXPANDED, SEEDS = 2.5, 6
@@ -24,7 +24,7 @@ MEMBER = np.radians(12)
 
 
 def constant(angle: float, degree: int) -> PlanarField:
-    """Return a constant field; the angle is in radians."""
+    """Return a constant field with a member at an angle, in radians."""
     return lambda p: np.full(p.shape, np.exp(1j * degree * angle))
 
 
@@ -54,13 +54,16 @@ def write() -> None:
 
 
 def _gain(degree: int, look: Look) -> float:
-    """Return the factor of contrast for streamlines of full length."""
+    """Return the factor by which the contrast of the blend is corrected, for streamlines of full length."""
     count = degree if degree % 2 else degree // 2
     return float(blend_gain(count, np.float32([2 * look.length + 1]), look)[0])
 
 
 def _corrected(degree: int) -> list[object]:
-    """Return the factor and the corrected deviation relative to one member image, for two noises."""
+    """Return a table row of a degree: the factor and the deviation after correction, for two kinds of noise.
+
+    The deviation is relative to that of the image of one member.
+    """
     count = degree if degree % 2 else degree // 2
     row: list[object] = [degree, count, float(np.sqrt(count))]
     for high_pass in (GRAY_LOOK.high_pass, 0.0):
@@ -75,14 +78,14 @@ def _corrected(degree: int) -> list[object]:
 
 
 def _cut(image: np.ndarray) -> np.ndarray:
-    """Return the (SIZE, SIZE, K) center of a picture."""
+    """Return the central (SIZE, SIZE, K) pixels of a picture."""
     middle = slice((FIELD_SIZE - SIZE) // 2, (FIELD_SIZE + SIZE) // 2)
     channels = [channel(image, FIELD_SIZE, k)[middle, middle] for k in range(image.shape[1])]
     return np.stack(channels, axis=-1)
 
 
 def _histogram(red: np.ndarray, deviation: float) -> Panel:
-    """Return the histogram of a channel, with the normal distribution that theory expects."""
+    """Draw the histogram of the red channel, with the normal distribution that theory predicts."""
     figure = Figure(layout="constrained")
     axes = figure.subplots()
     axes.hist(np.clip(red.ravel(), 0, 1), bins=100, range=(0, 1), density=True, color="#d98880")

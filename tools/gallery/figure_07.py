@@ -1,4 +1,4 @@
-"""Figures 7 and 8: members on surfaces that are tilted against the view."""
+"""Draw figures 7 and 8: members of fields on surfaces that are tilted against the view direction."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from .solid import compose_view, frame_of, harmonic_field, layer_in_view, view
 
 SIZE, TILTED_SIZE = 402, 262
 
-#: Tilts of the plane in degrees, and the angle of a member on it.
+#: Tilts of the plane in degrees, and angle of a member on the plane in radians.
 TILTS, MEMBER = (0, 60, 78), np.radians(30)
 
-#: Azimuth and elevation from which a corner of the cube is in the center.
+#: Azimuth and elevation of the view, in degrees: a corner of the cube is in the center of the picture.
 VIEW = (45, 35)
 
-#: Side of the closeup, its magnification, and its distance from the silhouette.
+#: Side of the closeup in pixels, its magnification, and its least distance from the silhouette in pixels.
 CLOSEUP, TIMES, MARGIN = 52, 5, 28
 
-#: Samples of a pixel in each direction.
+#: Samples along each side of a pixel.
 SAMPLES = SOLID.supersampling
 
-#: Looks of the sphere, by the choice of members.
+#: Looks of the sphere, by how the members are chosen that are drawn together in one LIC image.
 LOOKS = {
     "among projections": SOLID.with_settings({"gain": 3.0, "view_plane": False}),
     "in the view plane": SOLID.with_settings({"gain": 3.0}),
@@ -43,7 +43,7 @@ def write() -> None:
 
 
 def _tilted_planes() -> list[list[str]]:
-    """Draw a 4-RoSy field on a plane at several tilts, and compare members with the spectrum."""
+    """Draw a 4-RoSy field on tilted planes. Return rows with its directions and the peaks of the spectrum."""
     surface = plane()
     member = [np.cos(MEMBER), np.sin(MEMBER), 0.0]
     field = RosyField(4, np.tile(member, (surface.face_count, 1)))
@@ -60,7 +60,7 @@ def _tilted_planes() -> list[list[str]]:
         down, across = np.rint(0.45 * side * np.array([foreshortening, 1.0])).astype(int)
         middle = side // 2
         patch = tone[middle - down : middle + down, middle - across : middle + across]
-        # Drawn at twice the size: each pixel is the mean of 2 x 2.
+        # The tone has 2 x 2 samples per pixel, which are averaged.
         height, width = (length // 2 for length in patch.shape)
         patch = patch[: 2 * height, : 2 * width].reshape(height, 2, width, 2).mean(axis=(1, 3))
         angles = MEMBER + np.array([0, np.pi / 2])
@@ -72,7 +72,10 @@ def _tilted_planes() -> list[list[str]]:
 
 
 def _sphere() -> list[list[object]]:
-    """Draw the field of a cube on a sphere, and correlate both choices of members with brute force."""
+    """Draw a field with the symmetry of a cube on a sphere, for both ways to choose members.
+
+    Return rows with the correlations of the pictures with brute force.
+    """
     surface = sphere(64)
     field = harmonic_field(surface, 4, np.eye(3))
     camera = view(surface, VIEW, (SIZE, SIZE), SAMPLES)
@@ -114,12 +117,12 @@ def _sphere() -> list[list[object]]:
 
 
 def _frame(layer: DegreeLayer, values: np.ndarray | float) -> np.ndarray:
-    """Return (H, W) values of the pixels of a layer, 0 elsewhere."""
+    """Return the (P,) values of the pixels of a layer as an (H, W) image, 0 elsewhere."""
     return frame_of(values, layer.pixel, (SIZE * SAMPLES,) * 2)
 
 
 def _worst_box(improvement: np.ndarray, covered: np.ndarray) -> tuple[int, int, int, int]:
-    """Return the box (left, top, right, bottom) of the picture where the correlation improves most."""
+    """Return the box (left, top, right, bottom) in the picture in which the correlation improves most."""
     inside = ndimage.binary_erosion(covered > 0, iterations=SAMPLES * MARGIN)
     improvement = np.where(inside, np.nan_to_num(improvement), 0)
     mean = ndimage.uniform_filter(improvement, SAMPLES * CLOSEUP)

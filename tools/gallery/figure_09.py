@@ -1,4 +1,4 @@
-"""Figure 9: the magnitude of a field as color, as the length of streaks, and as both."""
+"""Draw figure 9: the magnitude of a field as color, as the length of streaks, and as both."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from .sheet import Panel
 
 DEGREE, SIZE = 4, 400
 
-#: With few bright cells, the shortest streaks would be dots, so half of the cells are bright.
+#: Look of the pictures. Half of the noise cells are bright: with few of them, the shortest streaks would be
+#: dots.
 LOOK = PLANE.with_settings({"density": 0.5, "gain": 2.5})
 
 #: Ways to show the magnitude: label of the picture, label of the table, and settings.
@@ -34,12 +35,12 @@ ZEROS = ((-95 + 70j, 1), (80 + 95j, -1), (20 - 20j, 1), (-70 - 110j, -1), (120 -
 #: Distance from a zero in pixels at which the field reaches most of its magnitude.
 REACH = 90.0
 
-#: Ranges of the magnitude, relative to the largest.
+#: Limits of the ranges of magnitude in the table, relative to the largest magnitude.
 EDGES = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 def field(p: np.ndarray) -> np.ndarray:
-    """Return a 4-RoSy field with three singularities of index +1/4 and two of −1/4."""
+    """Return a 4-RoSy field at points, with three singularities of index +1/4 and two of −1/4."""
     z = np.ones(p.shape, dtype=complex)
     for position, index in ZEROS:
         offset = p - position
@@ -71,11 +72,11 @@ def _rank(look: Look, magnitude: np.ndarray) -> float:
 
 
 def _half_lengths(look: Look, z: np.ndarray, magnitude: np.ndarray) -> list[str]:
-    """Return the distance at which the correlation along streaks has halved, by range of magnitude."""
+    """Return the distance at which the correlation along streaks falls to 0.5, by range of magnitude."""
     look = look.with_settings({"weights": "none"})
     image = compose_field(field, DEGREE, SIZE, look).layer.images.members[0, :, 0]
     angle = np.angle(z) / DEGREE
-    # Leave out the borders, and the breaking points of the image that is measured.
+    # Leave out the borders, and the part of the measured image where its streaks are interrupted.
     selected = np.abs(DEGREE * angle) < 2.0
     margin = 45
     selected[:margin] = selected[-margin:] = selected[:, :margin] = selected[:, -margin:] = False

@@ -1,4 +1,4 @@
-"""Figure 10: legibility of fields with many directions."""
+"""Draw figure 10: how legible fields with many directions are."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from .page import fill_tables, picture
 from .plane import channel, compose_field, draw_field, singularity
 from .sheet import Panel, chart
 
-#: Sizes of a picture and of the windows of a spectrum in pixels, patterns of noise, and bins of a spectrum.
+#: Sides of a picture and of the windows of a spectrum in pixels, number of seeds of the noise, and number of
+#: bins of a spectrum.
 SIZE, SIDE, SEEDS, BINS = 400, 64, 2, 60
 
 

@@ -1,4 +1,4 @@
-"""Figure 11: fields on surfaces."""
+"""Draw figure 11: fields on surfaces."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from .solid import (
 WIDTH = 402
 MAGNITUDE = SOLID.with_settings({"hue": "magnitude", "gain": 2.0})
 
-#: Surface, look, azimuth and elevation, height in pixels, and label of each picture.
+#: For each picture: surface, look, azimuth and elevation in degrees, height in pixels, and label.
 SHOTS = (
     ("Suzanne", SOLID, (-28, 8), 380, "(a) Suzanne, 4-RoSy"),
     ("Suzanne", PLAID, (-28, 8), 380, "(b) the same, colored noise"),
@@ -72,7 +72,7 @@ def write() -> None:
 def _marked(
     shown: np.ndarray, surface: Surface, field: RosyField, camera: Camera, supersampling: int
 ) -> np.ndarray:
-    """Return a picture of the unit sphere with dots at the singularities."""
+    """Draw dots at the visible singularities on a picture of the unit sphere."""
     positions = surface.vertices[find_singularities(surface, field)[0]]
     for x, y in visible_points(positions, positions, camera, supersampling):
         shown = dotted(shown, x, y, RED)
@@ -80,7 +80,7 @@ def _marked(
 
 
 def _census(name: str, surface: Surface, field: RosyField) -> list[object]:
-    """Return the numbers of singularities by index, and their sum beside that of the theorem."""
+    """Return a table row: counts of singularities by index, sum of the indices, and sum by Poincaré-Hopf."""
     _, index = find_singularities(surface, field)
     kinds, counts = np.unique(index, return_counts=True)
     shown = [f"{count} of {signed(kind)}" for kind, count in zip(kinds, counts, strict=True)]

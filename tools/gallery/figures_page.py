@@ -1,4 +1,4 @@
-"""The pictures of docs/figures.md that `pictures.toml` does not describe: comparisons, and a render with a key."""
+"""Draw pictures of docs/figures.md: comparisons, and a render with a key (legend)."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from .sheet import save
 
 DEGREE, ANGLES = 4, (-26, 8)
 
-#: Width and height of the render with a key, and its look.
+#: Width and height of the render with a key (legend), and its look.
 RENDER_SIZE = 824, 520
 LOOK = Look(supersampling=2, hue="magnitude", singularity_dots="visible")
 
-#: Widths in inches and dots per inch of the sheet and of the picture on the page.
+#: Options of the sheet of comparisons: width in inches, dots per inch, view, and number of processes.
 SHEET = {"width": 7.0, "dpi": 150, "view": ANGLES, "workers": 1}
 PAGE = {"width": 6.0, "dpi": 160, "view": ANGLES, "workers": 1}
 
@@ -56,7 +56,7 @@ def write() -> None:
 
 
 def _render_with_key() -> Image.Image:
-    """Render a head in Blender: its curvature as color, its singularities, and what both mean."""
+    """Render a head in Blender: curvature as color, singularities as dots, and a key that explains both."""
     import bpy
 
     from rosy_addon.jobs.bake import bake

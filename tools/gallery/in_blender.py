@@ -1,4 +1,4 @@
-"""Objects of Blender that several pages use."""
+"""Functions that make objects in Blender, which several pages use."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rosy_addon.projection.camera import orbit_basis
 def evaluated_surface(
     add: Callable[[], object], modifier: str = "", name: str = "mesh", **settings: float
 ) -> Surface:
-    """Return the mesh that an operator of Blender adds to an empty file, with a modifier."""
+    """Return the mesh that an operator adds to an empty file, after a modifier, as a surface."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     add()
     obj = bpy.context.object
@@ -29,7 +29,7 @@ def evaluated_surface(
 
 
 def surface_of(mesh: bpy.types.Mesh, name: str, flat_faces: np.ndarray | None = None) -> Surface:
-    """Return a mesh as a surface."""
+    """Convert a mesh of Blender to a surface."""
     vertices = np.empty((len(mesh.vertices), 3), dtype=np.float32)
     mesh.vertices.foreach_get("co", vertices.ravel())
     corners = np.empty(len(mesh.loops), dtype=np.int32)
@@ -41,7 +41,7 @@ def surface_of(mesh: bpy.types.Mesh, name: str, flat_faces: np.ndarray | None = 
 
 
 def add_suzanne() -> bpy.types.Object:
-    """Add the monkey, subdivided twice, to an empty file."""
+    """Open an empty file, add the monkey, subdivided twice, and return its object."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.mesh.primitive_monkey_add()
     obj = bpy.context.object
@@ -51,7 +51,7 @@ def add_suzanne() -> bpy.types.Object:
 
 
 def add(kind: str, data: bpy.types.ID, angles: tuple[float, float], distance: float):
-    """Add an object that looks at the origin from an azimuth and an elevation in degrees."""
+    """Add an object with some data that faces the origin from an azimuth and an elevation, in degrees."""
     obj = bpy.data.objects.new(kind, data)
     bpy.context.scene.collection.objects.link(obj)
     axes = orbit_basis(*angles)

@@ -1,4 +1,4 @@
-"""The pictures of docs/listing, for the page of the extension on the Extensions platform."""
+"""Draw the pictures of docs/listing, for the page of the extension on Blender's Extensions platform."""
 
 from __future__ import annotations
 
@@ -30,30 +30,32 @@ from .solid import (
 
 FOLDER = ROOT / "docs" / "listing"
 
-#: The platform shows the featured picture at 16:9, and asks for at least this size.
+#: Size of the pictures. The platform shows the featured picture at 16:9, and asks for at least this size.
 SIZE = (1920, 1080)
 
-#: Bands of the featured picture from the left: preset, color behind the model, and the right end of the
-#: band at half the height, as a fraction of the width.
+#: Vertical bands of the featured picture, from the left: preset, color behind the model, and position of the
+#: right edge at half the height of the picture, as a fraction of its width.
 BANDS = (
     ("engraving", "#f6efdf", 0.39),
     ("plaid", "#b4c3c9", 0.58),
     ("white-on-black", "#0c0c10", 1.1),
 )
-#: Azimuth and elevation of the featured picture in degrees: each eye is in a band of its own.
+#: Azimuth and elevation of the featured picture in degrees. They are chosen so that each eye is in another
+#: band.
 VIEW = (-14.0, 4.0)
-#: Displacement of the edges between bands to the right, per pixel upward.
+#: Slope of the edges between bands: pixels to the right per pixel upward.
 SLANT = 0.22
 
-#: Settings in pixels, which are enlarged so that lines are visible in a small picture.
+#: Settings in pixels that are enlarged, and the factor, so that lines are visible when the picture is shown
+#: small.
 LENGTHS = ("length", "line_width", "line_distance", "high_pass", "outline", "overshoot")
 ENLARGED = 1.6
 
-#: Looks of the picture of fields: gray streaks, and a plaid.
+#: Looks of the picture of fields: gray streaks, and colored streaks that look woven.
 STREAKS = Look(length=80, line_width=2.6, gain=2.8, shading=0.85, supersampling=2)
 WEAVE = STREAKS.with_settings({"hue": "noise", "line_width": 4.0, "gain": 3.0})
 
-#: Size of the captions, and their color.
+#: Font size of the captions in pixels, and their color.
 CAPTION, INK = 34, (40, 40, 40)
 
 
@@ -94,7 +96,7 @@ def _band(left: float, right: float) -> Image.Image:
 
 
 def _presets(monkey: Surface, form: RosyField) -> Image.Image:
-    """Draw Suzanne in every preset, with their names."""
+    """Draw Suzanne in every preset, with the names of the presets."""
     curved = curvature_field(monkey, 4)
     shots = []
     for name in preset_keys():
@@ -107,7 +109,7 @@ def _presets(monkey: Surface, form: RosyField) -> Image.Image:
 
 
 def _fields(monkey: Surface) -> Image.Image:
-    """Draw fields of degrees 1 to 6 on shapes, with their degrees."""
+    """Draw fields of several degrees from 1 to 6 on several shapes, labeled with the degrees."""
     rings, ring, ball = triple_torus(), torus(), sphere(64)
     icosahedral = harmonic_field(ball, 6, icosahedron_axes())
     shots = (
@@ -125,7 +127,10 @@ def _fields(monkey: Surface) -> Image.Image:
 def _labeled(
     shots: Sequence[tuple], columns: int, font_size: int, caption: int, margin: float
 ) -> Image.Image:
-    """Draw pictures in columns: surface, field, look, angles, text below it and color behind it."""
+    """Draw labeled pictures in a grid.
+
+    A shot has surface, field, look, angles, label and background color.
+    """
     width, height = SIZE[0] // columns, SIZE[1] // -(-len(shots) // columns)
     canvas = Image.new("RGB", SIZE, (255, 255, 255))
     pen = ImageDraw.Draw(canvas)
@@ -147,7 +152,7 @@ def _draw(
     margin: float,
     background: str,
 ) -> np.ndarray:
-    """Return a picture on a plain background, (H, W, 3) uint8 with rows from the top."""
+    """Draw a field on a plain background. Return (H, W, 3) uint8 with rows from the top."""
     instance = MeshInstance(surface, np.eye(4), field)
     rgba = picture_on_paper(instance, look, angles, size, margin)
     color = np.rint(np.asarray(from_hex(background)) * 255)
@@ -157,6 +162,6 @@ def _draw(
 
 
 def _save(image: Image.Image, name: str, colors: int) -> None:
-    """Write a .png with a palette."""
+    """Write a .png file with a palette of `colors` colors."""
     image = image.quantize(colors, Image.Quantize.MEDIANCUT, kmeans=2, dither=Image.Dither.NONE)
     image.save(FOLDER / f"{name}.png", optimize=True)

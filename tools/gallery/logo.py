@@ -1,4 +1,4 @@
-"""The logo and the favicon of the site: streaks around a singularity of a 4-RoSy field, in a disc."""
+"""Draw the logo and the favicon of the site: a disc of streaks around a singularity of a 4-RoSy field."""
 
 from __future__ import annotations
 
@@ -11,21 +11,22 @@ from rosy_addon.core.color import from_hex, to_display
 from .page import IMAGES
 from .plane import compose_field, points, singularity
 
-#: Side of the picture that is drawn, and of the files, in pixels.
+#: Sides in pixels of the picture that is drawn, of the logo, and of the favicon.
 DRAWN, LOGO, FAVICON = 512, 128, 48
 
-#: A singularity of index -1/4. Broad streaks stay legible at the size of a favicon.
+#: Degree of the field, and index of its singularity in units of 1/4. The streaks are broad, to be legible in
+#: a favicon.
 DEGREE, INDEX = 4, -1
 LOOK = Look(length=400, line_width=26.0, density=0.15, high_pass=70.0, gain=3.0, seed=2)
 
-#: Tones, from 0 to 1, at which the ground ends and the streaks have their full color.
+#: Tones from 0 to 1 between which colors are blended: from the color of the ground to that of the streaks.
 RANGE = (0.50, 0.80)
 GROUND, STREAKS = from_hex("#1f2a52"), from_hex("#ffffff")
 
 
 def write() -> None:
     """Draw docs/images/logo.png and docs/images/favicon.png."""
-    # With the field turned like this, one of the five straight lines points down.
+    # The field is rotated so that one of the five straight streamlines of the singularity points down.
     rgba = compose_field(lambda p: singularity(INDEX)(1j * p), DEGREE, DRAWN, LOOK).rgba
     low, high = RANGE
     tone = np.clip((to_display(rgba[::-1, :, :1]) - low) / (high - low), 0, 1)

@@ -39,7 +39,7 @@ IMAGES = ROOT / "docs" / "images"
 
 SIDE = 256
 
-#: Paragraphs about the user's own presets.
+#: Markdown about the user's own presets.
 OWN = (
     "![The presets in the panel, each with its picture and its description](images/presets.png)",
     "To choose a preset, click the picture in the panel's *Look* section. You can undo the choice. "
@@ -78,7 +78,7 @@ OWN = (
     "`read_preset` and `write_preset`.",
 )
 
-#: Paragraphs about numbers as colors.
+#: Markdown about attributes as colors.
 NUMBERS = (
     "`hue` with `values` shows numbers on the surface through the color map: the angle between two "
     "fields, a curvature, an error. In Blender, choose *Look > Color > Hue: Values* and the "
@@ -129,7 +129,7 @@ def write() -> None:
 
 
 def _presets() -> str:
-    """Draw Suzanne in every preset, and list their descriptions."""
+    """Draw Suzanne in every preset, and return Markdown with the descriptions of the presets."""
     monkey = suzanne()
     curved = curvature_field(monkey, 4)
     even = smoothed_a_little(monkey, curved)
@@ -149,7 +149,10 @@ def _presets() -> str:
 
 
 def _numbers() -> str:
-    """Draw Suzanne with the angle between two fields, and with a height that is not known everywhere."""
+    """Draw Suzanne with attributes as colors, and return Markdown about them.
+
+    The attributes are the angle between two fields, and a height that is not known everywhere.
+    """
     monkey = suzanne()
     field, other = generate(monkey, "form", 4), curvature_field(monkey, 4)
     angle = np.degrees(angle_errors(monkey, field, other))[monkey.corner_face]
@@ -177,7 +180,7 @@ def _numbers() -> str:
 
 
 def _settings() -> list[str]:
-    """Describe all settings by panel, with a picture of each."""
+    """Return Markdown that describes all settings, panel by panel, and draw a picture of each setting."""
     pieces = []
     panels = dict.fromkeys(setting.panel for setting in settings_of(Look).values())
     for panel in sorted(panels, key=lambda panel: not panel):

@@ -1,4 +1,4 @@
-"""Folders of the documentation, and tables of measurements in its pages."""
+"""Folders of the documentation, and functions that fill in its pictures and tables."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ IMAGES = ROOT / "docs" / "images"
 
 
 def picture(name: str, *rows: Sequence[Panel]) -> None:
-    """Save a sheet of panels beside the pages of the gallery."""
+    """Save an image with rows of panels next to the pages of the gallery."""
     save(sheet(rows), FOLDER / f"{name}.png")
 
 
 def fill_tables(name: str, *tables: Sequence[Sequence[object]]) -> None:
-    """Replace the rows of the tables of a page of the gallery, in their order.
+    """Replace the rows of the tables in a page of the gallery, in the order of the tables.
 
     Floats are shown with three decimals.
     """

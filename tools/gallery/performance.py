@@ -1,4 +1,4 @@
-"""The pictures of docs/performance.md that `pictures.toml` does not describe: singularities, and samples."""
+"""Draw pictures of docs/performance.md: closeups of singularities, and different numbers of samples."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from .shapes import torus
 from .sheet import Panel, display, magnified, save, sheet
 from .solid import around_field
 
-#: Look with the noise and contrast of the paper, which show grain and breaking points best.
+#: Look with the noise and contrast of the paper, which show grain and interrupted streaks best.
 PLAIN = Look(length=40, gain=1.5, density=0.5, high_pass=0.0)
 
-#: Looks with one sample per pixel, which hides no artifacts.
+#: Looks with one sample per pixel, so that artifacts are visible.
 SAMPLED = {"samples": Look(length=40, gain=2.5), "hatching": load_preset("cross-hatch").look}
 
-#: Sides of a picture, of a closeup, and of the pictures with several samples a pixel.
+#: Sides in pixels of a picture, of a closeup, and of the pictures that compare numbers of samples.
 SIDE, CLOSE, SAMPLED_SIDE = 400, 128, 256
 
 
@@ -40,7 +40,7 @@ def write() -> None:
 
 
 def _singularities() -> list[list[Panel]]:
-    """Draw closeups of singularities, where the methods differ, enlarged twice."""
+    """Draw closeups of singularities, where the LIC methods differ, enlarged by 2."""
     inner = slice((SIDE - CLOSE) // 2, (SIDE + CLOSE) // 2)
     rows = []
     for degree, index, name in ((3, 1, "1/3"), (4, 1, "1/4"), (4, -1, "-1/4"), (6, -1, "-1/6")):
@@ -55,7 +55,7 @@ def _singularities() -> list[list[Panel]]:
 
 
 def _samples(look: Look) -> list[list[Panel]]:
-    """Draw a torus with one and four samples a pixel, at 100 % and at 400 %."""
+    """Draw a torus with one sample and with four samples per pixel, each at 100 % and at 400 %."""
     ring = torus()
     instance = MeshInstance(ring, np.eye(4), around_field(ring, 4))
     camera = orbit_camera(ring.vertices, 24, 44, SAMPLED_SIDE, SAMPLED_SIDE)

@@ -1,4 +1,4 @@
-"""Planar fields, and pictures of them."""
+"""Make planar fields, and draw them."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from tests.harness.planar import PlanarPicture, compose_planar
 
 from .sheet import display
 
-#: A function from points x + i y, in pixels from the center of the picture, to z.
+#: A planar field of degree N: a function from points x + i y, in pixels from the center of the picture, to
+#: the N-th power z of a member as a complex number.
 PlanarField = Callable[[np.ndarray], np.ndarray]
 
 
 def points(size: int, supersampling: int = 1) -> np.ndarray:
-    """Return the pixel centers of a square as complex numbers, relative to its center.
+    """Return the pixel centers of a square picture as complex numbers, relative to its center.
 
     The array has `size` times `supersampling` rows and columns, the first row at the bottom.
     """
@@ -25,12 +26,15 @@ def points(size: int, supersampling: int = 1) -> np.ndarray:
 
 
 def singularity(index: int) -> PlanarField:
-    """Return a field with a singularity of index `index` / N in the center."""
+    """Return a field of any degree N with a singularity of index `index` / N in the center."""
     return lambda p: (p / np.abs(p)) ** index
 
 
 def compose_field(field: PlanarField, degree: int, size: int, look: Look) -> PlanarPicture:
-    """Draw the picture of a field and its layer, without supersampling."""
+    """Draw a field without supersampling.
+
+    Return the picture with its layer, the images that it is made of.
+    """
     z = field(points(size))
     return compose_planar(np.angle(z) / degree, degree, look, np.abs(z))
 
@@ -38,7 +42,7 @@ def compose_field(field: PlanarField, degree: int, size: int, look: Look) -> Pla
 def draw_field(
     field: PlanarField, degree: int, size: int, look: Look, supersampling: int = 2
 ) -> np.ndarray:
-    """Return a picture of a field, (size, size, 3) uint8, supersampled in each direction."""
+    """Draw a field with supersampling, and return the picture, (size, size, 3) uint8."""
     z = field(points(size, supersampling))
     rgba = compose_planar(
         np.angle(z) / degree, degree, enlarged(look, supersampling), np.abs(z)
@@ -47,16 +51,16 @@ def draw_field(
 
 
 def enlarged(look: Look, supersampling: int) -> Look:
-    """Return a look with its lengths in the pixels of a supersampled picture."""
+    """Return a look whose lengths in pixels are multiplied by the supersampling."""
     lengths = ("length", "line_width", "high_pass")
     return look.with_settings({name: getattr(look, name) * supersampling for name in lengths})
 
 
 def averaged(values: np.ndarray, size: int, supersampling: int, index: int = 0) -> np.ndarray:
-    """Return one channel, (size, size), of the (P, K) values of a supersampled picture."""
+    """Return one channel of the (P, K) values of a supersampled picture, averaged to (size, size) pixels."""
     return values[:, index].reshape(size, supersampling, size, supersampling).mean(axis=(1, 3))
 
 
 def channel(values: np.ndarray, size: int, index: int = 0) -> np.ndarray:
-    """Return one channel, (size, size), of the (P, K) values of a planar picture."""
+    """Return one channel of the (P, K) values of a planar picture as a (size, size) array."""
     return values[:, index].reshape(size, size)

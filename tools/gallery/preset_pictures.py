@@ -1,4 +1,4 @@
-"""The preview pictures of the shipped presets, which are part of the zip."""
+"""Draw the preview pictures of the presets that come with RoSy, which are part of the zip."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from rosy_addon.preset_files.store import preset_files, preview_path, read_prese
 
 from .sheet import display
 
-#: Sizes of the palettes of pictures with the tones of one hue, with colors for the magnitude, and with
-#: noise of many hues. They are not visible at the size of previews, and reduce the files to a quarter.
+#: Numbers of palette colors: for pictures in tones of one hue, with colors for the magnitude, and with noise
+#: of many hues. At the size of previews the palettes are not visible. They reduce the files to a quarter.
 TONES, MAGNITUDE_COLORS, NOISE_COLORS = 16, 32, 64
 
 

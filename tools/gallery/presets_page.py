@@ -1,8 +1,8 @@
-"""Pictures of the presets: those in the panel, docs/presets.md and docs/first-pictures.md.
+"""Draw the pictures of docs/presets.md and docs/first-pictures.md, and write these pages.
 
-`python -m tools.gallery preset-pictures` draws the preview pictures of the shipped presets, which are part
-of the zip. `python -m tools.gallery.presets_page FOLDER` draws both pages, with the meshes of `FILES` in
-FOLDER/meshes, which are not part of this repository.
+`python -m tools.gallery.presets_page FOLDER` draws both pages. FOLDER/meshes has the mesh files of `FILES`,
+which are not part of this repository. (`python -m tools.gallery preset-pictures` draws the previews of
+presets in the zip.)
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from .solid import picture_on_paper
 
 PRESETS_PAGE, FIRST_PAGE = ROOT / "docs" / "presets.md", ROOT / "docs" / "first-pictures.md"
 
-#: Mesh files, by title.
+#: Names of mesh files, by the title of the picture.
 FILES = {
     "Stanford bunny": "stanford-bunny.obj",
     "Spot": "spot.obj",
@@ -36,13 +36,13 @@ FILES = {
     "Piece of a vase": "vase.off",
 }
 
-#: Azimuths and elevations of the models of docs/presets.md.
+#: Azimuth and elevation of each model of docs/presets.md, in degrees.
 VIEWS = {"Suzanne": (-26.0, 8.0), "Spot": (-128.0, 12.0), "Bunny": (-18.0, 10.0)}
 
-#: Sizes of the large picture of a preset and of the two small ones in pixels, and their margin.
+#: Sizes of the large picture of a preset and of its two small ones in pixels, and their margin as a fraction.
 LARGE, SMALL, MARGIN = (820, 640), (410, 320), 0.04
 
-#: Models of the large pictures, for presets with another model than Suzanne.
+#: Model of the large picture of a preset, if it is not Suzanne.
 LARGE_ON = {
     "charcoal": "Bunny",
     "engraving": "Bunny",
@@ -51,10 +51,11 @@ LARGE_ON = {
     "woodcut": "Spot",
 }
 
-#: Palette sizes of the .png files: of hatching (ink, paper and the edges between) and of others.
+#: Numbers of palette colors of the .png files: for hatching (ink, paper and the edges between), and for
+#: others.
 HATCHING_COLORS, COLORS = 32, 192
 
-#: Presets, size, view and margin of the pictures of docs/first-pictures.md, and pictures in a row.
+#: Presets, size, view and margin of the pictures of docs/first-pictures.md, and number of pictures in a row.
 FIRST_PRESETS = ("default", "cross-hatch", "engraving", "pencil")
 SIDE, FIRST_VIEW, FIRST_MARGIN, COLUMNS = 262, (-32.0, 24.0), 0.006, 3
 
@@ -67,7 +68,7 @@ def write_pages(folder: Path) -> None:
 
 
 def _read(path: Path) -> tuple[Surface, np.ndarray]:
-    """Return the surface of a mesh file, and the matrix that turns it so that z is up."""
+    """Return the surface of a mesh file, and the matrix that rotates it so that z points up."""
     return Surface(path), UP_AXIS_MATRIX[UP_AXIS_BY_SUFFIX[path.suffix]]
 
 
@@ -138,13 +139,13 @@ def _write_first_pictures(files: dict[str, tuple[Surface, np.ndarray]]) -> None:
 
 
 def _replace_sections(page: Path, sections: list[str]) -> None:
-    """Replace all that follows the introduction of a page."""
+    """Replace everything after the introduction of a page by sections."""
     introduction = page.read_text(encoding="utf-8").split("\n## ")[0].strip()
     page.write_text("\n\n".join([introduction, *sections]) + "\n", encoding="utf-8")
 
 
 def _made_models() -> list[tuple[str, Surface]]:
-    """Return the meshes that Blender adds, and some made of them, with their titles."""
+    """Return titles and surfaces of meshes: those that Blender can add, and some derived from them."""
     import bpy
 
     from .in_blender import evaluated_surface
@@ -171,7 +172,7 @@ def _made_models() -> list[tuple[str, Surface]]:
 
 
 def _with_noise(surface: Surface, share: float) -> Surface:
-    """Displace the vertices along their normals by a share of the diagonal of the bounding box."""
+    """Displace vertices randomly along their normals, relative to the diagonal of the bounding box."""
     normal = np.zeros_like(surface.vertices)
     np.add.at(normal, surface.corner_vertex, surface.corner_normal)
     amplitude = share * np.linalg.norm(np.ptp(surface.vertices, axis=0))
@@ -181,7 +182,7 @@ def _with_noise(surface: Surface, share: float) -> Surface:
 
 
 def _flange(columns: int = 96) -> Surface:
-    """Return a turned part: a disk with a bore and a hub, with a fillet between them."""
+    """Return a mechanical part with rotational symmetry: a disk with a bore, a hub and a fillet."""
     bend = np.linspace(0, np.pi / 2, 9)
     fillet = np.stack([0.75 - 0.2 * np.sin(bend), 0.45 - 0.2 * np.cos(bend)], axis=1)
     profile = np.concatenate(

@@ -1,4 +1,4 @@
-"""Pictures of what each setting of a look does, for docs/looks.md."""
+"""Draw pictures that show what each setting of a look does, for docs/looks.md."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ from .sheet import Panel, display, sheet
 #: Side of a picture in pixels, and the number of pictures in a row.
 SIDE, COLUMNS = 192, 4
 
-#: Quality of the files: streaks of noise are large in exact formats.
+#: Quality of the .webp files, which are lossy: in lossless formats, pictures of noise take much space.
 WEBP_QUALITY = 60
 
 
 class Scene(NamedTuple):
-    """What a picture shows."""
+    """The scene of a picture: meshes with fields, camera and lights."""
 
     instances: tuple[MeshInstance, ...]
     camera: Camera
@@ -44,17 +44,18 @@ class Scene(NamedTuple):
 
 @dataclass(frozen=True)
 class Shown:
-    """How a setting is shown.
+    """How a setting of a look is shown: one picture per value.
 
     Attributes
     ----------
     values : tuple
-        Values of the setting; or dicts of settings, of which the first is it.
+        Values of the setting. A value may also be a dict of several settings, with this setting first.
     scene : str
         Name of a function of this module that returns a `Scene`.
     preset : str
+        The preset that all pictures begin with.
     settings : dict
-        Changes of the preset that all pictures have.
+        Changes of the preset in all pictures.
     """
 
     values: tuple[Any, ...]
@@ -64,7 +65,7 @@ class Shown:
 
 
 def shown(*values: Any, scene: str = "head", preset: str = "default", **settings: Any) -> Shown:
-    """Return how a setting is shown; parameters as the attributes of `Shown`."""
+    """Return how a setting is shown. The parameters are the attributes of `Shown`."""
     return Shown(values, scene, preset, settings)
 
 
@@ -74,7 +75,7 @@ _HATCHED = {"scene": "ball", "preset": "cross-hatch"}
 _SHADED = {"light": "lamp", "shading": 0.9}
 _SPARSE = {"density": 0.03, "length": 24, "line_width": 2.0}
 
-#: The settings of a look, and how each is shown.
+#: How each setting of a look is shown, by its name.
 SETTINGS: dict[str, Shown] = {
     "method": shown("sheets", "members", "brute", "ibfv", scene="vortices"),
     "weights": shown("cosine", "binary", "none", scene="vortices", method="members", gain=5.0),
@@ -135,7 +136,7 @@ SETTINGS: dict[str, Shown] = {
 
 
 def setting_strip(name: str) -> Image.Image:
-    """Draw a setting at several values, side by side."""
+    """Return an image with a picture for each value of a setting, side by side in rows."""
     entry = SETTINGS[name]
     base = replace(load_preset(entry.preset).look, supersampling=2)
     panels = []
@@ -149,7 +150,7 @@ def setting_strip(name: str) -> Image.Image:
 
 
 def value_label(name: str, value: Any) -> str:
-    """Return a value as text, as on the command line."""
+    """Return a value of a setting as text, as it is written on the command line."""
     if isinstance(value, dict):
         return ", ".join(
             value_label(key, part) for key, part in value.items() if key in (name, "ink")
@@ -161,7 +162,7 @@ def value_label(name: str, value: Any) -> str:
 
 
 def check_every_setting_is_shown() -> None:
-    """Raise a `ValueError` if a setting has no entry, or an entry no setting."""
+    """Raise a `ValueError` if `SETTINGS` lacks a setting of looks, or has one that does not exist."""
     if different := set(settings_of(Look)) ^ set(SETTINGS):
         raise ValueError(f"settings and pictures differ: {', '.join(sorted(different))}")
 
@@ -171,7 +172,7 @@ def check_every_setting_is_shown() -> None:
 
 @cache
 def vortices() -> Scene:
-    """Return a field of four directions in the plane, with singularities of both signs."""
+    """Return a cross field in the plane, with one positive and one negative singularity."""
     square = plane(96)
     p = square.face_center[:, 0] + 1j * square.face_center[:, 1]
     left, right = p + 0.35, p - 0.35
@@ -190,21 +191,21 @@ def wind() -> Scene:
 
 @cache
 def head() -> Scene:
-    """Return Suzanne with a field along its form."""
+    """Return Suzanne with a cross field of the generator *form*."""
     monkey = suzanne()
     return _framed(MeshInstance(monkey, np.eye(4), generate(monkey, "form", 4)))
 
 
 @cache
 def bumps() -> Scene:
-    """Return Suzanne with the directions of curvature, whose magnitude varies."""
+    """Return Suzanne with the directions of curvature. The magnitude of this field varies."""
     monkey = suzanne()
     return _framed(MeshInstance(monkey, np.eye(4), curvature_field(monkey, 4)))
 
 
 @cache
 def numbers() -> Scene:
-    """Return Suzanne with the directions of curvature in two families, and its height as numbers."""
+    """Return Suzanne with curvature directions in two families, and heights as values for the color map."""
     monkey = suzanne()
     field = replace(curvature_field(monkey, 4), family_count=2)
     height = monkey.vertices[monkey.corner_vertex, 2].astype(np.float32)
@@ -213,7 +214,7 @@ def numbers() -> Scene:
 
 @cache
 def painted() -> Scene:
-    """Return Suzanne with dark and light bands as tone."""
+    """Return Suzanne with dark and light bands as surface tone."""
     (instance,) = head().instances
     height = instance.surface.vertices[instance.surface.corner_vertex, 2]
     tone = 0.55 + 0.4 * np.sin(9 * height)
@@ -244,14 +245,14 @@ def ring_of_six() -> Scene:
 
 @cache
 def ball() -> Scene:
-    """Return a sphere with few singularities."""
+    """Return a sphere with a smooth cross field."""
     surface = sphere()
     return _framed(MeshInstance(surface, np.eye(4), smoothest_field(surface, 4)))
 
 
 @cache
 def slope() -> Scene:
-    """Return the plane of `vortices`, which recedes."""
+    """Return the plane of `vortices`, which recedes from the camera."""
     camera = perspective_camera(
         look_at((0.3, -1.5, 0.5), (0, -0.2, 0)), SIDE, SIDE, fov=np.radians(60)
     )
@@ -269,7 +270,7 @@ def gusts() -> Scene:
 
 @cache
 def box() -> Scene:
-    """Return a prism, whose creases are not equally sharp."""
+    """Return a prism with seven sides. Its creases are not equally sharp."""
     import bpy
 
     surface = evaluated_surface(partial(bpy.ops.mesh.primitive_cylinder_add, vertices=7))
@@ -295,12 +296,12 @@ def table() -> Scene:
 
 
 def _in_plane(z: np.ndarray) -> np.ndarray:
-    """Return (F, 3) vectors in the plane z = 0, given complex numbers."""
+    """Convert (F,) complex numbers to (F, 3) vectors in the plane z = 0."""
     return np.stack([z.real, z.imag, np.zeros(len(z))], axis=1)
 
 
 def _flat(field: RosyField) -> Scene:
-    """Return the square of `plane` with a field, from above."""
+    """Return a scene with the square of `plane` and a field on it, seen from above."""
     camera = orbit_camera(
         np.array([[-1.0, -1, 0], [1, 1, 0]]), 0.0, 90.0, SIDE, SIDE, perspective=False
     )
@@ -308,13 +309,13 @@ def _flat(field: RosyField) -> Scene:
 
 
 def _framed(instance: MeshInstance, angles: tuple[float, float] = (-26, 8)) -> Scene:
-    """Return a mesh that fills the picture."""
+    """Return a scene with a mesh that fills the picture."""
     camera = orbit_camera(instance.surface.vertices, *angles, SIDE, SIDE, margin=0.006)
     return _lit((instance,), camera)
 
 
 def _lit(instances: Sequence[MeshInstance], camera: Camera) -> Scene:
-    """Return a scene with a sun."""
+    """Return a scene with some meshes, a camera and a sun."""
     toward = np.array([-0.55, -0.5, 0.75])
     sun = Light("sun", camera.view[:3, :3] @ (toward / np.linalg.norm(toward)), np.ones(3), 1.25)
     return Scene(tuple(instances), camera, (sun,))

@@ -1,4 +1,4 @@
-"""Meshes without license restrictions: made in code, or Blender's own."""
+"""Make meshes that are free of license restrictions: computed ones, and the monkey of Blender."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rosy_addon.field.surface import Surface, build_surface
 
 
 def plane(cells: int = 8) -> Surface:
-    """Return the square from -1 to 1 in x and y, facing up."""
+    """Return the square from -1 to 1 in x and y, whose normals point up."""
     axis = np.linspace(-1, 1, cells + 1)
     x, y = np.meshgrid(axis, axis, indexing="ij")
     return grid_surface("plane", np.stack([x, y, 0 * x], axis=-1), closed=(False, False))
@@ -47,7 +47,8 @@ def knot(tube: float = 0.34, around: int = 384, across: int = 36) -> Surface:
     t = np.arange(around) * (2 * np.pi / around)
     curve, tangent = _trefoil(t), _trefoil(t + 1e-4) - _trefoil(t - 1e-4)
     tangent /= np.linalg.norm(tangent, axis=1)[:, None]
-    # The knot winds around a torus, so the normal of that torus is never parallel to the knot.
+    # The knot winds around a torus. The normal of the torus is never parallel to the knot, so it spans a
+    # frame with it.
     torus_center = np.stack([np.cos(2 * t), np.sin(2 * t), 0 * t], axis=1) * 2
     outward = curve - torus_center
     outward -= np.sum(outward * tangent, axis=1)[:, None] * tangent
@@ -64,7 +65,7 @@ def _trefoil(t: np.ndarray) -> np.ndarray:
 
 
 def sphere(cells: int = 48) -> Surface:
-    """Return the unit sphere, as a cube whose faces are divided at equal angles."""
+    """Return the unit sphere, as the projection of a cube whose faces are divided at equal angles."""
     coordinates = np.tan(np.linspace(-np.pi / 4, np.pi / 4, cells + 1))
     u, v = np.meshgrid(coordinates, coordinates, indexing="ij")
     sides = []
@@ -76,7 +77,7 @@ def sphere(cells: int = 48) -> Surface:
     vertices = np.concatenate([side.reshape(-1, 3) for side in sides])
     cell = _cells(cells + 1, cells + 1, (False, False))
     faces = np.concatenate([cell + index * (cells + 1) ** 2 for index in range(6)])
-    # Adjacent sides share the vertices of their common edge.
+    # Merge the vertices along the edges of the cube, which two sides share.
     _, first, same = np.unique(
         np.rint(vertices * 1e6), axis=0, return_index=True, return_inverse=True
     )
@@ -85,7 +86,7 @@ def sphere(cells: int = 48) -> Surface:
 
 
 def triple_torus(cells: int = 110) -> Surface:
-    """Return three merged rings, a level set of a smooth function."""
+    """Return a torus with three holes: three merged rings, as a level set of a smooth function."""
     low, high = np.array([-2.8, -2.8, -0.8]), np.array([2.8, 2.8, 0.8])
     spacing = (high[0] - low[0]) / cells
     counts = np.rint((high - low) / spacing).astype(int) + 1
@@ -95,7 +96,7 @@ def triple_torus(cells: int = 110) -> Surface:
     vertices = vertices.astype(np.float64) + low
     ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     count = np.bincount(ends[:, 0], minlength=len(vertices))[:, None]
-    # Marching cubes leave slivers: smooth the vertices, then project them back.
+    # Marching cubes make thin triangles. Smooth the vertices, and project them back to the level set.
     for _ in range(12):
         neighbor_sum = np.zeros_like(vertices)
         np.add.at(neighbor_sum, ends[:, 0], vertices[ends[:, 1]])
@@ -106,7 +107,7 @@ def triple_torus(cells: int = 110) -> Surface:
 
 
 def _rings(points: np.ndarray, tube: float = 0.43, blend: float = 0.16) -> np.ndarray:
-    """Return the (P,) signed distances of points from three smoothly merged rings of radius 1."""
+    """Return the approximate (P,) signed distances of points from three smoothly merged rings of radius 1."""
     total = np.zeros(len(points))
     for angle in (0.5, 0.5 + 4 / 3, 0.5 + 2 / 3):
         center = 1.2 * np.array([np.cos(angle * np.pi), np.sin(angle * np.pi)])
@@ -152,13 +153,13 @@ def _polygons(name: str, vertices: np.ndarray, faces: np.ndarray, **options: flo
 def grid_surface(
     name: str, point: np.ndarray, closed: tuple[bool, bool], **options: float
 ) -> Surface:
-    """Return quads over an (A, B, 3) grid of points, each direction closed or not."""
+    """Return a surface of quads through an (A, B, 3) grid of points, closed or open in each direction."""
     cells = _cells(*point.shape[:2], closed)
     return _polygons(name, point.reshape(-1, 3), cells, **options)
 
 
 def _cells(a: int, b: int, closed: tuple[bool, bool]) -> np.ndarray:
-    """Return the (cells, 4) corners of the cells of an a x b grid, each direction closed or not."""
+    """Return the (n, 4) point indices of the cells of an a x b grid, closed or open in each direction."""
     index = np.arange(a * b).reshape(a, b)
     right, up = np.roll(index, -1, axis=0), np.roll(index, -1, axis=1)
     corners = np.stack([index, right, np.roll(right, -1, axis=1), up], axis=-1)

@@ -1,4 +1,4 @@
-"""Sheets of labeled pictures, scaled only by whole factors."""
+"""Compose sheets of labeled pictures, and draw on pictures. Pictures are scaled only by whole factors."""
 
 from __future__ import annotations
 
@@ -29,19 +29,19 @@ class Panel:
 
 
 def font(size: int = LABEL_SIZE) -> ImageFont.FreeTypeFont:
-    """Return the font of the labels, which comes with matplotlib."""
+    """Return the font of the labels. It comes with matplotlib."""
     return ImageFont.truetype(font_manager.findfont("DejaVu Sans"), size)
 
 
 def display(rgba: np.ndarray) -> np.ndarray:
-    """Convert a (H, W, 4) `Picture.rgba` to (H, W, 3) uint8 from the top, on white paper."""
+    """Composite an (H, W, 4) `Picture.rgba` over white, and return (H, W, 3) uint8 with rows from the top."""
     alpha = rgba[..., 3:]
     shown = to_display(rgba[..., :3] * alpha + (1 - alpha))
     return np.rint(shown[::-1] * 255).astype(np.uint8)
 
 
 def gray(tone: np.ndarray) -> np.ndarray:
-    """Convert (H, W) or (H, W, K) display values from the bottom to (H, W, 3) uint8 from the top."""
+    """Convert (H, W) or (H, W, K) display values, bottom row first, to (H, W, 3) uint8, top row first."""
     tone = tone[..., None] if tone.ndim == 2 else tone
     shown = np.rint(np.clip(tone[::-1], 0, 1) * 255).astype(np.uint8)
     return np.repeat(shown, 3 // shown.shape[2], axis=2)
@@ -76,7 +76,7 @@ def inset(
 
 
 def dotted(picture: np.ndarray, x: float, y: float, color: tuple[int, int, int]) -> np.ndarray:
-    """Draw a dot at a position in pixels from the upper left."""
+    """Draw a dot on a picture, at (x, y) in pixels from the upper left."""
     size = 4
     disc = Image.new("L", (2 * size + 3,) * 2)
     disc = disc.resize((disc.width * 8,) * 2)
@@ -134,7 +134,7 @@ def _wrapped(text: str, width: int) -> list[str]:
 
 
 def save(image: Image.Image, path: Path) -> None:
-    """Write a .png, gray if it has no color, otherwise with a palette of 256 colors."""
+    """Write a .png file: gray if the image has no color, otherwise with a palette of 256 colors."""
     pixels = np.asarray(image)
     if (pixels == pixels[..., :1]).all():
         image = image.convert("L")

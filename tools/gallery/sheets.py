@@ -40,7 +40,7 @@ INK, PAPER = (214, 84, 20), (255, 255, 255)
 
 
 def write_page(page: str) -> None:
-    """Draw and save the sheets and the films of a page."""
+    """Draw and save the sheets and films that `pictures.toml` lists for a page of the documentation."""
     table = PAGES[page]
     for name, spec in table.get("films", {}).items():
         _write_film(table | spec, ROOT / f"{table['prefix']}{name}.gif")
@@ -50,7 +50,10 @@ def write_page(page: str) -> None:
 
 
 def _write_film(spec: dict[str, Any], path: Path) -> None:
-    """Draw and save a turntable, or a loop of streaks that drift before a still camera."""
+    """Draw and save a film.
+
+    If the look has flow, streaks move in front of a still camera; else the camera orbits.
+    """
     look = Look().with_settings(spec["look"])
     surface = _surface(spec["mesh"])
     instance = MeshInstance(surface, np.eye(4), _field(surface, spec))
@@ -62,7 +65,10 @@ def _write_film(spec: dict[str, Any], path: Path) -> None:
 
 
 def draw_panel(*specs: dict[str, Any]) -> Panel:
-    """Return the panel of a picture that `pictures.toml` describes. Later keys replace earlier ones."""
+    """Draw a picture that tables of `pictures.toml` describe, and return it as a panel.
+
+    Keys of later tables replace those of earlier ones.
+    """
     spec = {key: value for part in specs for key, value in part.items()}
     look = load_preset(spec["preset"]).look if "preset" in spec else Look()
     for part in specs:
@@ -98,7 +104,7 @@ def _surface(name: str) -> Surface:
 
 
 def _field(surface: Surface, spec: dict[str, Any]) -> RosyField:
-    """Return a field of `MADE_FIELDS` or of a generator."""
+    """Return the field that a table describes: one of `MADE_FIELDS`, or the field of a generator."""
     kind, degree = spec["field"].split()
     if kind in MADE_FIELDS:
         return MADE_FIELDS[kind](surface, int(degree))
@@ -128,7 +134,7 @@ def _sun(camera: Camera, direction: Sequence[float]) -> Light:
 def with_line(
     picture: np.ndarray, line: np.ndarray, width: int, color: tuple[int, int, int]
 ) -> np.ndarray:
-    """Draw a line on a square picture. Points are fractions of it, from the top left."""
+    """Draw a polyline on a square picture. Its points are fractions of the picture from the top left."""
     image = Image.fromarray(picture)
     points = [tuple(point) for point in (line * len(picture)).tolist()]
     ImageDraw.Draw(image).line(points, fill=color, width=width, joint="curve")

@@ -1,4 +1,4 @@
-"""The picture of docs/simulations.md: the stress at the boundary of a beam, from a .vtu file."""
+"""Draw the picture of docs/simulations.md: the stress at the boundary of a beam, from a .vtu file."""
 
 from __future__ import annotations
 
@@ -12,13 +12,14 @@ from rosy_addon.extras.command_line import main
 
 from .page import IMAGES
 
-#: The picture.
+#: Path of the picture.
 PICTURE = IMAGES / "simulations-beam.png"
 
-#: Length, width and height of the beam, and cells along each.
+#: Length, width and height of the beam, and number of cells along each of them.
 SIZES, CELLS = (4.0, 1.0, 1.0), (40, 10, 10)
 
-#: Bending at the clamped end, shear force, and torsion, in units of the largest bending stress.
+#: Stresses by bending at the clamped end, by the shear force, and by torsion, relative to the largest bending
+#: stress.
 BENDING, SHEAR, TORSION = 1.0, 0.17, 0.08
 
 
@@ -33,7 +34,7 @@ def write() -> None:
 
 
 def _beam() -> pv.UnstructuredGrid:
-    """Tetrahedra with the stress of a beam that is clamped on the left, bent and twisted."""
+    """Return tetrahedra with the stress tensors of a beam that is clamped on the left, bent and twisted."""
     spacing = np.divide(SIZES, CELLS)
     mesh = pv.ImageData(dimensions=np.add(CELLS, 1), spacing=spacing).to_tetrahedra(5)
     mesh.clear_data()

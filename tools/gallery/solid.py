@@ -1,4 +1,4 @@
-"""Fields on surfaces, and pictures of them."""
+"""Make fields on surfaces, and draw them."""
 
 from __future__ import annotations
 
@@ -30,10 +30,11 @@ from tests.harness.planar import DegreeLayer, degree_layers
 
 
 def harmonic_field(surface: Surface, degree: int, axes: np.ndarray) -> RosyField:
-    """Return the RoSy of degree N with z = sum of (a.x + i a.y)^N over projected axes a.
+    """Return a RoSy field of degree N that is a sum over some axes.
 
-    On the sphere, the three axes of a cube and N = 4 give the pattern of a cube, singular at its
-    eight corners; the six axes of an icosahedron and N = 6 one that is singular at twelve points.
+    In the frame (x, y) of a face, the N-th power of a member is z = sum of (a.x + i a.y)^N over the axes a.
+    On the sphere, the three axes of a cube and N = 4 give a field with singularities at the eight corners of
+    the cube. The six axes of an icosahedron and N = 6 give a field with twelve singularities.
     """
     x, y = face_frames(surface)
     z = power((x + 1j * y) @ axes.T, degree).sum(axis=1)
@@ -41,23 +42,23 @@ def harmonic_field(surface: Surface, degree: int, axes: np.ndarray) -> RosyField
 
 
 def icosahedron_axes() -> np.ndarray:
-    """Return (6, 3) unit directions to vertices of an icosahedron, one of each opposite pair."""
+    """Return the (6, 3) unit directions to one vertex of each opposite pair of an icosahedron."""
     golden = (1 + np.sqrt(5)) / 2
     axes = [np.roll([0, sign, golden], shift) for shift in range(3) for sign in (1, -1)]
     return normalize(np.array(axes, dtype=np.float64))
 
 
 def around_field(surface: Surface, degree: int) -> RosyField:
-    """Return the field with one member around the z axis."""
+    """Return a field of magnitude 1 with one member in the direction of rotation about the z axis."""
     direction = np.cross([0.0, 0.0, 1.0], surface.face_center)
     direction -= np.sum(direction * surface.face_normal, axis=1)[:, None] * surface.face_normal
     return RosyField(degree, normalize(direction))
 
 
 def smoothed(surface: Surface, field: RosyField, rounds: int) -> RosyField:
-    """Smooth a field by repeated averaging, with magnitude 1.
+    """Smooth a field by repeated averaging over neighboring faces. The result has magnitude 1.
 
-    Singularities of opposite signs cancel.
+    Pairs of singularities of opposite signs vanish.
     """
     x, y = face_frames(surface)
     rotations = corner_rotations(surface.face_normal, x, surface.corner_face, surface.corner_normal)
@@ -69,7 +70,7 @@ def smoothed(surface: Surface, field: RosyField, rounds: int) -> RosyField:
 
 
 def smoothed_a_little(surface: Surface, field: RosyField) -> RosyField:
-    """Return a slightly smoothed curvature field, without the noise of small faces."""
+    """Smooth a field a little, which removes the noise of small faces."""
     return smoothed(surface, field, 6)
 
 
@@ -79,12 +80,12 @@ def even_curvature(surface: Surface, degree: int) -> RosyField:
 
 
 def ring_curvature(rings: Surface) -> RosyField:
-    """Return the smooth 4-RoSy field along the curvature of the triple torus."""
+    """Return a smooth 4-RoSy field along the principal curvature directions of the triple torus."""
     return smoothed(rings, curvature_field(rings, 4), 200)
 
 
 def pairs_of_directions(ball: Surface, degree: int) -> RosyField:
-    """Return two pairs of directions on a sphere, at angles from 90 to 25 degrees."""
+    """Return a field of two pairs of opposite directions on a sphere, with angles from 90 to 25 degrees."""
     up = 1 - np.abs(ball.face_center[:, 2])
     half = np.radians(12.5 + (45 - 12.5) * np.clip(up, 0, 1))[:, None]
     along = normalize(axis_field(ball, 1).vectors)
@@ -94,7 +95,7 @@ def pairs_of_directions(ball: Surface, degree: int) -> RosyField:
 
 
 def stress_of_force(ring: Surface, degree: int) -> RosyField:
-    """Return the directions of tension and compression in a ring with a force at its side."""
+    """Return the field of tension and compression in a ring, with a force at its side."""
     offset = ring.face_center - (1.2, -1.4, 0.6)
     distance = np.sqrt(dot(offset, offset))[:, None, None]
     outward = normalize(offset)
@@ -105,17 +106,18 @@ def stress_of_force(ring: Surface, degree: int) -> RosyField:
 def ring_of_singularities(
     ball: Surface, distance: float, far: float = 7.0, degree: int = 4
 ) -> RosyField:
-    """Return a field on a sphere with eight singularities around the axis toward the eye.
+    """Return a field on a sphere with eight singularities on one or two circles around the view direction.
 
     Parameters
     ----------
     ball : Surface
         The unit sphere.
     distance : float
-        Of the center of their circle from the center of the sphere, before they are moved onto it: toward
-        the eye for those at smaller angles than `far`, away from it for the others.
+        The singularities are points of a circle of radius 1 that are projected to the sphere from its center.
+        This is the distance of the circle from the center of the sphere, toward the eye. Singularities at
+        angles of at least `far` are on a second circle, which is as far away from the eye.
     far : float
-        In radians.
+        Angle around the view direction, in radians.
     """
     axes = view(ball, (-26, 8), (256, 256), 1).view[:3, :3]
     angle = np.arange(8) * np.pi / 4 + 0.2
@@ -126,7 +128,7 @@ def ring_of_singularities(
     return generate(ball, settings, degree)
 
 
-#: Fields that are no generator's, by name: functions of a surface and a degree.
+#: Fields that no generator of RoSy makes, by name: functions of a surface and a degree.
 MADE_FIELDS: dict[str, Callable[[Surface, int], RosyField]] = {
     "around": around_field,
     "even-curvature": even_curvature,
@@ -144,7 +146,7 @@ def view(
     supersampling: int,
     perspective: bool = True,
 ) -> Camera:
-    """Return a camera that frames a surface, with `supersampling` times `size` pixels."""
+    """Return a camera in whose frame a surface fits, with `supersampling` times `size` pixels."""
     width, height = (supersampling * side for side in size)
     return orbit_camera(
         surface.vertices, *angles, width, height, perspective=perspective, margin=0.006
@@ -152,7 +154,7 @@ def view(
 
 
 def compose_view(surface: Surface, field: RosyField, look: Look, camera: Camera) -> Picture:
-    """Draw a field; the resolution of the camera includes the supersampling of the look."""
+    """Draw a field. The resolution of the camera must include the supersampling of the look."""
     return compose(project([MeshInstance(surface, np.eye(4), field)], camera, look.display), look)
 
 
@@ -163,7 +165,7 @@ def picture_on_paper(
     size: tuple[int, int],
     margin: float,
 ) -> np.ndarray:
-    """Return the (H, W, 4) picture of a field, with the paper of its look as background if it has one."""
+    """Draw a field, with the paper color of its look as background if it is hatched. Return (H, W, 4)."""
     points = instance.surface.vertices @ instance.matrix[:3, :3].T + instance.matrix[:3, 3]
     width, height = (look.supersampling * side for side in size)
     camera = orbit_camera(points, *angles, width, height, margin=margin)
@@ -176,16 +178,16 @@ def picture_on_paper(
 
 
 def layer_in_view(surface: Surface, field: RosyField, look: Look, camera: Camera) -> DegreeLayer:
-    """Return the images that `compose_view` draws a field with."""
+    """Return the LIC images, and their pixels, from which `compose_view` draws a field."""
     instance = MeshInstance(surface, np.eye(4), field)
     (layer,) = degree_layers(project([instance], camera, look.display), look)
     return layer
 
 
 def curve_through(start: tuple, middle: tuple, stop: tuple) -> np.ndarray:
-    """Return (n, 2) points of a parabola through three points, in picture coordinates.
+    """Return (n, 2) points of a parabola through three points.
 
-    These are fractions of the picture from the top left.
+    All points are fractions of the picture from the top left.
     """
     t = np.linspace(0, 1, 60)[:, None]
     a, b, c = (np.array(point) for point in (start, middle, stop))
@@ -193,7 +195,10 @@ def curve_through(start: tuple, middle: tuple, stop: tuple) -> np.ndarray:
 
 
 def points_on_surface(surface: Surface, camera: Camera, curve: np.ndarray) -> np.ndarray:
-    """Return the points of a surface that a camera sees at (n, 2) places of the picture, without misses."""
+    """Return the (m, 3) visible points of a surface at (n, 2) fractions of the picture from the top left.
+
+    Fractions at which the camera does not see the surface are left out.
+    """
     buffer = _visible_pixels(surface, camera)
     position = np.full((camera.height * camera.width, 3), np.nan)
     position[buffer.pixel] = (
@@ -207,7 +212,7 @@ def points_on_surface(surface: Surface, camera: Camera, curve: np.ndarray) -> np
 def visible_points(
     points: np.ndarray, normals: np.ndarray, camera: Camera, supersampling: int
 ) -> list[tuple[float, float]]:
-    """Return (x, y) of the visible points of a convex surface, in pixels from the upper left.
+    """Return (x, y) of those points of a convex surface that are visible, in pixels from the upper left.
 
     `supersampling` is the number of camera pixels per picture pixel.
     """
@@ -222,13 +227,13 @@ def visible_points(
 
 
 def _visible_pixels(surface: Surface, camera: Camera) -> GBuffer:
-    """Return the G-buffer of a surface without a field of its own."""
+    """Return the G-buffer of a surface. It has some field, as a G-buffer needs one."""
     field = RosyField(1, np.broadcast_to([1.0, 0.0, 0.0], (surface.face_count, 3)))
     return project([MeshInstance(surface, np.eye(4), field)], camera)
 
 
 def frame_of(values: np.ndarray, pixel: np.ndarray, shape: Sequence[int]) -> np.ndarray:
-    """Return (H, W) values at their pixels, 0 elsewhere."""
+    """Return an (H, W) image with (P,) values at their pixels, 0 elsewhere."""
     frame = np.zeros(int(np.prod(shape)), dtype=np.float64)
     frame[pixel] = values
     return frame.reshape(shape)

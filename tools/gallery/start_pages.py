@@ -1,4 +1,4 @@
-"""The picture of docs/start/scripters.md, drawn by the script on that page."""
+"""Draw the picture of docs/start/scripters.md, with the script on that page."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ PAGE = ROOT / "docs" / "start" / "scripters.md"
 def write() -> None:
     """Run the script of the page, and keep its picture as docs/images/start-torus.png."""
     script = PAGE.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
-    # The name of the package when it is installed.
+    # The script imports the package by the name that it has when it is installed.
     sys.modules["rosyfields"] = rosy_addon
     with tempfile.TemporaryDirectory() as folder:
         with contextlib.chdir(folder):
             exec(compile(script, str(PAGE), "exec"), {})
-        # The picture is gray: two channels instead of four.
+        # The picture is gray, so two channels are enough.
         picture = Image.open(Path(folder) / "torus.png").convert("LA")
         picture.save(IMAGES / "start-torus.png", optimize=True)

@@ -1,4 +1,4 @@
-"""The pictures of docs/strokes.md, whose text is written by hand."""
+"""Draw the pictures of docs/strokes.md."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from .page import IMAGES
 from .shapes import suzanne
 from .sheet import Panel, save, sheet
 
-#: Size of a picture, and subpixels per pixel in each direction.
+#: Side of a picture in pixels, and subpixels along each side of a pixel.
 SIDE, SUPERSAMPLING = 402, 4
 
 #: Width of the strokes in pixels.
 WIDTH = 1.3
 
-#: Styles of the strokes on Suzanne, by label.
+#: Styles of the strokes on Suzanne, by the label of the picture.
 STYLES = {
     "evenly spaced, with an outline": StrokeStyle(spacing=6, outline=True),
     "by tone, of a lamp": StrokeStyle(spacing=4, outline=True, light="lamp"),
@@ -48,7 +48,7 @@ def write() -> None:
 
 
 def rasterize(strokes: Strokes, camera: Camera) -> np.ndarray:
-    """Return a picture of strokes, (H, W, 3) uint8 from the top: a round pen, black on white."""
+    """Draw strokes with a round black pen on white. Return (H, W, 3) uint8 with rows from the top."""
     pixels, _ = project_to_pixels(strokes.points, camera)
     pixels[:, 1] = camera.height - pixels[:, 1]
     pixels *= SUPERSAMPLING

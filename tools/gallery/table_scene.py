@@ -1,4 +1,4 @@
-"""The scene of the tones of docs/hatching.md: Suzanne and a ball on a table."""
+"""The scene in which docs/hatching.md shows tones: Suzanne and a ball on a table."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from .solid import even_curvature
 
 @lru_cache
 def instances(tone: str = "") -> list[MeshInstance]:
-    """Return the objects, with "occlusion" or "bands" as their tone.
+    """Return the meshes of the scene, with `tone` as their surface tone.
 
-    The table has no bands.
+    "occlusion" is ambient occlusion. "bands" are dark and light bands, which the table does not get.
     """
     monkey, ball, table = suzanne(), sphere(), plane(24)
     bare = [

@@ -1,4 +1,4 @@
-"""The pictures of docs/textures.md, whose text is written by hand."""
+"""Draw the pictures of docs/textures.md."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from rosy_addon.surface_texture.draw import draw_texture
 from .page import IMAGES
 from .sheet import Panel, display, save, sheet
 
-#: Side of a picture, samples per pixel in each direction, and side of the texture.
+#: Side of a picture in pixels, samples along each side of a pixel, and side of the texture in texels.
 SIDE, SAMPLES, TEXTURE_SIDE = 402, 3, 2048
 
-#: Lamps: labels, azimuths from the camera and elevations in degrees.
+#: Lamps: label, azimuth relative to the camera, and elevation, in degrees.
 LAMPS = (("a lamp at the left", -50.0, 35.0), ("a lamp at the right", 55.0, 25.0))
 
-#: Views from the front and from behind, azimuth and elevation in degrees.
+#: Azimuth and elevation of the views from the front and from behind, in degrees.
 FRONT, BACK = (-26.0, 8.0), (150.0, 14.0)
 
-#: A point at the forehead.
+#: A point at the forehead of Suzanne.
 FOREHEAD = (-0.25, -0.75, 0.55)
 
 
@@ -74,7 +74,7 @@ def write() -> None:
 
 
 def _hatching(instance: MeshInstance, uv: np.ndarray) -> list[list[Panel]]:
-    """Draw one texture of hatching in the light of several lamps, for two presets."""
+    """For two presets, draw the same hatching texture in the light of several lamps."""
     corner_uv = uv[instance.surface.triangles]
     rows = []
     for preset in ("cross-hatch", "engraving"):
@@ -96,7 +96,7 @@ def _hatching(instance: MeshInstance, uv: np.ndarray) -> list[list[Panel]]:
 
 
 def _highlights(instance: MeshInstance, uv: np.ndarray) -> list[Panel]:
-    """Render brushed metal: one field with two guiding angles."""
+    """Render a brushed metal head, with two guiding angles for the same field."""
     import bpy
 
     from rosy_addon.scene.blender_images import new_image
@@ -136,7 +136,7 @@ def _light_metal(scene) -> None:
 
 
 def _rendered(scene) -> np.ndarray:
-    """Return (SIDE, SIDE, 3) uint8 from the top, rendered with Cycles."""
+    """Render the scene with Cycles. Return (SIDE, SIDE, 3) uint8 with rows from the top."""
     import bpy
 
     scene.render.engine, scene.cycles.samples = "CYCLES", 256
@@ -158,7 +158,7 @@ def _rendered(scene) -> np.ndarray:
 
 
 def unwrapped_suzanne() -> tuple[Surface, np.ndarray]:
-    """Return Blender's monkey, subdivided and unwrapped into charts, and (C, 2) coordinates."""
+    """Return Blender's monkey, subdivided, and (C, 2) UV coordinates that unwrap it into charts."""
     import bpy
 
     from .in_blender import add_suzanne, surface_of
@@ -181,7 +181,7 @@ def view(
     points: np.ndarray | None = None,
     is_lit: bool = True,
 ) -> np.ndarray:
-    """Return a (SIDE, SIDE, 3) uint8 picture, with the mean of the samples of each pixel.
+    """Draw a mesh with colors of its pixels, averaged over samples. Return (SIDE, SIDE, 3) uint8.
 
     Parameters
     ----------
@@ -189,11 +189,11 @@ def view(
     angles : (float, float)
         Azimuth and elevation in degrees.
     color_of : function
-        Returns the colors of the pixels of a G-buffer.
+        Function that returns the (P, 3) linear colors of the pixels of a G-buffer.
     points : (P, 3) ndarray, optional
-        What the camera frames closely; the whole surface if it is not given.
+        Points that the camera frames closely. By default the whole surface.
     is_lit : bool
-        Light the colors by a lamp over the left shoulder of the viewer.
+        Whether a lamp over the left shoulder of the viewer lights the colors.
     """
     side = SIDE * SAMPLES
     framed, margin = (instance.surface.vertices, 0.03) if points is None else (points, -0.1)
@@ -211,7 +211,7 @@ def view(
 
 
 def texture_at(texture: np.ndarray, corner_uv: np.ndarray, gbuffer: GBuffer) -> np.ndarray:
-    """Return the (P, 4) values of a texture, interpolated as a renderer does."""
+    """Return the (P, 4) values of a texture at the pixels of a G-buffer, bilinearly interpolated."""
     place = np.einsum("nk,nki->ni", gbuffer.barycentric, corner_uv[gbuffer.triangle])
     height, width = texture.shape[:2]
     x, y = place[:, 0] * width - 0.5, place[:, 1] * height - 0.5
@@ -225,7 +225,7 @@ def texture_at(texture: np.ndarray, corner_uv: np.ndarray, gbuffer: GBuffer) -> 
 
 
 def _reduced(texture: np.ndarray, side: int) -> np.ndarray:
-    """Return a texture with about `side` pixels on each side, as the mean of its texels."""
+    """Reduce a texture to `side` x `side` pixels. Each is the mean of a square of texels."""
     factor = len(texture) // side
     used = texture[: side * factor, : side * factor]
     return used.reshape(side, factor, side, factor, 4).mean(axis=(1, 3))

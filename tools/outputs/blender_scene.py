@@ -1,4 +1,4 @@
-"""The scene of cases in Blender, and functions that write what a case has made there."""
+"""The scene in which cases run in Blender, and functions that write the data that a case has made."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-#: A stroke of the comb along the torus, in the space of the object.
+#: Points of a brush stroke along the torus, in object space.
 COMB_STROKE = [
     {
         "name": "",
@@ -26,7 +26,7 @@ COMB_STROKE = [
 
 
 def names_of_case(case: str) -> dict[str, Any]:
-    """Make the scene, and return the names that the code of a case may use."""
+    """Make the scene, and return the variables and functions that the code of a case may use, by name."""
     ring = build_scene(6 if not case.startswith("card-degree") else int(case[-1]))
     rosy = bpy.context.scene.rosy
 
@@ -113,7 +113,7 @@ def dump_images() -> None:
 
 
 def dump_attributes() -> None:
-    """Write the attributes of all meshes, point clouds and curves, a number a line."""
+    """Write the attributes of all meshes, point clouds and curves, with one number per line."""
     values_by_name = {}
     for kind in ("meshes", "pointclouds", "hair_curves"):
         for data in getattr(bpy.data, kind, ()):
@@ -130,7 +130,7 @@ def dump_attributes() -> None:
 
 
 def dump_pencil() -> None:
-    """Write the points of all Grease Pencil strokes, of version 2 or 3."""
+    """Write the points of all Grease Pencil strokes (version 2 or 3 of Grease Pencil)."""
     points_by_layer = {}
     for data in getattr(bpy.data, "grease_pencils_v3", bpy.data.grease_pencils):
         for layer in data.layers:
@@ -164,5 +164,5 @@ def dump_names() -> None:
 
 
 def _write_json(name: str, data: Any) -> None:
-    """Write JSON with sorted keys, a value a line."""
+    """Write a JSON file with sorted keys and one value per line."""
     Path(name).write_text(json.dumps(data, indent=0, sort_keys=True))

@@ -1,4 +1,4 @@
-"""The meshes, fields and images that cases name with `@`."""
+"""Write the input files of cases: meshes, fields and images. The code of a case names them after `@`."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from outputs.run_cases import TABLES
 
-#: Vertices (V, 3), and faces as tuples of vertex indices.
+#: A mesh: (V, 3) vertices, and faces as tuples of vertex indices.
 Mesh = tuple[np.ndarray, list[tuple[int, ...]]]
 
 
 def write_inputs(folder: Path, data: Path) -> None:
-    """Write all input files. Files in the subfolders of `data`, if it exists, are copied."""
+    """Write all input files. If the folder `data` exists, the files in its subfolders are copied too."""
     folder.mkdir()
     ring, bumpy = torus(), bumpy_sphere(18)
     texts = TABLES["inputs"] | {
@@ -36,7 +36,7 @@ def write_inputs(folder: Path, data: Path) -> None:
 
 
 def write_tone(path: Path) -> None:
-    """Write a picture of bands, with the proportions of the pictures of scenes."""
+    """Write a PNG file of dark and light bands, with the aspect ratio of the renders of the scene."""
     from rosy_addon.image_io.png import write_png
 
     v, u = np.mgrid[:48, :64] / 48
@@ -45,7 +45,10 @@ def write_tone(path: Path) -> None:
 
 
 def grid(columns: int, rows: int, wrap: bool, shape: Callable[..., Sequence[Any]]) -> Mesh:
-    """Return a lattice of quads over the unit square, mapped by ``shape(u, v)``."""
+    """Return a grid of quads over the unit square, with vertices mapped by ``shape(u, v)``.
+
+    If `wrap`, opposite sides of the square are connected.
+    """
     nu, nv = (columns, rows) if wrap else (columns + 1, rows + 1)
     u, v = np.divmod(np.arange(nu * nv), nv)
     faces = [
@@ -56,7 +59,7 @@ def grid(columns: int, rows: int, wrap: bool, shape: Callable[..., Sequence[Any]
 
 
 def torus() -> Mesh:
-    """Return a torus of triangles about the y axis."""
+    """Return a torus of triangles around the y axis."""
 
     def shape(u: np.ndarray, v: np.ndarray) -> Sequence[np.ndarray]:
         u, v = 2 * np.pi * u, 2 * np.pi * v
@@ -97,7 +100,7 @@ def wavy_sheet() -> Mesh:
 
 
 def two_parts() -> Mesh:
-    """Return a sphere and a torus beside it, not connected, of triangles."""
+    """Return a mesh of triangles with two parts that are not connected: a bumpy sphere and a torus."""
     (first, first_faces), (second, second_faces) = triangulated(bumpy_sphere(9)), torus()
     moved = second[:, [0, 2, 1]] * 0.6 + (1.3, -0.4, 0.2)
     faces = [tuple(len(first) + i for i in face) for face in second_faces]
@@ -116,12 +119,12 @@ def suzanne() -> Mesh:
 
 
 def triangulated(mesh: Mesh) -> Mesh:
-    """Return the mesh with its polygons cut into fans."""
+    """Return the mesh with its polygons divided into fans of triangles."""
     return mesh[0], [(f[0], f[k], f[k + 1]) for f in mesh[1] for k in range(1, len(f) - 1)]
 
 
 def field_texts(ring: Mesh, folder: Path) -> dict[str, str]:
-    """Return the files of fields on the torus; write the .npy files."""
+    """Return the contents of text files with fields on the torus, by name. Write fields as .npy files."""
     faces = np.array(ring[1])
     corners = ring[0][faces]
     normal = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
@@ -151,12 +154,12 @@ def field_texts(ring: Mesh, folder: Path) -> dict[str, str]:
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
-    """Return vectors of length 1."""
+    """Return the vectors scaled to length 1."""
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
 def tangents(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (F, 3) tangents at (F, 3) normals, and (F, 4, 3) on two lines that are not at right angles."""
+    """Return tangents (F, 3) at normals (F, 3), and two pairs of opposite ones that are not perpendicular."""
     first = np.cross(normal, (0.3, 1.0, 0.1))
     second = 0.6 * np.cross(normal, first) + 0.5 * first
     return first, np.stack([first, second, -first, -second], axis=1)
@@ -168,7 +171,7 @@ def rows_of(values: Any) -> list[str]:
 
 
 def obj_text(mesh: Mesh, uv: np.ndarray | None = None) -> str:
-    """Return an .obj file, with a UV coordinate at each vertex if there are any."""
+    """Return the text of an .obj file, with UV coordinates at the vertices if they are given."""
     corner = "{0}" if uv is None else "{0}/{0}"
     lines = [f"v {row}" for row in rows_of(mesh[0])]
     lines += [f"vt {row}" for row in rows_of([] if uv is None else uv)]
@@ -177,13 +180,13 @@ def obj_text(mesh: Mesh, uv: np.ndarray | None = None) -> str:
 
 
 def off_text(mesh: Mesh) -> str:
-    """Return an .off file."""
+    """Return the text of an .off file."""
     faces = [" ".join(map(str, (len(face), *face))) for face in mesh[1]]
     return "\n".join(["OFF", f"{len(mesh[0])} {len(faces)} 0", *rows_of(mesh[0]), *faces, ""])
 
 
 def ply_text(mesh: Mesh) -> str:
-    """Return a .ply file with a number `weight` and a color at each vertex."""
+    """Return the text of a .ply file with a scalar `weight` and a color at each vertex."""
     vertices, faces = mesh
     properties = [f"property double {name}" for name in ("x", "y", "z", "weight")]
     properties += [f"property uchar {name}" for name in ("red", "green", "blue")]
@@ -197,7 +200,7 @@ def ply_text(mesh: Mesh) -> str:
 
 
 def stl_text(mesh: Mesh) -> str:
-    """Return an .stl file of triangles."""
+    """Return the text of an .stl file of a mesh of triangles."""
     lines = ["solid mesh"]
     for face in mesh[1]:
         lines += ["facet normal 0 0 0", "outer loop"]

@@ -1,4 +1,6 @@
-"""Read the cases of `cases.toml`, and run some of them with one tree: the child of compare_outputs.py.
+"""Read the cases of `cases.toml`, and run some of them with the files of one revision (TREE).
+
+compare_outputs.py starts it as a child process::
 
     run_cases.py TREE OUTPUTS LANE NAME...
 
@@ -30,18 +32,19 @@ FOLDER = Path(__file__).resolve().parent
 TABLES = tomllib.loads((FOLDER / "cases.toml").read_text(encoding="utf-8"))
 PRESETS = sorted(path.stem for path in (FOLDER.parents[1] / "presets").glob("*.json"))
 
-#: What a case printed, and its exit status, which is written last.
+#: Files with what a case printed, and with its exit status, which is written last.
 LOG, STATUS = "log.txt", "status.txt"
 
-#: Pattern of an input file in the code of a case, and the folder of these files beside the outputs.
+#: Pattern of the name of an input file in the code of a case, and folder of these files, next to the outputs.
 INPUT, INPUTS = r"@([\w.-]+)", "inputs"
 
-#: `numpy` is plain Python, `bpy` Blender's Python module, `card` a full Blender with a graphics card.
+#: Environments in which cases run: `numpy` is plain Python, `bpy` is Blender's Python module, `card` is a
+#: full Blender with a graphics card.
 LANES = ("numpy", "bpy", "card")
 
 
 class Case(NamedTuple):
-    """Python statements whose outputs are compared, and the exit status that is expected of them."""
+    """A case: Python statements whose outputs are compared, and their expected exit status."""
 
     name: str
     lane: str
@@ -67,7 +70,7 @@ def read_cases() -> dict[str, Case]:
 
 
 def _expanded(pattern: str, code: str) -> list[tuple[str, str]]:
-    """Return a name and code for each combination of the words in braces."""
+    """Return a name and the code for each combination of the words that the pattern lists in braces."""
     choices = [
         PRESETS if words == "preset" else words.split(",")
         for words in re.findall(r"\{(.*?)\}", pattern)
@@ -84,7 +87,7 @@ def _expanded(pattern: str, code: str) -> list[tuple[str, str]]:
 
 
 def older_words(text: str) -> list[str]:
-    """Return a text, and as it was before the latest change of words, before the last two, and so on."""
+    """Return a text, then the text with the words of ever older revisions, which `cases.toml` lists."""
     texts = [text]
     for change in TABLES["older"]:
         for words, older in change.items():
@@ -94,7 +97,7 @@ def older_words(text: str) -> list[str]:
 
 
 def run_child(tree: Path, outputs: Path, lane: str, names: list[str]) -> None:
-    """Run cases with the package in `tree`."""
+    """Run cases with the package in `tree`. Each case runs in a folder of its own in `outputs`."""
     cases = read_cases()
     sys.path[:0] = [str(tree), str(FOLDER)]
     extension = None if lane == "numpy" else load_extension(tree)
@@ -125,7 +128,7 @@ def run_child(tree: Path, outputs: Path, lane: str, names: list[str]) -> None:
 
 
 def load_extension(tree: Path) -> Any:
-    """Load a tree's root as the package `rosy`, as Blender loads an extension, and register it."""
+    """Load the folder `tree` as the package `rosy`, as Blender loads an extension, and register it."""
     spec = importlib.util.spec_from_file_location(
         "rosy", tree / "__init__.py", submodule_search_locations=[str(tree)]
     )
@@ -138,7 +141,7 @@ def load_extension(tree: Path) -> Any:
 
 
 def run_case(case: Case, code: str, main: Callable[..., int]) -> int:
-    """Run code in the current folder, with the names of its lane; return the largest exit status."""
+    """Run code in the current folder, with the variables of its lane. Return the largest exit status."""
     statuses = [0]
 
     def cli(line: str) -> None:

@@ -1,8 +1,10 @@
-"""Check the built site: `python tools/site/check.py dist/site`.
+"""Check the built site of the documentation: `python tools/site/check.py dist/site`.
+
+Three things are checked:
 
 - Pictures have alternative text.
-- Nothing is loaded from elsewhere, and what is loaded exists.
-- The reference has all public names of the package.
+- Pages load only files of the site, and these files exist.
+- The reference describes all public names of the package.
 
 Links and anchors are checked by `mkdocs build --strict`.
 """
@@ -16,23 +18,24 @@ from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-#: Attributes whose address is loaded with a page. That of `link` is only for these relations.
+#: Attributes of tags with an address that is loaded with the page. The address of a `link` tag is loaded only
+#: for the relations below.
 LOADED = {"src", "srcset", "poster", "data", "background"}
 LOADED_RELATIONS = {"stylesheet", "icon", "preload", "modulepreload", "preconnect", "dns-prefetch"}
 
-#: Addresses in the scripts of the theme: names, and what it loads only for pages with a diagram, with
-#: a repository or in old browsers.
+#: Addresses in the scripts of the theme that are allowed: some are only names, others are loaded only for
+#: pages with a diagram or a repository, or in old browsers.
 DORMANT_IN_SCRIPTS = re.compile(
     r"http://www\.w3\.org/|https://(clipboardjs\.com|unpkg\.com/(mermaid|resize-observer-polyfill)"
     r"|api\.github\.com|bit\.ly/2s3ChXG|\$\{e\}/api/v4|github\.com/squidfunk|squidfunk\.github\.io)"
 )
 
-#: What makes the theme load them.
+#: Classes of tags for which the theme would load these addresses. No page may have them.
 DORMANT_CLASSES = {"mermaid", "md-source"}
 
 
 class Page(HTMLParser):
-    """The anchors of a page, the addresses that are loaded with it, and its problems."""
+    """A parser that collects the anchors of a page, the addresses that it loads, and its problems."""
 
     def __init__(self, html: str) -> None:
         super().__init__()
@@ -61,7 +64,7 @@ def problems(site: Path, names: list[str] | None = None) -> Iterator[str]:
     ----------
     site : Path
     names : list of str, optional
-        Names that api.html must describe.
+        Names that the page api.html must describe. By default they are not checked.
     """
     anchors: set[str] = set()
     for path in sorted(site.rglob("*.html")):
@@ -85,7 +88,7 @@ def problems(site: Path, names: list[str] | None = None) -> Iterator[str]:
 
 
 def _addresses(path: Path) -> list[str]:
-    """Return what a style sheet or a script loads from elsewhere."""
+    """Return the addresses outside the site that a style sheet or a script may load."""
     text = re.sub(r"/\*.*?\*/", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
     if path.suffix == ".css":
         return re.findall(r"(?:url\(|@import)\s*[\"']?((?:https?:)?//[^\"')\s]+)", text)
@@ -94,7 +97,7 @@ def _addresses(path: Path) -> list[str]:
 
 
 def main() -> int:
-    """Print what is wrong with the site; the exit status is 1 if anything is."""
+    """Print what is wrong with the site. The exit status is 1 if anything is wrong."""
     import rosyfields
 
     site = Path(sys.argv[1]).resolve()

@@ -1,7 +1,7 @@
-"""Hook of MkDocs: show the notebooks of docs/notebooks as pages, as they were run by the tests.
+"""Hook of MkDocs: show the notebooks of docs/notebooks as pages, with the outputs of the tests.
 
-A notebook is stored without outputs. A cell that shows a picture describes it in its metadata, for
-readers who do not see it: `"alt": "Bunny with a cross field"`.
+The notebooks in the repository have no outputs. If a cell shows a picture, its metadata have a description
+for readers who cannot see it: `"alt": "Bunny with a cross field"`.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from repository_pages import ROOT
 
 FOLDER = ROOT / "docs" / "notebooks"
 
-#: Where `make test-notebooks` keeps the notebooks with their outputs.
+#: Folder in which `make test-notebooks` stores the notebooks with their outputs.
 EXECUTED_FOLDER = ROOT / "dist" / "notebooks"
 
-#: Pictures in the Markdown of nbconvert, by the number of their cell.
+#: Pattern of a picture in the Markdown of nbconvert, with the number of its cell.
 _OUTPUT = re.compile(r"!\[\w+\]\((?P<file>output_(?P<cell>\d+)_\d+\.\w+)\)")
 
 
 class NotebookPage(File):
-    """A notebook as a page. Its name ends in .ipynb, as links in the repository do."""
+    """A page with a notebook. Its name ends in .ipynb, as that of the notebook in the repository."""
 
     def is_documentation_page(self) -> bool:
-        """Return True: the content is Markdown."""
+        """Return True, so that MkDocs renders the content as Markdown."""
         return True
 
 
@@ -40,7 +40,7 @@ def on_config(config):
 
 
 def on_files(files: Files, *, config) -> Files:
-    """Replace each notebook with its page, its pictures and the notebook for download."""
+    """Replace each notebook by its page, the pictures of the page, and the notebook for download."""
     for path in _notebooks():
         source = f"docs/notebooks/{path.name}"
         files.remove(files.src_uris[source])
@@ -53,13 +53,13 @@ def on_files(files: Files, *, config) -> Files:
             picture = _made(File, f"docs/{address}", address, config)
             picture.content_bytes = content
             files.append(picture)
-        # The notebook itself, for download; its name in the repository is that of the page.
+        # The notebook for download. The page has taken its name in the repository.
         files.append(File.generated(config, f"notebooks/{path.name}", abs_src_path=str(path)))
     return files
 
 
 def _made(kind: type[File], source: str, address: str, config) -> File:
-    """Return a file of the site that is none of the repository."""
+    """Return a file of the site whose content is generated. `address` is its path on the site."""
     return kind(source, None, config.site_dir, config.use_directory_urls, dest_uri=address)
 
 
@@ -68,7 +68,7 @@ def _notebooks() -> list[Path]:
 
 
 def _markdown(path: Path) -> tuple[str, dict[str, bytes]]:
-    """Return a notebook as Markdown, with the contents of its pictures by their names."""
+    """Return a notebook as Markdown, and the contents of its picture files by name."""
     executed = EXECUTED_FOLDER / path.name
     if not executed.exists():
         raise PluginError(f"{executed.relative_to(ROOT)} is missing: run `make test-notebooks`")

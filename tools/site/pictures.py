@@ -1,4 +1,4 @@
-"""Hook of MkDocs: pictures have their size, so that pages do not jump, and open at full size."""
+"""Hook of MkDocs: give pictures a link to the file, and their size, so that pages do not jump."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _IMAGE = re.compile(
 
 
 def on_page_content(html: str, *, page, config, files) -> str:
-    """Complete the pictures of a page. Pictures that are links already stay links."""
+    """Add sizes and links to the pictures of a page. Pictures that are links already keep these."""
 
     def completed(match: re.Match[str]) -> str:
         source = match["source"]
@@ -31,7 +31,7 @@ def on_page_content(html: str, *, page, config, files) -> str:
 
 
 def picture_size(content: bytes) -> tuple[int, int] | None:
-    """Return the width and the height of a .png, .gif or lossy .webp in pixels, None for other files."""
+    """Return the width and height in pixels of a .png, .gif or lossy .webp file; None for other files."""
     if content.startswith(b"\x89PNG"):
         return struct.unpack(">II", content[16:24])
     if content.startswith(b"GIF8"):

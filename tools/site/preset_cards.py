@@ -1,4 +1,4 @@
-"""Hook of MkDocs: a picture of each preset to click on the page of the presets, and its settings."""
+"""Hook of MkDocs: add clickable pictures of the presets, and their settings, to the page of the presets."""
 
 from __future__ import annotations
 
@@ -23,12 +23,13 @@ class Preset(NamedTuple):
     Attributes
     ----------
     key : str
-        Name of its files.
+        Name of its files, without the suffix.
     name, description : str
+        Texts for users.
     look : dict
-        The settings that differ from the default.
+        The settings that differ from their defaults.
     anchor : str
-        Anchor of its section.
+        Anchor of its section in the page.
     """
 
     key: str
@@ -39,7 +40,7 @@ class Preset(NamedTuple):
 
 
 def on_files(files: Files, *, config) -> Files:
-    """Add the pictures of the presets."""
+    """Add the pictures of the presets to the files of the site."""
     for preset in _presets():
         source = f"{FOLDER}/{preset.key}.png"
         files.append(repository_file(source, f"images/presets/{preset.key}.png", config))
@@ -87,7 +88,7 @@ def _cards(presets: list[Preset]) -> str:
 
 
 def _settings(preset: Preset) -> str:
-    """Return the settings that differ from the default, as a block that opens with a click."""
+    """Return Markdown with the settings that differ from their defaults, in a block that opens on a click."""
     if not preset.look:
         return f"All settings have their defaults.\n{{ #{preset.anchor}-settings }}"
     rows = [f"| `{name}` | `{json.dumps(value)}` |" for name, value in preset.look.items()]

@@ -1,7 +1,7 @@
 """Hook of MkDocs: name every page by its path in the repository.
 
-The pages are written for the repository: `docs/first-bake.md` links to `../README.md`, and the README
-to `docs/first-bake.md`. With these names MkDocs follows such links as they are, and checks them.
+The pages are written for the repository: `docs/first-bake.md` has a link to `../README.md`, and the README
+one to `docs/first-bake.md`. With these names, MkDocs can follow and check such links without changes.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).resolve().parents[2]
 
-#: What the pages link to outside of docs/, with its address on the site.
+#: Files outside of docs/ to which pages have links, with their addresses on the site.
 OUTSIDE_DOCS = {
     "README.md": "index.html",
     "CHANGELOG.md": "changes.html",
@@ -32,7 +32,7 @@ def on_files(files: Files, *, config) -> Files:
     named = [
         _named(file, config) if file.src_dir == config.docs_dir else file
         for file in files
-        # The theme's search in other languages.
+        # The theme's search in other languages is left out.
         if not file.src_uri.startswith("assets/javascripts/lunr/")
     ]
     for source, address in OUTSIDE_DOCS.items():
@@ -41,14 +41,14 @@ def on_files(files: Files, *, config) -> Files:
 
 
 def on_page_markdown(markdown: str, *, page, config, files) -> str:
-    """Leave out the list of pages beside the home page, which stands alone."""
+    """Hide the list of pages at the side of the home page."""
     if page.is_homepage:
         page.meta["hide"] = ["navigation"]
     return markdown
 
 
 def on_page_content(html: str, *, page, config, files) -> str:
-    """Show a bar in the code of a table, which is escaped for the tables of code hosts, as a bar."""
+    """Remove the backslash before a bar (``|``) in code in a table. Code hosts need it, MkDocs shows it."""
     return re.sub(r"<td[^>]*>.*?</td>", lambda cell: cell[0].replace(r"\|", "|"), html, flags=re.S)
 
 

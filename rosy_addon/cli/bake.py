@@ -36,13 +36,8 @@ def add_bake_command(subparsers: Any, has_cluster: bool) -> None:
     )
     cameras.add_argument("--all-cameras", action="store_true", help="draw from all cameras")
     parser.add_look_options()
-    parser.add_flow_option()
-    parser.add_argument(
-        "--size", type=parse_size, metavar="WxH", help="size in pixels; by default the scene's"
-    )
-    parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="write the pictures to this folder as .png files"
-    )
+    parser.add_value("--size", "WxH", "size in pixels; by default the scene's", parse_size)
+    parser.add_value("--out", "DIR", "write the pictures to this folder as .png files", Path)
     parser.add_argument(
         "--device",
         choices=list(RENDER_DEVICES),
@@ -50,11 +45,11 @@ def add_bake_command(subparsers: Any, has_cluster: bool) -> None:
         "one (auto); by default as set in the scene",
     )
     parser.add_workers_option()
-    parser.add_argument("--save", action="store_true", help="save the Blender file")
-    parser.add_argument(
+    parser.add_switch("--save", "save the Blender file")
+    parser.add_value(
         "--frames",
-        metavar="A-B[:STEP]",
-        help="draw a picture of each frame from the camera that renders it; pictures that exist and "
+        "A-B[:STEP]",
+        "draw a picture of each frame from the camera that renders it; pictures that exist and "
         "are up to date are kept",
     )
     workers = parser.add_mutually_exclusive_group()

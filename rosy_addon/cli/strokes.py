@@ -31,7 +31,8 @@ from .streams import print_line
 MESH_ONLY_DEFAULTS = {
     **dict.fromkeys(("field", "degree", "generate", "strokes", "guides", "field_mesh", "up")),
     **dict.fromkeys(("array", "step", "singularities", *settings_of(GeneratorSettings))),
-    **dict.fromkeys(("uv", "firmness", "undefined", "orthographic"), False),
+    **dict.fromkeys(("uv", "firmness", "undefined"), False),
+    "orthographic": None,
     "view": DEFAULT_VIEW,
 }
 #: The same of the options that are only for pictures.
@@ -52,25 +53,18 @@ def add_strokes_command(subparsers: Any) -> None:
     parser = add_subcommand(subparsers, "strokes", run_strokes)
     parser.description += " For a .blend file, the defaults are the settings of the scene."
     add_mesh_options(parser, allow_scene=True)
-    parser.add_argument(
-        "-o",
-        "--output",
-        required=True,
-        type=Path,
-        metavar="OUT",
-        help="file of strokes: a picture as .svg, or polylines in space as .ply, .obj or .csv",
+    parser.add_output_option(
+        "OUT", "file of strokes: a picture as .svg, or polylines in space as .ply, .obj or .csv"
     )
     parser.add_view_options()
     parser.add_object_option("objects of a .blend file; by default all with a field")
-    parser.add_argument(
-        "--camera", metavar="NAME", help="camera of a .blend file; by default the scene's"
-    )
-    parser.add_argument(
+    parser.add_value("--camera", "NAME", "camera of a .blend file; by default the scene's")
+    parser.add_value(
         "--frames",
-        metavar="A-B[:STEP]",
-        help="frames of a .blend file, each in its own file; # in OUT stands for the frame number",
+        "A-B[:STEP]",
+        "frames of a .blend file, each in its own file; # in OUT stands for the frame number",
     )
-    add_style_options(parser)
+    parser.add_set_option(StrokeStyle, "one setting of the strokes")
     add_pen_options(parser)
 
 
@@ -79,6 +73,8 @@ def run_strokes(options: Options) -> None:
     options.check_output()
     if check_drawing_suffix(options.output) != ".svg":
         _reject_options(options, PAGE_ONLY_DEFAULTS, options.output, ".svg files")
+    # Mistakes are reported before files are read.
+    style = StrokeStyle().with_settings(options.requested_settings(StrokeStyle))
     if options.mesh is None and "bpy" not in sys.modules:
         raise RosyError("no input: give a mesh file, or SCENE.blend")
     if options.mesh is None or options.mesh.suffix.lower() == ".blend":
@@ -87,12 +83,11 @@ def run_strokes(options: Options) -> None:
         _draw_scene_strokes(options)
         return
     _reject_options(options, SCENE_ONLY_DEFAULTS, options.mesh, ".blend files")
-    # Mistakes are reported before the mesh is read.
-    style, pen = stroke_style_of(options, StrokeStyle()), pen_of(options, Pen())
+    pen = pen_of(options, Pen())
     check_light(style.light, str(options.mesh))
-    size = check_size(*(options.size or DEFAULT_SIZE))
+    size, is_ortho = check_size(*(options.size or DEFAULT_SIZE)), bool(options.orthographic)
     surface, field = load_mesh_and_field(options)
-    drawing = draw_strokes(surface, field, style, pen, options.view, size, options.orthographic)
+    drawing = draw_strokes(surface, field, style, pen, options.view, size, is_ortho)
     drawing.save(options.output)
 
 
@@ -143,7 +138,7 @@ def _draw_frame_strokes(options: Options, scene: Any, path: Path) -> None:
         path=Path(os.path.realpath(path)),
         objects=objects,
         camera=camera,
-        style=stroke_style_of(options, read_stroke_style(settings)),
+        style=read_stroke_style(settings).with_settings(options.requested_settings(StrokeStyle)),
         pen=pen_of(options, read_pen(settings)),
         size=options.size,
     )
@@ -172,52 +167,21 @@ def _reject_options(
             raise RosyError(f"{file}: {option} applies only to {file_kind}")
 
 
-def add_style_options(parser: CommandParser) -> None:
-    """Add an option for each setting of `StrokeStyle` except the unit. Those not given are not set.
-
-    The unit follows from the option: `--spacing` is in pixels, `--distance` in units of the mesh.
-    """
-    for name, setting in settings_of(StrokeStyle).items():
-        if name != "unit":
-            parser.add_setting_option(setting)
-
-
-def stroke_style_of(options: Options, base: StrokeStyle) -> StrokeStyle:
-    """Return the style with the fields that the options override."""
-    values = vars(options)
-    overrides = {name: values[name] for name in settings_of(StrokeStyle) if name in values}
-    if "spacing" in overrides or "distance" in overrides:
-        overrides["unit"] = "world" if "distance" in overrides else "pixels"
-    return replace(base, **overrides)
-
-
 def add_pen_options(parser: CommandParser) -> None:
     """Add options for the fields of `Pen`. Those not given are not set."""
-    add = partial(parser.add_argument, default=argparse.SUPPRESS)
-    add(
-        "--width",
-        type=float_between(0.01, 1e3),
-        metavar="PX",
-        help=f"width of the strokes ({Pen.width:g})",
+    add = partial(parser.add_value, default=argparse.SUPPRESS)
+    switch = partial(
+        parser.add_argument, action=argparse.BooleanOptionalAction, default=argparse.SUPPRESS
     )
-    add(
+    add("--width", "PX", f"width of the strokes ({Pen.width:g})", float_between(0.01, 1e3))
+    switch(
         "--plotter",
-        action=argparse.BooleanOptionalAction,
         help="lines of constant width, without paper, in an order that keeps the pen travel short",
     )
-    add(
-        "--mm",
-        dest="millimeters",
-        type=float_between(1.0, 1e5),
-        metavar="WIDTH",
-        help="width of the page in millimeters",
-    )
-    add(
-        "--colors",
-        metavar="C,C,...",
-        help="SVG colors of the layers (#000000)",
-    )
-    add("--paper", action=argparse.BooleanOptionalAction, help="white paper behind the strokes")
+    page_width = float_between(1.0, 1e5)
+    add("--mm", "WIDTH", "width of the page in millimeters", page_width, dest="millimeters")
+    add("--colors", "C,C,...", "SVG colors of the layers (#000000)")
+    switch("--paper", help="white paper behind the strokes")
 
 
 def pen_of(options: Options, base: Pen) -> Pen:

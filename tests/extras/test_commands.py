@@ -66,7 +66,7 @@ def test_other_commands(rosy, files):
     field = ("field", files / "b.vtp", "--array", "rotation", "-o", files / "out.rosy")
     assert rosy(*field) == (0, "", "")
     strokes = ("strokes", files / "a.vtp", "-o", files / "a.svg", "--size", "60x60")
-    strokes += ("--spacing", 12)
+    strokes += ("--set", "spacing=12")
     assert rosy(*strokes) == (0, "", "")
     assert "<path" in (files / "a.svg").read_text()
 

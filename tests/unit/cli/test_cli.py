@@ -223,7 +223,7 @@ REFUSED = {
         ["turntable", "{mesh}", "-o", "{out}.gif", "--still"],
         "nothing moves",
     ),
-    "flow": (["turntable", "{mesh}", "-o", "{out}.gif", "--flow", "fast"], "expected a number"),
+    "flow": (["turntable", "{mesh}", "-o", "{out}.gif", "--set", "flow=fast"], "expected a number"),
     "value": (
         ["render", "{mesh}", "-o", "{out}", "--set", "length=long"],
         "--set length=long: expected a whole",

@@ -10,6 +10,7 @@ from ..rosy_addon.projection.camera import Camera
 from ..rosy_addon.scene.cameras import CameraSource, camera_of_view, render_camera, scene_cameras
 from ..rosy_addon.ui.preferences import worker_count
 from ..rosy_addon.ui.properties import CAMERA_ITEMS
+from ..rosy_addon.ui.property_makers import choice
 from ..rosy_addon.worker.job import Steps
 from .base import IDLE, VISIBLE_FIELD
 from .modal_job import ModalJobMixin
@@ -23,9 +24,7 @@ class ROSY_OT_bake(ModalJobMixin, bpy.types.Operator):
     bl_options = {"UNDO"}
     conditions = (IDLE, VISIBLE_FIELD)
 
-    camera: bpy.props.EnumProperty(
-        name="Camera", description="Camera to draw from", items=CAMERA_ITEMS
-    )
+    camera: choice("Camera", "Camera to draw from", CAMERA_ITEMS)
 
     def begin(self, context: bpy.types.Context) -> Steps[list[BakeResult]]:
         return bake.begin(

@@ -12,6 +12,7 @@ from ..rosy_addon.scene.cameras import scene_cameras
 from ..rosy_addon.scene.files import output_folder
 from ..rosy_addon.scene.pictures import read_output_settings
 from ..rosy_addon.ui.preferences import worker_count
+from ..rosy_addon.ui.property_makers import integer, text, toggle
 from ..rosy_addon.worker.job import Steps
 from .base import IDLE, VISIBLE_FIELD
 from .modal_job import DialogJobMixin
@@ -26,18 +27,18 @@ class ROSY_OT_bake_animation(DialogJobMixin, bpy.types.Operator):
     conditions = (IDLE, VISIBLE_FIELD)
     cancel_note = "completed frames were kept"
 
-    first: bpy.props.IntProperty(name="First", description="First frame", default=1)
-    last: bpy.props.IntProperty(name="Last", description="Last frame", default=250)
-    step: bpy.props.IntProperty(name="Step", description="Step between frames", default=1, min=1)
-    all_cameras: bpy.props.BoolProperty(
-        name="All Cameras",
-        description="A sequence of pictures from each camera, instead of one from the camera that "
+    first: integer("First", "First frame", default=1)
+    last: integer("Last", "Last frame", default=250)
+    step: integer("Step", "Step between frames", default=1, min=1)
+    all_cameras: toggle(
+        "All Cameras",
+        "A sequence of pictures from each camera, instead of one from the camera that "
         "renders each frame",
     )
 
-    directory: bpy.props.StringProperty(
-        name="Folder",
-        description="Folder that was chosen in the file browser",
+    directory: text(
+        "Folder",
+        "Folder that was chosen in the file browser",
         subtype="DIR_PATH",
         options={"HIDDEN", "SKIP_SAVE"},
     )

@@ -7,6 +7,7 @@ import bpy
 from ..rosy_addon.projection.ambient_occlusion import DIRECTION_COUNT
 from ..rosy_addon.scene.computed_attributes import OCCLUSION_ATTRIBUTE, store_occlusion
 from ..rosy_addon.scene.visible_objects import field_objects
+from ..rosy_addon.ui.property_makers import integer
 from ..rosy_addon.worker.job import Steps
 from .base import IDLE, VISIBLE_FIELD
 from .modal_job import ModalJobMixin
@@ -20,9 +21,9 @@ class ROSY_OT_occlusion(ModalJobMixin, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
     conditions = (IDLE, VISIBLE_FIELD)
 
-    directions: bpy.props.IntProperty(
-        name="Directions",
-        description="Number of sampled directions of light. More are smoother and take longer",
+    directions: integer(
+        "Directions",
+        "Number of sampled directions of light. More are smoother and take longer",
         default=DIRECTION_COUNT,
         min=1,
         soft_min=32,

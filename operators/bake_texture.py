@@ -17,6 +17,7 @@ from ..rosy_addon.core.errors import RosyError
 from ..rosy_addon.jobs.bake_texture import TextureResult, bake_texture
 from ..rosy_addon.scene.datablocks import is_editable
 from ..rosy_addon.scene.field_attributes import has_field
+from ..rosy_addon.ui.property_makers import toggle
 from ..rosy_addon.worker.job import Step, Steps
 from .base import ACTIVE_FIELD, IDLE, selected_mesh_objects
 from .modal_job import DialogJobMixin
@@ -36,10 +37,8 @@ class ROSY_OT_bake_texture(DialogJobMixin, bpy.types.Operator):
     bl_options = {"UNDO"}
     conditions = (IDLE, ACTIVE_FIELD)
 
-    unwrap: bpy.props.BoolProperty(
-        name="Unwrap",
-        description="Unwrap meshes that have no UV map, with Smart UV Project",
-        options={"SKIP_SAVE"},
+    unwrap: toggle(
+        "Unwrap", "Unwrap meshes that have no UV map, with Smart UV Project", options={"SKIP_SAVE"}
     )
 
     def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:

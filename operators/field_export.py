@@ -15,6 +15,7 @@ from ..rosy_addon.scene.field_attributes import field_degree
 from ..rosy_addon.scene.guides import read_combed_guides
 from ..rosy_addon.scene.mesh_fields import read_mesh_field
 from ..rosy_addon.scene.meshes import mesh_label, mesh_surface
+from ..rosy_addon.ui.property_makers import choice, file_filter
 from ..rosy_addon.worker.job import Call, Steps
 from .base import selected_mesh_objects, sync_suffix
 from .modal_job import ActiveMeshMixin, FileJobMixin
@@ -42,19 +43,16 @@ class ROSY_OT_field_export(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Ex
     cancel_note = "no file was written"
 
     filename_ext = ".rosy"
-    filter_glob: bpy.props.StringProperty(
-        default=";".join(f"*{suffix}" for suffix in FIELD_FORMATS), options={"HIDDEN"}
+    filter_glob: file_filter(*FIELD_FORMATS)
+    file_format: choice(
+        "Format",
+        "Format of the file",
+        [(suffix, name, text) for suffix, (name, text) in FIELD_FORMATS.items()],
     )
-    file_format: bpy.props.EnumProperty(
-        name="Format",
-        description="Format of the file",
-        items=[(suffix, name, text) for suffix, (name, text) in FIELD_FORMATS.items()],
-        default=".rosy",
-    )
-    content: bpy.props.EnumProperty(
-        name="Content",
-        description="What is written",
-        items=[
+    content: choice(
+        "Content",
+        "What is written",
+        [
             ("FIELD", "Field", "The field"),
             (
                 "GUIDES",

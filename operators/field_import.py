@@ -13,6 +13,7 @@ from ..rosy_addon.field.directional_field import field_directions
 from ..rosy_addon.field.field_io import READ_SUFFIXES, LoadedField, load_field
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
 from ..rosy_addon.scene.meshes import mesh_surface
+from ..rosy_addon.ui.property_makers import choice, file_filter, integer, text
 from ..rosy_addon.worker.job import Call, Steps
 from .base import EDITABLE, selected_mesh_objects
 from .modal_job import ActiveMeshMixin, FileJobMixin
@@ -27,35 +28,31 @@ class ROSY_OT_field_import(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Im
     conditions = EDITABLE
 
     filename_ext = ".rosy"
-    filter_glob: bpy.props.StringProperty(
-        default=";".join(f"*{suffix}" for suffix in READ_SUFFIXES), options={"HIDDEN"}
-    )
-    degree: bpy.props.IntProperty(
-        name="Degree",
-        description="Degree that the file must have, or degree of files that do not state it. 0: any, or 4",
+    filter_glob: file_filter(*READ_SUFFIXES)
+    degree: integer(
+        "Degree",
+        "Degree that the file must have, or degree of files that do not state it. 0: any, or 4",
         min=0,
         max=MAX_DEGREE,
-        default=0,
     )
-    mesh_file: bpy.props.StringProperty(
-        name="Mesh File",
-        description="Mesh file that the field was made for, if its faces differ from those of this "
+    mesh_file: text(
+        "Mesh File",
+        "Mesh file that the field was made for, if its faces differ from those of this "
         "mesh. The field is transferred by position. If the numbers of faces differ, a mesh file "
         "of the same name in the same folder is used by default",
         subtype="FILE_PATH",
     )
-    undefined: bpy.props.EnumProperty(
-        name="Bad Vectors",
-        description="Treatment of vectors that are NaN or infinite",
-        items=[
+    undefined: choice(
+        "Bad Vectors",
+        "Treatment of vectors that are NaN or infinite",
+        [
             ("error", "Refuse", "Report the first one, and import nothing"),
             ("zero", "Skip", "Treat the field as undefined on those faces"),
         ],
-        default="error",
     )
-    attribute: bpy.props.StringProperty(
-        name="Attribute",
-        description="Name of the mesh attribute that stores the field. An existing field is replaced",
+    attribute: text(
+        "Attribute",
+        "Name of the mesh attribute that stores the field. An existing field is replaced",
         default="rosy",
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import bpy
 
@@ -12,19 +13,21 @@ from ..rosy_addon.scene.mesh_fields import read_mesh_field
 from ..rosy_addon.scene.meshes import mesh_surface
 from ..rosy_addon.ui import singularity_handles
 from ..rosy_addon.ui.operator_settings import draw_settings
+from ..rosy_addon.ui.property_makers import fraction, integer, toggle
 from ..rosy_addon.worker.job import Call, Steps
-from .base import EDITABLE_FIELD, FRACTION, IN_3D_VIEW, RosyOperator, selected_mesh_objects
+from .base import EDITABLE_FIELD, IN_3D_VIEW, RosyOperator, selected_mesh_objects
 from .modal_job import ActiveMeshMixin, ModalJobMixin
 
-#: The reach of both operators; that of the tool is passed on by the operator that it starts.
-REACH = {
-    "name": "Reach",
-    "description": "Distance over which directions change, as a fraction of the size of the mesh. At least as "
-    "far as the singularity moves",
-    "soft_max": 0.5,
-    "default": 0.1,
-    **FRACTION,
-}
+
+def _reach() -> Any:
+    """Return the property of the reach; the tool's operator passes its reach on to the one that it starts."""
+    return fraction(
+        "Reach",
+        "Distance over which directions change, as a fraction of the size of the mesh. At least as "
+        "far as the singularity moves",
+        soft_max=0.5,
+        default=0.1,
+    )
 
 
 class ROSY_OT_field_singularities(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
@@ -34,27 +37,26 @@ class ROSY_OT_field_singularities(ActiveMeshMixin, ModalJobMixin, bpy.types.Oper
     bl_label = "Move Singularity"
     bl_options = {"REGISTER", "UNDO"}
 
-    source: bpy.props.IntProperty(
-        name="From",
-        description="Vertex whose index is moved. Without a singularity, it gets the opposite index. "
+    source: integer(
+        "From",
+        "Vertex whose index is moved. Without a singularity, it gets the opposite index. "
         "-1: beyond the border",
         min=OUTSIDE,
         default=OUTSIDE,
     )
-    target: bpy.props.IntProperty(
-        name="To",
-        description="Vertex to which the index is added. -1: beyond the border",
+    target: integer(
+        "To",
+        "Vertex to which the index is added. -1: beyond the border",
         min=OUTSIDE,
         default=OUTSIDE,
     )
-    index: bpy.props.IntProperty(
-        name="Index",
-        description="What is moved, in units of 1/N. 0: the whole index",
+    index: integer(
+        "Index",
+        "What is moved, in units of 1/N. 0: the whole index",
         soft_min=-4,
         soft_max=4,
-        default=0,
     )
-    reach: bpy.props.FloatProperty(**REACH)
+    reach: _reach()
 
     def begin(self, context: bpy.types.Context) -> Steps[None]:
         """Change the field of the active mesh."""
@@ -78,12 +80,12 @@ class ROSY_OT_drag_singularity(RosyOperator, bpy.types.Operator):
     bl_options = {"INTERNAL"}
     conditions = (IN_3D_VIEW, *EDITABLE_FIELD)
 
-    make_pair: bpy.props.BoolProperty(
-        name="Make Pair",
-        description="Start at any vertex, and leave the opposite index there",
+    make_pair: toggle(
+        "Make Pair",
+        "Start at any vertex, and leave the opposite index there",
         options={"SKIP_SAVE"},
     )
-    reach: bpy.props.FloatProperty(**REACH)
+    reach: _reach()
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         obj = selected_mesh_objects(context)[0]

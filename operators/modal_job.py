@@ -17,6 +17,7 @@ from ..rosy_addon.core.errors import REPORTED_ERRORS, as_sentence
 from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.ui import job_status
 from ..rosy_addon.ui.preferences import uses_helper
+from ..rosy_addon.ui.property_makers import toggle
 from ..rosy_addon.viewport.view3d import redraw_sidebars
 from ..rosy_addon.worker.helper import HELPER, HelperLostError
 from ..rosy_addon.worker.job import Step, Steps, run
@@ -347,10 +348,8 @@ class DialogJobMixin(ModalJobMixin):
 class FileJobMixin(DialogJobMixin):
     """Mixin of operators that ask for a file, unless `skip_browser` is set."""
 
-    skip_browser: bpy.props.BoolProperty(
-        name="Skip Browser",
-        description="Start without a file browser",
-        options={"HIDDEN", "SKIP_SAVE"},
+    skip_browser: toggle(
+        "Skip Browser", "Start without a file browser", options={"HIDDEN", "SKIP_SAVE"}
     )
 
     def take_answer(self, context: bpy.types.Context) -> None:

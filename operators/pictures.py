@@ -8,6 +8,7 @@ from ..rosy_addon.core.errors import counted
 from ..rosy_addon.scene.bake_records import has_pictures, remove_bakes
 from ..rosy_addon.scene.pictures import show_bake
 from ..rosy_addon.ui.main_panel import SHADING_WITHOUT_MATERIALS
+from ..rosy_addon.ui.property_makers import text
 from ..rosy_addon.viewport import session
 from .base import IDLE, IN_3D_VIEW, Condition, RosyOperator
 
@@ -20,7 +21,7 @@ class ROSY_OT_show(RosyOperator, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
     conditions = (IDLE,)
 
-    camera: bpy.props.StringProperty(name="Camera", description="Name of the camera")
+    camera: text("Camera", "Name of the camera")
 
     def act(self, context: bpy.types.Context) -> None:
         show_bake(context.scene, self.camera)

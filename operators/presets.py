@@ -24,28 +24,31 @@ from ..rosy_addon.preset_files.store import (
 from ..rosy_addon.scene.files import user_presets_folder
 from ..rosy_addon.scene.look_properties import read_look
 from ..rosy_addon.ui import preset_library
+from ..rosy_addon.ui.property_makers import file_filter, text, toggle
 from ..rosy_addon.viewport.view3d import redraw
 from .base import Condition, RosyOperator
-
-#: Arguments of properties that several operators have.
-PRESET_ARGUMENTS = {
-    "name": "Preset",
-    "description": "Name of the preset. Empty: the active preset of the scene",
-}
-DESCRIPTION_ARGUMENTS = {
-    "name": "Description",
-    "description": "What the look is like, or what it is for",
-    "maxlen": MAX_DESCRIPTION_LENGTH,
-}
-REPLACE_ARGUMENTS = {
-    "name": "Replace Existing",
-    "description": "Replace your preset of the same name",
-    "options": {"SKIP_SAVE"},
-}
 
 HAS_USER_PRESETS = Condition(
     lambda _: preset_library.user_preset_keys(), "You have no presets yet: save one first"
 )
+
+
+def _preset_property(search: Any) -> Any:
+    """Return the property of the preset that an operator acts on."""
+    return text(
+        "Preset", "Name of the preset. Empty: the active preset of the scene", search=search
+    )
+
+
+def _sentence_property() -> Any:
+    """Return the property of the description of a preset."""
+    sentence = "What the look is like, or what it is for"
+    return text("Description", sentence, maxlen=MAX_DESCRIPTION_LENGTH)
+
+
+def _replace_property() -> Any:
+    """Return the switch that lets an operator replace a preset of the user."""
+    return toggle("Replace Existing", "Replace your preset of the same name", options={"SKIP_SAVE"})
 
 
 def _draw_name_and_description(operator: Any) -> None:
@@ -67,9 +70,9 @@ class ROSY_OT_preset_apply(RosyOperator, bpy.types.Operator):
     bl_label = "Apply Preset"
     bl_options = {"REGISTER", "UNDO"}
 
-    preset: bpy.props.StringProperty(
-        name="Preset",
-        description="Name of a preset, or path of a .json file",
+    preset: text(
+        "Preset",
+        "Name of a preset, or path of a .json file",
         search=preset_library.search_presets,
         search_options={"SUGGESTION"},
     )
@@ -85,11 +88,9 @@ class ROSY_OT_preset_save(RosyOperator, bpy.types.Operator):
     bl_label = "Save Preset"
     bl_options = {"REGISTER"}
 
-    name: bpy.props.StringProperty(
-        name="Name", description="Name of the preset", maxlen=MAX_NAME_LENGTH
-    )
-    sentence: bpy.props.StringProperty(**DESCRIPTION_ARGUMENTS)
-    replace: bpy.props.BoolProperty(**REPLACE_ARGUMENTS)
+    name: text("Name", "Name of the preset", maxlen=MAX_NAME_LENGTH)
+    sentence: _sentence_property()
+    replace: _replace_property()
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         entry = preset_library.active_entry(context.scene.rosy)
@@ -127,11 +128,9 @@ class ROSY_OT_preset_rename(RosyOperator, bpy.types.Operator):
     bl_options = {"REGISTER"}
     conditions = (HAS_USER_PRESETS,)
 
-    preset: bpy.props.StringProperty(search=preset_library.search_user_presets, **PRESET_ARGUMENTS)
-    name: bpy.props.StringProperty(
-        name="Name", description="New name of the preset", maxlen=MAX_NAME_LENGTH
-    )
-    sentence: bpy.props.StringProperty(**DESCRIPTION_ARGUMENTS)
+    preset: _preset_property(preset_library.search_user_presets)
+    name: text("Name", "New name of the preset", maxlen=MAX_NAME_LENGTH)
+    sentence: _sentence_property()
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         entry = preset_library.entries().get(_target_preset(self, context))
@@ -159,7 +158,7 @@ class ROSY_OT_preset_remove(RosyOperator, bpy.types.Operator):
     bl_options = {"REGISTER"}
     conditions = (HAS_USER_PRESETS,)
 
-    preset: bpy.props.StringProperty(search=preset_library.search_user_presets, **PRESET_ARGUMENTS)
+    preset: _preset_property(preset_library.search_user_presets)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         name = preset_library.preset_name(_target_preset(self, context))
@@ -188,8 +187,8 @@ class ROSY_OT_preset_import(RosyOperator, bpy.types.Operator, ImportHelper):
     bl_options = {"REGISTER"}
 
     filename_ext = ".json"
-    filter_glob: bpy.props.StringProperty(default="*.json", options={"HIDDEN"})
-    replace: bpy.props.BoolProperty(**REPLACE_ARGUMENTS)
+    filter_glob: file_filter(".json")
+    replace: _replace_property()
 
     def act(self, context: bpy.types.Context) -> None:
         preset = read_preset(bpy.path.abspath(self.filepath))
@@ -206,8 +205,8 @@ class ROSY_OT_preset_export(RosyOperator, bpy.types.Operator, ExportHelper):
     bl_options = {"REGISTER"}
 
     filename_ext = ".json"
-    filter_glob: bpy.props.StringProperty(default="*.json", options={"HIDDEN"})
-    preset: bpy.props.StringProperty(search=preset_library.search_presets, **PRESET_ARGUMENTS)
+    filter_glob: file_filter(".json")
+    preset: _preset_property(preset_library.search_presets)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         self.filepath = f"{Path(_target_preset(self, context)).stem}.json"

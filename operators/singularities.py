@@ -13,6 +13,7 @@ from ..rosy_addon.scene.singularity_points import (
     remove_singularity_points,
 )
 from ..rosy_addon.ui import overlay
+from ..rosy_addon.ui.property_makers import choice
 from .base import ACTIVE_FIELD, IDLE, RosyOperator, selected_mesh_objects
 
 
@@ -24,10 +25,10 @@ class ROSY_OT_singularities(RosyOperator, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
     conditions = (IDLE, ACTIVE_FIELD)
 
-    show: bpy.props.EnumProperty(
-        name="Show",
-        description="How the singularities are shown",
-        items=[
+    show: choice(
+        "Show",
+        "How the singularities are shown",
+        [
             ("OVERLAY", "Overlay", "Dots and indices in the 3D view"),
             ("POINTS", "Points", "A point object with an attribute 'index', in units of 1/N"),
             ("BOTH", "Both", "Overlay and points"),

@@ -33,7 +33,7 @@ class ROSY_OT_bake(ModalJobMixin, bpy.types.Operator):
 
     def finish(self, context: bpy.types.Context, result: list[BakeResult]) -> None:
         names = ", ".join(f"'{picture.camera}'" for picture in result)
-        self.report({"INFO"}, f"Baked from {names}")
+        self.report_done(f"Baked from {names}")
         self.report_warnings(*(text for picture in result for text in picture.warnings))
 
     def _cameras(self, context: bpy.types.Context) -> list[CameraSource]:

@@ -38,9 +38,8 @@ class ROSY_OT_occlusion(ModalJobMixin, bpy.types.Operator):
     def finish(self, context: bpy.types.Context, result: None) -> None:
         settings = context.scene.rosy
         settings.tone_attribute, settings.look.tone = OCCLUSION_ATTRIBUTE, "attribute"
-        self.report(
-            {"INFO"},
-            f"Stored ambient occlusion as attribute '{OCCLUSION_ATTRIBUTE}', the source of the tone",
+        self.report_done(
+            f"Stored ambient occlusion as attribute '{OCCLUSION_ATTRIBUTE}', the source of the tone"
         )
 
 

@@ -66,7 +66,7 @@ class ROSY_OT_bake_texture(DialogJobMixin, bpy.types.Operator):
 
     def finish(self, context: bpy.types.Context, result: list[TextureResult]) -> None:
         names = ", ".join(f"'{texture.object.name}'" for texture in result)
-        self.report({"INFO"}, f"Baked the texture of {names}")
+        self.report_done(f"Baked the texture of {names}")
         self.report_warnings(*(text for texture in result for text in texture.warnings))
 
     def _without_uv_map(self, context: bpy.types.Context) -> list[bpy.types.Object]:

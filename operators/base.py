@@ -104,6 +104,10 @@ class RosyOperator:
         self.report({"ERROR"}, str(error).strip().removeprefix("Error: "))
         return {"CANCELLED"}
 
+    def report_done(self, message: str) -> None:
+        """Report what the operator has done."""
+        self.report({"INFO"}, message)
+
     def report_warnings(self, *messages: str) -> None:
         """Report what the user should know about a result, each message once."""
         for message in dict.fromkeys(messages):

@@ -62,12 +62,11 @@ class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
             format_degrees(np.degrees(angle))
             for angle in (statistics.mean, statistics.p95, statistics.max)
         )
-        self.report(
-            {"INFO"},
+        self.report_done(
             f"Off by {mean} degrees on average, {p95} on 95 % of the area, at most {largest} on "
             f"face {statistics.worst_face}; {comparison.matched_count} of "
             f"{counted(comparison.singularity_count, 'singularity', 'singularities')} match the "
-            f"{comparison.other_count} of '{other}'",
+            f"{comparison.other_count} of '{other}'"
         )
 
     def draw(self, context: bpy.types.Context) -> None:

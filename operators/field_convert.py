@@ -158,7 +158,7 @@ class ROSY_OT_field_convert(_FieldsJobMixin, bpy.types.Operator):
         return replace(field, source_directions=None)
 
     def finish(self, context: bpy.types.Context, result: int) -> None:
-        self.report({"INFO"}, f"Converted {counted(result, 'field')}")
+        self.report_done(f"Converted {counted(result, 'field')}")
 
     def draw(self, context: bpy.types.Context) -> None:
         draw_convert_settings(self.layout, self)
@@ -197,7 +197,7 @@ class ROSY_OT_field_store(_FieldsJobMixin, bpy.types.Operator):
         return len(fields)
 
     def finish(self, context: bpy.types.Context, result: int) -> None:
-        self.report({"INFO"}, f"Stored {counted(result, 'field')} as {FORMS[self.form][0]}")
+        self.report_done(f"Stored {counted(result, 'field')} as {FORMS[self.form][0]}")
 
     def draw(self, context: bpy.types.Context) -> None:
         draw_settings(self.layout, self, "form")

@@ -66,10 +66,6 @@ class ROSY_OT_field_export(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Ex
         """Set the suffix of the file name to the format's in the file browser."""
         return sync_suffix(self, self.file_format)
 
-    def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
-        """Ask for the path of the file."""
-        return None if self.skip_browser else ExportHelper.invoke(self, context, event)
-
     def begin(self, context: bpy.types.Context) -> Steps[Path]:
         path = Path(bpy.path.abspath(self.filepath))
         is_guides = self.content == "GUIDES"
@@ -81,7 +77,7 @@ class ROSY_OT_field_export(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Ex
         return _export(selected_mesh_objects(context)[0].data, path, is_guides)
 
     def finish(self, context: bpy.types.Context, result: Path) -> None:
-        self.report({"INFO"}, f"Wrote {result}")
+        self.report_done(f"Wrote {result}")
 
 
 def _export(mesh: bpy.types.Mesh, path: Path, is_guides: bool) -> Steps[Path]:

@@ -237,7 +237,7 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
         return dict.fromkeys(obj.data for obj in selected_mesh_objects(context))
 
     def finish(self, context: bpy.types.Context, result: str) -> None:
-        self.report({"INFO"}, f"Made {result}")
+        self.report_done(f"Made {result}")
 
     def draw(self, context: bpy.types.Context) -> None:
         draw_generator_settings(self.layout, self)

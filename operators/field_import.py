@@ -81,9 +81,7 @@ class ROSY_OT_field_import(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Im
             self.report_warnings(result.note)
         obj = selected_mesh_objects(context)[0]
         faces = counted(len(result.field.vectors), "face")
-        self.report(
-            {"INFO"}, f"Read a field of degree {result.field.degree} on {faces} of '{obj.name}'"
-        )
+        self.report_done(f"Read a field of degree {result.field.degree} on {faces} of '{obj.name}'")
 
 
 class ROSY_FH_field(bpy.types.FileHandler):

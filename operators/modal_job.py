@@ -12,6 +12,7 @@ from contextlib import contextmanager, nullcontext, suppress
 from typing import Any
 
 import bpy
+from bpy_extras.io_utils import ExportHelper
 
 from ..rosy_addon.core.errors import REPORTED_ERRORS, as_sentence
 from ..rosy_addon.scene.visible_objects import field_objects
@@ -346,11 +347,15 @@ class DialogJobMixin(ModalJobMixin):
 
 
 class FileJobMixin(DialogJobMixin):
-    """Mixin of operators that ask for a file, unless `skip_browser` is set."""
+    """Mixin of operators that ask for a file, by default one to write, unless `skip_browser` is set."""
 
     skip_browser: toggle(
         "Skip Browser", "Start without a file browser", options={"HIDDEN", "SKIP_SAVE"}
     )
+
+    def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
+        """Ask for the path of the file."""
+        return None if self.skip_browser else ExportHelper.invoke(self, context, event)
 
     def take_answer(self, context: bpy.types.Context) -> None:
         self.skip_browser = True

@@ -55,10 +55,9 @@ class ROSY_OT_remove(RosyOperator, bpy.types.Operator):
 
     def act(self, context: bpy.types.Context) -> None:
         removed = remove_bakes(context.scene)
-        self.report(
-            {"INFO"},
+        self.report_done(
             f"Removed {counted(removed.images, 'picture')} from "
-            f"{counted(removed.objects, 'object')}",
+            f"{counted(removed.objects, 'object')}"
         )
 
 

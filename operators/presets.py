@@ -108,7 +108,7 @@ class ROSY_OT_preset_save(RosyOperator, bpy.types.Operator):
         settings = context.scene.rosy
         preset = Preset(self.name.strip(), self.sentence.strip(), read_look(settings))
         settings.preset_name = save_preset(preset, user_presets_folder(), replace=self.replace)
-        self.report({"INFO"}, f"Saved preset '{preset.name}'")
+        self.report_done(f"Saved preset '{preset.name}'")
         redraw()
 
 
@@ -146,7 +146,7 @@ class ROSY_OT_preset_rename(RosyOperator, bpy.types.Operator):
         old_name = preset_library.preset_name(old)
         new = rename_preset(old, name, self.sentence.strip(), user_presets_folder())
         preset_library.rename_references(old, new)
-        self.report({"INFO"}, f"Renamed preset '{old_name}' to '{name}'")
+        self.report_done(f"Renamed preset '{old_name}' to '{name}'")
         redraw()
 
 
@@ -175,7 +175,7 @@ class ROSY_OT_preset_remove(RosyOperator, bpy.types.Operator):
         key = _target_preset(self, context)
         name = preset_library.preset_name(key)
         remove_preset(key, user_presets_folder())
-        self.report({"INFO"}, f"Deleted preset '{name}'")
+        self.report_done(f"Deleted preset '{name}'")
         redraw()
 
 
@@ -193,7 +193,7 @@ class ROSY_OT_preset_import(RosyOperator, bpy.types.Operator, ImportHelper):
     def act(self, context: bpy.types.Context) -> None:
         preset = read_preset(bpy.path.abspath(self.filepath))
         save_preset(preset, user_presets_folder(), replace=self.replace)
-        self.report({"INFO"}, f"Added preset '{preset.name}' to your presets")
+        self.report_done(f"Added preset '{preset.name}' to your presets")
         redraw()
 
 
@@ -215,7 +215,7 @@ class ROSY_OT_preset_export(RosyOperator, bpy.types.Operator, ExportHelper):
     def act(self, context: bpy.types.Context) -> None:
         path = Path(bpy.path.abspath(self.filepath))
         write_preset(path, load_preset(_target_preset(self, context), user_presets_folder()))
-        self.report({"INFO"}, f"Wrote {path}")
+        self.report_done(f"Wrote {path}")
 
 
 CLASSES = (

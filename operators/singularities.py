@@ -55,7 +55,7 @@ class ROSY_OT_singularities(RosyOperator, bpy.types.Operator):
             f"{format_index(int(singularities.index.sum()), singularities.degree)}"
             for obj, singularities in singularities_by_object.items()
         )
-        self.report({"INFO"}, f"{counted(count, 'singularity', 'singularities')}; {total}")
+        self.report_done(f"{counted(count, 'singularity', 'singularities')}; {total}")
 
 
 def _hide(context: bpy.types.Context, objects: list[bpy.types.Object]) -> None:

@@ -96,9 +96,8 @@ class ROSY_OT_strokes(DialogJobMixin, bpy.types.Operator):
 
     def finish(self, context: bpy.types.Context, result: StrokeResult) -> None:
         destination = f"'{result.obj.name}'" if result.path is None else str(result.path)
-        self.report(
-            {"INFO"},
-            f"{counted(len(result.drawing.strokes), 'stroke')} from '{result.camera}': {destination}",
+        self.report_done(
+            f"{counted(len(result.drawing.strokes), 'stroke')} from '{result.camera}': {destination}"
         )
         self.report_warnings(*result.notes)
 
@@ -125,7 +124,7 @@ class ROSY_OT_strokes_remove(RosyOperator, bpy.types.Operator):
 
     def act(self, context: bpy.types.Context) -> None:
         count = remove_strokes(context.scene)
-        self.report({"INFO"}, f"Removed {counted(count, 'object')} with strokes")
+        self.report_done(f"Removed {counted(count, 'object')} with strokes")
 
 
 CLASSES = (ROSY_OT_strokes, ROSY_OT_strokes_remove)

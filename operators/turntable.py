@@ -62,10 +62,6 @@ class ROSY_OT_turntable(FileJobMixin, bpy.types.Operator, ExportHelper):
         """Set the suffix of the file name to the video format's in the file browser."""
         return sync_suffix(self, self.film)
 
-    def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
-        """Ask for the path of the video."""
-        return None if self.skip_browser else ExportHelper.invoke(self, context, event)
-
     def begin(self, context: bpy.types.Context) -> Steps[Path]:
         path = Path(bpy.path.abspath(self.filepath))
         check_writable(path)
@@ -86,7 +82,7 @@ class ROSY_OT_turntable(FileJobMixin, bpy.types.Operator, ExportHelper):
         return selected_mesh_objects(context)[:1]
 
     def finish(self, context: bpy.types.Context, result: Path) -> None:
-        self.report({"INFO"}, f"Wrote {result}")
+        self.report_done(f"Wrote {result}")
 
 
 CLASSES = (ROSY_OT_turntable,)

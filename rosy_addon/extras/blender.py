@@ -20,8 +20,8 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, BinaryIO, TextIO
 
@@ -272,8 +272,7 @@ def run_job(program: str, arguments: Sequence[str]) -> int:
         )
         stack.enter_context(Guarded(process))
         try:
-            with _signals_as_exceptions():
-                process.wait()
+            process.wait()
         except KeyboardInterrupt:
             _stop(process, report)
             if _reported_status(report) is None:
@@ -314,29 +313,6 @@ def _inheritance(descriptors: Sequence[int]) -> tuple[list[int], dict[str, Any]]
         os.set_handle_inheritable(handle, True)
     startup = subprocess.STARTUPINFO(lpAttributeList={"handle_list": handles})
     return handles, {"startupinfo": startup}
-
-
-@contextmanager
-def _signals_as_exceptions() -> Iterator[None]:
-    """Raise SystemExit for signals that would end this process and leave Blender behind."""
-
-    def leave(number: int, _frame: object) -> None:
-        raise SystemExit(128 + number)
-
-    changed = []
-    try:
-        for name in ("SIGTERM", "SIGHUP"):
-            number = getattr(signal, name, None)
-            if number is not None and signal.getsignal(number) == signal.SIG_DFL:
-                signal.signal(number, leave)
-                changed.append(number)
-    except ValueError:  # not the main thread
-        pass
-    try:
-        yield
-    finally:
-        for number in changed:
-            signal.signal(number, signal.SIG_DFL)
 
 
 def _stop(process: subprocess.Popen[bytes], report: BinaryIO) -> None:

@@ -137,28 +137,20 @@ class FieldFiles(Sequence[api.Field]):
     paths : sequence of Path
     surface : Surface
     degree, nonfinite
-        See `api.read_field`. By default all fields must have the degree of the first one.
+        See `api.read_field`.
     """
 
     paths: Sequence[Path]
     surface: api.Surface
     degree: int | None = None
     nonfinite: str = "error"
-    _first_degree: int | None = None
 
     def __len__(self) -> int:
         return len(self.paths)
 
     def __getitem__(self, index: Any) -> Any:
         path = self.paths[index]
-        field = api.read_field(path, self.surface, self.degree, nonfinite=self.nonfinite)
-        self._first_degree = self._first_degree or field.degree
-        if field.degree != self._first_degree:
-            raise RosyError(
-                f"{path}: the field has degree {field.degree}, but {self.paths[0]} has "
-                f"{self._first_degree}"
-            )
-        return field
+        return api.read_field(path, self.surface, self.degree, nonfinite=self.nonfinite)
 
     def time_text(self, index: int) -> str:
         """Return the name of the file, for the line that is printed."""

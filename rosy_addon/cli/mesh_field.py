@@ -17,22 +17,16 @@ from ..field.rosy_field import check_degree
 from .options import CommandParser, Options, int_between
 
 
-def add_mesh_options(parser: CommandParser, *, allow_scene: bool = False) -> None:
-    """Add MESH, FIELD and the options that generate a field.
+def add_mesh_options(parser: CommandParser) -> None:
+    """Add MESH, FIELD and the options that generate a field."""
+    *suffixes, last = READERS
+    text = f"{', '.join(suffixes)} or {last}"
+    parser.add_argument("mesh", type=Path, metavar="MESH", help=text)
+    add_field_options(parser)
 
-    Parameters
-    ----------
-    parser : CommandParser
-    allow_scene : bool
-        Whether MESH may be a .blend file, or absent.
-    """
-    suffixes = list(READERS)
-    if allow_scene:
-        text = f"{', '.join(suffixes)} or .blend; in Blender, by default, the open file"
-        parser.add_argument("mesh", nargs="?", type=Path, metavar="MESH|SCENE.blend", help=text)
-    else:
-        text = f"{', '.join(suffixes[:-1])} or {suffixes[-1]}"
-        parser.add_argument("mesh", type=Path, metavar="MESH", help=text)
+
+def add_field_options(parser: CommandParser) -> None:
+    """Add FIELD and the options that generate a field."""
     text = ", ".join(READ_SUFFIXES)
     parser.add_argument("field", type=Path, nargs="?", metavar="FIELD", help=text)
     of_array = ", 1 for an array of vectors" if SIMULATION_READERS else ""

@@ -7,7 +7,8 @@ import inspect
 import os
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any, TextIO
@@ -109,9 +110,24 @@ class CommandParser(argparse.ArgumentParser):
         )
         self.add_value("--workers", "N", text, int_between(0, 256), default=0)
 
+    @contextmanager
+    def only_for(self, kind: str) -> Iterator[None]:
+        """Note that options which are added in the ``with`` block are for one kind of file only.
+
+        `Options.check_only_for` then refuses them for other files.
+        """
+        first = len(self._actions)
+        yield
+        kinds = self.get_default("kinds") or {}
+        self.set_defaults(kinds={**kinds, kind: self._actions[first:]})
+
     def add_view_options(self) -> None:
         """Add the options of the view and the size of the picture."""
         self.add_direction_options()
+        self.add_size_option()
+
+    def add_size_option(self) -> None:
+        """Add --size of a picture."""
         self.add_value("--size", "WxH", "size in pixels", parse_size)
 
     def add_direction_options(self) -> None:
@@ -205,6 +221,21 @@ class Options(argparse.Namespace):
                 is_path = name != "output" and isinstance(path, (str, os.PathLike))
                 if is_path and os.path.exists(path) and os.path.samefile(path, self.output):
                     raise RosyError(f"{self.output}: is also an input: choose another output file")
+
+    def check_only_for(self, kind: str, file: Path | str) -> None:
+        """Raise an error if an option is given that is for another kind of file; see `CommandParser.only_for`.
+
+        Parameters
+        ----------
+        kind : str
+            The kind of file that the options are for.
+        file : Path or str
+            The file that they do not apply to.
+        """
+        for action in self.kinds[kind]:
+            if getattr(self, action.dest, action.default) != action.default:
+                name = action.option_strings[0] if action.option_strings else action.metavar
+                raise RosyError(f"{file}: {name} applies only to {kind}")
 
     def requested_preset(self) -> Path | None:
         """Return the file of --preset, or None."""

@@ -58,6 +58,3 @@ def view_camera(context: bpy.types.Context) -> Camera:
         raise RosyError("there is no current view: run the operator in a 3D view")
     region = next(region for region in area.regions if region.type == "WINDOW")
     return camera_of_view(region, area.spaces.active.region_3d)
-
-
-CLASSES = (ROSY_OT_bake,)

@@ -92,6 +92,3 @@ class ROSY_OT_bake_animation(DialogJobMixin, bpy.types.Operator):
                 f"{counted(len(sequence.rendered), 'frame')} drawn, {len(sequence.skipped)} up to date: {sequence.sequence.path}"
             )
         self.report_warnings(*(text for sequence in result for text in sequence.warnings))
-
-
-CLASSES = (ROSY_OT_bake_animation,)

@@ -41,6 +41,3 @@ class ROSY_OT_occlusion(ModalJobMixin, bpy.types.Operator):
         self.report_done(
             f"Stored ambient occlusion as attribute '{OCCLUSION_ATTRIBUTE}', the source of the tone"
         )
-
-
-CLASSES = (ROSY_OT_occlusion,)

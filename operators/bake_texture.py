@@ -168,6 +168,3 @@ def _only_selected_copy(
         for obj in selected:
             obj.select_set(True)
         context.view_layer.objects.active = active
-
-
-CLASSES = (ROSY_OT_bake_texture,)

@@ -219,6 +219,3 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         use_property_columns(self.layout)
         comb_brush.draw_settings(self.layout, self)
         self.layout.prop(self, "radius")
-
-
-CLASSES = (RosyStrokePoint, ROSY_OT_field_comb)

@@ -71,6 +71,3 @@ class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
 
     def draw(self, context: bpy.types.Context) -> None:
         draw_settings(self.layout, self, "other", "use_as_color")
-
-
-CLASSES = (ROSY_OT_field_compare,)

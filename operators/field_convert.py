@@ -203,6 +203,3 @@ class ROSY_OT_field_store(_FieldsJobMixin, bpy.types.Operator):
         draw_settings(self.layout, self, "form")
         if self.form != "DIRECTIONS":
             draw_settings(self.layout, self, "attribute")
-
-
-CLASSES = (ROSY_OT_field_convert, ROSY_OT_field_store)

@@ -92,6 +92,3 @@ def _export(mesh: bpy.types.Mesh, path: Path, is_guides: bool) -> Steps[Path]:
     check_writable(path)
     write_bytes(path, (yield Call(field_file, (path, field, surface))))
     return path
-
-
-CLASSES = (ROSY_OT_field_export,)

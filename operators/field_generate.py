@@ -242,6 +242,3 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
     def draw(self, context: bpy.types.Context) -> None:
         draw_generator_settings(self.layout, self)
         draw_settings(self.layout, self, "attribute")
-
-
-CLASSES = (ROSY_OT_field_generate,)

@@ -95,6 +95,3 @@ class ROSY_FH_field(bpy.types.FileHandler):
     @classmethod
     def poll_drop(cls, context: bpy.types.Context) -> bool:
         return context.area is not None and context.area.type == "VIEW_3D"
-
-
-CLASSES = (ROSY_OT_field_import, ROSY_FH_field)

@@ -126,6 +126,3 @@ class ROSY_OT_drag_singularity(RosyOperator, bpy.types.Operator):
     def cancel(self, context: bpy.types.Context) -> None:
         """Stop drawing. Blender calls this if the window is closed or a file is opened."""
         self._drag.stop()
-
-
-CLASSES = (ROSY_OT_field_singularities, ROSY_OT_drag_singularity)

@@ -59,6 +59,3 @@ class ROSY_OT_remove(RosyOperator, bpy.types.Operator):
             f"Removed {counted(removed.images, 'picture')} from "
             f"{counted(removed.objects, 'object')}"
         )
-
-
-CLASSES = (ROSY_OT_show, ROSY_OT_show_here, ROSY_OT_remove)

@@ -40,22 +40,9 @@ def _preset_property(search: Any) -> Any:
     )
 
 
-def _sentence_property() -> Any:
-    """Return the property of the description of a preset."""
-    sentence = "What the look is like, or what it is for"
-    return text("Description", sentence, maxlen=MAX_DESCRIPTION_LENGTH)
-
-
 def _replace_property() -> Any:
     """Return the switch that lets an operator replace a preset of the user."""
     return toggle("Replace Existing", "Replace your preset of the same name", options={"SKIP_SAVE"})
-
-
-def _draw_name_and_description(operator: Any) -> None:
-    """Draw the name and description of a preset in an operator's dialog."""
-    operator.layout.use_property_split = True
-    operator.layout.prop(operator, "name")
-    operator.layout.prop(operator, "sentence")
 
 
 def _target_preset(operator: Any, context: bpy.types.Context) -> str:
@@ -81,25 +68,49 @@ class ROSY_OT_preset_apply(RosyOperator, bpy.types.Operator):
         preset_library.apply_preset(context.scene.rosy, self.preset)
 
 
-class ROSY_OT_preset_save(RosyOperator, bpy.types.Operator):
+class _DescribedPreset(RosyOperator):
+    """Mixin of operators that ask for the name and the description of a preset."""
+
+    #: The button that confirms the dialog.
+    confirm_text = ""
+
+    name: text("Name", "Name of the preset", maxlen=MAX_NAME_LENGTH)
+    sentence: text(
+        "Description",
+        "What the look is like, or what it is for",
+        maxlen=MAX_DESCRIPTION_LENGTH,
+    )
+
+    def ask(self, context: bpy.types.Context, entry: preset_library.PresetEntry | None) -> set[str]:
+        """Open the dialog with the name and the description of a preset, if there is one."""
+        if entry is not None:
+            self.name, self.sentence = entry.preset.name, entry.preset.description
+        return context.window_manager.invoke_props_dialog(
+            self, width=400, confirm_text=self.confirm_text
+        )
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.layout.use_property_split = True
+        self.layout.prop(self, "name")
+        self.layout.prop(self, "sentence")
+
+
+class ROSY_OT_preset_save(_DescribedPreset, bpy.types.Operator):
     """Save the look of this scene as one of your presets"""
 
     bl_idname = "rosy.preset_save"
     bl_label = "Save Preset"
     bl_options = {"REGISTER"}
+    confirm_text = "Save"
 
-    name: text("Name", "Name of the preset", maxlen=MAX_NAME_LENGTH)
-    sentence: _sentence_property()
     replace: _replace_property()
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         entry = preset_library.active_entry(context.scene.rosy)
-        if entry is not None and entry.is_user:
-            self.name, self.sentence = entry.preset.name, entry.preset.description
-        return context.window_manager.invoke_props_dialog(self, width=400, confirm_text="Save")
+        return self.ask(context, entry if entry is not None and entry.is_user else None)
 
     def draw(self, context: bpy.types.Context) -> None:
-        _draw_name_and_description(self)
+        super().draw(context)
         if _is_user_preset(self.name):
             self.layout.label(text="You already have a preset of this name", icon="INFO")
             self.layout.prop(self, "replace")
@@ -120,26 +131,19 @@ def _is_user_preset(name: str) -> bool:
         return False
 
 
-class ROSY_OT_preset_rename(RosyOperator, bpy.types.Operator):
+class ROSY_OT_preset_rename(_DescribedPreset, bpy.types.Operator):
     """Change the name or the description of one of your presets"""
 
     bl_idname = "rosy.preset_rename"
     bl_label = "Rename Preset"
     bl_options = {"REGISTER"}
+    confirm_text = "Rename"
     conditions = (HAS_USER_PRESETS,)
 
     preset: _preset_property(preset_library.search_user_presets)
-    name: text("Name", "New name of the preset", maxlen=MAX_NAME_LENGTH)
-    sentence: _sentence_property()
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        entry = preset_library.entries().get(_target_preset(self, context))
-        if entry is not None:
-            self.name, self.sentence = entry.preset.name, entry.preset.description
-        return context.window_manager.invoke_props_dialog(self, width=400, confirm_text="Rename")
-
-    def draw(self, context: bpy.types.Context) -> None:
-        _draw_name_and_description(self)
+        return self.ask(context, preset_library.entries().get(_target_preset(self, context)))
 
     def act(self, context: bpy.types.Context) -> None:
         old, name = _target_preset(self, context), self.name.strip()
@@ -216,13 +220,3 @@ class ROSY_OT_preset_export(RosyOperator, bpy.types.Operator, ExportHelper):
         path = Path(bpy.path.abspath(self.filepath))
         write_preset(path, load_preset(_target_preset(self, context), user_presets_folder()))
         self.report_done(f"Wrote {path}")
-
-
-CLASSES = (
-    ROSY_OT_preset_apply,
-    ROSY_OT_preset_save,
-    ROSY_OT_preset_rename,
-    ROSY_OT_preset_remove,
-    ROSY_OT_preset_import,
-    ROSY_OT_preset_export,
-)

@@ -28,6 +28,9 @@ from . import (
     viewport,
 )
 
+#: Types whose subclasses are registered.
+REGISTRABLE = (bpy.types.Operator, bpy.types.PropertyGroup, bpy.types.FileHandler)
+
 #: Modules with operators, in the order of registration.
 MODULES = (
     field_generate,
@@ -50,11 +53,21 @@ MODULES = (
 )
 
 
+#: The classes that these modules define for Blender, in their order. Mixins are not registered.
+CLASSES = tuple(
+    value
+    for module in MODULES
+    for value in vars(module).values()
+    if isinstance(value, type)
+    and issubclass(value, REGISTRABLE)
+    and value.__module__ == module.__name__
+)
+
+
 def register() -> None:
     """Register the operators, and the tools that call them."""
-    for module in MODULES:
-        for cls in module.CLASSES:
-            bpy.utils.register_class(cls)
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
     bpy.utils.register_tool(VIEW3D_TOOL_rosy_comb, separator=True)
     bpy.utils.register_tool(VIEW3D_TOOL_rosy_singularities, after={VIEW3D_TOOL_rosy_comb.bl_idname})
     bpy.utils.register_tool(VIEW3D_TOOL_rosy_comb_sculpt, separator=True)
@@ -68,6 +81,5 @@ def unregister() -> None:
     bpy.utils.unregister_tool(VIEW3D_TOOL_rosy_singularities)
     bpy.utils.unregister_tool(VIEW3D_TOOL_rosy_comb)
     brush_mouse.unregister()
-    for module in reversed(MODULES):
-        for cls in reversed(module.CLASSES):
-            bpy.utils.unregister_class(cls)
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -63,6 +63,3 @@ def _hide(context: bpy.types.Context, objects: list[bpy.types.Object]) -> None:
     for obj in objects:
         overlay.hide(obj.name)
         remove_singularity_points(context.scene, obj)
-
-
-CLASSES = (ROSY_OT_singularities,)

@@ -125,6 +125,3 @@ class ROSY_OT_strokes_remove(RosyOperator, bpy.types.Operator):
     def act(self, context: bpy.types.Context) -> None:
         count = remove_strokes(context.scene)
         self.report_done(f"Removed {counted(count, 'object')} with strokes")
-
-
-CLASSES = (ROSY_OT_strokes, ROSY_OT_strokes_remove)

@@ -83,6 +83,3 @@ class ROSY_OT_turntable(FileJobMixin, bpy.types.Operator, ExportHelper):
 
     def finish(self, context: bpy.types.Context, result: Path) -> None:
         self.report_done(f"Wrote {result}")
-
-
-CLASSES = (ROSY_OT_turntable,)

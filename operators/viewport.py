@@ -68,6 +68,3 @@ class ROSY_OT_flow_play(RosyOperator, bpy.types.Operator):
 
     def act(self, context: bpy.types.Context) -> None:
         session.play_flow(not session.is_flow_playing())
-
-
-CLASSES = (ROSY_OT_viewport, ROSY_OT_flow_play)

@@ -14,7 +14,7 @@ from ..core.progress import listening
 from ..gpu.select import RENDER_DEVICES
 from ..preset_files.store import SHIPPED_FOLDER, find_preset_file
 from ..worker.frame_workers import parse_frames, run_local
-from .options import Options, add_subcommand, parse_size, user_presets_folder
+from .options import Options, add_subcommand, int_between, parse_size, user_presets_folder
 from .scene import open_scene, print_warnings, requested_cameras, requested_objects
 from .streams import print_line
 
@@ -54,7 +54,11 @@ def add_bake_command(subparsers: Any, has_cluster: bool) -> None:
     )
     workers = parser.add_mutually_exclusive_group()
     workers.add_argument(
-        "--jobs", type=int, default=1, metavar="J", help="number of processes for the frames"
+        "--jobs",
+        type=int_between(1, 1024),
+        default=1,
+        metavar="J",
+        help="number of processes for the frames",
     )
     parser.set_defaults(scheduler=None)
     if has_cluster:
@@ -109,8 +113,6 @@ def _check_bake_options(options: Options) -> None:
         raise RosyError("--jobs and --scheduler distribute frames: give --frames A-B")
     if options.frames is not None and options.out is None:
         raise RosyError("--frames writes files: give --out DIR")
-    if options.jobs < 1:
-        raise RosyError(f"--jobs {options.jobs}: expected 1 or more")
     if options.out is not None:
         check_folder(options.out)
 

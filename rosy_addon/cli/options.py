@@ -275,9 +275,6 @@ class Options(argparse.Namespace):
         """
         sources = {"attribute": self.tone_values, "image": self.tone_image}
         sources["picture"] = getattr(self, "tone_picture", None)
-        given = [f"--tone-{option}" for option, value in sources.items() if value is not None]
-        if len(given) > 1:
-            raise RosyError(f"give either {given[0]} or {given[1]}, not both")
         preset, settings = self.requested_preset(), self.requested_settings()
         # Mistakes are reported before the mesh is read.
         picture_look(str(self.mesh), preset, settings, sources, self.color_values is not None)

@@ -52,7 +52,7 @@ def add_turntable_command(subparsers: Any) -> None:
     add_mesh_options(parser)
     parser.add_output_option("OUT.mp4|OUT.gif")
     parser.add_value(
-        "--pictures", "N", "pictures in a full turn (%(default)d)", int_between(1, 10_000)
+        "--pictures", "N", "pictures in a full turn (%(default)d)", int_between(2, 10_000)
     )
     add_rate_option(parser)
     parser.add_switch(
@@ -70,8 +70,6 @@ def run_turntable(options: Options) -> None:
     """Draw the field of a mesh file from all sides, as a video."""
     options.check_output()
     check_video_path(options.output)
-    if options.pictures < 2:
-        raise RosyError("a turntable needs 2 or more --pictures")
     arguments = options.picture_arguments(api.turntable)
     encode = video_encoder(options)
 

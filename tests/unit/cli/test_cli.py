@@ -563,7 +563,11 @@ def test_tones_that_are_not_there(painted, sphere, tmp_path):
         (sphere, ("--tone-picture", tmp_path / "none.png"), ("none.png", "no such file")),
         (sphere, ("--tone-picture", tmp_path / "wide.png"), ("wide.png", "64 x 16")),
         (sphere, ("--set", "tone=picture"), ("picture", "none is given")),
-        (painted, ("--tone-attribute", "red", "--tone-image", "x.png"), ("not both",)),
+        (
+            painted,
+            ("--tone-attribute", "red", "--tone-image", "x.png"),
+            ("choose one source of the tone, attribute or image",),
+        ),
     ):
         assert_refused(rosy("render", mesh, *out, *words), *expected)
         assert not (tmp_path / "a.png").exists()

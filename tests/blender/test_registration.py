@@ -21,6 +21,7 @@ SMALL_WORDS = {
     "or",
     "the",
     "to",
+    "with",
 }
 VISIBLE_GROUPS = {"RosyLook", "RosyStrokes", "RosyScene", "RosyMesh", "RosyObject"}
 

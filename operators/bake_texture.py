@@ -88,7 +88,7 @@ def _with_uv_maps(
     objects : sequence of bpy.types.Object
         Meshes without a UV map.
     steps : Steps
-        Of the job that needs the UV maps.
+        Steps of the job that needs the UV maps.
 
     Raises
     ------

@@ -166,7 +166,7 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
             bpy.ops.view3d.select("EXEC_DEFAULT", True, deselect_all=True, location=mouse)
 
     def _add(self, context: bpy.types.Context, event: bpy.types.Event) -> bool:
-        """Go on to the place under the mouse. Return whether the field has changed."""
+        """Extend the stroke to the point under the mouse. Return whether the field has changed."""
         place = self._mouse.place((event.mouse_region_x, event.mouse_region_y))
         if place is None:
             self._is_away = True

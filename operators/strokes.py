@@ -82,7 +82,7 @@ class ROSY_OT_strokes(DialogJobMixin, bpy.types.Operator):
         return not self.filepath.lower().endswith(DRAWING_SUFFIXES) and sync_suffix(self, ".svg")
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Show no settings in the file browser: those of the panel apply."""
+        """Show no settings in the file browser: the settings of the panel apply."""
 
     def begin(self, context: bpy.types.Context) -> Steps[StrokeResult]:
         return draw_strokes.begin(

@@ -257,9 +257,9 @@ class Options(argparse.Namespace):
         Parameters
         ----------
         function : function
-            Of `api`.
+            A function of `api`.
         **others
-            Arguments that replace those of the options.
+            Arguments that replace the values of options.
         """
         names = inspect.getfullargspec(function).kwonlyargs
         arguments = {name: value for name, value in vars(self).items() if name in names}

@@ -1,9 +1,9 @@
-"""Running a command in a Blender, where Python has no module ``bpy``.
+"""Run a command in a Blender if Python has no module ``bpy``.
 
-Blender prints messages of its own, from its first line with the version to its last one, some of them
-from C code. They must not mix with the output of the command. So Blender starts with its standard
-output and error in a log file, and the command inside writes to copies of the streams of this process.
-These are the real streams: a terminal stays a terminal, and the command notices a closed pipe.
+Blender prints its own messages, some of them from C code. They must not mix with the output of the
+command. So Blender starts with its standard output and error in a log file, and the command inside
+writes to copies of the streams of this process: a terminal stays a terminal, and the command notices
+a closed pipe.
 
 The command reports its exit status in a file, because Blender cannot end in order with any other
 status than 0. If there is no report, Blender failed, and its log says why.

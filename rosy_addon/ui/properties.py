@@ -89,7 +89,7 @@ class RosyFrameState(bpy.types.PropertyGroup):
 
 
 class RosyBake(bpy.types.PropertyGroup):
-    """A baked picture and what it was drawn from. Its name is that of the camera at that time."""
+    """A baked picture and what it was drawn from, named after the camera."""
 
     image: bpy.props.PointerProperty(type=bpy.types.Image)
     material: bpy.props.PointerProperty(type=bpy.types.Material)
@@ -127,7 +127,7 @@ class RosyNodeTree(bpy.types.PropertyGroup):
 
 
 class RosyStrokeObject(bpy.types.PropertyGroup):
-    """An object of strokes made by RoSy. Its name is that of the camera."""
+    """An object of strokes made by RoSy, named after the camera."""
 
     kind: bpy.props.StringProperty()
     thing: bpy.props.PointerProperty(type=bpy.types.Object)

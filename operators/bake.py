@@ -1,18 +1,30 @@
-"""Operator: bake pictures of the fields from a camera, all cameras or the current view."""
+"""Operators: bake pictures of fields and of ambient occlusion, at one frame or many; show and remove them."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 
-from ..rosy_addon.core.errors import RosyError
+from ..rosy_addon.core.errors import RosyError, counted
+from ..rosy_addon.jobs.animation import SequenceResult, bake_animation
 from ..rosy_addon.jobs.bake import BakeResult, bake
+from ..rosy_addon.projection.ambient_occlusion import DIRECTION_COUNT
 from ..rosy_addon.projection.camera import Camera
+from ..rosy_addon.scene.bake_records import has_pictures, remove_bakes
 from ..rosy_addon.scene.cameras import CameraSource, camera_of_view, render_camera, scene_cameras
+from ..rosy_addon.scene.computed_attributes import OCCLUSION_ATTRIBUTE, store_occlusion
+from ..rosy_addon.scene.files import output_folder
+from ..rosy_addon.scene.pictures import read_output_settings, show_bake
+from ..rosy_addon.scene.visible_objects import field_objects
+from ..rosy_addon.ui.main_panel import SHADING_WITHOUT_MATERIALS
 from ..rosy_addon.ui.preferences import worker_count
 from ..rosy_addon.ui.properties import CAMERA_ITEMS
+from ..rosy_addon.ui.property_makers import choice, integer, text, toggle
+from ..rosy_addon.viewport import session
 from ..rosy_addon.worker.job import Steps
-from .base import IDLE, VISIBLE_FIELD
-from .modal_job import ModalJobMixin
+from .base import IDLE, IN_3D_VIEW, VISIBLE_FIELD, Condition, RosyOperator
+from .modal_job import DialogJobMixin, ModalJobMixin
 
 
 class ROSY_OT_bake(ModalJobMixin, bpy.types.Operator):
@@ -23,9 +35,7 @@ class ROSY_OT_bake(ModalJobMixin, bpy.types.Operator):
     bl_options = {"UNDO"}
     conditions = (IDLE, VISIBLE_FIELD)
 
-    camera: bpy.props.EnumProperty(
-        name="Camera", description="Camera to draw from", items=CAMERA_ITEMS
-    )
+    camera: choice("Camera", "Camera to draw from", CAMERA_ITEMS)
 
     def begin(self, context: bpy.types.Context) -> Steps[list[BakeResult]]:
         return bake.begin(
@@ -34,7 +44,7 @@ class ROSY_OT_bake(ModalJobMixin, bpy.types.Operator):
 
     def finish(self, context: bpy.types.Context, result: list[BakeResult]) -> None:
         names = ", ".join(f"'{picture.camera}'" for picture in result)
-        self.report({"INFO"}, f"Baked from {names}")
+        self.report_done(f"Baked from {names}")
         self.report_warnings(*(text for picture in result for text in picture.warnings))
 
     def _cameras(self, context: bpy.types.Context) -> list[CameraSource]:
@@ -61,4 +71,155 @@ def view_camera(context: bpy.types.Context) -> Camera:
     return camera_of_view(region, area.spaces.active.region_3d)
 
 
-CLASSES = (ROSY_OT_bake,)
+class ROSY_OT_bake_animation(DialogJobMixin, bpy.types.Operator):
+    """Draw the fields at every frame, save the pictures to a folder, and play them back on the meshes. Frames that are up to date are kept, so a run that was stopped with ESC can be continued"""
+
+    bl_idname = "rosy.bake_animation"
+    bl_label = "Bake Animation"
+    bl_options = {"UNDO"}
+    conditions = (IDLE, VISIBLE_FIELD)
+    cancel_note = "completed frames were kept"
+
+    first: integer("First", "First frame", default=1)
+    last: integer("Last", "Last frame", default=250)
+    step: integer("Step", "Step between frames", default=1, min=1)
+    all_cameras: toggle(
+        "All Cameras",
+        "A sequence of pictures from each camera, instead of one from the camera that "
+        "renders each frame",
+    )
+
+    directory: text(
+        "Folder",
+        "Folder that was chosen in the file browser",
+        subtype="DIR_PATH",
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
+    filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
+
+    def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
+        """Ask for a folder if the scene has none, as in a file that was never saved."""
+        try:
+            output_folder(context.scene)
+        except RosyError:
+            for name, value in self._frame_settings(context.scene).items():
+                setattr(self, name, value)
+            context.window_manager.fileselect_add(self)
+            return {"RUNNING_MODAL"}
+        return None
+
+    def take_answer(self, context: bpy.types.Context) -> None:
+        context.scene.rosy.directory = self.directory
+
+    def begin(self, context: bpy.types.Context) -> Steps[list[SequenceResult]]:
+        scene = context.scene
+        frame_settings = self._frame_settings(scene)
+        frames = range(frame_settings["first"], frame_settings["last"] + 1, frame_settings["step"])
+        if not len(frames):
+            raise RosyError(
+                f"the last frame, {frame_settings['last']}, is before the first, "
+                f"{frame_settings['first']}"
+            )
+        cameras = scene_cameras(scene) if self.all_cameras else None
+        # Frames are saved in the scene's folder, even if single pictures are packed.
+        settings = replace(read_output_settings(scene), folder=output_folder(scene))
+        return bake_animation.begin(
+            scene,
+            frames,
+            cameras=cameras,
+            settings=settings,
+            workers=worker_count(context),
+        )
+
+    def _frame_settings(self, scene: bpy.types.Scene) -> dict[str, int]:
+        """Return the first and last frame and the step: the operator's, by default the scene's."""
+        return {
+            "first": self.chosen("first", scene.frame_start),
+            "last": self.chosen("last", scene.frame_end),
+            "step": self.chosen("step", scene.frame_step),
+        }
+
+    def finish(self, context: bpy.types.Context, result: list[SequenceResult]) -> None:
+        for sequence in result:
+            self.report_done(
+                f"{counted(len(sequence.rendered), 'frame')} drawn, {len(sequence.skipped)} up to date: {sequence.sequence.path}"
+            )
+        self.report_warnings(*(text for sequence in result for text in sequence.warnings))
+
+
+class ROSY_OT_occlusion(ModalJobMixin, bpy.types.Operator):
+    """Compute the ambient occlusion of all meshes with a field, store it as an attribute, and use it as the tone"""
+
+    bl_idname = "rosy.occlusion"
+    bl_label = "Tone by Occlusion"
+    bl_options = {"REGISTER", "UNDO"}
+    conditions = (IDLE, VISIBLE_FIELD)
+
+    directions: integer(
+        "Directions",
+        "Number of sampled directions of light. More are smoother and take longer",
+        default=DIRECTION_COUNT,
+        min=1,
+        soft_min=32,
+        max=65536,
+    )
+
+    def begin(self, context: bpy.types.Context) -> Steps[None]:
+        depsgraph = context.evaluated_depsgraph_get()
+        objects = field_objects(context.view_layer)
+        return store_occlusion.begin(depsgraph, objects, direction_count=self.directions)
+
+    def finish(self, context: bpy.types.Context, result: None) -> None:
+        settings = context.scene.rosy
+        settings.tone_attribute, settings.look.tone = OCCLUSION_ATTRIBUTE, "attribute"
+        self.report_done(
+            f"Stored ambient occlusion as attribute '{OCCLUSION_ATTRIBUTE}', the source of the tone"
+        )
+
+
+class ROSY_OT_show(RosyOperator, bpy.types.Operator):
+    """Show the picture that was baked from this camera on the meshes"""
+
+    bl_idname = "rosy.show"
+    bl_label = "Show Picture"
+    bl_options = {"REGISTER", "UNDO"}
+    conditions = (IDLE,)
+
+    camera: text("Camera", "Name of the camera")
+
+    def act(self, context: bpy.types.Context) -> None:
+        show_bake(context.scene, self.camera)
+
+
+class ROSY_OT_show_here(RosyOperator, bpy.types.Operator):
+    """Show the baked pictures in this 3D view: with materials, and without the live fields over them"""
+
+    bl_idname = "rosy.show_here"
+    bl_label = "Show the Picture Here"
+    bl_options = {"REGISTER"}
+    conditions = (IN_3D_VIEW,)
+
+    def act(self, context: bpy.types.Context) -> None:
+        space = context.space_data
+        session.stop(space)
+        if space.shading.type in SHADING_WITHOUT_MATERIALS:
+            space.shading.type = "MATERIAL"
+
+
+class ROSY_OT_remove(RosyOperator, bpy.types.Operator):
+    """Remove the pictures of this scene, and the modifiers and materials that show them. Fields are kept"""
+
+    bl_idname = "rosy.remove"
+    bl_label = "Remove Pictures"
+    bl_options = {"REGISTER", "UNDO"}
+    conditions = (
+        IDLE,
+        Condition(lambda context: has_pictures(context.scene), "This scene has no baked pictures"),
+    )
+
+    def act(self, context: bpy.types.Context) -> None:
+        removed = remove_bakes(context.scene)
+        self.report_done(
+            f"Removed {counted(removed.images, 'picture')} from "
+            f"{counted(removed.objects, 'object')}"
+        )

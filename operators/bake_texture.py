@@ -17,6 +17,7 @@ from ..rosy_addon.core.errors import RosyError
 from ..rosy_addon.jobs.bake_texture import TextureResult, bake_texture
 from ..rosy_addon.scene.datablocks import is_editable
 from ..rosy_addon.scene.field_attributes import has_field
+from ..rosy_addon.ui.property_makers import toggle
 from ..rosy_addon.worker.job import Step, Steps
 from .base import ACTIVE_FIELD, IDLE, selected_mesh_objects
 from .modal_job import DialogJobMixin
@@ -36,10 +37,8 @@ class ROSY_OT_bake_texture(DialogJobMixin, bpy.types.Operator):
     bl_options = {"UNDO"}
     conditions = (IDLE, ACTIVE_FIELD)
 
-    unwrap: bpy.props.BoolProperty(
-        name="Unwrap",
-        description="Unwrap meshes that have no UV map, with Smart UV Project",
-        options={"SKIP_SAVE"},
+    unwrap: toggle(
+        "Unwrap", "Unwrap meshes that have no UV map, with Smart UV Project", options={"SKIP_SAVE"}
     )
 
     def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
@@ -67,7 +66,7 @@ class ROSY_OT_bake_texture(DialogJobMixin, bpy.types.Operator):
 
     def finish(self, context: bpy.types.Context, result: list[TextureResult]) -> None:
         names = ", ".join(f"'{texture.object.name}'" for texture in result)
-        self.report({"INFO"}, f"Baked the texture of {names}")
+        self.report_done(f"Baked the texture of {names}")
         self.report_warnings(*(text for texture in result for text in texture.warnings))
 
     def _without_uv_map(self, context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -89,7 +88,7 @@ def _with_uv_maps(
     objects : sequence of bpy.types.Object
         Meshes without a UV map.
     steps : Steps
-        Of the job that needs the UV maps.
+        Steps of the job that needs the UV maps.
 
     Raises
     ------
@@ -169,6 +168,3 @@ def _only_selected_copy(
         for obj in selected:
             obj.select_set(True)
         context.view_layer.objects.active = active
-
-
-CLASSES = (ROSY_OT_bake_texture,)

@@ -16,9 +16,6 @@ from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.ui import job_status, live_views, overlay
 from ..rosy_addon.ui.preferences import apply_preferences
 
-#: Arguments of properties that are a fraction of the size of the mesh.
-FRACTION = {"min": 0.0, "max": 10.0, "precision": 3, "step": 1}
-
 
 class Condition(NamedTuple):
     """What must hold so that an operator can run, and what the user is told if it does not."""
@@ -106,6 +103,10 @@ class RosyOperator:
         """Report the error of another operator that was called. Return the result of one that has failed."""
         self.report({"ERROR"}, str(error).strip().removeprefix("Error: "))
         return {"CANCELLED"}
+
+    def report_done(self, message: str) -> None:
+        """Report what the operator has done."""
+        self.report({"INFO"}, message)
 
     def report_warnings(self, *messages: str) -> None:
         """Report what the user should know about a result, each message once."""

@@ -11,11 +11,11 @@ from ..rosy_addon.core.errors import REPORTED_ERRORS, RosyError
 from ..rosy_addon.field.combing import EFFECTS, GuideBrush
 from ..rosy_addon.jobs.comb_field import CombStroke
 from ..rosy_addon.ui import comb_brush, overlay
-from ..rosy_addon.ui.properties import BRUSH_STRENGTH
+from ..rosy_addon.ui.property_makers import brush_strength, choice, fraction, real, toggle
 from ..rosy_addon.ui.sidebar import use_property_columns
 from ..rosy_addon.viewport.brush_mouse import hold_mouse, release_mouse
 from ..rosy_addon.worker.job import Steps, part
-from .base import ACTIVE_FIELD, FRACTION, IDLE, Condition, selected_mesh_objects
+from .base import ACTIVE_FIELD, IDLE, Condition, selected_mesh_objects
 from .modal_job import ActiveMeshMixin, Job, ModalJobMixin
 
 #: Modes of the view in which the field can be combed.
@@ -30,12 +30,9 @@ class RosyStrokePoint(bpy.types.PropertyGroup):
         description="Place on the mesh without modifiers, in object space",
         subtype="XYZ",
     )
-    pressure: bpy.props.FloatProperty(
-        name="Pressure", description="Pressure of the pen", min=0.0, max=1.0, default=1.0
-    )
-    is_start: bpy.props.BoolProperty(
-        name="Start",
-        description="Whether another line begins here, as after the pen has left the mesh",
+    pressure: real("Pressure", "Pressure of the pen", min=0.0, max=1.0, default=1.0)
+    is_start: toggle(
+        "Start", "Whether another line begins here, as after the pen has left the mesh"
     )
 
 
@@ -59,27 +56,19 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         description="The points of the stroke",
         options={"HIDDEN", "SKIP_SAVE"},
     )
-    effect: bpy.props.EnumProperty(
-        name="Effect",
-        description="What the brush does",
-        items=[(name.upper(), name.capitalize(), text) for name, text in EFFECTS.items()],
+    effect: choice(
+        "Effect",
+        "What the brush does",
+        [(name.upper(), name.capitalize(), text) for name, text in EFFECTS.items()],
     )
-    radius: bpy.props.FloatProperty(
-        name="Radius",
-        description="Radius of the brush",
-        subtype="DISTANCE",
-        min=1e-6,
-        soft_max=10.0,
-        default=0.2,
+    radius: real(
+        "Radius", "Radius of the brush", subtype="DISTANCE", min=1e-6, soft_max=10.0, default=0.2
     )
-    strength: bpy.props.FloatProperty(**BRUSH_STRENGTH)
-    exact: bpy.props.BoolProperty(
-        name="Exact",
-        description="Let the field follow the stroke exactly, in the whole radius",
-    )
-    front_faces: bpy.props.BoolProperty(
-        name="Front Faces Only",
-        description="Leave out faces that are turned away from those under the brush",
+    strength: brush_strength()
+    exact: toggle("Exact", "Let the field follow the stroke exactly, in the whole radius")
+    front_faces: toggle(
+        "Front Faces Only",
+        "Leave out faces that are turned away from those under the brush",
         default=True,
     )
     mirror: bpy.props.BoolVectorProperty(
@@ -87,13 +76,12 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         description="Repeat the stroke on the other side along each axis of the object",
         subtype="XYZ",
     )
-    reach: bpy.props.FloatProperty(
-        name="Reach",
-        description="Distance from the stroke at which the field stays what it is, as a fraction of the size of the "
+    reach: fraction(
+        "Reach",
+        "Distance from the stroke at which the field stays what it is, as a fraction of the size of the "
         "mesh, when the mesh has no guides yet",
         soft_max=0.5,
         default=0.1,
-        **FRACTION,
     )
 
     #: The stroke of the mouse, once that has been on the mesh.
@@ -178,7 +166,7 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
             bpy.ops.view3d.select("EXEC_DEFAULT", True, deselect_all=True, location=mouse)
 
     def _add(self, context: bpy.types.Context, event: bpy.types.Event) -> bool:
-        """Go on to the place under the mouse. Return whether the field has changed."""
+        """Extend the stroke to the point under the mouse. Return whether the field has changed."""
         place = self._mouse.place((event.mouse_region_x, event.mouse_region_y))
         if place is None:
             self._is_away = True
@@ -231,6 +219,3 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         use_property_columns(self.layout)
         comb_brush.draw_settings(self.layout, self)
         self.layout.prop(self, "radius")
-
-
-CLASSES = (RosyStrokePoint, ROSY_OT_field_comb)

@@ -15,6 +15,7 @@ from ..rosy_addon.scene.computed_attributes import (
     store_difference,
 )
 from ..rosy_addon.ui.operator_settings import draw_settings
+from ..rosy_addon.ui.property_makers import text, toggle
 from ..rosy_addon.worker.job import Steps
 from .base import selected_mesh_objects
 from .modal_job import ActiveMeshMixin, ModalJobMixin
@@ -33,15 +34,15 @@ class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
     bl_label = "Compare"
     bl_options = {"REGISTER", "UNDO"}
 
-    other: bpy.props.StringProperty(
-        name="With",
-        description="Attribute of the active mesh that holds the other field, of the same degree. Empty: the only "
+    other: text(
+        "With",
+        "Attribute of the active mesh that holds the other field, of the same degree. Empty: the only "
         "other one",
         search=_search_fields,
     )
-    use_as_color: bpy.props.BoolProperty(
-        name="Color Lines",
-        description="Color the lines by the angle: light where the fields are the same, dark at 180/N degrees",
+    use_as_color: toggle(
+        "Color Lines",
+        "Color the lines by the angle: light where the fields are the same, dark at 180/N degrees",
         default=True,
     )
 
@@ -61,16 +62,12 @@ class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
             format_degrees(np.degrees(angle))
             for angle in (statistics.mean, statistics.p95, statistics.max)
         )
-        self.report(
-            {"INFO"},
+        self.report_done(
             f"Off by {mean} degrees on average, {p95} on 95 % of the area, at most {largest} on "
             f"face {statistics.worst_face}; {comparison.matched_count} of "
             f"{counted(comparison.singularity_count, 'singularity', 'singularities')} match the "
-            f"{comparison.other_count} of '{other}'",
+            f"{comparison.other_count} of '{other}'"
         )
 
     def draw(self, context: bpy.types.Context) -> None:
         draw_settings(self.layout, self, "other", "use_as_color")
-
-
-CLASSES = (ROSY_OT_field_compare,)

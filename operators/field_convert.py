@@ -19,8 +19,9 @@ from ..rosy_addon.scene.field_attributes import has_field
 from ..rosy_addon.scene.mesh_fields import STORAGE_FORMS, assign_fields, read_mesh_field
 from ..rosy_addon.scene.meshes import mesh_surface
 from ..rosy_addon.ui.operator_settings import draw_convert_settings, draw_settings
+from ..rosy_addon.ui.property_makers import choice, fraction, integer, real, text
 from ..rosy_addon.worker.job import Call, Step, Steps, part
-from .base import EDITABLE_FIELD, FRACTION, selected_mesh_objects
+from .base import EDITABLE_FIELD, selected_mesh_objects
 from .modal_job import ModalJobMixin
 
 _Result = TypeVar("_Result")
@@ -87,48 +88,42 @@ class ROSY_OT_field_convert(_FieldsJobMixin, bpy.types.Operator):
     bl_label = "Convert Field"
     bl_options = {"REGISTER", "UNDO"}
 
-    degree: bpy.props.IntProperty(
-        name="Degree",
-        description="New degree, a multiple or a divisor of the present one. 0: keep the degree",
+    degree: integer(
+        "Degree",
+        "New degree, a multiple or a divisor of the present one. 0: keep the degree",
         min=0,
         max=MAX_DEGREE,
-        default=0,
     )
-    new_degree: bpy.props.EnumProperty(
-        name="Degree",
-        description="New degree, a multiple or a divisor of the present one",
-        items=DEGREE_ITEMS,
+    new_degree: choice(
+        "Degree",
+        "New degree, a multiple or a divisor of the present one",
+        DEGREE_ITEMS,
         get=_get_degree,
         set=_set_degree,
         options={"SKIP_SAVE"},
     )
-    angle: bpy.props.FloatProperty(
-        name="Rotate",
-        description="Rotate all directions counter-clockwise by this angle",
+    angle: real(
+        "Rotate",
+        "Rotate all directions counter-clockwise by this angle",
         subtype="ANGLE",
         min=-2 * pi,
         max=2 * pi,
-        default=0.0,
     )
-    smooth: bpy.props.FloatProperty(
-        name="Smooth",
-        description="Smooth the field over this fraction of the size of the mesh",
+    smooth: fraction(
+        "Smooth",
+        "Smooth the field over this fraction of the size of the mesh",
         soft_max=0.2,
-        default=0.0,
-        **FRACTION,
     )
-    pair_distance: bpy.props.FloatProperty(
-        name="Cancel Pairs",
-        description="Remove pairs of singularities with opposite indices that are nearer than this fraction of "
+    pair_distance: fraction(
+        "Cancel Pairs",
+        "Remove pairs of singularities with opposite indices that are nearer than this fraction of "
         "the size of the mesh",
         soft_max=0.2,
-        default=0.0,
-        **FRACTION,
     )
-    magnitude: bpy.props.EnumProperty(
-        name="Magnitude",
-        description="Lengths of the directions",
-        items=[
+    magnitude: choice(
+        "Magnitude",
+        "Lengths of the directions",
+        [
             ("keep", "Keep", "Keep the present lengths"),
             *((kind, kind.capitalize(), text) for kind, text in MAGNITUDES.items()),
             (
@@ -138,11 +133,7 @@ class ROSY_OT_field_convert(_FieldsJobMixin, bpy.types.Operator):
             ),
         ],
     )
-    values: bpy.props.StringProperty(
-        name="Values",
-        description="Name of the attribute or vertex group",
-        search=_search_values,
-    )
+    values: text("Values", "Name of the attribute or vertex group", search=_search_values)
 
     def begin(self, context: bpy.types.Context) -> Steps[int]:
         """Convert all fields, then store them. Return the number of meshes."""
@@ -167,7 +158,7 @@ class ROSY_OT_field_convert(_FieldsJobMixin, bpy.types.Operator):
         return replace(field, source_directions=None)
 
     def finish(self, context: bpy.types.Context, result: int) -> None:
-        self.report({"INFO"}, f"Converted {counted(result, 'field')}")
+        self.report_done(f"Converted {counted(result, 'field')}")
 
     def draw(self, context: bpy.types.Context) -> None:
         draw_convert_settings(self.layout, self)
@@ -180,14 +171,14 @@ class ROSY_OT_field_store(_FieldsJobMixin, bpy.types.Operator):
     bl_label = "Store Field"
     bl_options = {"REGISTER", "UNDO"}
 
-    form: bpy.props.EnumProperty(
-        name="Store As",
-        description="Form in which the field is stored",
-        items=[(form, name, text) for form, (name, text) in FORMS.items()],
+    form: choice(
+        "Store As",
+        "Form in which the field is stored",
+        [(form, name, text) for form, (name, text) in FORMS.items()],
     )
-    attribute: bpy.props.StringProperty(
-        name="Attribute",
-        description="Name of the attribute. Empty: the name of the field for vectors, 'rosy_angle' for angles, "
+    attribute: text(
+        "Attribute",
+        "Name of the attribute. Empty: the name of the field for vectors, 'rosy_angle' for angles, "
         "'rosy_tangent' for tangents",
     )
 
@@ -206,12 +197,9 @@ class ROSY_OT_field_store(_FieldsJobMixin, bpy.types.Operator):
         return len(fields)
 
     def finish(self, context: bpy.types.Context, result: int) -> None:
-        self.report({"INFO"}, f"Stored {counted(result, 'field')} as {FORMS[self.form][0]}")
+        self.report_done(f"Stored {counted(result, 'field')} as {FORMS[self.form][0]}")
 
     def draw(self, context: bpy.types.Context) -> None:
         draw_settings(self.layout, self, "form")
         if self.form != "DIRECTIONS":
             draw_settings(self.layout, self, "attribute")
-
-
-CLASSES = (ROSY_OT_field_convert, ROSY_OT_field_store)

@@ -31,7 +31,7 @@ from ..rosy_addon.scene.singularity_points import (
     read_singularity_points,
 )
 from ..rosy_addon.ui.operator_settings import draw_generator_settings, draw_settings
-from ..rosy_addon.ui.properties import setting_properties
+from ..rosy_addon.ui.property_makers import choice, integer, setting_properties, text
 from ..rosy_addon.worker.job import Call, Steps
 from .base import EDITABLE, selected_mesh_objects
 from .modal_job import ModalJobMixin
@@ -86,50 +86,46 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
     conditions = EDITABLE
 
     __annotations__ = setting_properties(GeneratorSettings) | {
-        "degree": bpy.props.IntProperty(
-            name="Degree",
-            description="Number of directions at each point: 2 for lines, 4 for crosses, 6 for triangles "
+        "degree": integer(
+            "Degree",
+            "Number of directions at each point: 2 for lines, 4 for crosses, 6 for triangles "
             "and hexagons",
             min=1,
             max=MAX_DEGREE,
             default=4,
         ),
-        "guides": bpy.props.EnumProperty(
-            name="Follow",
-            description="Kinds of guides that the field follows",
+        "guides": choice(
+            "Follow",
+            "Kinds of guides that the field follows",
+            GUIDE_ITEMS,
             options={"ENUM_FLAG"},
-            items=GUIDE_ITEMS,
             default={"OBJECTS"},
         ),
-        "guide": bpy.props.StringProperty(
-            name="Object",
-            description="Grease Pencil, curve or empty that the field follows. Empty: all that are "
+        "guide": text(
+            "Object",
+            "Grease Pencil, curve or empty that the field follows. Empty: all that are "
             "selected. An object of type Empty guides along its z axis, within its display size",
             search=_search_guides,
         ),
-        "edges": bpy.props.EnumProperty(
-            name="Edges", description="Edges that the field follows", items=EDGE_ITEMS
+        "edges": choice("Edges", "Edges that the field follows", EDGE_ITEMS),
+        "uv_map": text(
+            "UV Map", "UV map that the field follows. Empty: the active one", search=_search_uv_maps
         ),
-        "uv_map": bpy.props.StringProperty(
-            name="UV Map",
-            description="UV map that the field follows. Empty: the active one",
-            search=_search_uv_maps,
-        ),
-        "vectors": bpy.props.StringProperty(
-            name="Vectors",
-            description="Vector attribute on faces, points or corners that the field follows. Empty: for "
+        "vectors": text(
+            "Vectors",
+            "Vector attribute on faces, points or corners that the field follows. Empty: for "
             "Guided, the guides that you have combed; for Prescribed, none",
             search=_search_attributes,
         ),
-        "singularities": bpy.props.StringProperty(
-            name="Points",
-            description="Object whose points are the singularities, with an integer attribute 'index'. "
+        "singularities": text(
+            "Points",
+            "Object whose points are the singularities, with an integer attribute 'index'. "
             "Empty: the points that Singularities has made for the mesh, wherever you have moved them",
             search=_search_points,
         ),
-        "attribute": bpy.props.StringProperty(
-            name="Attribute",
-            description="Name of the mesh attribute that stores the field. An existing field is replaced",
+        "attribute": text(
+            "Attribute",
+            "Name of the mesh attribute that stores the field. An existing field is replaced",
             default="rosy",
         ),
     }
@@ -241,11 +237,8 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
         return dict.fromkeys(obj.data for obj in selected_mesh_objects(context))
 
     def finish(self, context: bpy.types.Context, result: str) -> None:
-        self.report({"INFO"}, f"Made {result}")
+        self.report_done(f"Made {result}")
 
     def draw(self, context: bpy.types.Context) -> None:
         draw_generator_settings(self.layout, self)
         draw_settings(self.layout, self, "attribute")
-
-
-CLASSES = (ROSY_OT_field_generate,)

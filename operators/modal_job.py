@@ -1,4 +1,4 @@
-"""Jobs in a window: a helper process computes, a timer hears from it, and ESC ends both at once.
+"""Modal operators that run a job: a helper process computes, a timer polls it, and ESC stops both.
 
 An operator derives from `ModalJobMixin`, and returns the steps of its job from `begin`. If it is called
 with ``EXEC_DEFAULT``, or if there is no window, the job runs in Blender's process at once.
@@ -12,21 +12,23 @@ from contextlib import contextmanager, nullcontext, suppress
 from typing import Any
 
 import bpy
+from bpy_extras.io_utils import ExportHelper
 
 from ..rosy_addon.core.errors import REPORTED_ERRORS, as_sentence
 from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.ui import job_status
 from ..rosy_addon.ui.preferences import uses_helper
+from ..rosy_addon.ui.property_makers import toggle
 from ..rosy_addon.viewport.view3d import redraw_sidebars
 from ..rosy_addon.worker.helper import HELPER, HelperLostError
 from ..rosy_addon.worker.job import Step, Steps, run
 from ..rosy_addon.worker.step_runner import StepRunner
 from .base import EDITABLE_FIELD, RosyOperator, selected_mesh_objects
 
-#: Seconds for which steps in Blender's process go on. Events of the user are handled between them.
+#: Longest time in seconds that steps run in Blender's process before events of the user are handled.
 SLICE_SECONDS = 0.05
 
-#: Seconds between two looks at what the helper says.
+#: Seconds between two polls of the helper.
 TIMER_SECONDS = 0.01
 
 #: Handlers of events that invalidate the data of a job, and the reasons that the user is told.
@@ -36,13 +38,13 @@ INTERRUPT_REASONS = {
     "load_pre": "another file was opened",
 }
 
-#: Said once if there is no helper.
+#: Warning if there is no helper; shown once.
 NO_HELPER = "Blender waits while RoSy computes, as no other process can be started"
 
 #: The running job, if any.
 _current_job: Job | None = None
 
-#: Whether the user knows that there is no helper.
+#: Whether this warning was shown.
 _has_said_no_helper = False
 
 
@@ -101,7 +103,7 @@ class Job:
         self._show_progress(context, Step(0.0, "starting"))
 
     def advance(self, context: bpy.types.Context) -> bool:
-        """Hear what the helper says, and go on with the job if it waits for nothing.
+        """Poll the helper, and run steps of the job until it waits for the helper again.
 
         Returns
         -------
@@ -136,7 +138,7 @@ class Job:
         return False
 
     def finish(self, context: bpy.types.Context) -> bool:
-        """Go on until the job is done or stopped, and return whether it is done."""
+        """Run until the job is done or stopped, and return whether it is done."""
         while self.stop_reason is None:
             if self.advance(context):
                 return True
@@ -145,7 +147,7 @@ class Job:
 
     @contextmanager
     def _waiting(self, context: bpy.types.Context) -> Iterator[None]:
-        """Show that Blender is busy, and say once why if the user has not chosen so."""
+        """Show the wait cursor. Warn once if there is no helper although the preferences ask for one."""
         global _has_said_no_helper
         if uses_helper(context) and not _has_said_no_helper:
             self.note, _has_said_no_helper = NO_HELPER, True
@@ -345,13 +347,15 @@ class DialogJobMixin(ModalJobMixin):
 
 
 class FileJobMixin(DialogJobMixin):
-    """Mixin of operators that ask for a file, unless `skip_browser` is set."""
+    """Mixin of operators that ask for a file, by default one to write, unless `skip_browser` is set."""
 
-    skip_browser: bpy.props.BoolProperty(
-        name="Skip Browser",
-        description="Start without a file browser",
-        options={"HIDDEN", "SKIP_SAVE"},
+    skip_browser: toggle(
+        "Skip Browser", "Start without a file browser", options={"HIDDEN", "SKIP_SAVE"}
     )
+
+    def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
+        """Ask for the path of the file."""
+        return None if self.skip_browser else ExportHelper.invoke(self, context, event)
 
     def take_answer(self, context: bpy.types.Context) -> None:
         self.skip_browser = True

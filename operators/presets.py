@@ -24,35 +24,25 @@ from ..rosy_addon.preset_files.store import (
 from ..rosy_addon.scene.files import user_presets_folder
 from ..rosy_addon.scene.look_properties import read_look
 from ..rosy_addon.ui import preset_library
+from ..rosy_addon.ui.property_makers import file_filter, text, toggle
 from ..rosy_addon.viewport.view3d import redraw
 from .base import Condition, RosyOperator
-
-#: Arguments of properties that several operators have.
-PRESET_ARGUMENTS = {
-    "name": "Preset",
-    "description": "Name of the preset. Empty: the active preset of the scene",
-}
-DESCRIPTION_ARGUMENTS = {
-    "name": "Description",
-    "description": "What the look is like, or what it is for",
-    "maxlen": MAX_DESCRIPTION_LENGTH,
-}
-REPLACE_ARGUMENTS = {
-    "name": "Replace Existing",
-    "description": "Replace your preset of the same name",
-    "options": {"SKIP_SAVE"},
-}
 
 HAS_USER_PRESETS = Condition(
     lambda _: preset_library.user_preset_keys(), "You have no presets yet: save one first"
 )
 
 
-def _draw_name_and_description(operator: Any) -> None:
-    """Draw the name and description of a preset in an operator's dialog."""
-    operator.layout.use_property_split = True
-    operator.layout.prop(operator, "name")
-    operator.layout.prop(operator, "sentence")
+def _preset_property(search: Any) -> Any:
+    """Return the property of the preset that an operator acts on."""
+    return text(
+        "Preset", "Name of the preset. Empty: the active preset of the scene", search=search
+    )
+
+
+def _replace_property() -> Any:
+    """Return the switch that lets an operator replace a preset of the user."""
+    return toggle("Replace Existing", "Replace your preset of the same name", options={"SKIP_SAVE"})
 
 
 def _target_preset(operator: Any, context: bpy.types.Context) -> str:
@@ -67,9 +57,9 @@ class ROSY_OT_preset_apply(RosyOperator, bpy.types.Operator):
     bl_label = "Apply Preset"
     bl_options = {"REGISTER", "UNDO"}
 
-    preset: bpy.props.StringProperty(
-        name="Preset",
-        description="Name of a preset, or path of a .json file",
+    preset: text(
+        "Preset",
+        "Name of a preset, or path of a .json file",
         search=preset_library.search_presets,
         search_options={"SUGGESTION"},
     )
@@ -78,27 +68,49 @@ class ROSY_OT_preset_apply(RosyOperator, bpy.types.Operator):
         preset_library.apply_preset(context.scene.rosy, self.preset)
 
 
-class ROSY_OT_preset_save(RosyOperator, bpy.types.Operator):
+class _DescribedPreset(RosyOperator):
+    """Mixin of operators that ask for the name and the description of a preset."""
+
+    #: The button that confirms the dialog.
+    confirm_text = ""
+
+    name: text("Name", "Name of the preset", maxlen=MAX_NAME_LENGTH)
+    sentence: text(
+        "Description",
+        "What the look is like, or what it is for",
+        maxlen=MAX_DESCRIPTION_LENGTH,
+    )
+
+    def ask(self, context: bpy.types.Context, entry: preset_library.PresetEntry | None) -> set[str]:
+        """Open the dialog with the name and the description of a preset, if there is one."""
+        if entry is not None:
+            self.name, self.sentence = entry.preset.name, entry.preset.description
+        return context.window_manager.invoke_props_dialog(
+            self, width=400, confirm_text=self.confirm_text
+        )
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.layout.use_property_split = True
+        self.layout.prop(self, "name")
+        self.layout.prop(self, "sentence")
+
+
+class ROSY_OT_preset_save(_DescribedPreset, bpy.types.Operator):
     """Save the look of this scene as one of your presets"""
 
     bl_idname = "rosy.preset_save"
     bl_label = "Save Preset"
     bl_options = {"REGISTER"}
+    confirm_text = "Save"
 
-    name: bpy.props.StringProperty(
-        name="Name", description="Name of the preset", maxlen=MAX_NAME_LENGTH
-    )
-    sentence: bpy.props.StringProperty(**DESCRIPTION_ARGUMENTS)
-    replace: bpy.props.BoolProperty(**REPLACE_ARGUMENTS)
+    replace: _replace_property()
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         entry = preset_library.active_entry(context.scene.rosy)
-        if entry is not None and entry.is_user:
-            self.name, self.sentence = entry.preset.name, entry.preset.description
-        return context.window_manager.invoke_props_dialog(self, width=400, confirm_text="Save")
+        return self.ask(context, entry if entry is not None and entry.is_user else None)
 
     def draw(self, context: bpy.types.Context) -> None:
-        _draw_name_and_description(self)
+        super().draw(context)
         if _is_user_preset(self.name):
             self.layout.label(text="You already have a preset of this name", icon="INFO")
             self.layout.prop(self, "replace")
@@ -107,7 +119,7 @@ class ROSY_OT_preset_save(RosyOperator, bpy.types.Operator):
         settings = context.scene.rosy
         preset = Preset(self.name.strip(), self.sentence.strip(), read_look(settings))
         settings.preset_name = save_preset(preset, user_presets_folder(), replace=self.replace)
-        self.report({"INFO"}, f"Saved preset '{preset.name}'")
+        self.report_done(f"Saved preset '{preset.name}'")
         redraw()
 
 
@@ -119,35 +131,26 @@ def _is_user_preset(name: str) -> bool:
         return False
 
 
-class ROSY_OT_preset_rename(RosyOperator, bpy.types.Operator):
+class ROSY_OT_preset_rename(_DescribedPreset, bpy.types.Operator):
     """Change the name or the description of one of your presets"""
 
     bl_idname = "rosy.preset_rename"
     bl_label = "Rename Preset"
     bl_options = {"REGISTER"}
+    confirm_text = "Rename"
     conditions = (HAS_USER_PRESETS,)
 
-    preset: bpy.props.StringProperty(search=preset_library.search_user_presets, **PRESET_ARGUMENTS)
-    name: bpy.props.StringProperty(
-        name="Name", description="New name of the preset", maxlen=MAX_NAME_LENGTH
-    )
-    sentence: bpy.props.StringProperty(**DESCRIPTION_ARGUMENTS)
+    preset: _preset_property(preset_library.search_user_presets)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        entry = preset_library.entries().get(_target_preset(self, context))
-        if entry is not None:
-            self.name, self.sentence = entry.preset.name, entry.preset.description
-        return context.window_manager.invoke_props_dialog(self, width=400, confirm_text="Rename")
-
-    def draw(self, context: bpy.types.Context) -> None:
-        _draw_name_and_description(self)
+        return self.ask(context, preset_library.entries().get(_target_preset(self, context)))
 
     def act(self, context: bpy.types.Context) -> None:
         old, name = _target_preset(self, context), self.name.strip()
         old_name = preset_library.preset_name(old)
         new = rename_preset(old, name, self.sentence.strip(), user_presets_folder())
         preset_library.rename_references(old, new)
-        self.report({"INFO"}, f"Renamed preset '{old_name}' to '{name}'")
+        self.report_done(f"Renamed preset '{old_name}' to '{name}'")
         redraw()
 
 
@@ -159,7 +162,7 @@ class ROSY_OT_preset_remove(RosyOperator, bpy.types.Operator):
     bl_options = {"REGISTER"}
     conditions = (HAS_USER_PRESETS,)
 
-    preset: bpy.props.StringProperty(search=preset_library.search_user_presets, **PRESET_ARGUMENTS)
+    preset: _preset_property(preset_library.search_user_presets)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         name = preset_library.preset_name(_target_preset(self, context))
@@ -176,7 +179,7 @@ class ROSY_OT_preset_remove(RosyOperator, bpy.types.Operator):
         key = _target_preset(self, context)
         name = preset_library.preset_name(key)
         remove_preset(key, user_presets_folder())
-        self.report({"INFO"}, f"Deleted preset '{name}'")
+        self.report_done(f"Deleted preset '{name}'")
         redraw()
 
 
@@ -188,13 +191,13 @@ class ROSY_OT_preset_import(RosyOperator, bpy.types.Operator, ImportHelper):
     bl_options = {"REGISTER"}
 
     filename_ext = ".json"
-    filter_glob: bpy.props.StringProperty(default="*.json", options={"HIDDEN"})
-    replace: bpy.props.BoolProperty(**REPLACE_ARGUMENTS)
+    filter_glob: file_filter(".json")
+    replace: _replace_property()
 
     def act(self, context: bpy.types.Context) -> None:
         preset = read_preset(bpy.path.abspath(self.filepath))
         save_preset(preset, user_presets_folder(), replace=self.replace)
-        self.report({"INFO"}, f"Added preset '{preset.name}' to your presets")
+        self.report_done(f"Added preset '{preset.name}' to your presets")
         redraw()
 
 
@@ -206,8 +209,8 @@ class ROSY_OT_preset_export(RosyOperator, bpy.types.Operator, ExportHelper):
     bl_options = {"REGISTER"}
 
     filename_ext = ".json"
-    filter_glob: bpy.props.StringProperty(default="*.json", options={"HIDDEN"})
-    preset: bpy.props.StringProperty(search=preset_library.search_presets, **PRESET_ARGUMENTS)
+    filter_glob: file_filter(".json")
+    preset: _preset_property(preset_library.search_presets)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         self.filepath = f"{Path(_target_preset(self, context)).stem}.json"
@@ -216,14 +219,4 @@ class ROSY_OT_preset_export(RosyOperator, bpy.types.Operator, ExportHelper):
     def act(self, context: bpy.types.Context) -> None:
         path = Path(bpy.path.abspath(self.filepath))
         write_preset(path, load_preset(_target_preset(self, context), user_presets_folder()))
-        self.report({"INFO"}, f"Wrote {path}")
-
-
-CLASSES = (
-    ROSY_OT_preset_apply,
-    ROSY_OT_preset_save,
-    ROSY_OT_preset_rename,
-    ROSY_OT_preset_remove,
-    ROSY_OT_preset_import,
-    ROSY_OT_preset_export,
-)
+        self.report_done(f"Wrote {path}")

@@ -9,52 +9,55 @@ from ..rosy_addon.ui.singularity_handles import VIEW3D_TOOL_rosy_singularities
 from ..rosy_addon.viewport import brush_mouse, session
 from . import (
     bake,
-    bake_animation,
-    bake_occlusion,
     bake_texture,
     field_comb,
     field_compare,
     field_convert,
-    field_export,
+    field_files,
     field_generate,
-    field_import,
-    field_singularities,
     modal_job,
-    pictures,
     presets,
     singularities,
     strokes,
     turntable,
     viewport,
 )
+
+#: Types whose subclasses are registered.
+REGISTRABLE = (bpy.types.Operator, bpy.types.PropertyGroup, bpy.types.FileHandler)
 
 #: Modules with operators, in the order of registration.
 MODULES = (
     field_generate,
     field_convert,
-    field_import,
-    field_export,
+    field_files,
     singularities,
-    field_singularities,
     field_comb,
     field_compare,
     strokes,
-    bake_occlusion,
     bake,
-    bake_animation,
     bake_texture,
     turntable,
     viewport,
-    pictures,
     presets,
+)
+
+
+#: The classes that these modules define for Blender, in their order. Mixins are not registered.
+CLASSES = tuple(
+    value
+    for module in MODULES
+    for value in vars(module).values()
+    if isinstance(value, type)
+    and issubclass(value, REGISTRABLE)
+    and value.__module__ == module.__name__
 )
 
 
 def register() -> None:
     """Register the operators, and the tools that call them."""
-    for module in MODULES:
-        for cls in module.CLASSES:
-            bpy.utils.register_class(cls)
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
     bpy.utils.register_tool(VIEW3D_TOOL_rosy_comb, separator=True)
     bpy.utils.register_tool(VIEW3D_TOOL_rosy_singularities, after={VIEW3D_TOOL_rosy_comb.bl_idname})
     bpy.utils.register_tool(VIEW3D_TOOL_rosy_comb_sculpt, separator=True)
@@ -68,6 +71,5 @@ def unregister() -> None:
     bpy.utils.unregister_tool(VIEW3D_TOOL_rosy_singularities)
     bpy.utils.unregister_tool(VIEW3D_TOOL_rosy_comb)
     brush_mouse.unregister()
-    for module in reversed(MODULES):
-        for cls in reversed(module.CLASSES):
-            bpy.utils.unregister_class(cls)
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

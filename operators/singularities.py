@@ -1,19 +1,36 @@
-"""Operator: show the singularities of fields, in the overlay or as points."""
+"""Operators: show the singularities of fields, and move them, by numbers or with the mouse in the 3D view."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import bpy
 
-from ..rosy_addon.core.errors import counted
+from ..rosy_addon.core.errors import REPORTED_ERRORS, counted
 from ..rosy_addon.field.singularities import format_index
+from ..rosy_addon.field.singularity_changes import OUTSIDE, move_index
 from ..rosy_addon.scene.field_attributes import has_field
+from ..rosy_addon.scene.mesh_fields import read_mesh_field
+from ..rosy_addon.scene.meshes import mesh_surface
 from ..rosy_addon.scene.singularity_points import (
     add_singularity_points,
     read_singularities,
     remove_singularity_points,
 )
-from ..rosy_addon.ui import overlay
-from .base import ACTIVE_FIELD, IDLE, RosyOperator, selected_mesh_objects
+from ..rosy_addon.ui import overlay, singularity_handles
+from ..rosy_addon.ui.operator_settings import draw_settings
+from ..rosy_addon.ui.property_makers import choice, fraction, integer, toggle
+from ..rosy_addon.worker.job import Call, Steps
+from .base import (
+    ACTIVE_FIELD,
+    EDITABLE_FIELD,
+    IDLE,
+    IN_3D_VIEW,
+    RosyOperator,
+    selected_mesh_objects,
+)
+from .modal_job import ActiveMeshMixin, ModalJobMixin
 
 
 class ROSY_OT_singularities(RosyOperator, bpy.types.Operator):
@@ -24,10 +41,10 @@ class ROSY_OT_singularities(RosyOperator, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
     conditions = (IDLE, ACTIVE_FIELD)
 
-    show: bpy.props.EnumProperty(
-        name="Show",
-        description="How the singularities are shown",
-        items=[
+    show: choice(
+        "Show",
+        "How the singularities are shown",
+        [
             ("OVERLAY", "Overlay", "Dots and indices in the 3D view"),
             ("POINTS", "Points", "A point object with an attribute 'index', in units of 1/N"),
             ("BOTH", "Both", "Overlay and points"),
@@ -54,7 +71,7 @@ class ROSY_OT_singularities(RosyOperator, bpy.types.Operator):
             f"{format_index(int(singularities.index.sum()), singularities.degree)}"
             for obj, singularities in singularities_by_object.items()
         )
-        self.report({"INFO"}, f"{counted(count, 'singularity', 'singularities')}; {total}")
+        self.report_done(f"{counted(count, 'singularity', 'singularities')}; {total}")
 
 
 def _hide(context: bpy.types.Context, objects: list[bpy.types.Object]) -> None:
@@ -64,4 +81,110 @@ def _hide(context: bpy.types.Context, objects: list[bpy.types.Object]) -> None:
         remove_singularity_points(context.scene, obj)
 
 
-CLASSES = (ROSY_OT_singularities,)
+def _reach() -> Any:
+    """Return the property of the reach; the tool's operator passes its reach on to the one that it starts."""
+    return fraction(
+        "Reach",
+        "Distance over which directions change, as a fraction of the size of the mesh. At least as "
+        "far as the singularity moves",
+        soft_max=0.5,
+        default=0.1,
+    )
+
+
+class ROSY_OT_field_singularities(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
+    """Move a singularity of the active mesh's field to another vertex, merge it with another one, split it, or make a pair"""
+
+    bl_idname = "rosy.field_singularities"
+    bl_label = "Move Singularity"
+    bl_options = {"REGISTER", "UNDO"}
+
+    source: integer(
+        "From",
+        "Vertex whose index is moved. Without a singularity, it gets the opposite index. "
+        "-1: beyond the border",
+        min=OUTSIDE,
+        default=OUTSIDE,
+    )
+    target: integer(
+        "To",
+        "Vertex to which the index is added. -1: beyond the border",
+        min=OUTSIDE,
+        default=OUTSIDE,
+    )
+    index: integer(
+        "Index",
+        "What is moved, in units of 1/N. 0: the whole index",
+        soft_min=-4,
+        soft_max=4,
+    )
+    reach: _reach()
+
+    def begin(self, context: bpy.types.Context) -> Steps[None]:
+        """Change the field of the active mesh."""
+        mesh = selected_mesh_objects(context)[0].data
+        surface = mesh_surface(mesh)
+        field = read_mesh_field(mesh, surface=surface)
+        reach = self.reach * surface.extent
+        inputs = surface, field, self.source, self.target, self.index, reach
+        field = yield Call(move_index, inputs)
+        self.store_fields(context, {mesh: replace(field, source_directions=None)})
+
+    def draw(self, context: bpy.types.Context) -> None:
+        draw_settings(self.layout, self, "source", "target", "index", "reach")
+
+
+class ROSY_OT_drag_singularity(RosyOperator, bpy.types.Operator):
+    """Drag a singularity along the surface, onto another one to merge them, or with Ctrl from any vertex to make a pair"""
+
+    bl_idname = "rosy.drag_singularity"
+    bl_label = "Drag Singularity"
+    bl_options = {"INTERNAL"}
+    conditions = (IN_3D_VIEW, *EDITABLE_FIELD)
+
+    make_pair: toggle(
+        "Make Pair",
+        "Start at any vertex, and leave the opposite index there",
+        options={"SKIP_SAVE"},
+    )
+    reach: _reach()
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        obj = selected_mesh_objects(context)[0]
+        mouse = event.mouse_region_x, event.mouse_region_y
+        try:
+            self._drag = singularity_handles.start_drag(context, obj, mouse, self.make_pair)
+        except REPORTED_ERRORS as error:
+            return self.report_error(error)
+        if self._drag is None:
+            return {"CANCELLED", "PASS_THROUGH"}
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        mouse = event.mouse_region_x, event.mouse_region_y
+        if event.type in {"MOUSEMOVE", "INBETWEEN_MOUSEMOVE"}:
+            self._drag.move(context, mouse)
+        elif event.type in {"ESC", "RIGHTMOUSE"}:
+            self.cancel(context)
+            return {"CANCELLED"}
+        elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
+            # A busy Blender may have dropped the last moves.
+            self._drag.move(context, mouse)
+            source, target = self._drag.source, self._drag.target
+            self.cancel(context)
+            if target is None or target == source:
+                return {"CANCELLED"}
+            index = 1 if self.make_pair else 0
+            try:
+                bpy.ops.rosy.field_singularities(
+                    "INVOKE_DEFAULT", source=source, target=target, index=index, reach=self.reach
+                )
+            except RuntimeError as error:  # reported by that operator
+                return self.report_operator_error(error)
+            return {"FINISHED"}
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Stop drawing. Blender calls this if the window is closed or a file is opened."""
+        self._drag.stop()

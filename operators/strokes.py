@@ -15,6 +15,7 @@ from ..rosy_addon.scene.stroke_objects import (
     target_objects,
 )
 from ..rosy_addon.ui.properties import STROKE_CAMERA_ITEMS, STROKE_KIND_ITEMS
+from ..rosy_addon.ui.property_makers import choice, file_filter, text, toggle
 from ..rosy_addon.worker.job import Steps
 from .bake import view_camera
 from .base import IDLE, OBJECT_MODE, VISIBLE_FIELD, Condition, RosyOperator, sync_suffix
@@ -29,29 +30,23 @@ class ROSY_OT_strokes(DialogJobMixin, bpy.types.Operator):
     bl_options = {"UNDO"}
     conditions = (OBJECT_MODE, IDLE, VISIBLE_FIELD)
 
-    kind: bpy.props.EnumProperty(
-        name="Make",
-        description="Type of object or file. Default: the setting of the scene",
-        items=STROKE_KIND_ITEMS,
+    kind: choice(
+        "Make", "Type of object or file. Default: the setting of the scene", STROKE_KIND_ITEMS
     )
-    camera: bpy.props.EnumProperty(
-        name="Camera",
-        description="Viewpoint of the strokes. Default: the setting of the scene",
-        items=STROKE_CAMERA_ITEMS,
+    camera: choice(
+        "Camera", "Viewpoint of the strokes. Default: the setting of the scene", STROKE_CAMERA_ITEMS
     )
-    filepath: bpy.props.StringProperty(
-        name="File",
-        description="Path of the .svg, .ply, .obj or .csv file. Default: the setting of the scene",
+    filepath: text(
+        "File",
+        "Path of the .svg, .ply, .obj or .csv file. Default: the setting of the scene",
         subtype="FILE_PATH",
         options={"SKIP_SAVE"},
     )
-    filter_glob: bpy.props.StringProperty(
-        default=";".join(f"*{suffix}" for suffix in DRAWING_SUFFIXES), options={"HIDDEN"}
-    )
+    filter_glob: file_filter(*DRAWING_SUFFIXES)
     check_existing: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
-    replace: bpy.props.BoolProperty(
-        name="Replace Edited",
-        description="Do not ask before strokes are replaced that were edited",
+    replace: toggle(
+        "Replace Edited",
+        "Do not ask before strokes are replaced that were edited",
         options={"HIDDEN", "SKIP_SAVE"},
     )
 
@@ -87,7 +82,7 @@ class ROSY_OT_strokes(DialogJobMixin, bpy.types.Operator):
         return not self.filepath.lower().endswith(DRAWING_SUFFIXES) and sync_suffix(self, ".svg")
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Show no settings in the file browser: those of the panel apply."""
+        """Show no settings in the file browser: the settings of the panel apply."""
 
     def begin(self, context: bpy.types.Context) -> Steps[StrokeResult]:
         return draw_strokes.begin(
@@ -101,9 +96,8 @@ class ROSY_OT_strokes(DialogJobMixin, bpy.types.Operator):
 
     def finish(self, context: bpy.types.Context, result: StrokeResult) -> None:
         destination = f"'{result.obj.name}'" if result.path is None else str(result.path)
-        self.report(
-            {"INFO"},
-            f"{counted(len(result.drawing.strokes), 'stroke')} from '{result.camera}': {destination}",
+        self.report_done(
+            f"{counted(len(result.drawing.strokes), 'stroke')} from '{result.camera}': {destination}"
         )
         self.report_warnings(*result.notes)
 
@@ -130,7 +124,4 @@ class ROSY_OT_strokes_remove(RosyOperator, bpy.types.Operator):
 
     def act(self, context: bpy.types.Context) -> None:
         count = remove_strokes(context.scene)
-        self.report({"INFO"}, f"Removed {counted(count, 'object')} with strokes")
-
-
-CLASSES = (ROSY_OT_strokes, ROSY_OT_strokes_remove)
+        self.report_done(f"Removed {counted(count, 'object')} with strokes")

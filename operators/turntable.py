@@ -14,6 +14,7 @@ from ..rosy_addon.jobs.render_turntable import render_turntable
 from ..rosy_addon.projection.camera import check_size
 from ..rosy_addon.rendering.turntable import check_video_path
 from ..rosy_addon.ui.preferences import worker_count
+from ..rosy_addon.ui.property_makers import choice, file_filter, integer, real, toggle
 from ..rosy_addon.worker.job import Steps
 from .base import ACTIVE_FIELD, IDLE, selected_mesh_objects, sync_suffix
 from .modal_job import FileJobMixin
@@ -35,48 +36,31 @@ class ROSY_OT_turntable(FileJobMixin, bpy.types.Operator, ExportHelper):
     cancel_note = "no video was written"
 
     filename_ext = ".mp4"
-    filter_glob: bpy.props.StringProperty(default="*.mp4;*.gif", options={"HIDDEN"})
-    film: bpy.props.EnumProperty(
-        name="Format",
-        description="Format of the video",
-        items=[(".mp4", "MP4", "H.264"), (".gif", "GIF", "256 colors, for web pages")],
+    filter_glob: file_filter(".mp4", ".gif")
+    film: choice(
+        "Format",
+        "Format of the video",
+        [(".mp4", "MP4", "H.264"), (".gif", "GIF", "256 colors, for web pages")],
     )
-    pictures: bpy.props.IntProperty(
-        name="Pictures", description="Pictures in a full turn", default=72, min=2, max=10_000
-    )
-    rate: bpy.props.FloatProperty(
-        name="Rate", description="Pictures per second", default=24.0, min=0.1, max=120.0
-    )
-    width: bpy.props.IntProperty(
-        name="Width",
-        description="Width of the video",
-        **SIDE,
-    )
-    height: bpy.props.IntProperty(
-        name="Height",
-        description="Height of the video",
-        **SIDE,
-    )
-    elevation: bpy.props.FloatProperty(
-        name="Elevation",
-        description="Angle of the camera above the horizon",
+    pictures: integer("Pictures", "Pictures in a full turn", default=72, min=2, max=10_000)
+    rate: real("Rate", "Pictures per second", default=24.0, min=0.1, max=120.0)
+    width: integer("Width", "Width of the video", **SIDE)
+    height: integer("Height", "Height of the video", **SIDE)
+    elevation: real(
+        "Elevation",
+        "Angle of the camera above the horizon",
         subtype="ANGLE",
         default=0.35,
         min=-1.5,
         max=1.5,
     )
-    still: bpy.props.BoolProperty(
-        name="Still Camera",
-        description="Leave the camera where it is, so that only streaks drift: a look with Flow",
+    still: toggle(
+        "Still Camera", "Leave the camera where it is, so that only streaks drift: a look with Flow"
     )
 
     def check(self, context: bpy.types.Context) -> bool:
         """Set the suffix of the file name to the video format's in the file browser."""
         return sync_suffix(self, self.film)
-
-    def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
-        """Ask for the path of the video."""
-        return None if self.skip_browser else ExportHelper.invoke(self, context, event)
 
     def begin(self, context: bpy.types.Context) -> Steps[Path]:
         path = Path(bpy.path.abspath(self.filepath))
@@ -98,7 +82,4 @@ class ROSY_OT_turntable(FileJobMixin, bpy.types.Operator, ExportHelper):
         return selected_mesh_objects(context)[:1]
 
     def finish(self, context: bpy.types.Context, result: Path) -> None:
-        self.report({"INFO"}, f"Wrote {result}")
-
-
-CLASSES = (ROSY_OT_turntable,)
+        self.report_done(f"Wrote {result}")

@@ -6,6 +6,7 @@ import bpy
 
 from ..rosy_addon.compositor.look import has_flow
 from ..rosy_addon.ui import live_views
+from ..rosy_addon.ui.property_makers import choice
 from ..rosy_addon.viewport import session
 from .base import IN_3D_VIEW, Condition, RosyOperator
 
@@ -18,20 +19,20 @@ class ROSY_OT_viewport(RosyOperator, bpy.types.Operator):
     bl_options = {"REGISTER"}
     conditions = (IN_3D_VIEW,)
 
-    show: bpy.props.EnumProperty(
-        name="Show",
-        description="Whether this view draws the fields",
-        items=[
+    show: choice(
+        "Show",
+        "Whether this view draws the fields",
+        [
             ("TOGGLE", "Toggle", "Switch on or off"),
             ("ON", "On", "Draw the fields in this view"),
             ("OFF", "Off", "Do not draw the fields in this view"),
         ],
     )
 
-    device: bpy.props.EnumProperty(
-        name="Device",
-        description="Device that draws the fields",
-        items=[
+    device: choice(
+        "Device",
+        "Device that draws the fields",
+        [
             (
                 "AUTO",
                 "Graphics Card",
@@ -67,6 +68,3 @@ class ROSY_OT_flow_play(RosyOperator, bpy.types.Operator):
 
     def act(self, context: bpy.types.Context) -> None:
         session.play_flow(not session.is_flow_playing())
-
-
-CLASSES = (ROSY_OT_viewport, ROSY_OT_flow_play)

@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -28,28 +28,22 @@ _LATEX = {
 }
 
 
-class _Column(NamedTuple):
-    """A column of the table: its title, the key of its values, and the function that formats them."""
-
-    title: str
-    key: str
-    to_text: Callable[[Any], str] = str
-
-
-_COLUMNS = (
-    _Column("degree", "degree"),
-    _Column("energy", "energy", "{:.4g}".format),
-    _Column("singularities", "singularities"),
-    _Column("positive", "positive"),
-    _Column("negative", "negative"),
-)
-_DIFFERENCE_COLUMNS = (
-    _Column("matched", "matched"),
-    _Column("mean (deg)", "mean", format_degrees),
-    _Column("95 % (deg)", "p95", format_degrees),
-    _Column("largest (deg)", "max", format_degrees),
-    _Column("on face", "worst_face"),
-)
+#: The columns of the table by their titles: the key of the values, and the function that formats them.
+_COLUMNS: dict[str, tuple[str, Callable[[Any], str]]] = {
+    "degree": ("degree", str),
+    "energy": ("energy", "{:.4g}".format),
+    "singularities": ("singularities", str),
+    "positive": ("positive", str),
+    "negative": ("negative", str),
+}
+#: The further columns of differences from the first field.
+_DIFFERENCE_COLUMNS: dict[str, tuple[str, Callable[[Any], str]]] = {
+    "matched": ("matched", str),
+    "mean (deg)": ("mean", format_degrees),
+    "95 % (deg)": ("p95", format_degrees),
+    "largest (deg)": ("max", format_degrees),
+    "on face": ("worst_face", str),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,12 +118,10 @@ class Comparison:
 
     def cells(self) -> list[list[str]]:
         """Return the table as texts: a row of titles, then one for each field; "-" for missing values."""
-        columns = _COLUMNS + (_DIFFERENCE_COLUMNS if self.differences else ())
-        cells = [["field", *(column.title for column in columns)]]
+        columns = _COLUMNS | (_DIFFERENCE_COLUMNS if self.differences else {})
+        cells = [["field", *columns]]
         for row in self.rows:
-            values = [
-                column.to_text(row[column.key]) if column.key in row else "-" for column in columns
-            ]
+            values = [write(row[key]) if key in row else "-" for key, write in columns.values()]
             cells.append([row["title"], *values])
         return cells
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -12,9 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compositor.shading import lights_of
-from ..core.errors import RosyError
 from ..core.file_io import write_bytes
-from ..core.settings import settings_of
 from ..field.field import Field
 from ..field.surface import Surface
 from ..field.up_axis import UP_AXIS_MATRIX
@@ -151,7 +148,7 @@ def strokes(
     >>> drawing.svg.startswith("<?xml") and len(drawing) > 4
     True
     """
-    stroke_style = _style_of(style)
+    stroke_style = StrokeStyle().with_settings(style)
     check_light(stroke_style.light, surface.name)
     pen = Pen(width, tuple(colors), None if plotter else paper, millimeters, plotter)
     return draw_strokes(surface, field, stroke_style, pen, view, size, orthographic)
@@ -173,14 +170,3 @@ def draw_strokes(
     )
     drawing = draw_instances([instance], camera, style, lights=lights_of(style, ()))
     return Drawing(drawing, camera, pen, surface.up)
-
-
-def _style_of(values: dict[str, Any]) -> StrokeStyle:
-    """Return the style of strokes with some settings. The unit follows from the spacing."""
-    known = [name for name in settings_of(StrokeStyle) if name != "unit"]
-    unknown = sorted(set(values) - set(known))
-    if unknown:
-        raise RosyError(f"unknown setting '{unknown[0]}' of strokes: choose {', '.join(known)}")
-    if "distance" in values:
-        values = {**values, "unit": "world"}
-    return replace(StrokeStyle(), **values)

@@ -47,7 +47,7 @@ def form(surface: Surface, degree: int = 4) -> Field:
 def smoothest(surface: Surface, degree: int = 4) -> Field:
     """Make the field of the lowest Dirichlet energy, which has few singularities.
 
-    The method is that of Knöppel, Crane, Pinkall and Schröder, "Globally Optimal Direction Fields"
+    Method: Knöppel, Crane, Pinkall and Schröder, "Globally Optimal Direction Fields"
     (SIGGRAPH 2013).
 
     Parameters
@@ -237,7 +237,7 @@ def prescribed(
 ) -> Field:
     """Make the smoothest field that has given singularities, and no other ones.
 
-    The method is that of Crane, Desbrun and Schröder, "Trivial Connections on Discrete Surfaces" (SGP
+    Method: Crane, Desbrun and Schröder, "Trivial Connections on Discrete Surfaces" (SGP
     2010). On a closed surface, the indices have to add up to N times the Euler characteristic.
 
     Parameters
@@ -246,7 +246,7 @@ def prescribed(
     singularities : mapping of int to int, or path-like
         The indices of singular vertices, in units of 1/N; or a file of singularities, ``.sings``.
     degree : int, optional
-        N, from 1 to 12. By default that of the file, or 4.
+        N, from 1 to 12. By default the degree of the file, or 4.
     vectors : (F, 3) array_like or Field, optional
         Guides, zero where there is none. On each connected part, the field is turned as a whole to be near
         to them; by default, to the edges of the mesh.

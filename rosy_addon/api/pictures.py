@@ -287,7 +287,7 @@ def picture_look(
         If a setting is not possible, there are two tone sources, or the look uses the lights of a
         scene.
     """
-    look = Look() if preset is None else load_preset(Path(preset), default_user_folder()).look
+    look = preset_look(preset)
     if look.supersampling == Look().supersampling:
         look = replace(look, supersampling=SUPERSAMPLING)
     look = look.with_settings(dict(settings))
@@ -297,6 +297,11 @@ def picture_look(
         raise RosyError(f"{name}: choose one source of the tone, {' or '.join(given)}")
     look = replace(look, hue="values") if has_color_values else look
     return replace(look, tone=given[0]) if given else look
+
+
+def preset_look(preset: str | os.PathLike[str] | None) -> Look:
+    """Return the look of a preset; the default look if there is none."""
+    return Look() if preset is None else load_preset(Path(preset), default_user_folder()).look
 
 
 def default_encoder(path: Path, encode: Encoder | None) -> Encoder | None:

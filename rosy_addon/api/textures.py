@@ -19,7 +19,6 @@ from ..core.errors import RosyError
 from ..field.field import Field
 from ..field.frames import unit_direction
 from ..field.surface import Surface
-from ..preset_files.store import default_user_folder, load_preset
 from ..projection.gbuffer import MeshInstance
 from ..surface_texture.draw import (
     CONTENTS,
@@ -30,7 +29,7 @@ from ..surface_texture.draw import (
 )
 from .field import warn
 from .generators import uv_map
-from .pictures import corner_numbers, upright_instance
+from .pictures import corner_numbers, preset_look, upright_instance
 
 #: Placeholder for the number of the tile in a file name, as in Blender.
 UDIM_TOKEN = "<UDIM>"
@@ -235,8 +234,7 @@ def texture_look(
     RosyError
         If a setting is not possible, or there are numbers to show as hues, and the look has ink.
     """
-    look = Look() if preset is None else load_preset(Path(preset), default_user_folder()).look
-    look = look.with_settings(dict(settings))
+    look = preset_look(preset).with_settings(settings)
     if has_color_values and is_hatched(look):
         raise RosyError("textures of hatching show no numbers as colors: choose the ink 'soft'")
     return replace(look, hue="values") if has_color_values else look

@@ -14,7 +14,7 @@ from ..core.progress import listening
 from ..gpu.select import RENDER_DEVICES
 from ..preset_files.store import SHIPPED_FOLDER, find_preset_file
 from ..worker.frame_workers import parse_frames, run_local
-from .options import Options, add_subcommand, parse_size, user_presets_folder
+from .options import Options, add_subcommand, int_between, parse_size, user_presets_folder
 from .scene import open_scene, print_warnings, requested_cameras, requested_objects
 from .streams import print_line
 
@@ -36,13 +36,8 @@ def add_bake_command(subparsers: Any, has_cluster: bool) -> None:
     )
     cameras.add_argument("--all-cameras", action="store_true", help="draw from all cameras")
     parser.add_look_options()
-    parser.add_flow_option()
-    parser.add_argument(
-        "--size", type=parse_size, metavar="WxH", help="size in pixels; by default the scene's"
-    )
-    parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="write the pictures to this folder as .png files"
-    )
+    parser.add_value("--size", "WxH", "size in pixels; by default the scene's", parse_size)
+    parser.add_value("--out", "DIR", "write the pictures to this folder as .png files", Path)
     parser.add_argument(
         "--device",
         choices=list(RENDER_DEVICES),
@@ -50,16 +45,20 @@ def add_bake_command(subparsers: Any, has_cluster: bool) -> None:
         "one (auto); by default as set in the scene",
     )
     parser.add_workers_option()
-    parser.add_argument("--save", action="store_true", help="save the Blender file")
-    parser.add_argument(
+    parser.add_switch("--save", "save the Blender file")
+    parser.add_value(
         "--frames",
-        metavar="A-B[:STEP]",
-        help="draw a picture of each frame from the camera that renders it; pictures that exist and "
+        "A-B[:STEP]",
+        "draw a picture of each frame from the camera that renders it; pictures that exist and "
         "are up to date are kept",
     )
     workers = parser.add_mutually_exclusive_group()
     workers.add_argument(
-        "--jobs", type=int, default=1, metavar="J", help="number of processes for the frames"
+        "--jobs",
+        type=int_between(1, 1024),
+        default=1,
+        metavar="J",
+        help="number of processes for the frames",
     )
     parser.set_defaults(scheduler=None)
     if has_cluster:
@@ -114,8 +113,6 @@ def _check_bake_options(options: Options) -> None:
         raise RosyError("--jobs and --scheduler distribute frames: give --frames A-B")
     if options.frames is not None and options.out is None:
         raise RosyError("--frames writes files: give --out DIR")
-    if options.jobs < 1:
-        raise RosyError(f"--jobs {options.jobs}: expected 1 or more")
     if options.out is not None:
         check_folder(options.out)
 

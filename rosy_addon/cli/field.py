@@ -20,8 +20,8 @@ from ..field.formats.sings import SINGULARITY_SUFFIXES, read_sings
 from ..field.mesh_arrays import SIMULATION_READERS
 from ..field.mesh_io import READERS
 from ..field.rosy_field import check_degree
-from .mesh_field import add_mesh_options, load_mesh_and_field, read_field
-from .options import Options, add_subcommand, float_between, int_between
+from .mesh_field import add_field_file_options, add_mesh_options, load_mesh_and_field, read_field
+from .options import CommandParser, Options, add_subcommand, float_between, int_between
 from .streams import print_line
 
 #: Generators that need nothing but the mesh and a degree.
@@ -32,36 +32,31 @@ def add_field_command(subparsers: Any) -> None:
     """Add the command `field`."""
     parser = add_subcommand(subparsers, "field", run_field)
     add_mesh_options(parser)
-    parser.add_argument(
-        "-o", "--output", required=True, type=Path, metavar="OUT", help=", ".join(WRITE_SUFFIXES)
+    parser.add_output_option("OUT", ", ".join(WRITE_SUFFIXES))
+    parser.add_value(
+        "--to-degree", "N", "convert to this degree, a multiple or a divisor of the field's", int
     )
-    parser.add_argument(
-        "--to-degree",
-        type=int,
-        metavar="N",
-        help="convert to this degree, a multiple or a divisor of the field's",
-    )
-    parser.add_argument(
+    parser.add_value(
         "--turn",
-        type=float_between(-360.0, 360.0),
+        "DEGREES",
+        "rotate all directions by this angle",
+        float_between(-360.0, 360.0),
         default=0.0,
-        metavar="DEGREES",
-        help="rotate all directions by this angle",
     )
-    parser.add_argument(
+    parser.add_value(
         "--smooth",
-        type=float_between(0.0, 10.0),
+        "SHARE",
+        "diffuse the field over this fraction of the size of the mesh",
+        float_between(0.0, 10.0),
         default=0.0,
-        metavar="SHARE",
-        help="diffuse the field over this fraction of the size of the mesh",
     )
-    parser.add_argument(
+    parser.add_value(
         "--cancel-pairs",
-        type=float_between(0.0, 10.0),
-        default=0.0,
-        metavar="SHARE",
-        help="remove pairs of singularities with opposite indices that are nearer than this fraction of the size "
+        "SHARE",
+        "remove pairs of singularities with opposite indices that are nearer than this fraction of the size "
         "of the mesh",
+        float_between(0.0, 10.0),
+        default=0.0,
     )
     parser.add_argument(
         "--magnitude", choices=list(MAGNITUDES), help="replace the lengths of the vectors"
@@ -86,12 +81,12 @@ def add_info_command(subparsers: Any) -> None:
     """Add the command `info`."""
     parser = add_subcommand(subparsers, "info", run_info)
     add_mesh_options(parser)
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument(
+    parser.add_switch("--json", "print one JSON object")
+    parser.add_value(
         "--against",
-        type=Path,
-        metavar="FILE",
-        help="compare with another field file, or with a file of singularities (.sings)",
+        "FILE",
+        "compare with another field file, or with a file of singularities (.sings)",
+        Path,
     )
 
 
@@ -187,12 +182,10 @@ def add_compare_command(subparsers: Any) -> None:
         help=f"a field file ({', '.join(READ_SUFFIXES)}), or what to generate: "
         f"{', '.join(GENERATORS)}. The first one is what the others are compared with",
     )
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        metavar="OUT.pdf|OUT.svg|OUT.png",
-        help="draw the fields, their differences and the table; a .pdf has two pages",
+    parser.add_output_option(
+        "OUT.pdf|OUT.svg|OUT.png",
+        "draw the fields, their differences and the table; a .pdf has two pages",
+        required=False,
     )
     parser.add_argument(
         "--format",
@@ -200,71 +193,35 @@ def add_compare_command(subparsers: Any) -> None:
         default="text",
         help="of the table that is printed (%(default)s)",
     )
-    parser.add_argument(
-        "--degree",
-        type=int,
-        metavar="N",
-        help="degree of generated fields, 1 to 12; by default that of the first field file, or 4",
+    parser.add_degree_option(
+        "degree of generated fields, 1 to 12; by default that of the first field file, or 4"
     )
-    parser.add_argument(
-        "--field-mesh",
-        type=Path,
-        metavar="MESH",
-        help="mesh file that the field files belong to, if it is not MESH; the fields are transferred by "
-        "position",
-    )
-    parser.add_argument(
-        "--undefined", action="store_true", help="treat NaN and infinite vectors as undefined"
-    )
-    parser.add_argument(
+    add_field_file_options(parser)
+    parser.add_value(
         "--match-reach",
+        "SHARE",
+        "largest distance of singularities that match, as a fraction of the size of the mesh (%(default)g)",
+        float_between(0.0, 10.0),
         dest="reach",
-        type=float_between(0.0, 10.0),
-        metavar="SHARE",
-        help="largest distance of singularities that match, as a fraction of the size of the mesh "
-        "(%(default)g)",
     )
-    parser.add_argument(
-        "--lines",
-        choices=LINES,
-        help="lines that are drawn over differences (%(default)s)",
-    )
-    parser.add_argument(
-        "--columns",
-        type=int_between(1, 100),
-        metavar="N",
-        help="panels side by side; by default at most 3",
-    )
-    parser.add_argument(
-        "--width",
-        type=float_between(0.5, 100.0),
-        metavar="INCHES",
-        help="width of the figure (%(default)g)",
-    )
-    parser.add_argument(
-        "--dpi",
-        type=int_between(10, 2400),
-        metavar="N",
-        help="resolution of the pictures (%(default)d)",
-    )
-    parser.add_argument("--caption", metavar="TEXT", help="text below the fields")
-    parser.add_argument(
-        "--scale-bar", metavar="UNIT", help="draw a scale bar, in this unit of the coordinates"
-    )
-    parser.add_argument(
-        "--color-label",
-        metavar="TEXT",
-        help="title of the color bar; by default the name of what is shown",
-    )
+    _add_layout_options(parser)
     parser.add_direction_options()
-    parser.add_argument(
-        "--perspective",
-        dest="orthographic",
-        action="store_false",
-        help="perspective projection instead of orthographic",
-    )
     parser.add_workers_option()
     parser.add_look_options()
+
+
+def _add_layout_options(parser: CommandParser) -> None:
+    """Add the options of the page of a comparison: its layout and its texts."""
+    parser.add_argument(
+        "--lines", choices=LINES, help="lines that are drawn over differences (%(default)s)"
+    )
+    add, count, inches = parser.add_value, int_between(1, 100), float_between(0.5, 100.0)
+    add("--columns", "N", "panels side by side; by default at most 3", count)
+    add("--width", "INCHES", "width of the figure (%(default)g)", inches)
+    add("--dpi", "N", "resolution of the pictures (%(default)d)", int_between(10, 2400))
+    add("--caption", "TEXT", "text below the fields")
+    add("--scale-bar", "UNIT", "draw a scale bar, in this unit of the coordinates")
+    add("--color-label", "TEXT", "title of the color bar; by default the name of what is shown")
 
 
 def run_compare(options: Options) -> None:

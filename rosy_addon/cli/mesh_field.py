@@ -17,34 +17,40 @@ from ..field.rosy_field import check_degree
 from .options import CommandParser, Options, int_between
 
 
-def add_mesh_options(parser: CommandParser, *, allow_scene: bool = False) -> None:
-    """Add MESH, FIELD and the options that generate a field.
+def add_mesh_options(parser: CommandParser) -> None:
+    """Add MESH, FIELD and the options that generate a field."""
+    *suffixes, last = READERS
+    text = f"{', '.join(suffixes)} or {last}"
+    parser.add_argument("mesh", type=Path, metavar="MESH", help=text)
+    add_field_options(parser)
 
-    Parameters
-    ----------
-    parser : CommandParser
-    allow_scene : bool
-        Whether MESH may be a .blend file, or absent.
-    """
-    suffixes = list(READERS)
-    if allow_scene:
-        help_text = f"{', '.join(suffixes)} or .blend; in Blender, by default, the open file"
-        parser.add_argument(
-            "mesh", nargs="?", type=Path, metavar="MESH|SCENE.blend", help=help_text
-        )
-    else:
-        help_text = f"{', '.join(suffixes[:-1])} or {suffixes[-1]}"
-        parser.add_argument("mesh", type=Path, metavar="MESH", help=help_text)
-    parser.add_argument(
-        "field", type=Path, nargs="?", metavar="FIELD", help=", ".join(READ_SUFFIXES)
-    )
+
+def add_field_options(parser: CommandParser) -> None:
+    """Add FIELD and the options that generate a field."""
+    text = ", ".join(READ_SUFFIXES)
+    parser.add_argument("field", type=Path, nargs="?", metavar="FIELD", help=text)
     of_array = ", 1 for an array of vectors" if SIMULATION_READERS else ""
-    parser.add_argument(
-        "--degree",
-        type=int,
-        metavar="N",
-        help=f"degree of the field, 1 to 12; by default that of the field file{of_array}, or 4",
+    parser.add_degree_option(
+        f"degree of the field, 1 to 12; by default that of the field file{of_array}, or 4"
     )
+    add_field_file_options(parser)
+    _add_generator_options(parser)
+    _add_simulation_options(parser)
+
+
+def add_field_file_options(parser: CommandParser) -> None:
+    """Add the options of field files."""
+    parser.add_value(
+        "--field-mesh",
+        "MESH",
+        "mesh file that the field belongs to, if it is not MESH; the field is transferred by position",
+        Path,
+    )
+    parser.add_undefined_option()
+
+
+def _add_generator_options(parser: CommandParser) -> None:
+    """Add the options that generate a field."""
     parser.add_argument(
         "--generate",
         choices=list(GENERATORS),
@@ -55,46 +61,31 @@ def add_mesh_options(parser: CommandParser, *, allow_scene: bool = False) -> Non
         kinds = [kind for kind in GENERATORS if name in options_of(kind)]
         if kinds:
             parser.add_setting_option(setting, f"; for --generate {', '.join(kinds)}")
-    parser.add_argument(
+    parser.add_value(
         "--strokes",
-        type=Path,
-        metavar="FILE",
-        help="strokes on the mesh that a guided field follows: rows x y z, with an empty line "
-        "between two strokes",
+        "FILE",
+        "strokes on the mesh that a guided field follows: rows x y z, with an empty line between two strokes",
+        Path,
     )
-    parser.add_argument(
+    parser.add_value(
         "--guides",
-        type=Path,
-        metavar="FIELD",
-        help="a field file that a guided field follows where its vectors are not zero; a prescribed field "
+        "FIELD",
+        "a field file that a guided field follows where its vectors are not zero; a prescribed field "
         "is turned to it as a whole",
+        Path,
     )
-    parser.add_argument(
+    parser.add_switch(
         "--firmness",
-        action="store_true",
-        help="let the lengths of --guides, from 0 to 1, say how firmly a guided field follows them, as for "
+        "let the lengths of --guides, from 0 to 1, say how firmly a guided field follows them, as for "
         "guides that are combed in Blender",
     )
-    parser.add_argument(
+    parser.add_value(
         "--singularities",
-        type=Path,
-        metavar="FILE.sings",
-        help="singular vertices and their indices, for --generate prescribed",
+        "FILE.sings",
+        "singular vertices and their indices, for --generate prescribed",
+        Path,
     )
-    parser.add_argument(
-        "--uv", action="store_true", help="make a guided field follow the UV map of an .obj file"
-    )
-    parser.add_argument(
-        "--field-mesh",
-        type=Path,
-        metavar="MESH",
-        help="mesh file that the field file belongs to, if it is not MESH; the field is transferred by "
-        "position",
-    )
-    parser.add_argument(
-        "--undefined", action="store_true", help="treat NaN and infinite vectors as undefined"
-    )
-    _add_simulation_options(parser)
+    parser.add_switch("--uv", "make a guided field follow the UV map of an .obj file")
 
 
 def _add_simulation_options(parser: CommandParser) -> None:
@@ -104,17 +95,16 @@ def _add_simulation_options(parser: CommandParser) -> None:
         return
     suffixes = ", ".join(SIMULATION_READERS)
     parser.epilog = f"MESH may also be the file of a simulation: {suffixes}."
-    parser.add_argument(
+    parser.add_value(
         "--array",
-        metavar="NAME",
-        help="array of the file of a simulation that is the field; by default the only one of vectors "
-        "or tensors",
+        "NAME",
+        "array of the file of a simulation that is the field; by default the only one of vectors or tensors",
     )
-    parser.add_argument(
+    parser.add_value(
         "--step",
-        type=int_between(1, 10**9),
-        metavar="N",
-        help="step of the file of a simulation, from 1; by default the last one",
+        "N",
+        "step of the file of a simulation, from 1; by default the last one",
+        int_between(1, 10**9),
     )
 
 

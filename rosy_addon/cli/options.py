@@ -7,7 +7,8 @@ import inspect
 import os
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any, TextIO
@@ -18,21 +19,11 @@ from ..api.pictures import DEFAULT_VIEW, VERTEX_COLOR, picture_look
 from ..compositor.look import Look
 from ..core.errors import RosyError
 from ..core.file_io import check_writable
-from ..core.settings import Choice, Number, Numbers, Setting, Switch, settings_of
+from ..core.settings import Number, Numbers, Setting, Switch, settings_of
 from ..field.up_axis import UP_AXIS_MATRIX
 from ..preset_files.store import default_user_folder, find_preset_file, preset_keys, read_preset
 from ..projection.camera import check_size
 from .streams import print_line
-
-#: Placeholders of numbers in the help, by their units.
-METAVARS = {
-    "pixels": "PX",
-    "length": "UNITS",
-    "spacings": "SPACINGS",
-    "size": "SHARE",
-    "angle": "DEGREES",
-    "": "AMOUNT",
-}
 
 
 class CommandParser(argparse.ArgumentParser):
@@ -44,127 +35,162 @@ class CommandParser(argparse.ArgumentParser):
     def _print_message(self, message: str, file: TextIO | None = None) -> None:
         print_line(message.removesuffix("\n"), sys.stderr if file is None else file)
 
-    def add_object_option(self, help_text: str) -> None:
-        """Add --object with one name or more. It may be repeated; ``--object=-x`` is the name -x."""
-        self.add_argument("--object", nargs="+", action="extend", metavar="NAME", help=help_text)
+    def add_value(
+        self,
+        option: str,
+        metavar: str,
+        text: str,
+        parse: Callable[[str], Any] | None = None,
+        **keywords: Any,
+    ) -> None:
+        """Add an option with a value.
 
-    def add_setting_option(self, setting: Setting, note: str = "") -> None:
-        """Add the option of a setting, with its range or choices, help text and default.
+        Parameters
+        ----------
+        option : str
+        metavar : str
+            Stands for the value in the help.
+        text : str
+            Help text. %(default)s stands for the default.
+        parse : function, optional
+            Returns the value of a text; by default the text itself.
+        **keywords
+            Others of `argparse.ArgumentParser.add_argument`.
+        """
+        self.add_argument(option, metavar=metavar, help=text, type=parse, **keywords)
+
+    def add_switch(self, option: str, text: str) -> None:
+        """Add an option without a value, which is False by default."""
+        self.add_argument(option, action="store_true", help=text)
+
+    def add_output_option(self, metavar: str, text: str = "", *, required: bool = True) -> None:
+        """Add -o, the path of the output."""
+        self.add_argument(
+            "-o", "--output", required=required, type=Path, metavar=metavar, help=text or None
+        )
+
+    def add_object_option(self, text: str) -> None:
+        """Add --object with one name or more. It may be repeated; ``--object=-x`` is the name -x."""
+        self.add_value("--object", "NAME", text, nargs="+", action="extend")
+
+    def add_setting_option(self, setting: Setting, note: str) -> None:
+        """Add the option of a setting, with its range, help text and default.
 
         An option that is not given is not set. Angles are in degrees on the command line, and then in radians.
         `note` is added to the help text.
         """
         text = setting.text[0].lower() + setting.text[1:] + note
-        option, default = f"--{setting.name.replace('_', '-')}", setting.default
-        add = partial(self.add_argument, option, default=argparse.SUPPRESS)
+        add = partial(
+            self.add_argument, f"--{setting.name.replace('_', '-')}", default=argparse.SUPPRESS
+        )
         match setting:
             case Switch():
                 add(action=argparse.BooleanOptionalAction, help=text)
-            case Choice(options=options):
-                add(choices=tuple(options), help=f"{text} ({default})")
-            case Numbers(parts=parts):
-                names, help_text = ",".join(parts), ",".join(f"{value:g}" for value in default)
-                add(
-                    type=float_tuple(len(parts), names), metavar=names, help=f"{text} ({help_text})"
-                )
-            case Number(low=low, high=high, unit="angle"):
-                help_text = f"{text} ({np.degrees(default):g})"
-                add(type=degrees_between(low, high), metavar=METAVARS["angle"], help=help_text)
-            case Number(low=low, high=high, unit=unit):
-                help_text = f"{text} ({default:g})"
-                add(type=float_between(low, high), metavar=METAVARS[unit], help=help_text)
+            case Numbers(parts=parts, default=default):
+                names, values = ",".join(parts), ",".join(f"{value:g}" for value in default)
+                add(type=float_tuple(len(parts), names), metavar=names, help=f"{text} ({values})")
+            case Number(low=low, high=high, unit="angle", default=default):
+                parse = degrees_between(low, high)
+                add(type=parse, metavar="DEGREES", help=f"{text} ({np.degrees(default):g})")
+            case Number(low=low, high=high, unit="size", default=default):
+                add(type=float_between(low, high), metavar="SHARE", help=f"{text} ({default:g})")
             case _:
                 raise TypeError(f"setting '{setting.name}' has no option")
 
+    def add_set_option(self, settings_class: type, text: str) -> None:
+        """Add --set, which may be repeated; `Options.requested_settings` returns the settings."""
+        names = ", ".join(settings_of(settings_class))
+        self.add_value("--set", "NAME=VALUE", f"{text}: {names}", action="append", default=[])
+
     def add_workers_option(self) -> None:
         """Add --workers."""
-        self.add_argument(
-            "--workers",
-            type=int_between(0, 256),
-            default=0,
-            metavar="N",
-            help="number of processes that draw a large picture together; 0 is one for each core "
-            "(%(default)d). The picture is the same for any number",
+        text = (
+            "number of processes that draw a large picture together; 0 is one for each core "
+            "(%(default)d). The picture is the same for any number"
         )
+        self.add_value("--workers", "N", text, int_between(0, 256), default=0)
+
+    @contextmanager
+    def only_for(self, kind: str) -> Iterator[None]:
+        """Note that options which are added in the ``with`` block are for one kind of file only.
+
+        `Options.check_only_for` then refuses them for other files.
+        """
+        first = len(self._actions)
+        yield
+        kinds = self.get_default("kinds") or {}
+        self.set_defaults(kinds={**kinds, kind: self._actions[first:]})
 
     def add_view_options(self) -> None:
-        """Add the options of the view."""
+        """Add the options of the view and the size of the picture."""
         self.add_direction_options()
-        self.add_argument("--size", type=parse_size, metavar="WxH", help="size in pixels")
-        self.add_argument(
-            "--ortho",
-            dest="orthographic",
-            action="store_true",
-            help="orthographic projection instead of perspective",
-        )
+        self.add_size_option()
+
+    def add_size_option(self) -> None:
+        """Add --size of a picture."""
+        self.add_value("--size", "WxH", "size in pixels", parse_size)
 
     def add_direction_options(self) -> None:
-        """Add --view and --up."""
-        self.add_argument(
+        """Add --view, --up and --ortho."""
+        self.add_value(
             "--view",
-            type=float_tuple(2, "AZ,EL"),
+            "AZ,EL",
+            "azimuth and elevation in degrees: 0,0 is from the front, 90,0 from the right, 0,90 from above",
+            float_tuple(2, "AZ,EL"),
             default=DEFAULT_VIEW,
-            metavar="AZ,EL",
-            help="azimuth and elevation in degrees: 0,0 is from the front, 90,0 from the right, 0,90 from "
-            "above",
         )
         self.add_argument(
             "--up",
             choices=list(UP_AXIS_MATRIX),
             help="upward axis of the file; by default y for .obj and .off, otherwise z",
         )
+        self.add_argument(
+            "--ortho",
+            dest="orthographic",
+            action=argparse.BooleanOptionalAction,
+            help="orthographic projection, or with --no-ortho perspective",
+        )
 
     def add_look_options(self) -> None:
         """Add --preset and --set."""
-        self.add_argument(
-            "--preset",
-            metavar="NAME",
-            help=f"preset of the look: {', '.join(preset_keys())}, one of your own, or a .json file; "
-            "`presets` lists them",
+        text = (
+            f"preset of the look: {', '.join(preset_keys())}, one of your own, or a .json file; "
+            "`presets` lists them"
         )
-        self.add_argument(
-            "--set",
-            action="append",
-            default=[],
-            metavar="NAME=VALUE",
-            help=f"one setting of the look, after the preset: {', '.join(settings_of(Look))}",
-        )
+        self.add_value("--preset", "NAME", text)
+        self.add_set_option(Look, "one setting of the look, after the preset")
 
-    def add_flow_option(self) -> None:
-        """Add --flow, which is short for a setting of the look."""
-        self.add_argument(
-            "--flow",
-            dest="set",
-            action="append",
-            default=[],
-            type="flow={}".format,
-            metavar="PIXELS",
-            help="let streaks drift along the field by this many pixels per picture, as --set flow=PIXELS does",
-        )
+    def add_degree_option(self, text: str) -> None:
+        """Add --degree, of fields."""
+        self.add_value("--degree", "N", text, int)
+
+    def add_undefined_option(self) -> None:
+        """Add --undefined."""
+        self.add_switch("--undefined", "treat NaN and infinite vectors as undefined")
 
     def add_picture_options(self) -> None:
         """Add the options of a picture of a mesh: view, look, and sources of its colors and its tone."""
         self.add_view_options()
         self.add_workers_option()
         self.add_look_options()
-        self.add_argument(
+        self.add_value(
             "--color-values",
-            metavar="NAME",
-            help="color the lines by the numbers of a property of the faces or vertices, such as a vertex "
+            "NAME",
+            "color the lines by the numbers of a property of the faces or vertices, such as a vertex "
             "property of a .ply file",
         )
-        self.add_argument(
+        self.add_value(
             "--tone-attribute",
-            dest="tone_values",
-            metavar="NAME",
-            help="take the tone from a vertex property of a .ply file, or from the vertex colors: "
+            "NAME",
+            "take the tone from a vertex property of a .ply file, or from the vertex colors: "
             f"'{VERTEX_COLOR}'",
+            dest="tone_values",
         )
-        self.add_argument(
+        self.add_value(
             "--tone-image",
-            type=Path,
-            metavar="IMAGE.png",
-            help="take the tone from an image on the UV map of an .obj file",
+            "IMAGE.png",
+            "take the tone from an image on the UV map of an .obj file",
+            Path,
         )
 
 
@@ -196,13 +222,28 @@ class Options(argparse.Namespace):
                 if is_path and os.path.exists(path) and os.path.samefile(path, self.output):
                     raise RosyError(f"{self.output}: is also an input: choose another output file")
 
+    def check_only_for(self, kind: str, file: Path | str) -> None:
+        """Raise an error if an option is given that is for another kind of file; see `CommandParser.only_for`.
+
+        Parameters
+        ----------
+        kind : str
+            The kind of file that the options are for.
+        file : Path or str
+            The file that they do not apply to.
+        """
+        for action in self.kinds[kind]:
+            if getattr(self, action.dest, action.default) != action.default:
+                name = action.option_strings[0] if action.option_strings else action.metavar
+                raise RosyError(f"{file}: {name} applies only to {kind}")
+
     def requested_preset(self) -> Path | None:
         """Return the file of --preset, or None."""
         return find_preset_file(self.preset, user_presets_folder()) if self.preset else None
 
-    def requested_settings(self) -> dict[str, Any]:
-        """Return the settings of --set."""
-        return dict(_parse_setting(text) for text in self.set)
+    def requested_settings(self, settings_class: type = Look) -> dict[str, Any]:
+        """Return the settings of --set, by name."""
+        return dict(_parse_setting(text, settings_of(settings_class)) for text in self.set)
 
     def requested_look(self, default: Look) -> Look:
         """Return the look of --preset, by default `default`, with the settings of --set."""
@@ -216,9 +257,9 @@ class Options(argparse.Namespace):
         Parameters
         ----------
         function : function
-            Of `api`.
+            A function of `api`.
         **others
-            Arguments that replace those of the options.
+            Arguments that replace the values of options.
         """
         names = inspect.getfullargspec(function).kwonlyargs
         arguments = {name: value for name, value in vars(self).items() if name in names}
@@ -234,9 +275,6 @@ class Options(argparse.Namespace):
         """
         sources = {"attribute": self.tone_values, "image": self.tone_image}
         sources["picture"] = getattr(self, "tone_picture", None)
-        given = [f"--tone-{option}" for option, value in sources.items() if value is not None]
-        if len(given) > 1:
-            raise RosyError(f"give either {given[0]} or {given[1]}, not both")
         preset, settings = self.requested_preset(), self.requested_settings()
         # Mistakes are reported before the mesh is read.
         picture_look(str(self.mesh), preset, settings, sources, self.color_values is not None)
@@ -325,10 +363,9 @@ def int_between(low: int, high: int) -> Callable[[str], int]:
     return parse
 
 
-def _parse_setting(text: str) -> tuple[str, Any]:
+def _parse_setting(text: str, settings: Mapping[str, Setting]) -> tuple[str, Any]:
     """Return the name and the value of NAME=VALUE, converted to the type of the setting."""
     name, separator, value = text.partition("=")
-    settings = settings_of(Look)
     if not separator:
         raise RosyError(f"--set {text}: expected NAME=VALUE")
     if name not in settings:

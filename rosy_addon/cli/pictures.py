@@ -28,13 +28,13 @@ def add_render_command(subparsers: Any) -> None:
     """Add the command `render`."""
     parser = add_subcommand(subparsers, "render", run_render, api.render)
     add_mesh_options(parser)
-    parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.png")
+    parser.add_output_option("OUT.png")
     parser.add_picture_options()
-    parser.add_argument(
+    parser.add_value(
         "--tone-picture",
-        type=Path,
-        metavar="PICTURE.png",
-        help="take the tone from a picture of the same mesh in the same view",
+        "PICTURE.png",
+        "take the tone from a picture of the same mesh in the same view",
+        Path,
     )
 
 
@@ -50,39 +50,26 @@ def add_turntable_command(subparsers: Any) -> None:
     """Add the command `turntable`."""
     parser = add_subcommand(subparsers, "turntable", run_turntable, api.turntable)
     add_mesh_options(parser)
-    parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.mp4|OUT.gif")
-    parser.add_argument(
-        "--pictures",
-        type=int_between(1, 10_000),
-        metavar="N",
-        help="pictures in a full turn (%(default)d)",
+    parser.add_output_option("OUT.mp4|OUT.gif")
+    parser.add_value(
+        "--pictures", "N", "pictures in a full turn (%(default)d)", int_between(2, 10_000)
     )
-    add_motion_options(parser)
-    parser.add_argument(
-        "--still",
-        action="store_true",
-        help="leave the camera where it is: only streaks drift, as --flow says",
+    add_rate_option(parser)
+    parser.add_switch(
+        "--still", "leave the camera where it is: only streaks drift, as the setting flow says"
     )
     parser.add_picture_options()
 
 
-def add_motion_options(parser: CommandParser) -> None:
-    """Add --rate, of a video, and --flow."""
-    parser.add_argument(
-        "--rate",
-        type=float_between(0.1, 1000.0),
-        metavar="N",
-        help="pictures per second (%(default)g)",
-    )
-    parser.add_flow_option()
+def add_rate_option(parser: CommandParser) -> None:
+    """Add --rate, of a video."""
+    parser.add_value("--rate", "N", "pictures per second (%(default)g)", float_between(0.1, 1000.0))
 
 
 def run_turntable(options: Options) -> None:
     """Draw the field of a mesh file from all sides, as a video."""
     options.check_output()
     check_video_path(options.output)
-    if options.pictures < 2:
-        raise RosyError("a turntable needs 2 or more --pictures")
     arguments = options.picture_arguments(api.turntable)
     encode = video_encoder(options)
 
@@ -122,32 +109,25 @@ def add_texture_command(subparsers: Any) -> None:
     """Add the command `texture`."""
     parser = add_subcommand(subparsers, "texture", run_texture, api.texture)
     add_mesh_options(parser)
-    parser.add_argument(
-        "-o",
-        "--output",
-        required=True,
-        type=Path,
-        metavar="OUT.png",
-        help=f"{UDIM_TOKEN} in the name stands for the number of a tile: each has a file of its own",
+    parser.add_output_option(
+        "OUT.png",
+        f"{UDIM_TOKEN} in the name stands for the number of a tile: each has a file of its own",
     )
-    parser.add_argument(
-        "--size",
-        type=int_between(MIN_SIZE, MAX_SIZE),
-        metavar="N",
-        help="width and height in texels (%(default)d)",
+    parser.add_value(
+        "--size", "N", "width and height in texels (%(default)d)", int_between(MIN_SIZE, MAX_SIZE)
     )
-    parser.add_argument(
+    parser.add_value(
         "--margin",
-        type=int_between(0, MAX_MARGIN),
-        metavar="N",
-        help="width of the margin around charts, in texels (%(default)d)",
+        "N",
+        "width of the margin around charts, in texels (%(default)d)",
+        int_between(0, MAX_MARGIN),
     )
-    parser.add_argument(
+    parser.add_value(
         "--light-direction",
-        type=float_tuple(3, "X,Y,Z"),
-        metavar="X,Y,Z",
-        help="direction to a lamp, in the axes of the mesh: draw its hatching as ink, and not thresholds "
+        "X,Y,Z",
+        "direction to a lamp, in the axes of the mesh: draw its hatching as ink, and not thresholds "
         "for a shader",
+        float_tuple(3, "X,Y,Z"),
     )
     parser.add_argument(
         "--content",

@@ -18,7 +18,7 @@ from .streams import print_error, print_line
 def add_presets_command(subparsers: Any) -> None:
     """Add the command `presets`."""
     parser = add_subcommand(subparsers, "presets", run_presets)
-    parser.add_argument("--json", action="store_true", help="print a JSON list of objects")
+    parser.add_switch("--json", "print a JSON list of objects")
 
 
 def run_presets(options: Options) -> None:

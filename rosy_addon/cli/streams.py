@@ -16,12 +16,12 @@ _own_output: TextIO | None = None
 
 
 def output_stream() -> TextIO:
-    """Return the stream that commands print to: standard output, or that of `use_output`."""
+    """Return the stream that commands print to: standard output, or the one given to `use_output`."""
     return sys.stdout if _own_output is None else _own_output
 
 
 def use_output(stream: TextIO) -> None:
-    """Let commands print to a stream of their own: Blender prints to `sys.stdout` as well."""
+    """Let commands print to another stream than `sys.stdout`, to which Blender prints as well."""
     global _own_output
     _own_output = stream
 
@@ -33,7 +33,7 @@ def printable(text: str, encoding: str | None = None) -> str:
     ----------
     text : str
     encoding : str, optional
-        Of the terminal.
+        Encoding of the terminal; UTF-8 by default.
 
     Examples
     --------
@@ -56,7 +56,7 @@ def print_error(text: str) -> None:
 
 
 def discard_output() -> None:
-    """Send standard output to nowhere, as what is left in its buffer cannot be written."""
+    """Redirect standard output to the null device, because the rest of its buffer cannot be written."""
     descriptor = os.open(os.devnull, os.O_WRONLY)
     os.dup2(descriptor, output_stream().fileno())
     os.close(descriptor)

@@ -12,87 +12,73 @@ from pathlib import Path
 from typing import Any
 
 from ..api.drawings import draw_strokes
-from ..api.pictures import DEFAULT_SIZE, DEFAULT_VIEW
+from ..api.pictures import DEFAULT_SIZE
 from ..core.errors import RosyError
-from ..core.settings import settings_of
-from ..field.generate import GeneratorSettings
+from ..field.mesh_io import READERS
 from ..line_drawing.polyline_files import check_drawing_suffix
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen
 from ..projection.camera import check_size
 from ..rendering.mesh_view import check_light
 from ..worker.frame_workers import parse_frames
-from .mesh_field import add_mesh_options, load_mesh_and_field
+from .mesh_field import add_field_options, load_mesh_and_field
 from .options import CommandParser, Options, add_subcommand, float_between
 from .scene import find_camera, open_scene, print_warnings, requested_objects
 from .streams import print_line
 
-#: Default values of the options that are only for mesh files, and only for .blend files.
-MESH_ONLY_DEFAULTS = {
-    **dict.fromkeys(("field", "degree", "generate", "strokes", "guides", "field_mesh", "up")),
-    **dict.fromkeys(("array", "step", "singularities", *settings_of(GeneratorSettings))),
-    **dict.fromkeys(("uv", "firmness", "undefined", "orthographic"), False),
-    "view": DEFAULT_VIEW,
-}
-#: The same of the options that are only for pictures.
-PAGE_ONLY_DEFAULTS = dict.fromkeys(("plotter", "millimeters", "colors", "paper"))
-#: What users give for a value, if it has another name.
-OPTION_NAMES = {
-    "field": "FIELD",
-    "orthographic": "--ortho",
-    "millimeters": "--mm",
-    "colors": "--colors",
-}
-
-SCENE_ONLY_DEFAULTS = dict.fromkeys(("object", "camera", "frames"))
+#: The kinds of files that some options are for.
+MESH_FILES, SCENES, PICTURES = "mesh files", ".blend files", ".svg files"
 
 
 def add_strokes_command(subparsers: Any) -> None:
     """Add the command `strokes`."""
     parser = add_subcommand(subparsers, "strokes", run_strokes)
     parser.description += " For a .blend file, the defaults are the settings of the scene."
-    add_mesh_options(parser, allow_scene=True)
-    parser.add_argument(
-        "-o",
-        "--output",
-        required=True,
-        type=Path,
-        metavar="OUT",
-        help="file of strokes: a picture as .svg, or polylines in space as .ply, .obj or .csv",
+    text = f"{', '.join(READERS)} or .blend; in Blender, by default, the open file"
+    parser.add_argument("mesh", nargs="?", type=Path, metavar="MESH|SCENE.blend", help=text)
+    with parser.only_for(MESH_FILES):
+        add_field_options(parser)
+        parser.add_direction_options()
+    parser.add_output_option(
+        "OUT", "file of strokes: a picture as .svg, or polylines in space as .ply, .obj or .csv"
     )
-    parser.add_view_options()
-    parser.add_object_option("objects of a .blend file; by default all with a field")
-    parser.add_argument(
-        "--camera", metavar="NAME", help="camera of a .blend file; by default the scene's"
+    parser.add_size_option()
+    with parser.only_for(SCENES):
+        parser.add_object_option("objects of a .blend file; by default all with a field")
+        parser.add_value("--camera", "NAME", "camera of a .blend file; by default the scene's")
+        parser.add_value(
+            "--frames",
+            "A-B[:STEP]",
+            "frames of a .blend file, each in its own file; # in OUT stands for the frame number",
+        )
+    parser.add_set_option(StrokeStyle, "one setting of the strokes")
+    width = float_between(0.01, 1e3)
+    parser.add_value(
+        "--width", "PX", f"width of the strokes ({Pen.width:g})", width, default=argparse.SUPPRESS
     )
-    parser.add_argument(
-        "--frames",
-        metavar="A-B[:STEP]",
-        help="frames of a .blend file, each in its own file; # in OUT stands for the frame number",
-    )
-    add_style_options(parser)
-    add_pen_options(parser)
+    with parser.only_for(PICTURES):
+        add_page_options(parser)
 
 
 def run_strokes(options: Options) -> None:
     """Draw evenly spaced strokes along the fields of meshes, as an .svg file or as polylines."""
     options.check_output()
     if check_drawing_suffix(options.output) != ".svg":
-        _reject_options(options, PAGE_ONLY_DEFAULTS, options.output, ".svg files")
+        options.check_only_for(PICTURES, options.output)
+    # Mistakes are reported before files are read.
+    style = StrokeStyle().with_settings(options.requested_settings(StrokeStyle))
     if options.mesh is None and "bpy" not in sys.modules:
         raise RosyError("no input: give a mesh file, or SCENE.blend")
     if options.mesh is None or options.mesh.suffix.lower() == ".blend":
-        name = options.mesh or "the open file"
-        _reject_options(options, MESH_ONLY_DEFAULTS, name, "mesh files")
+        options.check_only_for(MESH_FILES, options.mesh or "the open file")
         _draw_scene_strokes(options)
         return
-    _reject_options(options, SCENE_ONLY_DEFAULTS, options.mesh, ".blend files")
-    # Mistakes are reported before the mesh is read.
-    style, pen = stroke_style_of(options, StrokeStyle()), pen_of(options, Pen())
+    options.check_only_for(SCENES, options.mesh)
+    pen = pen_of(options, Pen())
     check_light(style.light, str(options.mesh))
-    size = check_size(*(options.size or DEFAULT_SIZE))
+    size, is_ortho = check_size(*(options.size or DEFAULT_SIZE)), bool(options.orthographic)
     surface, field = load_mesh_and_field(options)
-    drawing = draw_strokes(surface, field, style, pen, options.view, size, options.orthographic)
+    drawing = draw_strokes(surface, field, style, pen, options.view, size, is_ortho)
     drawing.save(options.output)
 
 
@@ -143,7 +129,7 @@ def _draw_frame_strokes(options: Options, scene: Any, path: Path) -> None:
         path=Path(os.path.realpath(path)),
         objects=objects,
         camera=camera,
-        style=stroke_style_of(options, read_stroke_style(settings)),
+        style=read_stroke_style(settings).with_settings(options.requested_settings(StrokeStyle)),
         pen=pen_of(options, read_pen(settings)),
         size=options.size,
     )
@@ -151,73 +137,20 @@ def _draw_frame_strokes(options: Options, scene: Any, path: Path) -> None:
     print_line(f"{result.camera}: {result.path}")
 
 
-def _reject_options(
-    options: Options, defaults: dict[str, Any], file: Path | str, file_kind: str
-) -> None:
-    """Raise an error if an option is set that is for another kind of file.
-
-    Parameters
-    ----------
-    options : Options
-    defaults : dict
-        Default values of the options that are not allowed.
-    file : Path or str
-        The file that they do not apply to.
-    file_kind : str
-        The files that they are for.
-    """
-    for name, default in defaults.items():
-        if getattr(options, name, default) != default:
-            option = OPTION_NAMES.get(name, "--" + name.replace("_", "-"))
-            raise RosyError(f"{file}: {option} applies only to {file_kind}")
-
-
-def add_style_options(parser: CommandParser) -> None:
-    """Add an option for each setting of `StrokeStyle` except the unit. Those not given are not set.
-
-    The unit follows from the option: `--spacing` is in pixels, `--distance` in units of the mesh.
-    """
-    for name, setting in settings_of(StrokeStyle).items():
-        if name != "unit":
-            parser.add_setting_option(setting)
-
-
-def stroke_style_of(options: Options, base: StrokeStyle) -> StrokeStyle:
-    """Return the style with the fields that the options override."""
-    values = vars(options)
-    overrides = {name: values[name] for name in settings_of(StrokeStyle) if name in values}
-    if "spacing" in overrides or "distance" in overrides:
-        overrides["unit"] = "world" if "distance" in overrides else "pixels"
-    return replace(base, **overrides)
-
-
-def add_pen_options(parser: CommandParser) -> None:
-    """Add options for the fields of `Pen`. Those not given are not set."""
-    add = partial(parser.add_argument, default=argparse.SUPPRESS)
-    add(
-        "--width",
-        type=float_between(0.01, 1e3),
-        metavar="PX",
-        help=f"width of the strokes ({Pen.width:g})",
+def add_page_options(parser: CommandParser) -> None:
+    """Add options for the fields of `Pen` that only pictures have. Those not given are not set."""
+    add = partial(parser.add_value, default=argparse.SUPPRESS)
+    switch = partial(
+        parser.add_argument, action=argparse.BooleanOptionalAction, default=argparse.SUPPRESS
     )
-    add(
+    switch(
         "--plotter",
-        action=argparse.BooleanOptionalAction,
         help="lines of constant width, without paper, in an order that keeps the pen travel short",
     )
-    add(
-        "--mm",
-        dest="millimeters",
-        type=float_between(1.0, 1e5),
-        metavar="WIDTH",
-        help="width of the page in millimeters",
-    )
-    add(
-        "--colors",
-        metavar="C,C,...",
-        help="SVG colors of the layers (#000000)",
-    )
-    add("--paper", action=argparse.BooleanOptionalAction, help="white paper behind the strokes")
+    page_width = float_between(1.0, 1e5)
+    add("--mm", "WIDTH", "width of the page in millimeters", page_width, dest="millimeters")
+    add("--colors", "C,C,...", "SVG colors of the layers (#000000)")
+    switch("--paper", help="white paper behind the strokes")
 
 
 def pen_of(options: Options, base: Pen) -> Pen:

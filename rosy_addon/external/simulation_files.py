@@ -164,21 +164,6 @@ def list_steps(paths: Sequence[str | os.PathLike[str]]) -> list[Step]:
     return steps
 
 
-def simulation_steps(
-    paths: Sequence[str | os.PathLike[str]],
-) -> Iterator[tuple[Step, MeshArrays]]:
-    """Iterate over the steps of a series with their meshes.
-
-    Each mesh is read when the iterator reaches it, and is not kept.
-
-    Examples
-    --------
-    >>> for step, arrays in simulation_steps(["flow.pvd"]):
-    ...     print(step.time, Surface(arrays).face_count)
-    """
-    return ((step, step.read()) for step in list_steps(paths))
-
-
 def in_order(paths: list[Path]) -> list[Path]:
     """Return paths sorted by the numbers in their names, if nothing else differs."""
     parts = [re.split(r"(\d+)", str(path)) for path in paths]

@@ -1,9 +1,9 @@
-"""Running a command in a Blender, where Python has no module ``bpy``.
+"""Run a command in a Blender if Python has no module ``bpy``.
 
-Blender prints messages of its own, from its first line with the version to its last one, some of them
-from C code. They must not mix with the output of the command. So Blender starts with its standard
-output and error in a log file, and the command inside writes to copies of the streams of this process.
-These are the real streams: a terminal stays a terminal, and the command notices a closed pipe.
+Blender prints its own messages, some of them from C code. They must not mix with the output of the
+command. So Blender starts with its standard output and error in a log file, and the command inside
+writes to copies of the streams of this process: a terminal stays a terminal, and the command notices
+a closed pipe.
 
 The command reports its exit status in a file, because Blender cannot end in order with any other
 status than 0. If there is no report, Blender failed, and its log says why.
@@ -20,8 +20,8 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, BinaryIO, TextIO
 
@@ -272,8 +272,7 @@ def run_job(program: str, arguments: Sequence[str]) -> int:
         )
         stack.enter_context(Guarded(process))
         try:
-            with _signals_as_exceptions():
-                process.wait()
+            process.wait()
         except KeyboardInterrupt:
             _stop(process, report)
             if _reported_status(report) is None:
@@ -314,29 +313,6 @@ def _inheritance(descriptors: Sequence[int]) -> tuple[list[int], dict[str, Any]]
         os.set_handle_inheritable(handle, True)
     startup = subprocess.STARTUPINFO(lpAttributeList={"handle_list": handles})
     return handles, {"startupinfo": startup}
-
-
-@contextmanager
-def _signals_as_exceptions() -> Iterator[None]:
-    """Raise SystemExit for signals that would end this process and leave Blender behind."""
-
-    def leave(number: int, _frame: object) -> None:
-        raise SystemExit(128 + number)
-
-    changed = []
-    try:
-        for name in ("SIGTERM", "SIGHUP"):
-            number = getattr(signal, name, None)
-            if number is not None and signal.getsignal(number) == signal.SIG_DFL:
-                signal.signal(number, leave)
-                changed.append(number)
-    except ValueError:  # not the main thread
-        pass
-    try:
-        yield
-    finally:
-        for number in changed:
-            signal.signal(number, signal.SIG_DFL)
 
 
 def _stop(process: subprocess.Popen[bytes], report: BinaryIO) -> None:

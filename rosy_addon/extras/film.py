@@ -13,7 +13,7 @@ from .. import api
 from ..api.films import MAX_BETWEEN
 from ..api.pictures import picture_look
 from ..cli.options import Options, add_subcommand, int_between
-from ..cli.pictures import add_motion_options, video_encoder
+from ..cli.pictures import add_rate_option, video_encoder
 from ..cli.streams import print_line
 from ..core.errors import RosyError
 from ..core.file_io import check_readable
@@ -41,34 +41,25 @@ def add_film_command(subparsers: Any) -> None:
         help=f"a file with several steps, or a file for each step: {', '.join(SUFFIXES)}; or a mesh file and a "
         f"field file for each step: {', '.join(READ_SUFFIXES)}",
     )
-    parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.mp4|OUT.gif")
-    parser.add_argument(
-        "--array",
-        metavar="NAME",
-        help="array that is the field; by default the only one of vectors or tensors",
+    parser.add_output_option("OUT.mp4|OUT.gif")
+    parser.add_value(
+        "--array", "NAME", "array that is the field; by default the only one of vectors or tensors"
     )
-    parser.add_argument(
-        "--degree",
-        type=int,
-        metavar="N",
-        help="degree of the fields, 1 to 12; by default that of the files, 1 for an array of vectors, or 4",
+    parser.add_degree_option(
+        "degree of the fields, 1 to 12; by default that of the files, 1 for an array of vectors, or 4"
     )
-    parser.add_argument(
-        "--undefined", action="store_true", help="treat NaN and infinite vectors as undefined"
-    )
-    parser.add_argument(
+    parser.add_undefined_option()
+    parser.add_value(
         "--between",
-        type=_count_or_auto,
-        metavar="N|auto",
-        help="pictures between two steps, for which fields and vertices are interpolated (%(default)d); auto: as "
+        "N|auto",
+        "pictures between two steps, for which fields and vertices are interpolated (%(default)d); auto: as "
         "many as keep streaks steady",
+        _count_or_auto,
     )
-    parser.add_argument(
-        "--loop",
-        action="store_true",
-        help="let the first step follow the last one, for films that are shown in a loop",
+    parser.add_switch(
+        "--loop", "let the first step follow the last one, for films that are shown in a loop"
     )
-    add_motion_options(parser)
+    add_rate_option(parser)
     parser.add_view_options()
     parser.add_workers_option()
     parser.add_look_options()
@@ -146,28 +137,20 @@ class FieldFiles(Sequence[api.Field]):
     paths : sequence of Path
     surface : Surface
     degree, nonfinite
-        See `api.read_field`. By default all fields must have the degree of the first one.
+        See `api.read_field`.
     """
 
     paths: Sequence[Path]
     surface: api.Surface
     degree: int | None = None
     nonfinite: str = "error"
-    _first_degree: int | None = None
 
     def __len__(self) -> int:
         return len(self.paths)
 
     def __getitem__(self, index: Any) -> Any:
         path = self.paths[index]
-        field = api.read_field(path, self.surface, self.degree, nonfinite=self.nonfinite)
-        self._first_degree = self._first_degree or field.degree
-        if field.degree != self._first_degree:
-            raise RosyError(
-                f"{path}: the field has degree {field.degree}, but {self.paths[0]} has "
-                f"{self._first_degree}"
-            )
-        return field
+        return api.read_field(path, self.surface, self.degree, nonfinite=self.nonfinite)
 
     def time_text(self, index: int) -> str:
         """Return the name of the file, for the line that is printed."""

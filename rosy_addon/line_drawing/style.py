@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 from ..annotation.singularity_settings import (
     singularity_dots_choice,
     singularity_size_number,
 )
-from ..core.settings import check_settings, choice, number, switch
+from ..core.errors import RosyError
+from ..core.settings import check_settings, choice, number, settings_of, switch
 
 
 @dataclass(frozen=True)
@@ -128,3 +130,20 @@ class StrokeStyle:
 
     def __post_init__(self) -> None:
         check_settings(self)
+
+    def with_settings(self, settings: dict[str, Any]) -> StrokeStyle:
+        """Return the style with some settings changed. The unit follows from `spacing` or `distance`.
+
+        Raises
+        ------
+        RosyError
+            If there is no such setting, or its value is not allowed.
+        """
+        known = settings_of(StrokeStyle)
+        unknown = [name for name in settings if name not in known]
+        if unknown:
+            raise RosyError(f"unknown setting '{unknown[0]}' of strokes: choose {', '.join(known)}")
+        if settings.keys() & {"spacing", "distance"}:
+            unit = "world" if "distance" in settings else "pixels"
+            settings = {"unit": unit} | settings
+        return replace(self, **settings)

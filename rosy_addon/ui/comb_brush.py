@@ -16,7 +16,7 @@ from ..viewport import session
 from ..viewport.brush_mouse import current_mouse
 from .view_lines import draw_lines, to_pixels
 
-#: Color of the cursor, and those of dashes on faces without and with a firm guide.
+#: Color of the cursor, and colors of dashes on faces without and with a firm guide.
 CURSOR_COLOR = (1.0, 1.0, 1.0, 0.8)
 FREE_COLOR, GUIDED_COLOR = (0.85, 0.85, 0.85, 0.9), (1.0, 0.55, 0.15, 1.0)
 

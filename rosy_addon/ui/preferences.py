@@ -8,6 +8,7 @@ from ..compositor.look import Look
 from ..core.settings import settings_of
 from ..scene.files import EXTENSION_ID
 from . import preset_library
+from .property_makers import integer, text, toggle
 
 
 class ROSY_AP_preferences(bpy.types.AddonPreferences):
@@ -15,37 +16,37 @@ class ROSY_AP_preferences(bpy.types.AddonPreferences):
 
     bl_idname = EXTENSION_ID
 
-    preset: bpy.props.StringProperty(
-        name="Preset",
-        description="Initial look of a scene: the name of a preset, or the path of a preset file. "
+    preset: text(
+        "Preset",
+        "Initial look of a scene: the name of a preset, or the path of a preset file. "
         "Empty: the default look",
         search=preset_library.search_presets,
         search_options={"SUGGESTION"},
     )
-    directory: bpy.props.StringProperty(
-        name="Picture Folder",
-        description="Folder for the pictures of a scene, if they are saved to files. Empty: the "
+    directory: text(
+        "Picture Folder",
+        "Folder for the pictures of a scene, if they are saved to files. Empty: the "
         "folder 'rosy' beside the .blend file",
         subtype="DIR_PATH",
     )
 
-    live_first_field: bpy.props.BoolProperty(
-        name="Live View",
-        description="Show the first field of a scene live in the 3D view in which it is made",
+    live_first_field: toggle(
+        "Live View",
+        "Show the first field of a scene live in the 3D view in which it is made",
         default=True,
     )
 
-    workers: bpy.props.IntProperty(
-        name="Worker Processes",
-        description="Number of processes that draw a large picture together on the processor. 0: one "
+    workers: integer(
+        "Worker Processes",
+        "Number of processes that draw a large picture together on the processor. 0: one "
         "for each core. The picture is the same for any number",
         min=0,
         max=256,
     )
 
-    use_helper: bpy.props.BoolProperty(
-        name="Helper Process",
-        description="Compute in a process beside Blender, which stays responsive. Off: Blender waits",
+    use_helper: toggle(
+        "Helper Process",
+        "Compute in a process beside Blender, which stays responsive. Off: Blender waits",
         default=True,
     )
 

@@ -147,7 +147,7 @@ def is_changed(settings: Any) -> bool:
 
 
 def apply_preset(settings: Any, preset: str) -> None:
-    """Set the look of ``scene.rosy`` to that of a preset.
+    """Copy the look of a preset to ``scene.rosy``.
 
     Raises
     ------

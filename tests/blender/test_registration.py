@@ -116,15 +116,10 @@ def test_nothing_outside_bpy_is_touched():
 
 def controls():
     """Yield the description of each operator, and all properties that a user sees, by their owner."""
-    for module in sys.modules[f"{EXTENSION}.operators.registration"].MODULES:
-        for cls in module.CLASSES:
-            if issubclass(cls, bpy.types.Operator):
-                rna = getattr(bpy.ops.rosy, cls.bl_idname.split(".")[1]).get_rna_type()
-                yield (
-                    cls.bl_idname,
-                    rna.description,
-                    [rna.properties[k] for k in cls.__annotations__],
-                )
+    for cls in sys.modules[f"{EXTENSION}.operators.registration"].CLASSES:
+        if issubclass(cls, bpy.types.Operator):
+            rna = getattr(bpy.ops.rosy, cls.bl_idname.split(".")[1]).get_rna_type()
+            yield cls.bl_idname, rna.description, [rna.properties[k] for k in cls.__annotations__]
     for cls in sys.modules[f"{EXTENSION}.rosy_addon.ui.properties"].CLASSES:
         if cls.__name__ in VISIBLE_GROUPS:
             items = [cls.bl_rna.properties[name] for name in cls.__annotations__]

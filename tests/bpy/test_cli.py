@@ -141,7 +141,8 @@ def test_strokes_of_a_file_are_those_of_the_button(with_stroke_settings, tmp_pat
 def test_options_override_the_settings_of_the_scene(with_stroke_settings, tmp_path):
     scene = bpy.context.scene
     settings = scene.rosy.strokes
-    options = ["--distance", "0.5", "--light", "none", "--taper", "0", "--overshoot", "0"]
+    changes = "distance=0.5", "light=none", "taper=0", "overshoot=0"
+    options = [word for change in changes for word in ("--set", change)]
     options += ["--plotter", "--colors", "red,blue"]
     process = rosy(with_stroke_settings, "-o", tmp_path / "out.svg", *options, verb="strokes")
     assert process.returncode == 0, process.stderr
@@ -169,7 +170,7 @@ def test_strokes_of_frames(with_stroke_settings, tmp_path):
         monkey.rotation_euler.z = angle
         monkey.keyframe_insert("rotation_euler", frame=frame)
     bpy.ops.wm.save_mainfile()
-    options = "--spacing", "20", "--frames", "1-3:2", "--size", "120x90"
+    options = "--set", "spacing=20", "--frames", "1-3:2", "--size", "120x90"
     process = rosy(with_stroke_settings, "-o", tmp_path / "out-###.svg", *options, verb="strokes")
     assert process.returncode == 0, process.stderr
     drawn = sorted(tmp_path.glob("out-*.svg"))
@@ -190,7 +191,10 @@ def test_strokes_of_frames(with_stroke_settings, tmp_path):
         (["--field-mesh", "a.obj"], "suzanne.blend: --field-mesh applies only to mesh files"),
         (["--view", "0,90"], "suzanne.blend: --view applies only to mesh files"),
         (["--frames", "1-3"], "out.svg: several frames need #"),
-        (["--frames", "9", "--spacing", "9999", "--no-outline"], "frame 9: no stroke fits"),
+        (
+            ["--frames", "9", "--set", "spacing=9999", "--set", "outline=off"],
+            "frame 9: no stroke fits",
+        ),
         (["-o", "a.png"], "a.png: the name of the file must end in .svg"),
         (["-o", "/nowhere/a.svg"], "the folder /nowhere does not exist"),
     ],

@@ -30,8 +30,7 @@ def test_field_picture_strokes_and_removal(scene, camera, monkey, tmp_path):
 
 
 def test_blender_can_read_the_properties_of_every_operator():
-    operators = importlib.import_module("rosy.operators.registration")
-    classes = [cls for module in operators.MODULES for cls in module.CLASSES]
+    classes = importlib.import_module("rosy.operators.registration").CLASSES
     for cls in classes:
         # Blender does the same when it registers a class. It prints errors and goes on.
         assert set(inspect.get_annotations(cls)) <= set(typing.get_type_hints(cls))
@@ -40,15 +39,11 @@ def test_blender_can_read_the_properties_of_every_operator():
 
 def test_callbacks_of_properties_see_the_names_of_their_module():
     """A function that is written inside an annotation does not."""
-    modules = importlib.import_module("rosy.operators.registration").MODULES
-    modules += tuple(
-        importlib.import_module(f"rosy.rosy_addon.ui.{name}")
-        for name in ("properties", "preferences")
-    )
+    rooms = "operators.registration", "rosy_addon.ui.properties", "rosy_addon.ui.preferences"
     callbacks = [
         value
-        for module in modules
-        for cls in module.CLASSES
+        for room in rooms
+        for cls in importlib.import_module(f"rosy.{room}").CLASSES
         for hint in typing.get_type_hints(cls).values()
         for value in getattr(hint, "keywords", {}).values()
         if inspect.isfunction(value)

@@ -66,7 +66,7 @@ def test_other_commands(rosy, files):
     field = ("field", files / "b.vtp", "--array", "rotation", "-o", files / "out.rosy")
     assert rosy(*field) == (0, "", "")
     strokes = ("strokes", files / "a.vtp", "-o", files / "a.svg", "--size", "60x60")
-    strokes += ("--spacing", 12)
+    strokes += ("--set", "spacing=12")
     assert rosy(*strokes) == (0, "", "")
     assert "<path" in (files / "a.svg").read_text()
 
@@ -249,7 +249,7 @@ def test_film_of_fields_errors(rosy, turning, monkeypatch):
         ),
         (
             ("square.obj", "field1.rosy", "cross.rosy"),
-            "cross.rosy: the field has degree 4, but field1.rosy has 1",
+            "square.obj: field 2 of 2 has degree 4, but the one before it 1",
         ),
         (("square.obj", "field1.rosy", "none.rosy"), "none.rosy: cannot be read: no such file"),
         (("field1.rosy", "field2.rosy"), "field1.rosy: is not a mesh file: name the mesh first"),

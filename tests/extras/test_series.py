@@ -12,10 +12,14 @@ import pyvista as pv
 from extras.exodus import write_exodus
 from extras.rotations import rotation
 
-from rosy_addon.external.simulation_files import list_steps, read_simulation, simulation_steps
+from rosy_addon.external.simulation_files import list_steps, read_simulation
 
 #: The times of the steps. The rotation has the speed 1 + time.
 TIMES = [0.0, 0.5, 10.0]
+
+
+def steps_with_meshes(paths):
+    return [(step, step.read()) for step in list_steps(paths)]
 
 
 def write_files(folder, mesh, suffix="vtu"):
@@ -72,7 +76,7 @@ def test_series(write, tmp_path, sphere):
     times = [None] * 3 if write is write_numbered else TIMES
     steps = list_steps(paths)
     assert [step.time for step in steps] == times
-    for (_, mesh), time in zip(simulation_steps(paths), TIMES, strict=True):
+    for (_, mesh), time in zip(steps_with_meshes(paths), TIMES, strict=True):
         speed = mesh.vertex_data["rotation"] / (1 + time)
         assert speed == pytest.approx(rotation(mesh.vertices), abs=1e-5)
 
@@ -91,7 +95,7 @@ def test_exodus_series(tmp_path, box):
     velocity = np.stack([(1 + time) * points for time in TIMES])
     tetrahedra = box.cells_dict[pv.CellType.TETRA]
     write_exodus(tmp_path / "a.exo", points, tetrahedra, TIMES, velocity)
-    for (step, mesh), time in zip(simulation_steps([tmp_path / "a.exo"]), TIMES, strict=True):
+    for (step, mesh), time in zip(steps_with_meshes([tmp_path / "a.exo"]), TIMES, strict=True):
         assert step.time == time and len(mesh.face_start) - 1 == 108
         expected = (1 + time) * mesh.vertices
         assert mesh.vertex_data["velocity_"] == pytest.approx(expected, abs=1e-5)

@@ -12,6 +12,7 @@ from numpy.random import Generator
 from rosy_addon.cli.parser import _build_parser
 from rosy_addon.compositor.look import Look
 from rosy_addon.core.settings import Choice, Color, Numbers, Setting, Switch, settings_of
+from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.preset_files.store import preset_keys
 
 from .damage import random_word
@@ -67,7 +68,9 @@ def random_options(
                 words.append(name)
                 continue
             value = (
-                random_word(rng).replace("\0", "") if rng.random() < wild else _value(rng, action)
+                random_word(rng).replace("\0", "")
+                if rng.random() < wild
+                else _value(rng, action, command)
             )
             words += [name, value] if rng.random() < 0.5 else [f"{name}={value}"]
     return words
@@ -82,9 +85,9 @@ def _actions(command: str) -> list[argparse.Action]:
     return [a for a in actions if a.option_strings and a.dest not in FILE_OPTIONS]
 
 
-def _value(rng: Generator, action: argparse.Action) -> str:
+def _value(rng: Generator, action: argparse.Action, command: str) -> str:
     if action.dest == "set":
-        settings = list(settings_of(Look).values())
+        settings = list(settings_of(StrokeStyle if command == "strokes" else Look).values())
         setting = settings[rng.integers(len(settings))]
         value = setting_value(rng, setting)
         return f"{setting.name}={','.join(map(str, value)) if isinstance(value, list) else value}"

@@ -11,6 +11,7 @@ from PIL import Image
 from shapes import icosphere, torus
 
 import rosy_addon as rf
+from rosy_addon.api.pictures import _named_tone as named_tone
 from rosy_addon.api.pictures import corner_numbers
 from rosy_addon.cli.parser import main
 from rosy_addon.compositor.look import Look
@@ -289,6 +290,20 @@ def test_sources_of_the_tone(sphere, field, error_of):
         ({"size": (0, 10)}, "size 0x10"),
     ):
         assert expected in error_of(rf.render, sphere, field, **keywords)
+
+
+def test_colors_of_vertices_as_a_tone():
+    """The tone "Color" is their linear luminance; sRGB as IEC 61966 defines it."""
+    display = np.array([[60, 60, 60], [230, 230, 230], [255, 0, 0], [0, 0, 255]]) / 255
+    arrays = mesh_arrays.MeshArrays(
+        np.array(SQUARE, dtype=float),
+        np.arange(4),
+        np.array([0, 4]),
+        vertex_data=dict(zip(("red", "green", "blue"), display.T, strict=True)),
+    )
+    linear = ((display + 0.055) / 1.055) ** 2.4 * (display > 0)
+    expected = linear @ (0.2126, 0.7152, 0.0722)
+    assert np.allclose(named_tone(rf.Surface(arrays), "Color"), expected, atol=1e-3)
 
 
 def test_an_image_on_the_uv_map(error_of):

@@ -17,8 +17,8 @@ from conftest import ROOT, long
 from harness.forked import run_command
 from shapes import cube, icosphere, torus
 
+import rosy_addon as rf
 from rosy_addon.cli import bake, parser
-from rosy_addon.core.color import to_linear
 from rosy_addon.extras.command_line import main
 from rosy_addon.field.surface import Surface
 from rosy_addon.image_io.png import write_png
@@ -223,7 +223,7 @@ REFUSED = {
         ["turntable", "{mesh}", "-o", "{out}.gif", "--still"],
         "nothing moves",
     ),
-    "flow": (["turntable", "{mesh}", "-o", "{out}.gif", "--flow", "fast"], "expected a number"),
+    "flow": (["turntable", "{mesh}", "-o", "{out}.gif", "--set", "flow=fast"], "expected a number"),
     "value": (
         ["render", "{mesh}", "-o", "{out}", "--set", "length=long"],
         "--set length=long: expected a whole",
@@ -463,8 +463,6 @@ def test_the_uv_map_of_a_file(shared_data, tmp_path):
 
 # --- tones ----------------------------------------------------------------------------------------
 
-HATCHED = ("--preset", "cross-hatch", "--size", "128x128", "--generate", "axis")
-
 
 def write_ply(path, surface: Surface, **columns):
     """Write a .ply file with further columns of vertices, integers as bytes and others as floats."""
@@ -484,16 +482,6 @@ def write_ply(path, surface: Surface, **columns):
     return path
 
 
-def halves_of(path) -> tuple[float, float]:
-    """Return the mean linear values of the left and the right half of the covered pixels."""
-    rgba = pixels_of(path) / 255
-    covered = rgba[..., 3] == 1
-    left, right = covered.copy(), covered.copy()
-    left[:, 58:], right[:, :70] = False, False
-    light = to_linear(rgba[..., 1])
-    return float(light[left].mean()), float(light[right].mean())
-
-
 @pytest.fixture(scope="module")
 def painted(tmp_path_factory):
     """A ball that is dark on the left and light on the right, in its colors and in a number."""
@@ -505,51 +493,39 @@ def painted(tmp_path_factory):
     return write_ply(path, ball, **colors, cavity=np.where(right, 0.8, 0.1))
 
 
-@pytest.mark.slow
-def test_tones_of_vertices(painted, tmp_path):
-    out = tmp_path / "a.png"
-    for name, dark, light in (("cavity", 0.1, 0.8), ("Color", 0.045, 0.79), ("red", 0.235, 0.9)):
-        done = main(["render", str(painted), *HATCHED, "-o", str(out), "--view", "0,0",
-                     "--tone-attribute", name])  # fmt: skip
-        assert done == 0
-        left, right = halves_of(out)
-        assert left == pytest.approx(dark, abs=0.08) and right == pytest.approx(light, abs=0.08)
-    done = main(["turntable", str(painted), "-o", str(tmp_path / "a.gif"), "--size", "64x64",
-                 "--pictures", "2", "--generate", "axis", "--tone-attribute", "cavity"])  # fmt: skip
-    assert done == 0
-
-
-def test_colors_of_vertices(painted, tmp_path):
-    out = tmp_path / "a.png"
-    words = ["--generate", "axis", "--color-values", "cavity", "--set", "color_map=gray"]
-    flat = ["--set", "gain=0", "--set", "shading=0", "--size", "128x128"]
-    assert main(["render", str(painted), *words, *flat, "-o", str(out), "--view", "0,0"]) == 0
-    left, right = halves_of(out)
-    assert left == pytest.approx(0.0056, abs=0.001) and right == pytest.approx(1, abs=0.001)
-    words[3] = "Cavity"
-    assert_refused(rosy("render", painted, *words, "-o", out), "'Cavity'", "'cavity'", "ball.ply")
-
-
-@pytest.mark.slow
-def test_tones_of_pictures_and_images(sphere, tmp_path):
-    picture = np.ones((64, 64, 4), dtype=np.float32)
-    picture[:, :32, :3], picture[:, 32:, :3] = 0.2, 0.85
-    write_png(tmp_path / "shot.png", picture)
-    out = tmp_path / "a.png"
-    words = [*HATCHED, "-o", str(out), "--view", "0,0"]
-    assert main(["render", str(sphere), *words, "--tone-picture", str(tmp_path / "shot.png")]) == 0
-    left, right = halves_of(out)
-    assert left == pytest.approx(0.2, abs=0.08) and right == pytest.approx(0.85, abs=0.08)
-    # A square that faces the camera, with the image upright.
-    square = tmp_path / "square.obj"
-    square.write_text(
-        "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
-        "f 1/1 2/2 3/3 4/4\n"
-    )
-    words = ["render", str(square), *words, "--axis", "1,0,0", "--degree", "2"]
-    assert main([*words, "--tone-image", str(tmp_path / "shot.png")]) == 0
-    left, right = halves_of(out)
-    assert left == pytest.approx(0.2, abs=0.08) and right == pytest.approx(0.85, abs=0.08)
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        ("--preset cross-hatch --tone-attribute cavity", "tone_values"),
+        ("--preset cross-hatch --tone-picture shot.png", "tone_picture"),
+        ("--preset cross-hatch --tone-image shot.png", "tone_image"),
+        ("--set color_map=gray --color-values cavity", "color_values"),
+    ],
+)
+def test_sources_of_tones_and_colors(words, name, painted, tmp_path, monkeypatch):
+    """The command draws what the function does, which is another picture than without the source."""
+    monkeypatch.chdir(tmp_path)
+    write_png("shot.png", np.linspace(0.2, 0.9, 64 * 64 * 4, dtype=np.float32).reshape(64, 64, 4))
+    mesh = painted
+    if name == "tone_image":
+        mesh = tmp_path / "square.obj"
+        corners = "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+        mesh.write_text(corners + "f 1/1 2/2 3/3 4/4\n")
+    view = "--generate smoothest --size 64x64 --view 0,0 --up z --ortho"
+    plain, out = [
+        [*["render", "-o", "a.png"], str(mesh), *view.split(), *options.split()]
+        for options in (words.rsplit(" ", 2)[0], words)
+    ]
+    assert main(plain) == 0
+    before = pixels_of(tmp_path / "a.png")
+    assert main(out) == 0
+    drawn = pixels_of(tmp_path / "a.png")
+    _, look, _, source = words.split()
+    keywords = {"preset": look} if "=" not in look else dict([look.split("=")])
+    surface = rf.Surface(mesh, up="z")
+    frame = {"size": (64, 64), "view": (0, 0), "orthographic": True}
+    expected = rf.render(surface, rf.smoothest(surface), **frame, **keywords, **{name: source})
+    assert np.array_equal(drawn, np.asarray(expected)) and not np.array_equal(drawn, before)
 
 
 @pytest.mark.slow
@@ -558,12 +534,17 @@ def test_tones_that_are_not_there(painted, sphere, tmp_path):
     out = ("-o", tmp_path / "a.png", "--size", "64x64")
     for mesh, words, expected in (
         (painted, ("--tone-attribute", "ink"), ("'ink'", "'cavity'", "ball.ply")),
+        (painted, ("--color-values", "Cavity"), ("'Cavity'", "'cavity'", "ball.ply")),
         (sphere, ("--tone-attribute", "ink"), ("sphere.off", ".ply")),
         (sphere, ("--tone-image", "x.png"), ("sphere.off", "UV map")),
         (sphere, ("--tone-picture", tmp_path / "none.png"), ("none.png", "no such file")),
         (sphere, ("--tone-picture", tmp_path / "wide.png"), ("wide.png", "64 x 16")),
         (sphere, ("--set", "tone=picture"), ("picture", "none is given")),
-        (painted, ("--tone-attribute", "red", "--tone-image", "x.png"), ("not both",)),
+        (
+            painted,
+            ("--tone-attribute", "red", "--tone-image", "x.png"),
+            ("choose one source of the tone, attribute or image",),
+        ),
     ):
         assert_refused(rosy("render", mesh, *out, *words), *expected)
         assert not (tmp_path / "a.png").exists()

@@ -1,0 +1,176 @@
+"""Operators: read the field of the active mesh from a file, and write it to one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import bpy
+from bpy_extras.io_utils import ExportHelper, ImportHelper
+
+from ..rosy_addon.core.errors import RosyError, counted
+from ..rosy_addon.core.file_io import check_writable, write_bytes
+from ..rosy_addon.field.directional_field import field_directions
+from ..rosy_addon.field.field_io import READ_SUFFIXES, LoadedField, field_file, load_field
+from ..rosy_addon.field.rosy_field import MAX_DEGREE, RosyField
+from ..rosy_addon.scene.field_attributes import field_degree
+from ..rosy_addon.scene.guides import read_combed_guides
+from ..rosy_addon.scene.mesh_fields import read_mesh_field
+from ..rosy_addon.scene.meshes import mesh_label, mesh_surface
+from ..rosy_addon.ui.property_makers import choice, file_filter, integer, text
+from ..rosy_addon.worker.job import Call, Steps
+from .base import EDITABLE, selected_mesh_objects, sync_suffix
+from .modal_job import ActiveMeshMixin, FileJobMixin
+
+
+class ROSY_OT_field_import(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, ImportHelper):
+    """Read the field of the active mesh from a file"""
+
+    bl_idname = "rosy.field_import"
+    bl_label = "Import Field"
+    bl_options = {"REGISTER", "UNDO"}
+    conditions = EDITABLE
+
+    filename_ext = ".rosy"
+    filter_glob: file_filter(*READ_SUFFIXES)
+    degree: integer(
+        "Degree",
+        "Degree that the file must have, or degree of files that do not state it. 0: any, or 4",
+        min=0,
+        max=MAX_DEGREE,
+    )
+    mesh_file: text(
+        "Mesh File",
+        "Mesh file that the field was made for, if its faces differ from those of this "
+        "mesh. The field is transferred by position. If the numbers of faces differ, a mesh file "
+        "of the same name in the same folder is used by default",
+        subtype="FILE_PATH",
+    )
+    undefined: choice(
+        "Bad Vectors",
+        "Treatment of vectors that are NaN or infinite",
+        [
+            ("error", "Refuse", "Report the first one, and import nothing"),
+            ("zero", "Skip", "Treat the field as undefined on those faces"),
+        ],
+    )
+    attribute: text(
+        "Attribute",
+        "Name of the mesh attribute that stores the field. An existing field is replaced",
+        default="rosy",
+    )
+
+    def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
+        """Ask for the settings of a file that was dropped on the view, or for a file."""
+        return None if self.skip_browser else self.invoke_popup(context)
+
+    def begin(self, context: bpy.types.Context) -> Steps[LoadedField]:
+        """Read the field, then store it."""
+        mesh = selected_mesh_objects(context)[0].data
+        surface = mesh_surface(mesh)
+        mesh_file = bpy.path.abspath(self.mesh_file) if self.mesh_file else None
+        path = bpy.path.abspath(self.filepath)
+        inputs = path, surface, self.degree or None, self.undefined
+        field, note = yield Call(partial(load_field, mesh=mesh_file), inputs, 0.0, 0.9)
+        if field.direction_ratios is not None and field.source_directions is None:
+            directions = yield Call(
+                field_directions, (surface, field), 0.9, label="computing directions"
+            )
+            field = replace(field, source_directions=directions)
+        self.store_fields(context, {mesh: field}, self.attribute)
+        return LoadedField(field, note)
+
+    def finish(self, context: bpy.types.Context, result: LoadedField) -> None:
+        if result.note:
+            self.report_warnings(result.note)
+        obj = selected_mesh_objects(context)[0]
+        faces = counted(len(result.field.vectors), "face")
+        self.report_done(f"Read a field of degree {result.field.degree} on {faces} of '{obj.name}'")
+
+
+class ROSY_FH_field(bpy.types.FileHandler):
+    """Import field files that are dropped on the 3D view."""
+
+    bl_idname = "ROSY_FH_field"
+    bl_label = "RoSy field"
+    bl_import_operator = "rosy.field_import"
+    bl_file_extensions = ".rosy;.rawfield"
+
+    @classmethod
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
+        return context.area is not None and context.area.type == "VIEW_3D"
+
+
+#: File formats by suffix: label and description in the user interface.
+FIELD_FORMATS = {
+    ".rosy": ("RoSy", "One member vector per face"),
+    ".rawfield": ("Raw Field", "One row per face with all directions, for Directional"),
+    ".txt": ("Text", "One row per face with all directions, without a header"),
+    ".npy": ("NumPy", "An array with one row per face with all directions"),
+    ".obj": ("Fieldgen OBJ", "The mesh, with one direction per vertex, as written by fieldgen"),
+    ".sings": ("Singularities", "Singular vertices and their indices, for Directional"),
+}
+
+#: Formats that keep the lengths of the vectors of each face.
+GUIDE_FORMATS = (".rosy", ".rawfield", ".txt", ".npy")
+
+
+class ROSY_OT_field_export(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, ExportHelper):
+    """Write the field of the active mesh to a file"""
+
+    bl_idname = "rosy.field_export"
+    bl_label = "Export Field"
+    bl_options = {"REGISTER"}
+    cancel_note = "no file was written"
+
+    filename_ext = ".rosy"
+    filter_glob: file_filter(*FIELD_FORMATS)
+    file_format: choice(
+        "Format",
+        "Format of the file",
+        [(suffix, name, text) for suffix, (name, text) in FIELD_FORMATS.items()],
+    )
+    content: choice(
+        "Content",
+        "What is written",
+        [
+            ("FIELD", "Field", "The field"),
+            (
+                "GUIDES",
+                "Combed Guides",
+                "The guides that were combed; the lengths of the vectors, from 0 to 1, are their firmness",
+            ),
+        ],
+    )
+
+    def check(self, context: bpy.types.Context) -> bool:
+        """Set the suffix of the file name to the format's in the file browser."""
+        return sync_suffix(self, self.file_format)
+
+    def begin(self, context: bpy.types.Context) -> Steps[Path]:
+        path = Path(bpy.path.abspath(self.filepath))
+        is_guides = self.content == "GUIDES"
+        if is_guides and path.suffix.lower() not in GUIDE_FORMATS:
+            raise RosyError(
+                f"{path}: cannot keep the firmness of guides: write a {', '.join(GUIDE_FORMATS[:-1])} or "
+                f"{GUIDE_FORMATS[-1]} file"
+            )
+        return _export(selected_mesh_objects(context)[0].data, path, is_guides)
+
+    def finish(self, context: bpy.types.Context, result: Path) -> None:
+        self.report_done(f"Wrote {result}")
+
+
+def _export(mesh: bpy.types.Mesh, path: Path, is_guides: bool) -> Steps[Path]:
+    """Read the field or the combed guides of a mesh, and write them to a file."""
+    surface = mesh_surface(mesh)
+    if is_guides:
+        field = RosyField(field_degree(mesh), read_combed_guides(mesh, surface))
+        if not field.vectors.any():
+            raise RosyError(f"{mesh_label(mesh)}: its field has no combed guides: comb it first")
+    else:
+        field = read_mesh_field(mesh, surface=surface)
+    check_writable(path)
+    write_bytes(path, (yield Call(field_file, (path, field, surface))))
+    return path

@@ -128,19 +128,42 @@ def test_simplified_lines_stay_within_the_tolerance(sizes, seed):
 
 
 @pytest.mark.slow
-def test_command_line(tmp_path):
+def test_command_line(tmp_path, capsys, monkeypatch):
     mesh, out = tmp_path / "ball.obj", tmp_path / "ball.svg"
     ball = icosphere(3)
     rows = [f"v {x} {y} {z}" for x, y, z in ball.vertices]
     mesh.write_text("\n".join(rows + [f"f {a} {b} {c}" for a, b, c in ball.triangle_vertex + 1]))
-    command = ["strokes", str(mesh), "--generate", "smoothest", "--spacing", "12", "-o", str(out)]
+    command = [
+        "strokes",
+        str(mesh),
+        "--generate",
+        "smoothest",
+        "--set",
+        "spacing=12",
+        "-o",
+        str(out),
+    ]
     contents = []
     for _ in range(2):
-        assert (
-            main([*command, "--size", "300x200", "--outline", "--gaps", "0.3", "--light", "lamp"])
-            == 0
-        )
+        options = "--size 300x200 --set outline=on --set gaps=0.3 --set light=lamp"
+        assert main([*command, *options.split()]) == 0
         contents.append(out.read_bytes())
     assert contents[0] == contents[1]
     root = ElementTree.fromstring(contents[0])
     assert len(root.findall("{http://www.w3.org/2000/svg}g")) == 4
+    for arguments, message in (
+        (["-o", str(tmp_path / "ball.png")], "ball.png"),
+        (["--camera", "Close"], "ball.obj: --camera applies only to .blend files"),
+        (["--frames", "1-3"], "ball.obj: --frames applies only to .blend files"),
+        (["--set", "light=scene"], "ball.obj: has no lights"),
+        (["--set", "taper=-1"], "setting 'taper' is -1.0, expected a number from 0"),
+        (["--set", "wobble=1"], "--set wobble=1: unknown setting 'wobble'"),
+        (["--set", "light"], "--set light: expected NAME=VALUE"),
+    ):
+        assert main([*command, *arguments]) == 2
+        assert message in capsys.readouterr().err
+    assert main(["strokes", "-o", str(out)]) == 2
+    assert "give a mesh file" in capsys.readouterr().err
+    monkeypatch.setitem(sys.modules, "bpy", None)
+    assert main(["strokes", "scene.blend", "-o", str(out)]) == 2
+    assert "needs Blender" in capsys.readouterr().err

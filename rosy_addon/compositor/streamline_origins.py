@@ -218,15 +218,17 @@ class Sheets:
         weights = [1 - x - y + both, x - both, y - both, both]
         return _Surroundings(states, unlinked, column, row, weights)
 
-    def linked_neighbors(self, cell: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Yield the cells among (n,) cells that streamlines can step from, and those where they arrive.
+    def linked_neighbors(self, cell: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Return the steps of streamlines from (n,) cells to their four nearest neighbors.
 
-        There is a pair of arrays for each of the four nearest neighbors.
+        For each neighbor: the cells from which a streamline can step to it, and the cells where it arrives.
         """
+        steps = []
         for bit, (column, row) in enumerate(NEIGHBOR_OFFSETS):
             if abs(column) + abs(row) == 1:
                 linked = cell[self._shift.take(bit * self.cell_count + cell) >= 0]
-                yield linked, linked + (row * self._width + column)
+                steps.append((linked, linked + (row * self._width + column)))
+        return steps
 
     def _sheet_shifts(self, spacing: int) -> np.ndarray:
         """Tabulate what steps to neighbors add to the number of the sheet, from 0.

@@ -302,7 +302,7 @@ def test_invalid_options_are_refused(file, tmp_path, monkeypatch):
     monkeypatch.setenv("DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT", "1s")
     for options, expected in (
         (["--jobs", "2"], "give --frames"),
-        (["--frames", "1-3", "--jobs", "0"], "1 or more"),
+        (["--frames", "1-3", "--jobs", "0"], "a whole number from 1"),
         (["--frames", "3-1"], "expected A"),
         (["--frames", "1-3", "--scheduler", "tcp://127.0.0.1:1"], "--scheduler"),
     ):

@@ -91,7 +91,7 @@ class Studio:
     def difference_row(self, lines: str, largest_angle: float) -> Row:
         """Return the row of the figure that shows the differences from the first field.
 
-        Panels have the order of the fields. A field without a difference has an empty panel. See
+        Panels have the order of the fields. A field without a difference has None as its panel. See
         `_difference_panel` and `figure` for the parameters.
         """
         reference, first = next(iter(self.comparison.fields.items()))

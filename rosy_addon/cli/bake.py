@@ -1,4 +1,4 @@
-"""The command `bake`: draw pictures of a .blend file from its cameras, with several processes if requested."""
+"""The command `bake`: draw pictures of a .blend file from its cameras, in one process or several."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def run_bake(options: Options) -> None:
     out = None if options.out is None else Path(os.path.realpath(options.out))
     settings = read_output_settings(scene, out)
     if out is None and settings.folder is not None and not is_beside_blend(settings.folder):
-        # The file may come from someone else.
+        # The file may come from another person, and must not choose a folder to write to.
         raise RosyError(
             f"the file stores its pictures in another place, {os.path.realpath(settings.folder)}: give --out DIR"
         )
@@ -226,5 +226,5 @@ def _forwarded_preset(preset: str) -> str:
 
 
 def _forwarded_program(program: str) -> str:
-    """Return the absolute path of a program. If there is no such file, it is a name on the PATH: return the name."""
+    """Return the absolute path of a program; if there is no such file, its name, which the PATH resolves."""
     return os.path.abspath(program) if os.path.exists(program) else program

@@ -70,7 +70,10 @@ class CommandParser(argparse.ArgumentParser):
         )
 
     def add_object_option(self, text: str) -> None:
-        """Add the option --object with one or more names. It may be repeated. ``--object=-x`` is the name -x."""
+        """Add the option --object with one or more names, which may be repeated.
+
+        A name with a dash at its start is given as ``--object=-x``.
+        """
         self.add_value("--object", "NAME", text, nargs="+", action="extend")
 
     def add_setting_option(self, setting: Setting, note: str) -> None:
@@ -169,7 +172,7 @@ class CommandParser(argparse.ArgumentParser):
         self.add_switch("--undefined", "treat NaN and infinite vectors as undefined")
 
     def add_picture_options(self) -> None:
-        """Add the options of a picture of a mesh: view, look, values for the color map, and source of the tone."""
+        """Add the options of a picture of a mesh: view, look, values for colors, source of the tone."""
         self.add_view_options()
         self.add_workers_option()
         self.add_look_options()
@@ -223,7 +226,7 @@ class Options(argparse.Namespace):
                     raise RosyError(f"{self.output}: is also an input: choose another output file")
 
     def check_only_for(self, kind: str, file: Path | str) -> None:
-        """Raise an error if an option is given that is only for some kind of file; see `CommandParser.only_for`.
+        """Raise an error if an option of `CommandParser.only_for` is given for a file of another kind.
 
         Parameters
         ----------

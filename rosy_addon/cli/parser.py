@@ -47,8 +47,8 @@ class Extras:
         Function that runs the command in a Blender process and exits with its status. It takes the options,
         the name of the command and the .blend file. It returns if the command can run in this process.
     is_in_blender : bool
-        Whether this is the Blender process of `run_in_blender`. Frames of other processes are then drawn
-        already.
+        Whether this is the Blender process of `run_in_blender`. If the
+        options ask for several processes, these have already drawn the frames.
     """
 
     program: tuple[str, ...] = ()

@@ -1,4 +1,4 @@
-"""The properties of RoSy: `Scene.rosy`, `Mesh.rosy`, `Object.rosy` and `NodeTree.rosy`."""
+"""RoSy's properties of Blender datablocks: `Scene.rosy`, `Mesh.rosy`, `Object.rosy` and `NodeTree.rosy`."""
 
 from __future__ import annotations
 
@@ -67,7 +67,8 @@ INK_ITEMS = [
     ("ONE", "Single", "One ink for all strokes"),
     ("FAMILIES", "By Family", "One ink for each family of strokes"),
 ]
-#: Viewpoints of strokes. Only one drawing is made at a time, so there is no item for all cameras.
+#: Items of the property that chooses the camera of strokes. Strokes are drawn from only one camera at a time,
+#: so there is no item for all cameras.
 STROKE_CAMERA_ITEMS = [item for item in CAMERA_ITEMS if item[0] != "ALL"]
 TEXTURE_CONTENT_ITEMS = [(name.upper(), name.capitalize(), text) for name, text in CONTENTS.items()]
 IMAGE_FORMAT_ITEMS = [
@@ -434,7 +435,7 @@ def unregister() -> None:
 
 
 def ensure_registered() -> None:
-    """Add the properties if the extension is not enabled, for scripts and the command line.
+    """Add the properties, unless the enabled extension has added them. Scripts and commands call this.
 
     They are removed when Python exits, because Blender's Python module cannot free them later.
     """

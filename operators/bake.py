@@ -1,4 +1,4 @@
-"""Operators: bake pictures of fields (of one frame or many) and ambient occlusion, show or remove pictures."""
+"""Operators: bake pictures of fields and ambient occlusion; show and remove baked pictures."""
 
 from __future__ import annotations
 

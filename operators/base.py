@@ -94,7 +94,7 @@ class RosyOperator:
         return {"FINISHED"}
 
     def chosen(self, name: str, default: object) -> object:
-        """Return the value of a property if it was set for this call of the operator, and `default` otherwise."""
+        """Return the value of a property if it was set for this call of the operator, else `default`."""
         return getattr(self, name) if self.properties.is_property_set(name) else default
 
     def report_error(self, error: Exception) -> set[str]:

@@ -85,9 +85,9 @@ class _DescribedPreset(RosyOperator):
     )
 
     def ask(self, context: bpy.types.Context, entry: preset_library.PresetEntry | None) -> set[str]:
-        """Open the dialog.
+        """Open the dialog for the name and the description of a preset.
 
-        If there is a preset (`entry`), its fields show the name and description of the preset.
+        If there is an `entry`, the dialog first shows the name and the description of this preset.
         """
         if entry is not None:
             self.name, self.sentence = entry.preset.name, entry.preset.description

@@ -111,7 +111,9 @@ def strokes(
     plotter: bool = False,
     **style: Any,
 ) -> Drawing:
-    """Draw evenly spaced strokes along a field. Hidden parts of the surface get none.
+    """Draw evenly spaced strokes along a field.
+
+    Hidden strokes are left out, unless the setting `hidden` is on.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ DIFFERENCE_COLORS, DIFFERENCE_ENDS = "magma", (1.0, 0.25)
 
 @dataclass(frozen=True, eq=False)
 class Studio:
-    """Draws the panels of a figure, with all fields seen from the same camera.
+    """The panels of a figure, which its methods draw. All fields are seen from the same camera.
 
     Attributes
     ----------

@@ -276,7 +276,7 @@ def _check_parts(comparison: Comparison, parts: Sequence[str], lines: str) -> No
 
 
 def _check_numbers(name: str, **numbers: float) -> None:
-    """Check numbers of a figure against their `LIMITS`.
+    """Check that numeric arguments are within their `LIMITS`.
 
     Raises
     ------

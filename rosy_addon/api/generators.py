@@ -208,7 +208,7 @@ def guided(
 def _guide_vectors(
     surface: Surface, vectors: ArrayLike | Field | None, degree: int
 ) -> np.ndarray | None:
-    """Return guides as (F, 3) vectors.
+    """Return the argument `vectors` of `guided` as (F, 3) vectors, or None if it is None.
 
     Raises
     ------

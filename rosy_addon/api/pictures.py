@@ -441,7 +441,7 @@ def _surface_tone(
 
 
 def _named_tone(surface: Surface, name: str) -> NDArray[Any]:
-    """Return (V,) tones: the vertex attribute `name`, or for "Color" the linear luminance of the colors."""
+    """Return (V,) tones: the vertex attribute `name`; for "Color", the linear luminance of vertex colors."""
     data = surface.vertex_data
     rgb = [data.get(channel) for channel in ("red", "green", "blue")]
     if name == VERTEX_COLOR and all(channel is not None for channel in rgb):

@@ -245,7 +245,7 @@ def _draw_tone_source(column: bpy.types.UILayout, context: bpy.types.Context) ->
 
 
 class VIEW3D_PT_rosy_look_key(SidebarPanel, bpy.types.Panel):
-    """What explains a picture in renders."""
+    """The key (legend) that explains a picture in renders."""
 
     bl_label = "Key"
     bl_parent_id = "VIEW3D_PT_rosy_look"

@@ -84,13 +84,13 @@ class RosyLook(bpy.types.PropertyGroup):
 
 
 class RosyFrameState(bpy.types.PropertyGroup):
-    """What a frame of a sequence was drawn from. Its name is the number of the frame."""
+    """The state of the scene from which a frame of a sequence was drawn, named after the frame number."""
 
     state: bpy.props.StringProperty(description="State of the scene, as JSON")
 
 
 class RosyBake(bpy.types.PropertyGroup):
-    """A baked picture and what it was drawn from, named after the camera."""
+    """A baked picture and the state of the scene from which it was drawn, named after the camera."""
 
     image: bpy.props.PointerProperty(type=bpy.types.Image)
     material: bpy.props.PointerProperty(type=bpy.types.Material)
@@ -112,7 +112,7 @@ class RosyBake(bpy.types.PropertyGroup):
 
 
 class RosyProjection(bpy.types.PropertyGroup):
-    """How an object shows one of its pictures, by the material of the picture."""
+    """The projection with which an object shows one of its pictures, and the material of the picture."""
 
     material: bpy.props.PointerProperty(type=bpy.types.Material)
     matrix: bpy.props.FloatVectorProperty(
@@ -122,13 +122,13 @@ class RosyProjection(bpy.types.PropertyGroup):
 
 
 class RosyNodeTree(bpy.types.PropertyGroup):
-    """The pictures of an object. They belong to the node group of the modifier that shows one."""
+    """The pictures that an object can show, stored in the node group of the modifier that shows one of them."""
 
     projections: bpy.props.CollectionProperty(type=RosyProjection)
 
 
 class RosyStrokeObject(bpy.types.PropertyGroup):
-    """An object of strokes made by RoSy, named after the camera."""
+    """An object with strokes that RoSy has made, named after the camera."""
 
     kind: bpy.props.StringProperty()
     thing: bpy.props.PointerProperty(type=bpy.types.Object)

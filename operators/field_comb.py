@@ -196,7 +196,7 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         return CombStroke(selected_mesh_objects(context)[0].data, brush, self.reach)
 
     def _settle(self, context: bpy.types.Context, line: CombStroke) -> Steps[None]:
-        """Return the steps of the job that solves for the whole field after the stroke `line`, and stores it."""
+        """Return the steps of the job that solves for the field after the stroke `line`, and stores it."""
         yield from line.settle()
         field = line.store()
         overlay.refresh(context, {line.mesh: field})

@@ -122,7 +122,7 @@ class RosyProjection(bpy.types.PropertyGroup):
 
 
 class RosyNodeTree(bpy.types.PropertyGroup):
-    """The pictures that an object can show, stored in the node group of the modifier that shows one of them."""
+    """The pictures that an object can show, stored in the node group of its modifier."""
 
     projections: bpy.props.CollectionProperty(type=RosyProjection)
 

@@ -20,8 +20,8 @@ from .field import warn
 def form(surface: Surface, degree: int = 4) -> Field:
     """Make a field that follows the form of the surface. It is the default of RoSy.
 
-    It follows sharp edges and clear directions of curvature, and is smooth between them. How far it is
-    smoothed depends on the noise of the mesh.
+    It follows sharp edges and clear directions of curvature, and is smooth between them.
+    Curvature is averaged over a distance that depends on the noise of the mesh.
 
     Parameters
     ----------

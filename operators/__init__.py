@@ -1,4 +1,4 @@
 """The operators of the extension.
 
-`base` and `modal_job` have what operators share, and `registration` registers all of them.
+`base` and `modal_job` have base classes and functions of operators. `registration` registers all operators.
 """

@@ -1,4 +1,4 @@
-"""Operators: bake pictures of fields and of ambient occlusion, at one frame or many; show and remove them."""
+"""Operators: bake pictures of fields and ambient occlusion; show and remove baked pictures."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class ROSY_OT_bake(ModalJobMixin, bpy.types.Operator):
         self.report_warnings(*(text for picture in result for text in picture.warnings))
 
     def _cameras(self, context: bpy.types.Context) -> list[CameraSource]:
-        """Return the cameras to bake from: the operator's choice, by default the scene's."""
+        """Return the cameras to bake from, as set for the operator, or else in the settings of the scene."""
         scene = context.scene
         source = self.chosen("camera", scene.rosy.camera)
         if source == "VIEW":
@@ -98,7 +98,7 @@ class ROSY_OT_bake_animation(DialogJobMixin, bpy.types.Operator):
     filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
 
     def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
-        """Ask for a folder if the scene has none, as in a file that was never saved."""
+        """Ask for a folder if the scene has none, such as in a file that was never saved."""
         try:
             output_folder(context.scene)
         except RosyError:
@@ -121,7 +121,8 @@ class ROSY_OT_bake_animation(DialogJobMixin, bpy.types.Operator):
                 f"{frame_settings['first']}"
             )
         cameras = scene_cameras(scene) if self.all_cameras else None
-        # Frames are saved in the scene's folder, even if single pictures are packed.
+        # Frames are saved to the folder of the scene, even if single pictures are packed into the .blend
+        # file.
         settings = replace(read_output_settings(scene), folder=output_folder(scene))
         return bake_animation.begin(
             scene,
@@ -132,7 +133,7 @@ class ROSY_OT_bake_animation(DialogJobMixin, bpy.types.Operator):
         )
 
     def _frame_settings(self, scene: bpy.types.Scene) -> dict[str, int]:
-        """Return the first and last frame and the step: the operator's, by default the scene's."""
+        """Return the first and last frame and the step, as set for the operator, or else in the scene."""
         return {
             "first": self.chosen("first", scene.frame_start),
             "last": self.chosen("last", scene.frame_end),

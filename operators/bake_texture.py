@@ -1,6 +1,6 @@
 """Operator: bake the field of the selected meshes into textures for their UV maps.
 
-Meshes without one are unwrapped with Blender's Smart UV Project.
+Meshes without a UV map are unwrapped with Blender's Smart UV Project, if the user agrees.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from ..rosy_addon.worker.job import Step, Steps
 from .base import ACTIVE_FIELD, IDLE, selected_mesh_objects
 from .modal_job import DialogJobMixin
 
-#: Angle between the faces of a chart, and distance between charts as a fraction of the map.
+#: Largest angle between the faces of a chart in radians, and distance between charts in UV units.
 ANGLE, MARGIN = math.radians(66), 0.003
 
-#: Name of the new UV maps, as Blender's own.
+#: Name of new UV maps, the same as Blender gives them.
 UV_MAP_NAME = "UVMap"
 
 
@@ -42,7 +42,7 @@ class ROSY_OT_bake_texture(DialogJobMixin, bpy.types.Operator):
     )
 
     def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
-        """Ask whether to unwrap meshes, if there are any without a UV map."""
+        """If there are meshes without a UV map, ask the user whether to unwrap them."""
         if self.unwrap or not self._without_uv_map(context):
             return None
         return context.window_manager.invoke_props_dialog(self, width=340, confirm_text="Unwrap")
@@ -80,7 +80,9 @@ class ROSY_OT_bake_texture(DialogJobMixin, bpy.types.Operator):
 def _with_uv_maps(
     context: bpy.types.Context, objects: Sequence[bpy.types.Object], steps: Steps[Any]
 ) -> Steps[Any]:
-    """Add a UV map to the meshes of objects for a job, which removes them if it is not finished.
+    """Add UV maps to the meshes of objects. Return the steps of a job that uses the maps.
+
+    If the job does not finish, it removes the UV maps.
 
     Parameters
     ----------
@@ -105,19 +107,19 @@ def _with_uv_maps(
         bpy.ops.object.mode_set(mode="OBJECT")
     map_names = {}
     for mesh in meshes:
-        # The operator refuses meshes without faces.
+        # Smart UV Project raises an error for meshes without faces.
         uv = _unwrapped(context, mesh) if mesh.polygons else np.zeros(0, dtype=np.float32)
         layer = mesh.uv_layers.new(name=UV_MAP_NAME)
         layer.data.foreach_set("uv", uv)
         # Blender adds a number if the mesh has another attribute of this name.
         map_names[mesh] = layer.name
     with_cleanup = _with_removal(map_names, steps)
-    next(with_cleanup)  # from here on, it removes the maps also if it is closed
+    next(with_cleanup)  # has started, so it removes the maps also if it is closed
     return with_cleanup
 
 
 def _with_removal(map_names: Mapping[bpy.types.Mesh, str], steps: Steps[Any]) -> Steps[Any]:
-    """Run the steps of a job. If it is not finished, the UV maps are removed from the meshes."""
+    """Run the steps of a job. If the job does not finish, remove UV maps, given by name for each mesh."""
     try:
         yield Step(0.0, "unwrapping")
         return (yield from steps)
@@ -129,10 +131,10 @@ def _with_removal(map_names: Mapping[bpy.types.Mesh, str], steps: Steps[Any]) ->
 
 
 def _unwrapped(context: bpy.types.Context, mesh: bpy.types.Mesh) -> np.ndarray:
-    """Return the (2 C,) float32 coordinates of an unwrapped copy of a mesh.
+    """Return new UV coordinates for the C corners of a mesh, (2 C,) float32, as u, v, u, v ...
 
-    Blender's operator changes what is hidden and selected, and needs an object that is visible. The copy
-    keeps both away from the user's mesh.
+    A copy of the mesh is unwrapped, because Blender's operator needs a visible object, and changes which
+    faces are hidden and selected.
     """
     with _only_selected_copy(context, mesh) as copy:
         bpy.ops.object.mode_set(mode="EDIT")
@@ -150,7 +152,7 @@ def _unwrapped(context: bpy.types.Context, mesh: bpy.types.Mesh) -> np.ndarray:
 def _only_selected_copy(
     context: bpy.types.Context, mesh: bpy.types.Mesh
 ) -> Iterator[bpy.types.Object]:
-    """Yield an object with a copy of a mesh, which alone is selected and active."""
+    """Context manager: yield a temporary object with a copy of a mesh, the only one that is selected."""
     active = context.view_layer.objects.active
     selected = list(context.selected_objects)
     copy = bpy.data.objects.new("RoSy Unwrapping", mesh.copy())

@@ -1,4 +1,4 @@
-"""What operators share: conditions, reports, selected meshes, storing fields."""
+"""Base class and functions of operators: conditions, reports, selected meshes, storing of fields."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ..rosy_addon.ui.preferences import apply_preferences
 
 
 class Condition(NamedTuple):
-    """What must hold so that an operator can run, and what the user is told if it does not."""
+    """A condition for an operator to run, and the message to the user if the condition does not hold."""
 
     holds: Callable[[bpy.types.Context], object]
     message: str
@@ -53,7 +53,7 @@ VISIBLE_FIELD = Condition(
     "No visible mesh has a field: make or import one first",
 )
 
-#: Conditions of operators that give fields to the selected meshes, and of those that change them.
+#: Conditions of operators that make fields on the selected meshes, and of operators that change fields.
 EDITABLE = (IDLE, Condition(selected_mesh_objects, "Select a mesh object first"), OBJECT_MODE)
 EDITABLE_FIELD = (*EDITABLE, ACTIVE_FIELD)
 
@@ -61,12 +61,15 @@ EDITABLE_FIELD = (*EDITABLE, ACTIVE_FIELD)
 class RosyOperator:
     """Mixin of all operators: checks their conditions, and reports errors as sentences."""
 
-    #: Checked in this order.
+    #: The conditions, which are checked in this order.
     conditions: tuple[Condition, ...] = ()
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether all conditions hold. Set the poll message if not."""
+        """Return whether all conditions hold.
+
+        If not, set the message that Blender shows for a disabled button.
+        """
         for condition in cls.conditions:
             if not condition.holds(context):
                 cls.poll_message_set(condition.message)
@@ -74,12 +77,12 @@ class RosyOperator:
         return True
 
     def act(self, context: bpy.types.Context) -> None:
-        """Do all the work, in operators that are no jobs.
+        """Do the work of the operator. Operators that run a job implement `ModalJobMixin.begin` instead.
 
         Raises
         ------
         RosyError
-            Reported to the user.
+            The message is reported to the user.
         """
         raise NotImplementedError
 
@@ -91,16 +94,22 @@ class RosyOperator:
         return {"FINISHED"}
 
     def chosen(self, name: str, default: object) -> object:
-        """Return the property of a name if it was set for this operator, and else the default."""
+        """Return the value of a property if it was set for this call of the operator, else `default`."""
         return getattr(self, name) if self.properties.is_property_set(name) else default
 
     def report_error(self, error: Exception) -> set[str]:
-        """Report one of `REPORTED_ERRORS`. Return the result of an operator that has failed."""
+        """Report an error of a type in `REPORTED_ERRORS`.
+
+        Return the result of an operator that has failed.
+        """
         self.report({"ERROR"}, as_sentence(error_text(error)))
         return {"CANCELLED"}
 
     def report_operator_error(self, error: RuntimeError) -> set[str]:
-        """Report the error of another operator that was called. Return the result of one that has failed."""
+        """Report the error of another operator that this one has called.
+
+        Return the result of an operator that has failed.
+        """
         self.report({"ERROR"}, str(error).strip().removeprefix("Error: "))
         return {"CANCELLED"}
 
@@ -119,10 +128,10 @@ class RosyOperator:
         fields: dict[bpy.types.Mesh, RosyField],
         name: str | None = None,
     ) -> None:
-        """Store fields on meshes as `assign_fields`, and apply the preferences to the scene.
+        """Store fields on meshes with `assign_fields`, and apply the preferences to the scene.
 
-        The overlay of singularities is updated where it is shown. The first field of a scene is
-        shown live. What the preferences ask for and cannot be done is reported.
+        Shown singularities are updated. With the first field of a scene, the 3D view is made live, if the
+        preferences ask for it. If a request of the preferences fails, this is reported to the user.
 
         Parameters
         ----------
@@ -153,7 +162,7 @@ class RosyOperator:
 def sync_suffix(operator: bpy.types.Operator, suffix: str) -> bool:
     """Set the suffix of an operator's file path. Return whether the path has changed.
 
-    A path without a name is left alone.
+    A path without a file name is not changed.
     """
     path = Path(operator.filepath)
     if not path.name or path.suffix == suffix:

@@ -84,11 +84,14 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         default=0.1,
     )
 
-    #: The stroke of the mouse, once that has been on the mesh.
+    #: The stroke that is drawn with the mouse. None until the mouse has been over the mesh.
     _line = None
 
     def begin(self, context: bpy.types.Context) -> Steps[None]:
-        """Draw the whole stroke."""
+        """Comb along all points of the property `stroke`.
+
+        Return the steps of the job that solves for the field.
+        """
         if not len(self.stroke):
             raise RosyError("the stroke has no points: give some, or drag in the 3D view")
         line = self._start_line(context)
@@ -119,7 +122,7 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
                 release_mouse()
             return result
         if event.type == "LEFTMOUSE" and event.value == "PRESS":
-            # The next stroke begins: settle at once.
+            # The next stroke begins, so the job of this one is completed at once.
             return self._settle_now(context) | {"PASS_THROUGH"}
         result = super().modal(context, event)
         if result == {"CANCELLED"}:
@@ -127,7 +130,7 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         return result
 
     def _drag(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Handle an event while the mouse button is down."""
+        """Handle an event while the mouse button is down. Return the result for `modal`."""
         try:
             if event.type in {"MOUSEMOVE", "INBETWEEN_MOUSEMOVE"}:
                 if self._add(context, event) and event.type == "MOUSEMOVE":
@@ -150,13 +153,13 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def _take_back(self) -> None:
-        """Restore the field, if it was changed and the mesh still exists."""
+        """Restore the field as it was before the stroke, if it was changed and the mesh still exists."""
         with suppress(ReferenceError):
             if self._line is not None:
                 self._line.restore()
 
     def _click_beside(self, context: bpy.types.Context, event: bpy.types.Event) -> None:
-        """Select what is under the mouse, if it was clicked and not dragged beside the mesh."""
+        """Select the object under the mouse after a click beside the mesh. Do nothing after a drag."""
         moved = np.hypot(
             event.mouse_x - event.mouse_prev_press_x, event.mouse_y - event.mouse_prev_press_y
         )
@@ -193,13 +196,16 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         return CombStroke(selected_mesh_objects(context)[0].data, brush, self.reach)
 
     def _settle(self, context: bpy.types.Context, line: CombStroke) -> Steps[None]:
-        """Solve for the whole field, and store it."""
+        """Return the steps of the job that solves for the field after the stroke `line`, and stores it."""
         yield from line.settle()
         field = line.store()
         overlay.refresh(context, {line.mesh: field})
 
     def _settle_now(self, context: bpy.types.Context) -> set[str]:
-        """Run the rest of the job. Return the result of the operator."""
+        """Run the rest of the job without returning to Blender's event loop.
+
+        Return the result of the operator.
+        """
         try:
             if self._job.finish(context):
                 return {"FINISHED"}
@@ -210,7 +216,10 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         return {"CANCELLED"}
 
     def cancel(self, context: bpy.types.Context) -> None:
-        """Stop. Blender calls this if the window is closed or a file is opened."""
+        """Cancel the stroke and its job, and restore the field.
+
+        Blender calls this if the window is closed or a file is opened.
+        """
         release_mouse()
         super().cancel(context)
         self._take_back()

@@ -54,7 +54,7 @@ class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         if self.use_as_color:
             settings = context.scene.rosy
             settings.color_attribute = DIFFERENCE_ATTRIBUTE
-            # Light where the fields are the same, and lines can be seen.
+            # The range is reversed. So lines are light, and can be seen, where the fields are the same.
             settings.look.hue, settings.look.color_map = "values", "magma"
             settings.look.color_range = 180.0 / degree, 0.0
         statistics = comparison.statistics

@@ -26,8 +26,8 @@ from .modal_job import ModalJobMixin
 
 _Result = TypeVar("_Result")
 
-#: Items of the new degree; the number of each item is the degree. Not inside the annotation: up to
-#: Python 3.11, a comprehension there cannot see module names.
+#: Items of the property for the new degree. The number of each item is the degree. They are not in the
+#: annotation of the property, because up to Python 3.11 a comprehension there cannot see names of the module.
 DEGREE_ITEMS = [
     ("KEEP", "Keep", "Keep the degree", 0),
     *(
@@ -36,7 +36,7 @@ DEGREE_ITEMS = [
     ),
 ]
 
-#: Forms in which a field can be stored, and what shaders need of it.
+#: Forms in which a field can be stored, and in addition the tangents that shaders need.
 FORMS = {
     **STORAGE_FORMS,
     "TANGENT": ("Tangents", "One direction on each corner, for the Tangent input of shaders"),
@@ -52,7 +52,7 @@ def _set_degree(operator: bpy.types.OperatorProperties, degree: int) -> None:
 
 
 def _search_values(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
-    """Return the vertex groups and scalar attributes of the active mesh, by name."""
+    """Return the names of the vertex groups and the scalar attributes of the active mesh."""
     obj = selected_mesh_objects(context)[0]
     scalar_types = {"FLOAT", "INT", "INT8", "BOOLEAN", "FLOAT_COLOR", "BYTE_COLOR"}
     names = [
@@ -72,7 +72,10 @@ class _FieldsJobMixin(ModalJobMixin):
     def each_mesh(
         self, context: bpy.types.Context, begin: Callable[[bpy.types.Mesh], Steps[_Result]]
     ) -> Steps[dict[bpy.types.Mesh, _Result]]:
-        """Run a job for each mesh, and return the results."""
+        """Run a job for each selected mesh. Return the results by mesh.
+
+        `begin` returns the steps of the job for a mesh.
+        """
         meshes, results = list(self.required_data(context)), {}
         for index, mesh in enumerate(meshes):
             start, stop = index / len(meshes), (index + 1) / len(meshes)
@@ -136,13 +139,13 @@ class ROSY_OT_field_convert(_FieldsJobMixin, bpy.types.Operator):
     values: text("Values", "Name of the attribute or vertex group", search=_search_values)
 
     def begin(self, context: bpy.types.Context) -> Steps[int]:
-        """Convert all fields, then store them. Return the number of meshes."""
+        """Convert the fields of all selected meshes, then store them. The result is the number of meshes."""
         converted = yield from self.each_mesh(context, self._converted)
         self.store_fields(context, converted)
         return len(converted)
 
     def _converted(self, mesh: bpy.types.Mesh) -> Steps[RosyField]:
-        """Return the converted field of a mesh."""
+        """Return the steps of the job that computes the converted field of a mesh."""
         surface = mesh_surface(mesh)
         field = read_mesh_field(mesh, surface=surface)
         values = read_face_scalars(mesh, self.values) if self.magnitude == "values" else None
@@ -183,7 +186,7 @@ class ROSY_OT_field_store(_FieldsJobMixin, bpy.types.Operator):
     )
 
     def begin(self, context: bpy.types.Context) -> Steps[int]:
-        """Read all fields, then store them. Return the number of meshes."""
+        """Read the fields of all selected meshes, then store them. The result is the number of meshes."""
         if self.form == "TANGENT":
             guiding_angle = context.scene.rosy.look.guiding_angle
             tangents = yield from self.each_mesh(

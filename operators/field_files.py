@@ -1,4 +1,4 @@
-"""Operators: read the field of the active mesh from a file, and write it to one."""
+"""Operators: read the field of the active mesh from a file, and write it to a file."""
 
 from __future__ import annotations
 
@@ -62,11 +62,11 @@ class ROSY_OT_field_import(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Im
     )
 
     def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
-        """Ask for the settings of a file that was dropped on the view, or for a file."""
+        """Ask for the settings if a file was dropped on the 3D view; otherwise ask for a file."""
         return None if self.skip_browser else self.invoke_popup(context)
 
     def begin(self, context: bpy.types.Context) -> Steps[LoadedField]:
-        """Read the field, then store it."""
+        """Read the field from the file, then store it on the mesh."""
         mesh = selected_mesh_objects(context)[0].data
         surface = mesh_surface(mesh)
         mesh_file = bpy.path.abspath(self.mesh_file) if self.mesh_file else None
@@ -102,7 +102,7 @@ class ROSY_FH_field(bpy.types.FileHandler):
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
-#: File formats by suffix: label and description in the user interface.
+#: Labels and descriptions of file formats in the user interface, by suffix.
 FIELD_FORMATS = {
     ".rosy": ("RoSy", "One member vector per face"),
     ".rawfield": ("Raw Field", "One row per face with all directions, for Directional"),
@@ -112,7 +112,7 @@ FIELD_FORMATS = {
     ".sings": ("Singularities", "Singular vertices and their indices, for Directional"),
 }
 
-#: Formats that keep the lengths of the vectors of each face.
+#: Suffixes of formats that keep the length of the vector on each face.
 GUIDE_FORMATS = (".rosy", ".rawfield", ".txt", ".npy")
 
 
@@ -145,7 +145,7 @@ class ROSY_OT_field_export(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Ex
     )
 
     def check(self, context: bpy.types.Context) -> bool:
-        """Set the suffix of the file name to the format's in the file browser."""
+        """Set the suffix of the file name to that of the chosen format. The file browser calls this."""
         return sync_suffix(self, self.file_format)
 
     def begin(self, context: bpy.types.Context) -> Steps[Path]:

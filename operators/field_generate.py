@@ -36,8 +36,8 @@ from ..rosy_addon.worker.job import Call, Steps
 from .base import EDITABLE, selected_mesh_objects
 from .modal_job import ModalJobMixin
 
-#: Generators that take less time than singularities take to be counted, and the number of faces up
-#: to which they are counted nevertheless.
+#: Generators that take less time than it takes to count the singularities. After these, singularities are
+#: counted only if there are at most this many faces.
 FAST_KINDS, MAX_FAST_FACES = ("axis", "uv"), 50_000
 
 
@@ -131,10 +131,10 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
     }
 
     def begin(self, context: bpy.types.Context) -> Steps[str]:
-        """Generate all fields, then store them. Return what was made, for a message.
+        """Generate the fields of all selected meshes, then store them. The result is a message to the user.
 
-        Meshes without features to follow, or without a direction on any face, are reported and left
-        out, unless there is no other mesh.
+        A mesh without features to follow, or on which the field is undefined everywhere, is left out and
+        reported. If no other mesh is selected, an error is raised.
         """
         inputs, fields, errors = [], {}, []
         for mesh in self.required_data(context):
@@ -164,7 +164,7 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
         self.report_warnings(*map(str, errors))
         surfaces = {mesh: surface for mesh, surface, _ in inputs}
         fields_on_surfaces = [(surfaces[mesh], field) for mesh, field in fields.items()]
-        # Counting must not take long.
+        # To count singularities must not take longer than to generate the field.
         face_count = sum(surface.face_count for surface, _ in fields_on_surfaces)
         is_cheap = self.kind not in FAST_KINDS or face_count <= MAX_FAST_FACES
         describe = partial(description, count_singularities=is_cheap)
@@ -175,7 +175,7 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
         return f"a field of degree {self.degree} on {target}{notes and ': '}{notes}"
 
     def _no_direction_error(self, surface: Surface) -> RosyError:
-        """Return the error of a mesh on which this kind of field is undefined everywhere."""
+        """Return the error for a mesh on which this kind of field is undefined everywhere."""
         kind = self.properties.bl_rna.properties["kind"].enum_items[self.kind].name
         return RosyError(
             f"{surface.name}: {kind} gives no direction on any face: choose another kind, such as "
@@ -185,7 +185,7 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
     def _generator_settings(
         self, context: bpy.types.Context, mesh: bpy.types.Mesh, surface: Surface
     ) -> GeneratorSettings:
-        """Return the settings of the generator for one mesh, with the guides read."""
+        """Return the settings of the generator for a mesh. They contain the guides, read from the scene."""
         owner = next(obj for obj in selected_mesh_objects(context) if obj.data == mesh)
         kind_guides = {"features": {"EDGES"}, "uv": {"UV"}, "guided": self.guides}
         guides = kind_guides.get(self.kind, ())
@@ -217,7 +217,7 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
         return GeneratorSettings(**values)
 
     def _guide_objects(self, context: bpy.types.Context) -> list[bpy.types.Object]:
-        """Return the guide objects: the named one, or by default the selected ones."""
+        """Return the guide objects: the one that the settings name, or else the selected ones."""
         if not self.guide:
             objects = guide_objects(context.selected_objects)
             if not objects:

@@ -1,4 +1,4 @@
-"""Modal operators that run a job: a helper process computes, a timer polls it, and ESC stops both.
+"""Modal operators that run a job. A helper process computes, a timer polls it, and ESC cancels the job.
 
 An operator derives from `ModalJobMixin`, and returns the steps of its job from `begin`. If it is called
 with ``EXEC_DEFAULT``, or if there is no window, the job runs in Blender's process at once.
@@ -25,31 +25,32 @@ from ..rosy_addon.worker.job import Step, Steps, run
 from ..rosy_addon.worker.step_runner import StepRunner
 from .base import EDITABLE_FIELD, RosyOperator, selected_mesh_objects
 
-#: Longest time in seconds that steps run in Blender's process before events of the user are handled.
+#: Longest time in seconds for which steps run in Blender's process before the user's events are handled.
 SLICE_SECONDS = 0.05
 
-#: Seconds between two polls of the helper.
+#: Seconds between two polls of the helper process.
 TIMER_SECONDS = 0.01
 
-#: Handlers of events that invalidate the data of a job, and the reasons that the user is told.
+#: Blender's lists of handlers for events that invalidate the data of a job, and the reason for the user why
+#: the job is then stopped.
 INTERRUPT_REASONS = {
     "undo_pre": "undo was used",
     "redo_pre": "redo was used",
     "load_pre": "another file was opened",
 }
 
-#: Warning if there is no helper; shown once.
+#: Warning if no helper process can be started. It is shown once.
 NO_HELPER = "Blender waits while RoSy computes, as no other process can be started"
 
-#: The running job, if any.
+#: The running job, or None.
 _current_job: Job | None = None
 
-#: Whether this warning was shown.
+#: Whether the warning that there is no helper process was shown.
 _has_said_no_helper = False
 
 
 def stop_current_job() -> None:
-    """Cancel the current job, if any, like ESC."""
+    """Cancel the current job, if there is one, as ESC does."""
     if _current_job is not None:
         _current_job.stop("RoSy was disabled")
 
@@ -57,8 +58,8 @@ def stop_current_job() -> None:
 class Job:
     """A job that runs in a window, with its timer, handlers and progress display.
 
-    At most one job runs at a time. `stop` ends the helper, releases the timer, the handlers and the
-    progress display, and sets `stop_reason`.
+    At most one job runs at a time. `stop` ends the helper process, removes the timer, the handlers and
+    the progress display, and sets `stop_reason`.
 
     Parameters
     ----------
@@ -74,7 +75,7 @@ class Job:
     result : Any
         The result of the job once it is done.
     note : str
-        What the user should know when it has ended.
+        A note for the user that is reported when the job has ended. Empty if there is none.
     """
 
     def __init__(
@@ -103,17 +104,17 @@ class Job:
         self._show_progress(context, Step(0.0, "starting"))
 
     def advance(self, context: bpy.types.Context) -> bool:
-        """Poll the helper, and run steps of the job until it waits for the helper again.
+        """Poll the helper process, and run steps of the job until it waits for the helper process again.
 
         Returns
         -------
         bool
-            True if the job is done. False if it continues, or was stopped.
+            True if the job is done. False if it is still running or was stopped.
 
         Raises
         ------
         RosyError
-            An error of the job, which is stopped in this case.
+            If the job raises an error. It is stopped then.
         """
         if (reason := self._abort_reason(context)) is not None:
             self.stop(reason)
@@ -147,7 +148,10 @@ class Job:
 
     @contextmanager
     def _waiting(self, context: bpy.types.Context) -> Iterator[None]:
-        """Show the wait cursor. Warn once if there is no helper although the preferences ask for one."""
+        """Context manager: show the wait cursor.
+
+        Warn once if there is no helper process although the preferences ask for one.
+        """
         global _has_said_no_helper
         if uses_helper(context) and not _has_said_no_helper:
             self.note, _has_said_no_helper = NO_HELPER, True
@@ -164,7 +168,7 @@ class Job:
         try:
             if context.scene != self.scene:
                 return "another scene was chosen"
-            if context.view_layer != self.view_layer:  # jobs hold its depsgraph
+            if context.view_layer != self.view_layer:  # jobs use the depsgraph of the view layer
                 return "another view layer was chosen"
             for data_block in self.required_data:
                 if isinstance(data_block, bpy.types.Object) and not data_block.users_scene:
@@ -174,7 +178,7 @@ class Job:
         return None
 
     def _show_progress(self, context: bpy.types.Context, step: Step | None) -> None:
-        """Show the progress in the cursor, the status bar and the sidebars, if it has changed."""
+        """If the progress has changed, show it at the cursor, in the status bar and in the sidebars."""
         if step is None or step == job_status.current:
             return
         job_status.current = step
@@ -188,7 +192,10 @@ class Job:
         redraw_sidebars()
 
     def stop(self, reason: str) -> None:
-        """Stop the job, and release everything that it holds. Later calls have no effect."""
+        """Stop the job, for a reason that the user is told, and free its resources.
+
+        Later calls have no effect.
+        """
         global _current_job
         if self.stop_reason is not None:
             return
@@ -198,11 +205,11 @@ class Job:
         try:
             self._runner.close()
         except ReferenceError:
-            pass  # the data that the job would restore were deleted
+            pass  # the user has deleted data that the job wants to restore
         finally:
             self._cleanup()
         with suppress(HelperLostError):
-            HELPER.start()  # for the next job
+            HELPER.start()  # so that it is ready for the next job
 
     def _cleanup(self) -> None:
         """Remove the handlers, the timer and the progress display."""
@@ -218,11 +225,11 @@ class Job:
 
 
 class ModalJobMixin(RosyOperator):
-    """Mixin of operators that run a job: implements act, invoke, modal and cancel."""
+    """Mixin of operators that run a job. It implements act, invoke, modal and cancel."""
 
     _job: Job | None = None
 
-    #: State of the scene or of the files after a cancel, for the message to the user.
+    #: Sentence for the user that says in which state the scene or files are after the job was cancelled.
     cancel_note = "nothing was changed"
 
     def begin(self, context: bpy.types.Context) -> Steps[Any]:
@@ -231,14 +238,14 @@ class ModalJobMixin(RosyOperator):
         Raises
         ------
         RosyError
-            Reported to the user, like errors that the job itself raises.
+            The message is reported to the user, as are errors that the job itself raises.
         """
         raise NotImplementedError
 
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         """Return the datablocks that the job needs. It stops if one of them is deleted.
 
-        By default these are all visible objects with a field.
+        By default, these are all visible objects with a field.
         """
         return field_objects(context.view_layer)
 
@@ -297,24 +304,24 @@ class ActiveMeshMixin:
 class DialogJobMixin(ModalJobMixin):
     """Mixin of operators that may ask the user something before they run their job.
 
-    Blender frees an operator when its dialog or file browser is confirmed. So a second operator, with
-    the answer, does the work.
+    Blender frees an operator when its dialog or file browser is confirmed. So the operator is called a second
+    time, with the answer in its properties, to do the work.
     """
 
     _has_asked = False
 
     def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
-        """Open a dialog or a file browser. Return what that returns; None if there is no need to ask.
+        """Open a dialog or a file browser, and return the result of the operator. None if nothing is asked.
 
         Raises
         ------
         RosyError
-            Reported to the user.
+            The message is reported to the user.
         """
         raise NotImplementedError
 
     def take_answer(self, context: bpy.types.Context) -> None:
-        """Set the properties of the operator that does the work, so that it need not ask again."""
+        """Set the properties with which the operator is called again to do the work, without asking."""
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if bpy.app.background or context.window is None:
@@ -341,13 +348,16 @@ class DialogJobMixin(ModalJobMixin):
         operator = getattr(bpy.ops.rosy, type(self).bl_idname.partition(".")[2])
         try:
             result = operator("INVOKE_DEFAULT", **settings)
-        except RuntimeError as error:  # reported by the second operator
+        except RuntimeError as error:  # the second call has reported it
             return self.report_operator_error(error)
         return {"CANCELLED"} if result == {"CANCELLED"} else {"FINISHED"}
 
 
 class FileJobMixin(DialogJobMixin):
-    """Mixin of operators that ask for a file, by default one to write, unless `skip_browser` is set."""
+    """Mixin of operators that ask for a file, unless `skip_browser` is set.
+
+    By default, it is a file to write.
+    """
 
     skip_browser: toggle(
         "Skip Browser", "Start without a file browser", options={"HIDDEN", "SKIP_SAVE"}

@@ -34,19 +34,22 @@ HAS_USER_PRESETS = Condition(
 
 
 def _preset_property(search: Any) -> Any:
-    """Return the property of the preset that an operator acts on."""
+    """Return the text property for the key of the preset that an operator acts on.
+
+    `search` returns the keys to choose from.
+    """
     return text(
         "Preset", "Name of the preset. Empty: the active preset of the scene", search=search
     )
 
 
 def _replace_property() -> Any:
-    """Return the switch that lets an operator replace a preset of the user."""
+    """Return the boolean property that lets an operator replace a preset of the user."""
     return toggle("Replace Existing", "Replace your preset of the same name", options={"SKIP_SAVE"})
 
 
 def _target_preset(operator: Any, context: bpy.types.Context) -> str:
-    """Return the key of the preset that an operator acts on; by default the scene's."""
+    """Return the key of the preset that an operator acts on. By default, it is the preset of the scene."""
     return operator.preset or context.scene.rosy.preset_name
 
 
@@ -71,7 +74,7 @@ class ROSY_OT_preset_apply(RosyOperator, bpy.types.Operator):
 class _DescribedPreset(RosyOperator):
     """Mixin of operators that ask for the name and the description of a preset."""
 
-    #: The button that confirms the dialog.
+    #: Label of the button that confirms the dialog.
     confirm_text = ""
 
     name: text("Name", "Name of the preset", maxlen=MAX_NAME_LENGTH)
@@ -82,7 +85,10 @@ class _DescribedPreset(RosyOperator):
     )
 
     def ask(self, context: bpy.types.Context, entry: preset_library.PresetEntry | None) -> set[str]:
-        """Open the dialog with the name and the description of a preset, if there is one."""
+        """Open the dialog for the name and the description of a preset.
+
+        If there is an `entry`, the dialog first shows the name and the description of this preset.
+        """
         if entry is not None:
             self.name, self.sentence = entry.preset.name, entry.preset.description
         return context.window_manager.invoke_props_dialog(
@@ -124,7 +130,7 @@ class ROSY_OT_preset_save(_DescribedPreset, bpy.types.Operator):
 
 
 def _is_user_preset(name: str) -> bool:
-    """Return whether the user has a preset of this name."""
+    """Return whether the user has a preset with this name."""
     try:
         return preset_key(name) in preset_library.user_preset_keys()
     except RosyError:

@@ -1,4 +1,4 @@
-"""Registration of the operators."""
+"""Register the operators with Blender."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from . import (
     viewport,
 )
 
-#: Types whose subclasses are registered.
+#: Blender's base classes. Classes that derive from one of them are registered.
 REGISTRABLE = (bpy.types.Operator, bpy.types.PropertyGroup, bpy.types.FileHandler)
 
 #: Modules with operators, in the order of registration.
@@ -43,7 +43,7 @@ MODULES = (
 )
 
 
-#: The classes that these modules define for Blender, in their order. Mixins are not registered.
+#: The classes of these modules to register, in the order of their definition. Mixins are not among them.
 CLASSES = tuple(
     value
     for module in MODULES
@@ -55,7 +55,7 @@ CLASSES = tuple(
 
 
 def register() -> None:
-    """Register the operators, and the tools that call them."""
+    """Register the operators and the tools that call them."""
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     bpy.utils.register_tool(VIEW3D_TOOL_rosy_comb, separator=True)

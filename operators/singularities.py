@@ -1,4 +1,4 @@
-"""Operators: show the singularities of fields, and move them, by numbers or with the mouse in the 3D view."""
+"""Operators: show the singularities of fields, and move them, by vertex numbers or with the mouse."""
 
 from __future__ import annotations
 
@@ -75,14 +75,17 @@ class ROSY_OT_singularities(RosyOperator, bpy.types.Operator):
 
 
 def _hide(context: bpy.types.Context, objects: list[bpy.types.Object]) -> None:
-    """Remove the overlay and the points of objects."""
+    """Hide the singularities of objects in the overlay, and remove the point objects that show them."""
     for obj in objects:
         overlay.hide(obj.name)
         remove_singularity_points(context.scene, obj)
 
 
 def _reach() -> Any:
-    """Return the property of the reach; the tool's operator passes its reach on to the one that it starts."""
+    """Return the property for the distance over which directions change.
+
+    Two operators have it: the one of the tool passes its value on to the one that moves singularities.
+    """
     return fraction(
         "Reach",
         "Distance over which directions change, as a fraction of the size of the mesh. At least as "
@@ -121,7 +124,7 @@ class ROSY_OT_field_singularities(ActiveMeshMixin, ModalJobMixin, bpy.types.Oper
     reach: _reach()
 
     def begin(self, context: bpy.types.Context) -> Steps[None]:
-        """Change the field of the active mesh."""
+        """Return the steps of the job that changes the singularities of the field of the active mesh."""
         mesh = selected_mesh_objects(context)[0].data
         surface = mesh_surface(mesh)
         field = read_mesh_field(mesh, surface=surface)
@@ -169,7 +172,7 @@ class ROSY_OT_drag_singularity(RosyOperator, bpy.types.Operator):
             self.cancel(context)
             return {"CANCELLED"}
         elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
-            # A busy Blender may have dropped the last moves.
+            # If Blender was busy, it may have skipped the last events of the mouse.
             self._drag.move(context, mouse)
             source, target = self._drag.source, self._drag.target
             self.cancel(context)
@@ -180,11 +183,14 @@ class ROSY_OT_drag_singularity(RosyOperator, bpy.types.Operator):
                 bpy.ops.rosy.field_singularities(
                     "INVOKE_DEFAULT", source=source, target=target, index=index, reach=self.reach
                 )
-            except RuntimeError as error:  # reported by that operator
+            except RuntimeError as error:  # the called operator has reported it
                 return self.report_operator_error(error)
             return {"FINISHED"}
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:
-        """Stop drawing. Blender calls this if the window is closed or a file is opened."""
+        """Remove the drawing of the drag from the view.
+
+        Blender also calls this if the window is closed or a file is opened during a drag.
+        """
         self._drag.stop()

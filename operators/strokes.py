@@ -51,7 +51,10 @@ class ROSY_OT_strokes(DialogJobMixin, bpy.types.Operator):
     )
 
     def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
-        """Ask for the path of a file, or before strokes are replaced that the user has edited."""
+        """Ask for the path if strokes go to a file.
+
+        Ask for a confirmation if edited strokes would be replaced.
+        """
         if self._kind(context) == "FILE":
             if self.properties.is_property_set("filepath"):
                 return None
@@ -78,7 +81,7 @@ class ROSY_OT_strokes(DialogJobMixin, bpy.types.Operator):
             self.replace = True
 
     def check(self, context: bpy.types.Context) -> bool:
-        """Set the suffix of the file name in the file browser, unless it is one of a file of strokes."""
+        """Set the suffix .svg in the file browser, unless the file already has a suffix of stroke files."""
         return not self.filepath.lower().endswith(DRAWING_SUFFIXES) and sync_suffix(self, ".svg")
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -102,11 +105,14 @@ class ROSY_OT_strokes(DialogJobMixin, bpy.types.Operator):
         self.report_warnings(*result.notes)
 
     def _kind(self, context: bpy.types.Context) -> str:
-        """Return what to make: the operator's choice, by default the scene's."""
+        """Return the kind of object or file to make, as set for the operator, or else in the scene."""
         return self.chosen("kind", context.scene.rosy.strokes.kind)
 
     def _camera(self, context: bpy.types.Context) -> CameraSource | None:
-        """Return the camera of the current view if it is chosen; None for the scene's camera."""
+        """Return the camera of the current 3D view if the view is chosen.
+
+        None means the camera of the scene.
+        """
         source = self.chosen("camera", context.scene.rosy.strokes.camera)
         return view_camera(context) if source == "VIEW" else None
 

@@ -22,7 +22,7 @@ from .modal_job import FileJobMixin
 #: Azimuth of the first picture, in degrees.
 AZIMUTH = -25.0
 
-#: Arguments of the width and the height.
+#: Keyword arguments of the properties for the width and the height.
 SIDE = {"subtype": "PIXEL", "default": 512, "min": 16, "max": 8192}
 
 
@@ -59,7 +59,7 @@ class ROSY_OT_turntable(FileJobMixin, bpy.types.Operator, ExportHelper):
     )
 
     def check(self, context: bpy.types.Context) -> bool:
-        """Set the suffix of the file name to the video format's in the file browser."""
+        """Set the suffix of the file name to that of the video format. The file browser calls this."""
         return sync_suffix(self, self.film)
 
     def begin(self, context: bpy.types.Context) -> Steps[Path]:

@@ -2,16 +2,16 @@
 
 Angles are in radians, except for the angles of a view, which are in degrees.
 
-    field        fields from arrays and files
-    generators   fields that are computed
-    pictures     pictures and turntables
-    films        films of fields that change with time
-    comparison   how fields differ
-    figures      fields side by side, with their keys; `figure_panels` draws the pictures
-    drawings     strokes
-    textures     textures
+    field        makes fields from arrays and files
+    generators   computes fields from surfaces and guides
+    pictures     draws pictures and turntables (videos of a camera that orbits a mesh)
+    films        draws videos of fields that change with time
+    comparison   measures how fields differ
+    figures      draws fields side by side, with keys (legends); `figure_panels` draws the pictures
+    drawings     draws strokes: evenly spaced lines along a field
+    textures     draws textures for UV maps
 
-`Surface` and `Field` are classes of the room `field`, `Picture` of the room `compositor`. The names
+`Surface` and `Field` are classes of the subpackage `field`. `Picture` is a class of `compositor`. The names
 that are imported here are public; `rosy_addon.__all__` lists them.
 """
 

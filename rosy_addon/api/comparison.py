@@ -1,4 +1,4 @@
-"""`compare`: how several fields differ, as a table."""
+"""`compare`: measure how several fields differ, and list it in a table."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ _LATEX = {
 }
 
 
-#: The columns of the table by their titles: the key of the values, and the function that formats them.
+#: Columns of the table, by title: the key of its values in `Comparison.rows`, and the function that formats
+#: a value.
 _COLUMNS: dict[str, tuple[str, Callable[[Any], str]]] = {
     "degree": ("degree", str),
     "energy": ("energy", "{:.4g}".format),
@@ -36,7 +37,7 @@ _COLUMNS: dict[str, tuple[str, Callable[[Any], str]]] = {
     "positive": ("positive", str),
     "negative": ("negative", str),
 }
-#: The further columns of differences from the first field.
+#: Columns that are added if there are differences from the first field, by title.
 _DIFFERENCE_COLUMNS: dict[str, tuple[str, Callable[[Any], str]]] = {
     "matched": ("matched", str),
     "mean (deg)": ("mean", format_degrees),
@@ -48,17 +49,17 @@ _DIFFERENCE_COLUMNS: dict[str, tuple[str, Callable[[Any], str]]] = {
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """How fields differ from the first of them. A notebook shows it as a table.
+    """The differences of several fields from the first of them. A notebook shows them as a table.
 
     Attributes
     ----------
     fields : dict of str to Field
-        By their titles.
+        The fields, by title.
     differences : dict of str to Difference
-        From the first field, by the titles of the others. Fields of another degree or on another surface
-        have none.
+        Differences of the other fields from the first one, by title. A field of another degree or on another
+        surface than the first has no item.
     matchings : dict of str to SingularityMatching
-        Pairs of matching singularities of the first field and another one, by title.
+        Pairs of singularities of the first field and of another field that match, by the title of the other.
 
     Examples
     --------
@@ -83,10 +84,11 @@ class Comparison:
     def rows(self) -> list[dict[str, Any]]:
         """Measurements of each field, with angles in degrees.
 
-        Keys are title, degree, energy, singularities, positive and negative (how many there are), and
-        for each field with a difference from the first: mean, rms, p95, max, worst_face, worst_position
-        (the center of that face), compared, matched and matched_distance (how many singularities match,
-        and how far apart they are on average, in units of the mesh; None without any).
+        Keys are title, degree, energy, and numbers of singularities: singularities (all), positive and
+        negative. Fields with a difference from the first one have more keys. These are mean, rms, p95,
+        max, worst_face, worst_position (the center of that face) and compared; see `Difference`. Then
+        matched is the number of singularities that match, and matched_distance is their mean distance in
+        units of the mesh (None if no singularities match).
         """
         return [self._row(title, field) for title, field in self.fields.items()]
 
@@ -117,7 +119,7 @@ class Comparison:
         return row
 
     def cells(self) -> list[list[str]]:
-        """Return the table as texts: a row of titles, then one for each field; "-" for missing values."""
+        """Return the table as texts: a row of titles, then a row for each field. A missing value is "-"."""
         columns = _COLUMNS | (_DIFFERENCE_COLUMNS if self.differences else {})
         cells = [["field", *columns]]
         for row in self.rows:
@@ -164,7 +166,7 @@ class Comparison:
 
 
 def _latex_text(text: str) -> str:
-    """Return a text escaped for LaTeX; "--" for a missing value."""
+    """Return a text escaped for LaTeX. The sign of a missing value, "-", becomes "--"."""
     return "--" if text == "-" else "".join(_LATEX.get(letter, letter) for letter in text)
 
 
@@ -176,10 +178,11 @@ def compare(
     Parameters
     ----------
     fields : sequence of Field, or mapping of str to Field
-        The keys of a mapping are their titles; without, they are "field 1", "field 2" and so on.
+        The keys of a mapping are the titles of the fields. In a sequence, the titles are "field 1",
+        "field 2" and so on.
     reach : float
-        Largest distance of two singularities of the same index that match, as a fraction of the longest
-        side of the mesh. Of several, the nearest two match.
+        Singularities of two fields match if they have the same index and are at most this far apart, as a
+        fraction of the longest side of the mesh. Each matches at most one other; near pairs come first.
 
     Raises
     ------
@@ -208,12 +211,12 @@ def compare(
 
 
 def titled_fields(fields: Iterable[Field] | Mapping[str, Field]) -> dict[str, Field]:
-    """Return fields by their titles; see `compare`.
+    """Return a dictionary of fields by title, with the titles that `compare` gives them.
 
     Raises
     ------
     RosyError
-        If there is none.
+        If there is no field.
     """
     if isinstance(fields, Mapping):
         titled = dict(fields)

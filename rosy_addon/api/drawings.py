@@ -1,4 +1,4 @@
-"""`strokes`: evenly spaced lines along a field, as a drawing in SVG or as polylines in space."""
+"""`strokes`: draw evenly spaced lines along a field, as an SVG document or as polylines in space."""
 
 from __future__ import annotations
 
@@ -73,13 +73,14 @@ class Drawing:
 
     @property
     def family_names(self) -> list[str]:
-        """Family of each stroke: a line of the field, or a kind of outline."""
+        """Name of the family of each stroke: a direction of the field, or a kind of outline."""
         return [self._strokes.names[family] for family in self._strokes.family]
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a file: the picture as ``.svg``, or the lines in space.
+        """Write a file: the picture as ``.svg``, or the strokes as polylines in space.
 
-        Lines have the coordinates of the mesh, with normals, widths in units of the mesh, and families.
+        The points of polylines are in the coordinates of the mesh. They have normals, widths in units of
+        the mesh, and families.
         A ``.csv`` file has a row for each point, an ``.obj`` file a line element for each stroke, and a
         ``.ply`` file vertices and edges.
 
@@ -110,22 +111,24 @@ def strokes(
     plotter: bool = False,
     **style: Any,
 ) -> Drawing:
-    """Draw evenly spaced strokes along a field, without the hidden ones.
+    """Draw evenly spaced strokes along a field.
+
+    Hidden strokes are left out, unless the setting `hidden` is on.
 
     Parameters
     ----------
     surface, field, view, size, orthographic
-        See `render`. The length of a pixel follows from the size.
+        See `render`. Lengths in pixels are relative to this size.
     width : float
         Full width of a stroke in pixels.
     colors : sequence of str
-        SVG colors of the families in turn, such as ``"#204060"`` or ``"navy"``.
+        SVG colors, used for the families of strokes in turn, such as ``"#204060"`` or ``"navy"``.
     paper : str or None
-        Color of the background; None for none.
+        Color of the background. With None, there is no background.
     millimeters : float, optional
         Width of the page in millimeters; by default the page is in pixels.
     plotter : bool
-        Lines of constant width, in an order that keeps the travel of the pen short.
+        Draw strokes of constant width, in an order that keeps the travel of the pen short.
     **style
         Settings of `line_drawing.style.StrokeStyle`: ``spacing=6, light="lamp", outline=True``.
         `spacing` is in pixels; `distance` is the spacing in units of the mesh.
@@ -137,7 +140,7 @@ def strokes(
     Raises
     ------
     RosyError
-        If a setting is not possible, the field is on another surface, no stroke is visible, or there
+        If a setting is invalid, the field is on another surface, no stroke is visible, or there
         is not enough memory.
 
     Examples

@@ -1,4 +1,4 @@
-"""Fields from arrays and files."""
+"""Make fields from arrays and files."""
 
 from __future__ import annotations
 
@@ -32,13 +32,14 @@ def from_vectors(
     """Make a field from one member vector for each face or vertex.
 
     Vectors slightly off the surface are rotated into it and keep their length. Values of vertices are
-    averaged onto the faces as RoSys.
+    averaged onto the faces as RoSys (sets of N equivalent vectors).
 
     Parameters
     ----------
     surface : Surface
     vectors : (F, 3) or (V, 3) array_like
-        Zero where the field is undefined. If there are as many faces as vertices, they are of faces.
+        Zero where the field is undefined. If there are as many faces as vertices, each vector belongs to a
+        face.
     degree : int
         N, from 1 to 12: 1 for a vector field, 2 for a line field, 4 for a cross field.
     nonfinite : {"error", "zero"}
@@ -47,7 +48,7 @@ def from_vectors(
     Raises
     ------
     RosyError
-        If their number fits neither faces nor vertices, a vector is not finite, or vectors do not lie
+        If there is not one vector for each face or each vertex, a vector is not finite, or vectors do not lie
         on the surface.
 
     Examples
@@ -72,11 +73,12 @@ def from_angles(
     ----------
     surface : Surface
     angles : (F,) array_like
-        Radians, counter-clockwise about the normal, from x of `Surface.face_frames`: the first edge
-        of the face, as in ``igl.local_basis``.
+        Radians, counter-clockwise about the normal. The angle 0 is the x axis of `Surface.face_frames`,
+        which is along the first edge of the face, as in ``igl.local_basis``.
     degree : int
         N, from 1 to 12.
     magnitude : (F,) array_like or float
+        Length of the members.
 
     Raises
     ------
@@ -112,7 +114,8 @@ def from_representation(surface: Surface, representation: ArrayLike, degree: int
     ----------
     surface : Surface
     representation : (F,) array_like of complex
-        The magnitude r, and N times the angle t of a member from x of `Surface.face_frames`.
+        The magnitude is r, the length of the members. The phase is N t, where t is the angle of a member to
+        the x axis of `Surface.face_frames`.
     degree : int
         N, from 1 to 12.
 
@@ -134,13 +137,14 @@ def from_representation(surface: Surface, representation: ArrayLike, degree: int
 
 
 def from_directions(surface: Surface, directions: ArrayLike, *, nonfinite: str = "error") -> Field:
-    """Make a field from N directions for each face or vertex, which need not be a RoSy.
+    """Make a field from N directions for each face or vertex. They need not be at equal angles.
 
     Parameters
     ----------
     surface : Surface
     directions : (F, N, 3) or (V, N, 3) array_like
-        In any order. Where one of them is zero, the field is undefined.
+        The N directions of a face or vertex may be in any order. If one of them is zero, the field is
+        undefined there.
     nonfinite : {"error", "zero"}
         Raise an error if a vector is not finite, or treat it as undefined.
 
@@ -213,27 +217,28 @@ def from_array(
 ) -> Field:
     """Make a field from an array of `Surface.vertex_data` or `Surface.face_data`.
 
-    The count of numbers in each row says what they are:
+    The number of components in each row of the array determines what they mean:
 
-    | numbers | meaning |
-    | ------- | ------- |
+    | components | meaning |
+    | ---------- | ------- |
     | 2 | on a mesh with constant z: a vector, z is 0 |
     | 3 | a vector: one member of the field |
     | 6 | a symmetric tensor, in VTK's order XX, YY, ZZ, XY, YZ, XZ |
     | 9 | a symmetric tensor, 3 x 3 |
-    | 12, 15, ... 36 | all N directions, 3 numbers each |
+    | 12, 15, ... 36 | all N directions, 3 components each |
 
     Vectors that are not tangent to the surface, such as velocities at the boundary of a volume, are
-    replaced by their tangential components. Of tensors, the field consists of the two principal
-    directions in each face. Values of vertices are averaged onto the faces.
+    replaced by their tangential components. A tensor gives the field of the two principal directions in
+    each face. Values of vertices are averaged onto the faces.
 
     Parameters
     ----------
     surface : Surface
         From a file of a simulation, from the mesh of another library, or from a ``.ply`` file.
     name : str, optional
-        Name of the array; "point:NAME" or "cell:NAME" if both vertices and faces have one. It can be
-        left out if a single array of floating-point numbers can be a field. Normals do not count.
+        Name of the array. If the vertices and the faces both have an array of this name, "point:NAME" is
+        that of the vertices, and "cell:NAME" that of the faces. By default, the only array that can be a
+        field is used: floating-point numbers that are not normals.
     degree : int, optional
         N, from 1 to 12; by default 1 for an array of vectors. Tensors have degree 4.
     nonfinite : {"error", "zero"}
@@ -242,8 +247,8 @@ def from_array(
     Raises
     ------
     RosyError
-        If there is no such array, it holds scalars or tensors that are not symmetric, has another
-        degree, or has numbers that are not finite.
+        If there is no such array, several could be meant, it holds scalars or tensors that are not
+        symmetric, its degree is another one, or a number is not finite.
 
     Examples
     --------
@@ -271,7 +276,7 @@ def read_field(
         ``.rosy``, ``.rawfield``, ``.obj`` (of fieldgen), ``.txt`` or ``.npy``.
     surface : Surface
     degree : int, optional
-        The required degree; any if not given. Files that state none have 4.
+        The required degree. By default, any degree is accepted. A file that states no degree has degree 4.
     nonfinite : {"error", "zero"}
         Raise an error if a vector is not finite, or treat it as undefined.
     mesh : path-like, optional
@@ -302,6 +307,9 @@ def read_field(
 
 
 def warn(note: str, stacklevel: int = 3) -> None:
-    """Issue a `RosyWarning`, unless the note is empty. By default it names the caller's caller."""
+    """Issue a `RosyWarning` with a note, unless the note is empty.
+
+    By default (`stacklevel` 3), the warning refers to the line that called the caller of this function.
+    """
     if note:
         warnings.warn(note, RosyWarning, stacklevel=stacklevel)

@@ -1,4 +1,4 @@
-"""`Studio`: the panels of a figure, drawn under one camera."""
+"""`Studio`: draws the panels of a figure, all from the same camera."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ from ..rendering.draw import draw_picture
 from ..rendering.view_input import ViewInput
 from .comparison import Comparison
 
-#: Largest part of a panel that the dots of singularities cover.
+#: Largest fraction of the area of a panel that the dots of singularities may cover.
 MAX_DOT_SHARE = 0.06
 
-#: The color map of differences, and where in it an angle of 0 and the largest one are: light and dark, but
-#: not so dark that lines vanish.
+#: The color map of differences, and its positions (0 to 1) for an angle of 0 and for the largest angle. They
+#: are light and dark, but not so dark that lines vanish.
 DIFFERENCE_COLORS, DIFFERENCE_ENDS = "magma", (1.0, 0.25)
 
 
 @dataclass(frozen=True, eq=False)
 class Studio:
-    """Draw the panels of a figure: all fields under one camera.
+    """The panels of a figure, which its methods draw. All fields are seen from the same camera.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class Studio:
     camera : Camera
     look : Look
     workers : int
-        Processes that draw a picture together; see `draw_picture`.
+        Number of processes that draw a picture together; see `draw_picture`.
     """
 
     comparison: Comparison
@@ -56,14 +56,17 @@ class Studio:
     _cache: Cache = field(default_factory=Cache)
 
     def _rgba(self, instance: MeshInstance, **changes: Any) -> NDArray[np.float32]:
-        """Return the picture of an instance as `Picture.rgba`, without singularities."""
+        """Return the picture of a mesh instance as `Picture.rgba`, without singularities.
+
+        `changes` are settings that replace those of the look.
+        """
         look = replace(self.look, singularity_dots="none", **changes)
         view = ViewInput((instance,), self.camera, look)
         return draw_picture(view, self._cache, keep_gbuffers=False, workers=self.workers).rgba
 
     @cached_property
     def _marks(self) -> dict[str, SingularityMarks | None]:
-        """Singularities of each field in its picture; None if the look shows none.
+        """The dots of the singularities of each field, by title; None if the look shows no singularities.
 
         If there are very many, their dots are smaller, so that they do not hide the lines.
         """
@@ -78,7 +81,7 @@ class Studio:
         return shown
 
     def field_row(self, titles: Sequence[str], color_bar: ColorBar | None) -> Row:
-        """Return the panels of the fields."""
+        """Return the row of the figure that shows the fields. `titles` are the texts over the panels."""
         panels = [
             Panel(text, to_srgb_uint8(self._rgba(instance)[::-1]), self._marks[title])
             for text, (title, instance) in zip(titles, self.instances.items(), strict=True)
@@ -86,7 +89,11 @@ class Studio:
         return Row(panels, color_bar)
 
     def difference_row(self, lines: str, largest_angle: float) -> Row:
-        """Return the panels of the differences from the first field, in the same order as the fields."""
+        """Return the row of the figure that shows the differences from the first field.
+
+        Panels have the order of the fields. A field without a difference has None as its panel. See
+        `_difference_panel` and `figure` for the parameters.
+        """
         reference, first = next(iter(self.comparison.fields.items()))
         top = largest_angle or 180.0 / first.degree
         panels = [
@@ -105,13 +112,14 @@ class Studio:
         return Row(panels, ColorBar("angle (degrees)", 0.0, top, stops.astype(np.float64)), legend)
 
     def _difference_panel(self, title: str, lines: str, top: float) -> Panel:
-        """Return the panel of the difference of a field from the first one.
+        """Return the panel that shows the difference between a field and the first field.
 
         Parameters
         ----------
         title : str
+            Title of the field.
         lines : {"other", "first", "both"}
-            The field whose lines are drawn.
+            Whether the lines of this field, of the first field or of both are drawn.
         top : float
             Angle at the top of the color map, in degrees.
         """
@@ -131,7 +139,7 @@ class Studio:
             )
             for instance in {"first": [first], "other": [other], "both": [first, other]}[lines]
         ]
-        # The pictures cover the same pixels.
+        # The pictures cover the same pixels, so their mean has the same coverage.
         rgba = np.mean(pictures, axis=0)
         mean, p95, largest = (
             f"{format_degrees(np.degrees(angle))}\u00b0"
@@ -148,7 +156,10 @@ class Studio:
         )
 
     def _links(self, title: str) -> NDArray[np.float64]:
-        """Return the (n, 2, 2) ends of lines between singularities that match, if both are visible."""
+        """Return the (n, 2, 2) end points, in pixels, of lines that connect matching singularities.
+
+        Lines of which an end is hidden are left out.
+        """
         first = next(iter(self.comparison.fields.values())).singularities
         second = self.comparison.fields[title].singularities
         matching = self.comparison.matchings[title]
@@ -157,7 +168,10 @@ class Studio:
         return place.reshape(-1, 2, 2)[is_visible.reshape(-1, 2).all(axis=1)]
 
     def _worst_place(self, face: int) -> NDArray[np.float64] | None:
-        """Return the place of a face in the picture, (2,) pixels; None if none of its corners is visible."""
+        """Return the position of a face in the picture, (2,) pixels.
+
+        None if none of its corners is visible, or `face` is negative.
+        """
         if face < 0:
             return None
         surface = next(iter(self.instances.values())).surface
@@ -168,7 +182,7 @@ class Studio:
     def _projected(
         self, vertices: NDArray[np.integer[Any]]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Return the (n, 2) places of vertices of the first surface in pixels, and which are visible."""
+        """Return the (n, 2) positions of vertices of the first surface in pixels, and which are visible."""
         first = next(iter(self.instances.values()))
         projected = project_vertices([first], self.camera, [vertices])
         return projected.position, projected.is_visible

@@ -1,4 +1,4 @@
-"""`figure`: fields side by side with their keys, drawn by matplotlib."""
+"""`figure`: draw fields side by side, with keys (legends), with matplotlib."""
 
 from __future__ import annotations
 
@@ -32,25 +32,27 @@ from .pictures import DEFAULT_VIEW, corner_numbers, picture_look, upright_instan
 if TYPE_CHECKING:
     from ..external.matplotlib_figure import Figure
 
-#: What a figure may have, from top to bottom.
+#: The parts that a figure may have, from top to bottom.
 PARTS = ("fields", "differences", "table")
 
-#: The lines over a difference: of the other field, of the first, or of both.
+#: Which lines are drawn over a difference: those of the other field, of the first field, or of both.
 LINES = ("other", "first", "both")
 
-#: The resolution at which the lengths of the look are pixels. Lines are as wide in print at any other.
+#: The resolution at which lengths of the look are in pixels of the figure. At other resolutions they are
+#: scaled, so lines have the same width in print.
 LENGTH_DPI = 150
 
-#: The smallest and the largest width in inches, resolution, and angle in degrees.
+#: Smallest and largest value of each numeric argument. Widths are in inches, angles in degrees.
 LIMITS = {"width": (0.5, 100.0), "dpi": (10, 2400), "largest_angle": (0.0, 360.0)}
 
 #: Limits of the height of a panel, relative to its width.
 MIN_ASPECT, MAX_ASPECT = 0.4, 1.6
 
-#: Panels side by side, unless the caller says how many; empty border of a panel, as a fraction.
+#: Default of the largest number of panels side by side. Width of the empty border of a panel, as a fraction
+#: of the panel.
 MAX_COLUMNS, MARGIN = 3, 0.02
 
-#: The files of figures.
+#: Suffixes of the files of figures.
 FIGURE_SUFFIXES = (".pdf", ".svg", ".png")
 
 
@@ -74,7 +76,7 @@ def figure(
     workers: int = 0,
     **settings: Any,
 ) -> Figure:
-    """Draw fields side by side with their keys: a figure of matplotlib, for papers and talks.
+    """Draw fields side by side, with keys (legends), as a figure of matplotlib for papers and talks.
 
     All panels have one camera, one light and one range of colors. Titles, keys and singularities are
     text and vectors. Singularities are shown unless ``singularity_dots="none"``.
@@ -82,36 +84,38 @@ def figure(
     Parameters
     ----------
     fields : Field, sequence of Field, mapping of str to Field, or Comparison
-        The keys of a mapping are the titles. Fields may be on different surfaces. A `Comparison` is used as it is.
+        The keys of a mapping are the titles. Fields may be on different surfaces. A `Comparison` is used as
+        it is.
     parts : sequence of {"fields", "differences", "table"}
-        What to draw: the fields; the angle of each field to the first as a color, from 0 to 180/N
-        degrees, with a cross at the largest, and the singularities of both; the table of `compare`.
+        What to draw. "fields" are pictures of the fields. "differences" show the angle between each field
+        and the first one as a color, from 0 to 180/N degrees, with a cross at the largest angle and the
+        singularities of both fields. "table" is the table of `compare`.
     columns : int, optional
-        Panels side by side; by default at most 3.
+        Number of panels side by side; by default at most 3.
     width : float
-        Inches. The height follows from the contents.
+        Width of the figure in inches. The height follows from the contents.
     dpi : int
         Resolution of the pictures. Lines do not get thinner with it: lengths of the look are in
         pixels at 150 dpi.
     view, preset
         See `render`.
     orthographic : bool
-        Whether the projection is orthographic; a scale bar needs it.
+        Whether the projection is orthographic. A scale bar needs this.
     color_values : str, or sequence of str or array_like, optional
-        Numbers to show as colors (see `render`) for each field, or a name for all fields.
+        Values for the color map (see `render`) for each field, or the name of an array for all fields.
     color_label : str, optional
-        What the color bar of the fields says: a quantity and its unit. By default the name of the numbers,
-        or "magnitude" if the colors show it.
+        Label of the color bar of the fields: a quantity and its unit. By default the name of the array of
+        values, or "magnitude" if the colors show magnitudes.
     largest_angle : float
-        Angle at the top of the color map of differences, in degrees; 0 for 180/N.
+        Angle at the top of the color map of differences, in degrees. 0 means 180/N.
     lines : {"other", "first", "both"}
-        Which lines are drawn over a difference.
+        Which lines are drawn over a difference: those of the other field, of the first field, or of both.
     reach : float
         Largest distance of singularities that match; see `compare`.
     scale_bar : str, optional
-        Unit of the coordinates, such as "mm" or "": draw a scale bar.
+        Unit of the coordinates, such as "mm", or "" if they have none. By default, no scale bar is drawn.
     caption : str
-        Below everything.
+        Text below everything else.
     workers
         See `render`.
     **settings
@@ -179,7 +183,7 @@ def _comparison_of(
     parts: Sequence[str],
     reach: float,
 ) -> Comparison:
-    """Return the comparison of fields, without differences if no part shows them."""
+    """Return the comparison of fields. It has no differences if no part of the figure shows any."""
     if isinstance(fields, Comparison):
         return fields
     titled = {fields.surface.name: fields} if isinstance(fields, Field) else fields
@@ -272,7 +276,7 @@ def _check_parts(comparison: Comparison, parts: Sequence[str], lines: str) -> No
 
 
 def _check_numbers(name: str, **numbers: float) -> None:
-    """Check numbers of a figure against their `LIMITS`.
+    """Check that numeric arguments are within their `LIMITS`.
 
     Raises
     ------
@@ -297,7 +301,7 @@ def _instances(
     Raises
     ------
     RosyError
-        If there is not one set of numbers for each field, or for the same reasons as `corner_numbers`.
+        If there is not one array of values for each field, or for the same reasons as `corner_numbers`.
     """
     if color_values is None or isinstance(color_values, str):
         values: Sequence[str | ArrayLike | None] = [color_values] * len(fields)
@@ -316,7 +320,7 @@ def _instances(
 def _figure_look(
     look: Look, fields: Mapping[str, Field], instances: Iterable[MeshInstance], scale: float
 ) -> Look:
-    """Return the look of all panels, with lengths in pixels and common ranges of the color map."""
+    """Return the look of all panels: lengths are multiplied by `scale`, the color range covers all fields."""
     look = scaled_look(look, scale)
     look = replace(look, singularity_size=float(np.clip(look.singularity_size * scale, 1, 256)))
     if colors_values(look):
@@ -330,7 +334,7 @@ def _figure_look(
 def _panel_camera(
     points: NDArray[np.float64], view: tuple[float, float], width: int, *, perspective: bool
 ) -> Camera:
-    """Return the camera of all panels, whose height fits what they show."""
+    """Return the camera of all panels. The height of its picture fits the points that it shows."""
     right, up, _ = orbit_basis(*view) @ points.T
     aspect = np.clip(np.ptp(up) / max(float(np.ptp(right)), 1e-30), MIN_ASPECT, MAX_ASPECT)
     height = max(round(width * float(aspect)), 1)
@@ -338,7 +342,7 @@ def _panel_camera(
 
 
 def _color_bar(look: Look, label: str) -> ColorBar | None:
-    """Return the color bar of the fields; None if color shows neither magnitudes nor numbers."""
+    """Return the color bar of the fields; None if colors show neither magnitudes nor values."""
     if not (colors_magnitude(look) or colors_values(look)):
         return None
     return ColorBar(label, *look.color_range, color_stops(look.color_map))
@@ -347,7 +351,8 @@ def _color_bar(look: Look, label: str) -> ColorBar | None:
 def _scale_bar(camera: Camera, unit: str, share: float) -> tuple[float, str]:
     """Return the length of a scale bar in pixels, and its text.
 
-    Its length is 1, 2 or 5 times a power of ten in units of the coordinates.
+    The length is 1, 2 or 5 times a power of ten in units of the coordinates, and at most the fraction `share`
+    of the width of a panel.
     """
     length = round_below(share * camera.width / camera.pixels_per_unit)
     return length * camera.pixels_per_unit, f"{length:g} {unit}".strip()

@@ -1,4 +1,4 @@
-"""Films: the fields of a series under one camera, as a video."""
+"""Films: draw the fields of a series from one camera, as a video."""
 
 from __future__ import annotations
 
@@ -32,11 +32,12 @@ from ..rendering.view_input import ViewInput
 from .field import warn
 from .pictures import DEFAULT_VIDEO_SIZE, DEFAULT_VIEW, default_encoder, picture_look
 
-#: The mean angle by which a field may turn from picture to picture, times the half length of streaks and
-#: divided by the width of lines. The correlation of the two pictures is then above 0.9.
+#: Limit for steady streaks of a s / w: a is the mean angle (radians) by which the field turns from picture to
+#: picture, s is the half length of streaks, and w is the line width. Up to this limit, the correlation of
+#: neighboring pictures is above 0.9.
 STEADY_TURN = 0.2
 
-#: Pictures between two fields, at most.
+#: Largest number of pictures between two fields.
 MAX_BETWEEN = 1000
 
 
@@ -56,25 +57,25 @@ def film(
     on_picture: Callable[[int], None] | None = None,
     **settings: Any,
 ) -> Path:
-    """Draw a field that changes with time as a video, under one camera.
+    """Draw a field that changes with time as a video, seen from one camera.
 
     With the setting `flow`, streaks drift along the field while it changes. If the mesh moves and keeps its
-    polygons, the noise moves with it, unless the setting `anchor` says otherwise.
+    polygons, the noise of the look moves with it, unless the setting `anchor` is given.
 
     Parameters
     ----------
     fields : sequence of Field
-        Two or more of the same degree, on one surface or on a surface each. Each item is requested twice:
-        for the camera and the range of magnitudes, and to be drawn. At most two are kept, so the sequence
-        may read files.
+        Two or more fields of the same degree. They may all be on one surface, or each on its own. Each item
+        is requested twice: first to determine the camera and the range of magnitudes, then to be drawn. At
+        most two fields are kept, so the items may be read from files on request.
     path : path-like
         A ``.gif``, or an ``.mp4`` if there is an encoder.
     between : int or None
-        Pictures between two fields, for which the fields and the vertices are interpolated. The surfaces must
-        then have the same polygons. None chooses a number that keeps streaks steady: they flicker if the
-        field turns by more than about half a degree from picture to picture.
+        Number of pictures between two fields. In these the fields and the vertices are interpolated, so the
+        surfaces must have the same polygons. None chooses a number that keeps streaks steady: they flicker
+        if the field turns by more than about half a degree from picture to picture.
     loop : bool
-        The first field follows the last one again: the film, shown in a loop, has no seam.
+        Add pictures from the last field back to the first one, so that the video can be played as a loop.
     rate : float
         Pictures per second.
     view, size, orthographic, preset, workers, **settings
@@ -90,14 +91,14 @@ def film(
     Warns
     -----
     RosyWarning
-        If the field turns too fast for steady streaks, with the number of pictures between two fields that
-        keeps them steady.
+        If the field turns too fast for steady streaks. The warning says which value of `between` keeps them
+        steady.
 
     Raises
     ------
     RosyError
-        If there is one field only, they differ in their degrees or, with pictures between them, in their
-        polygons; or for the same reasons as `turntable`.
+        If there is only one field, fields have different degrees, pictures between fields are requested but
+        the surfaces have different polygons, or for the same reasons as `turntable`.
 
     Examples
     --------
@@ -154,26 +155,27 @@ class _Survey(NamedTuple):
 
 @dataclass(eq=False)
 class Film:
-    """Views of the fields of a series, under one camera that frames all of them.
+    """The views of the fields of a series, from one camera whose frame contains all of them.
 
     Parameters
     ----------
     fields : sequence of Field
         See `film`.
     look : Look
-        Look of the first picture. If it shows magnitudes and sets no range, the range covers all fields.
+        Look of the first picture. If it shows magnitudes and sets no range of colors, the range covers all
+        fields.
     view_angles : (float, float)
         Azimuth and elevation in degrees, see `orbit_camera`.
     size : (int, int)
         Pixels.
     between : int or None
-        Pictures between two fields. None chooses a number that keeps streaks steady, or 0 if the polygons
-        change.
+        Number of pictures between two fields. None chooses a number that keeps streaks steady, or 0 if the
+        polygons change.
     loop : bool
-        Whether the first field follows the last one.
+        Whether pictures lead from the last field back to the first one.
     perspective : bool
     keeps_anchor : bool
-        Use the anchor of the look even if the mesh moves.
+        Whether the setting `anchor` of the look is used even if the mesh moves.
     name : str
         For messages.
 
@@ -193,7 +195,7 @@ class Film:
     perspective: bool = True
     keeps_anchor: bool = False
     name: str = "film"
-    #: A warning about the motion, set before the first view; may be empty.
+    #: A warning about streaks that flicker, set before the first view; empty if there is none.
     advice: str = ""
 
     def __post_init__(self) -> None:
@@ -249,7 +251,7 @@ class Film:
             yield ViewInput((instance,), camera, look, drift=drift)
 
     def _moments(self) -> Iterator[tuple[Surface, RosyField]]:
-        """Yield the meshes and fields of the pictures."""
+        """Yield the mesh and the field of each picture, interpolated between two fields if needed."""
         count, stop = len(self.fields), self._between + 1
         previous = self.fields[0]
         for number in range(1, count + self.loop):
@@ -291,12 +293,12 @@ class Film:
         return _Survey(points, largest, turn, keeps_polygons, rest)
 
     def _check(self, number: int, field: Field, previous: Field) -> bool:
-        """Return whether a field has the polygons of the one before it.
+        """Return whether a field has the polygons of the previous field.
 
         Raises
         ------
         RosyError
-            If it has another degree, or must have the same polygons and does not.
+            If the degrees differ, or the polygons differ although fields are to be interpolated.
         """
         name = f"{field.surface.name}: field {number + 1} of {len(self.fields)}"
         if field.degree != previous.degree:
@@ -314,7 +316,10 @@ class Film:
 
 
 def _mesh_between(first: Surface, second: Surface, share: float) -> Surface:
-    """Interpolate two meshes with the same polygons. The result has the fans and triangles of the first."""
+    """Interpolate the vertices of two meshes with the same polygons: `share` 0 gives the first, 1 the second.
+
+    The result has the triangulation and the vertex fans of the first mesh.
+    """
     if first is second:
         return first
     vertices = (1 - share) * first.vertices + share * second.vertices
@@ -333,7 +338,7 @@ def _mean_turn(first: Field, second: Field) -> float:
 
 
 def _steady_between(turn: float, look: Look) -> int:
-    """Return how many pictures between two fields keep streaks steady."""
+    """Return how many pictures between two fields keep streaks steady; `turn` is their angle in radians."""
     if look.unit_size:
         return 0
     steady = STEADY_TURN * look.line_width / look.length
@@ -341,7 +346,7 @@ def _steady_between(turn: float, look: Look) -> int:
 
 
 def _advice(turn: float, between: int, look: Look) -> str:
-    """Return how many pictures between two fields keep streaks steady, if there are too few."""
+    """Return a warning that there are too few pictures between two fields; empty if there are enough."""
     needed = _steady_between(turn, look)
     if needed <= between:
         return ""

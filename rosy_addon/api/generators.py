@@ -1,4 +1,4 @@
-"""Fields that are computed from the surface, or from guides on it."""
+"""Compute fields from a surface, or from guides on it."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from .field import warn
 def form(surface: Surface, degree: int = 4) -> Field:
     """Make a field that follows the form of the surface. It is the default of RoSy.
 
-    It follows clear curvature and sharp edges, and is smooth between them. The scale suits the noise
-    of the mesh.
+    It follows sharp edges and clear directions of curvature, and is smooth between them.
+    Curvature is averaged over a distance that depends on the noise of the mesh.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def smoothest(surface: Surface, degree: int = 4) -> Field:
 def curvature(surface: Surface, degree: int = 4, *, reach: float = 0.0) -> Field:
     """Make a field along the principal directions of curvature.
 
-    Its magnitude says how well they are defined, from 0 to 1.
+    The magnitude of the field says how well the directions are defined, from 0 to 1.
 
     Parameters
     ----------
@@ -86,8 +86,8 @@ def curvature(surface: Surface, degree: int = 4, *, reach: float = 0.0) -> Field
     degree : int
         N, an even number.
     reach : float
-        Distance over which clear directions extend into parts without any, as a fraction of the
-        longest side of the mesh. At 0, each face has its own directions.
+        Distance over which clear directions extend into parts of the surface without clear directions, as a
+        fraction of the longest side of the mesh. At 0, each face has its own directions.
 
     Raises
     ------
@@ -122,7 +122,7 @@ def features(
     sharp_angle : float
         Smallest angle in radians between the normals of the two faces of a sharp edge.
     edges : (E, 2) array_like of int, optional
-        Pairs of vertices: the edges to follow instead.
+        Pairs of vertices: edges that the field follows instead of borders and sharp edges.
 
     Raises
     ------
@@ -157,7 +157,7 @@ def guided(
 ) -> Field:
     """Make a field that follows guides and is smooth between them.
 
-    A face with several guides gets their mean, as RoSys.
+    A face with several guides gets the mean of their directions, each taken as N equivalent directions.
 
     Parameters
     ----------
@@ -167,17 +167,17 @@ def guided(
     strokes : sequence of (n, 3) array_like
         Polylines on the surface.
     vectors : (F, 3) array_like or Field, optional
-        A member for each face, zero where there is no guide.
+        One vector (a member of the field) for each face, zero where there is no guide.
     edges : (E, 2) array_like of int, optional
         Pairs of vertices: edges of the mesh to follow.
     uv : bool
-        Follow the UV map of the surface.
+        Whether the field also follows the axes of the UV map of the surface.
     reach : float
         Distance over which guides are smoothed, as a fraction of the longest side of the mesh. At 0,
         the field meets them exactly.
     vectors_have_firmness : bool
-        The lengths of `vectors`, from 0 to 1, say how firmly the field follows them, as for guides that are
-        combed in Blender. Otherwise, it follows all of them exactly.
+        If true, the lengths of `vectors`, from 0 to 1, say how firmly the field follows them, as for guides
+        that are combed in Blender. If false, the field follows all of them exactly.
 
     Raises
     ------
@@ -208,7 +208,7 @@ def guided(
 def _guide_vectors(
     surface: Surface, vectors: ArrayLike | Field | None, degree: int
 ) -> np.ndarray | None:
-    """Return guides as (F, 3) vectors.
+    """Return the argument `vectors` of `guided` as (F, 3) vectors, or None if it is None.
 
     Raises
     ------
@@ -238,23 +238,27 @@ def prescribed(
     """Make the smoothest field that has given singularities, and no other ones.
 
     Method: Crane, Desbrun and Schröder, "Trivial Connections on Discrete Surfaces" (SGP
-    2010). On a closed surface, the indices have to add up to N times the Euler characteristic.
+    2010). On a closed surface, the sum of the indices, in units of 1/N, must be N times the Euler
+    characteristic.
 
     Parameters
     ----------
     surface : Surface
     singularities : mapping of int to int, or path-like
-        The indices of singular vertices, in units of 1/N; or a file of singularities, ``.sings``.
+        The indices of singularities by their vertices, in units of 1/N, or the path of a file of
+        singularities (``.sings``).
     degree : int, optional
         N, from 1 to 12. By default the degree of the file, or 4.
     vectors : (F, 3) array_like or Field, optional
-        Guides, zero where there is none. On each connected part, the field is turned as a whole to be near
-        to them; by default, to the edges of the mesh.
+        Guides: one vector for each face, zero where there is no guide. On each connected part of the mesh,
+        the field is rotated as a whole to be near to the guides. By default, it is near to the edges of the
+        mesh.
     reach : float
-        If it is above 0, the field also bends to the guides. Their influence falls off over this distance, a
-        fraction of the longest side of the mesh.
+        If it is above 0, the field also bends toward the guides. Their influence falls off over this
+        distance, which is a fraction of the longest side of the mesh.
     add_missing : bool
-        Add the further singularities that the field needs, where it is smoothest.
+        Whether to add the singularities that are missing for the sum of the indices, at vertices where the
+        field stays smoothest.
 
     Raises
     ------
@@ -294,20 +298,20 @@ def prescribed(
 def along_axis(surface: Surface, axis: Sequence[float] = (0.0, 0.0, 1.0), degree: int = 4) -> Field:
     """Make a field along a direction that is projected to the surface.
 
-    Its magnitude is the length of the projection. The field is undefined where that is zero.
+    The magnitude is the length of the projection. Where it is zero, the field is undefined.
 
     Parameters
     ----------
     surface : Surface
     axis : sequence of 3 floats
-        Of any length above 0.
+        The direction, of any length above 0.
     degree : int
         N, from 1 to 12.
 
     Raises
     ------
     RosyError
-        If the axis is not a direction.
+        If the axis is not three finite numbers, or all of them are 0.
 
     Examples
     --------
@@ -339,7 +343,7 @@ def along_uv(surface: Surface, degree: int = 4) -> Field:
     return generated(surface, GeneratorSettings("uv", uv=uv_map(surface)), degree)
 
 
-#: The function of each kind of field.
+#: Functions that generate fields, by the kind of the field.
 GENERATOR_FUNCTIONS: dict[str, Callable[..., Field]] = {
     "form": form,
     "smoothest": smoothest,
@@ -368,10 +372,10 @@ def uv_map(surface: Surface) -> np.ndarray:
 
 
 def generated(surface: Surface, settings: GeneratorSettings, degree: int) -> Field:
-    """Generate a field, and warn of faces without a direction."""
+    """Generate a field. Warn if it is undefined on faces, or if the faces are not consistently oriented."""
     warn(orientation_warning(surface), stacklevel=4)
     field = Field.of(surface, generate(surface, settings, degree))
-    # Faces without area do not count.
+    # On faces without area, the field is always undefined.
     has_area = surface.face_normal.any(axis=1)
     count = int((has_area & ~field.vectors.any(axis=1)).sum())
     if count:

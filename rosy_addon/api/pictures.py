@@ -1,4 +1,4 @@
-"""Pictures: `render`, tones for it such as `ambient_occlusion`, and the video of a `turntable`."""
+"""Draw pictures with `render` and videos with `turntable`, and compute tones with `ambient_occlusion`."""
 
 from __future__ import annotations
 
@@ -33,16 +33,17 @@ from ..rendering.mesh_view import check_light, mesh_instance, mesh_view
 from ..rendering.turntable import Encoder
 from .generators import form, uv_map
 
-#: Azimuth and elevation in degrees: from the front left, looking slightly down.
+#: Azimuth and elevation of the default view in degrees: from the front left, looking slightly down.
 DEFAULT_VIEW = (-25.0, 20.0)
 
-#: Width and height in pixels of pictures, and of the pictures of a turntable.
+#: Default width and height in pixels of a picture, and of a video.
 DEFAULT_SIZE, DEFAULT_VIDEO_SIZE = (1024, 1024), (512, 512)
 
-#: Samples per pixel along each axis, unless the preset has more. No renderer smooths the edges later.
+#: Number of samples per pixel along each axis, unless the preset sets it. Pictures of scenes need fewer, as
+#: the renderer smooths their edges.
 SUPERSAMPLING = 2
 
-#: The tone attribute that is the luminance of the vertex colors, as Blender calls it.
+#: Name of the vertex attribute whose tone is the luminance of the vertex colors: Blender's name of colors.
 VERTEX_COLOR = "Color"
 
 
@@ -63,7 +64,7 @@ def list_presets() -> dict[str, str]:
 
 
 def ambient_occlusion(surface: Surface, directions: int = DIRECTION_COUNT) -> NDArray[np.float32]:
-    """Return how much of the sky each corner of a surface sees, as a tone for `render`.
+    """Return the ambient occlusion at the corners of a surface, as a tone for `render`.
 
     Parameters
     ----------
@@ -74,8 +75,8 @@ def ambient_occlusion(surface: Surface, directions: int = DIRECTION_COUNT) -> ND
     Returns
     -------
     (C,) float32 ndarray
-        Visible part of the hemisphere over each corner, face by face, weighted by the cosine to the
-        normal: 1 is fully open, 0 fully occluded.
+        Visible fraction of the hemisphere over each corner, weighted by the cosine of the angle to the
+        normal: 1 is fully open, 0 fully occluded. Corners are listed face by face.
 
     Raises
     ------
@@ -124,21 +125,21 @@ def render(
     preset : str or path-like, optional
         Name of a preset, or a ``.json`` file; see `list_presets`.
     color_values : str or (F,), (V,) or (C,) array_like, optional
-        Numbers of the faces, vertices or corners, such as the angle between two fields, which the hue of
-        the lines shows through the `color_map`; NaN where there is none. A string names an array of
-        `Surface.face_data` or `Surface.vertex_data`. If there are as many faces as vertices, they are of
-        faces. The setting `color_range` holds the ends of the color map.
+        Values at the faces, vertices or corners, such as the angle between two fields. Lines are colored by
+        them through the setting `color_map`. NaN means that there is no value. A string names an array of
+        `Surface.face_data` or `Surface.vertex_data`. If there are as many faces as vertices, the values
+        belong to the faces. The setting `color_range` has the values at both ends of the color map.
     tone_values : str or (V,) or (C,) array_like, optional
-        For hatching: tones of the vertices or corners, linear, 0 is dark and 1 is light, such as
-        `ambient_occlusion`. A string names an array of `Surface.vertex_data`; "Color" is the
-        luminance of the colors of a ``.ply`` file or of a mesh of trimesh or Open3D.
+        For hatching: linear tones at the vertices or corners, such as the result of `ambient_occlusion`. 0
+        is dark and 1 is light. A string names an array of `Surface.vertex_data`. The name "Color" stands for
+        the luminance of the vertex colors of a ``.ply`` file or of a mesh of trimesh or Open3D.
     tone_image : path-like, array_like or Picture, optional
-        For hatching: an image on the UV map of the surface, whose luminance is the tone.
+        For hatching: an image for the UV map of the surface. Its luminance is the tone.
     tone_picture : path-like, array_like or Picture, optional
-        For hatching: a picture of the surface in the same view, whose luminance is the tone.
+        For hatching: a picture of the surface from the same view. Its luminance is the tone.
     workers : int
-        Number of processes that draw a large picture together; 0 is one for each core. The picture
-        is the same for any number.
+        Number of processes that draw a large picture together. 0 means one for each processor core. The
+        picture does not depend on it.
     **settings
         Settings of the look, after the preset: ``length=120, seed=3``. See the page of looks.
 
@@ -150,8 +151,8 @@ def render(
     Raises
     ------
     RosyError
-        If a setting, the preset, the size or the view is not possible, the field is on another
-        surface, or there is not enough memory.
+        If a setting, the preset, the size or the view is invalid, the field is on another surface, or there
+        is not enough memory.
 
     Examples
     --------
@@ -206,24 +207,26 @@ def turntable(
     surface, field, size, orthographic, preset, color_values, tone_values, tone_image, workers, **settings
         See `render`.
     path : path-like
-        A ``.gif``, or an ``.mp4`` if there is an encoder.
+        Path of a ``.gif`` file, or of an ``.mp4`` file if there is an encoder.
     pictures : int
         Number of pictures in a full turn, 2 or more.
     rate : float
         Pictures per second.
     still : bool
-        Keep the camera at the first view. The look then needs `flow`, so that streaks drift.
+        Keep the camera at the first view. The look must then have the setting `flow` above 0, so that
+        streaks drift.
     view : (float, float)
         Azimuth of the first picture, and elevation, in degrees.
     encode : function, optional
-        Encodes an ``.mp4``: see `rendering.turntable.Encoder`. By default ffmpeg, if it is installed.
+        Function that encodes an ``.mp4`` file; see `rendering.turntable.Encoder`. By default ffmpeg, if it is
+        installed.
     on_picture : function, optional
-        Called with the number of each picture, from 1, before it is drawn.
+        Function that is called before each picture is drawn, with its number, from 1.
 
     Returns
     -------
     Path
-        The file. It is written after the last picture.
+        Path of the video file. It is written after the last picture is drawn.
 
     Raises
     ------
@@ -266,7 +269,7 @@ def picture_look(
     tone_sources: Mapping[str, Any],
     has_color_values: bool = False,
 ) -> Look:
-    """Return the look of a picture of a surface that is not in a scene.
+    """Return the look of a picture of a surface that is not in a scene of Blender.
 
     Parameters
     ----------
@@ -275,17 +278,16 @@ def picture_look(
     preset : str or path-like or None
         Name of a preset, or a file.
     settings : mapping
-        Settings of `Look`, after the preset.
+        Settings of `Look` by name. They replace those of the preset.
     tone_sources : mapping
-        The sources of the tone by the values of `Look.tone`; None where there is none.
+        The source of each kind of tone, by the values of `Look.tone`. None where a source is not given.
     has_color_values : bool
-        Whether there are numbers for the hue to show.
+        Whether there are values for the color map.
 
     Raises
     ------
     RosyError
-        If a setting is not possible, there are two tone sources, or the look uses the lights of a
-        scene.
+        If a setting is invalid, more than one tone source is given, or the look uses the lights of a scene.
     """
     look = preset_look(preset)
     if look.supersampling == Look().supersampling:
@@ -300,24 +302,24 @@ def picture_look(
 
 
 def preset_look(preset: str | os.PathLike[str] | None) -> Look:
-    """Return the look of a preset; the default look if there is none."""
+    """Return the look of a preset. If `preset` is None, return the default look."""
     return Look() if preset is None else load_preset(Path(preset), default_user_folder()).look
 
 
 def default_encoder(path: Path, encode: Encoder | None) -> Encoder | None:
-    """Return the encoder of a video: ffmpeg for an .mp4, if none is given.
+    """Return `encode`. If it is None and the file is an .mp4, return ffmpeg, or None without ffmpeg.
 
     Raises
     ------
     RosyError
-        If the file name has no suffix of a video.
+        If the file name does not have the suffix of a video.
     """
     turntable_video.check_video_path(path)
     return find_ffmpeg() if encode is None and path.suffix.lower() == ".mp4" else encode
 
 
 def find_ffmpeg() -> Encoder | None:
-    """Return the encoder of the Python package; None in the extension, or if ffmpeg is not installed."""
+    """Return the encoder ffmpeg. None if it is not installed, or if this is the extension for Blender."""
     try:
         from ..external.ffmpeg import find_encoder
     except ImportError:  # the extension for Blender
@@ -331,7 +333,10 @@ def upright_instance(
     tone: SurfaceTone | None,
     color_values: NDArray[np.float32] | None = None,
 ) -> MeshInstance:
-    """Return a surface with its field in world space, upright."""
+    """Return a surface with a field as a mesh instance, with its upward axis along z of world space.
+
+    If `field` is None, the field is the result of `form`.
+    """
     field = form(surface) if field is None else field
     check_same_surface(surface, field)
     return mesh_instance(surface, field, tone, color_values)
@@ -340,7 +345,7 @@ def upright_instance(
 def corner_numbers(
     surface: Surface, color_values: str | ArrayLike | None
 ) -> NDArray[np.float32] | None:
-    """Return the numbers for the color map at the corners of a surface; NaN where they are not finite.
+    """Return the values for the color map at the corners of a surface; NaN where they are not finite.
 
     Parameters
     ----------
@@ -351,11 +356,12 @@ def corner_numbers(
     Returns
     -------
     (C,) float32 ndarray or None
+        None if `color_values` is None.
 
     Raises
     ------
     RosyError
-        If they are not one number for each face, vertex or corner, or no array has the name.
+        If there is not one value for each face, vertex or corner, or no array has the given name.
     """
     if color_values is None:
         return None
@@ -373,12 +379,13 @@ def corner_numbers(
 def _at_corners(
     surface: Surface, values: ArrayLike, name: str, *, may_be_of_faces: bool = False
 ) -> NDArray[np.float32]:
-    """Return (C,) numbers of corners, given numbers of faces, vertices or corners.
+    """Return (C,) values at the corners, given values at the vertices, corners or (if allowed) faces.
 
     Raises
     ------
     RosyError
-        If they are not numbers, or their count fits none of these. The message names the argument.
+        If the values are not numbers, or there are as many as neither of these. The message begins with
+        `name`, the name of the argument.
     """
     try:
         array = np.asarray(values, dtype=np.float64)
@@ -403,7 +410,7 @@ def _at_corners(
 def _named_array(
     surface: Surface, name: str, data: Mapping[str, NDArray[Any]], kind: str, kinds: str
 ) -> NDArray[Any]:
-    """Return an array of a surface by name. `kind` and `kinds` name such arrays in errors."""
+    """Return an array of a surface by name. Errors call such arrays `kind` and `kinds` (plural)."""
     if name in data:
         return data[name]
     if not data:
@@ -417,7 +424,10 @@ def _surface_tone(
     values: str | ArrayLike | None,
     image: str | os.PathLike[str] | ArrayLike | Picture | None,
 ) -> SurfaceTone | None:
-    """Return the tone from values at vertices or corners, or from an image on the UV map; None without."""
+    """Return the tone from values at vertices or corners, or from an image on the UV map.
+
+    None if neither is given.
+    """
     if values is not None:
         if isinstance(values, str):
             values = _named_tone(surface, values)
@@ -431,7 +441,7 @@ def _surface_tone(
 
 
 def _named_tone(surface: Surface, name: str) -> NDArray[Any]:
-    """Return (V,) tones: an array of the vertices, or the luminance of their colors."""
+    """Return (V,) tones: the vertex attribute `name`; for "Color", the linear luminance of vertex colors."""
     data = surface.vertex_data
     rgb = [data.get(channel) for channel in ("red", "green", "blue")]
     if name == VERTEX_COLOR and all(channel is not None for channel in rgb):
@@ -447,7 +457,10 @@ def _named_tone(surface: Surface, name: str) -> NDArray[Any]:
 def _image_luminance(
     image: str | os.PathLike[str] | ArrayLike | Picture,
 ) -> NDArray[np.float32]:
-    """Return (H, W) linear luminance, the bottom row first, of a file or of display values."""
+    """Return the linear luminance of an image, (H, W), with the bottom row first.
+
+    The image is a picture, a file, or an array of display values (sRGB).
+    """
     if isinstance(image, Picture):
         return luminance(image.rgba)
     if isinstance(image, (str, os.PathLike)):

@@ -1,4 +1,4 @@
-"""`texture`: the field drawn in the UV map of a surface."""
+"""`texture`: draw a field as a texture for the UV map of a surface."""
 
 from __future__ import annotations
 
@@ -31,24 +31,26 @@ from .field import warn
 from .generators import uv_map
 from .pictures import corner_numbers, preset_look, upright_instance
 
-#: Placeholder for the number of the tile in a file name, as in Blender.
+#: Placeholder in a file name for the number of the UDIM tile, as in Blender.
 UDIM_TOKEN = "<UDIM>"
 
 
 class Texture:
     """A texture for the UV map of a surface. A notebook shows its first tile.
 
-    A texture of hatching does not hold ink, but thresholds: red, green and blue are the fractions of the
-    paper that the first, second and third lines cover when they reach the texel. A shader can then draw
-    the hatching for any light. They are stored as they are, in a file without a color space.
+    A texture of hatching does not hold ink, but thresholds, from which a shader can draw the hatching for
+    any light. Hatching has up to three layers of lines, whose lines get wider in darker tones. Red, green
+    and blue belong to the first, second and third layer. Each is the fraction of the paper that the layer
+    covers when its lines are just wide enough to reach the texel. Thresholds are data without a color space.
 
     Attributes
     ----------
     tiles : dict of int to Picture
-        The pictures, by the numbers of their tiles. A texture that is not of the kind UDIM has one
-        picture, with the number 1001.
+        The pictures, by the numbers of their UDIM tiles. A texture without UDIM tiles has one picture, with
+        the number 1001.
     overlap : float
-        Fraction of the area of the UV map that lies under other charts, which show the same texels.
+        Fraction of the area of the UV map that is covered by more than one chart. There, several parts of
+        the surface show the same texels.
 
     Examples
     --------
@@ -87,8 +89,8 @@ class Texture:
         Raises
         ------
         RosyError
-            If the name does not end in ``.png``, it has no place for the number of one of several
-            tiles, or a file cannot be written.
+            If the name does not end in ``.png``, it has no ``<UDIM>`` although there are several tiles, or a
+            file cannot be written.
         """
         path = Path(path)
         if len(self.tiles) > 1 and UDIM_TOKEN not in path.name:
@@ -115,36 +117,38 @@ def texture(
 ) -> Texture:
     """Draw a field as a texture for the UV map of a surface.
 
-    Streamlines run on the surface: no seam shows, and lines are as wide on all charts. Light is left to the
-    renderer that shows the texture. A texture of hatching has thresholds for a shader; see `Texture`.
+    Streamlines are traced on the surface, so no seams are visible, and lines have the same width on all
+    charts. Light is left to the renderer that shows the texture. A texture of hatching has thresholds for a
+    shader; see `Texture`.
 
     Parameters
     ----------
     surface : Surface
-        With a UV map.
+        The surface must have a UV map.
     field : Field, optional
         By default a field of degree 4 along the form of the surface; see `form`.
     size : int
         Width and height in texels.
     margin : int
-        Width of the margin around charts, in texels. Smaller versions of the texture then show no
-        seams either.
+        Width of the margin around charts, in texels. It avoids seams in mipmaps of the texture.
     udim : bool
-        Whether each tile of the UV map has a picture of its own. Otherwise, the texture repeats beyond u
-        and v from 0 to 1.
+        Whether each tile of the UV map has a picture of its own. Otherwise there is one
+        picture, which repeats outside of the unit square.
     light_direction : (3,) array_like, optional
-        Direction to a lamp, in the space of the surface. Hatching is then drawn as ink for this lamp, for
-        renderers that have no shader for thresholds.
+        Direction to a lamp, in the coordinates of the mesh. If it is given, hatching is drawn as ink in the
+        light of this lamp, for renderers that have no shader for thresholds.
     content : {"look", "anisotropy", "flow"}
-        What the texture shows: the picture of the look, or the direction of the field, near to the
-        `guiding_angle`. Red and green are its components, from -1 to 1: along tangent and bitangent in an
-        anisotropy map of glTF, along u and v in a flow map. Blue is 1, and 0 where the field is undefined.
+        What the texture shows. "look" is the picture of the look. The others are maps of the direction of
+        the field that is nearest to the setting `guiding_angle`. Red and green are the components of this
+        direction, from -1 to 1. In an anisotropy map (as in glTF) they are along the tangent and the
+        bitangent, in a flow map along u and v. Blue is 1, or 0 where the field is undefined.
     flow_phase : float
-        Where the streaks of a look with `flow` are in the cycle in which they drift and fade, 0 to 1.
+        For a look with the setting `flow`, whose streaks drift and fade in a cycle: the phase in this cycle,
+        0 to 1.
     preset : str or path-like, optional
         Name of a preset, or a ``.json`` file; see `list_presets`.
     color_values : str or (F,), (V,) or (C,) array_like, optional
-        Numbers that the hue of the streaks shows; see `render`. Hatching shows none.
+        Values for the color map, by which streaks are colored; see `render`. Hatching cannot show them.
     **settings
         Settings of the look, after the preset: ``line_width=3, seed=3``. Lengths in pixels refer to a
         square with the area of the surface and 1024 pixels on each side, independent of the size of the
@@ -162,8 +166,8 @@ def texture(
     Raises
     ------
     RosyError
-        If there is no UV map, it cannot be drawn, a setting, the preset or the colors are not possible,
-        or there is not enough memory.
+        If there is no UV map, nothing can be drawn with it, a setting, the preset or the color values are
+        invalid, or there is not enough memory.
 
     Examples
     --------
@@ -206,12 +210,12 @@ def texture(
 
 
 def _lamp(light_direction: ArrayLike, instance: MeshInstance) -> Light:
-    """Return a lamp in a direction, in world space.
+    """Return a lamp in world space, given the direction to it in the coordinates of the mesh.
 
     Raises
     ------
     RosyError
-        If it is not three finite numbers, or all of them are 0.
+        If the direction is not three finite numbers, or all of them are 0.
     """
     direction = unit_direction(light_direction)
     if direction is None:
@@ -227,12 +231,13 @@ def texture_look(
     settings: dict[str, Any],
     has_color_values: bool = False,
 ) -> Look:
-    """Return the look of a texture.
+    """Return the look of a texture: a preset with settings; see `texture`.
 
     Raises
     ------
     RosyError
-        If a setting is not possible, or there are numbers to show as hues, and the look has ink.
+        If a setting is invalid, or there are values for the color map although the look is
+        one of hatching.
     """
     look = preset_look(preset).with_settings(settings)
     if has_color_values and is_hatched(look):

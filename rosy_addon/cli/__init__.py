@@ -1,15 +1,15 @@
-"""The command line, the same in Blender and in plain Python.
+"""The command line. It is the same in Blender and in Python without Blender.
 
-``render``, ``turntable``, ``field``, ``info``, ``presets`` and ``strokes`` of mesh files need numpy
-only. ``bake`` and ``strokes`` of .blend files need Blender or its Python module.
+The commands ``render``, ``turntable``, ``field``, ``info`` and ``presets``, and ``strokes`` for mesh files,
+need only numpy. ``bake``, and ``strokes`` for .blend files, need Blender or its Python module.
 
-Each command has its options and its function in one module. An option for a function of `api` has the name and
-the default of a parameter, or says so by its ``dest``: `Options.api_arguments` passes it on. Modules in order of
-dependence:
+The options and the function of a command are in the same module. `Options.api_arguments` passes an option
+on to a function of `api` if the function has a parameter of the same name (or with the name of its
+``dest``). The parameter also sets the default. Modules in order of dependence:
 
-    streams                                          safe output
+    streams                                          output that is safe on any terminal
     options, mesh_field                              options that several commands share
-    scene                                            Blender files
+    scene                                            access to .blend files
     pictures, strokes, field, bake, presets          the commands
     parser                                           the parser of all commands, and `main`
 """

@@ -1,4 +1,4 @@
-"""The command `bake`: pictures of a Blender file, from its cameras, and processes that draw its frames."""
+"""The command `bake`: draw pictures of a .blend file from its cameras, in one process or several."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def run_bake(options: Options) -> None:
     out = None if options.out is None else Path(os.path.realpath(options.out))
     settings = read_output_settings(scene, out)
     if out is None and settings.folder is not None and not is_beside_blend(settings.folder):
-        # The file may come from someone else.
+        # The file may come from another person, and must not choose a folder to write to.
         raise RosyError(
             f"the file stores its pictures in another place, {os.path.realpath(settings.folder)}: give --out DIR"
         )
@@ -118,7 +118,7 @@ def _check_bake_options(options: Options) -> None:
 
 
 def _bake(options: Options, scene: Any, settings: Any) -> list[Any]:
-    """Draw the current frame or several in this process, and return what was made for each camera."""
+    """Draw the current frame or several frames in this process. Return the result for each camera."""
     from ..jobs.animation import bake_animation
     from ..jobs.bake import bake
     from ..scene.look_properties import read_look
@@ -136,14 +136,15 @@ def _bake(options: Options, scene: Any, settings: Any) -> list[Any]:
         return bake(scene, **arguments)
     frames = parse_frames(options.frames)
     if uses_workers(options):
-        # The workers have drawn all frames. The first and the last set the range of the materials.
+        # The workers have drawn all frames. The first and the last frame are needed here, as they determine
+        # the frame range of the materials.
         frames = sorted({frames[0], frames[-1]})
     with listening(_FrameLog()):
         return bake_animation(scene, frames, show=options.save, **arguments)
 
 
 class _FrameLog:
-    """Prints a line for each frame of an animation when it begins."""
+    """A listener for progress that prints a line when a frame of an animation begins."""
 
     def __init__(self) -> None:
         self._last_label = ""
@@ -155,7 +156,7 @@ class _FrameLog:
 
 
 def uses_workers(options: Options) -> bool:
-    """Return whether other processes draw the frames."""
+    """Return whether the options ask for other processes to draw the frames."""
     return options.jobs > 1 or options.scheduler is not None
 
 
@@ -188,9 +189,9 @@ def run_workers(options: Options) -> None:
 
 
 def _forwarded_args(options: Options) -> list[str]:
-    """Return the options that are passed on to the other processes.
+    """Return the arguments of the processes that draw frames, for the options of this command.
 
-    Each is one word, because names may begin with a dash.
+    An option and its value are one argument (``--object=-x``), because names may begin with a dash.
     """
     size, preset = options.size, options.preset
     blender = getattr(options, "blender", None)
@@ -203,7 +204,7 @@ def _forwarded_args(options: Options) -> list[str]:
         "device": [options.device],
         "set": options.set,
         "blender": [blender and _forwarded_program(blender)],
-        # The processes for frames use all cores already.
+        # The processes that draw frames already use all cores.
         "workers": [options.workers or 1],
     }
     arguments = [
@@ -216,14 +217,14 @@ def _forwarded_args(options: Options) -> list[str]:
 
 
 def _forwarded_preset(preset: str) -> str:
-    """Return the name of a preset of RoSy, or the path of another one.
+    """Return how other processes find a preset: by its name if RoSy provides it, otherwise by its path.
 
-    RoSy may be installed in another folder where the worker runs.
+    RoSy may be installed in another folder on the machine of a worker.
     """
     path = find_preset_file(preset, user_presets_folder())
     return path.stem if path.parent == SHIPPED_FOLDER else os.path.realpath(path)
 
 
 def _forwarded_program(program: str) -> str:
-    """Return the path of a program, which may be a link, or a name that is looked up on the PATH."""
+    """Return the absolute path of a program; if there is no such file, its name, which the PATH resolves."""
     return os.path.abspath(program) if os.path.exists(program) else program

@@ -24,7 +24,7 @@ from .mesh_field import add_field_file_options, add_mesh_options, load_mesh_and_
 from .options import CommandParser, Options, add_subcommand, float_between, int_between
 from .streams import print_line
 
-#: Generators that need nothing but the mesh and a degree.
+#: Generators that need only the mesh and a degree.
 GENERATORS = ("form", "smoothest", "curvature", "features", "uv")
 
 
@@ -111,7 +111,11 @@ def run_info(options: Options) -> None:
 
 
 def _compare(options: Options, field: api.Field) -> dict[str, Any]:
-    """Return the angles to the field in a file, or the differences from a file of singularities."""
+    """Compare a field with the file of the option --against, and return the results by name.
+
+    For a field file these are angles in degrees. For a file of singularities (.sings) these are the number of
+    equal singularities, and the singularities that only the field or only the file has.
+    """
     if options.against.suffix.lower() not in SINGULARITY_SUFFIXES:
         other = read_field(options, options.against, field.surface, field.degree)
         difference = field.difference(other)
@@ -132,7 +136,7 @@ def _compare(options: Options, field: api.Field) -> dict[str, Any]:
 
 
 def _format_info(facts: dict[str, Any]) -> str:
-    """Return the facts as text."""
+    """Return the results of the command `info` as text."""
     singularity_lines = [
         f"  vertex {vertex}: {index:+d}/{facts['degree']}"
         for vertex, index in facts["singularities"]
@@ -155,7 +159,7 @@ def _format_info(facts: dict[str, Any]) -> str:
 
 
 def _format_comparison(against: dict[str, Any] | None) -> list[str]:
-    """Return the lines of text that describe a comparison."""
+    """Return lines of text for the result of `_compare`; no lines if it is None."""
     if against is None:
         return []
     if "same" in against:
@@ -211,7 +215,7 @@ def add_compare_command(subparsers: Any) -> None:
 
 
 def _add_layout_options(parser: CommandParser) -> None:
-    """Add the options of the page of a comparison: its layout and its texts."""
+    """Add the options for the layout and the texts of the figure of a comparison."""
     parser.add_argument(
         "--lines", choices=LINES, help="lines that are drawn over differences (%(default)s)"
     )
@@ -240,7 +244,7 @@ def run_compare(options: Options) -> None:
 
 
 def _draw(options: Options, comparison: api.Comparison) -> None:
-    """Write the figures."""
+    """Draw the figures of a comparison, and write them to a file."""
     rest = ("differences", "table") if comparison.differences else ("table",)
     if options.output.suffix.lower() == ".pdf":
         pages: list[dict[str, Any]] = [{}, {"parts": rest, "caption": ""}]
@@ -253,7 +257,7 @@ def _draw(options: Options, comparison: api.Comparison) -> None:
 
 
 def _load_fields(options: Options) -> dict[str, api.Field]:
-    """Read or generate the fields, by their titles."""
+    """Read or generate the fields that the options name. Return them by title."""
     if options.degree is not None:
         check_degree(options.degree)
     sources = dict(_titled_source(text) for text in options.fields)
@@ -262,7 +266,7 @@ def _load_fields(options: Options) -> dict[str, api.Field]:
     fields: dict[str, api.Field | None] = dict.fromkeys(sources)
     surface = api.Surface(options.mesh, up=options.up)
     degree = options.degree
-    # Files come first, because the first of them sets the degree of the generated fields.
+    # Files are read before fields are generated, because the first file sets the degree of the latter.
     for title, source in sorted(sources.items(), key=lambda item: item[1] in GENERATORS):
         if source in GENERATORS:
             fields[title] = GENERATOR_FUNCTIONS[source](surface, degree or DEFAULT_DEGREE)
@@ -273,7 +277,7 @@ def _load_fields(options: Options) -> dict[str, api.Field]:
 
 
 def _titled_source(text: str) -> tuple[str, str]:
-    """Return the title and the source of [TITLE=]FIELD."""
+    """Split an argument of the form [TITLE=]FIELD, and return the title and the source of the field."""
     title, separator, source = text.partition("=")
     if separator and source and not Path(text).exists():
         return title, source

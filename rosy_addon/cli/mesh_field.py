@@ -18,7 +18,7 @@ from .options import CommandParser, Options, int_between
 
 
 def add_mesh_options(parser: CommandParser) -> None:
-    """Add MESH, FIELD and the options that generate a field."""
+    """Add the arguments MESH and FIELD, and the options that generate a field."""
     *suffixes, last = READERS
     text = f"{', '.join(suffixes)} or {last}"
     parser.add_argument("mesh", type=Path, metavar="MESH", help=text)
@@ -26,7 +26,7 @@ def add_mesh_options(parser: CommandParser) -> None:
 
 
 def add_field_options(parser: CommandParser) -> None:
-    """Add FIELD and the options that generate a field."""
+    """Add the argument FIELD, and the options that generate a field."""
     text = ", ".join(READ_SUFFIXES)
     parser.add_argument("field", type=Path, nargs="?", metavar="FIELD", help=text)
     of_array = ", 1 for an array of vectors" if SIMULATION_READERS else ""
@@ -39,7 +39,7 @@ def add_field_options(parser: CommandParser) -> None:
 
 
 def add_field_file_options(parser: CommandParser) -> None:
-    """Add the options of field files."""
+    """Add the options for reading field files."""
     parser.add_value(
         "--field-mesh",
         "MESH",
@@ -89,7 +89,7 @@ def _add_generator_options(parser: CommandParser) -> None:
 
 
 def _add_simulation_options(parser: CommandParser) -> None:
-    """Add the options for files of simulations, if these can be read."""
+    """Add the options for files of simulations, if this program can read such files."""
     parser.set_defaults(array=None, step=None)
     if not SIMULATION_READERS:
         return
@@ -109,9 +109,10 @@ def _add_simulation_options(parser: CommandParser) -> None:
 
 
 def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
-    """Read the mesh; read the field, or generate one.
+    """Read the mesh. Read the field from a file, or generate it.
 
-    In the file of a simulation, the field is one of its arrays, unless the options name another.
+    If the mesh is in a file of a simulation, the field is one of the arrays of this file, unless the options
+    name a field file or a generator.
     """
     if options.degree is not None:
         check_degree(options.degree)
@@ -139,7 +140,7 @@ def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
 
 
 def read_field(options: Options, path: Path, surface: api.Surface, degree: int | None) -> api.Field:
-    """Read a field file, with the options for field files."""
+    """Read a field file, with the options that `add_field_file_options` adds."""
     nonfinite = "zero" if options.undefined else "error"
     return api.read_field(path, surface, degree, nonfinite=nonfinite, mesh=options.field_mesh)
 
@@ -171,7 +172,7 @@ def _generate_field(options: Options, surface: api.Surface) -> api.Field:
 
 
 def _guides(options: Options, surface: api.Surface, degree: int | None) -> api.Field | None:
-    """Read the field of the option --guides, if it is given."""
+    """Read the field file of the option --guides. None if the option is not given."""
     if options.guides is None:
         return None
     return read_field(options, options.guides, surface, degree)

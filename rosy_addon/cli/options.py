@@ -1,4 +1,4 @@
-"""The parser of a command, its options, and those that several commands share."""
+"""`CommandParser` and `Options`: the parser of a command, with options that several commands share."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from .streams import print_line
 
 
 class CommandParser(argparse.ArgumentParser):
-    """The parser of a command, which can add the options that several commands share.
+    """A parser of a command, with methods that add the options that several commands share.
 
-    Its messages are safe on any terminal.
+    Control characters in its messages are escaped.
     """
 
     def _print_message(self, message: str, file: TextIO | None = None) -> None:
@@ -49,13 +49,13 @@ class CommandParser(argparse.ArgumentParser):
         ----------
         option : str
         metavar : str
-            Stands for the value in the help.
+            Placeholder for the value in the help.
         text : str
-            Help text. %(default)s stands for the default.
+            Help text, in which %(default)s stands for the default.
         parse : function, optional
-            Returns the value of a text; by default the text itself.
+            Function that converts the text of the argument to a value. By default, the value is the text.
         **keywords
-            Others of `argparse.ArgumentParser.add_argument`.
+            More keyword arguments of `argparse.ArgumentParser.add_argument`.
         """
         self.add_argument(option, metavar=metavar, help=text, type=parse, **keywords)
 
@@ -64,20 +64,23 @@ class CommandParser(argparse.ArgumentParser):
         self.add_argument(option, action="store_true", help=text)
 
     def add_output_option(self, metavar: str, text: str = "", *, required: bool = True) -> None:
-        """Add -o, the path of the output."""
+        """Add the option -o, the path of the output."""
         self.add_argument(
             "-o", "--output", required=required, type=Path, metavar=metavar, help=text or None
         )
 
     def add_object_option(self, text: str) -> None:
-        """Add --object with one name or more. It may be repeated; ``--object=-x`` is the name -x."""
+        """Add the option --object with one or more names, which may be repeated.
+
+        A name with a dash at its start is given as ``--object=-x``.
+        """
         self.add_value("--object", "NAME", text, nargs="+", action="extend")
 
     def add_setting_option(self, setting: Setting, note: str) -> None:
-        """Add the option of a setting, with its range, help text and default.
+        """Add an option for a setting, with the range, help text and default of the setting.
 
-        An option that is not given is not set. Angles are in degrees on the command line, and then in radians.
-        `note` is added to the help text.
+        If the option is not given, `Options` has no attribute for it. Angles are in degrees on the command
+        line, and are converted to radians. `note` is added to the help text.
         """
         text = setting.text[0].lower() + setting.text[1:] + note
         add = partial(
@@ -98,12 +101,12 @@ class CommandParser(argparse.ArgumentParser):
                 raise TypeError(f"setting '{setting.name}' has no option")
 
     def add_set_option(self, settings_class: type, text: str) -> None:
-        """Add --set, which may be repeated; `Options.requested_settings` returns the settings."""
+        """Add the option --set, which may be repeated. `Options.requested_settings` returns the settings."""
         names = ", ".join(settings_of(settings_class))
         self.add_value("--set", "NAME=VALUE", f"{text}: {names}", action="append", default=[])
 
     def add_workers_option(self) -> None:
-        """Add --workers."""
+        """Add the option --workers, the number of processes that draw a picture."""
         text = (
             "number of processes that draw a large picture together; 0 is one for each core "
             "(%(default)d). The picture is the same for any number"
@@ -112,9 +115,9 @@ class CommandParser(argparse.ArgumentParser):
 
     @contextmanager
     def only_for(self, kind: str) -> Iterator[None]:
-        """Note that options which are added in the ``with`` block are for one kind of file only.
+        """Context manager: note that the options added in its block are only for one kind of file.
 
-        `Options.check_only_for` then refuses them for other files.
+        With other files, `Options.check_only_for` raises an error if one of these options is given.
         """
         first = len(self._actions)
         yield
@@ -127,11 +130,11 @@ class CommandParser(argparse.ArgumentParser):
         self.add_size_option()
 
     def add_size_option(self) -> None:
-        """Add --size of a picture."""
+        """Add the option --size, the size of a picture."""
         self.add_value("--size", "WxH", "size in pixels", parse_size)
 
     def add_direction_options(self) -> None:
-        """Add --view, --up and --ortho."""
+        """Add the options --view, --up and --ortho, which set the camera."""
         self.add_value(
             "--view",
             "AZ,EL",
@@ -152,7 +155,7 @@ class CommandParser(argparse.ArgumentParser):
         )
 
     def add_look_options(self) -> None:
-        """Add --preset and --set."""
+        """Add the options --preset and --set."""
         text = (
             f"preset of the look: {', '.join(preset_keys())}, one of your own, or a .json file; "
             "`presets` lists them"
@@ -161,15 +164,15 @@ class CommandParser(argparse.ArgumentParser):
         self.add_set_option(Look, "one setting of the look, after the preset")
 
     def add_degree_option(self, text: str) -> None:
-        """Add --degree, of fields."""
+        """Add the option --degree, the degree of a field, with a help text."""
         self.add_value("--degree", "N", text, int)
 
     def add_undefined_option(self) -> None:
-        """Add --undefined."""
+        """Add the option --undefined, which treats vectors that are not finite as undefined."""
         self.add_switch("--undefined", "treat NaN and infinite vectors as undefined")
 
     def add_picture_options(self) -> None:
-        """Add the options of a picture of a mesh: view, look, and sources of its colors and its tone."""
+        """Add the options of a picture of a mesh: view, look, values for colors, source of the tone."""
         self.add_view_options()
         self.add_workers_option()
         self.add_look_options()
@@ -195,15 +198,15 @@ class CommandParser(argparse.ArgumentParser):
 
 
 class Options(argparse.Namespace):
-    """The options of a command."""
+    """The options of a command, as parsed by a `CommandParser`."""
 
     def check_output(self, suffix: str = "") -> None:
-        """Check the option -o, before long work computes its contents.
+        """Check that the file of the option -o can be written, before its contents are computed.
 
         Parameters
         ----------
         suffix : str
-            The extension that the name of the file must have; by default any.
+            The extension that the name of the file must have. By default, any is allowed.
 
         Raises
         ------
@@ -223,14 +226,14 @@ class Options(argparse.Namespace):
                     raise RosyError(f"{self.output}: is also an input: choose another output file")
 
     def check_only_for(self, kind: str, file: Path | str) -> None:
-        """Raise an error if an option is given that is for another kind of file; see `CommandParser.only_for`.
+        """Raise an error if an option of `CommandParser.only_for` is given for a file of another kind.
 
         Parameters
         ----------
         kind : str
             The kind of file that the options are for.
         file : Path or str
-            The file that they do not apply to.
+            The file of this command, which is of another kind.
         """
         for action in self.kinds[kind]:
             if getattr(self, action.dest, action.default) != action.default:
@@ -238,45 +241,47 @@ class Options(argparse.Namespace):
                 raise RosyError(f"{file}: {name} applies only to {kind}")
 
     def requested_preset(self) -> Path | None:
-        """Return the file of --preset, or None."""
+        """Return the file of the preset of the option --preset. None if the option is not given."""
         return find_preset_file(self.preset, user_presets_folder()) if self.preset else None
 
     def requested_settings(self, settings_class: type = Look) -> dict[str, Any]:
-        """Return the settings of --set, by name."""
+        """Return the settings of the options --set, by name."""
         return dict(_parse_setting(text, settings_of(settings_class)) for text in self.set)
 
     def requested_look(self, default: Look) -> Look:
-        """Return the look of --preset, by default `default`, with the settings of --set."""
+        """Return the look of the option --preset (by default `default`), changed by the options --set."""
         preset = self.requested_preset()
         look = default if preset is None else read_preset(preset).look
         return look.with_settings(self.requested_settings())
 
     def api_arguments(self, function: Callable[..., Any], **others: Any) -> dict[str, Any]:
-        """Return the keyword arguments of a function: the options with these names, and the settings of the look.
+        """Return keyword arguments for a function: the options with the names of its parameters, and --set.
 
         Parameters
         ----------
         function : function
             A function of `api`.
         **others
-            Arguments that replace the values of options.
+            Arguments that replace those of the options.
         """
         names = inspect.getfullargspec(function).kwonlyargs
         arguments = {name: value for name, value in vars(self).items() if name in names}
         return arguments | {"preset": self.requested_preset()} | others | self.requested_settings()
 
     def picture_arguments(self, function: Callable[..., Any]) -> dict[str, Any]:
-        """Return what the options say about a picture of a mesh, as arguments of a function of `api`.
+        """Return keyword arguments for a function of `api` that draws a mesh, after a check.
+
+        See `api_arguments`.
 
         Raises
         ------
         RosyError
-            If they are not possible.
+            If the options of the look, the tone or the size are invalid.
         """
         sources = {"attribute": self.tone_values, "image": self.tone_image}
         sources["picture"] = getattr(self, "tone_picture", None)
         preset, settings = self.requested_preset(), self.requested_settings()
-        # Mistakes are reported before the mesh is read.
+        # Errors in the options are reported before the mesh is read.
         picture_look(str(self.mesh), preset, settings, sources, self.color_values is not None)
         check_size(*self.size)
         return self.api_arguments(function)
@@ -288,17 +293,17 @@ def add_subcommand(
     run: Callable[[Options], None],
     function: Callable[..., Any] | None = None,
 ) -> CommandParser:
-    """Add a command.
+    """Add a command, and return its parser.
 
     Parameters
     ----------
     subparsers : argparse action
     name : str
     run : function
-        Runs it. The first line of its docstring becomes the help.
+        Function that runs the command. The first line of its docstring is the help of the command.
     function : function, optional
-        A function of `api` with whose keyword parameters the options have names and defaults in common;
-        see `api_arguments`.
+        A function of `api` that the command calls with its options; see `api_arguments`. The defaults of its
+        keyword parameters are the defaults of the options.
     """
     text = run.__doc__.splitlines()[0]
     parser = subparsers.add_parser(name, help=text, description=text)
@@ -317,7 +322,7 @@ def parse_size(text: str) -> tuple[int, int]:
 
 
 def float_tuple(count: int, metavar: str) -> Callable[[str], tuple[float, ...]]:
-    """Return a parser for numbers that are separated by commas."""
+    """Return a function that parses `count` numbers, separated by commas."""
 
     def parse(text: str) -> tuple[float, ...]:
         try:
@@ -332,7 +337,7 @@ def float_tuple(count: int, metavar: str) -> Callable[[str], tuple[float, ...]]:
 
 
 def float_between(low: float, high: float) -> Callable[[str], float]:
-    """Return a parser for a number in a closed interval."""
+    """Return a function that parses a number in the closed interval from `low` to `high`."""
 
     def parse(text: str) -> float:
         try:
@@ -347,13 +352,13 @@ def float_between(low: float, high: float) -> Callable[[str], float]:
 
 
 def degrees_between(low: float, high: float) -> Callable[[str], float]:
-    """Return a parser for an angle in degrees that returns radians. The interval is in radians."""
+    """Return a function that parses an angle in degrees and returns radians. Limits are in radians."""
     parse = float_between(np.degrees(low), np.degrees(high))
     return lambda text: float(np.radians(parse(text)))
 
 
 def int_between(low: int, high: int) -> Callable[[str], int]:
-    """Return a parser for a whole number in a closed interval."""
+    """Return a function that parses an integer in the closed interval from `low` to `high`."""
 
     def parse(text: str) -> int:
         if not re.fullmatch(r"[+-]?\d{1,18}", text) or not low <= int(text) <= high:
@@ -380,7 +385,7 @@ def _parse_setting(text: str, settings: Mapping[str, Setting]) -> tuple[str, Any
 
 
 def user_presets_folder() -> Path:
-    """Return the folder of the user's presets: in Blender, the one of the extension."""
+    """Return the folder of the user's presets. In Blender it is the folder of the extension."""
     if sys.modules.get("bpy") is None:
         return default_user_folder()
     from ..scene.files import user_presets_folder

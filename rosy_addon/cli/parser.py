@@ -22,32 +22,33 @@ from .strokes import add_strokes_command
 #: Commands that may need Blender.
 BLENDER_VERBS = {"bake", "strokes", "turntable", "film"}
 
-#: Exit statuses: success, standard output failed, an error in the user's input, interrupted by
-#: Ctrl-C, and standard output was closed.
+#: Exit statuses: success, standard output cannot be written, error in the user's input, interrupted by
+#: Ctrl-C, and standard output closed by its reader.
 EXIT_OK, EXIT_OUTPUT_ERROR, EXIT_USER_ERROR, EXIT_INTERRUPTED, EXIT_BROKEN_PIPE = 0, 1, 2, 130, 141
 
 
 @dataclass(frozen=True)
 class Extras:
-    """What the Python package adds to the commands. The extension for Blender has none of it.
+    """Additions to the commands in the Python package. The extension for Blender has none of them.
 
     Attributes
     ----------
     program : tuple of str
-        The program that runs the commands and its first arguments.
+        The program that runs the commands, with its first arguments.
     run_on_cluster : function, optional
-        Runs a command for frames on a cluster, given its arguments, the frames and the address of the
-        cluster, and yields the lines that it prints.
+        Function that runs a command for some frames on a cluster. It takes the arguments of the command,
+        the frames and the address of the cluster, and yields the printed lines.
     add_commands : tuple of function
-        Each adds a command to the subparsers.
+        Functions that each add a command to the subparsers.
     find_blender_encoder : function, optional
-        Returns an encoder of videos by a Blender, or None, given the Blender that the user named, or
-        None.
+        Function that returns an encoder of videos that runs Blender, or None if there is no Blender. It
+        takes the program that the user named, or None.
     run_in_blender : function, optional
-        Runs the command in a Blender and exits with its status, given the options, the verb and the
-        .blend file. Returns if the command can run in this process.
+        Function that runs the command in a Blender process and exits with its status. It takes the options,
+        the name of the command and the .blend file. It returns if the command can run in this process.
     is_in_blender : bool
-        Whether this is the Blender that runs a command again. Other processes have drawn its frames already.
+        Whether this is the Blender process of `run_in_blender`. If the
+        options ask for several processes, these have already drawn the frames.
     """
 
     program: tuple[str, ...] = ()
@@ -75,7 +76,7 @@ def main(
     prog : str
         How the user starts the program, for the help.
     extras : Extras
-        What the commands can do besides.
+        Additions to the commands.
 
     Returns
     -------
@@ -95,7 +96,7 @@ def main(
     except KeyboardInterrupt:
         print_error("stopped")
         return EXIT_INTERRUPTED
-    except BrokenPipeError:  # the reader of the output has ended
+    except BrokenPipeError:  # the program that reads the output has ended
         discard_output()
         return EXIT_BROKEN_PIPE
     except OSError as error:

@@ -1,4 +1,4 @@
-"""The commands `render`, `turntable` and `texture`: pictures, videos and textures of a mesh file."""
+"""The commands `render`, `turntable` and `texture`: draw pictures, videos and textures of a mesh file."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def add_turntable_command(subparsers: Any) -> None:
 
 
 def add_rate_option(parser: CommandParser) -> None:
-    """Add --rate, of a video."""
+    """Add the option --rate, the frame rate of a video."""
     parser.add_value("--rate", "N", "pictures per second (%(default)g)", float_between(0.1, 1000.0))
 
 
@@ -82,12 +82,12 @@ def run_turntable(options: Options) -> None:
 
 
 def video_encoder(options: Options) -> Encoder | None:
-    """Return ffmpeg's or Blender's encoder for an .mp4 as the output; None for a .gif.
+    """Return an encoder (ffmpeg or Blender) if the output is an .mp4 file; None if it is a .gif.
 
     Raises
     ------
     RosyError
-        If there is no encoder.
+        If the output is an .mp4 file and there is no encoder.
     """
     if options.output.suffix.lower() != ".mp4":
         return None
@@ -140,7 +140,7 @@ def add_texture_command(subparsers: Any) -> None:
 def run_texture(options: Options) -> None:
     """Draw the field of a mesh file as a texture for its UV map."""
     options.check_output(".png")
-    # Mistakes are reported before the mesh is read.
+    # Errors in the options are reported before the mesh is read.
     texture_look(options.requested_preset(), options.requested_settings())
     surface, field = load_mesh_and_field(options)
     arguments = options.api_arguments(api.texture, udim=UDIM_TOKEN in options.output.name)

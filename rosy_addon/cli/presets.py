@@ -1,4 +1,4 @@
-"""The command `presets`."""
+"""The command `presets`: list the presets of looks."""
 
 from __future__ import annotations
 

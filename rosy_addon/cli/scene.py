@@ -1,4 +1,4 @@
-"""Access to Blender files, for the commands that read them."""
+"""Access to .blend files, for the commands that read them."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from .streams import print_error
 
 
 def open_scene(options: Options, command: str, path: Path | None) -> Any:
-    """Open a Blender file, if one is given, and return the scene.
+    """Open a .blend file, and return its scene. If `path` is None, return the current scene of Blender.
 
-    The Python package may run the command in a Blender instead, and exit.
+    The Python package may instead run the command in a Blender process, and exit.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def open_scene(options: Options, command: str, path: Path | None) -> Any:
 
 
 def requested_cameras(scene: Any, options: Options) -> list[Any] | None:
-    """Return the camera objects that the options name; None for the scene's active camera."""
+    """Return the camera objects that the options name. If they name none, return None: the active camera."""
     from ..scene.cameras import scene_cameras
 
     if options.all_cameras:
@@ -49,7 +49,7 @@ def requested_cameras(scene: Any, options: Options) -> list[Any] | None:
 
 
 def requested_objects(options: Options) -> list[Any] | None:
-    """Return the objects that the options name; None for all whose fields can be drawn."""
+    """Return the objects that the options name. If they name none, return None: all objects with a field."""
     import bpy
 
     from ..scene.visible_objects import field_objects
@@ -58,13 +58,13 @@ def requested_objects(options: Options) -> list[Any] | None:
 
 
 def print_warnings(warnings: Iterable[str]) -> None:
-    """Print each of several warnings once."""
+    """Print warnings to the error stream, equal ones only once."""
     for warning in dict.fromkeys(warnings):
         print_error(warning)
 
 
 def find_camera(scene: Any, name: str) -> Any:
-    """Return the camera object of a name."""
+    """Return the object of a scene with the name of a camera; raise an error if there is none."""
     if name not in scene.objects:
         names = ", ".join(f"'{obj.name}'" for obj in scene.objects if obj.type == "CAMERA")
         raise RosyError(

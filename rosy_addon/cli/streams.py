@@ -1,4 +1,4 @@
-"""Output of the command line that is safe on any terminal."""
+"""Print the output of commands so that it is safe on any terminal."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any, TextIO
 
 from ..core.errors import RosyWarning, escape_unsafe
 
-#: Where commands print, if that is not `sys.stdout`.
+#: The stream that commands print to. None: `sys.stdout`.
 _own_output: TextIO | None = None
 
 
@@ -21,13 +21,13 @@ def output_stream() -> TextIO:
 
 
 def use_output(stream: TextIO) -> None:
-    """Let commands print to another stream than `sys.stdout`, to which Blender prints as well."""
+    """Let commands print to a stream instead of `sys.stdout`. This separates their output from Blender's."""
     global _own_output
     _own_output = stream
 
 
 def printable(text: str, encoding: str | None = None) -> str:
-    """Return a text with escapes, such as ``\\x1b``, for what a terminal acts on or cannot encode.
+    """Return a text in which control characters, and those a terminal cannot encode, are escaped (``\\x1b``).
 
     Parameters
     ----------
@@ -45,13 +45,13 @@ def printable(text: str, encoding: str | None = None) -> str:
 
 
 def print_line(text: str, file: TextIO | None = None) -> None:
-    """Print a text, escaped by `printable`, to standard output or another stream, at once."""
+    """Print a text, escaped by `printable`, to a stream (by default standard output), and flush it."""
     file = output_stream() if file is None else file
     print(printable(text, getattr(file, "encoding", None)), file=file, flush=True)
 
 
 def print_error(text: str) -> None:
-    """Print one line to the error stream: the name of the program and a message."""
+    """Print a line to the error stream: ``rosy:`` and a message."""
     print_line("rosy: " + text.replace("\n", "\\n"), sys.stderr)
 
 
@@ -64,14 +64,14 @@ def discard_output() -> None:
 
 @contextmanager
 def printed_warnings() -> Iterator[None]:
-    """Print each `RosyWarning` of a ``with`` block to the error stream; other warnings are for programmers."""
+    """Context manager: print each `RosyWarning` of its block to the error stream. Drop other warnings."""
 
     def show(message: Warning | str, category: type[Warning], *_: Any) -> None:
         if issubclass(category, RosyWarning):
             print_error(str(message))
 
     with warnings.catch_warnings():
-        # The same text from the same place is printed once.
+        # A warning with the same text from the same line of code is printed only once.
         warnings.simplefilter("default", RosyWarning)
         warnings.showwarning = show
         yield

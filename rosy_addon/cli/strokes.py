@@ -1,4 +1,4 @@
-"""The command `strokes`: evenly spaced streamlines as an .svg file, or as polylines in space."""
+"""The command `strokes`: draw evenly spaced streamlines as an .svg file, or as polylines in space."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from .options import CommandParser, Options, add_subcommand, float_between
 from .scene import find_camera, open_scene, print_warnings, requested_objects
 from .streams import print_line
 
-#: The kinds of files that some options are for.
+#: Names of kinds of files. Some options apply only to one of these; see `CommandParser.only_for`.
 MESH_FILES, SCENES, PICTURES = "mesh files", ".blend files", ".svg files"
 
 
@@ -65,7 +65,7 @@ def run_strokes(options: Options) -> None:
     options.check_output()
     if check_drawing_suffix(options.output) != ".svg":
         options.check_only_for(PICTURES, options.output)
-    # Mistakes are reported before files are read.
+    # Errors in the options are reported before files are read.
     style = StrokeStyle().with_settings(options.requested_settings(StrokeStyle))
     if options.mesh is None and "bpy" not in sys.modules:
         raise RosyError("no input: give a mesh file, or SCENE.blend")
@@ -83,7 +83,7 @@ def run_strokes(options: Options) -> None:
 
 
 def _draw_scene_strokes(options: Options) -> None:
-    """Draw the strokes of a Blender file, at one frame or several.
+    """Draw the strokes of a .blend file, at one frame or several.
 
     The settings of the scene apply unless an option overrides them.
     """
@@ -105,12 +105,15 @@ def _draw_scene_strokes(options: Options) -> None:
 
 
 def _path_of_frame(path: Path, frame: int) -> Path:
-    """Return the path with each run of # in the file name replaced by the frame number."""
+    """Return the path with each run of # in the file name replaced by the frame number.
+
+    The number is padded with zeros to the length of the run.
+    """
     return path.with_name(re.sub("#+", lambda row: f"{frame:0{len(row[0])}d}", path.name))
 
 
 def _draw_frame_strokes(options: Options, scene: Any, path: Path) -> None:
-    """Draw the strokes of the current frame, as the operator does."""
+    """Draw the strokes of the current frame to a file, as the operator for strokes does."""
     import bpy
 
     from ..jobs.draw_strokes import draw_strokes
@@ -138,7 +141,10 @@ def _draw_frame_strokes(options: Options, scene: Any, path: Path) -> None:
 
 
 def add_page_options(parser: CommandParser) -> None:
-    """Add options for the fields of `Pen` that only pictures have. Those not given are not set."""
+    """Add options for those fields of `Pen` that apply only to pictures (not to polylines in space).
+
+    If an option is not given, `Options` has no attribute for it.
+    """
     add = partial(parser.add_value, default=argparse.SUPPRESS)
     switch = partial(
         parser.add_argument, action=argparse.BooleanOptionalAction, default=argparse.SUPPRESS
@@ -154,7 +160,7 @@ def add_page_options(parser: CommandParser) -> None:
 
 
 def pen_of(options: Options, base: Pen) -> Pen:
-    """Return the pen with the fields that the options override."""
+    """Return the pen `base`, with those fields replaced for which options are given."""
     values = vars(options)
     overrides = {
         name: values[name] for name in ("width", "millimeters", "plotter") if name in values

@@ -1,11 +1,12 @@
 """Adapters to other libraries and programs, in the Python package only.
 
-Each module raises a `RosyError` if its library is missing; for `matplotlib_figure`, `api.figures` does::
+If the library of a module is missing, a `RosyError` is raised: by the module, or for `matplotlib_figure` by
+`api.figures`::
 
-    ffmpeg             ffmpeg: videos in .mp4 files
-    matplotlib_figure  matplotlib: figures
-    simulation_files   pyvista and meshio: meshes with arrays in the files of simulations
-    vtk_surface        pyvista: the surface of VTK's datasets
+    ffmpeg             encodes .mp4 videos with ffmpeg
+    matplotlib_figure  draws figures with matplotlib
+    simulation_files   reads meshes with arrays from files of simulations, with pyvista and meshio
+    vtk_surface        extracts the surface of VTK datasets, with pyvista
 """
 
 #: Message if matplotlib cannot be imported.

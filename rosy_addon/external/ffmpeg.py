@@ -1,4 +1,4 @@
-"""Encoding videos with the program ffmpeg."""
+"""Encode videos with the program ffmpeg."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..worker.program import run_program
 def find_encoder() -> Encoder | None:
     """Return the encoder of .mp4 files, or None if ffmpeg is not installed.
 
-    It uses the program on the path, or the one in the package imageio-ffmpeg.
+    The encoder uses the program on the PATH, or else the one in the Python package imageio-ffmpeg.
     """
     program = shutil.which("ffmpeg")
     if program is None:
@@ -23,11 +23,11 @@ def find_encoder() -> Encoder | None:
             return None
         try:
             program = get_ffmpeg_exe()
-        except RuntimeError:  # the package has none for this system
+        except RuntimeError:  # the package has no program for this system
             return None
 
     def encode(folder: Path, count: int, size: tuple[int, int], fps: float, path: Path) -> None:
-        """Encode the pictures of a folder. See `Encoder`."""
+        """Encode the pictures in a folder; see `Encoder`."""
         command = [
             program, "-v", "error", "-y", "-framerate", f"{fps:g}", "-i", f"{folder}/%05d.png",
             "-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p", str(path),

@@ -1,6 +1,6 @@
-"""Figures of pictures with their keys, drawn by matplotlib as vectors and text.
+"""Draw figures with matplotlib: pictures, with keys (legends) as vectors and text.
 
-`api.figures` imports this module when a figure is drawn, and says so if matplotlib is missing.
+`api.figures` imports this module when a figure is drawn, and raises an error if matplotlib is missing.
 """
 
 from __future__ import annotations
@@ -37,32 +37,34 @@ from ..annotation.singularity_marks import (
 from ..core.errors import RosyError
 from ..field.singularities import format_index
 
-#: Sizes of text in points: titles, everything else.
+#: Font sizes in points, of titles and of all other text.
 TITLE_SIZE, TEXT_SIZE = 8.0, 7.0
 
-#: Points in an inch, and the height of a line of text in its sizes.
+#: Points per inch, and the height of a line of text relative to its font size.
 POINTS, LINE_HEIGHT = 72, 1.35
 
-#: Lengths in inches: between panels, above a row for its titles, between rows, and of the column of keys.
+#: Lengths in inches: gap between panels, height of the titles above a row, gap between rows, and width of
+#: the column of keys.
 GAP, TITLE_HEIGHT, ROW_GAP, KEY_WIDTH = 0.08, 0.2, 0.14, 0.95
 
-#: Width of a letter of average text, and height of a capital letter, in sizes of the font.
+#: Average width of a letter, and height of a capital letter, relative to the font size.
 LETTER_WIDTH, CAPITAL_HEIGHT = 0.52, 0.73
 
-#: Length of a scale bar, at most this fraction of a panel.
+#: Largest length of a scale bar, as a fraction of the width of a panel.
 SCALE_BAR_SHARE = 0.3
 
 INK = "#141414"
 
-#: Marks are drawn over the lines between them, which have the order 2, and a cross over marks.
+#: Drawing orders: marks are drawn over the lines that connect them (order 2), and the cross at the largest
+#: angle over marks.
 MARK_ORDER = 3
 
 
 def encode_figures(figures: Sequence[Figure], suffix: str) -> bytes:
-    """Return the contents of a file with figures: pages of a .pdf, or a single .svg or .png.
+    """Return the contents of a file with figures: the pages of a .pdf, or a single figure as .svg or .png.
 
-    Fonts are embedded as TrueType in a .pdf, as journals ask. Text in an .svg is text. The same figures
-    give the same bytes.
+    Fonts are embedded as TrueType in a .pdf, as journals ask. In an .svg, text stays text. Equal figures
+    give equal bytes.
 
     Parameters
     ----------
@@ -120,23 +122,24 @@ class NotebookFigure(Figure):
 
 @dataclass(frozen=True, eq=False)
 class Page:
-    """Contents of a figure, from top to bottom. Positions are in inches from its upper left corner.
+    """The contents of a figure, from top to bottom. Positions are in inches from its upper left corner.
 
     Attributes
     ----------
     rows : sequence of Row
-        Each may take several lines of the grid. The pictures have the width `panel_width`.
+        Rows of panels. If a row has more panels than `columns`, it is broken into several lines. Pictures
+        have the width `panel_width`.
     table : list of list of str
-        The first row has the titles. Empty without a table.
+        The texts of a table. Its first row has the titles. Empty if there is no table.
     caption : str
     scale_bar : (float, str) or None
-        Its length in pixels, and its text.
+        Length of the scale bar in pixels, and its text. None if there is no scale bar.
     width : float
         Width in inches. The height follows from the contents.
     columns : int
         Number of columns of the grid of panels.
     dpi : int
-        Pixels of pictures in an inch.
+        Resolution of the pictures, in pixels per inch.
     """
 
     rows: Sequence[Row]
@@ -195,7 +198,7 @@ class Page:
         return TITLE_HEIGHT if any(panel.title for panel in row.drawn) else 0.0
 
     def _axes(self, left: float, top: float, width: float, height: float) -> Axes:
-        """Add axes with their upper left corner and size in inches, on whole pixels."""
+        """Add axes, given their upper left corner and size in inches. They are rounded to whole pixels."""
         unit = self.dpi * self.width, self.dpi * self._height
         x, y = round(left * self.dpi), round((self._height - top - height) * self.dpi)
         size = round(width * self.dpi), round(height * self.dpi)
@@ -203,7 +206,7 @@ class Page:
         return self._figure.add_axes(place)
 
     def _text(self, left: float, top: float, text: str, size: float, **options: object) -> None:
-        """Write a line of text whose upper left corner is at a place in inches."""
+        """Write a line of text. Its upper left corner is at (`left`, `top`), in inches."""
         baseline = top + 0.8 * _text_height(size)
         place = left / self.width, 1 - baseline / self._height
         self._figure.text(*place, text, fontsize=size, color=INK, va="baseline", **options)
@@ -211,7 +214,7 @@ class Page:
     # --- drawing -------------------------------------------------------------------------------
 
     def draw(self) -> Figure:
-        """Draw all parts."""
+        """Draw all contents, and return the figure."""
         top = 0.0
         for row in self.rows:
             self._draw_row(row, top)
@@ -224,7 +227,7 @@ class Page:
         return self._figure
 
     def _draw_row(self, row: Row, top: float) -> None:
-        """Draw the panels of a row and its keys."""
+        """Draw a row of panels, with its keys. Its upper edge is at `top`, in inches."""
         panel_width, panel_height = self._panel_size
         legend, title_height = row.legend, self._title_height(row)
         for place, panel in enumerate(row.panels):
@@ -250,7 +253,7 @@ class Page:
         self._draw_keys(row, top)
 
     def _draw_keys(self, row: Row, top: float) -> None:
-        """Draw the color bar and the legend of the singularities of a row, in the column of keys."""
+        """Draw the keys of a row in their column: the color bar and the legend of singularities."""
         left = self.columns * (self._panel_size[0] + GAP) + GAP
         top += self._title_height(row)
         marks = [marks for panel in row.drawn for marks in (panel.dots, panel.rings)]
@@ -289,10 +292,10 @@ class Page:
         drawn.solids.set_edgecolor("face")
 
     def _draw_table(self, top: float) -> None:
-        """Draw a table with lines above, below and under its titles."""
+        """Draw the table, with horizontal lines above it, under its titles and below it."""
         table, height = self.table, _text_height(TEXT_SIZE) * 1.15
         widths = np.array([max(map(_text_width, column)) for column in zip(*table, strict=True)])
-        # The text is smaller if the columns are too wide for the figure.
+        # The font is made smaller if the columns are too wide for the figure.
         room, least_gap = self.width, _text_width("mm") * (len(widths) - 1)
         scale = min(room / (widths.sum() + least_gap), 1.0)
         gap = (room - scale * widths.sum()) / max(len(widths) - 1, 1)
@@ -310,19 +313,19 @@ class Page:
 
 
 def _text_height(size: float) -> float:
-    """Return the height of a line of text in inches."""
+    """Return the height of a line of text in inches, given its font size in points."""
     return LINE_HEIGHT * size / POINTS
 
 
 def _text_width(text: str) -> float:
-    """Return the width of a text in the size `TEXT_SIZE`, in inches."""
+    """Return the width of a text of font size `TEXT_SIZE`, in inches."""
     font = FontProperties(size=TEXT_SIZE)
     width, _, _ = text_to_path.get_text_width_height_descent(text, font, ismath=False)
     return width / POINTS
 
 
 def _draw_panel(axes: Axes, panel: Panel, dpi: int) -> None:
-    """Draw a picture with its marks."""
+    """Draw the picture of a panel, with the marks over it."""
     height, width = panel.picture.shape[:2]
     axes.imshow(panel.picture, extent=(0, width, 0, height), interpolation="antialiased")
     axes.set(xlim=(0, width), ylim=(0, height))
@@ -340,7 +343,7 @@ def _draw_panel(axes: Axes, panel: Panel, dpi: int) -> None:
 
 
 def _draw_marks(axes: Axes, marks: SingularityMarks, dpi: int, is_open: bool) -> None:
-    """Draw dots or rings, and the labels beside visible dots."""
+    """Draw singularities as dots, with labels beside visible dots, or as rings (`is_open`) without labels."""
     marks = marks.in_drawing_order()
     signs = np.sign(marks.index).astype(int)
     colors = to_rgba_array([COLOR_BY_SIGN[sign] for sign in signs.tolist()])
@@ -368,14 +371,14 @@ def _draw_marks(axes: Axes, marks: SingularityMarks, dpi: int, is_open: bool) ->
 
 
 def _marker_size(diameter: np.ndarray, is_open: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Return sizes and line widths of markers, in points.
+    """Return the diameters and line widths of the markers of singularities, in points.
 
     Parameters
     ----------
     diameter : ndarray
         Diameters of dots without their outlines, in points.
     is_open : bool
-        Whether they are circles around dots.
+        Whether the markers are rings, which are larger than the dots. If not, they are dots with outlines.
     """
     if is_open:
         return 1.75 * diameter, 0.22 * diameter
@@ -384,7 +387,7 @@ def _marker_size(diameter: np.ndarray, is_open: bool) -> tuple[np.ndarray, np.nd
 
 
 def _legend_entries(marks: Sequence[SingularityMarks]) -> list[tuple[str, str, float]]:
-    """Return text, color and diameter in pixels of each index that occurs, the largest first."""
+    """Return text, color and diameter (pixels) for each index of singularities, the largest index first."""
     entries = {}
     for part in marks:
         for index, degree, radius in zip(
@@ -402,7 +405,7 @@ def _legend_entries(marks: Sequence[SingularityMarks]) -> list[tuple[str, str, f
 
 
 def _draw_scale_bar(axes: Axes, length: float, text: str, dpi: int) -> None:
-    """Draw a bar of a length in pixels at the lower left, with its text."""
+    """Draw a scale bar of a given length in pixels at the lower left of a panel, with its text."""
     margin, gap = 0.06 * dpi, 0.03 * dpi
     axes.plot(
         [margin, margin + length], [margin, margin], color=INK, linewidth=1.2, solid_capstyle="butt"

@@ -1,4 +1,4 @@
-"""Surfaces with arrays from the files of simulations, read with pyvista and meshio.
+"""Read surfaces with arrays from files of simulations, with pyvista and meshio.
 
 `Surface` takes the `MeshArrays` that these functions return, and `field.array_field` makes a field from
 one of the arrays.
@@ -26,20 +26,20 @@ from ..core.file_io import check_readable, open_file, read_bytes
 from ..field.mesh_arrays import MeshArrays
 from .vtk_surface import surface_arrays
 
-#: Files that VTK reads, and among them those that may hold several steps of time.
+#: Suffixes of files that VTK reads. Files of the second and third format may hold several time steps.
 VTK_SUFFIXES = (".vtk", ".vtu", ".vtp", ".vts", ".vtr", ".vti", ".vtm", ".pvtu", ".pvtp")
 XDMF_SUFFIXES = (".xdmf", ".xmf")
 EXODUS_SUFFIXES = (".exo", ".ex2", ".e", ".g")
 
-#: Files that meshio reads. VTK reads other files with the name .inp.
+#: Suffixes of files that meshio reads. VTK also reads .inp files, but these have another format.
 MESHIO_SUFFIXES = (".msh", ".med", ".inp")
 
-#: Files that list the files of a series.
+#: Suffixes of files that list the files of a series.
 SERIES_SUFFIXES = (".pvd", ".series")
 
 SUFFIXES = (*VTK_SUFFIXES, *XDMF_SUFFIXES, *EXODUS_SUFFIXES, *MESHIO_SUFFIXES, *SERIES_SUFFIXES)
 
-#: Files whose parts repeat the points along the cuts between them.
+#: Suffixes of files whose mesh is stored in parts. Points along the cuts are stored in several parts.
 PARTED_SUFFIXES = (".pvtu", ".pvtp")
 
 #: The first bytes of an HDF5 file.
@@ -48,15 +48,16 @@ _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 @dataclass(frozen=True)
 class Step:
-    """One step of a series.
+    """A time step of a simulation.
 
     Attributes
     ----------
     paths : tuple of Path
-        The files of the step; several if it is stored in parts.
+        The files of the step. There are several if the step is stored in parts.
     index : int or None
-        Number of the step in a file that holds several, from 0.
+        Number of the step in its file, from 0, if the file has several steps. None otherwise.
     time : float or None
+        Time of the step; None if the files do not state it.
     """
 
     paths: tuple[Path, ...]
@@ -83,12 +84,12 @@ class Step:
 
 
 def read_simulation(path: str | os.PathLike[str], step: int | None = None) -> MeshArrays:
-    """Read the surface in the file of a simulation.
+    """Read the surface in a file of a simulation.
 
     ==================================  =======================================================
     ``.vtk``                            VTK's legacy format, any dataset
     ``.vtu .vtp .vts .vtr .vti .vtm``   VTK's XML formats
-    ``.pvtu .pvtp``                     the same in parts, which are joined
+    ``.pvtu .pvtp``                     VTK's XML formats in parts, which are joined
     ``.xdmf .xmf``                      XDMF, with the numbers in XML or HDF5
     ``.exo .ex2 .e .g``                 Exodus II
     ``.msh``                            Gmsh
@@ -97,27 +98,27 @@ def read_simulation(path: str | os.PathLike[str], step: int | None = None) -> Me
     ``.pvd .series``                    lists of files, one for each step
     ==================================  =======================================================
 
-    If a file has surface cells, the mesh consists of these. Otherwise it is the boundary of the
-    volume cells; a face then has the values of the cell behind it. Cells of second and higher order
-    are reduced to their corners, triangle strips are split. If a file has several blocks, only the
-    arrays that all blocks have are kept. VTK's normals and texture coordinates are not read as arrays.
+    If a file has surface cells, the mesh consists of these. Otherwise the mesh is the boundary of the
+    volume cells, and each face has the values of the cell behind it. Cells of second and higher order
+    are reduced to their corners. Triangle strips are split into triangles. If a file has several blocks,
+    an array is kept only if all blocks have it. VTK's normals and texture coordinates are not read.
 
     Parameters
     ----------
     path : path-like
     step : int, optional
-        Number of the step in a file with several, from 1. The last one by default.
+        Number of the time step, from 1, if the file has several. By default, the last step is read.
 
     Returns
     -------
     MeshArrays
-        The vertices are the points that a face uses, in the order of the file. Arrays have the dtype of
-        the file.
+        Its vertices are those points of the file that a face uses, in the order of the file. Arrays have the
+        dtype that they have in the file.
 
     Raises
     ------
     RosyError
-        If the file is missing, damaged or of another kind, has no surface or no such step, or the
+        If the file is missing, damaged or of another format, has no surface or no such step, or the
         libraries that read it are not installed.
 
     Examples
@@ -145,8 +146,8 @@ def list_steps(paths: Sequence[str | os.PathLike[str]]) -> list[Step]:
     Parameters
     ----------
     paths : sequence of path-like
-        Files of one step or several. If their names differ only in numbers, the numbers determine
-        the order; otherwise they stay in the given order.
+        Files with one or more steps each. If their names differ only in numbers, the files are sorted by
+        these numbers. Otherwise they stay in the given order.
 
     Returns
     -------
@@ -165,7 +166,7 @@ def list_steps(paths: Sequence[str | os.PathLike[str]]) -> list[Step]:
 
 
 def in_order(paths: list[Path]) -> list[Path]:
-    """Return paths sorted by the numbers in their names, if nothing else differs."""
+    """Return paths sorted by the numbers in them. If they also differ in other text, keep the given order."""
     parts = [re.split(r"(\d+)", str(path)) for path in paths]
     if len({tuple(part[::2]) for part in parts}) > 1:
         return paths
@@ -193,7 +194,7 @@ def _steps_of(path: Path) -> list[Step]:
 
 
 def _listed_steps(path: Path) -> list[Step]:
-    """Return the steps of a .pvd or .series file of ParaView. Files of one time are one step."""
+    """Return the steps of a .pvd or .series file of ParaView. Files with the same time form one step."""
     text = read_bytes(path)
     try:
         if path.suffix.lower() == ".pvd":
@@ -212,7 +213,7 @@ def _listed_steps(path: Path) -> list[Step]:
 
 
 def _time_reader(path: Path) -> Any:
-    """Return VTK's reader of a file with time steps, after it has read the metadata."""
+    """Return VTK's reader for an XDMF or Exodus II file. It has already read the metadata, such as times."""
     if path.suffix.lower() in XDMF_SUFFIXES:
         from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
 
@@ -231,12 +232,12 @@ def _time_reader(path: Path) -> Any:
 
 
 def _check_hdf5_files(path: Path) -> None:
-    """Check the files that an .xdmf file refers to. VTK crashes without them.
+    """Check the HDF5 files that an .xdmf file refers to. If one is missing, VTK would crash.
 
     Raises
     ------
     RosyError
-        If one of them is missing, or is not an HDF5 file.
+        If one of these files is missing, or is not an HDF5 file.
     """
     try:
         items = ElementTree.fromstring(read_bytes(path)).iter("DataItem")
@@ -251,7 +252,7 @@ def _check_hdf5_files(path: Path) -> None:
 
 
 def _times(reader: Any) -> Sequence[float]:
-    """Return the times in a file; empty if it states none."""
+    """Return the times of the steps in a file; empty if the file states no times."""
     from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 
     return reader.GetOutputInformation(0).Get(vtkStreamingDemandDrivenPipeline.TIME_STEPS()) or ()
@@ -280,15 +281,16 @@ def _read_dataset(path: Path, index: int | None) -> Any:
 
 
 def _missing(path: Path, error: ModuleNotFoundError) -> RosyError:
-    """Return the error for a library that is not installed."""
+    """Return the error that says which library must be installed to read a file."""
     return RosyError(f"{path}: needs {error.name}: pip install rosyfields[io]")
 
 
 @contextlib.contextmanager
 def _reporting(path: Path) -> Iterator[None]:
-    """Report what the libraries raise or print as an error of one line, or not at all.
+    """Context manager: raise errors of the libraries as a `RosyError` of one line. Discard all other output.
 
-    VTK and the libraries below it print errors and continue. meshio prints them and exits.
+    It catches exceptions, errors that VTK prints before it continues, and the exit of meshio, which prints
+    its errors first. Warnings are discarded.
     """
     try:
         import pyvista
@@ -310,7 +312,7 @@ def _reporting(path: Path) -> Iterator[None]:
             reason = text or printed() or type(error).__name__
     alerts = [event.alert for event in catcher.events if event.kind.upper().startswith("ERR")]
     if alerts:
-        # Messages with addresses say only which part of VTK failed.
+        # Messages with memory addresses tell only which class of VTK failed, not why.
         telling = [alert for alert in alerts if "(0x" not in alert]
         reason = (telling or ["it is damaged, or another kind of file"])[0]
     if reason is not None:
@@ -320,12 +322,12 @@ def _reporting(path: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _discarded_output() -> Iterator[Any]:
-    """Discard what is printed to the standard streams, also by C libraries.
+    """Context manager: discard everything that is printed to the standard streams, also by C libraries.
 
     Yields
     ------
     function
-        Returns what Python code printed so far.
+        Function that returns what Python code (but not C code) has printed so far, as text.
     """
     text = io.StringIO()
     with contextlib.ExitStack() as stack:

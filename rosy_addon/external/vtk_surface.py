@@ -1,4 +1,4 @@
-"""`surface_arrays`: the surface of VTK datasets, as polygons with arrays."""
+"""`surface_arrays`: extract the surface of VTK datasets, as polygons with arrays."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..field.frames import dot
 from ..field.mesh_arrays import MeshArrays
 from ..field.polygon_arrays import face_area_vectors, mean_per_face
 
-#: VTK's cell types. Surface cells have this number of corners, or None: all points are corners.
+#: VTK's types of surface cells, with the number of their corners. None: all points of the cell are corners.
 _STRIP, _PIXEL, _QUADRATIC_POLYGON = 6, 8, 36
 _CORNERS_OF_SURFACE_CELL: dict[int, int | None] = {
     **dict.fromkeys((_STRIP, 7, _QUADRATIC_POLYGON)),
@@ -20,7 +20,8 @@ _CORNERS_OF_SURFACE_CELL: dict[int, int | None] = {
     **dict.fromkeys((_PIXEL, 9, 23, 28, 30, 70, 77), 4),
 }
 
-#: Volume cells: the linear cell of the same shape, and the number of its corners, which come first.
+#: VTK's types of volume cells. For each: the type of the linear cell of the same shape, and the number of its
+#: corners, which are the first points of the cell.
 _POLYHEDRON = 42
 _LINEAR_VOLUME_CELL: dict[int, tuple[int, int]] = {
     **dict.fromkeys((10, 24, 71, 78), (10, 4)),
@@ -32,7 +33,7 @@ _LINEAR_VOLUME_CELL: dict[int, tuple[int, int]] = {
     16: (16, 12),
 }
 
-#: Arrays that describe the data structure.
+#: Names of arrays with which VTK describes the data structure. They are no results of a simulation.
 _INTERNAL_ARRAYS = (
     *("vtkOriginalPointIds", "vtkOriginalCellIds", "vtkGhostType", "vtkGhostLevels"),
     *("PointMergeMap", "gmsh:dim_tags"),
@@ -42,18 +43,18 @@ _INTERNAL_ARRAYS = (
 def surface_arrays(
     datasets: list[Any], name: str, *, has_parts: bool, repeats_blocks: bool
 ) -> MeshArrays:
-    """Return the surface of the datasets of a step, with the arrays at its points and cells.
+    """Return the surface of the datasets of a time step, with the arrays at its points and cells.
 
     Parameters
     ----------
     datasets : list of pyvista.DataSet or pyvista.MultiBlock
-        Several are parts of one mesh.
+        The datasets of the step. If there are several, they are parts of one mesh.
     name : str
         Name of the step, for messages.
     has_parts : bool
-        Whether a dataset repeats the points along the cuts between its parts.
+        Whether a dataset consists of parts, so that points along the cuts occur in several parts.
     repeats_blocks : bool
-        Whether a dataset may have the same block several times.
+        Whether a dataset may contain the same block several times.
 
     Raises
     ------
@@ -88,7 +89,7 @@ def _joined_grid(datasets: list[Any], name: str, has_parts: bool, repeats_blocks
 
 
 def _blocks(dataset: Any) -> list[Any]:
-    """Return the meshes with cells in nested blocks."""
+    """Return all meshes in nested blocks that have cells."""
     blocks = []
     for block in dataset:
         if hasattr(block, "combine"):
@@ -99,9 +100,9 @@ def _blocks(dataset: Any) -> list[Any]:
 
 
 def _without_copies(blocks: list[Any]) -> list[Any]:
-    """Return the blocks without the repeated ones.
+    """Return the blocks of a dataset, each only once.
 
-    VTK returns the grid that the steps of an .xdmf file refer to as a further block.
+    If the steps of an .xdmf file refer to a common grid, VTK returns this grid as an additional block.
     """
     kept: list[Any] = []
     for block in blocks:
@@ -118,7 +119,7 @@ def _without_copies(blocks: list[Any]) -> list[Any]:
 
 
 def _arrays(attributes: Any, index: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the arrays of numbers at some points or cells."""
+    """Return the numeric arrays of points or cells, by name, with the rows that `index` selects."""
     skipped = {
         *_INTERNAL_ARRAYS,
         attributes.active_normals_name,
@@ -138,9 +139,9 @@ def _surface_polygons(grid: Any, name: str) -> tuple[Polygons, np.ndarray, np.nd
     -------
     polygons : Polygons
     points : (V,) int64 ndarray
-        The point of each vertex, ascending.
+        Index of the point of each vertex, ascending.
     cells : (F,) int64 ndarray
-        The cell of each face, ascending.
+        Index of the cell of each face, ascending.
     """
     cell_types = np.asarray(grid.celltypes)
     if not len(cell_types):
@@ -161,13 +162,16 @@ def _surface_polygons(grid: Any, name: str) -> tuple[Polygons, np.ndarray, np.nd
 
 
 def _surface_cells(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the surface cells of a grid as polygons of points, in the order of the cells.
+    """Return the surface cells of a grid as polygons, in the order of the cells.
 
     Returns
     -------
     corner_point : (C,) int64 ndarray
+        Index of the point at each corner.
     face_start : (F + 1,) int64 ndarray
+        Index of the first corner of each face, and the number of corners C at the end.
     face_cell : (F,) int64 ndarray
+        Index of the cell of each face.
     """
     connectivity, offset = np.asarray(grid.cell_connectivity), np.asarray(grid.offset)
     corner_count = np.diff(offset)
@@ -184,7 +188,7 @@ def _surface_cells(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray, np.nd
     face_start = offsets_from_sizes(np.where(in_strip, 3, corner_count[face_cell]))
     sizes = np.diff(face_start)
     position = _ranks(face_start)
-    # Every other triangle of a strip is clockwise. The points of a pixel are in rows.
+    # In a strip, every other triangle is clockwise. A pixel cell lists its points row by row, not around it.
     is_turned = np.repeat(in_strip & (rank % 2 == 1), sizes) & (position > 0)
     position = np.where(is_turned, 3 - position, position)
     position += np.repeat(np.where(in_strip, rank, 0), sizes)
@@ -195,13 +199,13 @@ def _surface_cells(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _boundary(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the boundary of the volume cells of a grid; the result is as in `_surface_cells`."""
+    """Return the boundary of the volume cells of a grid as polygons, in the form of `_surface_cells`."""
     import pyvista
     from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
 
     volume_cells = np.arange(len(cell_types))
     if not (cell_types == _POLYHEDRON).any():
-        # VTK confuses the points of cells of second order.
+        # VTK mixes up the points of second-order cells, so cells are made linear first.
         volume_cells, grid = _linear_volume_cells(grid, cell_types)
     surface_filter = vtkDataSetSurfaceFilter()
     surface_filter.SetInputData(grid)
@@ -217,11 +221,11 @@ def _boundary(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray, np.ndarray
     points = np.asarray(grid.points, dtype=np.float64)
     cell_points = points[np.asarray(grid.cell_connectivity)]
     cell_center = mean_per_face(cell_points, np.asarray(grid.offset))[surface_cell]
-    # Cells may be inside out, so faces are turned away from the centers of their cells.
+    # Cells may be inside out. So each face is oriented to point away from the center of its cell.
     outward = mean_per_face(points[corner_point], face_start) - cell_center
     area_vectors = face_area_vectors(*Polygons(points, corner_point, face_start))
     is_inward = dot(area_vectors, outward) < 0
-    # VTK's order of the faces is not documented.
+    # The order in which VTK returns faces is not documented, so they are sorted.
     smallest = np.minimum.reduceat(corner_point, face_start[:-1])
     total = np.add.reduceat(corner_point, face_start[:-1])
     order = np.lexsort((total, smallest, face_cell))
@@ -235,12 +239,15 @@ def _boundary(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _ranks(start: np.ndarray) -> np.ndarray:
-    """Return the position of each element in its run, given the start of each run and the end of the last."""
+    """Return the position of each element in its run.
+
+    `start` has the index of the first element of each run, and the number of elements at the end.
+    """
     return np.arange(start[-1]) - np.repeat(start[:-1], np.diff(start))
 
 
 def _linear_volume_cells(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray, Any]:
-    """Return the volume cells of a grid, and a grid of these cells reduced to their corners."""
+    """Return the indices of the volume cells of a grid, and a grid of these cells with only their corners."""
     import pyvista
 
     cells = np.flatnonzero(np.isin(cell_types, list(_LINEAR_VOLUME_CELL)))
@@ -249,7 +256,7 @@ def _linear_volume_cells(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray,
     for cell_type, (linear, count) in _LINEAR_VOLUME_CELL.items():
         is_type = cell_types[cells] == cell_type
         linear_type[is_type], sizes[is_type] = linear, count
-    # In front of its points, each cell has their number.
+    # In this array, the number of points of a cell comes before its points.
     start = offsets_from_sizes(sizes + 1)
     first = np.repeat(np.asarray(grid.offset)[cells], sizes + 1)
     position = np.maximum(_ranks(start) - 1, 0)

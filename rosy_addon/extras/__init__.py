@@ -1,7 +1,7 @@
 """The command line of the Python package, with commands that the extension for Blender lacks.
 
-command_line   the commands
-film           the command `film`: the steps of a simulation as a video
-cluster        Dask: frames on a cluster
-blender        Blender: .blend files, and videos
+command_line   runs the commands
+film           is the command `film`, which draws the steps of a simulation as a video
+cluster        draws frames on a cluster, with Dask
+blender        runs Blender, for .blend files and to encode videos
 """

@@ -1,12 +1,12 @@
-"""Run a command in a Blender if Python has no module ``bpy``.
+"""Run a command in a Blender process if Python has no module ``bpy``.
 
 Blender prints its own messages, some of them from C code. They must not mix with the output of the
-command. So Blender starts with its standard output and error in a log file, and the command inside
-writes to copies of the streams of this process: a terminal stays a terminal, and the command notices
-a closed pipe.
+command. So the standard output and error of Blender are redirected to a log file. The command that runs in
+Blender writes to copies of the streams of this process. So it still knows whether they are a terminal,
+and it notices if a pipe is closed.
 
-The command reports its exit status in a file, because Blender cannot end in order with any other
-status than 0. If there is no report, Blender failed, and its log says why.
+The command writes its exit status to a report file, because Blender can exit regularly only with the
+status 0. If there is no report, Blender itself failed, and its log says why.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from ..worker.start import Guarded
 #: The oldest version of Blender that RoSy runs in.
 OLDEST_VERSION = (4, 2)
 
-#: Environment variable with the Blender to run. The option --blender comes before it.
+#: Environment variable with the path of the Blender to run. The option --blender takes precedence.
 BLENDER_VARIABLE = "ROSY_BLENDER"
 
 #: Folder of the package, and its name.
@@ -44,10 +44,11 @@ PACKAGE = __package__.split(".")[0]
 #: The script that Blender runs.
 SCRIPT = Path(__file__).resolve().with_name("blender_script.py")
 
-#: How Blender is started: without the user's settings and add-ons, and without scripts in .blend files.
+#: Options with which Blender is started: without the user's settings and add-ons, and without scripts in
+#: .blend files.
 BLENDER_OPTIONS = ("-b", "--factory-startup", "--disable-autoexec", "--python-exit-code", "1")
 
-#: Names of Blender on the PATH. Flatpak uses the second one.
+#: Names of the program of Blender on the PATH. The second one is that of Flatpak.
 PROGRAM_NAMES = ("blender", "org.blender.Blender")
 
 #: Where installers and users put Blender, by `sys.platform`. ``%...%`` is an environment variable.
@@ -75,7 +76,8 @@ USUAL_PLACES = {
     ),
 }
 
-#: Seconds that Blender has to print its version, and to end after an interrupt before it is killed.
+#: Longest times in seconds for Blender to print its version, and to end after an interrupt. After the second
+#: one it is killed.
 VERSION_SECONDS, STOP_SECONDS = 60.0, 5.0
 
 
@@ -85,9 +87,9 @@ def find_blender(requested: str | None = None) -> str:
     Parameters
     ----------
     requested : str, optional
-        A program, its name on the PATH, or a folder that holds it. By default it is the environment
-        variable ROSY_BLENDER. If that is not set either, it is ``blender`` on the PATH, or else the
-        newest one in the usual places.
+        Path of a program, its name on the PATH, or a folder that contains it. By default, the value of the
+        environment variable ROSY_BLENDER is used. If that is not set either, ``blender`` on the PATH is
+        used, or else the newest Blender in the folders where it is usually installed.
 
     Raises
     ------
@@ -115,7 +117,10 @@ def find_blender(requested: str | None = None) -> str:
 
 
 def _checked_blender(named: str, source: str) -> str:
-    """Return the program of a Blender that the user named; `source` is where, for the errors."""
+    """Return the program of a Blender that the user named, after a check.
+
+    `source` says in errors where the user named it: the option or the environment variable.
+    """
     program = shutil.which(named) or _program(Path(named).expanduser())
     if program is None:
         raise RosyError(f"{source}{named}: there is no such program")
@@ -135,9 +140,9 @@ def _version_text(version: Sequence[int]) -> str:
 
 
 def installed_blenders() -> list[str]:
-    """Return the programs of Blender on the PATH and in the usual places, newest first in these.
+    """Return the programs of Blender: first those on the PATH, then those in the usual folders, newest first.
 
-    Numbers in the names of their folders count as versions.
+    Versions are taken from the numbers in the names of the folders.
     """
     on_path = filter(None, map(shutil.which, PROGRAM_NAMES))
     found: list[str | None] = []
@@ -148,19 +153,19 @@ def installed_blenders() -> list[str]:
 
 
 def _usual_places() -> list[str]:
-    """Return the patterns of paths where Blender may be on this system."""
+    """Return patterns (as for `glob`) of the paths where Blender may be installed on this system."""
     places = map(os.path.expandvars, USUAL_PLACES.get(sys.platform, USUAL_PLACES["linux"]))
     return [place for place in places if not place.startswith("%")]
 
 
 def _numbers(path: str) -> list[int]:
-    """Return the numbers in those parts of a path that are named after Blender."""
+    """Return the numbers in those parts of a path that contain the name Blender, as a version to compare."""
     names = " ".join(part for part in Path(path).parts if "blender" in part.lower())
     return [int(number) for number in re.findall(r"\d+", names)]
 
 
 def _program(path: Path) -> str | None:
-    """Return the program at a path, which may be a folder or an app bundle of macOS; None without."""
+    """Return the program at a path (a program, a folder or an app bundle of macOS); None if there is none."""
     for part in (".", "blender", "blender.exe", "Contents/MacOS/Blender"):
         if os.access(path / part, os.X_OK) and (path / part).is_file():
             return str((path / part).absolute())
@@ -168,7 +173,7 @@ def _program(path: Path) -> str | None:
 
 
 def blender_version(program: str) -> tuple[int, ...] | None:
-    """Return the version of a Blender, such as (4, 2, 1), or None if it is not Blender."""
+    """Return the version of a Blender program, such as (4, 2, 1). None if the program is not Blender."""
     try:
         done = subprocess.run(
             [program, "-b", "--version"],
@@ -185,7 +190,7 @@ def blender_version(program: str) -> tuple[int, ...] | None:
 
 
 def has_bpy() -> bool:
-    """Return whether Python has Blender's module."""
+    """Return whether Python has Blender's module ``bpy``."""
     try:
         importlib.import_module("bpy")
     except ImportError:
@@ -196,9 +201,10 @@ def has_bpy() -> bool:
 def run_in_blender(
     arguments: Sequence[str], options: Options, command: str, path: Path | None
 ) -> None:
-    """Run a command again in a Blender and exit with its status.
+    """Run a command again in a Blender process, and exit with its status.
 
-    Return if the option --blender is not set and Python has the module ``bpy``.
+    If the option --blender is not set and Python has the module ``bpy``, do nothing, so that the command can
+    run in this process.
 
     Parameters
     ----------
@@ -207,14 +213,14 @@ def run_in_blender(
     options : Options
         The options of the command.
     command : str
-        The verb.
+        Name of the command, such as "bake".
     path : Path or None
         The .blend file.
 
     Raises
     ------
     SystemExit
-        With the status of the command.
+        With the exit status of the command.
     RosyError
         If there is no file, no Blender, or Blender failed.
     """
@@ -230,7 +236,7 @@ def run_in_blender(
 
 
 def run_job(program: str, arguments: Sequence[str]) -> int:
-    """Run `blender_script.py` in a Blender, and return the exit status of its command.
+    """Run `blender_script.py` in a Blender process, and return the exit status of the command that it runs.
 
     Parameters
     ----------
@@ -244,7 +250,7 @@ def run_job(program: str, arguments: Sequence[str]) -> int:
     RosyError
         If Blender ended before the command did.
     KeyboardInterrupt
-        If the user stopped it before the command began, or it did not end at once.
+        If the user interrupted Blender before the command began, or the command did not end soon after.
     """
     with ExitStack() as stack:
         log = stack.enter_context(tempfile.TemporaryFile())
@@ -266,7 +272,7 @@ def run_job(program: str, arguments: Sequence[str]) -> int:
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=subprocess.STDOUT,
-            # Sandboxes of Blender have other folders of user data.
+            # A sandboxed Blender (Flatpak, Snap) has other folders of user data.
             env=os.environ | {"ROSY_PRESETS": str(user_presets_folder())},
             **inheritance,
         )
@@ -286,7 +292,10 @@ def run_job(program: str, arguments: Sequence[str]) -> int:
 
 
 def _copy(stream: TextIO | None, default: int, stack: ExitStack) -> int:
-    """Return a copy of the descriptor of a stream; of a default one if it has none."""
+    """Return a duplicate of the file descriptor of a stream, or of `default` if the stream has none.
+
+    `stack` closes it.
+    """
     try:
         descriptor = stream.fileno()
     except (AttributeError, OSError, ValueError):
@@ -303,7 +312,15 @@ def _encoding(stream: TextIO | None) -> tuple[str, str]:
 
 
 def _inheritance(descriptors: Sequence[int]) -> tuple[list[int], dict[str, Any]]:
-    """Return descriptors as a child process gets them, and arguments of `subprocess.Popen`."""
+    """Return what a child process needs to inherit file descriptors.
+
+    Returns
+    -------
+    numbers : list of int
+        The descriptors in the child process; on Windows, their handles.
+    arguments : dict
+        Keyword arguments of `subprocess.Popen`.
+    """
     if sys.platform != "win32":
         return list(descriptors), {"pass_fds": tuple(descriptors)}
     import msvcrt
@@ -318,12 +335,12 @@ def _inheritance(descriptors: Sequence[int]) -> tuple[list[int], dict[str, Any]]
 def _stop(process: subprocess.Popen[bytes], report: BinaryIO) -> None:
     """End Blender if it still runs: interrupt the command, and kill it if that does not help.
 
-    Before the command has begun, Blender ignores interrupts.
+    Before the command has begun, Blender ignores interrupts, so it is killed at once.
     """
     if process.poll() is not None:
         return
     if _report_lines(report):
-        if sys.platform != "win32":  # where Ctrl-C reaches Blender, and nothing else is a signal
+        if sys.platform != "win32":  # on Windows, Ctrl-C has reached Blender already
             process.send_signal(signal.SIGINT)
         try:
             process.wait(STOP_SECONDS)
@@ -347,7 +364,7 @@ def _reported_status(report: BinaryIO) -> int | None:
 
 
 def _failure(status: int, log: BinaryIO) -> str:
-    """Return in one line how Blender failed."""
+    """Return an error message of one line that says how Blender failed."""
     log.seek(0)
     lines = [line.strip() for line in log.read().decode(errors="replace").splitlines()]
     last_line = next((line for line in reversed(lines) if line), "it printed nothing")
@@ -356,7 +373,7 @@ def _failure(status: int, log: BinaryIO) -> str:
 
 
 def blender_encoder(requested: str | None) -> Encoder | None:
-    """Return an encoder of .mp4 files that runs Blender, or None if none is installed.
+    """Return an encoder of .mp4 files that runs Blender. None if no Blender is installed.
 
     Parameters
     ----------
@@ -377,7 +394,7 @@ def blender_encoder(requested: str | None) -> Encoder | None:
     script = PACKAGE_FOLDER / "scene" / "video_encoding.py"
 
     def encode(folder: Path, count: int, size: tuple[int, int], fps: float, path: Path) -> None:
-        """Encode the pictures of a folder. See `Encoder`."""
+        """Encode the pictures in a folder; see `Encoder`."""
         command = [program, *BLENDER_OPTIONS, "--python", str(script), "--"]
         command += map(str, (folder, count, *size, repr(fps), path))
         status, output = run_program(command, "encoding the video")

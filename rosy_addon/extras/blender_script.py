@@ -1,7 +1,7 @@
-"""Script that runs a command of the Python package in a Blender; see `extras.blender`.
+"""Script that runs a command of the Python package in a Blender process; see `extras.blender`.
 
-It loads the package from its folder. The folder around the package is not added to the path of
-modules, because other packages there are installed for another Python::
+It loads the package from its folder. The parent folder is not added to `sys.path`, because the other
+packages in it are installed for another Python::
 
     blender -b --factory-startup --python blender_script.py -- JOB
 
@@ -12,10 +12,10 @@ package, folder
 arguments
     Arguments of the command.
 handles
-    Descriptors for the output of the command, for its errors, and for the report: the word "begun",
-    and then the exit status. On Windows they are handles.
+    File descriptors for the output of the command, for its errors, and for the report. The report is
+    the word "begun", and then the exit status. On Windows they are handles.
 encodings
-    Encoding of the output and of the errors, each with the way to handle errors.
+    Two encodings: of the output and of the errors. Each is a name and an error handler.
 """
 
 from __future__ import annotations
@@ -40,7 +40,9 @@ def run(job: dict[str, Any]) -> None:
     )
     blender_errors, sys.stderr = sys.stderr, errors
     signal.signal(signal.SIGINT, interrupt)
-    if hasattr(signal, "SIGPIPE"):  # as in Python outside of Blender: a closed pipe is an OSError
+    if hasattr(
+        signal, "SIGPIPE"
+    ):  # as in Python outside of Blender, a closed pipe raises an OSError
         signal.signal(signal.SIGPIPE, signal.SIG_IGN)
     os.write(report, b"begun\n")
     try:
@@ -48,14 +50,14 @@ def run(job: dict[str, Any]) -> None:
     except BaseException:
         traceback.print_exc()
         status = 1
-    # A Ctrl-C does nothing from here on.
+    # From here on, Ctrl-C is ignored.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.write(report, b"%d\n" % status)
     sys.stderr = blender_errors
 
 
 def own_descriptor(handle: int) -> int:
-    """Return the descriptor of a stream of this process, which its children do not inherit."""
+    """Return the file descriptor of an inherited descriptor or handle. Child processes do not inherit it."""
     if sys.platform == "win32":
         import msvcrt
 
@@ -65,7 +67,10 @@ def own_descriptor(handle: int) -> int:
 
 
 def interrupt(_number: int, _frame: object) -> None:
-    """Stop the command, once: a Ctrl-C reaches Blender from the terminal and from `extras.blender`."""
+    """Handle Ctrl-C: stop the command, and ignore further signals.
+
+    A Ctrl-C arrives twice: from the terminal and from `extras.blender`.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     raise KeyboardInterrupt
 

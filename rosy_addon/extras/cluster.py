@@ -8,27 +8,28 @@ from typing import Any
 from ..core.errors import RosyError
 from ..worker.frame_workers import error_line, format_frames
 
-#: Frames of one task. Several, because starting Blender takes as long as several frames.
+#: Number of frames per task. There are several, because to start Blender takes as long as several frames.
 FRAMES_PER_TASK = 8
 
-#: How many times Dask may run a task again whose worker was lost.
+#: How often Dask may repeat a task whose worker was lost.
 MAX_RETRIES = 3
 
-#: Name of the package, which workers have as well.
+#: Name of the package, which is also installed on workers.
 PACKAGE = __package__.split(".")[0]
 
 
 def run_on_cluster(arguments: Sequence[str], frames: Sequence[int], address: str) -> Iterator[str]:
     """Run a command of RoSy for all frames on the workers of a Dask cluster.
 
-    Workers run it with their own Python, in which RoSy is installed. Files have the same paths on all
-    machines. If a worker is lost, its frames are given to another one. The frames of tasks that fail
-    are run again one by one, to complete the others. If this process ends early, workers stop.
+    Workers run the command with their own Python, in which RoSy must be installed. Files must have the
+    same paths on all machines. If a worker is lost, another worker gets its frames. If a task fails, its
+    frames are repeated one by one, so that only bad frames are missing. If this process ends early, the
+    workers stop.
 
     Parameters
     ----------
     arguments : sequence of str
-        Arguments of the command, without ``--frames``, which is added.
+        Arguments of the command. ``--frames`` is added to them.
     frames : sequence of int
     address : str
         Address of the scheduler.
@@ -36,7 +37,7 @@ def run_on_cluster(arguments: Sequence[str], frames: Sequence[int], address: str
     Yields
     ------
     str
-        Lines of the output of each task that succeeded.
+        Lines of output of the tasks that succeeded.
 
     Raises
     ------
@@ -66,7 +67,10 @@ def run_on_cluster(arguments: Sequence[str], frames: Sequence[int], address: str
 def _run_tasks(
     client: Any, arguments: Sequence[str], tasks: Sequence[tuple[int, ...]]
 ) -> Generator[str, None, dict[tuple[int, ...], str]]:
-    """Run a command for the frames of each task, yield its output, and return the errors of failed tasks."""
+    """Run a command for the frames of each task, and yield its lines of output.
+
+    `tasks` has the frames of each task. Return the error messages of failed tasks, by their frames.
+    """
     from distributed import as_completed
 
     commands = [
@@ -88,10 +92,13 @@ def _run_tasks(
 
 
 def _python_runner() -> Callable[[list[str]], tuple[int, str, str]]:
-    """Return a local function, which Dask sends by value, so that the scheduler does not need RoSy."""
+    """Return a function that runs Python with some arguments on a worker.
+
+    It is a local function. Dask sends these by value, so RoSy need not be installed on the scheduler.
+    """
 
     def run_python(words: list[str]) -> tuple[int, str, str]:
-        """Run Python with some arguments on a worker; return its exit status, output and errors."""
+        """Run Python with some arguments, and return its exit status, standard output and standard error."""
         import subprocess
         import sys
 
@@ -102,7 +109,7 @@ def _python_runner() -> Callable[[list[str]], tuple[int, str, str]]:
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "stdin": subprocess.DEVNULL}
         command = [sys.executable, *words]
         with subprocess.Popen(command, text=True, errors="replace", **pipes) as process:
-            # If the client ends, it does not want the result any more.
+            # If the client has ended, nobody needs the result.
             while key in tasks and tasks[key].state != "cancelled":
                 try:
                     output, errors = process.communicate(timeout=1.0)

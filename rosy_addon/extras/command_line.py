@@ -1,4 +1,4 @@
-"""The command line of the Python package, with the commands that the extension lacks."""
+"""Run commands of the Python package, including those that the extension for Blender lacks."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def main_in_blender(argv: Sequence[str], output: TextIO) -> int:
-    """Run a command of `main` in the Blender that it has started, and return the exit status.
+    """Run a command in the Blender process that `main` has started, and return the exit status.
 
     Parameters
     ----------
     argv : sequence of str
         The arguments of `main`.
     output : text file
-        Standard output of the command. Blender prints reports of operators to `sys.stdout`.
+        Standard output of the command. `sys.stdout` is not used, as Blender also prints to it.
     """
     use_output(output)
     extras = Extras(

@@ -1,4 +1,4 @@
-"""The command `film`: the steps of a simulation, or a series of fields, as a video under one camera."""
+"""The command `film`: draw the steps of a simulation, or a series of fields, as a video from one camera."""
 
 from __future__ import annotations
 
@@ -97,12 +97,15 @@ def run_film(options: Options) -> None:
 
 
 def requested_fields(options: Options) -> SimulationFields | FieldFiles:
-    """Return the fields of the files of a series.
+    """Return the fields of the series that the command line names.
+
+    These are the fields of field files on one mesh if there are field files or the first file is a mesh file.
+    Otherwise they are arrays of the steps of a simulation. Files are read on access to an item.
 
     Raises
     ------
     RosyError
-        If there is one step only, or a file is missing or of another kind.
+        If there is only one step or field, or a file is missing or of another format.
     """
     name, *others = options.series
     nonfinite = "zero" if options.undefined else "error"
@@ -130,7 +133,7 @@ def requested_fields(options: Options) -> SimulationFields | FieldFiles:
 
 @dataclass(eq=False)
 class FieldFiles(Sequence[api.Field]):
-    """Fields of files on one surface. An item is read from its file at each access.
+    """A sequence of fields from field files, all on one surface. Each access to an item reads its file.
 
     Parameters
     ----------
@@ -153,13 +156,13 @@ class FieldFiles(Sequence[api.Field]):
         return api.read_field(path, self.surface, self.degree, nonfinite=self.nonfinite)
 
     def time_text(self, index: int) -> str:
-        """Return the name of the file, for the line that is printed."""
+        """Return the name of a file, for the line that is printed before its field is drawn."""
         return f", {self.paths[index].name}"
 
 
 @dataclass(eq=False)
 class SimulationFields(Sequence[api.Field]):
-    """Fields of the steps of a simulation. An item is read from its file at each access.
+    """A sequence of fields from the steps of a simulation. Each access to an item reads its files.
 
     Parameters
     ----------
@@ -182,7 +185,7 @@ class SimulationFields(Sequence[api.Field]):
 
     def __getitem__(self, index: Any) -> Any:
         name, mesh = self.steps[index].name, self.steps[index].read()
-        # If the mesh has not changed since the last step, its surface is used again.
+        # If the mesh has not changed since the last step that was read, its surface is reused.
         if self._last is None or not all(map(np.array_equal, mesh.polygons, self._last[0])):
             surface = api.Surface(MeshArrays(*mesh.polygons), name=name, up=self.up)
             self._last = mesh.polygons, surface
@@ -192,6 +195,9 @@ class SimulationFields(Sequence[api.Field]):
         return api.Field.of(surface, field)
 
     def time_text(self, index: int) -> str:
-        """Return the time of a step, for the line that is printed; empty if the files state none."""
+        """Return the time of a step, for the line that is printed before it is drawn.
+
+        Empty if the files state no time.
+        """
         time = self.steps[index].time
         return "" if time is None else f", time {time:g}"

@@ -143,7 +143,7 @@ def draw_rows(
         picture = _draw_strips(view, strips, cache, None)
     except NothingInViewError:
         return None
-    if cache is BAKE_CACHE:  # others have owners that evict
+    if cache is BAKE_CACHE:  # the owners of other caches evict their entries
         cache.evict_over_limit()
     return picture.rgba
 
@@ -151,7 +151,10 @@ def draw_rows(
 def _draw_strips(
     view: ViewInput, strips: Sequence[Strip], cache: Cache | None, gbuffer_cache: Cache | None
 ) -> Picture:
-    """Draw neighboring strips, and return them as a picture of their rows. Other rows are only context."""
+    """Draw neighboring strips, and return a picture of their rows.
+
+    The mesh is also projected to some rows above and below, which streamlines of these rows may reach.
+    """
     camera, look = view.shaded_camera, view.look
     scene = view.instances, camera, look.display
     whole, rows = _whole(strips), None
@@ -178,7 +181,7 @@ def _draw_strips(
 
 
 def _whole(strips: Sequence[Strip]) -> Strip:
-    """Return one strip with the rows of neighboring strips."""
+    """Return a single strip with all rows of neighboring strips."""
     return Strip(strips[0].start, strips[-1].stop, strips[0].height)
 
 

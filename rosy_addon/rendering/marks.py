@@ -67,7 +67,7 @@ def with_marks(picture: Picture, view: ViewInput, cache: Cache | None = BAKE_CAC
             )
         with progress(0.9, 1.0):
             picture = replace(picture, rgba=draw_marks(picture.rgba, marks), marks=marks)
-    if cache is BAKE_CACHE:  # others have owners that evict
+    if cache is BAKE_CACHE:  # the owners of other caches evict their entries
         cache.evict_over_limit()
     return picture
 

@@ -142,7 +142,7 @@ def turntable(
     Returns
     -------
     Path
-        The file.
+        Path of the video file.
 
     Raises
     ------

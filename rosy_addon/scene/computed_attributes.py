@@ -52,7 +52,8 @@ def mesh_tangents(mesh: bpy.types.Mesh, guiding_angle: float, name: str = "") ->
         Decides which member of the field is stored: one near the direction at this angle from the horizontal,
         in radians.
     name : str
-        Name of the attribute in which they will be stored; see `assign_tangents`. Only checked here.
+        Name of the attribute in which the tangents will be stored; see `assign_tangents`. It is only checked
+        here, and nothing is stored.
 
     Returns
     -------

@@ -117,7 +117,10 @@ def check_not_missing(obj: bpy.types.Object) -> None:
 
 
 def remedy_for_absence(otherwise: str) -> str:
-    """Return advice for a message that something is absent: to relink missing libraries, else `otherwise`."""
+    """Return advice for a message that something is absent.
+
+    If libraries are missing, it is to relink them. If not, it is `otherwise`.
+    """
     paths = [library.filepath for library in bpy.data.libraries if library.is_missing]
     return f"relink the missing library {', '.join(paths)}" if paths else otherwise
 

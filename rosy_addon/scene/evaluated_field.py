@@ -255,7 +255,9 @@ def _prepare_field(
     mesh, label = obj.data, f"object '{obj.name}'"
     name = attribute_name(mesh)
     if mesh.is_editmode and is_face_vector_field(mesh):
-        return FieldLayout(name, field_degree(mesh))  # only the evaluated mesh can be read
+        return FieldLayout(
+            name, field_degree(mesh)
+        )  # in this case, only the evaluated mesh can be read
     field = read_mesh_field(mesh, nonfinite=nonfinite, label=label, cache=cache)
     if is_face_vector_field(mesh):
         return FieldLayout(name, field.degree)

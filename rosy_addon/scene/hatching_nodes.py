@@ -201,7 +201,7 @@ def _build_hatching(build: NodeBuilder, source: Any) -> None:
 
 
 def _tone(number: Any) -> Number:
-    """Return the input Tone after the strength of the shading and the tone curve."""
+    """Return the input Tone, changed by the strength of the shading and by the tone curve."""
     shading = number("Shading")
     tone = 1 - shading + shading * number("Tone")
     black, white = number("Black"), number("White")

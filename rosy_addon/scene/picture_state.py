@@ -170,7 +170,10 @@ class SceneState:
         source: CameraSource,
         is_frame: bool = False,
     ) -> PictureState:
-        """Return the state of the picture from a camera; if `is_frame`, that of a frame of an animation."""
+        """Return the state of a picture from a camera.
+
+        `is_frame` says whether the picture is a frame of an animation.
+        """
         camera = _resolved_camera(scene, depsgraph, source)
         look = read_look(scene.rosy)
         is_relit = scene.rosy.relight and is_hatched(look) and not is_frame
@@ -252,7 +255,9 @@ def read_picture_states(
     mesh_states: MeshStates,
     is_frame: bool = False,
 ) -> list[PictureState]:
-    """Return the state of the picture from each camera; if `is_frame`, that of a frame of an animation.
+    """Return the state of a picture from each camera.
+
+    `is_frame` says whether the pictures are frames of an animation.
 
     `mesh_states` are the states of meshes from reading the scene (`SceneData.mesh_states`), so that meshes
     are not read again.
@@ -355,7 +360,10 @@ def _resolved_camera(
 
 
 def _reference_digest(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> str:
-    """Return a digest of the file and the camera of the reference render; the error if it cannot be read."""
+    """Return a digest of the file and the camera of the reference render.
+
+    If it cannot be read, return the error message.
+    """
     try:
         path = reference_path(scene)
         camera = camera_of_object(scene, depsgraph, render_camera(scene), *render_size(scene))

@@ -140,7 +140,10 @@ def _field_errors(
     entries: Sequence[SceneInstance],
     targets: Sequence[bpy.types.Object],
 ) -> list[RosyError]:
-    """Return why fields of `targets` cannot be drawn, one error per object. Raise errors of other objects."""
+    """Return one error for each object of `targets` whose field cannot be drawn.
+
+    If `errors` has an error of another object, or one that is not a `RosyError`, raise it.
+    """
     names = [obj.name_full for obj in targets]
     for name, error in errors.items():
         if name not in names or not isinstance(error, RosyError):
@@ -472,7 +475,10 @@ class SceneReader:
         return read_evaluated_field(mesh, layout, surface, self._request.nonfinite, label)
 
     def _with_rest(self, surface: Surface, rest: np.ndarray | None) -> Surface:
-        """Return a surface with rest positions; the same surface if they are None, or its own positions."""
+        """Return a surface with rest positions.
+
+        If they are None or equal to the positions of the surface, return the surface itself.
+        """
         if rest is None or np.array_equal(rest, surface.vertices):
             return surface
         rest = np.asarray(rest, dtype=np.float64)
@@ -483,7 +489,10 @@ class SceneReader:
 
 
 def lost_field_error(obj: bpy.types.Object, attribute: str | None) -> RosyError:
-    """Return the error for an object whose modifiers remove an attribute, or all faces if that is None."""
+    """Return the error for an object whose modifiers remove an attribute.
+
+    If `attribute` is None, they remove all faces.
+    """
     if attribute is None and not len(obj.data.polygons):
         return no_faces_error(obj.data, f"object '{obj.name}'")
     names = ", ".join(modifier.name for modifier in user_modifiers(obj)) or "none"

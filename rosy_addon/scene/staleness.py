@@ -124,7 +124,7 @@ def difference(recorded: PictureState, present: PictureState, source: str) -> st
     present : PictureState
         The state that it would be drawn from now.
     source : str
-        How the reason calls the camera, or the UV map of a texture.
+        Text by which the reason refers to the camera, or for a texture to its UV map.
     """
     content = present.output.get("texture_content")
     if recorded.output.get("texture_content") != content:
@@ -186,7 +186,10 @@ def _object_difference(
 def _without_renamed(
     recorded: Mapping[str, list[str]], present: Mapping[str, list[str]]
 ) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
-    """Return both with equal names for the same object, if it was renamed and keeps at least one digest."""
+    """Return copies of both arguments in which renamed objects have their new names.
+
+    An object counts as renamed if its name is gone, and a new name has one of its digests.
+    """
     before, after = dict(recorded), dict(present)
     for name in recorded.keys() - present.keys():
         for new_name in after.keys() - before.keys():

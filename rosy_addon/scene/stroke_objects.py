@@ -71,9 +71,10 @@ def read_pen(settings: bpy.types.PropertyGroup) -> Pen:
 def target_objects(
     scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer
 ) -> list[bpy.types.Object] | None:
-    """Return the objects to draw strokes on: None for all with a field, or only the selected ones.
+    """Return the objects to draw strokes on.
 
-    The setting *Selected Only* decides.
+    If the setting *Selected Only* is on, these are the selected objects with a field. If it is off, return
+    None, which stands for all objects with a field.
 
     Raises
     ------

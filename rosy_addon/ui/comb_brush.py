@@ -16,7 +16,7 @@ from ..viewport import session
 from ..viewport.brush_mouse import current_mouse
 from .view_lines import draw_lines, to_pixels
 
-#: Color of the cursor, and colors of dashes on faces without and with a firm guide.
+#: Color of the cursor, and colors of dashes on faces without and with a guide that the field follows firmly.
 CURSOR_COLOR = (1.0, 1.0, 1.0, 0.8)
 FREE_COLOR, GUIDED_COLOR = (0.85, 0.85, 0.85, 0.9), (1.0, 0.55, 0.15, 1.0)
 
@@ -25,7 +25,7 @@ DASH_WIDTH = 1.5
 
 
 def draw_settings(layout: bpy.types.UILayout, settings: Any) -> None:
-    """Draw the settings that the operator and the tool share."""
+    """Draw the settings that the operator and the tool have in common, in a panel."""
     layout.prop(settings, "exact")
     layout.prop(settings, "reach")
     layout.prop(settings, "front_faces")
@@ -33,7 +33,7 @@ def draw_settings(layout: bpy.types.UILayout, settings: Any) -> None:
 
 
 class CombTool:
-    """The tool in all modes."""
+    """Base class of the tool: what it has in common in Object Mode and in Sculpt Mode."""
 
     bl_space_type = "VIEW_3D"
     bl_label = "Comb Field"
@@ -66,7 +66,7 @@ class CombTool:
         ),
     )
 
-    # Blender calls both without an instance.
+    # Blender calls both functions without an instance, so they are static.
     @staticmethod
     def draw_settings(
         context: bpy.types.Context, layout: bpy.types.UILayout, tool: bpy.types.WorkSpaceTool
@@ -80,13 +80,13 @@ class CombTool:
     def draw_cursor(
         context: bpy.types.Context, tool: bpy.types.WorkSpaceTool, mouse: tuple[int, int]
     ) -> None:
-        """Draw the circle of the brush and, without a live view, the field around it."""
+        """Draw the circle of the brush. If the view is not live, also draw the field around it as dashes."""
         comb = context.scene.rosy.comb
         draw_circle_2d(mouse, CURSOR_COLOR, comb.size, segments=64)
         obj, region = context.view_layer.objects.active, context.region
         if obj is None or not has_field(obj) or session.is_live(context.space_data):
             return
-        with suppress(RosyError):  # combing reports it
+        with suppress(RosyError):  # the operator reports the error when the user combs
             brush = current_mouse(context, obj)
             place = brush.place((mouse[0] - region.x, mouse[1] - region.y))
             if place is not None:

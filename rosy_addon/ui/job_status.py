@@ -1,6 +1,7 @@
-"""The progress of the running job, for the panels, and the start of the helper that computes.
+"""The progress of the running job, for the panels, and the start of the helper process.
 
-The helper starts before the first job, so that no click waits for it.
+The helper process runs the computations of jobs. It starts before the first job, so that no click has to
+wait for it.
 """
 
 from __future__ import annotations
@@ -13,14 +14,14 @@ from ..worker.helper import HELPER, HelperLostError
 from ..worker.job import Step
 from .preferences import uses_helper
 
-#: How far the job has come that runs in a window; None if there is none.
+#: Progress of the job that runs in a window. None if no job runs.
 current: Step | None = None
 
 _has_started = False
 
 
 def start_helper_once(context: bpy.types.Context) -> None:
-    """Start the helper at the first call, unless the preferences switch it off."""
+    """Start the helper process at the first call, unless the preferences switch it off."""
     global _has_started
     if _has_started or bpy.app.background or not uses_helper(context):
         return
@@ -30,7 +31,7 @@ def start_helper_once(context: bpy.types.Context) -> None:
 
 
 def unregister() -> None:
-    """End the helper, and forget the job."""
+    """End the helper process, and forget the progress of the job."""
     global current, _has_started
     HELPER.close()
     current, _has_started = None, False

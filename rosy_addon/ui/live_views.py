@@ -1,4 +1,4 @@
-"""Live views that come on by themselves: with the first field of a scene, and with a file."""
+"""Switch on live views automatically: when a scene gets its first field, and when a file is loaded."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ _declined_scenes: set[int] = set()
 
 
 def decline(scene: bpy.types.Scene) -> None:
-    """Note that the user has switched a live view off: none comes on with a field any more."""
+    """Note that the user has switched off a live view in a scene. Its first field then starts none."""
     _declined_scenes.add(scene.session_uid)
 
 
 def start_with_first_field(context: bpy.types.Context) -> None:
-    """Make the context's 3D view live, unless the user does not want that or there is none.
+    """Make the 3D view of the context live, if there is one and the user has not declined live views.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def start_with_first_field(context: bpy.types.Context) -> None:
 
 @persistent
 def _save_live_views(*_: Any) -> None:
-    """Note in the scenes that remember them which views are live, before a file is saved."""
+    """Before a file is saved, store which views are live, in scenes with the setting to remember them."""
     live_views = [
         f"{index} {screen.name}"
         for screen in bpy.data.screens
@@ -53,7 +53,7 @@ def _save_live_views(*_: Any) -> None:
 
 @persistent
 def _restore_live_views(*_: Any) -> None:
-    """Make the views live that were live when the file was saved."""
+    """After a file is loaded, make those views live that were live when it was saved."""
     for window in bpy.context.window_manager.windows:
         settings = window.scene.rosy
         if not settings.remember_live:
@@ -67,11 +67,11 @@ def _restore_live_views(*_: Any) -> None:
                     try:
                         session.start(area.spaces.active)
                     except RosyError:
-                        return  # there is no graphics card any more
+                        return  # the graphics card can no longer be used
 
 
 def register() -> None:
-    """Add the handlers that remember live views in files. Without windows there are none."""
+    """Add the handlers that store live views in files. If Blender runs without windows, add none."""
     if not bpy.app.background:
         bpy.app.handlers.save_pre.append(_save_live_views)
         bpy.app.handlers.load_post.append(_restore_live_views)

@@ -1,4 +1,4 @@
-"""The panels of the look of pictures: presets, the settings of a look, output, and the key in renders."""
+"""The panels of the look of pictures: presets, settings of the look, output, and the key (legend)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .sidebar import (
     wrap_to_sidebar,
 )
 
-#: Labels of the panels of a look's settings by their keys, from top to bottom.
+#: Labels of the panels with settings of a look, from top to bottom. Settings refer to panels by these keys.
 LOOK_PANELS = {
     "streaks": "Streaks",
     "color": "Color",
@@ -31,7 +31,7 @@ LOOK_PANELS = {
     "quality": "Quality",
 }
 
-#: Properties of `Scene.rosy` that set how the picture is made, stored and shown.
+#: Properties of `Scene.rosy` that determine how the picture is made, stored and shown.
 OUTPUT_SETTINGS = (
     "percentage",
     "device",
@@ -45,15 +45,15 @@ OUTPUT_SETTINGS = (
     "image_format",
 )
 
-#: Height of a preset's picture in the panel and in the selection, in units of Blender's layout: 128
-#: screen pixels, half the size of the picture, at a resolution scale of 1.
+#: Height of the picture of a preset, in the panel and in the pop-up to choose one, in units of Blender's
+#: layout. At a resolution scale of 1, it is 128 screen pixels: half the size of the picture.
 THUMBNAIL_SCALE = 6.4
 
-#: Number of characters of a label that fits into Blender's own column of labels in a sidebar of default
-#: width, and the fraction of the width for longer ones.
+#: Number of characters of a label that fit into the column of labels, in a sidebar of default width. If a
+#: label is longer, the column gets this fraction of the width.
 MAX_LABEL_LENGTH, LONG_LABEL_FACTOR = 15, 0.49
 
-#: Properties of the scene and of objects that belong to a source of the tone, with that source.
+#: Properties of the scene and of objects that are used for only one source of the tone, with that source.
 TONE_SOURCE_OF_SETTING = {
     "tone_attribute": "attribute",
     "tone_image": "image",
@@ -61,10 +61,11 @@ TONE_SOURCE_OF_SETTING = {
     "tone_picture": "picture",
 }
 
-#: The parts of a key, and the settings of each.
+#: Switches of the parts of a key (legend), and the names of the settings of each part.
 KEY_PARTS = {"key_bar": ("key_title",), "key_legend": ("key_counts",), "key_scale": ()}
 
-#: Properties that hold a name in a collection of the active mesh, with that collection.
+#: Properties that hold the name of an attribute or UV map of the active mesh, and the collection of the mesh
+#: in which the name is looked up.
 SEARCH_COLLECTIONS = {
     "color_attribute": "attributes",
     "tone_attribute": "attributes",
@@ -135,7 +136,10 @@ class VIEW3D_MT_rosy_presets(bpy.types.Menu):
 def _make_settings_panel(
     label: str, parent: str, suffix: str, look_names: tuple[str, ...], names: tuple[str, ...] = ()
 ) -> type:
-    """Return a closed subpanel with settings of a look, then properties of `Scene.rosy`."""
+    """Return the class of a subpanel that shows settings of a look, then properties of `Scene.rosy`.
+
+    It is closed by default.
+    """
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
@@ -172,7 +176,7 @@ def _make_settings_panel(
 
 
 def _unused_output(settings: bpy.types.PropertyGroup) -> tuple[str, ...]:
-    """Return the properties of the output that have no effect."""
+    """Return the names of properties of the output that have no effect with the present settings."""
     if not is_hatched(settings.look):
         return "backdrop", "relight"
     return ("device", "emission", "diffuse") if settings.relight else ()
@@ -181,7 +185,7 @@ def _unused_output(settings: bpy.types.PropertyGroup) -> tuple[str, ...]:
 def _draw_setting(
     column: bpy.types.UILayout, look: bpy.types.PropertyGroup, setting: Setting
 ) -> None:
-    """Draw a property of the look, with more room for its label if that is long."""
+    """Draw a property of the look. If its label is long, give the label more room."""
     if isinstance(setting, Numbers):
         for index, part in enumerate(setting.parts):
             column.prop(look, setting.name, index=index, text=part)
@@ -199,7 +203,7 @@ def _draw_setting(
 
 
 def _draw_color_source(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw the property of the scene for the numbers that are colored, if the hue shows numbers."""
+    """Draw the name of the attribute with values for the color map, if the look colors lines by values."""
     settings = context.scene.rosy
     if settings.look.hue != "values":
         return
@@ -207,7 +211,7 @@ def _draw_color_source(column: bpy.types.UILayout, context: bpy.types.Context) -
 
 
 def _active_mesh_object(context: bpy.types.Context) -> bpy.types.Object | None:
-    """Return the active object if it is a mesh."""
+    """Return the active object if it is a mesh, and None otherwise."""
     obj = context.view_layer.objects.active
     return obj if obj is not None and obj.type == "MESH" else None
 
@@ -215,7 +219,10 @@ def _active_mesh_object(context: bpy.types.Context) -> bpy.types.Object | None:
 def _draw_name(
     row: bpy.types.UILayout, owner: Any, name: str, mesh_object: bpy.types.Object | None
 ) -> None:
-    """Draw a property that holds a name, with a search in `SEARCH_COLLECTIONS` of a mesh."""
+    """Draw a property that holds a name.
+
+    If there is a mesh, and `SEARCH_COLLECTIONS` has the property, the field can search the names of the mesh.
+    """
     if name in SEARCH_COLLECTIONS and mesh_object is not None:
         row.prop_search(owner, name, mesh_object.data, SEARCH_COLLECTIONS[name])
     else:
@@ -223,7 +230,7 @@ def _draw_name(
 
 
 def _draw_tone_source(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw the properties of the scene and of the active object for the source of the tone."""
+    """Draw the properties of the scene and of the active object that set the source of the tone."""
     settings, mesh_object = context.scene.rosy, _active_mesh_object(context)
     for name, source in TONE_SOURCE_OF_SETTING.items():
         owner = settings if hasattr(settings, name) else getattr(mesh_object, "rosy", None)
@@ -238,7 +245,7 @@ def _draw_tone_source(column: bpy.types.UILayout, context: bpy.types.Context) ->
 
 
 class VIEW3D_PT_rosy_look_key(SidebarPanel, bpy.types.Panel):
-    """What explains a picture in renders."""
+    """The key (legend) that explains a picture in renders."""
 
     bl_label = "Key"
     bl_parent_id = "VIEW3D_PT_rosy_look"
@@ -269,7 +276,7 @@ class VIEW3D_PT_rosy_look_key(SidebarPanel, bpy.types.Panel):
 
 
 def _range_may_differ(settings: bpy.types.PropertyGroup) -> bool:
-    """Whether a scene has an animation whose frames may have ranges of their own."""
+    """Return whether a scene has an animation whose frames may have different ranges of the color map."""
     look = settings.look
     is_animated = any(record.frames for record in settings.bakes)
     has_colors = colors_magnitude(look) or colors_values(look)

@@ -26,7 +26,7 @@ from .sidebar import (
     use_property_columns,
 )
 
-#: Types of shading in which a 3D view does not show the pictures.
+#: Types of viewport shading in which a 3D view does not show baked pictures.
 SHADING_WITHOUT_MATERIALS = ("WIREFRAME", "SOLID")
 
 
@@ -86,7 +86,7 @@ def _draw_existing_field(
 
 
 def _draw_convert_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw the settings and the button of the conversion, and the menu of storage formats."""
+    """Draw the settings and the button that convert fields, and the menu to store them in another form."""
     settings = context.window_manager.operator_properties_last("rosy.field_convert")
     draw_convert_settings(layout.column(), settings)
     layout.operator("rosy.field_convert")
@@ -96,7 +96,7 @@ def _draw_convert_settings(layout: bpy.types.UILayout, context: bpy.types.Contex
 def _draw_compare_settings(
     layout: bpy.types.UILayout, context: bpy.types.Context, other_fields: list[str]
 ) -> None:
-    """Draw the settings and the button of the comparison with another field."""
+    """Draw the settings and the button that compare the field with another field."""
     settings = context.window_manager.operator_properties_last("rosy.field_compare")
     only_other = other_fields[0] if len(other_fields) == 1 else ""
     draw_settings(layout.column(), settings, "other", "use_as_color", other=only_other)
@@ -119,7 +119,7 @@ def _draw_new_field(layout: bpy.types.UILayout, context: bpy.types.Context) -> N
 def _draw_picture_section(
     layout: bpy.types.UILayout, context: bpy.types.Context, objects: list[bpy.types.Object]
 ) -> None:
-    """Draw the switch of the live view, the baked pictures and the buttons that bake."""
+    """Draw the switch of the live view, the list of baked pictures, and the buttons that bake."""
     layout.label(text="2.  Picture", icon="RENDER_STILL")
     _draw_live_toggle(layout, context)
     if session.is_live(context.space_data):
@@ -135,7 +135,7 @@ def _draw_picture_section(
         draw_progress(layout)
     else:
         _draw_bakes(layout, context, objects)
-    # Below the buttons, so that messages that come and go do not move them.
+    # Messages are below the buttons, so that buttons do not move when messages come and go.
     draw_wrapped(layout, context, session.messages(context.area))
 
 
@@ -175,7 +175,7 @@ def bake_label(bake_infos: list[BakeInfo]) -> str:
 
 
 def _draw_texture_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw the settings and the button of textures."""
+    """Draw the settings and the button that bake textures."""
     if (body := closed_panel(layout, "texture", "Texture")) is None:
         return
     obj = context.view_layer.objects.active
@@ -242,13 +242,13 @@ def _draw_bake_info(
 
 
 def _redraw_later(seconds: float) -> None:
-    """Redraw the 3D views after some seconds, if the panel shows a state that may be outdated."""
+    """Redraw the 3D views after some seconds, when the panel may be outdated. Do nothing for 0 seconds."""
     if seconds and not bpy.app.timers.is_registered(redraw):
         bpy.app.timers.register(redraw, first_interval=seconds)
 
 
 def unregister() -> None:
-    """Stop the timer."""
+    """Stop the timer that redraws the 3D views."""
     if bpy.app.timers.is_registered(redraw):
         bpy.app.timers.unregister(redraw)
 
@@ -256,7 +256,7 @@ def unregister() -> None:
 def _draw_view_hints(
     layout: bpy.types.UILayout, context: bpy.types.Context, bake_infos: list[BakeInfo]
 ) -> None:
-    """Draw buttons that make the picture visible in a view that does not show it."""
+    """If this view does not show baked pictures, draw buttons that make them visible."""
     view, camera = context.space_data, context.scene.camera
     column = layout.column(align=True)
     is_live = session.is_live(view)
@@ -274,7 +274,7 @@ def _draw_view_hints(
 
 
 def _draw_view_transform_warning(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
-    """Warn if the view transform changes the tones of the picture."""
+    """Draw a warning if the view transform of the scene changes the tones of the picture."""
     transform = scene.view_settings.view_transform
     if transform not in NEUTRAL_VIEW_TRANSFORMS:
         column = layout.column(align=True)

@@ -1,4 +1,4 @@
-"""The settings of operators on fields, for the panels and for the operators themselves."""
+"""Draw the settings of operators on fields, in panels and in the dialogs of the operators."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .sidebar import use_property_columns
 
 _CONVERT_SETTINGS = ("new_degree", "angle", "smooth", "pair_distance", "magnitude")
 
-#: Inputs of the kinds of generated fields. Their options follow below them.
+#: Inputs of the generators, by the kind of field. Panels show them above the other options.
 _INPUTS_BY_KIND = {
     "features": ("edges",),
     "guided": ("guides", "guide", "edges", "uv_map", "vectors"),
@@ -19,10 +19,10 @@ _INPUTS_BY_KIND = {
     "uv": ("uv_map",),
 }
 
-#: The kind of guides that an input of a guided field belongs to.
+#: For each input of a guided field, the kind of guides for which it is used.
 _GUIDE_OF_INPUT = {"guide": "OBJECTS", "edges": "EDGES", "uv_map": "UV", "vectors": "ATTRIBUTE"}
 
-#: Placeholder texts of empty settings of the generator.
+#: Texts that empty settings of the generator show.
 _PLACEHOLDERS = {"guide": "Selected", "uv_map": "Active", "vectors": "Attribute"}
 
 
@@ -36,7 +36,7 @@ def draw_settings(
     layout : bpy.types.UILayout
     settings : bpy.types.OperatorProperties or operator
     *names : str
-        The properties.
+        Names of the properties.
     **placeholders : str
         Texts that empty properties show.
     """
@@ -60,7 +60,7 @@ def draw_generator_settings(layout: bpy.types.UILayout, settings: Any) -> None:
             name for name in inputs if _GUIDE_OF_INPUT.get(name, "") in {"", *settings.guides}
         )
     options = options_of(settings.kind)
-    # The angle applies to edges by angle alone, also if these are guides.
+    # The angle is used only for edges that are found by their angle, also if these edges are guides.
     if "edges" in inputs and settings.edges == "FEATURES":
         options = ["sharp_angle", *(name for name in options if name != "sharp_angle")]
     elif "sharp_angle" in options:

@@ -1,7 +1,8 @@
 """The overlay of singularities in the 3D view: dots colored by sign, labeled with their indices.
 
-Draw handlers exist only while something is shown. Singularities are computed once, and again when a field
-is stored and after an undo: the dots move with the object, but do not follow other changes of the mesh.
+Draw handlers exist only while something is shown. Singularities are computed when they are switched on, when
+a field is stored, and after an undo. So the dots move with the object, but do not follow other changes of the
+mesh.
 """
 
 from __future__ import annotations
@@ -21,14 +22,15 @@ from ..scene.singularity_points import (
 from ..viewport.overlays import SingularityDots, draw_dots, draw_labels
 from ..viewport.view3d import redraw
 
-#: Diameter of the dot of an index of 1 / N, without its outline, in pixels of a screen of normal resolution.
+#: Diameter in pixels of the dot of a singularity of index 1 / N, without its outline, at a resolution scale
+#: of 1.
 DOT_DIAMETER = 9.0
 
-#: Offset of dots from the surface, as a fraction of the size of the object. It avoids z-fighting.
+#: Distance of dots from the surface, as a fraction of the size of the object. It avoids z-fighting.
 SURFACE_OFFSET = 0.004
 
 
-#: The singularities that are shown, by the names of their objects. Emptied by `hide`, which `unregister` calls.
+#: The singularities that are shown, by the names of their objects.
 _SINGULARITIES: dict[str, Singularities] = {}
 
 #: The draw handlers, while something is shown.
@@ -64,9 +66,9 @@ def hide(object_name: str | None = None) -> None:
 
 
 def refresh(context: bpy.types.Context, meshes: Container[bpy.types.Mesh]) -> None:
-    """Read the singularities again of objects that show them and whose fields have changed.
+    """Compute shown singularities again, on all objects whose mesh is one of `meshes`.
 
-    They are hidden if they cannot be read, for example because a modifier loses the field.
+    If they cannot be computed, for example because a modifier loses the field, they are hidden.
     """
     for name, shown_before in list(_SINGULARITIES.items()):
         obj = context.view_layer.objects.get(name)
@@ -80,7 +82,7 @@ def refresh(context: bpy.types.Context, meshes: Container[bpy.types.Mesh]) -> No
 
 
 def _app_handlers() -> list[tuple[Any, Any]]:
-    """Return the lists of application handlers, and the handler that belongs in each."""
+    """Return pairs: a list of Blender's application handlers, and the handler of this module for it."""
     handlers = bpy.app.handlers
     return [
         (handlers.load_pre, _clear_on_load),
@@ -90,12 +92,12 @@ def _app_handlers() -> list[tuple[Any, Any]]:
 
 
 def _clear_on_load(*_: Any) -> None:
-    """Hide everything before a file is loaded, as its objects may have the same names."""
+    """Hide all singularities before a file is loaded, because its objects may have the same names."""
     hide()
 
 
 def _read_again(*_: Any) -> None:
-    """Read all singularities again, as an undo step may have changed the fields."""
+    """Compute all shown singularities again after an undo or redo, which may have changed the fields."""
     context = bpy.context
     refresh(context, {obj.data for obj in context.view_layer.objects if obj.type == "MESH"})
 
@@ -106,12 +108,15 @@ def is_shown(object_name: str) -> bool:
 
 
 def shown(object_name: str) -> Singularities | None:
-    """Return the singularities of an object that are shown, or None."""
+    """Return the shown singularities of an object; None if they are not shown."""
     return _SINGULARITIES.get(object_name)
 
 
 def _visible_singularities() -> list[tuple[bpy.types.Object, Singularities]]:
-    """Return the visible objects and their singularities, without objects that were removed or renamed."""
+    """Return pairs of visible objects and their singularities.
+
+    Objects that were removed or renamed are left out.
+    """
     view_layer = bpy.context.view_layer
     candidates = (
         (view_layer.objects.get(name), singularities)
@@ -125,7 +130,7 @@ def _visible_singularities() -> list[tuple[bpy.types.Object, Singularities]]:
 
 
 def _all_dots() -> list[SingularityDots]:
-    """Return the dots of the objects that are visible."""
+    """Return the dots of the singularities of each visible object."""
     return [
         SingularityDots(offset_points(obj, shown), shown.index, shown.degree)
         for obj, shown in _visible_singularities()
@@ -145,7 +150,7 @@ def _draw_labels() -> None:
 
 
 def offset_points(obj: bpy.types.Object, singularities: Singularities) -> np.ndarray:
-    """Return the (K, 3) positions in world space, slightly off the surface."""
+    """Return (K, 3) positions of the dots of singularities in world space, slightly above the surface."""
     matrix = np.array(obj.matrix_world)
     offset = SURFACE_OFFSET * max(obj.dimensions)
     scale = np.cbrt(abs(np.linalg.det(matrix[:3, :3]))) or 1.0

@@ -1,4 +1,4 @@
-"""Preferences of the extension: what happens when the first field of a scene is made."""
+"""Preferences of the extension, such as what happens when the first field of a scene is made."""
 
 from __future__ import annotations
 
@@ -68,19 +68,19 @@ def addon_preferences(context: bpy.types.Context) -> ROSY_AP_preferences | None:
 
 
 def worker_count(context: bpy.types.Context) -> int:
-    """Return the number of processes that draw a large picture; 0 is one for each core."""
+    """Return the number of processes that draw a large picture. 0 means one for each processor core."""
     preferences = addon_preferences(context)
     return 0 if preferences is None else preferences.workers
 
 
 def uses_helper(context: bpy.types.Context) -> bool:
-    """Return whether a process beside Blender computes."""
+    """Return whether jobs compute in a helper process, and not in Blender's process."""
     preferences = addon_preferences(context)
     return preferences is None or preferences.use_helper
 
 
 def apply_preferences(context: bpy.types.Context) -> None:
-    """Apply the preferences to a scene whose settings have not been changed.
+    """Apply the preferences to a scene, if the user has not changed its settings.
 
     Raises
     ------

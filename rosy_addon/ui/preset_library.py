@@ -1,4 +1,4 @@
-"""The presets that the panels show, with their pictures; reloaded when files change."""
+"""The presets that the panels show, with their pictures. They are read again when files change."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from ..preset_files.store import (
 from ..scene.files import user_presets_folder
 from ..scene.look_properties import apply_look, matches_look
 
-#: Icons of a preset without a picture and of a preset that is not found.
+#: Icon of a preset without a picture, and icon of a preset that is not found.
 DEFAULT_ICON, MISSING_ICON = "PRESET", "QUESTION"
 
-#: Seconds between checks of the files if their folders have not changed.
+#: Seconds between two checks of the files, if their folders have not changed.
 REFRESH_SECONDS = 1.0
 
 
@@ -38,7 +38,7 @@ class PresetEntry(NamedTuple):
 
 
 class _PresetLibrary:
-    """The presets that were read last, with the state of their files at the time."""
+    """A cache of the presets, with the state of their files when they were read."""
 
     def __init__(self) -> None:
         self.folder_keys: tuple[Any, ...] = ()
@@ -46,17 +46,18 @@ class _PresetLibrary:
         self.file_keys: dict[Path, tuple[Any, ...]] = {}
         self.entries: dict[str, PresetEntry] = {}
         self.load_errors: list[str] = []
-        #: Blender's preview images, while the extension is registered, and their icon ids.
+        #: Blender's collection of preview images (None unless the extension is registered), and the icon ids
+        #: of the images.
         self.previews: Any = None
         self.icon_ids: dict[str, int] = {}
-        #: Kept alive here, as Blender keeps no reference to the texts of enum items.
+        #: Items of the enum property. A reference is kept here, as Blender keeps none to the texts of items.
         self.enum_items: list[tuple] = []
 
     def refresh(self) -> None:
         """Read the files again if any was added, changed or removed.
 
-        Panels call this many times per redraw. The times of the folders show at once whether files
-        were added or removed. Edited files are found every `REFRESH_SECONDS`.
+        Panels call this many times per redraw. Each call checks the modification times of the folders, which
+        change when files are added or removed. Edited files are looked for every `REFRESH_SECONDS`.
         """
         user_folder = user_presets_folder()
         folder_keys = (user_folder, _stat_key(user_folder), _stat_key(SHIPPED_FOLDER))
@@ -83,7 +84,7 @@ class _PresetLibrary:
         self._load_previews()
 
     def _load_previews(self) -> None:
-        """Load the pictures beside the presets, and free those that are no longer used."""
+        """Load the pictures of the presets, and free pictures that are no longer used."""
         self.icon_ids = {}
         if self.previews is None or bpy.app.background:
             return
@@ -120,7 +121,7 @@ def user_preset_keys() -> list[str]:
 
 
 def preset_name(key: str) -> str:
-    """Return the name of a preset that users see; the key itself if the preset is not found."""
+    """Return the name of a preset for display, given its key. If it is not found, return the key."""
     entry = entries().get(key)
     return key if entry is None else entry.preset.name
 
@@ -136,7 +137,7 @@ def search_user_presets(_owner: Any, _context: Any, _typed: str) -> list[str]:
 
 
 def active_entry(settings: Any) -> PresetEntry | None:
-    """Return the preset that the look of ``scene.rosy`` was taken from; None if it is not found."""
+    """Return the preset from which the look of ``scene.rosy`` was copied. None if it is not found."""
     return entries().get(settings.preset_name)
 
 
@@ -204,7 +205,7 @@ def set_enum_index(settings: Any, index: int) -> None:
 
 
 def _stat_key(path: Path) -> tuple[int, ...]:
-    """Return a key that changes whenever a file or folder does; empty if it does not exist."""
+    """Return a key that changes when a file or folder changes. It is empty if the path does not exist."""
     try:
         status = path.stat()
     except OSError:

@@ -1,4 +1,4 @@
-"""The properties of RoSy: `Scene.rosy`, `Mesh.rosy`, `Object.rosy` and `NodeTree.rosy`."""
+"""RoSy's properties of Blender datablocks: `Scene.rosy`, `Mesh.rosy`, `Object.rosy` and `NodeTree.rosy`."""
 
 from __future__ import annotations
 
@@ -67,7 +67,8 @@ INK_ITEMS = [
     ("ONE", "Single", "One ink for all strokes"),
     ("FAMILIES", "By Family", "One ink for each family of strokes"),
 ]
-#: Viewpoints of strokes. Only one drawing is made at a time, so there is no item for all cameras.
+#: Items of the property that chooses the camera of strokes. Strokes are drawn from only one camera at a time,
+#: so there is no item for all cameras.
 STROKE_CAMERA_ITEMS = [item for item in CAMERA_ITEMS if item[0] != "ALL"]
 TEXTURE_CONTENT_ITEMS = [(name.upper(), name.capitalize(), text) for name, text in CONTENTS.items()]
 IMAGE_FORMAT_ITEMS = [
@@ -83,13 +84,13 @@ class RosyLook(bpy.types.PropertyGroup):
 
 
 class RosyFrameState(bpy.types.PropertyGroup):
-    """What a frame of a sequence was drawn from. Its name is the number of the frame."""
+    """The state of the scene from which a frame of a sequence was drawn, named after the frame number."""
 
     state: bpy.props.StringProperty(description="State of the scene, as JSON")
 
 
 class RosyBake(bpy.types.PropertyGroup):
-    """A baked picture and what it was drawn from, named after the camera."""
+    """A baked picture and the state of the scene from which it was drawn, named after the camera."""
 
     image: bpy.props.PointerProperty(type=bpy.types.Image)
     material: bpy.props.PointerProperty(type=bpy.types.Material)
@@ -111,7 +112,7 @@ class RosyBake(bpy.types.PropertyGroup):
 
 
 class RosyProjection(bpy.types.PropertyGroup):
-    """How an object shows one of its pictures, by the material of the picture."""
+    """The projection with which an object shows one of its pictures, and the material of the picture."""
 
     material: bpy.props.PointerProperty(type=bpy.types.Material)
     matrix: bpy.props.FloatVectorProperty(
@@ -121,13 +122,13 @@ class RosyProjection(bpy.types.PropertyGroup):
 
 
 class RosyNodeTree(bpy.types.PropertyGroup):
-    """The pictures of an object. They belong to the node group of the modifier that shows one."""
+    """The pictures that an object can show, stored in the node group of its modifier."""
 
     projections: bpy.props.CollectionProperty(type=RosyProjection)
 
 
 class RosyStrokeObject(bpy.types.PropertyGroup):
-    """An object of strokes made by RoSy, named after the camera."""
+    """An object with strokes that RoSy has made, named after the camera."""
 
     kind: bpy.props.StringProperty()
     thing: bpy.props.PointerProperty(type=bpy.types.Object)
@@ -434,7 +435,7 @@ def unregister() -> None:
 
 
 def ensure_registered() -> None:
-    """Add the properties if the extension is not enabled, for scripts and the command line.
+    """Add the properties, unless the enabled extension has added them. Scripts and commands call this.
 
     They are removed when Python exits, because Blender's Python module cannot free them later.
     """

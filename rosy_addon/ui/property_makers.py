@@ -1,6 +1,6 @@
-"""Makers of Blender's properties: from a name and a description, and from the settings of a class.
+"""Functions that make Blender's properties, from a name and a description or from a settings class.
 
-Keyword arguments are passed on to `bpy.props`.
+Further keyword arguments are passed on to the functions of `bpy.props`.
 """
 
 from __future__ import annotations
@@ -13,62 +13,62 @@ import bpy
 from ..core.settings import Choice, Color, Number, Numbers, Setting, Switch, settings_of, title
 from ..scene.look_properties import color_components
 
-#: Options of a path that may start with ``//``, the folder of the .blend file. Blender 5.0 and later need the
-#: second one for this.
+#: Options of path properties. The path may start with ``//``, which stands for the folder of the .blend file.
+#: Blender 5.0 and later require the second option for this.
 PATH_OPTIONS = {"ANIMATABLE"} | (
     {"PATH_SUPPORTS_BLEND_RELATIVE"}
     if "is_path_supports_blend_relative" in bpy.types.Property.bl_rna.properties
     else set()
 )
 
-#: Subtypes of number properties by the unit of the setting.
+#: Subtypes of number properties, by the unit of the setting.
 SUBTYPE_BY_UNIT = {"angle": "ANGLE", "length": "DISTANCE", "pixels": "PIXEL"}
 
 
 def toggle(name: str, description: str, **others: Any) -> Any:
-    """Return a property that is true or false, by default false."""
+    """Return a boolean property, by default false."""
     return bpy.props.BoolProperty(name=name, description=description, **others)
 
 
 def integer(name: str, description: str, **others: Any) -> Any:
-    """Return a property with a whole number, by default 0."""
+    """Return an integer property, by default 0."""
     return bpy.props.IntProperty(name=name, description=description, **others)
 
 
 def real(name: str, description: str, **others: Any) -> Any:
-    """Return a property with a floating-point number, by default 0."""
+    """Return a floating-point property, by default 0."""
     return bpy.props.FloatProperty(name=name, description=description, **others)
 
 
 def fraction(name: str, description: str, **others: Any) -> Any:
-    """Return a property with a length as a fraction of the size of the mesh, up to 10."""
+    """Return a property for a length, as a fraction (up to 10) of the size of the mesh."""
     return real(name, description, min=0.0, max=10.0, precision=3, step=1, **others)
 
 
 def brush_strength() -> Any:
-    """Return the property of the strength of the brush that combs."""
+    """Return the property for the strength of the brush that combs fields."""
     others = {"subtype": "FACTOR", "min": 0.0, "max": 1.0, "default": 1.0}
     return real("Strength", "How much of its effect the brush has", **others)
 
 
 def text(name: str, description: str, **others: Any) -> Any:
-    """Return a property with a text, by default empty."""
+    """Return a text property, by default empty."""
     return bpy.props.StringProperty(name=name, description=description, **others)
 
 
 def file_filter(*suffixes: str) -> Any:
-    """Return the property by which the file browser shows only files with some suffixes."""
+    """Return the property of an operator by which the file browser shows only files with some suffixes."""
     pattern = ";".join(f"*{suffix}" for suffix in suffixes)
     return bpy.props.StringProperty(default=pattern, options={"HIDDEN"})
 
 
 def choice(name: str, description: str, items: Iterable[tuple[Any, ...]], **others: Any) -> Any:
-    """Return a property with one of several items, by default the first one."""
+    """Return an enum property, by default the first item."""
     return bpy.props.EnumProperty(name=name, description=description, items=items, **others)
 
 
 def color(name: str, description: str, **others: Any) -> Any:
-    """Return a property with a color in display values, by default black."""
+    """Return a color property in display values (sRGB), by default black."""
     arguments = {"size": 3, "min": 0, "max": 1, "default": (0.0, 0.0, 0.0)} | others
     return bpy.props.FloatVectorProperty(
         name=name, description=description, subtype="COLOR_GAMMA", **arguments

@@ -1,4 +1,4 @@
-"""Registration of the user interface."""
+"""Register the user interface with Blender."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from . import (
     strokes_panel,
 )
 
-#: Modules with classes to register. Panels are shown in this order.
+#: Modules whose classes (their `CLASSES`) are registered. Panels are shown in this order.
 MODULES = (preferences, main_panel, look_panels, strokes_panel)
 
 
@@ -32,7 +32,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Remove them, and clear the state of this room."""
+    """Remove properties, panels and preferences, and clear the state of the modules of this subpackage."""
     live_views.unregister()
     bpy.types.VIEW3D_PT_overlay.remove(main_panel.draw_overlay_popover)
     main_panel.unregister()

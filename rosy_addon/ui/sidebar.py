@@ -1,4 +1,4 @@
-"""Base class and helpers of the panels in the sidebar of the 3D view."""
+"""Base class of the panels in the sidebar of the 3D view, and functions that they share."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import bpy
 from ..core.errors import as_sentence
 from . import job_status
 
-#: Mean width of a character, and width of the icon and margins of a row, at a user interface scale
-#: of 1.
+#: Mean width of a character, and total width of the icon and the margins of a row, in pixels at a resolution
+#: scale of 1.
 CHARACTER_PIXELS, MARGIN_PIXELS = 6.0, 60
 
-#: Characters of a row in the narrowest sidebar.
+#: Number of characters in a row of the narrowest sidebar.
 MIN_CHARACTERS = 16
 
 
 class SidebarPanel:
-    """Base of the panels: the tab RoSy in the sidebar of the 3D view."""
+    """Base class of the panels. It puts them into the tab RoSy in the sidebar of the 3D view."""
 
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
@@ -27,7 +27,7 @@ class SidebarPanel:
 
 
 def use_property_columns(layout: bpy.types.UILayout) -> None:
-    """Draw labels and values in two columns, without buttons for keyframes."""
+    """Let a layout show labels and values in two columns, without buttons for keyframes."""
     layout.use_property_split = True
     layout.use_property_decorate = False
 
@@ -38,7 +38,7 @@ def draw_wrapped(
     messages: Sequence[str],
     icon: str = "INFO",
 ) -> None:
-    """Draw messages as sentences, each in as many lines as the width of the region needs."""
+    """Draw messages as sentences, each wrapped to the width of the region."""
     for message in messages:
         column = layout.column(align=True)
         for index, row in enumerate(wrap_to_sidebar(as_sentence(message), context)):
@@ -46,13 +46,13 @@ def draw_wrapped(
 
 
 def wrap_to_sidebar(text: str, context: bpy.types.Context) -> list[str]:
-    """Return a text as rows that fit into the region."""
+    """Return the rows of a text that is wrapped to the width of the region."""
     width = context.region.width / context.preferences.system.ui_scale - MARGIN_PIXELS
     return textwrap.wrap(text, max(int(width / CHARACTER_PIXELS), MIN_CHARACTERS))
 
 
 def closed_panel(layout: bpy.types.UILayout, key: str, title: str) -> bpy.types.UILayout | None:
-    """Add a panel that is closed at first. Return its layout; None while it is closed."""
+    """Add a subpanel that is closed by default. Return its layout; None while the user has it closed."""
     header, body = layout.panel(f"rosy_{key}", default_closed=True)
     header.label(text=title)
     return body
@@ -66,6 +66,6 @@ def draw_progress(layout: bpy.types.UILayout) -> None:
 
 
 def draw_cycles_hint(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Say what hatching that follows the light does in Cycles, if that renders the scene."""
+    """Draw a note on what hatching with the light of the scene looks like in Cycles, if Cycles is chosen."""
     if context.scene.render.engine == "CYCLES":
         layout.label(text="Cycles: occlusion, not light", icon="INFO")

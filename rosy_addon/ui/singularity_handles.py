@@ -1,6 +1,6 @@
 """The tool *Field Singularities* of the 3D view: its handles, and dragging one of them along the surface.
 
-The handles are the dots of the overlay. Operators do the work.
+The handles are the dots of the overlay. Operators change the field.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from ..viewport.view3d import redraw
 from . import overlay
 from .view_lines import draw_lines, to_pixels
 
-#: Distance in pixels from the mouse up to which a handle is grabbed.
+#: Largest distance in pixels between the mouse and a handle that is grabbed.
 GRAB_DISTANCE = 16.0
 
-#: The ring around the vertex where a singularity will be: its radius and line width in pixels, its color.
+#: Radius and line width in pixels, and color, of the ring around the target vertex of a drag.
 RING_RADIUS, LINE_WIDTH = 9.0, 2.0
 RING_COLOR = (1.0, 1.0, 1.0, 1.0)
 
@@ -34,14 +34,14 @@ RING_SEGMENTS = 24
 
 
 class Drag:
-    """A singularity that is being dragged.
+    """A drag of a singularity with the mouse, which is drawn over the view.
 
     Attributes
     ----------
     source : int
-        Vertex where it started.
+        Vertex of the singularity where the drag has started.
     target : int or None
-        Vertex under the mouse; None beside the object.
+        Vertex nearest to the surface point under the mouse. None if the mouse is not over the object.
     """
 
     def __init__(self, obj: bpy.types.Object, source: int, region: bpy.types.Region) -> None:
@@ -54,7 +54,7 @@ class Drag:
         self._handler: Any = add(self._draw, (), "WINDOW", "POST_PIXEL")
 
     def move(self, context: bpy.types.Context, mouse: tuple[float, float]) -> None:
-        """Follow the mouse."""
+        """Find the target vertex for a new position of the mouse, in pixels, and redraw the view."""
         points = _own_points(context, self._obj)
         self.target = _vertex_under(context, self._obj, points, mouse)
         vertices = [self.source] if self.target is None else [self.source, self.target]
@@ -62,7 +62,7 @@ class Drag:
         redraw()
 
     def stop(self) -> None:
-        """Stop drawing. Later calls have no effect."""
+        """Remove the drawing of the drag from the view. Later calls have no effect."""
         if self._handler is not None:
             bpy.types.SpaceView3D.draw_handler_remove(self._handler, "WINDOW")
             self._handler = None
@@ -87,7 +87,9 @@ def start_drag(
     mouse: tuple[float, float],
     from_any_vertex: bool,
 ) -> Drag | None:
-    """Grab the handle under the mouse, or any vertex. Return None if there is none.
+    """Start to drag the handle under the mouse (or with `from_any_vertex` the vertex under it).
+
+    Return None if there is no handle or vertex under the mouse.
 
     Raises
     ------
@@ -103,7 +105,7 @@ def start_drag(
 
 
 def show_handles(context: bpy.types.Context, obj: bpy.types.Object) -> None:
-    """Show the singularities that can be edited, if the overlay does not yet.
+    """Show the singularities that can be edited, unless the overlay already shows them.
 
     Raises
     ------
@@ -117,7 +119,7 @@ def show_handles(context: bpy.types.Context, obj: bpy.types.Object) -> None:
 
 
 def _own_points(context: bpy.types.Context, obj: bpy.types.Object) -> np.ndarray:
-    """(V, 3) positions of the vertices of an object's own mesh as they are seen, in object space."""
+    """Return (V, 3) positions of an object's own vertices, as modifiers move them, in object space."""
     evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
     return vertex_positions(mesh_of_own_vertices(obj, evaluated.data))[: len(obj.data.vertices)]
 
@@ -128,7 +130,10 @@ def _vertex_under(
     points: np.ndarray,
     mouse: tuple[float, float],
 ) -> int | None:
-    """Return which of `_own_points` is next to the mouse, or None beside the object."""
+    """Return the vertex (an index of `_own_points`) nearest to the surface point under the mouse.
+
+    None if the mouse is not over the object.
+    """
     region, view = context.region, context.region_data
     to_object = obj.matrix_world.inverted_safe()
     origin = to_object @ region_2d_to_origin_3d(region, view, mouse)
@@ -143,7 +148,7 @@ def _vertex_under(
 def _handle_under(
     context: bpy.types.Context, obj: bpy.types.Object, mouse: tuple[float, float]
 ) -> int | None:
-    """Return the vertex of the visible handle next to the mouse, or None if there is none."""
+    """Return the vertex of the visible handle nearest to the mouse. None if no handle is near enough."""
     shown = overlay.shown(obj.name)
     assert shown is not None and shown.vertex is not None
     points = overlay.offset_points(obj, shown)
@@ -159,7 +164,7 @@ def _handle_under(
 
 
 def _to_world(obj: bpy.types.Object, points: np.ndarray) -> np.ndarray:
-    """(K, 3) points of object space in world space."""
+    """Transform (K, 3) points from object space to world space."""
     matrix = np.array(obj.matrix_world)
     return points @ matrix[:3, :3].T + matrix[:3, 3]
 
@@ -183,11 +188,11 @@ class VIEW3D_TOOL_rosy_singularities(bpy.types.WorkSpaceTool):
             {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True},
             {"properties": [("make_pair", True)]},
         ),
-        # Beside the singularities. Blender's own keymap would move the object.
+        # A drag that starts beside the singularities selects. Blender's own keymap would move the object.
         ("view3d.select_box", {"type": "LEFTMOUSE", "value": "CLICK_DRAG"}, None),
     )
 
-    # Blender calls both without an instance.
+    # Blender calls both functions without an instance, so they are static.
     @staticmethod
     def draw_settings(
         context: bpy.types.Context, layout: bpy.types.UILayout, tool: bpy.types.WorkSpaceTool
@@ -202,5 +207,5 @@ class VIEW3D_TOOL_rosy_singularities(bpy.types.WorkSpaceTool):
         """Show the handles while the tool is active."""
         obj = context.view_layer.objects.active
         if obj is not None and has_field(obj):
-            with suppress(RosyError):  # dragging reports it
+            with suppress(RosyError):  # the operator reports the error when the user drags
                 show_handles(context, obj)

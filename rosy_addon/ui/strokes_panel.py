@@ -1,4 +1,4 @@
-"""The panel of the settings of strokes."""
+"""The panel with the settings of strokes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ STROKE_ICONS = {
     "CURVES": "OUTLINER_OB_CURVES",
 }
 
-#: Subpanels of strokes with the names of their settings.
+#: Labels of the subpanels of strokes, with the names of their settings.
 STROKE_PANELS = {
     "Density": panel_settings(StrokeStyle, "density"),
     "Ends": panel_settings(StrokeStyle, "ends"),

@@ -1,4 +1,4 @@
-"""Lines over 3D views, and the places of points in them."""
+"""Project points to pixels of a 3D view, and draw lines over it."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from gpu_extras.batch import batch_for_shader
 def to_pixels(
     region: bpy.types.Region, view: bpy.types.RegionView3D, points: np.ndarray
 ) -> np.ndarray:
-    """Return the (..., 2) positions in the region of (..., 3) points of world space.
+    """Project (..., 3) points in world space to (..., 2) pixels of a region of a 3D view.
 
-    They are infinite behind the camera.
+    The pixels of points behind the camera are infinite.
     """
     matrix = np.array(view.perspective_matrix)
     clip = points @ matrix[:, :3].T + matrix[:, 3]
@@ -25,11 +25,11 @@ def to_pixels(
 
 
 def draw_lines(kind: str, points: np.ndarray, color: tuple[float, ...], width: float) -> None:
-    """Draw lines of a width in pixels between (n, 2) finite positions in the region or the window.
+    """Draw lines between (n, 2) finite positions in pixels of the region or window. `width` is in pixels.
 
-    The kind is "LINES", for pairs of points, or "LINE_STRIP".
+    The kind is "LINES" (one line for each pair of points) or "LINE_STRIP" (a polyline).
     """
-    if len(points) < 2:  # Blender makes no batch without vertices
+    if len(points) < 2:  # Blender cannot make an empty batch
         return
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     shader.bind()

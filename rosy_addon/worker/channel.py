@@ -50,8 +50,8 @@ class Channel:
         self._last_number = 0
         #: Objects that this process keeps, as later messages may refer to them, by number.
         self._kept: dict[int, Any] = {}
-        #: The generator that receives the next message in parts; and the message once it is complete, else
-        #: None.
+        #: The generator that receives the next message in parts, and the message. The message is None until
+        #: it is complete.
         self._parts = _message_parts(connection)
         self._message: tuple[list[int], bytes, list[np.ndarray]] | None = None
 
@@ -153,7 +153,7 @@ def _message_parts(
 
 
 class _Pickler(pickle.Pickler):
-    """A pickler that writes objects which the other process keeps as numbers.
+    """A pickler that writes a number in place of each object that the other process keeps.
 
     Attributes
     ----------
@@ -183,14 +183,20 @@ class _Pickler(pickle.Pickler):
         return number
 
     def _use(self, number: int, obj: Any) -> None:
-        """Record that the message contains a kept object, and the kept objects in its fields."""
+        """Record in `used` that the message contains a kept object.
+
+        Do the same for kept objects in its fields.
+        """
         self.used[number] = obj
         for value in vars(obj).values():
             if isinstance(value, KEPT_CLASSES):
                 self.persistent_id(value)
 
     def reducer_override(self, obj: Any) -> Any:
-        """Pickle an object to keep as a new number and its fields, without cached properties."""
+        """Pickle an object of `KEPT_CLASSES` that is sent for the first time: as a new number and its fields.
+
+        Cached properties are left out. Other objects are pickled as usual.
+        """
         if not isinstance(obj, KEPT_CLASSES):
             return NotImplemented
         self.last_number += 1
@@ -200,7 +206,10 @@ class _Pickler(pickle.Pickler):
 
 
 class _Unpickler(pickle.Unpickler):
-    """An unpickler that finds kept objects by number, and this package by its name in this process."""
+    """An unpickler that returns kept objects for their numbers.
+
+    It also replaces the name of this package in the other process by its name in this process.
+    """
 
     def __init__(
         self, stream: bytes, buffers: list[np.ndarray], kept: dict[int, Any], package: str
@@ -226,7 +235,7 @@ class _Unpickler(pickle.Unpickler):
 
 
 def _keep(number: int, kind: type, state: dict[str, Any]) -> Any:
-    """Mark an object to keep in a pickle.
+    """Stand in pickles for the function that creates an object and keeps it.
 
     It is never called: `_Unpickler` calls its method `_keep` instead.
     """

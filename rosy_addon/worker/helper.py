@@ -149,7 +149,10 @@ class Helper:
         return None
 
     def take(self, user: object) -> bool:
-        """Reserve the helper process for a user. Return whether it is reserved for this user now."""
+        """Reserve the helper process for a user (any object), if it is not reserved yet.
+
+        Return whether it is now reserved for this user.
+        """
         if self._user is None:
             self._user = user
         return self._user is user

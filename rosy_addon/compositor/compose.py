@@ -281,8 +281,8 @@ class _Layer(NamedTuple):
     ----------
     field : PixelField
     lines : HatchedLines
-        The attributes that depend on the strip, such as the LIC images, are not set. The `look` is adapted to the
-        symmetry of the field and the range of its magnitudes.
+        The attributes that depend on the strip, such as the LIC images, are not set. The `look` is adapted
+        to the symmetry of the field and the range of its magnitudes.
     tone : (P,) float32 ndarray or None
         Target tone of the pixels of `field`, if the look is hatched; None otherwise.
     """

@@ -78,7 +78,9 @@ class MovingKernel:
     def effective_samples(
         self, share: np.ndarray, forward: np.ndarray, behind: np.ndarray, ahead: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Compute the effective samples of each average: so many samples of equal weight have its variance.
+        """Compute the effective samples of each average.
+
+        This is the number of samples of equal weight whose mean has the variance of the average.
 
         Parameters
         ----------

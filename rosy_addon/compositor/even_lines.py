@@ -158,7 +158,7 @@ class EvenLines:
 
 
 def resolved_share(period: np.ndarray, supersampling: int = 1) -> np.ndarray:
-    """Compute how much of the contrast of lines is drawn: 0 if they are too close for the pixels, else up to 1.
+    """Compute how much of the contrast of lines is drawn, from 0 (too close for the pixels) to 1.
 
     Parameters
     ----------

@@ -193,7 +193,10 @@ def _write_averages(line_sums: np.ndarray, look: PixelLook, member: np.ndarray) 
 
 
 def _crop_rows(field: PixelField, extent: slice) -> PixelField:
-    """Return the field at the pixels `extent`, which are whole rows. Streamlines end at its first and last row."""
+    """Return the field at the pixels `extent`, which are whole rows.
+
+    Streamlines end at the first and the last of these rows.
+    """
     if extent.stop - extent.start == len(field.pixel):
         return field
     rows = field.part(extent)
@@ -233,7 +236,7 @@ class _LineAverages:
         self._values[:, cell, -1] = 1
 
     def write(self, line: np.ndarray, values: np.ndarray) -> None:
-        """Store (n, K + 1) averages at the (n,) indices of lines, in the form `StreamlineBatch.trace` yields."""
+        """Store (n, K + 1) averages at (n,) indices of lines, in the form `StreamlineBatch.trace` yields."""
         scatter_rows(self._flat, line, values)
 
     def clear_sink(self) -> None:
@@ -241,7 +244,10 @@ class _LineAverages:
         self._values[:, SINK_CELL, -1] = -1
 
     def copy_from(self, line: np.ndarray, source: np.ndarray) -> np.ndarray:
-        """Copy averages from the lines `source` to `line`. Return those of `line` whose source has no average."""
+        """Copy averages from the lines `source` to the lines `line`.
+
+        Return the elements of `line` whose source has no average. They are not changed.
+        """
         values = self._flat.take(source, axis=0)
         is_known = values[:, -1] > 0
         scatter_rows(self._flat, line[is_known], values[is_known])
@@ -311,7 +317,7 @@ def _cover_all_lines(
     looks: Sequence[PixelLook],
     step_limits: Sequence[np.ndarray | None],
 ) -> None:
-    """Trace streamlines until every line of the covering surface has an average for each look, if it needs one."""
+    """Trace streamlines until every line that needs an average has one, for each look."""
     look = looks[0]
     half_window = max(HALF_WINDOW_STEPS, look.length // 2)
     # A line that has the average for one look has the averages for all looks.
@@ -380,8 +386,8 @@ def has_slopes(look: PixelLook) -> bool:
 def is_fine(look: PixelLook) -> bool:
     """Return whether streaks are drawn more accurately: in antialiased pictures, and if they drift.
 
-    Small differences between neighboring streamlines do not drift with the streaks. In an animation they would
-    look like a fixed pattern in front of the surface.
+    Small differences between neighboring streamlines do not drift with the streaks. In an animation they
+    would look like a fixed pattern in front of the surface.
     """
     return has_flow(look) or look.is_antialiased
 

@@ -38,7 +38,8 @@ IBFV_DISTANCE = 4.0
 #: four directions, one is always above it.
 ONE_WAY_COSINE = math.sqrt(0.5)
 
-#: Maximum distance along a streamline, in steps, from its nearest point to the center of a pixel that it passes.
+#: Maximum distance along a streamline, in steps, from its nearest sample to the center of a pixel that it
+#: passes.
 MAX_AXIAL_STEPS = 2
 
 

@@ -67,8 +67,8 @@ class HatchedLines(NamedTuple):
         Member images in the order of `all_members(field, look.guiding_angle)`. None if they have not been
         computed yet, or are not needed because there are even lines.
     break_images : LicImages or None
-        LIC images whose streaks are as long as the pieces of broken lines (`break_steps`). None if lines are not
-        broken.
+        LIC images whose streaks are as long as the pieces of broken lines (`break_steps`). None if lines are
+        not broken.
     paper_grain : (M, P) float32 ndarray or None
         Height of the paper for each line, with mean 0 and standard deviation 1. Ink adheres better
         where it is larger.

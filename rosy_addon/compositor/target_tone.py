@@ -63,7 +63,7 @@ class ReferenceRender:
         return MipMap(self.luminance)
 
     def mip_level(self, camera: Camera) -> float:
-        """Return the level of the mip map at which pixels are as large as the pixels of a camera; not rounded."""
+        """Return the level of the mip map whose pixels are as large as the pixels of `camera`, not rounded."""
         height, width = self.luminance.shape
         pixels_per_unit = self.camera.resized(width, height).pixels_per_unit
         return max(float(np.log2(pixels_per_unit / camera.pixels_per_unit)), 0.0)

@@ -391,7 +391,7 @@ def _nearest_member(
 
 
 def _length(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the lengths of vectors, given by components, even where squared lengths overflow or underflow."""
+    """Return the lengths of vectors, given by components, also where squared lengths over- or underflow."""
     with np.errstate(over="ignore"):
         square = x * x + y * y
     length = np.sqrt(square)

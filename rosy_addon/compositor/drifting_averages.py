@@ -110,7 +110,10 @@ class MovingKernel:
 
 
 def _shifted_weights(position: np.ndarray, shift: float, length: float, kind: Kernel) -> np.ndarray:
-    """Return the weights of a kernel whose center is `shift` steps backward, interpolated between whole steps."""
+    """Return the weights of a kernel whose center is `shift` steps backward.
+
+    Weights are interpolated linearly between whole steps.
+    """
     whole = math.floor(shift)
     fraction = shift - whole
     return (1 - fraction) * sample_weights(position + whole, length, kind) + fraction * (

@@ -127,7 +127,7 @@ class HatchedLines(NamedTuple):
         return self.undirected / std + self.relief(line)
 
     def target_tones(self, tone: np.ndarray) -> np.ndarray:
-        """Return the target tones of the lines: (M, P) `line_tones` if set, else the (P,) `tone` as (1, P)."""
+        """Return the target tones of lines: (M, P) `line_tones` if set, else the (P,) `tone` as (1, P)."""
         return tone[None] if self.line_tones is None else self.line_tones
 
     def coverage(self, line: int, target_coverage: np.ndarray) -> np.ndarray:

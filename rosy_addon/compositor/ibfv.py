@@ -51,8 +51,8 @@ from .streamline_origins import Origins, Sheets
 MIN_WEIGHT = 0.01
 
 #: Sharpening of the noise for each doubling: the factor of the differences from the four neighbors, which are
-#: added to the noise of a pixel. It makes up for the blur of interpolation on average. (Streaks along the rows
-#: of pixels are not blurred, others are.)
+#: added to the noise of a pixel. It makes up for the blur of interpolation on average. (Streaks along the
+#: rows of pixels are not blurred, others are.)
 SHARPENING = 0.02
 
 #: Factors of the contrast, measured so that streaks have the same standard deviation as with other methods:
@@ -255,7 +255,7 @@ def _sharpened_sources(
 ) -> list[np.ndarray]:
     """Return the (C,) `_noise_sources` of the cells of a covering, from (P, K) noise, sharpened.
 
-    Cells without a pixel are 0. `sharpening` is the factor of the differences from neighbors; see `SHARPENING`.
+    Cells without a pixel are 0. `sharpening` is the factor of differences from neighbors; see `SHARPENING`.
     """
     plain: list[np.ndarray] = []
     for _, block, cell in sheets.blocks(1):
@@ -301,7 +301,9 @@ class _Sums:
                 total[state] = source.take(sheets.cells[block])
 
     def weighted(self, place: int, values: np.ndarray, steps: int, block: slice) -> np.ndarray:
-        """Multiply the sums that arrive from D steps upstream by their weight q^D, and rotate the second source.
+        """Multiply the sums that arrive from D steps upstream by their weight, q^D.
+
+        Sums of the second source are rotated, too.
 
         The arithmetic uses real numbers. Products of complex numbers are not rounded alike on all
         processors.

@@ -26,8 +26,8 @@ DENSITY_FACTOR = 1.6
 #: rounding error, 1 / (255 sqrt(12)) = 0.0011.
 ROUNDING_SPREAD = 0.001
 
-#: Ratio of w^2 to the variance of 2 t - 1, for thresholds t that are evenly distributed over the width 2 w. The
-#: variance of t is w^2 / 3, and the variance of 2 t - 1 is four times as much.
+#: Ratio of w^2 to the variance of 2 t - 1, for thresholds t that are evenly distributed over the width 2 w.
+#: The variance of t is w^2 / 3, and the variance of 2 t - 1 is four times as much.
 EDGE_VARIANCE = 0.75
 
 #: Half the width of the sharpest edges, in thresholds: half a step of 8 bits, 1 / 510.

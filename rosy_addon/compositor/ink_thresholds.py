@@ -46,8 +46,8 @@ MAX_LAYERS = 3
 #: quadrature with three nodes.
 PIXEL_NODES = ((-(0.6**0.5), 5 / 18), (0.0, 8 / 18), (0.6**0.5, 5 / 18))
 
-#: Crowding of even lines from which coarser lines replace them, at each of these sample positions. They are the
-#: middles of thirds of 0 to 1, so the share of coarser lines rises with the crowding.
+#: Crowding of even lines from which coarser lines replace them, at each of these sample positions. The
+#: values are the middles of thirds of 0 to 1, so the share of coarser lines rises with the crowding.
 PIXEL_LEVELS = (1 / 6, 1 / 2, 5 / 6)
 
 #: Half the width w over which the streaks of a pixel are averaged, in pixels. Its variance w^2 / 3 is 1/5, as
@@ -154,7 +154,10 @@ def _even_line_thresholds(
 
 
 def _coverage_from(streak: np.ndarray, table: np.ndarray) -> np.ndarray:
-    """Return the (P,) float32 coverages whose threshold in `StreakStatistics.threshold` is the given streak."""
+    """Return the (P,) float32 coverages at which streaks have ink, by inverting a table of thresholds.
+
+    `table` is `StreakStatistics.threshold`, or `disc_threshold` for the undirected texture.
+    """
     coverages = np.linspace(0, 1, COVERAGE_STEPS)
     return np.interp(streak, table[::-1], coverages[::-1]).astype(np.float32)
 

@@ -32,14 +32,15 @@ DEPTH_JUMP = 2.0
 #: of depth from the pixels at the step to the next ones.
 MIN_STEP, STEP_RATIO = 6.0, 2.0
 
-#: Lengths in pixels of the finished picture: a shorter mark than the first is not drawn, and from the second on
-#: a mark has its full width. So marks grow and shrink when something moves, but do not flicker.
+#: Lengths in pixels of the finished picture: a shorter mark than the first is not drawn, and from the second
+#: on a mark has its full width. So marks grow and shrink when something moves, but do not flicker.
 MIN_MARK_LENGTH, FULL_MARK_LENGTH = 6, 12
 
 #: Maximum number of samples of pixels in a band that is processed at once.
 MAX_OUTLINE_SAMPLES = 1 << 20
 
-#: Bits of a pixel at an edge: another part of a mesh or another instance is next to it; nothing is next to it.
+#: Bits of a pixel at an edge: whether another part of a mesh or another instance is next to it, and whether
+#: there is no surface next to it.
 PART_BORDER, EMPTY_BORDER = 1, 2
 
 #: The settings of a look that an outline depends on.
@@ -307,9 +308,9 @@ class _Edges:
     def _find_steps(self) -> None:
         """Set the width of lines at the nearer pixel of steps in the depth of a surface.
 
-        On a surface that is seen nearly edge-on, any difference in depth between neighbors is plausible, so the
-        neighbor masks link pixels across a silhouette. At a step, the depth changes much more than between
-        either pixel and the next one beyond it.
+        On a surface that is seen nearly edge-on, any difference in depth between neighbors is plausible, so
+        the neighbor masks link pixels across a silhouette. At a step, the depth changes much more than
+        between either pixel and the next one beyond it.
         """
         depth, tolerance, defined = self._depth, self._tolerance, self._defined
         for block in reported_blocks(self._count, STEP_LABEL):

@@ -110,7 +110,7 @@ class ComposeStages:
             return convolve(field, looks, noise)
 
     def undirected_texture(self, field: PixelField, look: PixelLook) -> np.ndarray | None:
-        """Compute the texture of hatching where the field is undefined; see `undirected.undirected_texture`."""
+        """Compute the texture of hatching where the field is undefined; see `undirected`."""
         if field.representation.all():
             return None
         noise = unconvolved_noise(self.noise(field, look), look)

@@ -54,7 +54,7 @@ from .target_tone import ReferenceRender, target_tone
 #: Fraction of the progress for tones, directions and outlines. They are computed once for all strips.
 SHARED_SHARE = 0.3
 
-#: Contrast of streaks in colored pictures, relative to gray pictures.
+#: Contrast of streaks in colored pictures, relative to streaks in gray pictures.
 COLOR_CONTRAST = 1.5
 
 

@@ -411,7 +411,7 @@ def _rotate(x: np.ndarray, y: np.ndarray, angle: float) -> tuple[np.ndarray, np.
 def _apply_harmonics(
     field: PixelField, block: slice, x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Compute `PixelField.member_direction` for a block of pixels.
+    """Compute `PixelField.member_direction`, the directions of members, for a block of pixels.
 
     Directions are given and returned as real and imaginary parts, x and y.
     """

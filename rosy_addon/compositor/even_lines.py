@@ -348,7 +348,7 @@ class _InstanceLines:
         Returns
         -------
         streaks, period : (M, n) float32 ndarray
-            See `EvenLines`. The period is the one of lines with the ratio 1.
+            See `EvenLines`. `period` is the distance between lines with the ratio 1.
         growth : (n,) float32 ndarray
             See `EvenLines`; 0 where no further lines grow.
         """

@@ -11,8 +11,8 @@ again. The three kernels are a third of the cycle apart, so the squares of their
 sum, and the contrast is constant. After a cycle the picture is the same, so an animation can loop.
 
 Streaks of a field of odd degree drift along its directions. In a field of even degree, each direction has its
-opposite, so a line has no sign. Its streaks drift toward the guiding angle. Where the line is perpendicular to
-the guiding angle, half of the kernel moves one way and half the other way.
+opposite, so a line has no sign. Its streaks drift toward the guiding angle. Where the line is perpendicular
+to the guiding angle, half of the kernel moves one way and half the other way.
 
 Cabral and Leedom (Imaging vector fields using line integral convolution, SIGGRAPH 1993) move streaks by
 kernels that are periodic along the streamline. Those change their shape, and have no constant contrast.

@@ -2,16 +2,16 @@
 
 Hatching draws ink where a streak exceeds the threshold of a target coverage (`hatching`). The inverse does
 not depend on the tone: the target coverage above which a given streak has ink. In this module, this
-coverage is called the *threshold* of the point. Thresholds are evenly distributed from 0 to 1, like the values
-of a halftone screen. Once they are known, hatching of any tone is a comparison: there is ink where the
+coverage is called the *threshold* of the point. Thresholds are evenly distributed from 0 to 1, like the
+values of a halftone screen. Once they are known, hatching of any tone is a comparison: there is ink where the
 threshold is below the target coverage.
 
 M lines (pairs of opposite directions of the field) cross at a point. The first covers the light tones, and
 further lines join in darker tones. Their thresholds are stored in that order, in *layers*. A tone with the
-transmittance T has the *density* -log(T). A line with the threshold t and the share s of the ink has ink where
-the density of the tone exceeds -log(1 - t) / s. Where two lines swap their places in the order, each has a
-share between those of the two places. Both are merged into the first of the two layers, which has ink where the
-density of the tone exceeds the smaller of both bounds. Such thresholds depend on the shares.
+transmittance T has the *density* -log(T). A line with the threshold t and the share s of the ink has ink
+where the density of the tone exceeds -log(1 - t) / s. Where two lines swap their places in the order, each
+has a share between those of the two places. Both are merged into the first of the two layers, which has ink
+where the density of the tone exceeds the smaller of both bounds. Such thresholds depend on the shares.
 """
 
 from __future__ import annotations
@@ -123,8 +123,8 @@ def _streak_thresholds(
 ) -> np.ndarray:
     """Compute `line_thresholds` for a LIC image with mean 0 and standard deviation 1.
 
-    `table` is `StreakStatistics.threshold`. `break_streak` is the same for short streamlines; None if lines are
-    not broken.
+    `table` is `StreakStatistics.threshold`. `break_streak` is the same for short streamlines; None if lines
+    are not broken.
     """
     if break_streak is None:
         return _coverage_from(streak, table)

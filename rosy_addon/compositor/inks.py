@@ -156,7 +156,7 @@ def ink_count(look: Look, line_count: int, family_count: int) -> int:
     line_count : int
         M, the number of lines through a pixel.
     family_count : int
-        Number of families of lines of the field. 1 if it does not distinguish its lines.
+        Number of families of lines of the field; 1 if the field does not distinguish families.
     """
     if not has_ink_per_line(look):
         return 1

@@ -283,7 +283,7 @@ class StreamlineBatch:
         direction: np.ndarray,
         lateral: np.ndarray,
     ) -> None:
-        """Fill the row `step` of `_states` and `_lateral_offset`. Lanes that have ended are in `SINK_CELL`."""
+        """Fill a row of `_states` and `_lateral_offset`. Lanes that have ended are in `SINK_CELL`."""
         records = [(self._states, state), (self._lateral_offset, lateral)]
         if self._axial_offset is not None:
             axial = axial_steps(lanes.position, direction, self._step_scale / np.float32(1.5))
@@ -306,9 +306,9 @@ class StreamlineBatch:
     def _tapered_sums(self, step: int, half_width: int | np.ndarray, lanes: int) -> np.ndarray:
         """Return (2 n, K) complex64 sums of the noise around step i, with tapered weights.
 
-        The kernel reaches r = `half_width` steps in each direction. With the sums of prefix sums E, the sum is
-        (E(i + r) - 2 E(i - 1) + E(i - r - 2)) / (r + 1), because a triangular kernel is the mean of r + 1 box
-        kernels of r + 1 steps, each one step further.
+        The kernel reaches r = `half_width` steps in each direction. With the sums of prefix sums E, the sum
+        is (E(i + r) - 2 E(i - 1) + E(i - r - 2)) / (r + 1), because a triangular kernel is the mean of r + 1
+        box kernels of r + 1 steps, each one step further.
         """
         total = self._second_prefix_sums(step + half_width, lanes)
         total = total - 2 * self._second_prefix_sums(step - 1, lanes)
@@ -323,9 +323,9 @@ class StreamlineBatch:
 
         The sum along a lane with weights that fall from 2 r + 1 to 1, r = `half_width`, is
         E(i + r) - E(i - r - 1) - (2 r + 1) P(i - r - 1). E are the sums of prefix sums, and
-        P(i) = E(i) - E(i - 1) are the prefix sums. If a lane runs against the field (`is_along` is False), the
-        weights rise along the lane. The sum is then that of a box of the weight 2 r + 2 minus the sum above.
-        All sums are divided by r + 1.
+        P(i) = E(i) - E(i - 1) are the prefix sums. If a lane runs against the field (`is_along` is False),
+        the weights rise along the lane. The sum is then that of a box of the weight 2 r + 2 minus the sum
+        above. All sums are divided by r + 1.
         """
         last, before = step + half_width, step - half_width - 1
         sums_through, sums_before = (self._second_prefix_sums(i, lanes) for i in (last, before))

@@ -65,8 +65,8 @@ class _Surroundings(NamedTuple):
     Attributes
     ----------
     states : list of (n,) intp ndarray
-        For each of the four pixels: its states, on the sheets (directions of the field) that match the sheet of
-        the point. Where streamlines cannot step to a pixel, the state of the first pixel is used.
+        For each of the four pixels: its states, on the sheets (directions of the field) that match the sheet
+        of the point. Where streamlines cannot step to a pixel, the state of the first pixel is used.
     unlinked : list of (m,) intp ndarray
         For each of the other three pixels: the indices of points whose streamlines cannot step there.
     column, row : (n,) intp ndarray
@@ -229,8 +229,8 @@ class Sheets:
     def linked_neighbors(self, cell: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return the steps that streamlines can make from (n,) cells to each of the four nearest neighbors.
 
-        The result is a pair of arrays for each neighbor: the cells where such steps start, and the cells where
-        they arrive.
+        The result is a pair of arrays for each neighbor: the cells where such steps start, and the cells
+        where they arrive.
         """
         steps = []
         for bit, (column, row) in enumerate(NEIGHBOR_OFFSETS):

@@ -1,7 +1,7 @@
 """Tracing of streamlines on a covering surface, many at once, in both directions from their seeds.
 
-A *lane* is one half of a streamline, forward or backward. A *state* is a pixel with one direction of the field
-there, and *sheet* is the number of that direction (see `covering`).
+A *lane* is one half of a streamline, forward or backward. A *state* is a pixel with one direction of the
+field there, and *sheet* is the number of that direction (see `covering`).
 """
 
 from __future__ import annotations
@@ -197,7 +197,7 @@ class TracedLanes:
         self._target_phase[crossing] += seams.sheet_shift.take(seam)
 
     def _choose_sheets(self) -> None:
-        """Choose the sheet (direction of the field) of each new cell that is nearest to the last direction."""
+        """Choose in each new cell the sheet (direction of the field) nearest to the previous direction."""
         self._packed_phase = self._covering.packed_phase.take(self._cell, mode="clip")
         self._target_phase -= self._packed_phase
         np.rint(self._target_phase, out=self._target_phase)
@@ -255,7 +255,7 @@ def lateral_offset(position: np.ndarray, direction: np.ndarray) -> np.ndarray:
 
 
 def axial_steps(position: np.ndarray, direction: np.ndarray, step_scale: np.float32) -> np.ndarray:
-    """Return the (n,) float32 distances along streamlines from positions to the centers of cells, in steps."""
+    """Return the (n,) float32 steps from positions to the centers of cells, measured along streamlines."""
     square = direction.real * direction.real + direction.imag * direction.imag
     along = position.real * direction.real + position.imag * direction.imag
     return along / np.minimum(-step_scale * square, np.float32(-1))

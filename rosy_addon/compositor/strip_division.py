@@ -30,15 +30,15 @@ from .undirected import disc_offsets
 #: the memory.
 STRIP_STATES = 1 << 20
 
-#: Minimum number of rows of a strip, in multiples of the `streamline_margin`, so that margins are a small part
-#: of the work.
+#: Minimum number of rows of a strip, in multiples of the `streamline_margin`, so that margins are a small
+#: part of the work.
 MIN_STRIP_MARGINS = 4
 
 #: Maximum number of rows between a pixel and the neighbors of its neighbors.
 NEIGHBOR_ROWS = 4
 
-#: Maximum number of pixels in the strips that one process draws together, unless a single strip has more. This
-#: bounds the memory.
+#: Maximum number of pixels in the strips that one process draws together, unless a single strip has more.
+#: This bounds the memory.
 MAX_GROUP_PIXELS = 1 << 21
 
 

@@ -1,11 +1,11 @@
 """Strips: ranges of rows of a picture that are drawn independently of each other.
 
 How a picture is cut into strips does not depend on the number of processes (see `strip_division`). A strip
-depends on a limited number of rows around it, its context. It is the same to the last bit in every process. So several
-processes can share a picture.
+depends on a limited number of rows around it, its context. It is the same to the last bit in every process.
+So several processes can share a picture.
 
-Streamlines differ between two strips. So the first rows of a strip are drawn twice, also with the strip below,
-and fade from the lower strip to the upper one (`join_strips`).
+Streamlines differ between two strips. So the first rows of a strip are drawn twice, also with the strip
+below, and fade from the lower strip to the upper one (`join_strips`).
 """
 
 from __future__ import annotations

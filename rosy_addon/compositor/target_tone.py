@@ -168,8 +168,8 @@ def apply_tone_curve(tone: np.ndarray, look: Look) -> np.ndarray:
     tone : ndarray
         Tones, of any shape.
     look : Look
-        Its `tone_levels` are the black point, the white point and the gamma. The black point becomes 0 and the
-        white point 1; the gamma is applied after that.
+        Its `tone_levels` are the black point, the white point and the gamma. The black point becomes 0 and
+        the white point 1; the gamma is applied after that.
 
     Returns
     -------

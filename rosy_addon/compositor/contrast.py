@@ -14,7 +14,7 @@ def normalize_variance(
 ) -> np.ndarray:
     """Scale averages over streamlines that ended early to the variance of full streamlines.
 
-    The mean of n samples has full / n times the variance of the mean of all samples. Without this
+    If full streamlines have m samples, the mean of n samples has m / n times their variance. Without this
     correction, contrast is too high at borders and around zeros of the field. Means over less than
     two cells of the noise fade to gray, because they would look like dots, not streaks.
 

@@ -123,7 +123,10 @@ def channel_shifts(phase: float, distance: float) -> np.ndarray:
 
 
 def blend_channels(noise: np.ndarray, phase: float) -> np.ndarray:
-    """Return the (P, 1) float32 blend of (P, 3) noise around 0, with the variance of one channel."""
+    """Return the (P, 1) float32 sum of the weighted channels of (P, 3) noise with the mean 0.
+
+    It has the variance of one channel.
+    """
     return noise @ channel_weights(phase).astype(np.float32)[:, None]
 
 

@@ -247,7 +247,7 @@ def _scaled_length(look: Look, setting: Number, scale: float) -> Any:
 
 
 def preview_look(look: Look, downscale: int) -> Look:
-    """Return the look for a preview with fewer pixels, in which streaks appear in the same size.
+    """Return the look for a preview with fewer pixels, in which streaks have the same size on screen.
 
     Parameters
     ----------

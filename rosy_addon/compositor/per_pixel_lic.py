@@ -28,7 +28,7 @@ from .pixel_field import (
     normalized,
 )
 
-#: Function (entries, offsets) -> directions; see `direction_at` of `integrate_noise`.
+#: Function (indices of pixels, offsets) -> directions; see `direction_at` of `integrate_noise`.
 DirectionSampler = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 #: Function that takes a block of pixels, and returns a sampler for one half (forward or backward) of the

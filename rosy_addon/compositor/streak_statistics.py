@@ -206,7 +206,7 @@ def _threshold_tables(samples: list[np.ndarray], half_width: float) -> np.ndarra
 def _noise_sample(
     shape: tuple[int, int], cell: float, density: float, high_pass: float, anchored: bool
 ) -> np.ndarray:
-    """Make an image of noise in image space or, if `anchored`, as on a surface.
+    """Make an image of the noise in image space or, if `anchored`, of the noise on a flat surface.
 
     On the surface, the cells of the middle octave have the size `cell` on screen.
     """

@@ -98,11 +98,12 @@ def wobble_angle(gbuffer: GBuffer, look: PixelLook) -> np.ndarray:
 
 
 def solid_wobble_angle(position: np.ndarray, line_width: np.ndarray) -> np.ndarray:
-    """Compute the angle between drawn lines and the field in rest space, for a `Look.wobble` of 1.
+    """Compute the angle between drawn lines and the field at 3D positions, for a `Look.wobble` of 1.
 
     Parameters
     ----------
     position : (3, n) float32 ndarray
+        Positions in the rest space of meshes.
     line_width : (n,) or () float32 ndarray
         Width of the lines at these positions, in units of rest space.
 

@@ -338,7 +338,7 @@ def unpack_neighbor_mask(packed_phase: np.ndarray) -> np.ndarray:
 
 
 def _pack_neighbor_mask(phase: np.ndarray, bits: np.ndarray | int) -> np.ndarray:
-    """Return phases with neighbor masks in the last bits of their mantissas."""
+    """Return float32 phases whose last nine bits of the mantissa are replaced by neighbor masks."""
     return (phase.view(np.uint32) & ~np.uint32(ALL_NEIGHBORS) | bits).view(np.float32)
 
 

@@ -254,7 +254,7 @@ class _LineAverages:
         return line[~is_known]
 
     def missing_lines(self) -> np.ndarray:
-        """Return the indices of the lines that need an average and have none yet."""
+        """Return the indices of the lines (see the class) that need an average and have none yet."""
         return np.flatnonzero(self._values[:, :, -1] == 0)
 
     def filter_missing(self, line: np.ndarray) -> np.ndarray:
@@ -304,7 +304,10 @@ class _LineAverages:
         return values
 
     def gather(self, cell: np.ndarray, line: np.ndarray) -> np.ndarray:
-        """Return the stored (M, n, K + 1) float32 values of the M lines of n cells, in the order `line`."""
+        """Return the stored (M, n, K + 1) float32 values of the lines of n cells.
+
+        `line` holds the numbers of the M lines of a cell in the order of the result.
+        """
         result = np.empty((len(line), len(cell), self._values.shape[2]), dtype=np.float32)
         for line_index, out in zip(line, result, strict=True):
             rows_as_scalars(out)[:] = rows_as_scalars(self._values[line_index]).take(cell)

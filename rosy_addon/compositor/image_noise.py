@@ -237,7 +237,7 @@ def _noise_tiles(
 
 
 def high_pass_margin(high_pass: float) -> int:
-    """Return the radius in pixels of the neighborhood on which the noise of a pixel depends, for a high pass."""
+    """Return the radius in pixels around a pixel on which its noise depends because of the high pass."""
     return int(np.ceil(3 * BLUR_FACTOR * high_pass))
 
 

@@ -224,14 +224,17 @@ def ordered_thresholds(
 def _layer_densities(layers: int, layering: float) -> np.ndarray:
     """Tabulate the (layers, DENSITY_STEPS) float32 density of each layer, by the total density `DENSITIES`.
 
-    Each row increases strictly. Beyond the table it continues linearly.
+    Density is -log(transmittance). Each row increases strictly. Beyond the table it continues linearly.
     """
     shares = np.stack(layer_shares(-np.expm1(-DENSITIES), layers, layering))
     return (DENSITIES * np.maximum(shares, LEAST_SHARE)).astype(np.float32)
 
 
 def _layer_density(table: np.ndarray, total: np.ndarray) -> np.ndarray:
-    """Return the density of a layer at total densities, interpolated in its row of `_layer_densities`."""
+    """Return the optical density of a layer for total densities of all layers.
+
+    `table` is the row of the layer in `_layer_densities`, which is interpolated.
+    """
     position = total / DENSITIES[1]
     index = np.minimum(position, DENSITY_STEPS - 2).astype(np.intp)
     return table[index] + (position - index) * (table[index + 1] - table[index])
@@ -239,6 +242,8 @@ def _layer_density(table: np.ndarray, total: np.ndarray) -> np.ndarray:
 
 def _merged_densities(density: np.ndarray, places: np.ndarray, table: np.ndarray) -> np.ndarray:
     """Return the density of each layer above which it has ink, where lines swap their places in the order.
+
+    Lines that swap are merged into the first of the two layers. Density is -log(transmittance).
 
     Parameters
     ----------

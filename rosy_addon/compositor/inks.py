@@ -100,13 +100,19 @@ class Inks:
         return dark + tone[:, None] * (light - dark)
 
     def transmittance(self, ink: np.ndarray) -> np.ndarray:
-        """Return the (..., 3) ratio of ink to paper in each channel; of their complements for light ink."""
+        """Return the (..., 3) ratio of ink to paper in each channel.
+
+        If the ink is lighter than the paper, it is the ratio of the complements, (1 - ink) / (1 - paper).
+        """
         return self.complement_if_light(ink) / np.maximum(
             self.complement_if_light(self.paper), 1e-3
         )
 
     def luminance_transmittance(self, ink: np.ndarray) -> np.ndarray:
-        """Return the (...,) ratio of the luminances of ink and paper; of their complements for light ink."""
+        """Return the (...,) ratio of the luminances of ink and paper.
+
+        If the ink is lighter than the paper, it is the ratio of 1 - luminance.
+        """
         paper_luminance = float(self.complement_if_light(self.paper) @ LUMINANCE_WEIGHTS)
         return (self.complement_if_light(ink) @ LUMINANCE_WEIGHTS) / max(paper_luminance, 1e-3)
 

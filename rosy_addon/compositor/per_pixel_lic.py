@@ -70,9 +70,9 @@ def brute_force(field: PixelField, look: PixelLook, noise: np.ndarray) -> LicIma
 def _best_match_sampler(
     candidates: np.ndarray, direction_tables: np.ndarray, line: int, block: slice
 ) -> DirectionSampler:
-    """Make a sampler that starts along one member and then follows the best match.
+    """Make a function for directions that starts along one member and then follows the best match.
 
-    It stores the current member of each streamline between calls.
+    The function stores the current member of each streamline between calls.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def _one_set(
 
 
 def _member_sampler(table: np.ndarray, _block: slice) -> DirectionSampler:
-    """Make a sampler of one vector field on screen, given its `direction_table`."""
+    """Make a function for the directions of one vector field on screen, given its `direction_table`."""
     return lambda entry, offset: interpolate_direction(table.take(entry, axis=0), offset)
 
 

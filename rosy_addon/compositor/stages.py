@@ -52,7 +52,7 @@ class ComposeStages:
         self._mesh_cache = mesh_cache
 
     def pixel_field(self, degree: int, look: PixelLook) -> PixelField:
-        """Return the pixel field of one degree, rotated by the wobble of the look."""
+        """Return the `PixelField` of one degree, with its directions rotated by the wobble of the look."""
         crease_angle = crease_angle_of(look)
         field = self._cache.get_or_create(
             ("pixel field", self._gbuffer, degree, crease_angle),

@@ -47,11 +47,11 @@ class Origins(NamedTuple):
         )
 
     def at(self, state: np.ndarray) -> Origins:
-        """Return the origins of the states with the given indices."""
+        """Return the origins of the states (pixels with a direction) that have the given indices."""
         return Origins(*(values.take(state) for values in self))
 
     def put(self, state: np.ndarray, origins: Origins) -> None:
-        """Replace the origins of the states with the given indices."""
+        """Replace the origins of the states (pixels with a direction) that have the given indices."""
         for values, new in zip(self, origins, strict=True):
             values[state] = new
 
@@ -82,7 +82,7 @@ class _Surroundings(NamedTuple):
     weights: list[np.ndarray]
 
     def interpolate(self, values: np.ndarray) -> np.ndarray:
-        """Return the (n,) interpolated values at the points, given the values of all states."""
+        """Return the (n,) interpolated values at the points, given a value for each state of `Sheets`."""
         total = values.take(self.states[0])
         total *= self.weights[0]
         for state, weight in zip(self.states[1:], self.weights[1:], strict=True):

@@ -129,7 +129,7 @@ def solid_wobble_angle(position: np.ndarray, line_width: np.ndarray) -> np.ndarr
 
 
 def rotate_pixel_field(field: PixelField, angle: np.ndarray) -> PixelField:
-    """Rotate the directions of a pixel field in the view plane.
+    """Return a pixel field with its directions rotated in the view plane.
 
     Parameters
     ----------

@@ -84,7 +84,7 @@ class EvenLines:
     coarse_streaks: np.ndarray | None = None
 
     def part(self, extent: slice) -> EvenLines:
-        """Return the lines at some of the pixels."""
+        """Return the evenly spaced lines at the pixels `extent`."""
         arrays = self.streaks, self.period, self.growth, self.coarse_streaks
         return EvenLines(*(None if values is None else values[..., extent] for values in arrays))
 
@@ -337,7 +337,7 @@ class _InstanceLines:
         self._sides = np.stack([(corner - first).astype(np.float32) for corner in others])
 
     def at(self, pixels: np.ndarray, ratio: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Evaluate the lines at some pixels of the field.
+        """Evaluate the evenly spaced lines of the instance at some pixels of the field.
 
         Parameters
         ----------

@@ -258,7 +258,7 @@ class _LineAverages:
         return np.flatnonzero(self._values[:, :, -1] == 0)
 
     def filter_missing(self, line: np.ndarray) -> np.ndarray:
-        """Return the lines, among those given, that need an average and have none yet."""
+        """Return the elements of `line` (indices of lines) that need an average and have none yet."""
         return line[self._flat[:, -1].take(line) == 0]
 
     def smooth(self, covering: Covering, cells: np.ndarray) -> None:

@@ -94,7 +94,7 @@ class HatchedLines(NamedTuple):
     even_lines: EvenLines | None = None
 
     def part(self, extent: slice) -> HatchedLines:
-        """Return the lines at some of the pixels."""
+        """Return the lines and what makes them uneven at the pixels `extent`."""
         return HatchedLines(self.look, *(_part(values, extent) for values in self[1:]))
 
     def relief(self, line: int) -> np.ndarray | np.float32:

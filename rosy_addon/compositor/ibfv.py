@@ -99,7 +99,7 @@ class StreakWaves:
 
 
 def wave_images(waves: Sequence[StreakWaves], looks: Sequence[PixelLook]) -> list[LicImages]:
-    """Return the LIC images of each look at its phase of the flow, from its waves."""
+    """Return the LIC images of each look at its phase of the flow, from its `StreakWaves`."""
     return [wave.images(look.flow_phase) for wave, look in zip(waves, looks, strict=True)]
 
 

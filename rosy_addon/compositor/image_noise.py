@@ -242,7 +242,7 @@ def high_pass_margin(high_pass: float) -> int:
 
 
 def box_radius(sigma: float) -> int:
-    """Return the radius in pixels of each of the three box filters of `gaussian_blur`."""
+    """Return the radius in pixels of the three box filters that make up `gaussian_blur`."""
     # A box filter of the width w has the variance (w^2 - 1) / 12.
     return max(int(np.rint((np.sqrt(4 * sigma**2 + 1) - 1) / 2)), 1)
 

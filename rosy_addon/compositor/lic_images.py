@@ -41,7 +41,7 @@ class LicImages:
     slopes: np.ndarray | None = None
 
     def part(self, extent: slice) -> LicImages:
-        """Return the images at some of the pixels."""
+        """Return the LIC images at the pixels `extent`."""
         return LicImages(
             self.members[:, extent],
             self.blend[extent],

@@ -136,7 +136,7 @@ class PixelField:
         return next((number for kind, number in self.channels if kind == "family"), 1)
 
     def part(self, extent: slice | np.ndarray) -> PixelField:
-        """Return the field at some of the pixels, without `seam_steps`.
+        """Return the field at the pixels `extent`, without `seam_steps`.
 
         The `neighbor_mask` of the result may refer to pixels that are left out.
         """

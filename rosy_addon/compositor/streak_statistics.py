@@ -152,7 +152,7 @@ def _measured(look: PixelLook) -> StreakStatistics:
 
 
 def break_amount(target_coverage: np.ndarray, breaks: float, wobble: float) -> np.ndarray:
-    """Compute the weight of the short streaks, which break lines into pieces, at coverages.
+    """Compute the weight of the short streaks that break lines into pieces, for each target coverage.
 
     Lines break first where the coverage is low. Wobble adds the same amount everywhere, which makes
     lines vary in width.

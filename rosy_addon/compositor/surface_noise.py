@@ -228,7 +228,7 @@ def feature_scale(
 ) -> np.ndarray:
     """Compute the factor, up to 1, by which cells are scaled down on small features of the surface.
 
-    It is proportional to the radius of curvature on screen below `FEATURE_CELLS` cells.
+    Where the radius of curvature on screen is below `FEATURE_CELLS` cells, the factor is proportional to it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The colors of numbers on surfaces: their range, and where they are in the color map."""
+"""Color values: numbers on the surfaces that a color map shows. Their range and positions in the map."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from ..projection.surface_sampling import surface_values
 from .look import Look, colors_values
 from .reported_blocks import reported_blocks
 
-#: Smallest difference between the numbers at the bottom and at the top of the color map. With it, the
-#: map is a step: larger numbers have the color at the top.
+#: Smallest difference between the color values at the bottom and at the top of the color map. If the
+#: difference is that small, the map is a step: larger values have the color at the top.
 MIN_VALUE_RANGE = 1e-30
 
-#: The lowest and the highest of some numbers; None if there are none.
+#: The lowest and the highest of some color values; None if no value is finite.
 ValueRange = tuple[float, float] | None
 
 
 def check_color_values(look: Look, instances: Iterable[MeshInstance]) -> None:
-    """Check that there are numbers on a surface if a look colors them.
+    """Check that a surface has color values if the look shows them; pass if it does not.
 
     Raises
     ------
     RosyError
-        If no mesh instance with a field has any.
+        If the look shows color values, and no mesh instance with a field has any.
     """
     if colors_values(look) and all(
         instance.color_values is None for instance in instances if instance.field is not None
@@ -35,7 +35,7 @@ def check_color_values(look: Look, instances: Iterable[MeshInstance]) -> None:
 
 
 def value_range(values: np.ndarray) -> ValueRange:
-    """Return the range of the finite ones of some numbers."""
+    """Return the lowest and the highest finite value, or None if no value is finite."""
     finite = np.isfinite(values)
     if not finite.any():
         return None
@@ -44,7 +44,7 @@ def value_range(values: np.ndarray) -> ValueRange:
 
 
 def value_ranges(instances: Iterable[MeshInstance]) -> list[ValueRange]:
-    """Return the range of the numbers of each mesh instance that has a field and numbers."""
+    """Return the `value_range` of each mesh instance that has both a field and color values."""
     return [
         value_range(instance.color_values)
         for instance in instances
@@ -53,14 +53,15 @@ def value_ranges(instances: Iterable[MeshInstance]) -> list[ValueRange]:
 
 
 def value_ends(look: Look, ranges: Iterable[ValueRange]) -> tuple[float, float]:
-    """Return the numbers at the bottom and at the top of the color map of a look.
+    """Return the color values at the bottom and at the top of the color map.
 
     Parameters
     ----------
     look : Look
-        If both ends of its `color_range` are 0, the range of the numbers is used.
+        Its `color_range` is returned, unless both ends of it are 0.
     ranges : iterable of (float, float) or None
-        From `value_range`, of the mesh instances that have a field and numbers.
+        Ranges of color values from `value_ranges`. If both ends of `color_range` are 0, the smallest range
+        that contains them all is returned, or (0, 0) if there is none.
     """
     if any(look.color_range):
         return look.color_range
@@ -69,9 +70,9 @@ def value_ends(look: Look, ranges: Iterable[ValueRange]) -> tuple[float, float]:
 
 
 def value_scale(look: Look, ranges: Iterable[ValueRange]) -> tuple[float, float]:
-    """Return (low, scale) of a look: a number v is at (v - low) * scale in the color map.
+    """Return (low, scale): the color value v is at the position (v - low) * scale in the color map.
 
-    Parameters as in `value_ends`.
+    The parameters are those of `value_ends`.
     """
     low, high = value_ends(look, ranges)
     difference = high - low
@@ -81,23 +82,27 @@ def value_scale(look: Look, ranges: Iterable[ValueRange]) -> tuple[float, float]
 
 
 def scaled_positions(values: np.ndarray, low: float, scale: float) -> np.ndarray:
-    """Return the (P,) float32 positions of (P,) numbers in the color map, 0 to 1; see `value_scale`."""
+    """Return the (P,) float32 positions of (P,) color values in the color map, clipped to 0 to 1.
+
+    `low` and `scale` are from `value_scale`.
+    """
     return np.clip((values.astype(np.float64) - low) * scale, 0, 1).astype(np.float32)
 
 
 def map_positions(gbuffer: GBuffer, look: Look) -> np.ndarray:
-    """Find where the numbers of the surfaces are in the color map.
+    """Compute the position in the color map of the color value at each pixel.
 
     Parameters
     ----------
     gbuffer : GBuffer
-        With `instances`. The numbers of all of them, visible or not, are the range of the color map.
+        Its `instances` must be set. The color map spans the color values of all instances, visible or not,
+        unless the look has a `color_range`.
     look : Look
 
     Returns
     -------
     (P,) float32 ndarray
-        0 to 1 at the pixels of the G-buffer; NaN where there is no number.
+        0 to 1 at the pixels of the G-buffer; NaN where the surface has no color value.
 
     Raises
     ------

@@ -51,10 +51,10 @@ from .strip_division import divide_into_strips
 from .strips import Strip, join_strips
 from .target_tone import ReferenceRender, target_tone
 
-#: Share of the progress that tones, directions and outlines take, which all strips share.
+#: Fraction of the progress for tones, directions and outlines. They are computed once for all strips.
 SHARED_SHARE = 0.3
 
-#: Contrast of streaks in colored pictures, relative to gray pictures.
+#: Contrast of streaks in colored pictures, relative to streaks in gray pictures.
 COLOR_CONTRAST = 1.5
 
 
@@ -69,38 +69,39 @@ def compose(
     draws_thresholds: bool = False,
     drift: Drift = NO_DRIFT,
 ) -> Picture:
-    """Draw the fields of a G-buffer.
+    """Draw the picture of the fields at the pixels of a G-buffer.
 
     Parameters
     ----------
     gbuffer : GBuffer
-        Its resolution is that of the picture times `look.supersampling`, in both directions; or that
-        of the picture, if it has a `coverage`.
+        It has the width and the height of the picture times `look.supersampling`; if it has a
+        `coverage`, it has the width and the height of the picture itself.
     look : Look
-        As the user set it.
+        The settings of the user, with lengths in pixels of the picture.
     lights : sequence of Light
-        Lights of the scene in the space of the camera. Used if the light of the look is "scene".
+        Lights of the scene in camera space. Used if the light of the look is "scene".
     reference : ReferenceRender, optional
         Required if the tone of the look is "picture".
     cache : Cache, optional
-        Stores intermediate results. For the same G-buffer and another look, those that do not
+        Stores intermediate results. For the same G-buffer and another look, the results that do not
         depend on the changed settings are reused.
     mesh_cache : Cache, optional
-        Stores what does not depend on the camera, by default `cache`.
+        Stores results that do not depend on the camera. By default `cache` stores them, too.
     strips : sequence of Strip, optional
-        The rows that are drawn, from `divide_into_strips`; by default all. The G-buffer has them and their
-        context. A G-buffer of samples that are shaded one by one is a single strip.
+        Rows to draw, from `divide_into_strips`; by default all rows. The G-buffer must contain these rows
+        and the rows around them that streamlines reach. Samples that are shaded one by one are a single
+        strip.
     draws_thresholds : bool
-        Whether the picture has the thresholds of its ink (`ink_thresholds`), if the look has ink. They do
-        not depend on the tone.
+        Whether to draw the thresholds of the ink (`ink_thresholds`), which do not depend on the tone,
+        instead of the ink. Without effect if the look has no ink.
     drift : Drift
-        How far streaks have drifted.
+        How far the streaks of an animation have drifted.
 
     Returns
     -------
     Picture
-        The rows of the strips and, if others follow, the rows in which the last strip fades into the
-        one above.
+        The rows of the strips. If the last strip is not the topmost one of the picture, the rows in which
+        it fades into the strip above follow.
 
     Raises
     ------
@@ -141,7 +142,7 @@ def compose(
 def _draw_strips(
     stages: ComposeStages, canvas: _Canvas, layers: Sequence[_Layer], strips: Sequence[Strip]
 ) -> list[np.ndarray]:
-    """Draw all layers, strip by strip. Return the picture, and the spread of its thresholds."""
+    """Draw all layers, strip by strip. Return the RGBA picture, and the image of `_Canvas.spread`."""
     pictures = []
     for number, strip in enumerate(strips):
         for index, layer in enumerate(layers):
@@ -156,7 +157,10 @@ def _draw_strips(
 def _color_range(
     gbuffer: GBuffer, look: Look, layers: Sequence[_Layer], canvas: _Canvas
 ) -> tuple[float, float] | None:
-    """Return the values at the ends of the color map; None if it shows none, or none that are common."""
+    """Return the values at the ends of the color map, for the color key.
+
+    None if the picture has no color map, or if the fields of different degrees have different color ranges.
+    """
     if canvas.map_position is not None:
         return value_ends(look, value_ranges(gbuffer.instances))
     if colors_magnitude(look):
@@ -165,7 +169,7 @@ def _color_range(
 
 
 class _Canvas:
-    """The colors of the pixels of a G-buffer, which strips fill one after the other.
+    """The colors of the pixels of a G-buffer. They are drawn strip by strip.
 
     Attributes
     ----------
@@ -174,12 +178,13 @@ class _Canvas:
         Degrees of the visible fields.
     tone_rgb : (P, 3) or (P, 1) float32 ndarray
     map_position : (P,) float32 ndarray or None
-        Where the numbers of pixels are in the color map, if they are drawn.
+        Position in the color map of the color value of each pixel; None if the look does not show color
+        values.
     color : (P, 3) float32 ndarray
         Linear, not premultiplied.
     alpha : (P,) float32 ndarray
     spread : (P, 1) float32 ndarray
-        The fourth channel of thresholds; 0 pixels without.
+        Fourth channel of thresholds of ink (`ink_thresholds`). It has 0 pixels if no thresholds are drawn.
     """
 
     def __init__(
@@ -205,7 +210,7 @@ class _Canvas:
         self.spread = np.zeros((count if draws_thresholds else 0, 1), dtype=np.float32)
 
     def picture(self, strip: Strip) -> tuple[np.ndarray, np.ndarray]:
-        """Return the pictures of a strip: its colors, and its spread, which is empty without thresholds."""
+        """Return two images of a strip: its colors, and the `spread` (empty if no thresholds are drawn)."""
         rgba = self._resolved(self.color, strip.drawn_rows)
         if not self.draws_thresholds:
             return rgba, rgba[:, :0]
@@ -237,7 +242,9 @@ class _Canvas:
             band_of_frame = rows[0] + start * s, rows[0] + (start + len(band)) * s
             first_pixel = band_of_frame[0] * width
             block = entries_of_rows(pixel, width, band_of_frame)
-            if block.start == block.stop:  # rows that are not written to take no memory
+            if (
+                block.start == block.stop
+            ):  # rows without pixels: memory that is not written to is not used
                 continue
             # Colors are premultiplied for averaging. Subpixels without a field are black, with alpha 0.
             band_rgba = np.zeros((band.size // 4 * s * s, 4), dtype=np.float32)
@@ -268,16 +275,16 @@ class _Canvas:
 
 
 class _Layer(NamedTuple):
-    """What the strips of the fields of one degree share.
+    """Data of the fields of one degree that is the same for all strips.
 
     Attributes
     ----------
     field : PixelField
     lines : HatchedLines
-        Without what depends on the strip. Their look is for the symmetry of the field and the range of its
-        magnitudes.
+        The attributes that depend on the strip, such as the LIC images, are not set. The `look` is adapted
+        to the symmetry of the field and the range of its magnitudes.
     tone : (P,) float32 ndarray or None
-        The tone, if the look is hatched.
+        Target tone of the pixels of `field`, if the look is hatched; None otherwise.
     """
 
     field: PixelField
@@ -286,7 +293,7 @@ class _Layer(NamedTuple):
 
 
 def _prepare_layer(stages: ComposeStages, canvas: _Canvas, degree: int, look: PixelLook) -> _Layer:
-    """Compute what the strips of the fields of one degree share."""
+    """Compute the data of the fields of one degree that all strips share."""
     with progress(0.0, 0.3):
         field = stages.pixel_field(degree, look)
     look = look.for_symmetry(field.symmetry)
@@ -314,7 +321,9 @@ def _prepare_layer(stages: ComposeStages, canvas: _Canvas, degree: int, look: Pi
         even_lines=even_lines,
     )
     if even_lines is None or undirected is not None or has_breaks(look) or has_paper_grain(look):
-        look_streak_statistics(look)  # `HatchedLines.coverage` finds them in their cache
+        look_streak_statistics(
+            look
+        )  # computed here, so that `HatchedLines.coverage` finds them cached
     tone = canvas.tone_rgb[field.gbuffer_index].mean(axis=1)
     return _Layer(field, lines, np.clip(tone, 0, 1, out=tone))
 
@@ -356,7 +365,10 @@ def _draw_layer(stages: ComposeStages, canvas: _Canvas, layer: _Layer, strip: St
 def _line_images(
     stages: ComposeStages, layer: _Layer, strip: Strip, even_lines: EvenLines | None
 ) -> tuple[LicImages, LicImages | None]:
-    """Return the images of the lines at the pixels of a strip, and of the short streaks that break them."""
+    """Return two LIC images of a strip: the streaks, and the short streaks that break lines into pieces.
+
+    The second one is None if lines are not broken.
+    """
     look, is_broken = layer.lines.look, has_breaks(layer.lines.look)
     looks = [look] if even_lines is None else []
     if is_broken:
@@ -365,16 +377,19 @@ def _line_images(
     break_images = images[-1] if is_broken else None
     if even_lines is None:
         return images[0], break_images
-    # Even lines stand for streaks.
+    # Evenly spaced lines are used in place of the streaks of LIC.
     members = even_lines.streaks[..., None]
     return lic_images(members, np.ones(members.shape[1], dtype=np.float32)), break_images
 
 
 def _tone_along_lines(layer: _Layer, strip: Strip) -> np.ndarray:
-    """Return the (M, n) means of the tones along lines, over the overshoot distance in each direction."""
+    """Return the (M, n) mean tone along the streamline of each of the M directions of the field.
+
+    The mean is over the overshoot distance in each direction, at the n pixels of the strip.
+    """
     # `normalize_variance` scales the means of streamlines that end early. A channel of ones is
-    # scaled by the same factor, which is divided out below. It is there twice, as images have one
-    # or three channels.
+    # scaled by the same factor, which is divided out below. There are two such channels, because LIC
+    # takes one or three channels.
     channels = np.ones((len(layer.tone), 3), dtype=np.float32)
     channels[:, 0] = layer.tone
     look = layer.lines.look.for_means(overshoot_steps(layer.lines.look))
@@ -391,7 +406,10 @@ def _tone_along_lines(layer: _Layer, strip: Strip) -> np.ndarray:
 
 
 def _paper_grain(stages: ComposeStages, field: PixelField, look: PixelLook) -> np.ndarray:
-    """Return the (M, P) heights of the paper for each line, with mean 0 and standard deviation 1."""
+    """Return the (M, P) heights of the paper grain for each of the M directions of the field.
+
+    The mean is 0, the standard deviation 1.
+    """
     if look.anchor == "picture":
         subpixels = look.supersampling
         line_width = look.line_width / subpixels
@@ -408,7 +426,7 @@ def _paper_grain(stages: ComposeStages, field: PixelField, look: PixelLook) -> n
 
 
 def streak_tone(field: PixelField, look: PixelLook, images: LicImages) -> np.ndarray:
-    """Scale blended images to the contrast of one image, times the gain of the look.
+    """Scale the mean of the M member images to the contrast of one image, times the gain of the look.
 
     Returns
     -------
@@ -425,9 +443,10 @@ def streak_tone(field: PixelField, look: PixelLook, images: LicImages) -> np.nda
 
 
 def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: PixelLook) -> np.ndarray:
-    """Return the (P, 3) or (P, 1) linear colors of pixels: gray, or colored by magnitude, family or numbers.
+    """Return the (P, 3) or (P, 1) linear colors of pixels.
 
-    `tone`, (P, K), is from `streak_tone`. Pixels without a number are gray.
+    Pixels are gray, or colored by the magnitude, the family of lines or the color values, as the look says.
+    Pixels without a color value are gray. `tone`, (P, K), is from `streak_tone`.
     """
     hue, position = None, None
     if colors_magnitude(look):

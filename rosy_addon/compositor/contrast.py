@@ -14,7 +14,7 @@ def normalize_variance(
 ) -> np.ndarray:
     """Scale averages over streamlines that ended early to the variance of full streamlines.
 
-    The mean of n samples has full / n times the variance of the mean of all samples. Without this
+    If full streamlines have m samples, the mean of n samples has m / n times their variance. Without this
     correction, contrast is too high at borders and around zeros of the field. Means over less than
     two cells of the noise fade to gray, because they would look like dots, not streaks.
 
@@ -23,7 +23,7 @@ def normalize_variance(
     mean : (P, K) float32 ndarray
         Mean noise along each streamline.
     effective_samples : (P,) float32 ndarray
-        n, at least 1.
+        n of each streamline, at least 1.
     look : PixelLook
         Its `length`, `line_width` and kernel are used.
 
@@ -52,7 +52,7 @@ def blend_gain(image_count: int, effective_samples: np.ndarray, look: PixelLook)
     image_count : int
         M.
     effective_samples : (P,) float32 ndarray
-        Effective samples of a streamline, mean over the M lines of a pixel.
+        Effective samples of a streamline (`KernelWeights`), mean over the M streamlines through a pixel.
     look : PixelLook
         Its `length`, `line_width`, `high_pass` and kernel are used.
 
@@ -71,7 +71,7 @@ def blend_gain(image_count: int, effective_samples: np.ndarray, look: PixelLook)
 
 
 def supersampling_gain(look: PixelLook) -> float:
-    """Compute the factor that gives supersampled streaks the contrast without supersampling.
+    """Compute the contrast gain that makes supersampled streaks as strong as streaks without supersampling.
 
     Parameters
     ----------
@@ -88,15 +88,18 @@ def supersampling_gain(look: PixelLook) -> float:
 
 
 def expected_std(look: PixelLook) -> float:
-    """Compute the theoretical standard deviation of one member image, with full streamlines."""
+    """Compute the theoretical standard deviation of the LIC image of one member of the field.
+
+    No streamline ends early.
+    """
     return streak_moments(*streak_args(look), kernel=look.kernel)[0]
 
 
 def streak_args(look: PixelLook) -> tuple[float, float, float]:
-    """Return the length of the streamlines, the size of cells and the high-pass width of the noise, in pixels."""
+    """Return the length of streamlines, and the cell size and high-pass width of the noise, in pixels."""
     return 2 * look.length + 1, look.line_width, look.high_pass
 
 
 def scale_contrast(tone: np.ndarray, gain: np.ndarray | float) -> np.ndarray:
-    """Scale the difference of tones from the mean of the noise by `gain` (equation 6)."""
+    """Scale the difference of tones from the mean of the noise by `gain` (equation 6 of the paper)."""
     return NOISE_MEAN + gain * (tone - NOISE_MEAN)

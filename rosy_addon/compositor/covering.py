@@ -14,9 +14,9 @@ Directions that are not a RoSy are matched like the members of the RoSy that the
 they have no opposites, the forward and backward directions are two separate coverings of N sheets,
 and a streamline stays on one of them. A full turn then passes N sheets, not S.
 
-Tracing is bound by memory accesses, not by arithmetic. So the record of a state is short. Pixels
-are *cells* of a window of the frame with an empty border. So the index of a neighbor is the index
-of the cell plus a constant, and no table of neighbors is read.
+Tracing is bound by memory accesses, not by arithmetic. So the row of a state in the table is short.
+Pixels are stored as *cells* of a rectangular window of the frame with an empty border. The index of a
+neighbor is then the index of the cell plus a constant, and no table of neighbors is read.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ from .look_units import PixelLook
 from .pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps, normalized, pixel_window
 from .reported_blocks import reported_blocks
 
-#: The largest integer in `Covering.state_table`.
+#: The largest value of an integer in `Covering.state_table`.
 INT16_MAX = 32767
 
-#: Squares of lengths between these bounds are neither rounded to 0 or infinity nor denormal.
+#: Squared lengths between these bounds are normal float32 numbers: they do not underflow or overflow.
 MIN_SQUARE, MAX_SQUARE = np.float32(1e-30), np.float32(1e30)
 
 #: Length in pixels of a foreshortened step, below which derivatives of the noise count less.
@@ -50,30 +50,38 @@ SINK_CELL = 0
 
 
 class SeamTable:
-    """Finds the steps across seams; see `pixel_field.SeamSteps`.
+    """A lookup table of the steps between pixels that cross a seam of a texture (`pixel_field.SeamSteps`).
 
     Parameters
     ----------
     steps : SeamSteps
-    cell_of_pixel : (P,) int32 ndarray
-    sheets_per_turn : int
+    cell_of_pixel, sheets_per_turn
+        Attributes of the `Covering`.
     """
 
     def __init__(self, steps: SeamSteps, cell_of_pixel: np.ndarray, sheets_per_turn: int) -> None:
         self.steps = steps
-        # The cells of pixels are in ascending order, too.
+        # Cells ascend with pixels, so the keys are sorted.
         self._key = cell_of_pixel.take(steps.source).astype(np.int64) * 9 + steps.bit
         self.target_cell = cell_of_pixel.take(steps.target)
         self.sheet_shift = steps.rotation * np.float32(sheets_per_turn / (2 * np.pi))
 
     def find(self, cell: np.ndarray, bit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Find the steps from (n,) cells that cross seams.
+        """Find which steps of streamlines cross a seam.
+
+        Parameters
+        ----------
+        cell : (n,) ndarray of int
+            Cells where the steps start.
+        bit : (n,) ndarray of int
+            Which neighbor each step leads to: its bit in the neighbor mask.
 
         Returns
         -------
         crosses : (n,) bool ndarray
+            Whether the step crosses a seam.
         seam : (k,) intp ndarray
-            The numbers of those that do.
+            Index into the `SeamSteps`, of each step that does.
         """
         key = cell.astype(np.int64) * 9 + bit
         place = np.minimum(np.searchsorted(self._key, key), len(self._key) - 1)
@@ -83,33 +91,35 @@ class SeamTable:
 
 @dataclass(frozen=True, eq=False)
 class Covering:
-    """The states of a pixel field.
+    """The covering surface of a pixel field: all its states (a pixel and one direction of the field there).
 
-    State (c, k) is row k C + c of `state_table`. Line l of the cell c consists of the sheets l and
-    l + S / 2, and has the index l C + c in arrays of lines.
+    The state of cell c and sheet k is row k C + c of `state_table`. Line l of the cell c is the pair of
+    the opposite sheets l and l + S / 2. Its index in arrays of lines is l C + c.
 
     Attributes
     ----------
     line_count : int
-        M = S / 2, the number of lines through a cell.
+        M = S / 2, the number of lines (pairs of opposite directions) through a cell.
     sheets_per_turn : int
         Sheets that a full turn passes: S, or N.
     width : int
-        Cells of a row of the window, which is the distance of a cell from the one above it.
+        Number of cells in a row of the window. The cell above the cell c is c + width.
     cell_of_pixel : (P,) int32 ndarray
         The cell of each pixel.
     packed_phase : (C,) float32 ndarray
-        t plus 2, in units of a full turn divided by `sheets_per_turn`. The last nine bits of the
-        mantissa hold the neighbor mask (see `unpack_neighbor_mask`). Every step reads both, so
-        they are stored together.
+        Angle t of the representation plus 2, in units of a full turn divided by `sheets_per_turn`. The
+        last nine bits of the mantissa hold the neighbor mask (see `unpack_neighbor_mask`). Every step
+        reads both, so they are stored together.
     state_table : (S C, 2 + 2 K) int16 ndarray
-        The step on screen, x and y; then for each channel the noise and its derivative to the left.
+        The step on screen, x and y; then for each of the K channels, the noise and its derivative to the
+        left of the step.
     state_scales : (3,) tuple of float
-        Scales of the integers: of the step (pixels), of the noise, and of its derivative.
+        Factors by which integers of the table are multiplied: for the step (in pixels), for the noise, and
+        for its derivative.
     seams : SeamTable or None
-        Steps across seams, if there are any.
+        Steps across the seams of a texture; None if there are no seams.
     has_directions : bool
-        Whether lines point one way only: the field has no opposites.
+        Whether the directions of the field have no opposites in the field (as for a RoSy of odd degree).
     """
 
     line_count: int
@@ -133,7 +143,7 @@ class Covering:
         return self.state_table.shape[1] // 2 - 1
 
     def sheet_offsets(self, max_winding: int) -> tuple[np.ndarray, int]:
-        """Tabulate the first state of each sheet, by sheet numbers that include full turns.
+        """Tabulate the index of the first state of each sheet, for sheet numbers beyond a full turn, too.
 
         Parameters
         ----------
@@ -143,9 +153,10 @@ class Covering:
         Returns
         -------
         offsets : (n,) intp ndarray
-            Index of the first state of sheet k, at k plus multiples of `sheets_per_turn`.
+            The elements at k plus any multiple of `sheets_per_turn` are the index of the first state of
+            sheet k.
         backward : int
-            Offset in that array of the opposite sheet.
+            The opposite of the sheet at element i is at element i + backward.
         """
         one_turn = np.arange(self.sheets_per_turn) * self.cell_count
         forward = np.tile(one_turn, 2 * max_winding)
@@ -154,21 +165,26 @@ class Covering:
         return np.concatenate([forward, forward + self.line_count * self.cell_count]), len(forward)
 
     def fold_to_line(self, state: np.ndarray) -> np.ndarray:
-        """Replace the indices of states by the indices of their lines, in place."""
+        """Replace indices of states by the indices of their lines (pairs of opposite states), in place."""
         entry_count = self.line_count * self.cell_count
         return np.subtract(state, entry_count, out=state, where=state >= entry_count)
 
     def is_along_member(self, state: np.ndarray) -> np.ndarray:
-        """Return an (n,) bool mask of states of a field of odd degree: its directions, not their opposites."""
+        """Return an (n,) bool mask: whether each state is a member of a field without opposites.
+
+        The other states are the opposite directions of members.
+        """
         sheet = state // np.int32(self.cell_count)
         if self.sheets_per_turn == 2 * self.line_count:
             return sheet % 2 == 0
         return sheet < self.line_count
 
     def forward_share(self, state: np.ndarray) -> np.ndarray:
-        """Return the (n,) float32 shares of moving kernels that drift along states; see `flow.forward_share`.
+        """Return how much of the moving kernel drifts in the direction of each of (n,) states.
 
-        If there are seams, the frames of the charts have no common angle, and lines without direction drift both ways.
+        The result is (n,) float32, 0 to 1; see `flow.forward_share`. Streaks of a field without opposites
+        drift along its directions. If there are seams, the angles of different charts cannot be compared,
+        and streaks of other fields drift half one way and half the other.
         """
         if self.has_directions:
             return self.is_along_member(state).astype(np.float32)
@@ -183,20 +199,22 @@ class Covering:
     def neighbor_lines(
         self, line: np.ndarray, offsets: Sequence[tuple[int, int]]
     ) -> list[np.ndarray]:
-        """Find the lines of neighboring cells that match the given lines.
+        """Find in neighboring cells the lines that continue the given lines.
+
+        A line is a pair of opposite directions of the field in a cell.
 
         Parameters
         ----------
         line : (n,) intp ndarray
             Indices of lines.
         offsets : sequence of (int, int)
-            Offsets of neighbors: pixels along the line, and to its left.
+            Offset of each neighbor: pixels forward along the line, and pixels to the left of it.
 
         Returns
         -------
         list of (n,) intp ndarray
-            Indices of lines for each offset, of the cell `SINK_CELL` where there is no linked
-            neighbor.
+            The indices of the lines that match, one array for each offset. Where no neighbor is linked, the
+            line is in `SINK_CELL`.
         """
         sheet, cell = np.divmod(line, self.cell_count)
         step = self.state_table.take(line, axis=0)[:, :2].astype(np.float32)
@@ -218,10 +236,10 @@ class Covering:
 
 
 def member_lines(field: PixelField) -> np.ndarray:
-    """Return the (M,) intp index of the line of each member image.
+    """Return the (M,) intp number of the line of each member image.
 
-    For a RoSy of odd degree, sheet 2 i is member i, and sheet 2 i - N is the other direction of its
-    line.
+    Lines are pairs of opposite sheets of the covering surface, numbered from 0 to M - 1. For an odd degree N,
+    sheet 2 i is member i of the field, and sheet 2 i - N is the opposite direction.
     """
     return (
         np.arange(field.line_count)
@@ -231,15 +249,16 @@ def member_lines(field: PixelField) -> np.ndarray:
 
 
 def build_covering(field: PixelField, look: PixelLook, noise: np.ndarray) -> Covering:
-    """Build the covering of a pixel field. Sheet 0 is the member nearest to the guiding angle.
+    """Build the covering surface of a pixel field. Sheet 0 is the member nearest to the guiding angle.
 
     Parameters
     ----------
     field : PixelField
-        At least one pixel.
+        It has at least one pixel.
     look : PixelLook
         Its `guiding_angle` and `is_on_surface` are used.
     noise : (P, K) float32 ndarray
+        Noise of the K channels, which streamlines average.
 
     Returns
     -------
@@ -279,7 +298,7 @@ def build_covering(field: PixelField, look: PixelLook, noise: np.ndarray) -> Cov
             step_x, step_y = step_x * quantize[0], step_y * quantize[0]
             rows[:, 0], rows[:, 1] = np.rint(step_x, out=step_x), np.rint(step_y, out=step_y)
             scatter_rows(state_table[sheet], block_cells, rows)
-            # For the opposite direction, all entries except the noise are negated.
+            # For the opposite direction, all columns except the noise are negated.
             for column in (0, 1, *range(3, rows.shape[1], 2)):
                 np.negative(rows[:, column], out=rows[:, column])
             scatter_rows(state_table[sheet + line_count], block_cells, rows)
@@ -300,10 +319,12 @@ def build_covering(field: PixelField, look: PixelLook, noise: np.ndarray) -> Cov
 
 
 def _surface_steps(x: np.ndarray, y: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Shorten steps to at most one row or column of pixels, and return factors of the noise gradient, too.
+    """Shorten steps to at most one pixel in x and y, and weight the noise gradient.
 
-    A derivative to the left is multiplied by a distance to the left (see `streamline_batch`). Both are
-    proportional to the length of the step, so the factors are divided by its square.
+    The result is two (x, y) pairs: the steps, and the factors by which the x and y components of the noise
+    gradient are multiplied for its derivative to the left. That derivative is multiplied by a distance
+    to the left (see `streamline_batch`). Both are proportional to the length of the step, so the factors
+    are divided by the square of the length.
     """
     scale = 1 / np.maximum(np.maximum(np.abs(x), np.abs(y)), np.float32(1))
     x, y = x * scale, y * scale
@@ -312,12 +333,12 @@ def _surface_steps(x: np.ndarray, y: np.ndarray) -> list[tuple[np.ndarray, np.nd
 
 
 def unpack_neighbor_mask(packed_phase: np.ndarray) -> np.ndarray:
-    """Return the (n,) uint32 neighbor masks of cells, given their entries of `Covering.packed_phase`."""
+    """Return the (n,) uint32 neighbor masks of cells, from elements of `Covering.packed_phase`."""
     return packed_phase.view(np.uint32) & np.uint32(ALL_NEIGHBORS)
 
 
 def _pack_neighbor_mask(phase: np.ndarray, bits: np.ndarray | int) -> np.ndarray:
-    """Return phases with neighbor masks in the last bits of their mantissas."""
+    """Return float32 phases whose last nine bits of the mantissa are replaced by neighbor masks."""
     return (phase.view(np.uint32) & ~np.uint32(ALL_NEIGHBORS) | bits).view(np.float32)
 
 
@@ -335,9 +356,9 @@ def rows_as_scalars(table: np.ndarray) -> np.ndarray:
 def _noise_gradient(
     noise: np.ndarray, cells: np.ndarray, width: int, mask: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the (n, K) central differences of the (C, K) noise at cells, to the right and upward.
+    """Return two (n, K) central differences of the (C, K) noise at n cells: in x and in y.
 
-    They are 0 where a neighbor is not linked.
+    A difference is 0 where one of the two neighbors is not linked to the cell (`mask`).
     """
     slopes = []
     for cell_offset, offset in ((1, (1, 0)), (width, (0, 1))):
@@ -353,7 +374,10 @@ def _noise_gradient(
 def _nearest_member(
     z: np.ndarray, degree: int, guiding_angle: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return angle, cosine and sine of the nearest member, relative to the guiding angle; 0 for z = 0."""
+    """Return the angle of the member nearest to the guiding angle, and its cosine and sine.
+
+    The angle is relative to the guiding angle. All three are 0 where the representation `z` is 0.
+    """
     x, y = _rotate(z.real, z.imag, -degree * guiding_angle)
     angle = vector_angle(x, y)
     angle /= np.float32(degree)
@@ -367,7 +391,7 @@ def _nearest_member(
 
 
 def _length(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the lengths of vectors, given by components. Their squares may overflow or underflow."""
+    """Return the lengths of vectors, given by components, also where squared lengths over- or underflow."""
     with np.errstate(over="ignore"):
         square = x * x + y * y
     length = np.sqrt(square)
@@ -387,7 +411,10 @@ def _rotate(x: np.ndarray, y: np.ndarray, angle: float) -> tuple[np.ndarray, np.
 def _apply_harmonics(
     field: PixelField, block: slice, x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Compute `PixelField.member_direction` for a block, as real and imaginary parts."""
+    """Compute `PixelField.member_direction`, the directions of members, for a block of pixels.
+
+    Directions are given and returned as real and imaginary parts, x and y.
+    """
     if not field.harmonics:
         return x, y
     member = x + 1j * y
@@ -400,7 +427,10 @@ def _apply_harmonics(
 def _to_screen(
     field: PixelField, block: slice, x: np.ndarray, y: np.ndarray, foreshorten: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Compute `PixelField.to_screen` for a block in single precision, as x and y."""
+    """Compute `PixelField.to_screen` for a block of pixels in single precision.
+
+    Directions are given and returned as components, x and y.
+    """
     x_axis, y_axis = field.screen_jacobian[block, 0], field.screen_jacobian[block, 1]
     screen_x = x_axis.real * x + y_axis.real * y
     screen_y = x_axis.imag * x + y_axis.imag * y

@@ -1,8 +1,9 @@
 """Averages of noise along streamlines, by kernels that move; see `flow`.
 
-The sum of the noise around the sample q, with the weights of any kernel here, is a few terms of the sums of
-prefix sums E of the noise: those of the second difference of the weights. Sums between two samples are
-interpolated.
+Let E be the prefix sum of the prefix sum of the noise along a streamline. The weights of every kernel here
+are piecewise linear, so their second difference is not 0 in only a few places. The weighted sum of the noise
+around the sample q is therefore a weighted sum of only a few values of E. Between two samples, sums
+are interpolated.
 """
 
 from __future__ import annotations
@@ -15,16 +16,16 @@ from .filter_kernel import Kernel, kernel_weights, sample_weights
 from .flow import MAX_AXIAL_STEPS, channel_shifts, channel_weights
 from .look_units import PixelLook
 
-#: Effective samples of a streamline that ends before its kernels begin. It is gray.
+#: Effective samples of a streamline that ends before its kernels begin. Its average is gray.
 MIN_EFFECTIVE_SAMPLES = 1e-3
 
 
-#: Levels of `MovingKernel.energies`, at most.
+#: Maximum number of levels (different lengths of streamlines) of `MovingKernel.energies`.
 MAX_LEVELS = 256
 
 
 class MovingKernel:
-    """The kernels of the channels of a look whose streaks drift.
+    """The moving filter kernels of drifting streaks, one for each of the three noise channels.
 
     Parameters
     ----------
@@ -43,8 +44,9 @@ class MovingKernel:
     reach : int
         R, steps from the pixel to the last sample.
     energies : (3, L, 2 R + 2) float64 ndarray
-        Prefix sums over the samples, from -R - 1, of the squares of the weights forward and backward, and
-        of their products. Level l is for streamlines of the length times l / (L - 1).
+        Prefix sums over the samples from -R - 1 to R of three products: the squares of the weights of the
+        kernel that drifts forward, the squares for the kernel that drifts backward, and the products of both
+        weights. Level l is for kernels of the full length times l / (L - 1).
     full_samples : (L,) float64 ndarray
         `filter_kernel.KernelWeights.effective_samples` of the kernels at rest.
     """
@@ -76,7 +78,9 @@ class MovingKernel:
     def effective_samples(
         self, share: np.ndarray, forward: np.ndarray, behind: np.ndarray, ahead: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Count the samples of equal weight whose mean has the variance of the average.
+        """Compute the effective samples of each average.
+
+        This is the number of samples of equal weight whose mean has the variance of the average.
 
         Parameters
         ----------
@@ -91,7 +95,7 @@ class MovingKernel:
         -------
         effective_samples : (n,) float64 ndarray
         factor : (n,) float64 ndarray
-            By which weighted sums are multiplied to be averages times the effective samples.
+            Weighted sums times this factor are averages times the effective samples.
         """
         table = self.energies.reshape(3, -1)
         width, levels = self.energies.shape[2], len(self.full_samples)
@@ -106,7 +110,10 @@ class MovingKernel:
 
 
 def _shifted_weights(position: np.ndarray, shift: float, length: float, kind: Kernel) -> np.ndarray:
-    """Return the weights of a kernel whose center is `shift` steps backward, interpolated between whole steps."""
+    """Return the weights of a kernel whose center is `shift` steps backward.
+
+    Weights are interpolated linearly between whole steps.
+    """
     whole = math.floor(shift)
     fraction = shift - whole
     return (1 - fraction) * sample_weights(position + whole, length, kind) + fraction * (
@@ -115,22 +122,23 @@ def _shifted_weights(position: np.ndarray, shift: float, length: float, kind: Ke
 
 
 class DriftingAverages:
-    """The averages along some streamlines, by the kernels of one look.
+    """Averages of noise along the streamlines of a batch, with the kernels of one look.
 
     Parameters
     ----------
     kernel : MovingKernel
     second_sums : (3, 2 R + 3, n) complex64 ndarray
-        Row i + R + 2 of a channel is the sum of prefix sums of its noise up to step i, from -R - 2 to R.
-        The imaginary part is the same sum for the derivative to the left.
+        E for n streamlines: row i + R + 2 of a channel is the sum up to step i of the prefix sums of its
+        noise, for i from -R - 2 to R. The imaginary part is the same for the derivative of the noise to the
+        left.
     """
 
     def __init__(self, kernel: MovingKernel, second_sums: np.ndarray) -> None:
         self._kernel = kernel
         self._second_sums = second_sums
-        #: Row of step 0.
+        #: Row of `second_sums` for step 0.
         self._middle = second_sums.shape[1] // 2 + 1
-        #: Sums of kernels of full length around all steps, forward and mirrored.
+        #: Weighted sums around all steps with kernels of full length. Key: whether the kernel is mirrored.
         self._full_sums: dict[bool, np.ndarray] = {}
 
     def at(
@@ -149,18 +157,19 @@ class DriftingAverages:
         position : int
             The step, negative in the backward half.
         axial : (n,) float32 ndarray
-            Steps from there to the center of the pixel, forward.
+            Distance forward from that step to the center of the pixel, in steps.
         length : (n,) ndarray of int or None
             Steps of the kernels in each direction; None for the full length.
         forward : (n,) float32 ndarray
-            The share of the kernel by which streaks drift forward.
+            Share of the kernel that drifts forward, 0 to 1; the rest drifts backward.
         behind, ahead : (n,) intp ndarray
             Steps to the ends of the streamlines.
 
         Returns
         -------
         sums : (n,) complex64 ndarray
-            The average of the noise, and of its derivative to the left, times the effective samples.
+            The average of the noise times the effective samples. The imaginary part is the same for the
+            derivative of the noise to the left.
         effective_samples : (n,) float32 ndarray
         """
         kernel = self._kernel
@@ -199,7 +208,10 @@ class DriftingAverages:
         length: np.ndarray | None,
         is_mirrored: bool,
     ) -> np.ndarray:
-        """Return (n,) complex64 sums around positions between steps, of some streamlines."""
+        """Return the (n,) complex64 weighted sums around positions between steps.
+
+        `place` is the position in steps, `columns` the streamline, one of each for each sum.
+        """
         whole = np.floor(place)
         fraction = place - whole
         step = whole.astype(np.intp)
@@ -215,7 +227,10 @@ class DriftingAverages:
         return low + fraction * (high - low)
 
     def _full(self, is_mirrored: bool) -> np.ndarray:
-        """Return the (3, 2 Q + 1, n) complex64 sums of kernels of full length around the steps from -Q to Q."""
+        """Return the (3, 2 Q + 1, n) complex64 weighted sums around each step from -Q to Q.
+
+        The kernels have the full length.
+        """
         if is_mirrored not in self._full_sums:
             kernel = self._kernel
             last = self._middle - 2 - kernel.length
@@ -237,7 +252,7 @@ class DriftingAverages:
         length: np.ndarray,
         is_mirrored: bool,
     ) -> np.ndarray:
-        """Return (n,) complex64 sums of kernels of their own length around steps of streamlines."""
+        """Return the (n,) complex64 weighted sums around steps, with a different kernel length for each."""
         flat, stride = self._second_sums[channel].reshape(-1), self._second_sums.shape[2]
         total = np.zeros(len(step), dtype=np.complex64)
         for offset, weight in _kernel_terms(self._kernel.kind, length, is_mirrored):
@@ -247,17 +262,17 @@ class DriftingAverages:
 
 
 def _kernel_terms(kind: Kernel, length, is_mirrored: bool) -> list[tuple]:
-    """Return the terms of a weighted sum around the sample q: offsets o and weights of E(q + o).
+    """Return (offset o, factor) pairs: the weighted sum around the sample q is the sum of factor * E(q + o).
 
-    With n(i) = E(i) - 2 E(i - 1) + E(i - 2), they are w(d) - 2 w(d + 1) + w(d + 2) at o = d, for the weights w
-    of `filter_kernel.sample_weights`.
+    The noise is n(i) = E(i) - 2 E(i - 1) + E(i - 2). So the factor at the offset d is
+    w(d) - 2 w(d + 1) + w(d + 2), for the weights w of `filter_kernel.sample_weights`.
 
     Parameters
     ----------
     length : int or ndarray of int
         Steps in each direction.
     is_mirrored : bool
-        Whether the weights belong to the opposite direction.
+        Whether the kernel belongs to the opposite direction: its weights are reversed.
     """
     width = length + 1
     terms = {

@@ -1,14 +1,14 @@
 """Evenly spaced lines, as in engravings: a phase on the surface instead of streaks of noise.
 
-The phase of each family of lines (`projection.surface_lines`) is evaluated at the pixels. Its
-distance from the nearest integer is the distance from the middle of a line, and is evenly
-distributed. So a line that covers a fraction of the paper is that fraction of the distance between
-lines wide, and the tone is exact. Lines swell and thin with the tone.
+The phase of each family of lines (`projection.surface_lines`) is evaluated at the pixels. Lines lie
+where the phase is an integer. The distance of the phase from the nearest integer is evenly distributed.
+So lines whose width is a fraction of the distance between lines cover the same fraction of the paper,
+and the tone is exact. Lines get wider in dark tones and thinner in light tones.
 
 Edges are smoothed by a box filter of at least a pixel. Where lines are too close for the pixels,
-they fade into their mean. Where a surface turns away across some lines, these are drawn last, after
-those in other directions, and lines at a larger distance on the surface take their place. Where lines
-are too far apart, as in near parts of a perspective picture, further lines grow between them.
+they fade into their mean. Where foreshortening crowds the lines of one direction, lines in other
+directions are drawn before them, and lines at a larger distance on the surface replace them. Where
+lines are too far apart, as in near parts of a perspective picture, further lines grow between them.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ from .wobble import WOBBLE_STD
 #: Distances between lines on screen, in pixels of the picture, over which lines fade in.
 FADE_PIXELS = (1.3, 2.6)
 
-#: Distances between lines on screen, relative to the one asked for, between which crowded lines leave
-#: their place to lines in other directions.
+#: Distances between lines on screen, relative to the `line_distance` of the look. Below the first, lines
+#: are crowded: lines in other directions are drawn before them. At the second, they are not crowded at all.
 CROWDED_SHARES = (0.25, 0.5)
 
 #: Distance on the surface between the lines that replace crowded ones, in distances between the crowded ones.
 COARSE_RATIO = 3.0
 
-#: Range of the distance between lines relative to the one asked for, as a base-2 logarithm, over
-#: which further lines grow between them.
+#: Range of distances between lines over which further lines grow between them: the base-2 logarithm
+#: of the distance relative to the `line_distance` of the look.
 GROWTH_OCTAVES = (0.5, 1.0)
 
 #: Width of the edges of lines at crispness 0, as a fraction of the distance between lines.
@@ -53,7 +53,7 @@ MAX_EDGE_WIDTH = 0.5
 #: Standard deviation of the displacement of lines at wobble 1, in distances between lines.
 WOBBLE_SHIFT = 0.2
 
-#: Largest weight of the short streaks that break lines.
+#: Largest weight of the short streaks of LIC noise that break lines into pieces.
 MAX_BREAK_AMOUNT = 0.85
 
 #: Label of all steps.
@@ -67,13 +67,13 @@ class EvenLines:
     Attributes
     ----------
     streaks : (M, P) float32 ndarray
-        1 in the middle of a line, 0 halfway between two lines, linear between. Members are in the
-        order of `all_members(field, look.guiding_angle)`.
+        For each of the M directions of the field: 1 in the middle of a line, 0 halfway between two lines,
+        linear between. Directions are in the order of `all_members(field, look.guiding_angle)`.
     period : (M, P) float32 ndarray
-        Distance between lines on screen, in pixels of the frame. 0 where there are none.
+        Distance between lines on screen, in pixels of the frame. 0 where there are no lines.
     growth : (P,) float32 ndarray or None
-        Width of the lines that grow between them, from 0 to 1: as wide as the others. None if
-        there are none.
+        Width of the further lines that grow between the lines, relative to these: from 0 (no further
+        lines) to 1 (equally wide). None if no further lines grow.
     coarse_streaks : (M, P) float32 ndarray or None
         `streaks` of the lines that replace crowded ones. None if no lines are crowded.
     """
@@ -84,18 +84,19 @@ class EvenLines:
     coarse_streaks: np.ndarray | None = None
 
     def part(self, extent: slice) -> EvenLines:
-        """Return the lines at some of the pixels."""
+        """Return the evenly spaced lines at the pixels `extent`."""
         arrays = self.streaks, self.period, self.growth, self.coarse_streaks
         return EvenLines(*(None if values is None else values[..., extent] for values in arrays))
 
     def coverage(self, line: int, target_coverage: np.ndarray, look: PixelLook) -> np.ndarray:
-        """Compute the coverage of each pixel by one line.
+        """Compute the coverage of each pixel by the lines of one direction of the field.
 
         Parameters
         ----------
         line : int
+            Index of the direction, from 0 to M - 1.
         target_coverage : (P,) ndarray
-            Width of the line as a fraction of the distance between lines, 0 to 1.
+            Width of the lines as a fraction of the distance between lines, 0 to 1.
         look : PixelLook
             Its `crispness` and `supersampling` are used.
 
@@ -125,7 +126,7 @@ class EvenLines:
         look: PixelLook,
         pixels: np.ndarray | slice = slice(None),
     ) -> np.ndarray:
-        """Return the (n,) coverage of some of the pixels by lines, minus their mean coverage `width`."""
+        """Return the (n,) coverage of each of `pixels` by lines, minus their mean coverage `width`."""
         position = np.float32(0.5) - np.float32(0.5) * streak
         min_edge = np.float32(MAX_EDGE_WIDTH * (1 - look.crispness) ** 2)
         edge = np.clip(1 / np.maximum(period, np.float32(1e-6)), min_edge, 1)
@@ -138,25 +139,26 @@ class EvenLines:
         return resolved_share(period, look.supersampling) * (covered - width)
 
     def crowding(self, line: int, look: PixelLook) -> np.ndarray:
-        """Compute how much one line is crowded.
+        """Compute how much the lines of one direction of the field are crowded on screen.
 
         Parameters
         ----------
         line : int
+            Index of the direction, from 0 to M - 1.
         look : PixelLook
             Its `line_distance` is used.
 
         Returns
         -------
         (P,) float32 ndarray
-            0 to 1.
+            0 (not crowded) to 1; see `CROWDED_SHARES`.
         """
         low, high = (np.float32(pixels) for pixels in crowded_pixels(look))
         return 1 - smoothstep((self.period[line] - low) / (high - low))
 
 
 def resolved_share(period: np.ndarray, supersampling: int = 1) -> np.ndarray:
-    """Compute how much of the contrast of lines is drawn: 0 if they are too close for the pixels, up to 1.
+    """Compute how much of the contrast of lines is drawn, from 0 (too close for the pixels) to 1.
 
     Parameters
     ----------
@@ -176,7 +178,7 @@ def crowded_pixels(look: PixelLook) -> tuple[float, float]:
 
 
 def _box_filtered(position: np.ndarray, width: np.ndarray, edge: np.ndarray) -> np.ndarray:
-    """Return the coverage of intervals of the length `edge` by lines at unit distance.
+    """Return the fraction of an interval that lines cover, for lines at unit distance from each other.
 
     Parameters
     ----------
@@ -185,7 +187,7 @@ def _box_filtered(position: np.ndarray, width: np.ndarray, edge: np.ndarray) -> 
     width : (P,) float32 ndarray
         Width of the lines, 0 to 1.
     edge : (P,) float32 ndarray
-        Above 0, at most 1.
+        Length of the interval: above 0, at most 1.
     """
     half, low, high = 0.5 * width, position - 0.5 * edge, position + 0.5 * edge
     covered = np.minimum(high, half) - np.maximum(low, -half)
@@ -202,7 +204,7 @@ def uneven_width(
     break_streak: np.ndarray | None,
     paper_grain: np.ndarray | None,
 ) -> np.ndarray:
-    """Compute widths of lines that are broken, or uneven by the paper grain, at equal mean widths.
+    """Vary the widths of lines by breaks and by the paper grain, without a change of their mean width.
 
     Parameters
     ----------
@@ -210,17 +212,18 @@ def uneven_width(
         Mean width, as a fraction of the distance between lines.
     look : PixelLook
     break_streak, paper_grain : (P,) ndarray or None
-        With mean 0 and standard deviation 1; see `hatching.HatchedLines`.
+        Short streaks that break lines, and the height of the paper, each with mean 0 and standard
+        deviation 1; see `hatching.HatchedLines`. None if lines are not broken, or the paper has no grain.
 
     Returns
     -------
     (P,) ndarray
-        0 to 1.
+        Widths as fractions of the distance between lines, 0 to 1.
     """
     if break_streak is None and paper_grain is None:
         return target_coverage
     amount = np.minimum(break_amount(target_coverage, look.breaks, look.wobble), MAX_BREAK_AMOUNT)
-    # The streaks of even lines have a uniform distribution with the standard deviation 1.
+    # Scaled to the standard deviation 1, the `streaks` of even lines have a uniform distribution.
     scale = 1 / ((1 - amount) * math.sqrt(12))
     width = np.interp(target_coverage, np.linspace(0, 1, COVERAGE_STEPS), look_width_table(look))
     if break_streak is not None:
@@ -231,14 +234,15 @@ def uneven_width(
 
 
 def look_width_table(look: PixelLook) -> np.ndarray:
-    """Return the (COVERAGE_STEPS,) widths of lines before `uneven_width`, for mean widths from 0 to 1."""
+    """Return the `_width_table` of a look: (COVERAGE_STEPS,) widths, for mean widths from 0 to 1."""
     return _width_table(look.breaks, look.wobble, PAPER_GRAIN_STRENGTH * look.paper_grain)
 
 
 @lru_cache(maxsize=16)
 def _width_table(breaks: float, wobble: float, paper_grain_amplitude: float) -> np.ndarray:
-    """Return the (COVERAGE_STEPS,) widths to which normal variations are added, for mean widths from 0 to 1.
+    """Return the (COVERAGE_STEPS,) widths m that give mean widths from 0 to 1 once they vary.
 
+    The variations are normally distributed, and varied widths are clipped to 0 to 1.
     The mean of clip(m + s X, 0, 1) for a normal X is g(m) - g(m - 1), with g(x) = x F(x / s) +
     s f(x / s), where F is the distribution function and f the density of X. It is solved for m.
     """
@@ -273,7 +277,7 @@ def even_lines(
     Parameters
     ----------
     gbuffer : GBuffer
-        With its mesh instances.
+        Its `instances` must be set.
     field : PixelField
         A field of one degree, from `gbuffer`.
     look : PixelLook
@@ -310,7 +314,7 @@ def even_lines(
 
 
 class _InstanceLines:
-    """The lines of one mesh instance; parameters as for `even_lines`."""
+    """The evenly spaced lines of one mesh instance. The other parameters are those of `even_lines`."""
 
     def __init__(
         self,
@@ -333,19 +337,20 @@ class _InstanceLines:
         self._sides = np.stack([(corner - first).astype(np.float32) for corner in others])
 
     def at(self, pixels: np.ndarray, ratio: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Evaluate the lines at some pixels of the field.
+        """Evaluate the evenly spaced lines of the instance at some pixels of the field.
 
         Parameters
         ----------
         pixels : (n,) intp ndarray
         ratio : float
-            Distance between lines on the surface, in line distances of the look.
+            Distance between lines on the surface, relative to the `line_distance` of the look.
 
         Returns
         -------
         streaks, period : (M, n) float32 ndarray
-            See `EvenLines`. The period is for the ratio 1.
+            See `EvenLines`. `period` is the distance between lines with the ratio 1.
         growth : (n,) float32 ndarray
+            See `EvenLines`; 0 where no further lines grow.
         """
         instance, look = self._instance, self._look
         lines = cached_surface_lines(
@@ -378,16 +383,17 @@ class _InstanceLines:
     def _evaluate(
         self, field: PixelField, lines: SurfaceLines
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-        """Evaluate lines at the pixels of a part of the field.
+        """Evaluate the lines of the surface at the pixels of `field`, which holds some pixels of the frame.
 
         Returns
         -------
         phases : (M, n) float32 ndarray
+            Phase of each of the M families of lines. Lines lie where it is an integer.
         period : (M, n) float32 ndarray
-            In pixels.
+            Distance between lines on screen, in pixels of the frame.
         octaves : (n,) float32 ndarray or None
-            Base-2 logarithm of the distance between lines, without foreshortening, relative to the one
-            asked for, at least 0. None if lines may be farther apart.
+            Base-2 logarithm of the distance between lines, without foreshortening, relative to the
+            `line_distance` of the look, at least 0. None if no further lines grow where lines are far apart.
         """
         gbuffer, look, entries = self._gbuffer, self._look, field.gbuffer_index
         leaf, weights = lines.tree.locate(gbuffer.triangle[entries], gbuffer.barycentric[entries])
@@ -399,7 +405,7 @@ class _InstanceLines:
         turn = vector_angle(relative.real, relative.imag) * np.float32(field.degree / (2 * np.pi))
         first_direction = step * np.rint(turn).astype(np.int32)
         asked_pixels = np.float32(look.line_distance)
-        # Distance between lines on screen, relative to the one asked for.
+        # Distance between lines on screen, relative to `line_distance`.
         unit = self._spacing / look.line_distance
         scale = np.full(len(entries), unit * gbuffer.camera.pixels_per_unit, dtype=np.float32)
         if gbuffer.camera.is_perspective:
@@ -419,7 +425,10 @@ class _InstanceLines:
         return phases, period, octaves
 
     def _heading_in_view(self, entries: np.ndarray, heading: np.ndarray) -> np.ndarray:
-        """Return (n,) complex64 directions in the view plane, given the (2, n) `SurfaceLines.heading`."""
+        """Return the (n,) complex64 directions in the view plane of headings on the surface.
+
+        `heading`, (2, n), is from `SurfaceLines.heading`; `entries` are indices of pixels of the G-buffer.
+        """
         gbuffer = self._gbuffer
         triangle = gbuffer.triangle[entries]
         tangent = [

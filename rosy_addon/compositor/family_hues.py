@@ -1,4 +1,4 @@
-"""The hue of each pixel where each family of lines has its own hue.
+"""The hue of each pixel, if each family of lines has its own hue.
 
 Families are the lines that a field distinguishes, such as the major and the minor directions of a
 tensor. Equation 6 of the paper restores the contrast that the mean of M gray images loses. If the
@@ -70,7 +70,7 @@ def family_hues(field: PixelField, images: LicImages, look: PixelLook) -> np.nda
 
 
 def line_families(field: PixelField, look: PixelLook) -> list[np.ndarray] | None:
-    """Find the family of each line at each pixel.
+    """Find the family of each of the M lines (pairs of opposite directions of the field) at each pixel.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def line_families(field: PixelField, look: PixelLook) -> list[np.ndarray] | None
     (_, family_count), stored_line = family_channel
     labels = []
     for member in all_members(field, look.guiding_angle)[: field.line_count]:
-        # The offset from the stored line, in steps of one family. It is 0 where no line is stored:
+        # The angle from the stored line, in steps of one family. It is 0 where no line is stored:
         # adding 0 turns -0, whose angle can be pi, into +0.
         relative = (
             member.astype(np.complex128) ** (field.degree // family_count) * stored_line.conj() + 0

@@ -2,10 +2,10 @@
 
 Pixels on the same streamline average almost the same noise, so tracing one streamline per pixel
 repeats work. This method traces fewer, longer streamlines and keeps a prefix sum of the noise along
-each. Every state of the covering (see `covering`) that a streamline passes takes its average from
-the difference of two prefix sums. States that no streamline has passed become the seeds of the next
-round. Many streamlines are traced together, in arrays (see `streamline_batch`). A state costs a few
-steps, whatever the length of the streamlines.
+each. A state of the covering surface is a pixel with one direction of the field (see `covering`). Every
+state that a streamline passes takes its average from the difference of two prefix sums. States that no
+streamline has passed become the seeds of the next round. Many streamlines are traced together, in
+arrays (see `streamline_batch`). A state costs a few steps, whatever the length of the streamlines.
 """
 
 from __future__ import annotations
@@ -44,11 +44,12 @@ STEP_LABEL = "tracing streamlines"
 #: Streamlines that are traced together, in both directions at once.
 BATCH_SIZE = 5120
 
-#: Steps in each direction, of all streamlines of a batch. Batches of long streamlines are smaller.
+#: Maximum number of steps in each direction, summed over the streamlines of a batch. Batches of long
+#: streamlines are smaller.
 MAX_BATCH_STEPS = 1 << 21
 
-#: Steps in each direction whose states take their average from the streamline. Long streamlines
-#: use half their length instead.
+#: The half window: states within so many steps of the seed, in each direction, take their average from the
+#: streamline. Long streamlines use half their length instead.
 HALF_WINDOW_STEPS = 96
 
 #: Spacing of the rows and columns of pixels where the first streamlines are seeded, in half
@@ -59,18 +60,19 @@ SEED_SPACING_FACTOR = 1.1
 #: remaining lines.
 RESEED_FACTOR = 1.75
 
-#: Maximum fraction of the lines that remain without a streamline after the last round: in general, and for
-#: antialiased pictures. They take the average of a neighbor.
+#: Maximum fraction of the lines (states without regard to sign) that no streamline has passed after the last
+#: round: in general, and for antialiased pictures. These lines take the average of a neighbor.
 MAX_UNCOVERED_FRACTION, FINE_UNCOVERED_FRACTION = 0.15, 0.05
 
 #: Maximum number of rounds of seeding.
 MAX_ROUNDS = 8
 
-#: Neighbors that these averages are taken from, in order: pixels forward and pixels to the left.
+#: Neighbors whose averages are taken by lines that no streamline has passed, in the order in which they are
+#: tried. Each is an offset: pixels forward and pixels to the left.
 FILL_OFFSETS = ((1, 0), (-1, 0), (1, 0), (-1, 0), (0, 1), (0, -1), (1, 0), (-1, 0), (0, 1), (0, -1))
 
 #: Factor of the contrast, in general and for antialiased pictures. Directions are not interpolated here, so
-#: streaks are a little sharper than with the method "brute"; this gives them the same standard
+#: streaks are a little sharper than with the method "brute". The factor gives them the same standard
 #: deviation.
 CONTRAST_MATCH, FINE_CONTRAST_MATCH = 0.99, 0.98
 
@@ -78,21 +80,23 @@ CONTRAST_MATCH, FINE_CONTRAST_MATCH = 0.99, 0.98
 def fast_lic(
     field: PixelField, looks: Sequence[PixelLook], noise: np.ndarray, strip: Strip | None = None
 ) -> list[LicImages]:
-    """Compute one LIC image for each of the M lines, for each of several lengths, with the same streamlines.
+    """Compute LIC images for several lengths of streamlines, with the same streamlines.
+
+    Each result has one member image for each of the M lines (pairs of opposite directions of the field).
 
     Parameters
     ----------
     field : PixelField
     looks : sequence of PixelLook
-        They differ in the `length` of streamlines. The first is the longest.
+        They differ in the `length` of streamlines. The first has the greatest length.
     noise : (P, K) float32 ndarray
     strip : Strip, optional
-        The rows of the images, if not all.
+        The rows to draw; by default all rows.
 
     Returns
     -------
     list of LicImages
-        One for each look, at the pixels in the `Strip.averaged_rows`.
+        One for each look, at the pixels in the `Strip.averaged_rows`, or at all pixels without a strip.
     """
     drawn = extent = slice(0, len(field.pixel))
     if strip is not None:
@@ -115,12 +119,15 @@ def fast_lic(
 def _line_averages(
     field: PixelField, extent: slice, drawn: slice, looks: Sequence[PixelLook], noise: np.ndarray
 ) -> list[tuple[np.ndarray, np.ndarray | None]]:
-    """Compute the averages of the lines at the pixels `drawn`, along streamlines in `extent`, for each look.
+    """Average noise along the streamlines through the pixels `drawn`, for each look.
+
+    Streamlines end at the border of the pixels `extent`. The result is a list of (sums, slopes) pairs.
 
     Returns
     -------
     sums : (M, n, K + 1) float32 ndarray
-        The average of each noise channel times the effective samples, and the effective samples.
+        For each of the M lines: the average of each noise channel times the effective samples, then the
+        effective samples.
     slopes : (M, n) float32 ndarray or None
         See `LicImages`.
     """
@@ -158,7 +165,10 @@ def _line_averages(
 def _pixels_to_cells(
     step_limit: np.ndarray | None, extent: slice, covering: Covering
 ) -> np.ndarray | None:
-    """Return the (C,) intp step limits of cells, given the (P,) limits of pixels."""
+    """Return the (C,) intp step limits of the cells of a covering, given the (P,) limits of pixels.
+
+    None if `step_limit` is None.
+    """
     if step_limit is None:
         return None
     cell_limit = np.zeros(covering.cell_count, dtype=np.intp)
@@ -167,7 +177,10 @@ def _pixels_to_cells(
 
 
 def _write_averages(line_sums: np.ndarray, look: PixelLook, member: np.ndarray) -> None:
-    """Write (n, K) averages of equal variance, from the (n, K + 1) sums and samples of a line."""
+    """Write the (n, K) averages of a line to `member`, scaled to the variance of full streamlines.
+
+    `line_sums`, (n, K + 1), holds the averages times the effective samples, then the effective samples.
+    """
     full_samples = np.float32(full_sample_count(look.length, look.kernel) - 0.5)
     for block in pixel_blocks(len(line_sums)):
         sums, effective_samples = line_sums[block, :-1], line_sums[block, -1].copy()
@@ -180,7 +193,10 @@ def _write_averages(line_sums: np.ndarray, look: PixelLook, member: np.ndarray) 
 
 
 def _crop_rows(field: PixelField, extent: slice) -> PixelField:
-    """Return the pixels of some rows. Streamlines end at the first and the last row."""
+    """Return the field at the pixels `extent`, which are whole rows.
+
+    Streamlines end at the first and the last of these rows.
+    """
     if extent.stop - extent.start == len(field.pixel):
         return field
     rows = field.part(extent)
@@ -192,10 +208,10 @@ def _crop_rows(field: PixelField, extent: slice) -> PixelField:
 
 
 class _LineAverages:
-    """The averages of noise along each line of each cell.
+    """Averages of noise along each line (pair of opposite directions) of each cell of the covering surface.
 
-    An average is stored as its product with the number of effective samples, and that number. The
-    number is 0 for a line that has no average yet, and -1 for one that needs none.
+    Stored are the average times the effective samples, and the effective samples. These are 0 for a line
+    that has no average yet, and -1 for a line that needs none.
 
     Parameters
     ----------
@@ -203,7 +219,7 @@ class _LineAverages:
     cells : (n,) int32 ndarray
         Cells whose lines need averages.
     channels : int
-        K, of the averages.
+        K, the number of noise channels.
     """
 
     def __init__(self, covering: Covering, cells: np.ndarray, channels: int) -> None:
@@ -215,37 +231,40 @@ class _LineAverages:
         self._flat = self._values.reshape(-1, shape[-1])
 
     def init_undefined(self, cell: np.ndarray, noise: np.ndarray) -> None:
-        """Set the averages of cells without a direction to their own noise."""
+        """Set the averages of cells where the field is undefined to the noise of the cell."""
         self._values[:, cell, :-1] = noise
         self._values[:, cell, -1] = 1
 
     def write(self, line: np.ndarray, values: np.ndarray) -> None:
-        """Write (n, K + 1) averages of lines, as `StreamlineBatch.trace` yields them."""
+        """Store (n, K + 1) averages at (n,) indices of lines, in the form `StreamlineBatch.trace` yields."""
         scatter_rows(self._flat, line, values)
 
     def clear_sink(self) -> None:
-        """Remove the averages of streamlines that have ended, which stay in one cell."""
+        """Clear the cell `SINK_CELL`, where streamlines that have ended write their averages."""
         self._values[:, SINK_CELL, -1] = -1
 
     def copy_from(self, line: np.ndarray, source: np.ndarray) -> np.ndarray:
-        """Copy the averages of other lines, and return the lines whose source has none."""
+        """Copy averages from the lines `source` to the lines `line`.
+
+        Return the elements of `line` whose source has no average. They are not changed.
+        """
         values = self._flat.take(source, axis=0)
         is_known = values[:, -1] > 0
         scatter_rows(self._flat, line[is_known], values[is_known])
         return line[~is_known]
 
     def missing_lines(self) -> np.ndarray:
-        """Return the entries of the lines that need an average and have none yet."""
+        """Return the indices of the lines (see the class) that need an average and have none yet."""
         return np.flatnonzero(self._values[:, :, -1] == 0)
 
     def filter_missing(self, line: np.ndarray) -> np.ndarray:
-        """Return the lines, among those given, that need an average and have none yet."""
+        """Return the elements of `line` (indices of lines) that need an average and have none yet."""
         return line[self._flat[:, -1].take(line) == 0]
 
     def smooth(self, covering: Covering, cells: np.ndarray) -> None:
-        """Average all lines of some cells with their neighbors along the line.
+        """Smooth the averages of all lines of some cells: average each with its two neighbors along the line.
 
-        Pixels of a line take their averages from different streamlines, which differ a little.
+        Neighboring cells can have their averages from different streamlines, which differ a little.
         """
         smooth = np.empty((len(self._values), len(cells), self._values.shape[2]), dtype=np.float32)
         for line, out in enumerate(smooth):
@@ -260,7 +279,10 @@ class _LineAverages:
             scatter_rows(self._values[line], cells, rows)
 
     def slopes(self, covering: Covering, cells: np.ndarray, line: np.ndarray) -> np.ndarray:
-        """Return the (M, n) float32 derivatives to the left of the lines of some cells; see `LicImages`."""
+        """Return the (M, n) float32 derivatives of averages perpendicular to the line, toward its left.
+
+        They are for the M lines of each of the n cells; `line` gives the order of lines. See `LicImages`.
+        """
         slopes = np.empty((len(line), len(cells)), dtype=np.float32)
         for first_entry, out in zip(line * covering.cell_count, slopes, strict=True):
             for block in pixel_blocks(len(cells)):
@@ -276,13 +298,16 @@ class _LineAverages:
 
     @staticmethod
     def _or_own(values: np.ndarray, own: np.ndarray) -> np.ndarray:
-        """Replace (n, K + 1) values of lines without an average by the values `own`, in place."""
+        """Replace (n, K + 1) values that hold no average by those of `own`, in place, and return `values`."""
         unknown = np.flatnonzero(values[:, -1] <= 0)
         values[unknown] = own[unknown]
         return values
 
     def gather(self, cell: np.ndarray, line: np.ndarray) -> np.ndarray:
-        """Return the (M, n, K + 1) float32 sums and effective samples of the lines of some cells."""
+        """Return the stored (M, n, K + 1) float32 values of the lines of n cells.
+
+        `line` holds the numbers of the M lines of a cell in the order of the result.
+        """
         result = np.empty((len(line), len(cell), self._values.shape[2]), dtype=np.float32)
         for line_index, out in zip(line, result, strict=True):
             rows_as_scalars(out)[:] = rows_as_scalars(self._values[line_index]).take(cell)
@@ -295,10 +320,10 @@ def _cover_all_lines(
     looks: Sequence[PixelLook],
     step_limits: Sequence[np.ndarray | None],
 ) -> None:
-    """Trace streamlines until every line has the averages that it needs, one for each look."""
+    """Trace streamlines until every line that needs an average has one, for each look."""
     look = looks[0]
     half_window = max(HALF_WINDOW_STEPS, look.length // 2)
-    # All lines that have one of the averages have the others, too.
+    # A line that has the average for one look has the averages for all looks.
     missing = averages[0].missing_lines()
     total = len(missing)
     fine = is_fine(look)
@@ -327,7 +352,7 @@ def _cover_all_lines(
         (source,) = covering.neighbor_lines(missing, [(forward, left)])
         remaining = [table.copy_from(missing, source) for table in averages]
         missing = remaining[0]
-    # Lines whose neighbors have no average get streamlines of their own, without a half window.
+    # Each line whose neighbors have no average either gets a streamline for itself alone (no half window).
     batch_size = min(_batch_size(look.streamline_reach()), len(missing))
     batch = StreamlineBatch(covering, looks, step_limits, 0, batch_size, fine)
     for batch_seeds in _batches(missing, batch_size):
@@ -339,7 +364,7 @@ def _write_streamlines(
     averages: Sequence[_LineAverages],
     steps: Iterable[tuple[np.ndarray, list[np.ndarray], np.ndarray]],
 ) -> None:
-    """Write the averages that `StreamlineBatch.trace` yields.
+    """Store the averages that `StreamlineBatch.trace` yields in `averages`, one of which is for each look.
 
     If several streamlines pass a line, one that passes near the center of the cell wins.
     """
@@ -364,13 +389,14 @@ def has_slopes(look: PixelLook) -> bool:
 def is_fine(look: PixelLook) -> bool:
     """Return whether streaks are drawn more accurately: in antialiased pictures, and if they drift.
 
-    Differences between neighboring streamlines do not drift. The eye sees them as a screen that stands still.
+    Small differences between neighboring streamlines do not drift with the streaks. In an animation they
+    would look like a fixed pattern in front of the surface.
     """
     return has_flow(look) or look.is_antialiased
 
 
 def _batch_size(half_length: int) -> int:
-    """Return the number of streamlines of a batch, given their steps in each direction."""
+    """Return the number of streamlines in a batch, given the number of steps of each in one direction."""
     return max(min(BATCH_SIZE, MAX_BATCH_STEPS // half_length), 1)
 
 
@@ -380,7 +406,7 @@ def _batches(seeds: np.ndarray, batch_size: int) -> list[np.ndarray]:
 
 
 def _grid_seeds(covering: Covering, averages: _LineAverages, spacing: int) -> np.ndarray:
-    """Return seeds on evenly spaced rows and columns of the window: the lines that cross the row or column.
+    """Return seeds on evenly spaced rows and columns of pixels: the lines that cross the row or column.
 
     Streamlines from there run side by side. They miss few lines, pass few lines twice, and their
     memory accesses are close to each other.
@@ -395,7 +421,7 @@ def _grid_seeds(covering: Covering, averages: _LineAverages, spacing: int) -> np
     Returns
     -------
     (n,) intp ndarray
-        Entries of lines.
+        Indices of lines; see `Covering`.
     """
     width, height = covering.width, covering.cell_count // covering.width
     rows, columns = (_even_positions(size, spacing)[:, None] for size in (height, width))
@@ -419,9 +445,9 @@ def _even_positions(size: int, spacing: int) -> np.ndarray:
 def _seed_priority(covering: Covering, line: np.ndarray) -> np.ndarray:
     """Return (n,) float64 priorities from 0 to 1, evenly distributed over rows and columns.
 
-    The seeds of a round are the lines whose priorities are in a range. A priority depends on nothing but the
-    position of the line. With seeds at every n-th place of a list, a field that changes a little would get
-    other streamlines everywhere, and pictures of a series would flicker.
+    The seeds of a round are the lines whose priorities are in a range. A priority depends on the cell and the
+    number of the line alone. If every n-th line that has no average were a seed, a small change of the
+    field would move the seeds everywhere, and animations would flicker.
     """
     line_index, cell = np.divmod(line, covering.cell_count)
     row, column = np.divmod(cell, covering.width)

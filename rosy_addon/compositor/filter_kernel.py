@@ -12,11 +12,11 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-#: The kernels.
+#: Names of the kernels.
 Kernel = Literal["box", "taper", "ramp"]
 
 
-#: How much the weights of samples fall over the length of a streamline, forward and backward.
+#: How much the weights of samples fall from the center to the end of a streamline: forward, backward.
 WEIGHT_SLOPES: dict[Kernel, tuple[float, float]] = {
     "box": (0.0, 0.0),
     "taper": (1.0, 1.0),
@@ -29,9 +29,9 @@ KERNEL_OF_FADE: dict[str, Kernel] = {"none": "box", "ends": "taper", "tail": "ra
 
 
 def sample_weights(position: np.ndarray, length: float, kernel: Kernel) -> np.ndarray:
-    """Return the weights of the samples at whole numbers of steps from the center, forward if positive.
+    """Return the weights of samples at given positions: whole steps from the center, positive if forward.
 
-    Those further away than `length` steps are 0.
+    Samples more than `length` steps away have the weight 0.
     """
     forward, backward = WEIGHT_SLOPES[kernel]
     slope = np.where(position > 0, forward, backward) / (1 + length)
@@ -65,8 +65,8 @@ def kernel_weights(forward: Any, backward: Any, full_length: Any, kernel: Kernel
     full_length : ndarray or float
         Number of samples on either side of a streamline that does not end early.
     kernel : {"box", "taper", "ramp"}
-        The weight of the sample d steps from the center: 1; or 1 - d / (full_length + 1); or, with d
-        negative on the backward side, the same, which reaches 2 there.
+        Weight of the sample d steps from the center: 1 for "box", and 1 - d / (full_length + 1) for the
+        others. For "ramp", d is negative on the backward side, so weights there are between 1 and 2.
 
     Returns
     -------
@@ -90,6 +90,6 @@ def full_sample_count(length: int, kernel: Kernel) -> float:
 
 
 def _weight_sums(count: Any, slope: Any) -> tuple[Any, Any]:
-    """Return the sums of 1 - d slope, and of its square, for d from 1 to count."""
+    """Return the sums over d from 1 to `count` of the weights 1 - d * slope, and of their squares."""
     step_sum = slope * count * (count + 1)
     return count - step_sum / 2, count - step_sum * (1 - slope * (2 * count + 1) / 6)

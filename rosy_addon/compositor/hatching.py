@@ -1,12 +1,13 @@
-"""Hatching: LIC images thresholded to lines of ink on paper that reproduce a tone.
+"""Hatching: thresholds turn LIC images into lines of ink on paper that reproduce a tone.
 
 Ink is drawn where the streaks of an LIC image exceed a threshold. The fraction of the paper above
 any threshold is known from the statistics of streaks (`streak_statistics`), so the threshold
 follows from the coverage that the tone requires, and no image has to be analyzed.
 
-Each line family with the coverage a transmits 1 - a of the light. To reach the tone T together,
-each family transmits 1 - a = T^s, with shares s that sum to 1. In light tones one family has the
-share 1. Further families join in darker tones, in order of their distance to the guiding angle.
+A *line* here is a pair of opposite directions of the field, and all ink along it. M lines cross at a pixel.
+Each line with the coverage a transmits 1 - a of the light. To reach the tone T together,
+each line transmits 1 - a = T^s, with shares s that sum to 1. In light tones one line has the
+share 1. Further lines join in darker tones, in order of their angle to the guiding angle (their *rank*).
 
 Effects that make lines uneven are added to the streaks before the threshold: shorter streaks, which
 break lines or vary their width, and the grain of the paper. The statistics include them, so
@@ -38,18 +39,18 @@ from .streak_statistics import (
     softness,
 )
 
-#: Range of darkness (1 - tone), beyond its onset, over which a family grows to its full share.
+#: Range of darkness (1 - tone), beyond the onset of a line, over which the line grows to its full share.
 ONSET_RANGE = 0.35
 
-#: Darkness before the onset at which a family already begins, faintly. It hides the seam where two
-#: families swap ranks.
+#: A line already begins faintly at this darkness before its onset. This hides the seam where two lines swap
+#: ranks.
 ONSET_LEAD = 0.15
 
-#: Half the width of the blend between two ranks, in ranks.
+#: Half the width of the blend between two ranks, in units of the rank.
 RANK_BLEND = 0.4
 
-#: Half the width of the step from paper to ink of antialiased streaks, in multiples of their slope per
-#: pixel.
+#: Half the width of the step from paper to ink of antialiased streaks, in multiples of the change of the
+#: streak over a pixel.
 PIXEL_SOFTNESS = 1.0
 
 #: Coverage, as a fraction of a pixel, below which ink is not visible.
@@ -63,10 +64,11 @@ class HatchedLines(NamedTuple):
     ----------
     look : PixelLook
     images : LicImages or None
-        Member images in the order of `all_members(field, look.guiding_angle)`. None if they are not
-        known yet, or not needed as there are even lines.
+        Member images in the order of `all_members(field, look.guiding_angle)`. None if they have not been
+        computed yet, or are not needed because there are even lines.
     break_images : LicImages or None
-        Images whose streaks are as long as the pieces of broken lines (`break_steps`).
+        LIC images whose streaks are as long as the pieces of broken lines (`break_steps`). None if lines are
+        not broken.
     paper_grain : (M, P) float32 ndarray or None
         Height of the paper for each line, with mean 0 and standard deviation 1. Ink adheres better
         where it is larger.
@@ -92,40 +94,51 @@ class HatchedLines(NamedTuple):
     even_lines: EvenLines | None = None
 
     def part(self, extent: slice) -> HatchedLines:
-        """Return the lines at some of the pixels."""
+        """Return the lines and what makes them uneven at the pixels `extent`."""
         return HatchedLines(self.look, *(_part(values, extent) for values in self[1:]))
 
     def relief(self, line: int) -> np.ndarray | np.float32:
-        """Return what the paper adds to the streaks of a line: (P,) float32, or 0 without paper grain."""
+        """Return what the paper grain adds to the LIC image of one direction of the field.
+
+        (P,) float32, in standard deviations of the image; or the scalar 0 if there is no paper grain.
+        """
         if self.paper_grain is None:
             return np.float32(0)
         return np.float32(PAPER_GRAIN_STRENGTH * self.look.paper_grain) * self.paper_grain[line]
 
     def break_streak(self, line: int) -> np.ndarray | None:
-        """Return the (P,) short streaks that break a line, with mean 0 and standard deviation 1."""
+        """Return the (P,) noise, averaged along short streamlines, that breaks lines of ink into pieces.
+
+        `line` is the index of a direction of the field (opposite members count as one). The mean is 0, the
+        standard deviation 1. None if lines are not broken.
+        """
         if self.break_images is None:
             return None
         std = look_streak_statistics(self.look).break_std
         return standard_streak(self.break_images, line, std)[0]
 
     def spots(self, line: int) -> np.ndarray:
-        """Return (P,) float32 streaks of the undirected texture, NaN where the field is defined."""
+        """Return what is thresholded in place of a LIC image where the field is undefined.
+
+        It is the undirected texture with standard deviation 1, plus the paper grain of the line. The result
+        is (P,) float32, NaN where the field is defined.
+        """
         std = np.float32(look_streak_statistics(self.look).disc_std)
         return self.undirected / std + self.relief(line)
 
     def target_tones(self, tone: np.ndarray) -> np.ndarray:
-        """Return the (M, P) target tones of the lines, or (1, P) if all lines have the same: `tone`."""
+        """Return the target tones of lines: (M, P) `line_tones` if set, else the (P,) `tone` as (1, P)."""
         return tone[None] if self.line_tones is None else self.line_tones
 
     def coverage(self, line: int, target_coverage: np.ndarray) -> np.ndarray:
-        """Compute the coverage of each pixel by one line.
+        """Compute the coverage of each pixel by the ink lines along one direction of the field.
 
         Parameters
         ----------
         line : int
-            Index into `images.members`.
+            Index of the direction (opposite members count as one), as in `images.members`.
         target_coverage : (P,) ndarray
-            Fraction of the paper that the line should cover on average, 0 to 1.
+            Fraction of the paper that these lines should cover on average, 0 to 1.
 
         Returns
         -------
@@ -159,7 +172,7 @@ class HatchedLines(NamedTuple):
 
 
 def _part(values: Any, extent: slice) -> Any:
-    """Return an array or other values at some of the pixels; None if there are none."""
+    """Return values (an array, or an object with a method `part`) at some of the pixels; None for None."""
     if values is None:
         return None
     return values[..., extent] if isinstance(values, np.ndarray) else values.part(extent)
@@ -196,7 +209,7 @@ def render_hatching(
 def _render_one_ink(
     field: PixelField, lines: HatchedLines, tone: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the (P, 3) linear color of the ink, and (P,) coverage, with the same ink for all lines."""
+    """Return the (P, 3) linear color of the ink and its (P,) coverage, if all lines have the same ink."""
     look = lines.look
     inks = inks_of(look.look)
     by_magnitude, position = colors_magnitude(look), field.map_position
@@ -224,7 +237,9 @@ def _render_one_ink(
 def _render_many_inks(
     field: PixelField, lines: HatchedLines, tone: np.ndarray, ink_indices: list[np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the (P, 3) linear color of the ink, and (P,) coverage, with an ink per family of lines.
+    """Return the (P, 3) linear color of the ink and its (P,) coverage, if lines have different inks.
+
+    `ink_indices` are from `line_ink_indices`.
 
     Inks are transparent: the transmittances of crossing lines are multiplied.
     """
@@ -257,7 +272,11 @@ def _render_many_inks(
 def standard_streak(
     images: LicImages, line: int, std: float
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    """Return the streaks of a line with mean 0 and variance 1, and their slopes if known."""
+    """Return the LIC image of one direction of the field with mean 0 and variance 1, and its slopes.
+
+    `std` is the standard deviation of streaks. The slopes (`LicImages.slopes`) are scaled in the same way, or
+    None if the images have none.
+    """
     streak = (images.members[line].mean(axis=1) - NOISE_MEAN) / std
     return streak, None if images.slopes is None else images.slopes[line] / std
 
@@ -271,7 +290,7 @@ def _above_threshold(
 ) -> np.ndarray:
     """Return 1 where streaks exceed the threshold of the target coverage, with soft edges.
 
-    With slopes, edges are at least as soft as the mean over a pixel.
+    If `slope` is given, edges are at least as soft as those of a mean over a pixel.
     """
     threshold = np.interp(target_coverage, np.linspace(0, 1, COVERAGE_STEPS), thresholds)
     half_width = np.float32(softness(look.crispness))
@@ -311,9 +330,10 @@ def has_paper_grain(look: Any) -> bool:
 
 
 def is_shaded_by_pixel(look: Any) -> bool:
-    """Return whether a pixel with several samples is shaded once, not at every sample.
+    """Return whether a pixel with several samples is shaded once (True) or at every sample (False).
 
-    The streaks of other methods do not have the slopes that smooth the edges of the ink.
+    Hatching needs the slopes of streaks to smooth the edges of the ink, and only the method "sheets"
+    computes them.
     """
     return not is_hatched(look) or look.method == "sheets"
 
@@ -321,14 +341,14 @@ def is_shaded_by_pixel(look: Any) -> bool:
 def line_ink_indices(field: PixelField, look: PixelLook) -> list[np.ndarray] | None:
     """Find the ink of each line at each pixel.
 
-    All lines of a family have the same ink. If the field does not distinguish its lines, it is chosen
-    by the rank of the line, which is its distance to the guiding angle.
+    All lines of a family have the same ink. If the field does not distinguish families, the ink is chosen
+    by the rank of the line (see `line_ranks`).
 
     Returns
     -------
     list of M (P,) ndarrays, or None
-        Indices of inks (see `Inks.ink_at_tone`). If they are ranks, they are fractional where two
-        lines swap ranks. None if all lines have the same ink.
+        Indices of inks (see `Inks.ink_at_tone`). If inks are chosen by rank, indices are fractional where
+        two lines swap ranks. None if all lines have the same ink.
     """
     if not has_ink_per_line(look.look):
         return None
@@ -353,7 +373,7 @@ def line_ranks(field: PixelField, look: PixelLook) -> list[np.ndarray]:
 
 
 def soft_rank_of(rank: np.ndarray, rank_count: int) -> np.ndarray:
-    """Return ranks rounded down, with a smooth transition around the integers, where lines swap ranks.
+    """Round ranks down to integers, with a smooth transition around the integers, where lines swap ranks.
 
     The result is at most `rank_count - 1`.
     """
@@ -380,9 +400,9 @@ def line_shares(
     look : PixelLook
         Its `guiding_angle`, `layers` and `layering` are used.
     transmittance : (M, P) or (1, P) ndarray
-        Target transmittance of each line, or of all lines.
+        Target transmittance of all ink together, with a row for each line if lines have different targets.
     even_lines : EvenLines, optional
-        At the pixels of the field.
+        Evenly spaced lines at the pixels of the field, if they are drawn.
 
     Returns
     -------
@@ -409,7 +429,10 @@ def line_shares(
 
 
 def onset_weights(darkness: np.ndarray, delays: Sequence[np.ndarray | float]) -> list[np.ndarray]:
-    """Compute how much each line has joined, 0 to 1, at a darkness, given the ones at which they do."""
+    """Compute how much each line has joined the hatching at a darkness, 0 to 1.
+
+    `delays` are the darkness at which each line joins. The result has an array for each line.
+    """
     return [
         smoothstep((darkness - delay + ONSET_LEAD) / (ONSET_RANGE + ONSET_LEAD)) for delay in delays
     ]
@@ -418,7 +441,10 @@ def onset_weights(darkness: np.ndarray, delays: Sequence[np.ndarray | float]) ->
 def _onset_darkness(
     field: PixelField, look: PixelLook, even_lines: EvenLines | None
 ) -> list[np.ndarray]:
-    """Return the (P,) darkness at which each line joins. Above 1 for ranks beyond `look.layers`."""
+    """Return M (P,) arrays: the darkness (1 - transmittance) at which each line joins the hatching.
+
+    It is above 1, so that the line is never drawn, for ranks beyond `look.layers`.
+    """
     onsets = []
     for line, rank in enumerate(line_ranks(field, look)):
         onset = soft_rank_of(rank, look.layers) * np.float32(look.layering)

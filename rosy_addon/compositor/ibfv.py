@@ -2,8 +2,9 @@
 
 Van Wijk (Image based flow visualization, SIGGRAPH 2002) carries the picture a step along a vector field,
 blends it with a little noise, and repeats this frame by frame. The picture is then an average of the noise
-upstream, whose weights q^m fall exponentially with the number m of steps. On the covering (see `covering`)
-an N-RoSy is a vector field as well: each state takes what arrives at it along its own sheet.
+upstream, with weights q^m that fall exponentially with the number m of steps. On the covering surface (see
+`covering`), an N-RoSy is a vector field, too. A state is a pixel with one direction (sheet) of the field.
+Each state receives the values that arrive along its own sheet.
 
 After many frames, the picture is the sum over m of q^m A^m n, where n is the noise, and A carries a picture
 one step. Repeating the blend would interpolate between pixels at every step, which blurs streaks. So the
@@ -11,17 +12,17 @@ sum is doubled instead:
 
     F_2D = F_D + q^D A^D F_D,    A^2D = A^D A^D.
 
-A^D is known by where the streamline of each state comes from, D steps upstream (see `streamline_origins`).
-Some doublings replace more than a hundred blends, and values are interpolated once in each.
+A^D is given by the point D steps upstream on the streamline of each state (see `streamline_origins`).
+A few doublings replace more than a hundred blends. Each doubling interpolates values only once.
 
 Noise that varies in time makes the streaks drift. It is interpolated between the three channels of the
 flow, by a constant and a cosine and sine of the phase: n_c at the phase -c / 3. The squares of the weights
 (1 + 2 cos) / 3 have the sum 1, so the contrast is constant. There is one frequency, and A does not depend on
-the time. So the picture of any frame is a blend of three images, which serve all frames: averages of the
-constant, the cosine and the sine part of the noise. Frames need no earlier ones, and loops close.
+the time. So the picture of any frame is a blend of the same three images: averages of the constant, the
+cosine and the sine part of the noise. No frame depends on earlier frames, and animations can loop.
 
-Streaks of a field of odd degree are one-sided, along its directions. A line without direction is a pair of
-opposite sheets. Its streaks are the mean of both.
+Streaks of a field of odd degree are averages upstream along its directions. In a field of even degree, a
+line is a pair of opposite sheets, and its streaks are the mean of both.
 """
 
 from __future__ import annotations
@@ -45,34 +46,35 @@ from .pixel_field import PixelField
 from .reported_blocks import reported_blocks
 from .streamline_origins import Origins, Sheets
 
-#: The doublings end when the weights of further steps are below this. Averages are divided by the weights
-#: that they have.
+#: The doublings end when the weights of further steps are below this. Averages are divided by the sum of
+#: the weights that were added.
 MIN_WEIGHT = 0.01
 
-#: Factor of the differences to the four neighbors that are added to the noise of a pixel, for each
-#: doubling. This restores what interpolation blurs, on average: streaks along the rows of pixels are not
-#: blurred, others are.
+#: Sharpening of the noise for each doubling: the factor of the differences from the four neighbors, which are
+#: added to the noise of a pixel. It makes up for the blur of interpolation on average. (Streaks along the
+#: rows of pixels are not blurred, others are.)
 SHARPENING = 0.02
 
 #: Factors of the contrast, measured so that streaks have the same standard deviation as with other methods:
-#: for streaks on one side of a pixel, which are carried further, and for streaks on both sides.
+#: for averages over one side of a pixel (with more steps), and for averages over both sides.
 ONE_SIDED_MATCH, TWO_SIDED_MATCH = np.float32(1.06), np.float32(1.02)
 
-#: Weight of the noise at the pixel itself, relative to the weight of the first step. It is part of both sheets of
-#: a line.
+#: Weight of the noise at the pixel itself in the sum along each of the two opposite sheets of a line. Both
+#: sums contain that pixel.
 OWN_WEIGHT = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class StreakWaves:
-    """The average noise of each line, for all phases of the flow.
+    """The noise averaged along each line (pair of opposite directions), as a function of the flow phase.
 
     Attributes
     ----------
     constant : (M, P, K) float32 ndarray
         Averages around 0, scaled to the variance of full streamlines.
     wave : (M, P) complex64 ndarray or None
-        The real part of its product with exp(2 pi i phase) is added. None without flow.
+        Part that depends on the phase: the real part of its product with exp(2 pi i phase) is added to
+        `constant`. None if the look has no flow.
     effective_samples : (P,) float32 ndarray
         See `LicImages`.
     """
@@ -82,7 +84,7 @@ class StreakWaves:
     effective_samples: np.ndarray
 
     def images(self, phase: float) -> LicImages:
-        """Return the LIC images at a phase of the flow."""
+        """Return the LIC images at a phase of the flow, from 0 to 1."""
         members = np.empty_like(self.constant)
         turn = np.exp(2j * np.pi * phase)
         real, imaginary = np.float32(turn.real), np.float32(turn.imag)
@@ -97,20 +99,20 @@ class StreakWaves:
 
 
 def wave_images(waves: Sequence[StreakWaves], looks: Sequence[PixelLook]) -> list[LicImages]:
-    """Return the LIC images of looks at their phases."""
+    """Return the LIC images of each look at its phase of the flow, from its `StreakWaves`."""
     return [wave.images(look.flow_phase) for wave, look in zip(waves, looks, strict=True)]
 
 
 def streak_waves(
     field: PixelField, looks: Sequence[PixelLook], noise: np.ndarray
 ) -> list[StreakWaves]:
-    """Average the noise upstream of every state, for looks that differ in the length of streamlines.
+    """Average noise along the lines of a field, for looks that differ in the length of streamlines.
 
     Parameters
     ----------
     field : PixelField
     looks : sequence of PixelLook
-        In pixels of the frame. The first is the longest.
+        Looks in pixels of the frame. The first has the greatest length.
     noise : (P, K) float32 ndarray
         The three channels of `flow`, if the looks have flow.
 
@@ -151,13 +153,14 @@ def _noise_sources(noise: np.ndarray, look: PixelLook) -> list[np.ndarray]:
     Parameters
     ----------
     noise : (P, K) float32 ndarray
-        Around 0.
+        Noise with the mean 0.
 
     Returns
     -------
     list of (P,) complex64 ndarray
-        The first has the noise, and 1 as its imaginary part, so that its sum is the sum of the weights. The second
-        has the other two channels of colored noise, or the wave of `StreakWaves`.
+        The real part of the first array is the noise. Its imaginary part is 1, so that its sum is the sum of
+        the weights. The second array has the other two channels of colored noise, or the noise that
+        becomes `StreakWaves.wave`.
     """
     if has_flow(look):
         third = np.exp(2j * np.pi * np.arange(FLOW_CHANNELS) / FLOW_CHANNELS)
@@ -178,7 +181,7 @@ def _step_turn(look: PixelLook) -> float:
     if not has_flow(look):
         return 0.0
     angle = 2 * np.pi / look.flow_distance
-    # What comes from upstream left there earlier. What is downstream will be there later.
+    # Noise that arrives from upstream started earlier. Noise downstream arrives there later.
     return angle if look.kernel == "ramp" else -angle
 
 
@@ -188,7 +191,7 @@ def _is_two_sided(field: PixelField, look: PixelLook) -> bool:
 
 
 def _doubling_count(decay: float) -> int:
-    """Return the number of doublings that a sum needs whose weights have the ratio `decay`."""
+    """Return how many doublings a sum needs, if successive weights have the ratio `decay`."""
     steps = math.log(MIN_WEIGHT) / math.log(decay) if decay > 0 else 0
     return math.ceil(math.log2(max(steps, 1)))
 
@@ -200,7 +203,10 @@ def _full_decay(field: PixelField, look: PixelLook) -> np.float32:
 
 
 def _decay(field: PixelField, look: PixelLook) -> np.ndarray:
-    """Return the (P,) or () float32 ratios q of the weights of successive steps."""
+    """Return the float32 ratio q of the weights of successive steps.
+
+    (P,) if the length of streamlines depends on the magnitude; () otherwise.
+    """
     limits = magnitude_step_limits(field, look)
     if limits is None:
         return _full_decay(field, look)
@@ -210,7 +216,7 @@ def _decay(field: PixelField, look: PixelLook) -> np.ndarray:
 
 
 def decay_of_samples(effective_samples: np.ndarray, two_sided: bool) -> np.ndarray:
-    """Return the decay of the kernel with given effective samples, by bisection.
+    """Find the decay of a kernel with given effective samples (`KernelWeights`), by bisection.
 
     Parameters
     ----------
@@ -237,14 +243,20 @@ def decay_of_samples(effective_samples: np.ndarray, two_sided: bool) -> np.ndarr
 
 
 def _square_sum(rest: np.ndarray | float, decay: np.ndarray) -> np.ndarray:
-    """Return the sum of the squares of the weights of a sheet up to the step whose weight is `rest`."""
+    """Return the sum of the squared weights along one direction, up to the step with the weight `rest`.
+
+    `decay` is the ratio q of the weights of successive steps.
+    """
     return OWN_WEIGHT**2 + decay**2 * (1 - np.square(rest)) / (1 - decay**2)
 
 
 def _sharpened_sources(
     sheets: Sheets, noise: np.ndarray, look: PixelLook, sharpening: np.float32
 ) -> list[np.ndarray]:
-    """Return the (C,) `_noise_sources` of cells, 0 outside, from (P, K) noise; see `SHARPENING`."""
+    """Return the (C,) `_noise_sources` of the cells of a covering, from (P, K) noise, sharpened.
+
+    Cells without a pixel are 0. `sharpening` is the factor of differences from neighbors; see `SHARPENING`.
+    """
     plain: list[np.ndarray] = []
     for _, block, cell in sheets.blocks(1):
         parts = _noise_sources(noise[block] - np.float32(NOISE_MEAN), look)
@@ -260,17 +272,17 @@ def _sharpened_sources(
 
 
 class _Sums:
-    """Weighted sums of noise along the streamlines of all states.
+    """Weighted sums of noise along the streamlines of all states of the covering surface.
 
     Parameters
     ----------
     sheets : Sheets
     sources : list of (C,) complex64 ndarray
-        What is summed.
+        Noise of cells that is summed, from `_sharpened_sources`.
     decay : (P,) or () float32 ndarray
-        q.
+        q, the ratio of the weights of successive steps.
     turn : float
-        Angle by which the second source is rotated at each step.
+        Angle in radians by which the second source is rotated at each step.
     """
 
     def __init__(
@@ -279,7 +291,7 @@ class _Sums:
         self._sheets = sheets
         self.sources = sources
         self.decay = decay
-        # The weight of the steps by which the sums are doubled next.
+        # q^D, the weight of the D steps by which the next doubling extends the sums.
         self.weight = decay
         self._turn = turn
         size = sheets.count * sheets.cell_count
@@ -289,7 +301,9 @@ class _Sums:
                 total[state] = source.take(sheets.cells[block])
 
     def weighted(self, place: int, values: np.ndarray, steps: int, block: slice) -> np.ndarray:
-        """Multiply sums that arrive from a number of steps by their weight, and rotate them.
+        """Multiply the sums that arrive from D steps upstream by their weight, q^D.
+
+        Sums of the second source are rotated, too.
 
         The arithmetic uses real numbers. Products of complex numbers are not rounded alike on all
         processors.
@@ -299,10 +313,11 @@ class _Sums:
         place : int
             Index of the source.
         values : (n,) complex64 ndarray
-            At the pixels of a block.
+            Sums that arrive at the pixels of a block.
         steps : int
-            The number of steps whose weight is `weight`.
+            D; the attribute `weight` must be the weight of as many steps.
         block : slice
+            The pixels.
         """
         values = values * (self.weight[block] if np.ndim(self.weight) else self.weight)
         angle = self._turn * steps
@@ -317,9 +332,10 @@ class _Sums:
     def at(
         self, covering_sheet: int, block: slice
     ) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
-        """Return the sums of a sheet at some pixels, their weights, and the sums of squared weights.
+        """Return the sums at the pixels of a block along one sheet (direction) of the covering surface.
 
-        The own noise has the weight `OWN_WEIGHT` in them.
+        The result is the sum of each source, the sum of the weights, and the sum of the squared weights. The
+        noise at the pixel itself has the weight `OWN_WEIGHT` in them.
         """
         sheets = self._sheets
         cell = sheets.cells[block].astype(np.intp)
@@ -339,12 +355,12 @@ class _Sums:
 def _doubled(
     sheets: Sheets, sums: Sequence[_Sums], steps: int, origins: Origins, is_last: bool
 ) -> Origins:
-    """Add to sums over a number of steps those over as many further steps, from the origins.
+    """Double the number of steps that sums cover: add the sums at the origins, which are `steps` upstream.
 
     Returns
     -------
     Origins
-        The origins after twice as many steps. Empty if `is_last`.
+        The points 2 * `steps` upstream of every state. Empty if `is_last`.
     """
     doubled = [[values.copy() for values in total.values] for total in sums]
     result = Origins.ended(0 if is_last else len(origins.cell))
@@ -363,7 +379,7 @@ def _doubled(
 
 
 def _line_waves(field: PixelField, covering: Covering, look: PixelLook, sums: _Sums) -> StreakWaves:
-    """Blend the two sheets of each line, and equalize the contrast."""
+    """Average the sums of the two opposite sheets of each line, and equalize the contrast."""
     lines, count = field.line_count, len(field.pixel)
     flows = has_flow(look)
     match = TWO_SIDED_MATCH if _is_two_sided(field, look) else ONE_SIDED_MATCH
@@ -383,7 +399,7 @@ def _line_waves(field: PixelField, covering: Covering, look: PixelLook, sums: _S
             else:
                 forward = covering.forward_share(state) if flows else np.float32(0.5)
                 backward = 1 - forward
-                # What drifts forward comes along the opposite sheet.
+                # Noise that drifts forward arrives along the opposite sheet.
                 one, one_weight, one_squares = sums.at(first_sheet + lines, block)
                 other, other_weight, other_squares = sums.at(first_sheet, block)
                 values = [forward * a + backward * b for a, b in zip(one, other, strict=True)]

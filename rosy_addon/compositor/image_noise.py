@@ -1,7 +1,7 @@
 """Image-space noise from an integer hash, and the variance of its mean along a streamline.
 
-Images that are anchored to the picture are computed for whole tiles. These do not change while the visible
-region changes a little, so they stay cached for later pictures.
+Noise that is anchored to the picture is computed for whole tiles. The set of tiles often stays the same when
+the visible region changes a little, so they can be reused for later pictures.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ LATTICE_ANGLE = 0.5
 #: Standard deviation of the blur that the high pass subtracts, as a fraction of `Look.high_pass`.
 BLUR_FACTOR = 0.5
 
-#: Largest margin in pixels around the picture whose noise is computed for the high pass. Wider ones
-#: would take longer than the picture, and their mean hardly differs from `NOISE_MEAN`.
+#: Largest margin in pixels around the picture whose noise is computed for the high pass. A wider margin
+#: would take longer than the picture, and its mean hardly differs from `NOISE_MEAN`.
 MAX_MARGIN = 512
 
 #: Label of all steps.
@@ -37,7 +37,7 @@ STEP_LABEL = "making noise"
 #: exact, and do not depend on where they begin.
 BLUR_QUANTUM = 2.0**-32
 
-#: Rows or columns that are blurred together. Their sums fit the caches of the processor.
+#: Rows or columns that are blurred together. Their sums fit into the caches of the processor.
 BLUR_LINES = 32
 
 #: Rows of cells that are hashed at once. Their intermediate results fit into the cache.
@@ -57,7 +57,7 @@ TILE_PIXELS = 256
 #: Maximum number of pixels of an image that is cached for the next picture.
 MAX_CACHED_PIXELS = 1 << 22
 
-#: The cached images. It holds eight of the largest.
+#: Cache of noise images. It has room for eight images of the maximum size.
 TILE_CACHE = Cache(max_bytes=8 * 4 * MAX_CACHED_PIXELS)
 
 
@@ -77,6 +77,7 @@ def hash_bits(
     Returns
     -------
     bool ndarray
+        The random bit of each cell.
 
     References
     ----------
@@ -111,7 +112,7 @@ class TileRectangle(NamedTuple):
 def tile_rectangle(
     pixel: np.ndarray, width: int, subpixels: int = 1, extra_columns: int = 0
 ) -> TileRectangle:
-    """Return the rectangle that covers some pixels.
+    """Return the smallest rectangle of whole tiles that contains some pixels.
 
     Parameters
     ----------
@@ -144,7 +145,7 @@ def cached_tiles(
 ) -> np.ndarray:
     """Return the result of ``create(rectangle, *settings)``, from the cache if it is there.
 
-    It is a flat image of the rectangle. Large images are not stored.
+    The result is a flat image of the rectangle. It is stored unless it has more than `MAX_CACHED_PIXELS`.
     """
     left, right, bottom, top = rectangle
     if (right - left) * (top - bottom) > MAX_CACHED_PIXELS:
@@ -236,12 +237,12 @@ def _noise_tiles(
 
 
 def high_pass_margin(high_pass: float) -> int:
-    """Return how many pixels around a pixel its noise depends on, with this high pass."""
+    """Return the radius in pixels around a pixel on which its noise depends because of the high pass."""
     return int(np.ceil(3 * BLUR_FACTOR * high_pass))
 
 
 def box_radius(sigma: float) -> int:
-    """Return the radius in pixels of each of the three box filters of `gaussian_blur`."""
+    """Return the radius in pixels of the three box filters that make up `gaussian_blur`."""
     # A box filter of the width w has the variance (w^2 - 1) / 12.
     return max(int(np.rint((np.sqrt(4 * sigma**2 + 1) - 1) / 2)), 1)
 
@@ -314,20 +315,20 @@ def streak_moments(
     cell, high_pass : float
         Cell size and high-pass width of the noise, in pixels.
     images : int
-        M, the number of streamlines through a pixel. Their angles are multiples of pi / M.
+        M, the number of streamlines through a pixel, at angles of multiples of pi / M.
     average : int
         Side in pixels of the squares that are averaged when the picture is downsampled.
     kernel : {"box", "taper", "ramp"}
-        The weights of the samples (see `filter_kernel`). With a ramp, the lines belong to a field of odd
-        degree: every other one points against its angle.
+        The weights of the samples (see `filter_kernel`). With "ramp", the streamlines are those of a field of
+        odd degree: every other one runs in the direction opposite to its angle.
 
     Returns
     -------
     std : float
         Standard deviation of the mean along one streamline.
     correlation_sum : float
-        Sum of the correlations of one of the M means with each of the others. They are correlated
-        because the streamlines share the noise around the pixel where they cross.
+        Sum of the correlations of one of the M means with each of the others. The means are correlated
+        because their streamlines share the noise around the pixel where they cross.
 
     Notes
     -----
@@ -367,7 +368,10 @@ def streak_moments(
 
 
 def _line_response(cycles: np.ndarray, kernel: Kernel) -> np.ndarray:
-    """Return the frequency response of the mean along a line, given the cycles of a wave along it."""
+    """Return the factor by which the mean along a streamline changes the amplitude of a wave of noise.
+
+    `cycles` is the number of cycles of the wave along the streamline.
+    """
     if kernel == "taper":
         return np.sinc(cycles / 2) ** 2
     if kernel == "box":

@@ -1,8 +1,7 @@
-"""The ink of hatching that is drawn from thresholds, for any tone.
+"""Ink of hatching for any tone, drawn from stored thresholds (see `ink_thresholds`).
 
-`filtered_edges` and `layer_coverage` are written for numbers of two kinds: arrays, with which
-`ink_of_thresholds` draws, and numbers of a node tree, with which `scene.hatching_nodes` makes the node group
-*RoSy Hatching*.
+`filtered_edges` and `layer_coverage` are written once for two uses: `ink_of_thresholds` calls them with
+arrays, and `scene.hatching_nodes` with sockets of shader nodes, to make the node group *RoSy Hatching*.
 """
 
 from __future__ import annotations
@@ -19,36 +18,39 @@ from .inks import Inks, has_ink_per_line, inks_of
 from .look import Look
 from .streak_statistics import softness
 
-#: The density of normally distributed streaks is about this times c (1 - c) at the threshold of the
-#: coverage c. At c = 1/2 it is 1 / sqrt(2 pi), and the factor 4 / sqrt(2 pi) = 1.596.
+#: The probability density of normally distributed streaks, at the threshold of the coverage c, is about this
+#: factor times c (1 - c). At c = 1/2 the density is 1 / sqrt(2 pi), so the factor is 4 / sqrt(2 pi) = 1.596.
 DENSITY_FACTOR = 1.6
 
-#: Spread of thresholds that is due to the storage of their spread with 8 bits: the standard deviation of
-#: its rounding is 1 / (255 sqrt(12)) = 0.0011.
+#: Part of a stored spread that may be due to its rounding to 8 bits: the standard deviation of the
+#: rounding error, 1 / (255 sqrt(12)) = 0.0011.
 ROUNDING_SPREAD = 0.001
 
-#: Square of half the width of an even distribution of thresholds t over the variance of 2 t - 1. For the
-#: half width w, the variance of t is w^2 / 3, and 2 t - 1 has four times as much.
+#: Ratio of w^2 to the variance of 2 t - 1, for thresholds t that are evenly distributed over the width 2 w.
+#: The variance of t is w^2 / 3, and the variance of 2 t - 1 is four times as much.
 EDGE_VARIANCE = 0.75
 
 #: Half the width of the sharpest edges, in thresholds: half a step of 8 bits, 1 / 510.
 MIN_EDGE = 0.002
 
-#: Coverages that differ from 0 or 1 by less than this fade to it.
+#: Coverages that differ from 0 or 1 by less than this fade to 0 or 1.
 EXACT_ENDS = 0.02
 
-#: Correction of coverages where a filter averages a few thresholds, which are not evenly distributed about
-#: their mean. Fitted to means of 2 to 64 thresholds, and to lines at least 4 pixels apart: the mean coverage is
-#: right to 0.02
+#: Strength of the correction of coverages where a texture filter has averaged a few thresholds, which are not
+#: evenly distributed about their mean. It is fitted to means of 2 to 64 thresholds, and to lines at least 4
+#: pixels apart. The mean coverage then has an error of at most 0.02
 #: (`test_smaller_versions_of_a_texture_keep_the_tone`).
 FILTER_CORRECTION = 3.0
 
-#: Smallest transmittance, and smallest difference to it.
+#: Lower bound of transmittances, and of differences between them.
 MIN_TRANSMITTANCE = 1e-3
 
 
 def layer_inks(look: Look, line_count: int) -> tuple[int, Inks]:
-    """Return the number of lines that cross at most, and their inks: one each, or one for all."""
+    """Return the number of layers of hatching, and their inks: one for each layer, or one for all.
+
+    Each layer holds the lines along one direction of the field. There are at most `line_count` layers.
+    """
     layers = min(look.layers, line_count, MAX_LAYERS)
     return layers, inks_of(look, layers if has_ink_per_line(look) else 1)
 
@@ -56,18 +58,18 @@ def layer_inks(look: Look, line_count: int) -> tuple[int, Inks]:
 def ink_of_thresholds(
     pixels: np.ndarray, tone: np.ndarray, look: Look, line_count: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Draw the ink of a tone, as the node group *RoSy Hatching* does.
+    """Draw the ink for a tone from thresholds, as the node group *RoSy Hatching* does.
 
     Parameters
     ----------
     pixels : (P, 4) float32 ndarray
-        From `threshold_pixels`, or means of them.
+        Pixels from `threshold_pixels`, or means of such pixels.
     tone : (P,) ndarray
         Linear, 0 to 1.
     look : Look
         Its settings of the ink are used.
     line_count : int
-        Number of lines through a point.
+        Number of lines (pairs of opposite directions of the field) through a point.
 
     Returns
     -------
@@ -90,7 +92,7 @@ def ink_of_thresholds(
     is_opaque = inks.paper_alpha == 1
     color = colors[-1] if not is_opaque else np.broadcast_to(inks.paper, (len(tone), 3))
     bare = np.ones(len(tone), dtype=np.float32)
-    # The lines that come first are on top of the others.
+    # The first layer is drawn last, on top of the others.
     for layer in reversed(range(layers)):
         left_by_layer = left[layer].view(_Values)
         covered = np.asarray(
@@ -103,12 +105,12 @@ def ink_of_thresholds(
 
 
 class FilteredEdges(NamedTuple):
-    """What follows from the spread of the thresholds that a filter of the texture has averaged.
+    """Parameters of the edges of ink where a texture filter has averaged several thresholds.
 
     Attributes
     ----------
     edge
-        Half the width of an even distribution with this spread.
+        Half the width of an even distribution with the spread of the averaged thresholds.
     correction
         Factor of the correction of coverages; see `FILTER_CORRECTION`.
     """
@@ -118,16 +120,16 @@ class FilteredEdges(NamedTuple):
 
 
 def filtered_edges(spread: Any, thresholds: Sequence[Any]) -> FilteredEdges:
-    """Compute what the filter of the texture did to thresholds.
+    """Compute the edges of ink from the spread of the thresholds that a texture filter has averaged.
 
-    Numbers are `_Values` or `scene.node_builder.Number`.
+    All numbers are arrays (`_Values`) or sockets of nodes (`scene.node_builder.Number`).
 
     Parameters
     ----------
     spread
-        Alpha of `threshold_pixels`.
+        Alpha channel of `threshold_pixels`.
     thresholds : sequence
-        The other three channels.
+        Red, green and blue channels of `threshold_pixels`.
     """
     centered = [threshold * 2 - 1.0 for threshold in thresholds]
     mean_square = reduce(add, [value * value for value in centered]) / MAX_LAYERS
@@ -140,14 +142,16 @@ def filtered_edges(spread: Any, thresholds: Sequence[Any]) -> FilteredEdges:
 def layer_coverage(
     left: Any, share: Any, threshold: Any, filtered: FilteredEdges, edge_factor: Any
 ) -> Any:
-    """Compute the coverage by the lines of one layer, 0 to 1; numbers as in `filtered_edges`.
+    """Compute the coverage by the lines of one layer, 0 to 1.
+
+    All numbers are arrays or sockets of nodes, as in `filtered_edges`.
 
     Parameters
     ----------
     left
-        The transmittance that all lines together should have.
+        The transmittance that the lines of all layers together should have.
     share
-        Exponent of it for these lines; see `layer_shares`.
+        Exponent of `left` for the lines of this layer; see `layer_shares`.
     threshold
         Threshold of the layer.
     filtered : FilteredEdges
@@ -161,16 +165,16 @@ def layer_coverage(
     edge = (inner * edge_factor).at_most(room).at_least(filtered.edge).at_least(MIN_EDGE)
     corrected = coverage + filtered.correction * inner * (1 - coverage * 2)
     covered = (corrected - threshold) / (edge * 2) + 0.5
-    # What is narrower than the edge covers no point of it entirely, be it ink or paper.
+    # Ink (or paper) that is narrower than the edge covers no point of the edge entirely.
     missed = 1 - (room / edge).at_most(1.0)
     is_dark = coverage > 0.5
     covered = covered.at_least(is_dark * missed).at_most(1 - (1 - is_dark) * missed)
-    # No ink at all, and nothing but ink, are exact.
+    # Coverages of 0 and 1 are exact.
     return is_dark + (room / EXACT_ENDS).at_most(1.0) * (covered - is_dark)
 
 
 class _Values(np.ndarray):
-    """An array with the operations of `scene.node_builder.Number`."""
+    """An array with the methods of `scene.node_builder.Number`, a socket of shader nodes."""
 
     def at_least(self, other: Any) -> Any:
         return np.maximum(self, other)

@@ -1,15 +1,17 @@
-"""Thresholds of hatching: the coverage from which each point is covered by ink.
+"""Thresholds of hatching: the lowest target coverage at which each point is covered by ink.
 
-Hatching draws ink where a streak exceeds the threshold of a target coverage (`hatching`). Its inverse
-does not depend on the tone: the target coverage from which the streak exceeds the threshold. It is
-evenly distributed from 0 to 1, as are the values of a halftone screen. With the thresholds of each
-line, the hatching of any tone is a comparison: there is ink where the threshold is below the coverage.
+Hatching draws ink where a streak exceeds the threshold of a target coverage (`hatching`). The inverse does
+not depend on the tone: the target coverage above which a given streak has ink. In this module, this
+coverage is called the *threshold* of the point. Thresholds are evenly distributed from 0 to 1, like the
+values of a halftone screen. Once they are known, hatching of any tone is a comparison: there is ink where the
+threshold is below the target coverage.
 
-Lines share the ink in their order: the first covers the light tones, and further ones join in darker
-tones. The thresholds are stored in that order, in layers. With the density E = -log(1 - threshold), a
-line of the share s has ink from the density E / s of the tone on. Where two lines swap, each has a share
-between those of their places, and both are merged into the first of the two layers: there is ink from the
-smaller of these densities on. Such thresholds depend on how the tone is shared.
+M lines (pairs of opposite directions of the field) cross at a point. The first covers the light tones, and
+further lines join in darker tones. Their thresholds are stored in that order, in *layers*. A tone with the
+transmittance T has the *density* -log(T). A line with the threshold t and the share s of the ink has ink
+where the density of the tone exceeds -log(1 - t) / s. Where two lines swap their places in the order, each
+has a share between those of the two places. Both are merged into the first of the two layers, which has ink
+where the density of the tone exceeds the smaller of both bounds. Such thresholds depend on the shares.
 """
 
 from __future__ import annotations
@@ -40,30 +42,32 @@ from .streak_statistics import (
 #: Number of lines whose thresholds are stored.
 MAX_LAYERS = 3
 
-#: Nodes across an antialiased pixel, in half widths of it, with their weights: Gauss quadrature.
+#: Sample positions across an antialiased pixel, in half pixels from its center, and their weights: Gauss
+#: quadrature with three nodes.
 PIXEL_NODES = ((-(0.6**0.5), 5 / 18), (0.0, 8 / 18), (0.6**0.5, 5 / 18))
 
-#: Crowding from which coarser lines replace even ones, at each of these nodes: the middles of thirds.
+#: Crowding of even lines from which coarser lines replace them, at each of these sample positions. The
+#: values are the middles of thirds of 0 to 1, so the share of coarser lines rises with the crowding.
 PIXEL_LEVELS = (1 / 6, 1 / 2, 5 / 6)
 
-#: Half the width w of a pixel for streaks, in pixels. Its variance w^2 / 3 is 1/5, that of the edges of
-#: `hatching`.
+#: Half the width w over which the streaks of a pixel are averaged, in pixels. Its variance w^2 / 3 is 1/5, as
+#: for the soft edges of `hatching`.
 STREAK_REACH = 0.6**0.5
 
-#: Steps of the bisection that finds the thresholds of uneven lines: to 1 / 1024.
+#: Steps of the bisection that finds the thresholds of uneven lines, with an error of at most 1 / 1024.
 BISECTION_STEPS = 10
 
-#: Entries of the table of densities, a power of two, and the largest density.
+#: Number of elements of the table of densities, a power of two, and the largest density in it.
 DENSITY_STEPS, MAX_DENSITY = 1024, 16.0
 DENSITIES = np.linspace(0, MAX_DENSITY, DENSITY_STEPS, dtype=np.float32)
 
 #: Least share of a layer in the table, so that the thresholds of layers without ink are defined.
 LEAST_SHARE = 0.003
 
-#: Least density that is a divisor.
+#: Lower bound of densities that are divided by.
 LEAST_DENSITY = np.float32(1e-6)
 
-#: Lines whose places differ by less than this from whole ones do not swap.
+#: Two lines do not swap places where the share of each place differs by less than this from 0 or 1.
 MAX_ROUNDING = 1e-3
 
 #: Where two lines swap, the one that gets the later place joins its layer while its share of that place
@@ -72,25 +76,25 @@ LAYER_CHANGE = 0.75
 
 
 def sharp_look(look: Look) -> Look:
-    """Return a look whose streak statistics are for lines with sharp edges."""
+    """Return the look with the greatest crispness, so that statistics of streaks are for sharp edges."""
     return replace(look, crispness=1.0)
 
 
 def unlit_look(look: Look) -> Look:
-    """Return a look without what thresholds do not depend on: light, and sources of tone and color."""
+    """Return the look with plain settings of light, tone and color, which thresholds do not depend on."""
     hue = "families" if look.hue == "families" else "one"
     return replace(look, tone="light", light="headlight", shadows=False, overshoot=0.0, hue=hue)
 
 
 def line_thresholds(line: int, lines: HatchedLines) -> np.ndarray:
-    """Compute the coverage from which each pixel is covered by one line.
+    """Compute for each pixel the target coverage above which the lines along one direction cover it with ink.
 
     Parameters
     ----------
     line : int
-        Index into `HatchedLines.images.members`.
+        Index of the direction, as in `HatchedLines.images.members`.
     lines : HatchedLines
-        With a `sharp_look`. Its `line_tones` and `outline` have no effect.
+        Its look must be a `sharp_look`. Its `line_tones` and `outline` have no effect.
 
     Returns
     -------
@@ -117,7 +121,11 @@ def line_thresholds(line: int, lines: HatchedLines) -> np.ndarray:
 def _streak_thresholds(
     streak: np.ndarray, break_streak: np.ndarray | None, look: PixelLook, table: np.ndarray
 ) -> np.ndarray:
-    """Compute `line_thresholds` of streaks; `table` is `StreakStatistics.threshold`."""
+    """Compute `line_thresholds` for a LIC image with mean 0 and standard deviation 1.
+
+    `table` is `StreakStatistics.threshold`. `break_streak` is the same for short streamlines; None if lines
+    are not broken.
+    """
     if break_streak is None:
         return _coverage_from(streak, table)
     difference = break_streak - streak
@@ -133,7 +141,7 @@ def _streak_thresholds(
 def _even_line_thresholds(
     line: int, break_streak: np.ndarray | None, lines: HatchedLines
 ) -> np.ndarray:
-    """Compute `line_thresholds` of even lines."""
+    """Compute `line_thresholds` for evenly spaced lines."""
     # 0 in the middle of a line, 1 between two lines.
     position = 1 - lines.even_lines.streaks[line]
     if break_streak is None and lines.paper_grain is None:
@@ -146,7 +154,10 @@ def _even_line_thresholds(
 
 
 def _coverage_from(streak: np.ndarray, table: np.ndarray) -> np.ndarray:
-    """Return the (P,) float32 coverages whose thresholds in a table are the given streaks."""
+    """Return the (P,) float32 coverages at which streaks have ink, by inverting a table of thresholds.
+
+    `table` is `StreakStatistics.threshold`, or `disc_threshold` for the undirected texture.
+    """
     coverages = np.linspace(0, 1, COVERAGE_STEPS)
     return np.interp(streak, table[::-1], coverages[::-1]).astype(np.float32)
 
@@ -163,12 +174,12 @@ def _bisect(excess: Callable[[np.ndarray], np.ndarray], count: int) -> np.ndarra
 
 
 def cyclic_places(first: np.ndarray) -> np.ndarray:
-    """Return the places of `ordered_thresholds` for lines that follow each other in the order of M.
+    """Return the `places` of `ordered_thresholds` for lines in cyclic order: line m + 1 follows line m.
 
     Parameters
     ----------
     first : (M, P) float32 ndarray
-        How much each line comes first; the sum is 1.
+        How much each line has the first place in the order, 0 to 1. The sum over the lines is 1.
     """
     return np.stack([np.roll(first, place, axis=0) for place in range(min(len(first), MAX_LAYERS))])
 
@@ -176,7 +187,7 @@ def cyclic_places(first: np.ndarray) -> np.ndarray:
 def ordered_thresholds(
     thresholds: np.ndarray, places: np.ndarray, undefined: np.ndarray, look: PixelLook
 ) -> np.ndarray:
-    """Sort the thresholds of lines by their order.
+    """Sort the thresholds of lines into layers, by the places of the lines in the order of hatching.
 
     Parameters
     ----------
@@ -186,14 +197,15 @@ def ordered_thresholds(
         For each of the first L = min(M, MAX_LAYERS) places in the order, how much each line has it. The
         sum over the lines is 1.
     undefined : (P,) bool ndarray
-        Where there are no lines, and the thresholds of the first hold for all ink together.
+        Where the field is undefined. The thresholds of the first line hold for all ink together there.
     look : PixelLook
         Its `layers` and `layering` are used where lines swap and where the field is undefined.
 
     Returns
     -------
     (L, P) float32 ndarray
-        0 to 1. With the shares of `layer_shares`, the ink of all layers transmits what the tone asks.
+        Thresholds of each layer, 0 to 1. If the layers have the shares of `layer_shares`, all layers together
+        have the transmittance of the tone.
     """
     if len(thresholds) == 1:
         return thresholds
@@ -210,29 +222,35 @@ def ordered_thresholds(
 
 
 def _layer_densities(layers: int, layering: float) -> np.ndarray:
-    """Return the (layers, DENSITY_STEPS) float32 densities of the layers at the total `DENSITIES`.
+    """Tabulate the (layers, DENSITY_STEPS) float32 density of each layer, by the total density `DENSITIES`.
 
-    They rise everywhere, and linearly beyond the table.
+    Density is -log(transmittance). Each row increases strictly. Beyond the table it continues linearly.
     """
     shares = np.stack(layer_shares(-np.expm1(-DENSITIES), layers, layering))
     return (DENSITIES * np.maximum(shares, LEAST_SHARE)).astype(np.float32)
 
 
 def _layer_density(table: np.ndarray, total: np.ndarray) -> np.ndarray:
-    """Interpolate a row of `_layer_densities` at total densities."""
+    """Return the optical density of a layer for total densities of all layers.
+
+    `table` is the row of the layer in `_layer_densities`, which is interpolated.
+    """
     position = total / DENSITIES[1]
     index = np.minimum(position, DENSITY_STEPS - 2).astype(np.intp)
     return table[index] + (position - index) * (table[index + 1] - table[index])
 
 
 def _merged_densities(density: np.ndarray, places: np.ndarray, table: np.ndarray) -> np.ndarray:
-    """Return the densities of layers from which lines that swap have ink.
+    """Return the density of each layer above which it has ink, where lines swap their places in the order.
+
+    Lines that swap are merged into the first of the two layers. Density is -log(transmittance).
 
     Parameters
     ----------
     density : (M, P) float32 ndarray
+        -log(1 - threshold) of each line.
     places : (L, M, P) float32 ndarray
-        See `ordered_thresholds`; for the layers that are drawn.
+        See `ordered_thresholds`. Only the layers that are drawn.
     table : (L, DENSITY_STEPS) float32 ndarray
         From `_layer_densities`.
 
@@ -244,7 +262,7 @@ def _merged_densities(density: np.ndarray, places: np.ndarray, table: np.ndarray
     def line_density(index: np.ndarray) -> np.ndarray:
         return np.einsum("klp,klp->lp", places, table[:, index])
 
-    # The density of the tone from which each line has ink.
+    # The density of the tone above which each line has ink.
     index = np.zeros(density.shape, dtype=np.intp)
     for exponent in reversed(range(int(np.log2(DENSITY_STEPS)))):
         middle = index + 2**exponent
@@ -252,14 +270,14 @@ def _merged_densities(density: np.ndarray, places: np.ndarray, table: np.ndarray
     index = np.minimum(index, DENSITY_STEPS - 2)
     low, high = line_density(index), line_density(index + 1)
     begin = DENSITIES[1] * (index + (density - low) / np.maximum(high - low, np.float32(1e-7)))
-    # How much each line has these places or later ones.
+    # How much each line has one of these places or a later one.
     total = np.maximum(places.sum(axis=0), np.float32(1e-6))
     onward = np.cumsum(places[::-1], axis=0)[::-1] / total
     onward[0] = 1
     merged = np.empty((len(places), density.shape[1]), dtype=np.float32)
     for layer, layer_table in enumerate(table):
-        # A line joins a layer before it leaves the layer before, and leaves it only for tones in which
-        # that layer has ink, so that its own ink always is in one.
+        # A line joins the next layer before it leaves the earlier one. It leaves the earlier layer only for
+        # tones at which the next one has ink. So its ink always is in one of both layers.
         joining = (onward[layer] - 0.5) / (LAYER_CHANGE - 0.5)
         delay = 1 / np.clip(joining, np.float32(1e-6), 1) - 1
         if layer + 1 < len(table):
@@ -272,14 +290,14 @@ def _merged_densities(density: np.ndarray, places: np.ndarray, table: np.ndarray
 
 
 def layer_shares(darkness: np.ndarray, layers: int, layering: float) -> list[np.ndarray]:
-    """Compute the shares of the lines, by their order, as `hatching.line_shares` does.
+    """Compute the share of the ink of each layer, in order, as `hatching.line_shares` does for lines.
 
     Parameters
     ----------
     darkness : ndarray
         1 - transmittance.
     layers : int
-        Number of lines.
+        Number of layers.
     layering : float
         The setting of the look.
     """
@@ -296,15 +314,15 @@ def threshold_pixels(ordered: np.ndarray, resolved: np.ndarray | float = 1.0) ->
     ordered : (L, P) float32 ndarray
         From `ordered_thresholds`.
     resolved : (L, P) or (P,) ndarray, or float
-        0 to 1: how much of the contrast of the lines is drawn. They are a mean tone where it is 0.
+        How much of the contrast of the lines is drawn, 0 to 1. Where it is 0, lines become an even tone.
 
     Returns
     -------
     (P, 4) float32 ndarray
-        The thresholds in red, green and blue, rounded to multiples of 1 / 255; missing ones repeat the
-        first. Alpha is the mean of (2 t - 1)^2 of the three thresholds t. Where pixels are averaged, it
-        exceeds the same expression of the averages by the spread of the thresholds, so that what is finer than a
-        pixel can be drawn as its mean.
+        The thresholds of three layers in red, green and blue, rounded to multiples of 1 / 255. If there are
+        fewer layers, the first one is repeated. Alpha is the mean of (2 t - 1)^2 over the three thresholds t.
+        After pixels are averaged, alpha minus the mean of (2 t - 1)^2 of the averaged thresholds is their
+        variance. With it, details finer than a pixel can be drawn as their mean.
     """
     resolved = np.broadcast_to(resolved, ordered.shape)
     rgba = np.empty((ordered.shape[1], 4), dtype=np.float32)
@@ -314,7 +332,7 @@ def threshold_pixels(ordered: np.ndarray, resolved: np.ndarray | float = 1.0) ->
         rgba[:, channel] = np.rint(255 * value) / np.float32(255)
     centered = 2 * rgba[:, :3] - 1
     rgba[:, 3] = (centered * centered).mean(axis=1)
-    # What is not drawn has the spread of all thresholds.
+    # Contrast that is not drawn has the spread of thresholds from 0 to 1.
     rgba[:, 3] += (1 - np.square(resolved).mean(axis=0)) / 3
     return rgba
 
@@ -324,15 +342,15 @@ def picture_thresholds(
 ) -> np.ndarray:
     """Compute the thresholds of the pixels of a picture.
 
-    The lines are in the order in which they are drawn in a picture, by rank. The outline has ink
-    in any tone but the lightest. Antialiased pixels have the mean and the spread of a few thresholds across
-    the lines.
+    The layers are in the order in which lines join in a picture, by rank (`hatching.line_ranks`). Pixels of
+    the outline have ink in any tone but the lightest. Antialiased pixels store the mean and the spread
+    of a few thresholds, sampled across the lines.
 
     Parameters
     ----------
     field : PixelField
     lines : HatchedLines
-        With a `sharp_look`. Its `line_tones` have no effect.
+        Its look must be a `sharp_look`. Its `line_tones` have no effect.
     samples_per_side : int
         Samples of the frame along each side of a pixel.
 
@@ -372,7 +390,7 @@ def picture_thresholds(
         if lines.outline is not None:
             ordered *= 1 - lines.outline
         pixels += np.float32(weight if is_sampled else 1) * threshold_pixels(ordered, resolved)
-    # The spread is that about the values that are stored.
+    # The spread is the one about the rounded values, which are stored.
     mean = pixels[:, :3]
     rounded = np.rint(255 * mean) / np.float32(255)
     pixels[:, 3] += (np.square(2 * rounded - 1) - np.square(2 * mean - 1)).mean(axis=1)
@@ -381,7 +399,7 @@ def picture_thresholds(
 
 
 def _streak_sample(images: LicImages | None, node: float) -> LicImages | None:
-    """Return images beside the centers of pixels, at a node of `PIXEL_NODES`."""
+    """Return LIC images sampled beside the centers of pixels, at a position `node` of `PIXEL_NODES`."""
     if images is None or images.slopes is None or not node:
         return images
     shift = np.float32(STREAK_REACH * node) * images.slopes
@@ -391,9 +409,10 @@ def _streak_sample(images: LicImages | None, node: float) -> LicImages | None:
 def _even_sample(
     lines: EvenLines, is_coarse: np.ndarray, node: float
 ) -> tuple[EvenLines, np.ndarray]:
-    """Return even lines beside the centers of pixels, at a node of `PIXEL_NODES`, and their period.
+    """Sample even lines beside the centers of pixels, at a position `node` of `PIXEL_NODES`.
 
-    `is_coarse`, (M, P) bool, says where lines at a larger distance replace them.
+    `is_coarse`, (M, P) bool, says where coarse lines (at a larger distance) replace them. The result is the
+    sampled lines, and the distance between the lines at each pixel, (M, P).
     """
     streaks, period = lines.streaks, lines.period
     if lines.coarse_streaks is not None:
@@ -402,7 +421,7 @@ def _even_sample(
     position = np.abs(1 - streaks + np.float32(node) / np.maximum(period, np.float32(1)))
     position = np.minimum(position, 2 - position)
     if lines.growth is not None:
-        # Ink spreads from lines and from those that grow between them.
+        # Ink spreads from the lines, and from the further lines that grow between them.
         between = 0.5 * lines.growth
         spread_between = (1 - position) / np.maximum(between, np.float32(1e-6))
         position = np.minimum(position / (1 - between), spread_between)

@@ -19,9 +19,8 @@ from .look import Look, has_tone_inks, is_hatched
 #: Maximum number of inks.
 MAX_INKS = 12
 
-#: Hue difference between the inks of successive families, and hue from which it is counted if the
-#: first ink is achromatic, in degrees of Oklab hue. With black ink the second is red, the third
-#: blue.
+#: Hue difference between the inks of successive families, and the hue that an achromatic first ink
+#: counts as, in degrees of Oklab hue. With black ink the second ink is red, the third blue.
 HUE_STEP, FIRST_HUE = 220.0, -185.0
 
 #: Range of lightness and minimum chroma in Oklab of all inks but the first, so that their hues are
@@ -63,8 +62,8 @@ class Inks:
     is_light : bool
         Whether the ink is lighter than the paper. Lighter tones then need more ink.
     min_transmittance : float
-        Luminance transmittance of the lightest of the inks at full coverage (for light ink, of the
-        darkest). All inks can reach it.
+        Smallest luminance transmittance that all inks can reach: the transmittance at full coverage of the
+        lightest ink (of the darkest ink, if inks are lighter than the paper).
     """
 
     paper: np.ndarray
@@ -87,7 +86,7 @@ class Inks:
         Returns
         -------
         (P, 3) float32 ndarray
-            Linear color. Read-only if there is only one.
+            Linear color. The array is read-only if it repeats a single color.
         """
         if len(self.dark) == 1 and (self.dark == self.light).all():
             return np.broadcast_to(self.dark, (len(tone), 3))
@@ -101,13 +100,19 @@ class Inks:
         return dark + tone[:, None] * (light - dark)
 
     def transmittance(self, ink: np.ndarray) -> np.ndarray:
-        """Return the (..., 3) ratio of ink to paper by channel, both complemented for light ink."""
+        """Return the (..., 3) ratio of ink to paper in each channel.
+
+        If the ink is lighter than the paper, it is the ratio of the complements, (1 - ink) / (1 - paper).
+        """
         return self.complement_if_light(ink) / np.maximum(
             self.complement_if_light(self.paper), 1e-3
         )
 
     def luminance_transmittance(self, ink: np.ndarray) -> np.ndarray:
-        """Return the (...,) ratio of the luminances of ink and paper, complemented for light ink."""
+        """Return the (...,) ratio of the luminances of ink and paper.
+
+        If the ink is lighter than the paper, it is the ratio of 1 - luminance.
+        """
         paper_luminance = float(self.complement_if_light(self.paper) @ LUMINANCE_WEIGHTS)
         return (self.complement_if_light(ink) @ LUMINANCE_WEIGHTS) / max(paper_luminance, 1e-3)
 
@@ -116,7 +121,7 @@ class Inks:
         return self.min_transmittance + relative_transmittance * (1 - self.min_transmittance)
 
     def required_coverage(self, target_transmittance: np.ndarray, ink: np.ndarray) -> np.ndarray:
-        """Return the (P,) coverage with which (P, 3) ink has a luminance transmittance."""
+        """Return the (P,) coverage at which (P, 3) ink has the luminance transmittance that is asked for."""
         return np.clip(
             (1 - target_transmittance) / np.maximum(1 - self.luminance_transmittance(ink), 1e-3),
             0,
@@ -157,7 +162,7 @@ def ink_count(look: Look, line_count: int, family_count: int) -> int:
     line_count : int
         M, the number of lines through a pixel.
     family_count : int
-        Number of families of lines of the field. 1 if it does not distinguish its lines.
+        Number of families of lines of the field; 1 if the field does not distinguish families.
     """
     if not has_ink_per_line(look):
         return 1

@@ -28,18 +28,19 @@ def lic_lengths(
     strip: Strip | None = None,
     method: str = "",
 ) -> list[LicImages]:
-    """Average noise along the streamlines of each member.
+    """Compute LIC images: average noise along the streamlines of each member of the field.
 
     Parameters
     ----------
     field : PixelField
     looks : sequence of PixelLook
-        They differ in the length of streamlines. The first is the longest.
+        They differ in the length of streamlines. The first has the greatest length.
     noise : (P, K) float32 ndarray
     strip : Strip, optional
-        With the method "sheets", the images are those at its `averaged_rows`.
+        Rows to draw. With the method "sheets", the images have the pixels of its `averaged_rows`; other
+        methods draw all pixels.
     method : str
-        By default the method of the looks.
+        LIC method; by default the `method` of the looks.
 
     Returns
     -------
@@ -66,7 +67,7 @@ def look_noise(field: PixelField, look: PixelLook) -> np.ndarray:
 
 
 def unconvolved_noise(noise: np.ndarray, look: PixelLook) -> np.ndarray:
-    """Return (P, K) noise as it is seen where nothing is convolved: with a single channel if there is flow."""
+    """Return the noise that is shown where no LIC is done: (P, K), or (P, 1) if the look has flow."""
     if not has_flow(look):
         return noise
     mean = np.float32(NOISE_MEAN)

@@ -1,4 +1,4 @@
-"""LIC images, one per line, and their blend."""
+"""LIC images, one for each line (pair of opposite directions of the field), and their blend."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ class LicImages:
     members : (M, P, K) float32 ndarray
         K is 1 for gray noise and 3 for colored noise.
     blend : (P, K) float32 ndarray
-        Their mean, in which there may be a second set of images.
+        Mean of the member images. With the method of the paper, a second set of images is blended in.
     effective_samples : (P,) float32 ndarray
         Effective samples of the streamlines of a pixel (see `filter_kernel.KernelWeights`), mean
         over the members.
     slopes : (M, P) float32 ndarray or None
-        Derivatives of the members, mean over their channels, to the left of the lines, per pixel. None
-        if they were not asked for.
+        Derivatives of the member images toward the left of the lines, per pixel, averaged over the channels.
+        None if they are not computed; see `fast_lic.has_slopes`.
     """
 
     members: np.ndarray
@@ -41,7 +41,7 @@ class LicImages:
     slopes: np.ndarray | None = None
 
     def part(self, extent: slice) -> LicImages:
-        """Return the images at some of the pixels."""
+        """Return the LIC images at the pixels `extent`."""
         return LicImages(
             self.members[:, extent],
             self.blend[extent],
@@ -53,7 +53,7 @@ class LicImages:
 def lic_images(
     members: np.ndarray, effective_samples: np.ndarray, slopes: np.ndarray | None = None
 ) -> LicImages:
-    """Blend member images. Parameters as in `LicImages`."""
+    """Make `LicImages`, whose blend is the mean of the member images. Parameters are its attributes."""
     blend = np.empty(members.shape[1:], dtype=np.float32)
     for block in pixel_blocks(len(blend)):
         blend[block] = members[:, block].mean(axis=0)
@@ -61,7 +61,10 @@ def lic_images(
 
 
 def magnitude_step_limits(field: PixelField, look: PixelLook) -> np.ndarray | None:
-    """Return the (P,) int32 steps in each direction if they depend on the magnitude, None otherwise."""
+    """Return the (P,) int32 length of streamlines at each pixel, as steps in each direction.
+
+    None if the length does not depend on the magnitude of the field.
+    """
     if not look.magnitude_length:
         return None
     ends = magnitude_ends(look, field)
@@ -79,9 +82,9 @@ def relative_magnitude(field: PixelField, ends: tuple[float, float]) -> np.ndarr
 
 
 def magnitude_ends(look: PixelLook, field: PixelField) -> tuple[float, float]:
-    """Return the magnitudes at the bottom and at the top of the range of a look.
+    """Return the magnitudes at the bottom and at the top of the color map.
 
-    If the look sets none, they are 0 and the largest magnitude of the field.
+    If the look sets no range, they are 0 and the largest magnitude of the field.
     """
     ends = magnitude_range(look)
     if ends is None:
@@ -90,9 +93,9 @@ def magnitude_ends(look: PixelLook, field: PixelField) -> tuple[float, float]:
 
 
 def with_magnitude_range(look: PixelLook, field: PixelField) -> PixelLook:
-    """Return a look that colors magnitudes, with its range set to `magnitude_ends`.
+    """Return the look with its `color_range` set to the `magnitude_ends` of the field.
 
-    Parts of the field can then be drawn one by one.
+    The field can then be drawn strip by strip with the same range.
     """
     return replace(look, color_range=magnitude_ends(look, field))
 

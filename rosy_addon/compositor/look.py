@@ -34,18 +34,18 @@ def uses_magnitude(look: Any) -> bool:
 
 
 def colors_values(look: Any) -> bool:
-    """Return whether the hue of the lines shows numbers on the surface."""
+    """Return whether the hue of the lines shows color values, which are numbers on the surface."""
     return look.hue == "values"
 
 
 def magnitude_range(look: Any) -> tuple[float, float] | None:
-    """Return the magnitudes at the ends of the range of a look; None if the fields determine them."""
+    """Return the range of magnitudes that a look sets; None if it sets none, and the fields determine it."""
     is_set = uses_magnitude(look) and not colors_values(look) and any(look.color_range)
     return look.color_range if is_set else None
 
 
 def crease_angle_of(look: Any) -> float | None:
-    """Return the least angle between normals at a crease, in radians. None if there are no creases."""
+    """Return the smallest angle between normals at a crease, in radians. None if edges are never creases."""
     return look.crease_angle if look.crease_angle < math.pi else None
 
 
@@ -65,7 +65,7 @@ def has_colored_noise(look: Any) -> bool:
 
 
 def _has_streaks(look: Any) -> bool:
-    """Return whether streaks of noise are drawn, or break even lines."""
+    """Return whether LIC noise is needed: to draw streaks, or to break even lines into pieces."""
     return not is_even(look) or bool(look.breaks or look.wobble)
 
 
@@ -88,12 +88,12 @@ def has_tone_inks(look: Any) -> bool:
 
 
 def _shading(panel: str, applies: Callable[[Any], bool] = always) -> dict[str, Any]:
-    """Return the arguments of settings that a panel shows, and that no LIC image depends on."""
+    """Return the arguments of a setting that LIC images do not depend on, shown in the given panel."""
     return {"panel": panel, "stage": Stage.SHADING, "applies": applies}
 
 
 def _ink(applies: Callable[[Any], bool] = is_hatched) -> dict[str, Any]:
-    """Return the arguments that most settings of the panel Ink share."""
+    """Return the arguments that most settings of the panel "Ink" have in common."""
     return _shading("ink", applies)
 
 
@@ -105,8 +105,8 @@ class Look:
     `unit_size` Blender units.
 
     To add a setting that both renderers draw with, edit three files: add a field here, use it in
-    this package, and declare and use the uniform of that name in the shader. All else is derived from
-    the field; see `rosy_addon.core.settings`.
+    this package, and declare and use the uniform of that name in the shader. All other code (panels, files,
+    command line) reads the fields of this class; see `rosy_addon.core.settings`.
 
     Raises
     ------
@@ -482,7 +482,7 @@ class Look:
         check_settings(self)
 
     def with_settings(self, settings: dict[str, Any]) -> Look:
-        """Return the look with some settings changed. Numbers may be a list, as in JSON files.
+        """Return the look with some settings changed. Tuples of numbers may be given as lists (from JSON).
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""`PixelLook`: a look with its lengths in pixels of the frame that is drawn, and other scales of looks."""
+"""`PixelLook`: a look with its lengths in pixels of the frame that is drawn. Other changes of scale."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from .look import Look, has_colored_noise, has_flow, magnitude_range
 #: look can be reused while the camera moves.
 STEPS_PER_OCTAVE = 32
 
-#: Distances between even lines in pixels are converted to steps of 1 / 8 octave on the surface, so
-#: that lines stay as they are while the camera moves a little.
+#: Distances between even lines on the surface are rounded to steps of 1 / 8 octave if they are set in
+#: pixels, so that lines do not change while the camera moves a little.
 SPACING_STEPS_PER_OCTAVE = 8
 
 #: Minimum distance from the camera to the center of the meshes, as a fraction of their size. It
@@ -32,7 +32,7 @@ MIN_DISTANCE_FACTOR = 0.25
 
 @dataclass(frozen=True, kw_only=True)
 class PixelLook:
-    """A look as one frame is drawn with it: lengths in pixels of the frame, and streaks at a time.
+    """A look for one frame: its lengths are in pixels of the frame, and its streaks have drifted to a phase.
 
     The settings of the look are attributes as well: ``pixel_look.crispness``. Lengths among them, such as
     ``pixel_look.line_width``, are in pixels of the frame, and may be out of range.
@@ -40,28 +40,29 @@ class PixelLook:
     Attributes
     ----------
     look : Look
-        As the user set it.
+        The settings of the user.
     scale : float
-        Pixels of the picture that the unit of the lengths of the look stands for.
+        Size in pixels of the picture of the unit in which the lengths of `look` are given.
     length : int
         Steps of streamlines in each direction.
     supersampling : int
         Pixels of the frame along a side of a pixel of the picture.
     pixel_size : float
-        Blender units that a pixel stands for; 0 if the lengths of the look are in pixels.
+        Blender units in place of a pixel, if `look` has lengths in Blender units (`unit_size`); otherwise 0.
     color_range : (float, float)
-        The setting of this name or, once a field is known that sets it, its `magnitude_ends`.
+        The setting `Look.color_range`, or the `magnitude_ends` of a field (see `with_magnitude_range`).
     kernel : {"box", "taper", "ramp"}
         The filter kernel.
     flow_phase : float
-        Where drifting streaks are in their cycle, 0 to 1; see `flow`.
+        Position of drifting streaks in their cycle, 0 to 1; see `flow`.
     flow_distance : float
-        Pixels that they drift in it.
+        Distance in pixels that streaks drift in a cycle.
     is_antialiased : bool
-        Whether streaks are drawn more accurately, as pixels have several samples; see
+        Whether streaks are drawn more accurately, because pixels have several samples; see
         `GBuffer.coverage`.
     is_on_surface : bool
-        Whether steps have one length on the surface, as in textures, and not in the picture.
+        Whether steps of streamlines have a constant length on the surface (as for textures). Otherwise
+        they have a constant length in the picture.
     """
 
     look: Look
@@ -107,13 +108,17 @@ class PixelLook:
         )
 
     def streamline_reach(self) -> int:
-        """Return how many steps the kernel reaches from its pixel, at most, in each direction."""
+        """Return the maximum number of steps that the kernel extends from its pixel in each direction."""
         if not has_flow(self):
             return self.length
         return self.length + math.ceil(self.flow_distance / 2) + MAX_AXIAL_STEPS + 1
 
     def for_symmetry(self, symmetry: FieldSymmetry) -> PixelLook:
-        """Return the look for a field. Lines that point both ways have no head and tail."""
+        """Return the look for fields of a symmetry.
+
+        In a field with opposite directions, streaks cannot have a head and a tail, so the ramp kernel is
+        not used.
+        """
         if self.kernel == "ramp" and symmetry.has_opposites:
             return replace(self, kernel="box")
         return self
@@ -123,7 +128,7 @@ class PixelLook:
         return replace(self, length=length)
 
     def for_means(self, length: int) -> PixelLook:
-        """Return the look that takes plain means over a length, in steps: without fading and drift."""
+        """Return the look for unweighted means over `length` steps in each direction: no fading, no drift."""
         still = replace(self.look, flow=0.0)
         return replace(self, look=still, length=length, kernel="box", is_antialiased=False)
 
@@ -148,7 +153,7 @@ def pixel_look(
 ) -> PixelLook:
     """Return a look in pixels of a frame.
 
-    Blender units become pixels by the scale at the center of the meshes.
+    Lengths in Blender units are converted to pixels with the scale at the center of the meshes.
 
     Parameters
     ----------
@@ -177,8 +182,8 @@ def pixel_look(
 def surface_pixel_look(look: Look, step: float, pixel: float, drift: Drift = NO_DRIFT) -> PixelLook:
     """Return a look for lines on a surface that no camera sees, with its lengths in steps.
 
-    Its streaks are traced with the method "sheets" and anchored to the surface. There is no picture in
-    which lines could be near a guiding angle.
+    Its streaks are traced with the method "sheets" and anchored to the surface. The guiding angle, which
+    refers to a picture, is not used.
 
     Parameters
     ----------
@@ -186,7 +191,7 @@ def surface_pixel_look(look: Look, step: float, pixel: float, drift: Drift = NO_
     step : float
         Length of a step of streamlines, in Blender units.
     pixel : float
-        Blender units that replace a pixel, if the lengths of the look are in pixels.
+        Blender units that stand for a pixel, if the lengths of the look are in pixels.
     drift : Drift
     """
     unit_size = look.unit_size or pixel
@@ -196,7 +201,10 @@ def surface_pixel_look(look: Look, step: float, pixel: float, drift: Drift = NO_
 
 
 def _scaled_pixel_look(look: Look, scale: float, unit_size: float, drift: Drift) -> PixelLook:
-    """Return a look with lengths in pixels, `scale` times its own, and pixels in place of `unit_size`."""
+    """Return the `PixelLook` whose lengths are `scale` times the lengths of `look`.
+
+    `unit_size` is the number of Blender units in the unit of the lengths of `look`; 0 if that is a pixel.
+    """
     scale = _possible_scale(look, scale)
     if not has_flow(look):
         drift = NO_DRIFT
@@ -214,14 +222,14 @@ def _scaled_pixel_look(look: Look, scale: float, unit_size: float, drift: Drift)
 
 
 def scaled_look(look: Look, scale: float) -> Look:
-    """Return a look for a picture that is larger by a scale, as far as the ranges of lengths allow."""
+    """Return the look with all lengths multiplied by `scale`, as far as the ranges of settings allow."""
     scale = _possible_scale(look, scale)
     lengths = {item.name: _scaled_length(look, item, scale) for item in pixel_lengths(Look)}
     return replace(look, **lengths, unit_size=look.unit_size / scale)
 
 
 def _possible_scale(look: Look, scale: float) -> float:
-    """Return a scale for the lengths of a look, as far as their ranges allow.
+    """Return the scale nearest to `scale` with which all lengths of a look are in their allowed ranges.
 
     Noise cells stay at least as large as a pixel, as smaller ones are not visible.
     """
@@ -233,13 +241,13 @@ def _possible_scale(look: Look, scale: float) -> float:
 
 
 def _scaled_length(look: Look, setting: Number, scale: float) -> Any:
-    """Return a length of a look times a scale; at least 1 if it is a whole number."""
+    """Return the value of a length setting times `scale`. Whole numbers are rounded to at least 1."""
     length = getattr(look, setting.name) * scale
     return max(round(length), 1) if setting.is_integer else length
 
 
 def preview_look(look: Look, downscale: int) -> Look:
-    """Return the look for a preview with fewer pixels, in which streaks appear in the same size.
+    """Return the look for a preview with fewer pixels, in which streaks have the same size on screen.
 
     Parameters
     ----------
@@ -259,7 +267,7 @@ def preview_look(look: Look, downscale: int) -> Look:
 def pixel_world_size(points: np.ndarray, camera: Camera) -> float:
     """Return the width of a pixel, in Blender units, at the center of (n, 3) points in world space.
 
-    The center of the bounding box counts.
+    The center is that of the bounding box.
     """
     if not camera.is_perspective:
         return 1 / camera.pixels_per_unit

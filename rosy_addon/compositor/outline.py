@@ -1,4 +1,4 @@
-"""Outlines: ink lines along silhouettes, borders and sharp creases, found in the G-buffer.
+"""Outlines: ink lines along silhouettes, borders and sharp creases that are found in the G-buffer.
 
 Silhouettes and borders lie between two adjacent pixels if the surface does not continue from one to
 the other (`pixel_neighbors.neighbor_masks`). Where one surface occludes the other, the line is drawn
@@ -32,14 +32,15 @@ DEPTH_JUMP = 2.0
 #: of depth from the pixels at the step to the next ones.
 MIN_STEP, STEP_RATIO = 6.0, 2.0
 
-#: Length in pixels of the finished picture below which a mark is not drawn, and from which on it has
-#: its full width: it grows and shrinks when something moves, but it does not flicker.
+#: Lengths in pixels of the finished picture: a shorter mark than the first is not drawn, and from the second
+#: on a mark has its full width. So marks grow and shrink when something moves, but do not flicker.
 MIN_MARK_LENGTH, FULL_MARK_LENGTH = 6, 12
 
-#: Samples of pixels that are looked at together.
+#: Maximum number of samples of pixels in a band that is processed at once.
 MAX_OUTLINE_SAMPLES = 1 << 20
 
-#: Bits of what begins next to a pixel at an edge.
+#: Bits of a pixel at an edge: whether another part of a mesh or another instance is next to it, and whether
+#: there is no surface next to it.
 PART_BORDER, EMPTY_BORDER = 1, 2
 
 #: The settings of a look that an outline depends on.
@@ -58,12 +59,12 @@ def outline_coverage(gbuffer: GBuffer, look: PixelLook, cache: Cache | None = No
     Parameters
     ----------
     gbuffer : GBuffer
-        Creases are drawn if its instances are known. If its pixels have several samples, outlines are
-        drawn at the samples near them.
+        Creases are drawn if its `instances` are set. If its pixels have several samples, the coverage is
+        computed at samples near outlines, and averaged.
     look : PixelLook
         Its `outline`, `crease_angle`, `supersampling` and `display` are used.
     cache : Cache, optional
-        Stores what does not depend on the view.
+        Stores results that do not depend on the view.
 
     Returns
     -------
@@ -80,7 +81,7 @@ def outline_coverage(gbuffer: GBuffer, look: PixelLook, cache: Cache | None = No
     is_start = (edges.line_width > 0) | (gbuffer.coverage.own < 1)
     reach = int(np.ceil(look.outline)) + 1
     is_near = _dilated(gbuffer, is_start, reach)
-    # The samples at the border of this part do not know their neighbors.
+    # The samples at the border of this part lack neighbors, so the part is a pixel larger than needed.
     entries = np.flatnonzero(_dilated(gbuffer, is_near, 1))
     sums, counts = np.zeros((2, len(gbuffer.pixel)))
     for band, core in _bands(gbuffer, entries, reach + FULL_MARK_LENGTH):
@@ -96,13 +97,13 @@ def outline_coverage(gbuffer: GBuffer, look: PixelLook, cache: Cache | None = No
 
 
 def _bands(gbuffer: GBuffer, entries: np.ndarray, margin: int) -> list[tuple[slice, slice]]:
-    """Divide entries of a G-buffer into bands of rows with at most `MAX_OUTLINE_SAMPLES` or so.
+    """Divide pixels of a G-buffer into bands of rows with about `MAX_OUTLINE_SAMPLES` samples at most.
 
     Returns
     -------
     list of (band, core)
-        Ranges of `entries`: the rows of the band, and the same without a margin of so many pixels
-        that it shares with the other bands.
+        Ranges of `entries` (indices of pixels of the G-buffer). The cores divide all entries. A band is its
+        core with `margin` more rows below and above.
     """
     row = gbuffer.pixel[entries] // np.int32(gbuffer.camera.width)
     limit = max(MAX_OUTLINE_SAMPLES // gbuffer.samples.side**2, 1)
@@ -127,15 +128,15 @@ def _sample_outline(
         Its pixels have several samples.
     look : PixelLook
     entries : (n,) intp ndarray
-        The pixels whose samples are looked at.
+        Indices of the pixels whose samples are computed.
     is_near : (P,) bool ndarray
-        Pixels where lines may begin.
+        Pixels at whose samples edges are drawn.
     cache : Cache, optional
 
     Returns
     -------
     home, shown : (Q,) int32 ndarray
-        Entries of the samples; see `project_samples`.
+        Indices of pixels of the G-buffer for each sample; see `project_samples`.
     coverage : (Q,) float32 ndarray
     """
     with progress(0.0, 0.4):
@@ -172,7 +173,7 @@ class _Edges:
     Attributes
     ----------
     line_width : (P,) float32 ndarray
-        Largest width of lines that begin at a pixel; 0 where there is no edge.
+        Largest width of the lines that are drawn from each pixel; 0 where there is no edge.
     """
 
     def __init__(self, gbuffer: GBuffer, look: PixelLook, cache: Cache | None) -> None:
@@ -185,7 +186,7 @@ class _Edges:
         self._stride = width + 2 * margin
         self._entry_of_cell = np.full((height + 2 * margin) * self._stride, -1, dtype=np.int32)
         self._cell = np.empty(count, dtype=np.int32)
-        # Larger depths are nearer to the eye.
+        # Larger values of `_depth` are nearer to the camera.
         self._depth, self._tolerance = np.empty((2, count), dtype=np.float32)
         for block in reported_blocks(count, STEP_LABEL, 0.0, 0.2):
             row, column = np.divmod(gbuffer.pixel[block], np.int32(width))
@@ -194,7 +195,7 @@ class _Edges:
             self._entry_of_cell[cell] = np.arange(block.start, block.stop, dtype=np.int32)
             self._depth[block], _, _, self._tolerance[block] = depth_slopes(gbuffer, block)
         with progress(0.2, 0.6, STEP_LABEL):
-            #: The `neighbor_masks` without creases.
+            #: The `neighbor_masks` of the surface, with links across creases.
             self._mask = neighbor_masks(gbuffer, None)
         self.line_width = np.zeros(count, dtype=np.float32)
         #: (P,) bits `PART_BORDER` and `EMPTY_BORDER`.
@@ -208,7 +209,7 @@ class _Edges:
             self._find_steps()
 
     def coverage(self) -> np.ndarray:
-        """Return the (P,) float32 coverage of each pixel by the lines of edges."""
+        """Return the (P,) float32 coverage of each pixel by the lines that are drawn at edges."""
         gbuffer, look, depth = self._gbuffer, self._look, self._depth
         edge = np.flatnonzero(self.line_width)
         with progress(0.0, 0.5, STEP_LABEL):
@@ -231,19 +232,19 @@ class _Edges:
         return coverage
 
     def _neighbor(self, entry: np.ndarray, dx: int, dy: int) -> np.ndarray:
-        """Return the entries of the neighbors at (dx, dy) of some entries; -1 where there is none."""
+        """Return the indices of the pixels at the offset (dx, dy) from pixels; -1 where there is none."""
         return self._entry_of_cell.take(self._cell[entry] + (dy * self._stride + dx))
 
     def _is_linked(self, entry: np.ndarray | slice, bit: int) -> np.ndarray:
-        """Return whether the surface continues from pixels to a neighbor."""
+        """Return whether the surface continues from each pixel to the neighbor of the given bit."""
         return self._mask[entry] >> np.uint16(bit) & 1 == 1
 
     def _find_creases_and_parts(self, instance_id: int, cache: Cache | None, origin: int) -> None:
-        """Set the width of lines along the creases of an instance, and along borders of its parts.
+        """Set the width of lines along the creases of an instance, and where its parts intersect.
 
-        There is a line where two parts of a mesh intersect if their normals differ by the crease angle.
-        The border becomes `PART_BORDER` wherever another part begins. `origin` is the cell of the lower
-        left pixel of the frame.
+        Parts are connected components of the mesh. A line is drawn where two of them intersect if their
+        normals differ by the crease angle. The bit `PART_BORDER` is set at pixels next to another part.
+        `origin` is the cell of the lower left pixel of the frame.
         """
         gbuffer, look, defined = self._gbuffer, self._look, self._defined
         instance = gbuffer.instances[instance_id]
@@ -280,7 +281,8 @@ class _Edges:
         """Set the width of lines at pixels where their surface ends, unless the neighbor occludes them.
 
         There is no edge at the border of the frame, and none where the surface continues but the field
-        ends. The border is set where another instance or no surface follows.
+        ends. The bits `PART_BORDER` and `EMPTY_BORDER` are set next to another instance and next to no
+        surface.
         """
         gbuffer, depth, outline = self._gbuffer, self._depth, np.float32(self._look.outline)
         for block in reported_blocks(self._count, STEP_LABEL):
@@ -306,9 +308,9 @@ class _Edges:
     def _find_steps(self) -> None:
         """Set the width of lines at the nearer pixel of steps in the depth of a surface.
 
-        A surface that is seen edge-on predicts any difference in depth, so the neighbor masks do not
-        tell it from a silhouette. At a step, the depth changes much more than from either pixel on to
-        the next.
+        On a surface that is seen nearly edge-on, any difference in depth between neighbors is plausible, so
+        the neighbor masks link pixels across a silhouette. At a step, the depth changes much more than
+        between either pixel and the next one beyond it.
         """
         depth, tolerance, defined = self._depth, self._tolerance, self._defined
         for block in reported_blocks(self._count, STEP_LABEL):
@@ -334,12 +336,12 @@ class _Edges:
 def _mark_strength(
     pixel: np.ndarray, border: np.ndarray, width: int, block_side: int
 ) -> np.ndarray:
-    """Return the share of the full width that lines may have, by the lengths of their marks.
+    """Return the fraction of the full width with which each mark is drawn, by the length of the mark.
 
     Marks are connected pixels of the finished picture; diagonal neighbors are connected. The length
-    of a mark is the longer side of its bounding box. A short mark has its full width if it is next to
-    the background, or if it surrounds something: then at least as many of its pixels as half of the
-    outline of its bounding box are borders of a part.
+    of a mark is the longer side of its bounding box. A short mark still has its full width if it is next to
+    the background, or if it surrounds a part: then the number of its pixels at borders of parts is at least
+    half the perimeter of its bounding box.
 
     Parameters
     ----------
@@ -350,7 +352,7 @@ def _mark_strength(
     width : int
         Width of the frame.
     block_side : int
-        Pixels of the frame in a pixel of the finished picture, along a side.
+        Number of pixels of the frame along a side of a pixel of the finished picture.
 
     Returns
     -------
@@ -384,7 +386,7 @@ def _mark_strength(
 
 
 def _extent_per_label(values: np.ndarray, label: np.ndarray) -> np.ndarray:
-    """Return (K,) numbers of integers from the smallest to the largest value of each label."""
+    """Return, for each of K labels, its largest minus its smallest value plus 1, (K,)."""
     order = np.argsort(label, kind="stable")
     start = np.flatnonzero(np.diff(label[order], prepend=-1))
     ordered = values[order]

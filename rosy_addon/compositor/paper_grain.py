@@ -36,8 +36,8 @@ SEED_SALT = 0x5EED
 #: Amplitudes of the frequency bands, one octave each, from fine to coarse.
 BAND_WEIGHTS = (1.0, 0.6, 0.4)
 
-#: Standard deviation of the paper grain added to the streaks at `Look.paper_grain` 1, in standard
-#: deviations of the streaks.
+#: Standard deviation of the paper grain that is added to the streaks if `Look.paper_grain` is 1, in
+#: standard deviations of the streaks.
 PAPER_GRAIN_STRENGTH = 1.2
 
 #: Noise cells of the grain that is anchored to surfaces: size in line widths, minimum
@@ -72,12 +72,12 @@ def picture_paper_grain(
     width : int
         Width of that frame in pixels.
     line_width : float
-        Width of the lines in pixels of the picture. The paper grain scales
-        with it.
+        Width of the lines in pixels of the picture. The paper grain scales with it.
     seed : int
     subpixels : int
         Subpixels along each side of a pixel. All subpixels of a pixel have the same height.
     line_count : int
+        Number of lines (pairs of opposite directions of the field) at a pixel.
 
     Returns
     -------
@@ -117,7 +117,7 @@ def surface_paper_grain_args(look: PixelLook) -> dict[str, Any]:
 
 
 def line_offset(line_width: float) -> int:
-    """Return the pixels between the grain of successive lines, enough for it to be uncorrelated."""
+    """Return the offset in pixels between the grain of successive lines, at which it is uncorrelated."""
     return int(np.ceil(3 * _band_sigmas(line_width)[-1]))
 
 
@@ -128,7 +128,7 @@ def _band_sigmas(line_width: float) -> list[float]:
 
 
 def _grain_tiles(rectangle: TileRectangle, line_width: float, seed: int) -> np.ndarray:
-    """Return the flat float32 heights in a rectangle of the picture, row by row."""
+    """Return the float32 heights of the paper grain in a rectangle of the picture, as a flat image."""
     sigmas = _band_sigmas(line_width)
     margin = 4 * box_radius(sigmas[-1])
     left, right, bottom, top = rectangle
@@ -144,7 +144,10 @@ def _grain_tiles(rectangle: TileRectangle, line_width: float, seed: int) -> np.n
 
 
 def _band_noise(white: np.ndarray, sigmas: Sequence[float]) -> np.ndarray:
-    """Return the weighted sum of frequency bands of (H, W) white noise: differences of successive blurs."""
+    """Return the weighted sum of the frequency bands of (H, W) white noise.
+
+    A band is the difference of two successive blurs, with the standard deviations `sigmas`.
+    """
     total = np.zeros_like(white)
     finer = _blur(white, sigmas[0])
     for finer_sigma, broader_sigma, weight in zip(sigmas, sigmas[1:], BAND_WEIGHTS, strict=False):
@@ -169,7 +172,7 @@ def _blur(image: np.ndarray, sigma: float) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def _band_noise_std(*sigmas: float) -> float:
-    """Return the standard deviation of `_band_noise` of binary noise, from its impulse response."""
+    """Return the standard deviation of the `_band_noise` of binary noise, from the impulse response."""
     radius = 4 * box_radius(sigmas[-1])
     impulse = np.zeros((2 * radius + 1,) * 2, dtype=np.float32)
     impulse[radius, radius] = 1

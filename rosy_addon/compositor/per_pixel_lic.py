@@ -1,8 +1,8 @@
-"""LIC with one streamline per pixel, traced for a block of pixels at once: the paper's method and its reference.
+"""LIC with one streamline per pixel, for a block of pixels at once: the method of the paper and brute force.
 
-The method of the paper decomposes the field into vector fields and blends two sets of their images. The
-reference that it is compared with is brute force: at each step, a streamline follows the best match among
-the N members.
+The method of the paper decomposes the field into vector fields and blends two sets of their LIC images. The
+paper compares it with brute force, in which a streamline follows at each step the best match among the N
+members.
 """
 
 from __future__ import annotations
@@ -28,10 +28,11 @@ from .pixel_field import (
     normalized,
 )
 
-#: Function (entries, offsets) -> directions; see `direction_at` of `integrate_noise`.
+#: Function (indices of pixels, offsets) -> directions; see `direction_at` of `integrate_noise`.
 DirectionSampler = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
-#: Takes a block of pixels, and returns a sampler for one half of the streamlines of one member.
+#: Function that takes a block of pixels, and returns a sampler for one half (forward or backward) of the
+#: streamlines of one member.
 LineTracer = Callable[[slice], DirectionSampler]
 
 
@@ -69,9 +70,9 @@ def brute_force(field: PixelField, look: PixelLook, noise: np.ndarray) -> LicIma
 def _best_match_sampler(
     candidates: np.ndarray, direction_tables: np.ndarray, line: int, block: slice
 ) -> DirectionSampler:
-    """Make a sampler that starts along one member and then follows the best match.
+    """Make a function for directions that starts along one member and then follows the best match.
 
-    It stores the current member of each streamline between calls.
+    The function stores the current member of each streamline between calls.
 
     Parameters
     ----------
@@ -80,8 +81,9 @@ def _best_match_sampler(
     direction_tables : (P + 1, N, 4) float32 ndarray
         The table of `direction_table` of each member, on screen.
     line : int
+        Index of the member along which the streamlines start.
     block : slice
-        Where the streamlines start.
+        Pixels at which the streamlines start.
     """
     degree = candidates.shape[1]
     flat_members, flat_tables = candidates.reshape(-1), direction_tables.reshape(-1, 4)
@@ -90,7 +92,7 @@ def _best_match_sampler(
     def direction_at(entry: np.ndarray, offset: np.ndarray) -> np.ndarray:
         nonlocal heading
         rows = candidates.take(entry, axis=0)
-        # The maximum is taken member by member. numpy is slow at reducing many short rows.
+        # The best match is found member by member, because numpy is slow at reducing many short rows.
         x, y = heading.real.copy(), heading.imag.copy()
         best_match = np.full(len(entry), -np.inf, dtype=np.float32)
         best_index = np.zeros(len(entry), dtype=np.int32)
@@ -147,7 +149,7 @@ def member_decomposition(field: PixelField, look: PixelLook, noise: np.ndarray) 
 def _one_set(
     field: PixelField, look: PixelLook, noise: np.ndarray, neighbors: np.ndarray, angle: float
 ) -> LicImages:
-    """Compute one set of member images, nearest to `angle` and its rotations by 2 pi / N."""
+    """Compute one set of member images, of the members nearest to `angle` and its rotations by 2 pi / N."""
     if look.view_plane:
         members, directions = _members_on_screen(field, angle, field.line_count)
     else:
@@ -160,12 +162,12 @@ def _one_set(
 
 
 def _member_sampler(table: np.ndarray, _block: slice) -> DirectionSampler:
-    """Make a sampler of one vector field on screen, given its `direction_table`."""
+    """Make a function for the directions of one vector field on screen, given its `direction_table`."""
     return lambda entry, offset: interpolate_direction(table.take(entry, axis=0), offset)
 
 
 def _first_set_weight(field: PixelField, look: PixelLook) -> np.ndarray:
-    """Return the (P,) float32 weight of the first set in the blend."""
+    """Return the (P,) float32 weight of the first set of member images in the blend."""
     if look.view_plane:
         weight = blend_weights(field, look.guiding_angle)
     else:
@@ -198,15 +200,15 @@ def _screen_space_members(field: PixelField, angle: float) -> np.ndarray:
 def _members_on_screen(
     field: PixelField, angle: float, count: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the first members of a field, and their directions on screen.
+    """Return the first `count` members of a field, and their directions on screen.
 
     Parameters
     ----------
     field : PixelField
     angle : float
-        The first member is nearest to it, in radians.
+        The first member is the one nearest to this angle, in radians.
     count : int
-        Number of members.
+        Number of members to return.
 
     Returns
     -------
@@ -240,7 +242,7 @@ def convolve_members(
     neighbors : (9, P + 1) int32 ndarray
         From `pixel_field.neighbor_table`.
     tracers : sequence of M functions
-        One per member image.
+        One function per member image.
 
     Returns
     -------
@@ -354,9 +356,9 @@ def integrate_noise(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Sum the noise along one half of each streamline that starts in a block.
 
-    A position is an entry of the pixel field and an offset from the center of that pixel. Steps are taken
-    by the two-step Adams-Bashforth method, v = 3/2 d - 1/2 d_previous. It evaluates the
-    direction once per step, like Euler's method, without its drift out of curves.
+    A position is the index of a pixel and an offset from its center. Steps are taken by the two-step
+    Adams-Bashforth method, v = 3/2 d - 1/2 d_previous. Like Euler's method, it evaluates the direction once
+    per step, but it does not drift out of curves.
 
     Parameters
     ----------
@@ -365,18 +367,17 @@ def integrate_noise(
     neighbors : (9, P + 1) int32 ndarray
         From `pixel_field.neighbor_table`.
     direction_at : function
-        Takes the (B,) int32 entries of the streamlines, P for those that have ended, and their
-        (B, 2) float32 offsets from the centers of those pixels. Returns their (B, 2) float32
-        directions on screen, 0 for P. It is called once per step, in order, and may keep state
-        between calls.
+        Takes the (B,) int32 indices of the pixels of the streamlines (P if a streamline has ended) and the
+        (B, 2) float32 offsets from the centers of these pixels. Returns the (B, 2) float32 directions on
+        screen (0 for P). It is called once per step, in order, and may keep data between calls.
     noise : (P + 1, K) float32 ndarray
-        0 in row P.
+        Noise at the P pixels; row P is 0.
     look : PixelLook
         In pixels of the frame. Its `length` and kernel are used.
     side : {1, -1}
-        The half of the streamline: forward or backward.
+        1 for the forward half of the streamline, -1 for the backward half.
     step_limit : (B,) ndarray or None
-        Number of steps after which each streamline ends. None for the length of the look.
+        Number of steps after which each streamline ends. If None, it is the `length` of the look.
 
     Returns
     -------

@@ -27,18 +27,20 @@ class Picture:
     ----------
     rgba : (H, W, 4) float32 ndarray
         Linear, not premultiplied, the bottom row first, as in Blender. Alpha is the fraction of the
-        pixel in which a field is visible; on paper that is not opaque, times the opacity of ink and
-        paper.
+        pixel in which a field is visible. If the paper is not opaque, this is multiplied by the opacity of
+        ink and paper.
     spread : (H, W) float32 ndarray or None
-        If the colors are thresholds of ink: the fourth channel of `ink_thresholds.threshold_pixels`. Alpha
-        is the fraction of the pixel in which a field is visible.
+        The fourth channel of `ink_thresholds.threshold_pixels`, if the picture has thresholds of ink in place
+        of colors. The alpha of `rgba` is then the fraction of the pixel in which a field is visible. None for
+        colors.
     color_range : (float, float) or None
-        Values of the first and the last color of the color map. None if the look has no color map, or the
-        fields of several degrees have ranges of their own.
+        Values of the first and the last color of the color map. None if the look has no color map, or if
+        fields of different degrees have different ranges.
     marks : SingularityMarks or None
-        The singularities that are drawn over it. None if it has no dots.
+        The singularities that are drawn over the picture as dots. None if dots are not drawn.
     line_count : int
-        The largest number of lines of its fields through a point; 0 if the picture is from a graphics card.
+        The largest number of lines (pairs of opposite directions of a field) through a point; 0 if the
+        picture is from a graphics card.
 
     Examples
     --------
@@ -84,5 +86,8 @@ class Picture:
 
 
 def common_color_range(ranges: Collection[tuple[float, float]]) -> tuple[float, float] | None:
-    """Return `Picture.color_range`, given the ranges of the magnitudes of each degree."""
+    """Return `Picture.color_range`: the range if fields of all degrees have the same one, else None.
+
+    `ranges` are the ranges of the magnitudes of the fields of each degree.
+    """
     return min(ranges) if len(set(ranges)) == 1 else None

@@ -1,4 +1,4 @@
-"""The contents of the key of a picture: what its colors and dots mean."""
+"""The contents of the key (legend) of a picture, which explains its colors and dots."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .picture import Picture
 
 
 def color_scale_of(look: Look, color_range: tuple[float, float] | None) -> ColorScale | None:
-    """Return what the color map of a look shows; None if it uses none.
+    """Return the scale of the color map for the key of a picture; None if the look has no color map.
 
     Parameters
     ----------
@@ -32,14 +32,16 @@ def color_scale_of(look: Look, color_range: tuple[float, float] | None) -> Color
 def fixed_color_range(
     look: Look, instances: Sequence[MeshInstance] = ()
 ) -> tuple[float, float] | None:
-    """Return the values of the first and the last color, if they do not depend on what is visible.
+    """Return the values of the first and the last color of the color map, if they are known before drawing.
+
+    None if they depend on the visible part of a field.
 
     Parameters
     ----------
     look : Look
     instances : sequence of MeshInstance
-        Their numbers are the range of a look that colors numbers and sets none. Without, such a range is
-        not known.
+        Mesh instances of the picture. If the look shows color values and sets no range, the result is
+        the range of their color values. In that case the result is None if no instances are given.
     """
     if colors_magnitude(look):
         ends = magnitude_range(look)
@@ -52,7 +54,7 @@ def fixed_color_range(
 
 
 def picture_key(look: Look, picture: Picture) -> PictureKey:
-    """Return what the key of a picture says, given the look that it was drawn with.
+    """Return the contents of the key (legend) of a picture, given the look that it was drawn with.
 
     Pictures with thresholds have neither a color map nor dots.
     """

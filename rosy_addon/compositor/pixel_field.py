@@ -22,10 +22,10 @@ NEIGHBOR_OFFSETS = tuple((dx, dy) for dy in (-1, 0, 1) for dx in (-1, 0, 1))
 
 
 class SeamSteps(NamedTuple):
-    """Steps to neighbors that the picture has elsewhere: those across the seams of a UV map.
+    """Steps across the seams of a UV map, to surface neighbors that are elsewhere in the picture.
 
-    The K steps are in ascending order of `source` and `bit`. A displacement d in the picture, as a
-    complex number, is `linear` d + `conjugate` conj(d) after the step.
+    The K steps are in ascending order of `source` and `bit`. A displacement d in the picture before the step,
+    as a complex number, becomes `linear` d + `conjugate` conj(d) after the step.
 
     Attributes
     ----------
@@ -36,8 +36,9 @@ class SeamSteps(NamedTuple):
     target : (K,) int32 ndarray
         Pixel after the step.
     offset : (K,) complex64 ndarray
-        The point that is reached, relative to the center of that pixel, in pixels.
+        The point that is reached, relative to the center of the target pixel, in pixels.
     linear, conjugate : (K,) complex64 ndarray
+        Coefficients of the linear map of displacements.
     rotation : (K,) float32 ndarray
         Angle that a direction gains, relative to the frames of the field, in radians.
     """
@@ -51,14 +52,17 @@ class SeamSteps(NamedTuple):
     rotation: np.ndarray
 
     def displaced(self, step: np.ndarray, displacement: np.ndarray) -> np.ndarray:
-        """Return (n,) complex64 displacements in the picture after steps, by their numbers."""
+        """Return the (n,) complex64 displacements after crossing seams, given displacements before.
+
+        `step` holds the index of the step of each displacement.
+        """
         linear, conjugate = self.linear.take(step), self.conjugate.take(step)
         return linear * displacement + conjugate * displacement.conj()
 
 
 @dataclass(frozen=True, eq=False)
 class PixelField:
-    """A field of one degree on a list of P pixels. It does not refer to meshes.
+    """A field of one degree at a list of P pixels, with all that LIC needs and no reference to meshes.
 
     Attributes
     ----------
@@ -68,24 +72,25 @@ class PixelField:
     pixel : (P,) int32 ndarray
         Flat indices into the frame, ascending, from the lower left.
     representation : (P,) complex64 ndarray
-        z = rho exp(i N t), where t is the angle of a member in the view plane. 0 is undefined.
+        z = rho exp(i N t), where t is the angle of a member in the view plane. It is 0 where the field
+        is undefined.
     screen_jacobian : (P, 2) complex64 ndarray
-        The axes of the frame of the view plane, projected to the screen along the surface. Pixels,
-        x + i y.
+        The two axes of the view plane, projected to the screen along the surface, as x + i y in pixels.
     neighbor_mask : (P,) uint16 ndarray
         Neighbors that streamlines may step to. Bit i stands for `NEIGHBOR_OFFSETS[i]`. No bit is
         set where the field is undefined.
     channels : dict of FieldChannel to (P,) complex64 ndarray
-        Further channels of the field, in the view plane: the harmonics by which its directions
-        deviate from the RoSy, and the representation of the line of the stored member.
+        Further channels of the field, in the view plane: the harmonics by which its directions deviate
+        from a RoSy; and the representation of the line of the stored member, from which families of
+        lines are counted.
     gbuffer_index : slice or (P,) intp ndarray
-        Indices of the pixels in the arrays of the G-buffer that they were taken from. A slice if
-        all were taken.
+        Indices of the pixels in the arrays of the G-buffer. A slice if the pixels are all or adjacent
+        pixels of the G-buffer.
     seam_steps : SeamSteps or None
-        Steps to pixels that are not neighbors in the picture.
+        Steps across seams, to pixels that are not neighbors in the picture. None if there are no seams.
     map_position : (P,) float32 ndarray or None
-        Where the numbers of the surfaces are in the color map, 0 to 1; NaN where there is none. None
-        if they are not colored.
+        Position in the color map of the color value at each pixel, 0 to 1; NaN where the surface has none.
+        None if color values are not shown.
     """
 
     degree: int
@@ -102,7 +107,10 @@ class PixelField:
 
     @property
     def harmonics(self) -> list[tuple[int, np.ndarray]]:
-        """Pairs of j and (P,) complex64 C_j (see `field.directional_field`). Empty for a RoSy."""
+        """The harmonics of the field, as pairs (j, C_j) with (P,) complex64 C_j. Empty for a RoSy.
+
+        See `field.directional_field`.
+        """
         return [
             (number, values)
             for (kind, number), values in self.channels.items()
@@ -111,12 +119,15 @@ class PixelField:
 
     @property
     def symmetry(self) -> FieldSymmetry:
-        """The symmetry of the directions: which of them share a line."""
+        """The symmetry of the field, which says which of its directions are opposite to each other."""
         return FieldSymmetry(self.degree, tuple(j for j, _ in self.harmonics))
 
     @property
     def line_count(self) -> int:
-        """M, the number of lines through a pixel. It is also the number of member images."""
+        """M, the number of lines through a pixel, and of member images.
+
+        A line is a pair of opposite directions of the field, or one direction without an opposite.
+        """
         return self.symmetry.line_count
 
     @property
@@ -125,9 +136,9 @@ class PixelField:
         return next((number for kind, number in self.channels if kind == "family"), 1)
 
     def part(self, extent: slice | np.ndarray) -> PixelField:
-        """Return the field at some of the pixels, without its `seam_steps`.
+        """Return the field at the pixels `extent`, without `seam_steps`.
 
-        Its `neighbor_mask` may refer to pixels that are left out.
+        The `neighbor_mask` of the result may refer to pixels that are left out.
         """
         index = self.gbuffer_index
         if not isinstance(index, slice):
@@ -149,7 +160,7 @@ class PixelField:
         )
 
     def member_direction(self, member: np.ndarray) -> np.ndarray:
-        """Compute the directions of the field that belong to members of the RoSy.
+        """Compute the directions of the field from the members of the RoSy that they deviate from.
 
         Parameters
         ----------
@@ -159,7 +170,7 @@ class PixelField:
         Returns
         -------
         (P,) complex ndarray
-            Unit vectors in the same frame. For a RoSy, the members themselves.
+            Unit vectors in the same frame. If the field is a RoSy, they are `member` itself.
         """
         if not self.harmonics:
             return member
@@ -179,7 +190,7 @@ class PixelField:
         Returns
         -------
         (P,) complex64 ndarray
-            Pixels.
+            x + i y in pixels.
         """
         # Double precision makes the float32 result the same with all versions of numpy.
         x, y = (
@@ -203,8 +214,8 @@ def neighbor_table(field: PixelField) -> np.ndarray:
     Returns
     -------
     (9, P + 1) int32 ndarray
-        Indices into the list of pixels after a step to each of `NEIGHBOR_OFFSETS`. The index is P
-        where streamlines end, and in column P. There is one row per offset, because a streamline
+        Index of the neighbor of each pixel at each of `NEIGHBOR_OFFSETS`. The index is P where streamlines
+        cannot step to the neighbor, and in column P. There is one row per offset, because a streamline
         mostly steps in one direction and then reads adjacent elements of a row.
     """
     count = len(field.pixel)
@@ -228,7 +239,7 @@ def surface_pixel_field(gbuffer: GBuffer, degree: int, crease_angle: float | Non
     degree : int
     crease_angle : float or None
         Streamlines end where the normals of neighboring pixels differ by more than this angle,
-        in radians. None: they cross creases.
+        in radians. If None, they cross all creases.
 
     Returns
     -------
@@ -266,10 +277,10 @@ def surface_pixel_field(gbuffer: GBuffer, degree: int, crease_angle: float | Non
 
 
 def _channels_of_degree(channels: dict[FieldChannel, np.ndarray]) -> dict[FieldChannel, np.ndarray]:
-    """Return the channels that are present in the fields of one degree.
+    """Return the channels that the fields of one degree have, given their values at the pixels.
 
-    A channel that only fields of other degrees have contains the values of a RoSy, 1 for C_0 and 0
-    otherwise, and is left out.
+    A channel that only fields of other degrees have is 1 (C_0) or 0 (all others) at all these pixels, as
+    for a RoSy. It is left out.
     """
     constant = ("deviation", 0)
     present = {
@@ -282,22 +293,25 @@ def _channels_of_degree(channels: dict[FieldChannel, np.ndarray]) -> dict[FieldC
 
 
 def entries_of_rows(pixel: np.ndarray, width: int, rows: tuple[int, int]) -> slice:
-    """Return the range of ascending flat pixels, (P,), that are in some rows of a frame."""
+    """Return the slice of `pixel`, (P,) ascending flat indices, that is in a range of rows of the frame.
+
+    `rows` is the first row, and the row after the last one.
+    """
     first_pixels = np.array([max(rows[0], 0) * width, rows[1] * width])
     return slice(*np.searchsorted(pixel, first_pixels.astype(pixel.dtype)).tolist())
 
 
 def pixel_window(pixel: np.ndarray, width: int, margin: int) -> tuple[np.ndarray, tuple[int, int]]:
-    """Return where pixels are in the smallest window around all of them, with an empty margin.
+    """Return the indices of pixels in the smallest window around them with an empty margin.
 
     Parameters
     ----------
     pixel : (P,) int32 ndarray
-        Flat pixels of a frame, ascending. At least one.
+        Flat indices of at least one pixel of a frame, ascending.
     width : int
         Width of the frame.
     margin : int
-        In pixels, on each side.
+        Width of the margin on each side, in pixels.
 
     Returns
     -------
@@ -316,7 +330,7 @@ def pixel_window(pixel: np.ndarray, width: int, margin: int) -> tuple[np.ndarray
 def mask_undefined(
     mask: np.ndarray, pixel: np.ndarray, width: int, height: int, defined: np.ndarray
 ) -> np.ndarray:
-    """Clear the bits of neighbor masks that lead from or to undefined pixels.
+    """Clear the bits of neighbor masks for steps from or to pixels where the field is undefined.
 
     Parameters
     ----------
@@ -372,11 +386,14 @@ def rotated(values: np.ndarray, angle: float) -> np.ndarray:
 
 
 def product(a: np.ndarray, b: np.ndarray | np.complex128) -> np.ndarray:
-    """Multiply complex numbers, as complex64. Rounded once, so all versions of numpy agree."""
+    """Multiply complex numbers, as complex64. They are rounded once, so all versions of numpy agree."""
     return (a.astype(np.complex128) * b).astype(np.complex64)
 
 
 def all_members(field: PixelField, guiding_angle: float) -> list[np.ndarray]:
-    """Return N (P,) complex64 arrays: the member nearest to a guiding angle, then its N - 1 rotations."""
+    """Return the N members of a field in the view plane, as (P,) complex64 arrays.
+
+    The first is the member nearest to the guiding angle, and the others are its rotations by 2 pi / N.
+    """
     nearest = nearest_member(field, guiding_angle)
     return [rotated(nearest, 2 * np.pi * k / field.degree) for k in range(field.degree)]

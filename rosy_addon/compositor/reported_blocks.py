@@ -1,4 +1,4 @@
-"""Blocks of pixels that report how far the work on them has come."""
+"""Loops over blocks of pixels that report the progress."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ def reported_blocks(
     ----------
     count : int
     label : str
-        What is being done, for a status bar.
+        Name of the step, for a status bar.
     start, stop : float
-        Fractions of the present work before the first and after the last block.
+        Progress before the first and after the last block, from 0 to 1 of the work of the caller.
     """
     for block in pixel_blocks(count):
         report(start + (stop - start) * block.start / count, label)

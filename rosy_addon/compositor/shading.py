@@ -18,18 +18,18 @@ from .look import Look
 
 @dataclass(frozen=True, eq=False)
 class Light:
-    """A light, in the space of the camera or the world.
+    """A light in camera space or world space.
 
     Attributes
     ----------
     kind : {"sun", "point"}
     vector : (3,) ndarray
-        The unit direction to a sun, or the position of a point light.
+        The unit vector toward a sun, or the position of a point light.
     color : (3,) ndarray
         Linear.
     strength : float
-        Radiance of a white diffuse surface that faces the light; 1 is white. For a point light, at
-        a distance of one Blender unit.
+        Radiance of a white diffuse surface that faces the light; 1 is white. If the light is a point light,
+        the surface is at a distance of one Blender unit.
     """
 
     kind: str
@@ -38,19 +38,26 @@ class Light:
     strength: float
 
     def transformed(self, matrix: np.ndarray) -> Light:
-        """Return the light in another space, given the (4, 4) rigid transform to it."""
+        """Return the light in another space. `matrix` is the (4, 4) rigid transform to that space."""
         vector = matrix[:3, :3] @ self.vector
         if self.kind == "point":
             vector = vector + matrix[:3, 3]
         return replace(self, vector=vector)
 
     def irradiance(self, position: np.ndarray, normal: np.ndarray) -> np.ndarray:
-        """Return (n,) the irradiance at points, without the color of the light and shadows.
+        """Return the irradiance of surface points by Lambert's law, as if the light were white.
+
+        Shadows are ignored.
 
         Parameters
         ----------
         position, normal : (n, 3) float32 ndarray
-            In the space of the light; the normals are unit vectors.
+            Positions and unit normals of the points, in the space in which the light is given.
+
+        Returns
+        -------
+        (n,) float32 ndarray
+            In the unit of `strength`.
         """
         vector = np.asarray(self.vector, dtype=np.float32)
         if self.kind == "sun":
@@ -60,14 +67,15 @@ class Light:
         return self.strength * np.maximum(dot(normal, normalize(to_light)), 0) / distance_squared
 
 
-#: The light "lamp", over the left shoulder of the viewer.
+#: The light of a look whose `light` is "lamp": a sun over the left shoulder of the viewer.
 KEY_LIGHT = Light("sun", np.array([-0.50, 0.60, 0.62]) / 0.9975, np.ones(3), 1.0)
 
 
 def lights_of(look: Any, lights: Sequence[Light]) -> Sequence[Light]:
-    """Return the lights that a look or a style of strokes uses, given the lights of the scene.
+    """Return the lights that a look or a style of strokes uses.
 
-    There are none for the headlight.
+    It is `KEY_LIGHT` for "lamp", the given lights of the scene for "scene", and none for "headlight", which
+    needs no `Light`.
     """
     return {"lamp": (KEY_LIGHT,), "scene": lights}.get(look.light, ())
 
@@ -86,14 +94,14 @@ def diffuse(
     look : Look
         Its `light`, `shadows` and `shading` are used. With a `shading` of 0 all pixels are 1.
     lights : sequence of Light
-        Lights of the scene in the space of the camera. Used if the light of the look is "scene".
+        Lights of the scene in camera space. Used if the light of the look is "scene".
     visibility : sequence of (P,) ndarray, optional
-        By default from `light_visibility`.
+        The fraction of each light that reaches each pixel. By default the result of `light_visibility`.
 
     Returns
     -------
     (P, 3) float32 ndarray
-        Linear factors.
+        Linear factors of the color.
     """
     if look.shading == 0:
         return np.ones((len(gbuffer.pixel), 3), dtype=np.float32)
@@ -127,7 +135,7 @@ def light_visibility(
     Returns
     -------
     list of (P,) float32 ndarray
-        One for each of the `lights_of` the look. Empty if nothing casts shadows.
+        One array for each light from `lights_of`. The list is empty if there are no shadows.
     """
     if look.shading == 0 or not look.shadows:
         return []

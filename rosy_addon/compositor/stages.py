@@ -1,4 +1,4 @@
-"""The cached stages between a G-buffer and a picture: pixel field, noise, LIC images, outline."""
+"""Stages between a G-buffer and a picture, with their cache: pixel field, noise, LIC images, outline."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from .surface_noise import surface_noise
 from .undirected import undirected_texture
 from .wobble import has_wobble, rotate_pixel_field, wobble_angle
 
-#: Share of the progress of LIC that the noise takes.
+#: Fraction of the progress of LIC for making the noise.
 NOISE_SHARE = 0.3
 
 
@@ -43,7 +43,7 @@ class ComposeStages:
     cache : Cache
         May be shared with other G-buffers.
     mesh_cache : Cache
-        Stores what does not depend on the camera.
+        Stores results that do not depend on the camera.
     """
 
     def __init__(self, gbuffer: GBuffer, cache: Cache, mesh_cache: Cache) -> None:
@@ -52,7 +52,7 @@ class ComposeStages:
         self._mesh_cache = mesh_cache
 
     def pixel_field(self, degree: int, look: PixelLook) -> PixelField:
-        """Return the pixel field of one degree, rotated by the wobble of the look."""
+        """Return the `PixelField` of one degree, with its directions rotated by the wobble of the look."""
         crease_angle = crease_angle_of(look)
         field = self._cache.get_or_create(
             ("pixel field", self._gbuffer, degree, crease_angle),
@@ -78,8 +78,8 @@ class ComposeStages:
     ) -> list[LicImages]:
         """Compute the LIC images of a field at the pixels of a strip, or find them in the cache.
 
-        The looks differ in the length of streamlines. The first is the longest. Methods other than "sheets"
-        have no strips.
+        The looks differ in the length of streamlines, and the first has the greatest length. Methods other
+        than "sheets" ignore `strip`.
         """
         key = "LIC images", self._gbuffer, field.degree, strip, *(look.lic_key() for look in looks)
         return self._cache.get_or_create(key, partial(self._new_lic, field, looks, strip))
@@ -87,7 +87,10 @@ class ComposeStages:
     def _new_lic(
         self, field: PixelField, looks: Sequence[PixelLook], strip: Strip | None
     ) -> list[LicImages]:
-        """Compute LIC images. Waves of the method "ibfv" with flow are kept in the cache."""
+        """Compute LIC images that are not in the cache.
+
+        With the method "ibfv" and flow, they are made from `ibfv.StreakWaves`, which are cached.
+        """
         if looks[0].method != "ibfv" or not has_flow(looks[0]):
             return self._convolved(partial(lic_lengths, strip=strip), field, looks)
         # The waves are the same at all times and speeds; see `ibfv`.
@@ -100,14 +103,14 @@ class ComposeStages:
     def _convolved(
         self, convolve: Callable[..., Any], field: PixelField, looks: Sequence[PixelLook]
     ) -> Any:
-        """Make the noise of a field, and return what a method of LIC makes of it."""
+        """Make the noise of a field, and return the result of `convolve` (a method of LIC) for it."""
         with progress(0.0, NOISE_SHARE):
             noise = self.noise(field, looks[0])
         with progress(NOISE_SHARE, 1.0):
             return convolve(field, looks, noise)
 
     def undirected_texture(self, field: PixelField, look: PixelLook) -> np.ndarray | None:
-        """Compute the texture where the field is undefined; see `undirected_texture`."""
+        """Compute the texture of hatching where the field is undefined; see `undirected`."""
         if field.representation.all():
             return None
         noise = unconvolved_noise(self.noise(field, look), look)
@@ -134,7 +137,7 @@ class ComposeStages:
     def surface_paper_grain(self, field: PixelField, look: PixelLook) -> np.ndarray:
         """Return the (P, K) float32 heights of the paper grain, for a look that is anchored to the surface.
 
-        They are not normalized: the mean is `NOISE_MEAN`.
+        They are not normalized; their mean is `NOISE_MEAN`.
         """
         args = surface_paper_grain_args(look) | cell_size_args(look)
         return self._surface_noise(field, args)
@@ -153,6 +156,6 @@ class ComposeStages:
         return noise[field.gbuffer_index]
 
     def _wobble_angle(self, look: PixelLook) -> np.ndarray:
-        """Return the (Q,) float32 angles at all Q pixels of the G-buffer; see `wobble_angle`."""
+        """Return the (Q,) float32 `wobble.wobble_angle` at all Q pixels of the G-buffer."""
         key = "wobble", self._gbuffer, look.anchor, look.line_width, *cell_size_args(look).values()
         return self._cache.get_or_create(key, partial(wobble_angle, self._gbuffer, look))

@@ -24,14 +24,14 @@ from .undirected import disc_means
 #: crispness 0 and 1.
 MAX_SOFTNESS, MIN_SOFTNESS = 1.6, 0.2
 
-#: Break amount that the wobble 1 adds everywhere.
+#: `break_amount` that a wobble of 1 adds everywhere.
 WOBBLE_BREAKS = 0.5
 
 #: Half the length of the pieces of broken lines, in line widths, and its upper bound, as a fraction of
 #: the length of the streamlines.
 BREAK_LENGTH_WIDTHS, MAX_BREAK_FRACTION = 4.0, 0.4
 
-#: Entries of tables of thresholds, by coverage, and the number of break amounts that are sampled.
+#: Number of coverages in tables of thresholds, and number of break amounts that are sampled.
 COVERAGE_STEPS, BREAK_LEVELS = 256, 17
 
 #: Side of the sample of noise: in line widths, and its least value in pixels.
@@ -43,7 +43,7 @@ MAX_SAMPLE_WIDTH = 12.0
 #: Bins of the histogram of a sample.
 HISTOGRAM_BINS = 1600
 
-#: The statistics of the latest looks. Those of one take about 4 KB.
+#: Cache of the statistics of the latest looks. The statistics of a look take about 4 KB.
 STATISTICS_CACHE = Cache(max_bytes=1 << 16)
 
 
@@ -60,15 +60,15 @@ class StreakStatistics(NamedTuple):
     Attributes
     ----------
     threshold : (COVERAGE_STEPS,) float64 ndarray
-        Thresholds for coverages from 0 to 1, in even steps: the streaks above a threshold cover
-        that fraction of the paper. In standard deviations of the streaks, from their mean.
+        Threshold for each coverage from 0 to 1, in even steps: streaks exceed the threshold on that fraction
+        of the paper. The unit is the standard deviation of the streaks; 0 is their mean.
     std : float
         Standard deviation of the streaks.
     break_std : float
-        Standard deviation of streaks as long as the pieces of broken lines.
+        Standard deviation of short streaks, which are as long as the pieces of broken lines.
     disc_threshold : (COVERAGE_STEPS,) float64 ndarray
-        Thresholds of means of noise over discs; see `undirected`. In standard deviations of these
-        means.
+        The same as `threshold` for means of noise over discs (see `undirected`), in standard deviations
+        of these means.
     disc_std : float
         Standard deviation of means over discs.
     paper_grain_std : float
@@ -152,7 +152,7 @@ def _measured(look: PixelLook) -> StreakStatistics:
 
 
 def break_amount(target_coverage: np.ndarray, breaks: float, wobble: float) -> np.ndarray:
-    """Compute the weight of the short streaks, which break lines into pieces, at coverages.
+    """Compute the weight of the short streaks that break lines into pieces, for each target coverage.
 
     Lines break first where the coverage is low. Wobble adds the same amount everywhere, which makes
     lines vary in width.
@@ -174,7 +174,7 @@ def break_amount(target_coverage: np.ndarray, breaks: float, wobble: float) -> n
 
 
 def break_steps(look: PixelLook) -> int:
-    """Return the steps in each direction of the short streaks that break lines into pieces."""
+    """Return the length of the short streaks that break lines into pieces, as steps in each direction."""
     steps = min(BREAK_LENGTH_WIDTHS * look.line_width, MAX_BREAK_FRACTION * look.length)
     return max(round(steps), 1)
 
@@ -206,7 +206,7 @@ def _threshold_tables(samples: list[np.ndarray], half_width: float) -> np.ndarra
 def _noise_sample(
     shape: tuple[int, int], cell: float, density: float, high_pass: float, anchored: bool
 ) -> np.ndarray:
-    """Make an image of noise in image space or, if `anchored`, as on a surface.
+    """Make an image of the noise in image space or, if `anchored`, of the noise on a flat surface.
 
     On the surface, the cells of the middle octave have the size `cell` on screen.
     """
@@ -223,7 +223,10 @@ def _noise_sample(
 
 
 def _line_means(noise: np.ndarray, length: int, side: int, kernel: Kernel) -> np.ndarray:
-    """Return (n, side) means over `length` pixels of the rows of (n, width) noise, from its center."""
+    """Return the (n, side) weighted means of `length` successive pixels in the rows of (n, width) noise.
+
+    They are centered at the middle `side` columns.
+    """
     if kernel == "ramp":
         # The weights of a window from column a on are 1 - 2 (j - middle) / length, for the column j.
         column = np.arange(noise.shape[1])
@@ -239,13 +242,13 @@ def _line_means(noise: np.ndarray, length: int, side: int, kernel: Kernel) -> np
 
 
 def _window_means(rows: np.ndarray, window: int) -> np.ndarray:
-    """Return (n, width - window + 1) float64 means over windows of the rows of (n, width) values."""
+    """Return the (n, width - window + 1) float64 means of `window` successive values in (n, width) rows."""
     sums = np.cumsum(np.pad(rows, ((0, 0), (1, 0))), axis=1, dtype=np.float64)
     return (sums[:, window:] - sums[:, :-window]) / window
 
 
 def _standardized(means: np.ndarray) -> tuple[np.ndarray, float]:
-    """Subtract the mean and divide by the standard deviation; return that deviation as well."""
+    """Return values minus their mean, divided by their standard deviation; and that standard deviation."""
     std = float(means.std())
     return (means - means.mean()) / std, std
 

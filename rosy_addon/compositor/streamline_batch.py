@@ -1,4 +1,8 @@
-"""Batches of streamlines on a covering, traced together in both directions from their seeds."""
+"""Batches of streamlines on a covering surface, traced together in both directions from their seeds.
+
+A *state* is a pixel with one direction of the field there, a *line* is a pair of opposite states (see
+`covering`).
+"""
 
 from __future__ import annotations
 
@@ -14,15 +18,15 @@ from .look_units import PixelLook
 from .streamline_tracing import COMPACT_INTERVAL, TracedLanes, axial_steps, lateral_offset
 
 #: Factor of the derivative of noise across a streamline. A central difference over two pixels
-#: predicts the change over half a pixel only in part. This value gives streaks the width that they
-#: have with the method "brute".
+#: predicts the change over half a pixel only in part. With this factor, streaks are as wide as with the
+#: method "brute".
 LATERAL_GAIN = 0.7
 
-#: The same if noise is interpolated, which leaves streaks as wide as they are.
+#: Factor of that derivative if noise is interpolated across streamlines, which does not widen streaks.
 INTERPOLATED_GAIN = 1.0
 
-#: Distance from the center of a pixel within which the average of a streamline is preferred,
-#: pixels.
+#: Distance in pixels from the center of a pixel. A streamline within it is preferred to others that pass the
+#: same pixel.
 MAX_LATERAL_OFFSET = 0.25
 
 
@@ -32,22 +36,22 @@ class StreamlineBatch:
     A *lane* of the buffers is one half of a streamline: n seeds have n forward lanes, followed by n
     backward lanes.
 
-    Lanes end at the border, where the field ends, and, if they are long, where they return to a
-    state: further turns around the loop would cost time and add no other noise.
+    Lanes end at the border and where the field ends. Long lanes also end where they return to a state that
+    they have passed: further turns around the loop would cost time and add no other noise.
 
     Parameters
     ----------
     covering : Covering
     looks : sequence of PixelLook
-        Averages are taken over the `length` of each; all else is the same.
+        Looks that differ in `length` alone. There is an average over the length of each.
     step_limits : sequence of (C,) intp ndarray or None
-        Steps in each direction that the average of a cell covers, for each look. None for its
-        `length`.
+        For each look: steps in each direction that the average of each cell covers. If None, they are
+        the `length` of the look.
     half_window : int
-        Steps in each direction whose states take their average from the streamline. Further steps
-        only contribute noise to these averages.
+        States within so many steps of the seed, in each direction, take their average from the streamline.
+        Further steps only contribute noise to these averages.
     max_streamlines : int
-        Size of the batch.
+        Maximum number of streamlines in the batch.
     interpolates : bool
         Whether noise is interpolated across streamlines at every step. Otherwise it is the noise of the
         nearest pixel.
@@ -77,7 +81,7 @@ class StreamlineBatch:
         self._step_scale, self._noise_scale = np.float32(1.5 * step_scale), np.float32(noise_scale)
         lateral_gain = (INTERPOLATED_GAIN if interpolates else LATERAL_GAIN) * slope_scale
         self._lateral_gain = np.float32(lateral_gain * step_scale)
-        # The same, in the unit of the noise of states.
+        # `_lateral_gain` in the unit of the noise of states.
         self._noise_gain = self._lateral_gain / self._noise_scale if interpolates else None
         self._max_lateral = np.float32(MAX_LATERAL_OFFSET / step_scale)
         self._step_limits = [
@@ -90,11 +94,11 @@ class StreamlineBatch:
         self._states = np.empty((half_window + 1, lanes), dtype=np.int32)
         self._lateral_offset = np.empty((half_window + 1, lanes), dtype=np.float32)
         self._axial_offset = np.empty_like(self._lateral_offset) if self._moving_kernels else None
-        #: Steps of the last traced streamlines before their end, within the half window.
+        #: Total number of steps, within the half window, of the streamlines that were traced last.
         self.covered_steps = 0
 
     def trace(self, seeds: np.ndarray) -> Iterator[tuple[np.ndarray, list[np.ndarray], np.ndarray]]:
-        """Trace streamlines and yield, step by step, the averages of the lines that they pass.
+        """Trace streamlines, and yield for each step the averages of the lines that they pass there.
 
         Parameters
         ----------
@@ -104,12 +108,12 @@ class StreamlineBatch:
         Yields
         ------
         line : (2 n,) int32 ndarray
-            Indices of lines, of the cell `SINK_CELL` where streamlines have ended.
+            Indices of the lines that are passed. If a streamline has ended, its line is in `SINK_CELL`.
         values : list of (2 n, K + 1) float32 ndarray
             For each look, the average of each noise channel times the effective samples, then the
-            effective samples. Overwritten by the next step.
+            effective samples. The arrays are overwritten by the next step.
         centered : (m,) intp ndarray
-            Indices of the streamlines that pass close to the center of the pixel.
+            Indices into `line`, of the lanes that pass close to the center of the pixel.
         """
         if self._moving_kernels:
             seeds = self._along_members(seeds)
@@ -127,8 +131,8 @@ class StreamlineBatch:
             if self._kernel == "ramp":
                 is_along = self._covering.is_along_member(state)
             line = self._covering.fold_to_line(state)
-            # A streamline passes the center of a pixel at up to half a pixel. The sum is corrected
-            # to the center by its derivative across the streamline.
+            # A streamline passes up to half a pixel beside the center of a pixel. The sum is corrected
+            # to the center with its derivative across the streamline.
             lateral = self._lateral_offset[step, :lanes]
             correction = (lateral * self._lateral_gain)[:, None]
             forward, backward = step_counts - np.float32(step), opposite_counts + np.float32(step)
@@ -159,7 +163,10 @@ class StreamlineBatch:
             yield line, values, np.flatnonzero(np.abs(lateral) < self._max_lateral)
 
     def _along_members(self, seeds: np.ndarray) -> np.ndarray:
-        """Replace lines by states whose sheets are members, if the lines have directions."""
+        """Return the state of each line that is a member of the field, not an opposite.
+
+        In a field with opposites, return `seeds` unchanged.
+        """
         covering = self._covering
         if not covering.has_directions:
             return seeds
@@ -169,7 +176,7 @@ class StreamlineBatch:
     def _drifting_averages(
         self, count: int, step_counts: np.ndarray, last_step: int
     ) -> Iterator[tuple[np.ndarray, list[np.ndarray], np.ndarray]]:
-        """Yield what `trace` does, for kernels that move. The averages have a single channel."""
+        """Yield the same as `trace`, for looks with flow, whose kernels move. Averages have one channel."""
         lanes, covering = 2 * count, self._covering
         second_sums = self._whole_second_sums(count)
         averages = [DriftingAverages(kernel, second_sums) for kernel in self._moving_kernels]
@@ -203,19 +210,21 @@ class StreamlineBatch:
             yield line, values, np.flatnonzero(np.abs(lateral) < self._max_lateral)
 
     def _whole_second_sums(self, count: int) -> np.ndarray:
-        """Join the sums of prefix sums of both halves of streamlines, in the order of the forward half.
+        """Return the prefix sums of prefix sums of whole streamlines, joined from both halves.
+
+        They run in the direction of the forward half.
 
         Returns
         -------
         (K, 2 R + 3, n) complex64 ndarray
-            Row i + R + 2 is the sum of prefix sums up to step i, with R the number of steps.
+            Row i + R + 2 is the sum of the prefix sums up to step i. R is the number of steps of a half.
         """
         steps, channels = self._max_steps, self._covering.noise_channels
         result = np.empty((channels, 2 * steps + 3, count), dtype=np.complex64)
         for channel, rows in enumerate(result):
             rows[steps + 2 :] = self._sums[:, :count, channel]
             rows[steps + 1] = 0
-            # As `_second_prefix_sums`.
+            # The same sums as `_second_prefix_sums` returns.
             np.conjugate(self._sums[::-1, count : 2 * count, channel], out=rows[: steps + 1])
             factor = np.arange(-steps - 1, 0, dtype=np.float32)
             rows[: steps + 1] += factor[:, None] * self._sums[0, :count, channel]
@@ -224,17 +233,18 @@ class StreamlineBatch:
     def _trace_steps(self, seeds: np.ndarray) -> tuple[np.ndarray, int]:
         """Trace the streamlines and fill the buffers. Row i of a buffer is step i.
 
-        Each row holds n forward halves of streamlines, then n backward halves. `_states` are their
-        states, `_lateral_offset` their distances to the left of the centers of pixels. `_sums` are
-        prefix sums of the noise, including the seed, with the derivative to the left as imaginary
-        part. For kernels that are not a box, `_sums` are prefix sums of these, in all rows.
+        A row holds n forward halves of streamlines, then n backward halves. The buffers are `_states`;
+        `_lateral_offset`, the distances to the left of the centers of pixels; and `_sums`, prefix sums of
+        the noise that include the seed. The imaginary part of `_sums` is the same for the derivative of the
+        noise to the left. For kernels other than the box, `_sums` are the prefix sums of these prefix sums,
+        and all rows are filled.
 
         Returns
         -------
         step_counts : (2 n,) intp ndarray
-            Steps before the streamlines ended.
+            Number of steps that each lane made before it ended.
         last_step : int
-            Last row that is filled.
+            Index of the last row that is filled.
         """
         lanes = TracedLanes(self._covering, seeds, self._max_steps)
         for step in range(self._max_steps + 1):
@@ -259,7 +269,7 @@ class StreamlineBatch:
         return lanes.step_counts(), self._max_steps
 
     def _store_sums(self, step: int, lanes: TracedLanes) -> None:
-        """Fill a row of `_sums`. Lanes that have ended keep their totals."""
+        """Fill the row `step` of `_sums`. Lanes that have ended keep their totals."""
         self._totals[lanes.index] = lanes.total
         self._sums[step, : lanes.count] = self._totals[: lanes.count]
         if self._has_second_sums and step:
@@ -273,17 +283,20 @@ class StreamlineBatch:
         direction: np.ndarray,
         lateral: np.ndarray,
     ) -> None:
-        """Fill a row of the buffers of states and offsets. Lanes that have ended are in the sink."""
+        """Fill a row of `_states` and `_lateral_offset`. Lanes that have ended are in `SINK_CELL`."""
         records = [(self._states, state), (self._lateral_offset, lateral)]
         if self._axial_offset is not None:
             axial = axial_steps(lanes.position, direction, self._step_scale / np.float32(1.5))
             records.append((self._axial_offset, axial))
         for buffer, values in records:
-            buffer[step, : lanes.count] = SINK_CELL  # 0, which is no offset, too
+            buffer[step, : lanes.count] = SINK_CELL  # it is 0, which also means no offset
             buffer[step, lanes.index] = values
 
     def _extend_sums(self, last_step: int, lanes: int) -> None:
-        """Fill the rows after the end of the last streamline, where sums of prefix sums still grow."""
+        """Fill the rows of `_sums` after the last streamline has ended.
+
+        Sums of prefix sums still grow there, because the prefix sums stay the same.
+        """
         if self._has_second_sums:
             for step in range(last_step, self._max_steps):
                 np.add(
@@ -291,10 +304,11 @@ class StreamlineBatch:
                 )
 
     def _tapered_sums(self, step: int, half_width: int | np.ndarray, lanes: int) -> np.ndarray:
-        """Return (2 n, K) complex64 tapered sums of the noise, `half_width` r steps in each direction.
+        """Return (2 n, K) complex64 sums of the noise around step i, with tapered weights.
 
-        With the sums of prefix sums E, this is (E(i + r) - 2 E(i - 1) + E(i - r - 2)) / (r + 1). A
-        triangular kernel is the mean of r + 1 box kernels of r + 1 steps, one step apart.
+        The kernel reaches r = `half_width` steps in each direction. With the sums of prefix sums E, the sum
+        is (E(i + r) - 2 E(i - 1) + E(i - r - 2)) / (r + 1), because a triangular kernel is the mean of r + 1
+        box kernels of r + 1 steps, each one step further.
         """
         total = self._second_prefix_sums(step + half_width, lanes)
         total = total - 2 * self._second_prefix_sums(step - 1, lanes)
@@ -305,11 +319,13 @@ class StreamlineBatch:
     def _ramp_sums(
         self, step: int, half_width: int | np.ndarray, lanes: int, is_along: np.ndarray
     ) -> np.ndarray:
-        """Return (2 n, K) complex64 sums of the noise with weights that fall along the field.
+        """Return (2 n, K) complex64 sums of the noise around step i, with weights that fall along the field.
 
-        Along a streamline, weights that fall from 2 r + 1 to 1 are
-        E(i + r) - E(i - r - 1) - (2 r + 1) P(i - r - 1), with the prefix sums P(i) = E(i) - E(i - 1). Where
-        the lane runs against the field, they rise instead: twice the box without these.
+        The sum along a lane with weights that fall from 2 r + 1 to 1, r = `half_width`, is
+        E(i + r) - E(i - r - 1) - (2 r + 1) P(i - r - 1). E are the sums of prefix sums, and
+        P(i) = E(i) - E(i - 1) are the prefix sums. If a lane runs against the field (`is_along` is False),
+        the weights rise along the lane. The sum is then that of a box of the weight 2 r + 2 minus the sum
+        above. All sums are divided by r + 1.
         """
         last, before = step + half_width, step - half_width - 1
         sums_through, sums_before = (self._second_prefix_sums(i, lanes) for i in (last, before))
@@ -323,7 +339,7 @@ class StreamlineBatch:
         return falling
 
     def _second_prefix_sums(self, step: int | np.ndarray, lanes: int) -> np.ndarray:
-        """Return the (2 n, K) complex64 sums of prefix sums E up to a step. E(-1) is 0."""
+        """Return the (2 n, K) complex64 sums E of the prefix sums up to and including a step. E(-1) is 0."""
         seed = self._sums[0, :lanes]
         if np.ndim(step) == 0:
             if step >= 0:
@@ -339,10 +355,10 @@ class StreamlineBatch:
         return np.where(same_side[:, None], gathered, mirrored)
 
     def _prefix_sums_before(self, step: int | np.ndarray, lanes: int) -> np.ndarray:
-        """Return the (2 n, K) complex64 prefix sums up to a step, excluding it.
+        """Return the (2 n, K) complex64 prefix sums up to the step before `step`.
 
-        Negative steps are on the opposite half of the streamline. Its sums run away from the seed,
-        and its derivatives to the left have the opposite sign.
+        Negative steps are on the opposite half of the streamline. The sums of that half run away from the
+        seed, and its derivatives to the left have the opposite sign.
         """
         seed, same_side = self._sums[0, :lanes], step > 0
         if np.ndim(step) == 0:
@@ -355,7 +371,10 @@ class StreamlineBatch:
     def _rows(
         self, row: int | np.ndarray, lanes: int, is_opposite: bool | np.ndarray = False
     ) -> np.ndarray:
-        """Return (2 n, K) complex64 `_sums` of a row, or of a row of each lane, or of the opposite lane."""
+        """Return the (2 n, K) complex64 elements of `_sums` in a row, which may differ by lane.
+
+        Where `is_opposite`, they are taken from the lane of the opposite half of the streamline.
+        """
         half = lanes // 2
         if np.ndim(row) == 0:
             rows = self._sums[row, :lanes]

@@ -1,8 +1,9 @@
-"""Where streamlines of the covering come from: the origin of every state, a number of steps upstream.
+"""Origins: for every state of the covering surface, the point a number of steps upstream on its streamline.
 
-The origins of one step are found by the midpoint method. Those of twice as many steps are composed of
-them, by interpolation between the origins of neighboring states, as in hierarchical line integration
-(Hlawatsch, Sadlo and Weiskopf, IEEE TVCG 2011).
+A state is a pixel with one direction (sheet) of the field; see `covering`. Origins of one step are found by
+the midpoint method. Origins of twice as many steps are composed of them: the origin of the origin is
+interpolated between the origins of neighboring states, as in hierarchical line integration (Hlawatsch,
+Sadlo and Weiskopf, IEEE TVCG 2011).
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ from ..projection.pixel_blocks import pixel_blocks
 from .covering import SINK_CELL, Covering, unpack_neighbor_mask
 from .pixel_field import NEIGHBOR_OFFSETS
 
-#: Largest distance in pixels, along each axis, of the points that neighbors come from. Streamlines that are
-#: further apart have parted.
+#: Largest distance in pixels, along each axis, between the origins of neighboring pixels. If they are further
+#: apart, their streamlines have parted, and origins are not interpolated.
 MAX_PARTING = np.float32(2.5)
 
 #: Label of all steps.
@@ -28,7 +29,8 @@ STEP_LABEL = "tracing streamlines"
 class Origins(NamedTuple):
     """The points that (n,) states are reached from: cells, sheets, and offsets from the centers of cells.
 
-    Cells and sheets are integers, offsets complex64, in pixels. The cell is `SINK_CELL` where the streamline has ended.
+    Cells and sheets are integers. Offsets are complex64, in pixels. The cell is `SINK_CELL` where the
+    streamline has ended.
     """
 
     cell: np.ndarray
@@ -37,7 +39,7 @@ class Origins(NamedTuple):
 
     @classmethod
     def ended(cls, count: int) -> Origins:
-        """Return origins of states whose streamlines have ended."""
+        """Return `count` origins of states whose streamlines have ended."""
         return cls(
             np.full(count, SINK_CELL, dtype=np.int32),
             np.zeros(count, dtype=np.int8),
@@ -45,11 +47,11 @@ class Origins(NamedTuple):
         )
 
     def at(self, state: np.ndarray) -> Origins:
-        """Return the origins of some states."""
+        """Return the origins of the states (pixels with a direction) that have the given indices."""
         return Origins(*(values.take(state) for values in self))
 
     def put(self, state: np.ndarray, origins: Origins) -> None:
-        """Replace the origins of some states."""
+        """Replace the origins of the states (pixels with a direction) that have the given indices."""
         for values, new in zip(self, origins, strict=True):
             values[state] = new
 
@@ -57,20 +59,20 @@ class Origins(NamedTuple):
 class _Surroundings(NamedTuple):
     """The four pixels around (n,) points, for bilinear interpolation.
 
-    They are the pixel that contains the point, the nearest one in the same row, the nearest one in the same
-    column, and the one diagonally opposite.
+    They are the pixel that contains the point, the nearest other pixel in its row, the nearest other pixel in
+    its column, and the fourth pixel of that square.
 
     Attributes
     ----------
     states : list of (n,) intp ndarray
-        The states of these pixels, on matching sheets. Where streamlines cannot step to a pixel, the state at
-        the point takes its place.
+        For each of the four pixels: its states, on the sheets (directions of the field) that match the sheet
+        of the point. Where streamlines cannot step to a pixel, the state of the first pixel is used.
     unlinked : list of (m,) intp ndarray
-        For each of the other three pixels: the points whose streamlines cannot step there.
+        For each of the other three pixels: the indices of points whose streamlines cannot step there.
     column, row : (n,) intp ndarray
-        The steps to the next column and row, 1 or -1.
+        Steps from the first pixel to the other column and row, 1 or -1.
     weights : list of (n,) float32 ndarray
-        The weights of bilinear interpolation.
+        Weights of the four pixels for bilinear interpolation.
     """
 
     states: list[np.ndarray]
@@ -80,7 +82,7 @@ class _Surroundings(NamedTuple):
     weights: list[np.ndarray]
 
     def interpolate(self, values: np.ndarray) -> np.ndarray:
-        """Return (n,) values at the points, given the values of all states."""
+        """Return the (n,) interpolated values at the points, given a value for each state of `Sheets`."""
         total = values.take(self.states[0])
         total *= self.weights[0]
         for state, weight in zip(self.states[1:], self.weights[1:], strict=True):
@@ -89,26 +91,27 @@ class _Surroundings(NamedTuple):
 
 
 class Sheets:
-    """The sheets that streamlines come from, and the steps between their states.
+    """The sheets (directions of the field) along which origins are found, and the steps between their states.
 
-    If a field has no opposites, only the directions or their opposites are needed. They are numbered from
-    0, and state (c, k) has the index k C + c.
+    If a field has no opposites, only its directions or only their opposites are needed. The needed sheets are
+    numbered from 0. The state of cell c and sheet k has the index k C + c.
 
     Parameters
     ----------
     covering : Covering
-        Without seams: no streamline crosses one.
+        The covering surface. It has no seams.
     is_upstream : bool
-        Whether streamlines come from where lines point away from.
+        Whether noise is carried along the directions of a field without opposites, so origins are upstream;
+        otherwise they are downstream. Without effect for other fields.
 
     Attributes
     ----------
     cells : (P,) int32 ndarray
         The cell of each pixel.
     cell_count, count : int
-        C, and the number of sheets.
+        C, the number of cells, and the number of sheets that are needed.
     covering_sheet : list of int
-        The sheet of the covering, by number.
+        For each of these sheets, its number in `covering`.
     """
 
     def __init__(self, covering: Covering, is_upstream: bool) -> None:
@@ -117,24 +120,28 @@ class Sheets:
         self.cell_count = covering.cell_count
         lines, turn = covering.line_count, covering.sheets_per_turn
         self.count = lines if covering.has_directions else 2 * lines
-        # Every other sheet of a RoSy of odd degree is a direction.
+        # In a RoSy of odd degree, every other sheet is a direction of the field, and the rest are opposites.
         spacing = turn // self.count
         sheet = np.arange(self.count) * spacing
         if is_upstream and covering.has_directions:
             sheet = (sheet + lines) % (2 * lines)
         self.covering_sheet = sheet.tolist()
         self._shift = self._sheet_shifts(spacing)
-        # The first state of each sheet, which are counted on after the last.
+        # Index of the first state of each sheet, twice, for sheet numbers beyond the last.
         self._first_states = np.tile(np.arange(self.count) * self.cell_count, 2)
 
     def blocks(self, sheets: int = 0) -> Iterator[tuple[int, slice, np.ndarray]]:
-        """Yield blocks of pixels on each sheet, or on the first ones, and report the progress.
+        """Yield blocks of pixels on each sheet, and report the progress.
+
+        If `sheets` is not 0, only the first `sheets` sheets are yielded.
 
         Yields
         ------
         sheet : int
         block : slice
+            Pixels of the block.
         state : (n,) intp ndarray
+            Indices of the states of these pixels on the sheet.
         """
         sheets, count = sheets or self.count, len(self.cells)
         for sheet in range(sheets):
@@ -143,7 +150,7 @@ class Sheets:
                 yield sheet, block, sheet * self.cell_count + self.cells[block].astype(np.intp)
 
     def one_step(self) -> Origins:
-        """Find where each state is reached from in a step, by the midpoint method."""
+        """Find the origin of each state one step upstream, by the midpoint method."""
         scale = np.float32(self._covering.state_scales[0])
         table = self._covering.state_table.reshape(
             -1, self.cell_count, self._covering.state_table.shape[1]
@@ -163,7 +170,7 @@ class Sheets:
         return result
 
     def interpolated(self, origins: Origins, around: _Surroundings) -> Origins:
-        """Interpolate the origins of states to points."""
+        """Return the origins of points, interpolated between the origins of the four states around each."""
         target = origins.at(around.states[0])
         change = np.zeros_like(target.offset)
         width, inverse_width = np.float32(self._width), np.float32(1 / self._width)
@@ -179,7 +186,8 @@ class Sheets:
             between -= rows * width
             distance.real += between
             distance.imag += rows
-            # If a neighbor comes from elsewhere, its origin is taken to be as far away as its pixel.
+            # If a neighbor has its origin elsewhere, the distance of both origins is taken to be that of the
+            # pixels.
             apart = np.abs(distance.view(np.float32))
             parted = np.maximum(apart[::2], apart[1::2]) > MAX_PARTING
             parted |= cells == SINK_CELL
@@ -193,7 +201,7 @@ class Sheets:
         return self._moved(Origins(target.cell, target.sheet, change))
 
     def surroundings(self, origins: Origins) -> _Surroundings:
-        """Return the four pixels around points."""
+        """Return the four pixels around the points `origins`, for interpolation."""
         cell, sheet = origins.cell.astype(np.intp), origins.sheet.astype(np.intp)
         x, y = origins.offset.real.copy(), origins.offset.imag.copy()
         column, row = np.where(x < 0, -1, 1), np.where(y < 0, -1, 1)
@@ -219,9 +227,10 @@ class Sheets:
         return _Surroundings(states, unlinked, column, row, weights)
 
     def linked_neighbors(self, cell: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Return the steps of streamlines from (n,) cells to their four nearest neighbors.
+        """Return the steps that streamlines can make from (n,) cells to each of the four nearest neighbors.
 
-        For each neighbor: the cells from which a streamline can step to it, and the cells where it arrives.
+        The result is a pair of arrays for each neighbor: the cells where such steps start, and the cells
+        where they arrive.
         """
         steps = []
         for bit, (column, row) in enumerate(NEIGHBOR_OFFSETS):
@@ -231,7 +240,7 @@ class Sheets:
         return steps
 
     def _sheet_shifts(self, spacing: int) -> np.ndarray:
-        """Tabulate what steps to neighbors add to the number of the sheet, from 0.
+        """Tabulate by how much the number of the sheet increases in a step to each neighbor, from 0 on.
 
         Returns
         -------
@@ -250,7 +259,7 @@ class Sheets:
         return table.reshape(-1)
 
     def _moved(self, origins: Origins) -> Origins:
-        """Assign points to the pixels that they are in. Streamlines end where they cannot step there."""
+        """Return points relative to the pixels that contain them. Streamlines that cannot step there end."""
         cell, sheet, offset = origins
         column = np.clip(np.rint(offset.real), -1, 1)
         row = np.clip(np.rint(offset.imag), -1, 1)

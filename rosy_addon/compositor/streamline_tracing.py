@@ -1,4 +1,8 @@
-"""Tracing of streamlines on a covering, many at once, in both directions from their seeds."""
+"""Tracing of streamlines on a covering surface, many at once, in both directions from their seeds.
+
+A *lane* is one half of a streamline, forward or backward. A *state* is a pixel with one direction of the
+field there, and *sheet* is the number of that direction (see `covering`).
+"""
 
 from __future__ import annotations
 
@@ -9,16 +13,16 @@ from .covering import ALL_NEIGHBORS, SINK_CELL, Covering, unpack_neighbor_mask
 #: Steps between compactions, which remove streamlines that have ended.
 COMPACT_INTERVAL = 8
 
-#: Steps after which streamlines that return to a state end. Shorter ones may return.
+#: Minimum number of steps after which a streamline ends where it returns to an earlier state.
 MIN_LOOP_STEPS = 256
 
-#: Steps within which a streamline that is at a state again may not have left it.
+#: Streamlines that are at the same state within so many steps may not have left it, so this is no loop.
 MIN_RETURN_STEPS = 4
 
-#: The number behind the R2 sequence (Roberts), in two dimensions what the golden ratio is in one.
+#: The plastic number, on which the R2 sequence (Roberts) is based: the analog of the golden ratio in 2D.
 PLASTIC_NUMBER = 1.3247179572447460
 
-#: Columns by which the offsets of seeds are shifted from one sheet to the next.
+#: Number of columns by which the pattern of offsets of seeds is shifted from one sheet to the next.
 SHEET_SHIFT = 17
 
 #: Largest offset from the center of a cell after a step across a seam, in pixels along each axis.
@@ -28,8 +32,8 @@ MAX_SEAM_OFFSET = np.float32(1.5)
 class TracedLanes:
     """Halves of streamlines that are traced together, a step at a time.
 
-    There are n forward halves, then n backward halves. The arrays hold those that had not ended at the
-    last compaction. The others are in the cell `SINK_CELL`, which they do not leave.
+    There are n forward halves (lanes), then n backward halves. The arrays hold the m lanes that had not ended
+    at the last compaction. Lanes that have ended are in the cell `SINK_CELL` and stay there.
 
     Parameters
     ----------
@@ -42,16 +46,16 @@ class TracedLanes:
     Attributes
     ----------
     count : int
-        2 n.
+        2 n, the number of all lanes.
     index : slice or (m,) intp ndarray
-        The lanes that the arrays hold.
+        Indices of the lanes that the arrays hold, out of all lanes.
     position : (m,) complex64 ndarray
-        From the centers of the cells, in pixels.
+        Offset from the center of the cell, in pixels.
     total : (m, K) complex64 ndarray
         Sum of the noise so far, to which the caller adds.
     """
 
-    #: The arrays with an entry for each lane.
+    #: Names of the arrays with an element for each lane.
     _LANE_ARRAYS = (
         *("position", "total", "_counts", "_cell", "_sheet", "_packed_phase", "_target_phase"),
         "_previous_direction",
@@ -69,7 +73,7 @@ class TracedLanes:
         self._cell = np.concatenate([cell, cell])
         self._sheet = np.concatenate([sheet, sheet + backward_offset]) + first_sheet
         self._packed_phase = covering.packed_phase.take(self._cell)
-        #: Phase of the direction. Steps keep it, and the sheet of the next cell is the nearest one.
+        #: Phase (angle) of the direction of each lane. In the next cell, lanes take the sheet nearest to it.
         self._target_phase = self._packed_phase + self._sheet.astype(np.float32)
         offset = _r2_offsets(covering, seeds)
         self.position = np.concatenate([offset, offset])
@@ -86,12 +90,12 @@ class TracedLanes:
         return not len(self._cell)
 
     def step_counts(self) -> np.ndarray:
-        """Return the (2 n,) steps that the lanes have made before they ended."""
+        """Return the (2 n,) number of steps that each lane made before it ended."""
         self._all_counts[self.index] = self._counts
         return self._all_counts
 
     def look_up(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the states of the lanes, their directions, and (m, K) noise there.
+        """Return the (m,) states of the lanes, their (m,) directions, and the (m, K) noise there.
 
         The imaginary part of the noise is its derivative to the left.
         """
@@ -104,14 +108,14 @@ class TracedLanes:
     def advance(
         self, step: int, state: np.ndarray, direction: np.ndarray, step_scale: np.float32
     ) -> None:
-        """Step along the directions to the next cells. Lanes end at the border, and in loops.
+        """Step along the directions to the next cells. Lanes end at the border, and where they close a loop.
 
         Parameters
         ----------
         step : int
             Number of this step.
         state, direction : (m,) ndarray
-            From `look_up`. The directions are changed.
+            Results of `look_up`. `direction` is overwritten.
         step_scale : float32
             3/2 pixel, in the unit of the directions.
         """
@@ -128,7 +132,7 @@ class TracedLanes:
         self._choose_sheets()
 
     def _move(self, direction: np.ndarray, step_scale: np.float32) -> np.ndarray:
-        """Move positions by a step; return the (m,) complex64 pixels to the cells in which they are then.
+        """Move positions by a step. Return the (m,) complex64 whole pixels from the old to the new cell.
 
         The method is two-step Adams-Bashforth, 3/2 d - 1/2 d_previous.
         """
@@ -140,7 +144,7 @@ class TracedLanes:
         axes *= step_scale
         self.position += displacement
         self._previous_direction = direction
-        # At most to a neighbor, even where the direction turns sharply.
+        # Lanes step at most to a neighbor, even where the direction turns sharply.
         np.rint(self.position.view(np.float32), out=axes)
         np.maximum(axes, np.float32(-1), out=axes)
         np.minimum(axes, np.float32(1), out=axes)
@@ -150,14 +154,14 @@ class TracedLanes:
     def _step_cells(
         self, mask: np.ndarray, column: np.ndarray, row: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Step to the cells -1 to 1 columns and rows away, or to the sink.
+        """Step to the neighbors at -1 to 1 columns and rows; to `SINK_CELL` where no neighbor is linked.
 
         Returns
         -------
         ended, crossing : (n,) intp ndarray
             Indices of the streamlines that end, and of those that cross a seam.
         seam : (n,) intp ndarray
-            The numbers of these steps across seams.
+            Index of each of these steps in `SeamSteps`.
         """
         covering, cell = self._covering, self._cell
         crossing = seam = np.empty(0, dtype=np.intp)
@@ -179,7 +183,10 @@ class TracedLanes:
         return ended, crossing, seam
 
     def _cross_seams(self, crossing: np.ndarray, seam: np.ndarray) -> None:
-        """Continue the lanes `crossing` in the frames behind their seams."""
+        """Continue the lanes `crossing` beyond the seam: adapt their position and direction.
+
+        `seam` is the index of the step across the seam in `SeamSteps`.
+        """
         seams, steps = self._covering.seams, self._covering.seams.steps
         reached = steps.displaced(seam, self.position[crossing]) + steps.offset.take(seam)
         axes = reached.view(np.float32)
@@ -190,7 +197,7 @@ class TracedLanes:
         self._target_phase[crossing] += seams.sheet_shift.take(seam)
 
     def _choose_sheets(self) -> None:
-        """Take the sheets of the new cells whose directions are nearest to those before."""
+        """Choose in each new cell the sheet (direction of the field) nearest to the previous direction."""
         self._packed_phase = self._covering.packed_phase.take(self._cell, mode="clip")
         self._target_phase -= self._packed_phase
         np.rint(self._target_phase, out=self._target_phase)
@@ -198,7 +205,7 @@ class TracedLanes:
         self._target_phase += self._packed_phase
 
     def compact(self) -> None:
-        """Remove the lanes that have ended from the arrays, if these are more than a tenth."""
+        """Remove the lanes that have ended from the arrays, if more than a tenth of the lanes have ended."""
         remaining = np.flatnonzero(self._cell)
         if len(remaining) >= 0.9 * len(self._cell):
             return
@@ -211,17 +218,20 @@ class TracedLanes:
 
 
 class _LoopFinder:
-    """Finds streamlines that return to a state, in about as many steps as the loop has.
+    """A detector of streamlines that return to an earlier state, after about one more turn of the loop.
 
-    Each state is compared with one state of the past, which is replaced at steps that are powers of
-    two (Brent, An improved Monte Carlo factorization algorithm, 1980).
+    Each new state is compared with one earlier state of the streamline. That state is replaced by the current
+    one at steps that are powers of two (Brent, An improved Monte Carlo factorization algorithm, 1980).
     """
 
     def __init__(self) -> None:
         self._past_step, self._past_state = MIN_LOOP_STEPS, np.empty(0, dtype=np.intp)
 
     def find(self, step: int, state: np.ndarray, next_cell: np.ndarray) -> np.ndarray:
-        """Return the indices of the streamlines that have returned to a state, and not ended otherwise."""
+        """Return the indices of the streamlines that have returned to an earlier state.
+
+        Streamlines whose `next_cell` is `SINK_CELL` have ended already, and are left out.
+        """
         if step in (MIN_LOOP_STEPS, 2 * self._past_step):
             self._past_step, self._past_state = step, state
         elif step >= self._past_step + MIN_RETURN_STEPS:
@@ -229,20 +239,23 @@ class _LoopFinder:
         return np.empty(0, dtype=np.intp)
 
     def keep(self, remaining: np.ndarray) -> None:
-        """Forget the streamlines that have ended; those with these indices remain."""
+        """Keep only the streamlines with the indices `remaining`. The others have ended."""
         if len(self._past_state):
             self._past_state = self._past_state[remaining]
 
 
 def lateral_offset(position: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Return (n,) float32 offsets to the left of the centers of cells, times the length of `direction`."""
+    """Return how far positions are to the left of the centers of cells, as seen along `direction`.
+
+    The result is (n,) float32, in pixels times the length of `direction`.
+    """
     lateral = position.imag * direction.real
     lateral -= position.real * direction.imag
     return lateral
 
 
 def axial_steps(position: np.ndarray, direction: np.ndarray, step_scale: np.float32) -> np.ndarray:
-    """Return (n,) float32 steps from streamlines to the centers of cells, along the streamlines."""
+    """Return the (n,) float32 steps from positions to the centers of cells, measured along streamlines."""
     square = direction.real * direction.real + direction.imag * direction.imag
     along = position.real * direction.real + position.imag * direction.imag
     return along / np.minimum(-step_scale * square, np.float32(-1))
@@ -252,9 +265,9 @@ def _r2_offsets(covering: Covering, seeds: np.ndarray) -> np.ndarray:
     """Return (n,) complex64 offsets from the centers of pixels, spread evenly (R2 sequence, Roberts).
 
     If all streamlines started at the centers, they would step to the next row of pixels at the same
-    time, which is visible. Along rows and columns, the offsets are a sequence of low discrepancy. They
-    depend on nothing but the place of a seed, so that streamlines stay where they are if a field changes
-    a little.
+    time, which is visible. Along rows and columns, the offsets are a sequence of low discrepancy. An offset
+    depends on the cell and the sheet of its seed alone, so streamlines stay where they are if the field
+    changes a little.
     """
     sheet, cell = np.divmod(seeds, covering.cell_count)
     row, column = np.divmod(cell, covering.width)

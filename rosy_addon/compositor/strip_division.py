@@ -1,4 +1,4 @@
-"""Dividing a picture into strips, and the strips among processes; see `strips`."""
+"""Division of a picture into strips of rows, and of the strips among processes; see `strips`."""
 
 from __future__ import annotations
 
@@ -26,17 +26,19 @@ from .streak_statistics import break_steps
 from .strips import OVERLAP_ROWS, Strip, streamline_margin
 from .undirected import disc_offsets
 
-#: Number of states of the covering in a strip, at least. Bounds the memory.
+#: Minimum number of states (pixels times directions of the field) in a strip. Strips of about this size bound
+#: the memory.
 STRIP_STATES = 1 << 20
 
-#: Rows of a strip, at least, in margins of streamlines: the margins are no large part of the work.
+#: Minimum number of rows of a strip, in multiples of the `streamline_margin`, so that margins are a small
+#: part of the work.
 MIN_STRIP_MARGINS = 4
 
-#: Rows by which the neighbors of a pixel, and theirs, can be away.
+#: Maximum number of rows between a pixel and the neighbors of its neighbors.
 NEIGHBOR_ROWS = 4
 
-#: Pixels of the strips that one process draws together, at most, if a picture can be divided so far. Bounds
-#: the memory.
+#: Maximum number of pixels in the strips that one process draws together, unless a single strip has more.
+#: This bounds the memory.
 MAX_GROUP_PIXELS = 1 << 21
 
 
@@ -57,7 +59,7 @@ def divide_into_strips(
     Returns
     -------
     list of Strip
-        A power of two. A single one if streamlines are traced by another method than "sheets".
+        The number of strips is a power of two. It is 1 if the LIC method of the look is not "sheets".
     """
     height, count = camera.height, 1
     if look.method == "sheets":
@@ -88,13 +90,13 @@ def group_strips(
     look, camera, instances
         See `divide_into_strips`.
     workers : int
-        Number of processes. The groups have at most `MAX_GROUP_PIXELS` pixels, if strips are not larger.
+        Number of processes. A group has at most `MAX_GROUP_PIXELS` pixels, unless a single strip has more.
 
     Returns
     -------
     list of sequence of Strip
-        From the bottom. A single group if something depends on all visible pixels, or takes a preparation
-        that only one process should make.
+        Groups from the bottom. There is a single group if some result depends on all visible pixels, or if a
+        result that all strips need should be computed by one process alone.
     """
     fields = [instance.field for instance in instances if instance.field is not None]
     if (
@@ -111,11 +113,12 @@ def group_strips(
 
 
 def context_rows(look: Look, camera: Camera, instances: Sequence[MeshInstance]) -> int:
-    """Return how many rows around a strip its pixels may depend on."""
+    """Return how many rows below and above a strip the pixels of the strip may depend on."""
     look = pixel_look(look, camera, instances)
     noise = 0
     if look.anchor == "surface":
-        # Noise that is anchored to the picture is known everywhere, other noise at visible pixels.
+        # Noise that is anchored to the picture is known everywhere. Noise on surfaces is known at visible
+        # pixels only, so its filters depend on these.
         noise = high_pass_margin(look.high_pass) + int(np.ceil(look.line_width))
     disc = int(np.abs(disc_offsets(look.line_width)).max())
     rows = max(_longest_margin(look), disc) + noise
@@ -127,7 +130,7 @@ def context_rows(look: Look, camera: Camera, instances: Sequence[MeshInstance]) 
 
 
 def _longest_margin(look: PixelLook) -> int:
-    """Return the largest `streamline_margin` of all images that a look takes."""
+    """Return the largest `streamline_margin` of all LIC images that a look needs."""
     lengths = [look.length]
     if has_breaks(look):
         lengths.append(break_steps(look))

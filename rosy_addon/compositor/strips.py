@@ -1,11 +1,11 @@
-"""Strips: rows of a picture that are drawn by themselves.
+"""Strips: ranges of rows of a picture that are drawn independently of each other.
 
-A large picture is cut into strips by its size alone (see `strip_division`). What a strip shows depends on a limited
-number of rows around it, its context, and is the same to the last bit wherever it is drawn. So several processes
-can share a picture.
+How a picture is cut into strips does not depend on the number of processes (see `strip_division`). A strip
+depends on a limited number of rows around it, its context. It is the same to the last bit in every process.
+So several processes can share a picture.
 
-Streamlines differ between two strips. So the first rows of a strip are drawn with the strip below, too, and
-fade from that one to this one (`join_strips`).
+Streamlines differ between two strips. So the first rows of a strip are drawn twice, also with the strip
+below, and fade from the lower strip to the upper one (`join_strips`).
 """
 
 from __future__ import annotations
@@ -17,18 +17,19 @@ import numpy as np
 
 from .look_units import PixelLook
 
-#: Rows of the strip above in which a strip takes averages of streamlines, too.
+#: Number of rows of the strip above for which a strip computes averages of streamlines, too.
 OVERLAP_ROWS = 12
 
-#: Rows beside a strip whose pixels may show a sample of it.
+#: Number of rows beside a strip whose pixels may contain samples of the surface in the strip.
 BORDER_ROWS = 1
 
-#: Rows in which a strip fades into the one above: a pixel in them may show the border.
+#: Number of rows in which a strip fades into the one above. Their pixels may show samples of `BORDER_ROWS`
+#: further rows.
 FADE_ROWS = OVERLAP_ROWS - BORDER_ROWS
 
 
 class Strip(NamedTuple):
-    """Rows of a frame.
+    """A strip: a range of rows of a frame.
 
     Attributes
     ----------
@@ -44,34 +45,37 @@ class Strip(NamedTuple):
 
     @property
     def averaged_rows(self) -> tuple[int, int]:
-        """The rows whose pixels get averages of streamlines."""
+        """The rows whose pixels get averages of streamlines: the first row, and the row after the last."""
         return self.start, min(self.stop + OVERLAP_ROWS, self.height)
 
     @property
     def drawn_rows(self) -> tuple[int, int]:
-        """The rows of the picture of this strip. The last ones fade into the strip above."""
+        """The rows of the picture of this strip: the first row, and the row after the last.
+
+        The last `FADE_ROWS` of them fade into the strip above, if there is one.
+        """
         return self.start, min(self.stop + FADE_ROWS, self.height)
 
 
 def streamline_margin(look: PixelLook) -> int:
-    """Return how many rows streamlines may leave a strip."""
+    """Return by how many rows streamlines may leave a strip."""
     return look.streamline_reach() + 2
 
 
 def join_strips(pictures: Sequence[np.ndarray], strips: Sequence[Strip]) -> np.ndarray:
-    """Join the pictures of strips, from the bottom.
+    """Join the pictures of strips, in order from the bottom. Neighboring strips fade into each other.
 
     Parameters
     ----------
     pictures : sequence of (h, W, 4) float32 ndarray
         The `drawn_rows` of the strips. RGBA, not premultiplied.
     strips : sequence of Strip
-        One above the other.
+        Adjacent strips, from the bottom.
 
     Returns
     -------
     (H, W, 4) float32 ndarray
-        From the first row of the first strip to the last drawn row of the last one.
+        The rows from the first row of the first strip to the last drawn row of the last strip.
     """
     if len(pictures) == 1:
         return pictures[0]
@@ -89,7 +93,7 @@ def join_strips(pictures: Sequence[np.ndarray], strips: Sequence[Strip]) -> np.n
 
 
 def _faded(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """Fade from one strip to the strip above, row by row. The first row is from the lower strip."""
+    """Fade from one strip to the strip above, row by row, beginning with the lower strip."""
     weight = np.linspace(1, 0, len(lower), endpoint=False, dtype=np.float32)[:, None, None]
     alpha = upper[..., 3:] + weight * (lower[..., 3:] - upper[..., 3:])
     premultiplied = upper[..., :3] * upper[..., 3:]

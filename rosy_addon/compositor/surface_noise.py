@@ -47,13 +47,14 @@ LATTICE_ANGLES = (0.61, 1.13, 0.37)
 #: neither.
 OCTAVES = 3
 
-#: Range of the ratio of the size of cells to `cell` in which the contrast is corrected for it.
+#: Range of the ratio of the size of cells to the parameter `cell` of `surface_noise`. Within it, the contrast
+#: is corrected for the ratio.
 CONTRAST_SCALE_RANGE = (0.25, 4.0)
 
 #: Radius of curvature on screen, in cells, below which a feature is small; see `feature_scale`.
 FEATURE_CELLS = 32.0
 
-#: Number of bits of the largest index of a cell.
+#: Maximum number of bits of the index of a cell.
 MAX_CELL_BITS = 28
 
 #: Added to octave indices, so that positive integers are hashed.
@@ -78,7 +79,7 @@ def surface_noise(
     Parameters
     ----------
     gbuffer : GBuffer
-        With its mesh instances.
+        Its `instances` must be set.
     cell : float
         Approximate side of a cell on screen, in pixels.
     seed : int
@@ -101,7 +102,7 @@ def surface_noise(
     Returns
     -------
     (P, channels) float32 ndarray
-        With the mean `NOISE_MEAN`, as for `image_noise`.
+        The mean is `NOISE_MEAN`, as for `image_noise`.
     """
     with progress(0.0, 0.3):
         rest = rest_coordinates(gbuffer)
@@ -117,8 +118,8 @@ def surface_noise(
         size = np.maximum(block_rest.pixel_size * scale, 1e-30) * np.float32(cell)
         block_hash = instance_hash[instance_id]
         solid_noise(block_rest, size, block_hash, seed, density, out=total[:, block])
-        # The variance of a mean along a streamline is proportional to the size of cells. The factor
-        # makes it the same as for cells of the size `cell`.
+        # The variance of a mean along a streamline is proportional to the size of cells. After the division
+        # it is the same as for cells of the size `cell`.
         total[:, block] /= np.sqrt(np.clip(scale, *CONTRAST_SCALE_RANGE))
     del rest  # as large as all other arrays together
     if high_pass:
@@ -151,12 +152,12 @@ def solid_noise(
     seed, density
         See `surface_noise`.
     out : (K, n) float32 ndarray
-        Independent channels with the mean 0. The standard deviation of single cells is `NOISE_STD`.
+        Output: independent channels with the mean 0. The standard deviation of cells is `NOISE_STD`.
     """
     # Base-2 logarithm of the size of cells.
     level = np.log2(cell_size * np.float32(LATTICE_SCALE))
     lattice = [_to_lattice_space(rest.at_offset(*tap)) for tap in SUBPIXEL_OFFSETS]
-    # Finer cells than float32 can tell apart would have indices too large for integers.
+    # Cells that are too small for float32 coordinates would have indices that are too large for integers.
     farthest = max(float(np.abs(position).max(initial=0)) for position in lattice)
     level = np.maximum(level, np.float32(np.log2(max(farthest, 1e-30)) - MAX_CELL_BITS))
     finest = np.floor(level - np.float32(OCTAVES / 2 - 1))
@@ -175,14 +176,14 @@ def solid_noise(
 
 
 def instance_units(gbuffer: GBuffer, unit: float) -> np.ndarray | None:
-    """Return the unit of lengths in the object space of each mesh instance.
+    """Convert a length from Blender units of world space to the object space of each mesh instance.
 
     Parameters
     ----------
     gbuffer : GBuffer
-        With its mesh instances.
+        Its `instances` must be set.
     unit : float
-        In Blender units. It replaces a pixel as the unit of lengths; 0 keeps pixels.
+        Unit of lengths on the surface, in Blender units; 0 if lengths are in pixels.
 
     Returns
     -------
@@ -198,7 +199,9 @@ def instance_units(gbuffer: GBuffer, unit: float) -> np.ndarray | None:
 def cell_scale(
     units: np.ndarray | None, instance_id: np.ndarray, size: np.ndarray, min_scale: float
 ) -> np.ndarray | np.float32:
-    """Compute the factor by which lengths on screen differ from their values in pixels.
+    """Compute the factor from lengths of a look to lengths in pixels on screen, at each pixel.
+
+    It is 1 if lengths are in pixels. Otherwise the unit of lengths has a fixed size on the surface.
 
     Parameters
     ----------
@@ -223,18 +226,18 @@ def cell_scale(
 def feature_scale(
     curvature: np.ndarray, pixel_size: np.ndarray, cell: float, detail: float
 ) -> np.ndarray:
-    """Compute the factor by which cells are smaller on small features.
+    """Compute the factor, up to 1, by which cells are scaled down on small features of the surface.
 
-    It is proportional to the radius of curvature on screen below `FEATURE_CELLS` cells.
+    Where the radius of curvature on screen is below `FEATURE_CELLS` cells, the factor is proportional to it.
 
     Parameters
     ----------
     curvature : (n,) float32 ndarray
-        In 1 / Blender unit of object space.
+        Curvature in 1 / Blender unit of object space.
     pixel_size : (n,) float32 ndarray
         `RestCoordinates.pixel_size`.
     cell : float
-        In pixels.
+        Side of a cell in pixels.
     detail : float
         The factor is at least 1 - detail.
 
@@ -247,7 +250,9 @@ def feature_scale(
 
 
 def octave_weights(octave_offset: np.ndarray) -> np.ndarray:
-    """Compute the weights of octaves, given their distance from the octave of a pixel's level.
+    """Compute the weights of octaves of noise in the blend.
+
+    `octave_offset` is the distance of the octave from the level of the pixel, in octaves.
 
     The squares of the weights of the `OCTAVES` octaves sum to 1, so the variance of the blend is
     the same as for a single octave.
@@ -288,13 +293,13 @@ def _to_lattice_space(position: np.ndarray) -> np.ndarray:
 
 
 def _high_pass(gbuffer: GBuffer, channels: np.ndarray, sigma: float) -> None:
-    """Subtract a Gaussian blur that ignores pixels outside the G-buffer from (K, P) `channels`."""
+    """Subtract from (K, P) `channels` their Gaussian blur, in place. Pixels without a surface are ignored."""
     count = len(gbuffer.pixel)
     # The empty margin is as wide as the support of the blur.
     cell, shape = pixel_window(gbuffer.pixel, gbuffer.camera.width, 3 * box_radius(sigma))
 
     def blurred_image(values: np.ndarray | None) -> np.ndarray:
-        """Return a flat image of the blurred values of the pixels, by default 1. It is 0 outside of them."""
+        """Return the blurred image of `values` (by default 1) at the pixels and 0 elsewhere, flat."""
         image = np.zeros(shape, dtype=np.float32)
         for block in reported_blocks(count, STEP_LABEL, 0.0, 0.0):
             image.reshape(-1)[cell[block]] = 1 if values is None else values[block]

@@ -63,7 +63,7 @@ class ReferenceRender:
         return MipMap(self.luminance)
 
     def mip_level(self, camera: Camera) -> float:
-        """Return the level of the mip map at which pixels are as large as the pixels of a camera; not rounded."""
+        """Return the (fractional) level of the mip map whose pixels are as large as those of `camera`."""
         height, width = self.luminance.shape
         pixels_per_unit = self.camera.resized(width, height).pixels_per_unit
         return max(float(np.log2(pixels_per_unit / camera.pixels_per_unit)), 0.0)
@@ -99,7 +99,7 @@ def target_tone(
     look : Look
         Its settings of light, and those whose names begin with `tone`, are used.
     lights : sequence of Light
-        Lights of the scene in the space of the camera. Used if the light of the look is "scene".
+        Lights of the scene in camera space. Used if the light of the look is "scene".
     reference : ReferenceRender, optional
         Required if the tone of the look is "picture".
     cache : Cache, optional
@@ -168,7 +168,8 @@ def apply_tone_curve(tone: np.ndarray, look: Look) -> np.ndarray:
     tone : ndarray
         Tones, of any shape.
     look : Look
-        The black of its `tone_levels` becomes 0 and the white 1. The gamma is applied after that.
+        Its `tone_levels` are the black point, the white point and the gamma. The black point becomes 0 and
+        the white point 1; the gamma is applied after that.
 
     Returns
     -------
@@ -184,7 +185,7 @@ def apply_tone_curve(tone: np.ndarray, look: Look) -> np.ndarray:
 
 
 def tone_curve(look: Look) -> tuple[float, float]:
-    """Return (scale, black) of a look, which maps tones to (tone - black) * scale before the gamma."""
+    """Return (scale, black): a look maps a tone to (tone - black) * scale, and then applies the gamma."""
     black, white, _ = look.tone_levels
     tone_range = white - black
     if abs(tone_range) < MIN_TONE_RANGE:

@@ -1,7 +1,8 @@
 """Undirected texture: what hatching draws where the field has no direction.
 
-A streak is a mean of noise along a line. Where there is no line, the mean over a disc takes its
-place. It is thresholded like a streak, with statistics of its own, so the picture keeps its tone.
+A streak is a mean of noise along a streamline. Where the field is undefined, there is no streamline, and
+a mean of noise over a disc is used instead. It is thresholded like a streak, with its own statistics, so
+the picture keeps its tone.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ def undirected_texture(
 ) -> np.ndarray | None:
     """Average the noise over a disc around each pixel where the field is undefined.
 
-    Samples of the disc beyond the pixels of the field are left out.
+    Samples of the disc that are not at pixels of the field are left out.
 
     Parameters
     ----------
@@ -79,7 +80,7 @@ def disc_means(noise: np.ndarray, line_width: float) -> np.ndarray:
     Parameters
     ----------
     noise : (H, W) ndarray
-        Taken as periodic.
+        The image is taken as periodic.
     line_width : float
         Width of a cell of the noise in pixels.
 

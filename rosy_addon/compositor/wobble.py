@@ -61,12 +61,12 @@ def wave_table() -> np.ndarray:
 
 
 def wobble_angle(gbuffer: GBuffer, look: PixelLook) -> np.ndarray:
-    """Compute the angle between lines and field at `Look.wobble` 1.
+    """Compute the angle between drawn lines and the field at each pixel, for a `Look.wobble` of 1.
 
     Parameters
     ----------
     gbuffer : GBuffer
-        With its mesh instances, if the look is anchored to the surface.
+        Its `instances` must be set if the look is anchored to the surface.
     look : PixelLook
         Its `anchor`, `line_width` and unit of lengths are used.
 
@@ -98,13 +98,14 @@ def wobble_angle(gbuffer: GBuffer, look: PixelLook) -> np.ndarray:
 
 
 def solid_wobble_angle(position: np.ndarray, line_width: np.ndarray) -> np.ndarray:
-    """Compute the angle between lines and field at `Look.wobble` 1, at positions in rest space.
+    """Compute the angle between drawn lines and the field at 3D positions, for a `Look.wobble` of 1.
 
     Parameters
     ----------
     position : (3, n) float32 ndarray
+        Positions in the rest space of meshes.
     line_width : (n,) or () float32 ndarray
-        Width of the lines there.
+        Width of the lines at these positions, in units of rest space.
 
     Returns
     -------
@@ -128,7 +129,7 @@ def solid_wobble_angle(position: np.ndarray, line_width: np.ndarray) -> np.ndarr
 
 
 def rotate_pixel_field(field: PixelField, angle: np.ndarray) -> PixelField:
-    """Rotate the directions of a pixel field in the view plane.
+    """Return a pixel field with its directions rotated in the view plane.
 
     Parameters
     ----------
@@ -151,7 +152,8 @@ def rotate_pixel_field(field: PixelField, angle: np.ndarray) -> PixelField:
         representation[block] = product(field.representation[block], phase)
         for channel, values in field.channels.items():
             if channel[0] == "deviation":
-                # A harmonic is a function of the member. This keeps its value for rotated members.
+                # A harmonic is a function of the angle of the member. The rotation of its phase gives rotated
+                # members the value of the members before.
                 phase = unit_phasor(-channel[1] * block_angle)
                 channels[channel][block] = product(values[block], phase)
     return replace(field, representation=representation, channels=channels)

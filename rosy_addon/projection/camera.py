@@ -13,7 +13,8 @@ from ..field.frames import normalize
 #: Largest width or height of a picture, in pixels.
 MAX_SIDE_PIXELS = 16384
 
-#: Angle of view over the longer side of Blender's default camera, in radians: a lens of 50 mm, a sensor of 36 mm.
+#: Angle of view over the longer side of the picture, in radians, of Blender's default camera: it has a lens
+#: of 50 mm and a sensor of 36 mm.
 DEFAULT_FOV = float(2 * np.arctan(36 / (2 * 50)))
 
 #: Fraction of the frame that stays empty at each border, where a camera frames points.
@@ -90,9 +91,10 @@ class Camera:
 
     @property
     def pixels_per_unit(self) -> float:
-        """Pixels per Blender unit, perpendicular to the camera axis; at depth 1 if perspective.
+        """Pixels per Blender unit, perpendicular to the camera axis.
 
-        If pixels are not square, the geometric mean of both directions.
+        A perspective camera has this scale at depth 1, an orthographic camera at any depth. If pixels are
+        not square, it is the geometric mean of the horizontal and the vertical scale.
         """
         scale = _xy_determinant(self.projection) * self.width * self.height / 4
         return float(np.sqrt(scale))
@@ -127,8 +129,8 @@ class Camera:
     def clip_to_camera_xy(self) -> np.ndarray:
         """Inverse of the upper left (2, 2) part of the projection matrix.
 
-        Maps x and y of clip space, after the lens shift is removed, to x and y of camera space: at
-        depth 1 if perspective, at any depth if orthographic.
+        It maps x and y of clip space, after the lens shift is removed, to x and y of camera space. They
+        are coordinates at depth 1 for a perspective camera, and at any depth for an orthographic one.
         """
         # In closed form, because linear algebra libraries start all their threads for any system.
         (a, b), (c, d) = self.projection[:2, :2]
@@ -429,17 +431,17 @@ def framing_points(
     *,
     perspective: bool = True,
 ) -> np.ndarray:
-    """Return the few points that determine `orbit_camera`.
+    """Return the few points that determine the result of `orbit_camera`.
 
-    The camera that frames them frames all points. The points of a long animation can so be joined
-    step by step.
+    The camera that frames these points frames all of the given points. So the framing of a long
+    animation can be computed frame by frame, without keeping all of its points.
 
     Parameters
     ----------
     points : (V, 3) ndarray
         World space; at least one.
     azimuth, elevation, width, height, perspective
-        See `orbit_camera`. The margin is its default.
+        See `orbit_camera`. The result is valid for its default margin.
 
     Returns
     -------

@@ -19,7 +19,7 @@ NamedValues = Mapping[str, Any]
 #: Name of the uniform block in shaders.
 UNIFORM_BLOCK = "rosy_constants"
 
-#: 32-bit words of each type of uniform.
+#: Number of 32-bit words of each GLSL type of uniform.
 UNIFORM_WORDS = {"vec4": 4, "vec2": 2, "ivec2": 2, "float": 1, "int": 1}
 
 
@@ -135,7 +135,7 @@ class Device:
         textures: NamedValues,
         uniforms: NamedValues,
     ) -> None:
-        """Draw batches into the current view, with its depth test."""
+        """Draw batches into the current 3D view, tested against the depths in it."""
         # With depth writes, the picture is drawn once where surfaces overlap.
         self._set_state("LESS_EQUAL", True, "ALPHA")
         try:
@@ -254,12 +254,12 @@ def release() -> None:
 
 
 def _std140_order(uniforms: Uniforms) -> Uniforms:
-    """Return uniforms in an order that std140 aligns without gaps."""
+    """Return uniforms in an order that the std140 layout aligns without gaps."""
     return tuple(sorted(uniforms, key=lambda uniform: -UNIFORM_WORDS[uniform[1]]))
 
 
 def _pack_uniforms(uniforms: Uniforms, values: NamedValues) -> np.ndarray:
-    """Return a uniform block in std140, padded to whole rows of 16 bytes."""
+    """Return the values of a uniform block in the std140 layout, padded to whole rows of 16 bytes."""
     words: list[np.ndarray] = []
     for name, kind in _std140_order(uniforms):
         type_ = np.int32 if kind in ("int", "ivec2") else np.float32

@@ -142,7 +142,7 @@ class Frame:
         )
 
     def fields_in_view(self) -> list[tuple[int, DrawItem, Box]]:
-        """Return the id, item and box of each instance that has a field and may be visible."""
+        """Return the index, draw item and box of each instance that has a field and may be visible."""
         boxes = [
             (instance_id, item, screen_box(item, self.camera))
             for instance_id, item in enumerate(self.items)
@@ -151,7 +151,7 @@ class Frame:
         return [entry for entry in boxes if not is_empty(entry[2])]
 
     def take_passes(self) -> list[FramePass]:
-        """Remove and return the passes that are to be run."""
+        """Remove all passes from the frame, and return them in the order in which they must be run."""
         passes = self.passes.copy()
         self.passes.clear()
         return passes
@@ -184,12 +184,12 @@ class Frame:
         self.run(shader, box, {**records, **textures}, images, uniforms)
 
     def instance_uniforms(self, instance_id: int) -> dict[str, Any]:
-        """Return the uniforms of one instance."""
+        """Return the uniforms of passes over the pixels of one instance, given its index."""
         first_triangle_id, item = self.first_triangle_ids[instance_id], self.items[instance_id]
         return instance_uniforms(instance_id, first_triangle_id, item, self.camera)
 
     def clear(self, image: Any, texel_format: str | None = None) -> None:
-        """Set an image of the size of the frame to 0; without a format, it is RGBA32F."""
+        """Add a pass that sets an image of the size of the frame to 0. Its default format is RGBA32F."""
         formats = () if texel_format is None else (("cleared", texel_format),)
         self.run(ComputePass("clear", formats), self.box, {}, {"cleared": image}, {})
 

@@ -44,7 +44,8 @@ def thresholds(resources: GpuResources, look: PixelLook) -> Any:
     """Return a texture of thresholds from `streak_statistics`, in the first channel.
 
     Row 0 contains the thresholds of streaks or, for evenly spaced lines, the widths from
-    `even_lines.look_width_table`. Row 1 contains the thresholds of undirected texture.
+    `even_lines.look_width_table`. Row 1 contains the thresholds of undirected texture. A look without
+    hatching gets the placeholder `palette`.
     """
     if not is_hatched(look):
         return palette(resources)
@@ -55,7 +56,10 @@ def thresholds(resources: GpuResources, look: PixelLook) -> Any:
 
 
 def undirected_offsets(resources: GpuResources, look: PixelLook) -> Any:
-    """Return a texture of `undirected.disc_offsets`, in the first two channels."""
+    """Return a texture of `undirected.disc_offsets`, in the first two channels.
+
+    A look without hatching gets the placeholder `palette`.
+    """
     if not is_hatched(look):
         return palette(resources)
     return resources.lookup_texture(
@@ -81,7 +85,8 @@ def picture_grain(
     """Return a texture of `paper_grain.picture_paper_grain`, in the first channel.
 
     It is at least as large as a frame of `width` x `height` pixels. It is wider than the frame, so that
-    each of the `line_count` line directions at a pixel reads another column (`line_offset`).
+    each of the `line_count` line directions at a pixel reads another column (`line_offset`). A look
+    without paper grain gets the placeholder `palette`.
     """
     if not has_paper_grain(look):
         return palette(resources)

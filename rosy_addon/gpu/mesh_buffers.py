@@ -127,7 +127,7 @@ def field_channels(field: RosyField) -> list[FieldChannel]:
 
 @dataclass(frozen=True)
 class FieldKind:
-    """The shader constants of all fields of one degree.
+    """The properties that all fields of one degree share in shaders, as constants.
 
     Attributes
     ----------
@@ -165,7 +165,7 @@ class FieldKind:
 
 
 def field_kinds(fields: Iterable[RosyField]) -> dict[int, FieldKind]:
-    """Return a `FieldKind` for each degree, by degree. It includes the channels of all fields of it."""
+    """Return a dict from each degree to its `FieldKind`, with the channels of all fields of this degree."""
     channels: dict[int, list[FieldChannel]] = {}
     for field in fields:
         channels.setdefault(field.degree, []).extend(field_channels(field))
@@ -313,7 +313,7 @@ def _write_records(
 
 
 def record_texels(channel_count: int, has_tone: bool = False, has_values: bool = False) -> int:
-    """Return the number of texels of a record."""
+    """Return the number of texels in the record of a triangle; see `_write_records`."""
     return VALUE_TEXEL + 2 * (1 + channel_count) + has_values + 2 * has_tone + 1
 
 

@@ -63,7 +63,7 @@ class Source(NamedTuple):
 def read_source(*files: str) -> Source:
     """Return the code and the declarations of source files, joined in this order."""
     text = "".join(map(_with_includes, files))
-    # By name, as several files may declare what they use together.
+    # By name, because several files may declare the same texture or uniform.
     textures: dict[str, str] = {}
     images: dict[str, str] = {}
     uniforms: dict[str, str] = {}
@@ -149,7 +149,7 @@ class ComputePass:
 
     @property
     def source(self) -> str:
-        """GLSL without declarations."""
+        """Code of the shader: GLSL without declarations."""
         constants = "".join(f"#define {name} {value}\n" for name, value in self.constants)
         common = read_source("common.glsl")
         return shader_defines() + constants + common.code + self._declared.code

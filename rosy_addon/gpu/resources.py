@@ -303,7 +303,7 @@ class GpuResources:
         return texture
 
     def reference_atlas(self, reference: ReferenceRender) -> MipAtlas:
-        """Return the image that the tone "picture" is sampled from."""
+        """Return the mip map of a reference render's luminance, which the tone "picture" is sampled from."""
         cached = self._lookup_textures.get("rendered")
         if cached is None or cached[0] is not reference:
             cached = reference, self._upload_atlas(reference.mip_map)
@@ -359,7 +359,7 @@ class GpuResources:
     def _rows_texture(
         self, rows: np.ndarray, surface: Surface, what: str, remedy: str = "choose the processor"
     ) -> Any:
-        """Return rows of `ROW_TEXELS` as a texture, or raise a `RosyError` if there are too many."""
+        """Return (rows, `ROW_TEXELS`, 4) values as a texture; raise a `RosyError` if they do not fit into one."""
         if len(rows) > self.device.max_texture_size:
             raise RosyError(f"{surface.name}: {what} are too many for this graphics card: {remedy}")
         return self._texture(rows)

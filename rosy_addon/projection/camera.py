@@ -81,7 +81,7 @@ class Camera:
 
     @property
     def key(self) -> Hashable:
-        """The values of the camera without its name, for keys of caches."""
+        """Key for caches: equal for two cameras that differ only in their names."""
         return self.view.tobytes(), self.projection.tobytes(), self.width, self.height
 
     @property
@@ -114,7 +114,7 @@ class Camera:
         return normalize(self.eye - points)
 
     def depths(self, points: np.ndarray) -> np.ndarray:
-        """Return the (...) distances of (..., 3) points in world space along the axis of this camera."""
+        """Return the (...) depths of (..., 3) points in world space, along the axis of this camera."""
         return -(points @ self.view[2, :3] + self.view[2, 3])
 
     def resized(self, width: int, height: int) -> Camera:
@@ -138,7 +138,7 @@ class Camera:
 
 
 def _xy_determinant(projection: np.ndarray) -> float:
-    """Return the determinant of the part of a projection matrix that maps x and y."""
+    """Return the determinant of the upper left (2, 2) part of a projection matrix, which maps x and y."""
     (a, b), (c, d) = projection[:2, :2]
     return float(a * d - b * c)
 
@@ -183,7 +183,7 @@ def _validated_projection(projection: np.ndarray, name: str) -> np.ndarray:
 
 
 def pixel_rays(camera: Camera, pixel: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return x and y of the rays through the centers of pixels, in camera space.
+    """Return the rays through the centers of pixels, each given by x and y in camera space.
 
     Parameters
     ----------
@@ -330,9 +330,9 @@ def look_at(
 
 
 def _view_from_axes(axes: np.ndarray, eye: np.ndarray) -> np.ndarray:
-    """Return the (4, 4) view matrix of a camera at a point, world space.
+    """Return the (4, 4) view matrix of a camera at the point `eye` in world space.
 
-    The rows of `axes`, (3, 3), are the unit vectors right, up and back.
+    The rows of `axes`, (3, 3), are unit vectors in world space: right, up and back, as seen by the camera.
     """
     view = np.eye(4)
     view[:3, :3], view[:3, 3] = axes, -axes @ eye
@@ -340,7 +340,7 @@ def _view_from_axes(axes: np.ndarray, eye: np.ndarray) -> np.ndarray:
 
 
 def orbit_basis(azimuth: float, elevation: float) -> np.ndarray:
-    """Return (3, 3) rows right, up and back of a camera, given its direction in degrees.
+    """Return a (3, 3) array with the unit vectors right, up and back of a camera, given angles in degrees.
 
     World z is up. Azimuth 0, elevation 0 looks along +y (Blender's front view), azimuth 90 along -x
     (its right view), elevation 90 down along -z (its top view).

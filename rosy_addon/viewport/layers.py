@@ -29,7 +29,7 @@ from ..scene.visible_objects import shown_instances
 #: Types of datablocks that may change a picture if they change.
 RELEVANT_ID_TYPES = ("OBJECT", "MESH", "COLLECTION", "SCENE", "LIGHT", "ARMATURE", "KEY", "IMAGE")
 
-#: Seconds of one slice of reading.
+#: Length of one time slice for reading meshes, in seconds.
 SLICE_SECONDS = 0.08
 
 
@@ -164,15 +164,16 @@ class LayerStates:
                 layer.stale = True
 
     def resolve_topologies(self) -> bool:
-        """Read the data that cannot be read while Blender draws, in all windows, for one slice.
+        """Read data that cannot be read while Blender draws, for all windows, during one slice of time.
 
         Returns
         -------
         bool
-            Whether everything was read.
+            Whether all such data was read. If not, this function must be called again.
         """
         deadline = time.monotonic() + SLICE_SECONDS
-        _evaluate_windows()  # notes the changes of the user; the others are temporary attributes
+        # Record the changes of the user first. Later changes are temporary attributes, which are ignored.
+        _evaluate_windows()
         self._is_resolving = True
         try:
             for window in bpy.context.window_manager.windows:

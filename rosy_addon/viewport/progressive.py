@@ -143,8 +143,8 @@ class ViewState:
     def is_rendering(self) -> bool:
         """Whether a picture is being rendered.
 
-        If nobody has worked on it for `ABANDON_SECONDS`, and it does not wait for the helper process, the view
-        is no longer on screen, and the picture does not count.
+        A picture does not count if it has not been worked on for `ABANDON_SECONDS` and does not wait for the
+        helper process: then its view is no longer on screen.
         """
         picture = self.picture
         return picture is not None and (

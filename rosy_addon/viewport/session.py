@@ -318,7 +318,7 @@ class ViewportSession:
         look: Look,
         overlay: ViewOverlay,
     ) -> ViewInput | None:
-        """Read what a view shows; None if there is nothing to draw yet.
+        """Return the input of the picture of a view, or None if there is nothing to draw yet.
 
         Raises
         ------
@@ -371,7 +371,7 @@ class ViewportSession:
         return drift_in_scene(scene, look, scene.frame_current_final + self.flow_clock.frames)
 
     def _draw_text(self) -> None:
-        """Draw the messages and labels of a view."""
+        """Draw the messages and the labels of singularities in a view."""
         context = bpy.context
         pointers = _pointers(context)
         if pointers[0] not in self.spaces:
@@ -404,7 +404,7 @@ class ViewportSession:
         return lines + [f"{counted(rest, 'more object')} cannot be drawn"] * (rest > 0)
 
     def messages(self, area: bpy.types.Area) -> list[str]:
-        """Return the messages in the views of an area, as they were drawn last."""
+        """Return the rows of text in the views of an area, as they were drawn last."""
         space_pointer = area.spaces.active.as_pointer()
         views = ((space_pointer, region.as_pointer()) for region in area.regions)
         lines = (self._overlays[view].lines for view in views if view in self._overlays)
@@ -412,7 +412,7 @@ class ViewportSession:
 
 
 def _pointers(context: bpy.types.Context) -> ViewPointers:
-    """Return the pointers of the view that is drawn."""
+    """Return the pointers of the space and the region that are being drawn."""
     return context.space_data.as_pointer(), context.region.as_pointer()
 
 

@@ -184,7 +184,7 @@ class RasterPass:
 
     @property
     def output(self) -> str:
-        """Name of the fragment's output, a vec4."""
+        """Name of the output variable of the fragment shader, a vec4."""
         return read_source(self._files[1]).outputs[0][0]
 
     @property
@@ -205,7 +205,7 @@ class RasterPass:
 
 @cache
 def all_passes() -> tuple[ComputePass | RasterPass, ...]:
-    """Return the passes of all source files."""
+    """Return all shader passes: one for each compute shader, and one for each pair of other shaders."""
     names = sorted(path.name for path in SHADER_FOLDER.glob("*.glsl"))
     kinds = {".comp.glsl": ComputePass, ".vert.glsl": RasterPass}
     return tuple(

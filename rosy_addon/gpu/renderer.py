@@ -117,7 +117,7 @@ class GpuRenderer(ViewportRenderer):
         return self.resources.upload(instances, display)
 
     def covered_pixels(self, items: Sequence[DrawItem], camera: Camera) -> int:
-        """Return the number of pixels in the box around all meshes on screen."""
+        """Return the number of pixels in the bounding box on screen of all meshes."""
         width, height = box_size(union_box([screen_box(item, camera) for item in items]))
         return width * height
 

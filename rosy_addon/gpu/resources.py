@@ -359,7 +359,7 @@ class GpuResources:
     def _rows_texture(
         self, rows: np.ndarray, surface: Surface, what: str, remedy: str = "choose the processor"
     ) -> Any:
-        """Return (rows, `ROW_TEXELS`, 4) values as a texture; raise a `RosyError` if they do not fit into one."""
+        """Return (rows, `ROW_TEXELS`, 4) values as a texture; raise a `RosyError` if they do not fit."""
         if len(rows) > self.device.max_texture_size:
             raise RosyError(f"{surface.name}: {what} are too many for this graphics card: {remedy}")
         return self._texture(rows)

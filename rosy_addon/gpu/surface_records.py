@@ -103,7 +103,7 @@ def outline_records(
 
 
 def feature_records(surface: Surface) -> np.ndarray:
-    """Return the curvature of features as (rows, ROW_TEXELS, 4) float32, one texel for each triangle.
+    """Return the curvature of surface features as (rows, ROW_TEXELS, 4) float32, a texel for each triangle.
 
     A texel has the curvatures at the three corners; see `field.feature_curvature`.
     """

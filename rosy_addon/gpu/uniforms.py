@@ -269,7 +269,7 @@ def direction_uniforms(kind: FieldKind, look: PixelLook, camera: Camera) -> dict
 
 
 def even_line_uniforms(look: PixelLook, item: DrawItem, camera: Camera) -> dict[str, Any]:
-    """Return the uniforms of the pass that evaluates the even lines of one instance.
+    """Return the uniforms of the pass that evaluates the evenly spaced lines of one instance.
 
     `camera` is the camera of the frame.
     """

@@ -313,7 +313,10 @@ def _fill_triangles(
 def _fill_missing_normals(
     normal: list[np.ndarray], geometric_normal: np.ndarray
 ) -> list[np.ndarray]:
-    """Replace zero normals by the geometric normals, or by the z axis if both are zero; in place."""
+    """Return normals in which zero normals are replaced by the geometric normals.
+
+    Where these are zero too, the result is the z axis.
+    """
     missing = dot_components(normal, normal) == 0
     if missing.any():
         replacements = geometric_normal[:, missing]

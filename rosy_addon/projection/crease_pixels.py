@@ -97,7 +97,7 @@ def _on_screen(points: np.ndarray, camera: Camera) -> np.ndarray:
 def _crossings(
     lines: np.ndarray, axis: int, camera: Camera
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield where segments cross the lines through the centers of pixel rows (axis 0) or columns (axis 1).
+    """Yield the crossings of segments with the center lines of pixel rows (axis 0) or columns (axis 1).
 
     Each crossing is yielded for the pixels on both sides of it.
 

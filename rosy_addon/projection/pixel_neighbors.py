@@ -183,7 +183,7 @@ def _pixel_grid(
 def depth_slopes(
     gbuffer: GBuffer, pixels: slice | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the depth of some pixels, its slopes, and its tolerance.
+    """Return the depth of the surface at pixels, its slopes on screen, and its tolerance.
 
     Parameters
     ----------

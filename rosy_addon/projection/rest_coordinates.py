@@ -105,7 +105,7 @@ def rest_coordinates(gbuffer: GBuffer) -> RestCoordinates:
 def rest_positions(surface: Surface) -> np.ndarray:
     """Return the positions of the vertices in the rest shape.
 
-    The rest shape is `Surface.rest_vertices`, or the vertices if there are none.
+    The rest shape is `Surface.rest_vertices`, or `Surface.vertices` if that is None.
 
     Returns
     -------

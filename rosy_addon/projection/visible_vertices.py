@@ -211,7 +211,7 @@ class _Scene:
     def of(
         cls, instances: Sequence[MeshInstance], camera: Camera, clip_planes: np.ndarray | None
     ) -> _Scene:
-        """Return the scene of mesh instances, all of which can hide points."""
+        """Return a scene of all triangles of mesh instances, as seen by a camera."""
         clip, triangles = all_triangles(instances, camera)
         world = np.concatenate([instance.world_points() for instance in instances])
         tolerance = SAME_POINT * float(np.ptp(world, axis=0).max(initial=0.0))

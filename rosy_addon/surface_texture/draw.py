@@ -158,7 +158,8 @@ def draw_texture(
 ) -> Texture:
     """Draw the field of a mesh as a texture.
 
-    Streamlines run on the surface. Texture and line width do not depend on the charts of the UV map.
+    Streamlines are traced on the surface, not in the UV map, so their shape and width do not depend on the
+    charts of the UV map.
 
     Parameters
     ----------
@@ -327,7 +328,7 @@ def _colors(on: TexelSurface, field: PixelField, look: PixelLook) -> np.ndarray:
 
 
 class TextureSettings(NamedTuple):
-    """The settings of `draw_texture` besides the look."""
+    """The arguments of `draw_texture` that the user can set besides the look."""
 
     size: int = DEFAULT_SIZE
     margin: int = DEFAULT_MARGIN

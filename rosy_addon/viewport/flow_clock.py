@@ -27,7 +27,7 @@ class FlowClock:
         self._time = 0.0
 
     def play(self, now: float) -> None:
-        """Run from now on, in seconds of a monotonic clock."""
+        """Start the clock. `now` is the current time, in seconds of a monotonic clock."""
         self.is_playing, self._time = True, now
 
     def pause(self) -> None:

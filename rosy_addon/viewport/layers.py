@@ -111,7 +111,7 @@ class LayerStates:
             layer.stale = True
 
     def clear(self) -> None:
-        """Drop all layers."""
+        """Forget the states of all layers."""
         self._layers.clear()
 
     def forget(self, *_: Any) -> None:

@@ -136,7 +136,7 @@ class ViewportSession:
     # --- switching -------------------------------------------------------------------------------
 
     def add(self, space: bpy.types.SpaceView3D) -> None:
-        """Make a view live."""
+        """Make a view live: from now on, the fields of its objects are drawn over it."""
         self.spaces.add(space.as_pointer())
         redraw()
 
@@ -439,7 +439,7 @@ _session: ViewportSession | None = None
 
 
 def is_live(space: bpy.types.SpaceView3D) -> bool:
-    """Return whether a 3D view is live."""
+    """Return whether a 3D view is live, that is, fields are drawn over it."""
     return _session is not None and space.as_pointer() in _session.spaces
 
 
@@ -460,7 +460,7 @@ def play_flow(plays: bool) -> None:
 
 
 def start(space: bpy.types.SpaceView3D, device: str = "auto") -> None:
-    """Make a 3D view live.
+    """Make a 3D view live: from now on, the fields of its objects are drawn over it.
 
     Parameters
     ----------

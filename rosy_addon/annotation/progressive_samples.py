@@ -1,14 +1,15 @@
 """Points spread evenly over surfaces, as many as a view needs, which stay where they are.
 
-Triangle t with the area A has the points i = 0, 1, 2, ... of a sequence that fills it evenly from its first
-point on. A point has the rank (i + u) / A, where u is a random number of the triangle: all points up to a
-rank r are an even sample of the whole mesh, with the density r. A view takes them up to a rank that depends on
-how large a part of the surface is on screen. So a moving camera adds and drops points of high rank, and
-all others stay.
+Each triangle has a low-discrepancy sequence of points i = 0, 1, 2, ...: any number of first points is evenly
+spread over the triangle. Point i of a triangle of area A has the rank (i + u) / A, where u is a random number
+of the triangle. All points up to a rank r are an even sample of the whole mesh, with r points per unit of
+area. A view takes the points up to a rank that depends on how large the surface appears on screen. So a
+moving camera adds and drops points of high rank, and all others stay.
 
-The sequence is the van der Corput sequence of triangles: the digits of i to the base 4 choose one of the four
-parts of a triangle, then one of the four parts of that part, and so on; see Kinjal Basu and Art B. Owen, "Low
-discrepancy constructions in the triangle", 2015. Each triangle shuffles the parts in its own way.
+The sequence is the van der Corput sequence of a triangle. A triangle is divided into four sub-triangles at
+the middles of its edges. The lowest digit of i in base 4 chooses one of them, the next digit chooses one of
+the four sub-triangles of that sub-triangle, and so on; see Kinjal Basu and Art B. Owen, "Low discrepancy
+constructions in the triangle", 2015. Each triangle of the mesh shuffles the sub-triangles in its own way.
 """
 
 from __future__ import annotations
@@ -23,20 +24,22 @@ from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.project import all_triangles
 
-#: Points in the area of a square whose side is the spacing.
+#: Number of points per square on screen whose side is the given spacing.
 POINTS_PER_SPACING = 8
 
-#: Digits to the base 4 that place a point, and divisions of a triangle that is seen in part or in perspective.
+#: Number of base 4 digits of an index that determine its point, and largest number of times that a triangle
+#: is divided because it is only partly in the frame, or its scale on screen varies.
 DIGITS, MAX_DIVISIONS = 15, 12
 
-#: Largest ratio of the depths of the corners of a triangle that is not divided, and its largest area if it
-#: is only partly in the frame, in squares of the spacing.
+#: A triangle is divided if the ratio of the largest and the smallest depth of its corners exceeds the first
+#: number, or if it is only partly in the frame and its area, in squares of the spacing, exceeds the second.
 MAX_DEPTH_RATIO, MAX_CUT_AREA = 1.4, 16.0
 
-#: Triangles whose sizes on screen are computed at a time.
+#: Number of triangles whose sizes on screen are computed at a time.
 TRIANGLES_PER_BLOCK = 1 << 16
 
-#: The corners of the parts of a triangle, in its barycentric coordinates: the middle, then those at its corners.
+#: Corners of the four sub-triangles of a triangle, in its barycentric coordinates: first of the sub-triangle
+#: in the middle, then of the sub-triangles at the three corners.
 PARTS = 0.5 * np.array(
     [
         [[0, 1, 1], [1, 0, 1], [1, 1, 0]],
@@ -49,17 +52,21 @@ PARTS = 0.5 * np.array(
 
 @dataclass(frozen=True, eq=False)
 class _Pieces:
-    """n parts of triangles, each with the points of its sequence whose first digits are the same.
+    """n sub-triangles of equal depth, each with the points of its triangle's sequence that lie in it.
+
+    The indices of these points share their lowest `depth` digits in base 4.
 
     Attributes
     ----------
     triangle : (n,) intp ndarray
+        Triangle of the mesh that contains each sub-triangle.
     corners : (n, 3, 3) float64 ndarray
-        Barycentric coordinates of the corners of each part.
+        Corners of each sub-triangle, in barycentric coordinates of the triangle.
     first : (n,) int64 ndarray
-        The first of its points. The others follow in steps of 4 ** `depth`.
+        Index of the first point in each sub-triangle. The indices of the others follow in steps of
+        4 ** `depth`.
     depth : int
-        How often the triangle was divided.
+        How often the triangles were divided.
     """
 
     triangle: np.ndarray
@@ -68,11 +75,14 @@ class _Pieces:
     depth: int
 
     def part(self, chosen: np.ndarray) -> _Pieces:
-        """Return those that a mask chooses."""
+        """Return the sub-triangles that a mask selects."""
         return _Pieces(self.triangle[chosen], self.corners[chosen], self.first[chosen], self.depth)
 
     def divided(self, shuffle: np.ndarray) -> _Pieces:
-        """Return the four parts of each piece, given the (T,) uint64 random bits of triangles."""
+        """Divide each sub-triangle into four, and return them.
+
+        `shuffle` holds the (T,) uint64 random bits of all triangles of the mesh.
+        """
         corners = np.einsum("pij,njk->npik", PARTS, self.corners).reshape(-1, 3, 3)
         part = np.tile(np.arange(4), len(self.triangle))
         triangle = np.repeat(self.triangle, 4)
@@ -91,14 +101,17 @@ def progressive_samples(
     instance : MeshInstance
     camera : Camera
     spacing : float
-        There are `POINTS_PER_SPACING` points in a square of this side, pixels.
+        Pixels. On screen, a square with this side contains about `POINTS_PER_SPACING` points.
 
     Returns
     -------
     triangle : (P,) int32 ndarray
+        Triangle of each point.
     barycentric : (P, 3) float64 ndarray
+        Barycentric coordinates of each point in its triangle.
     rank : (P,) float64 ndarray
-        The points up to a rank are an even sample of the surface. In points per square unit.
+        Rank of each point, in points per square Blender unit. All points up to a rank are an even sample of
+        the surface.
     """
     clip, triangles = all_triangles([instance], camera)
     shuffle = _random_bits(len(triangles))
@@ -123,7 +136,7 @@ def progressive_samples(
         screen_area, is_divided = _screen_areas(corners, camera, spacing)
         is_divided &= todo.depth < MAX_DIVISIONS
         whole = todo.part(~is_divided)
-        # The points of the triangle, if all of it had the scale of this part.
+        # The number of points of the triangle, if all of it had the scale of this sub-triangle on screen.
         total = POINTS_PER_SPACING * screen_area[~is_divided] * 4.0**whole.depth / spacing**2
         step = 4**whole.depth
         count = np.ceil((total - offset[whole.triangle] - whole.first) / step)
@@ -143,7 +156,7 @@ def _with_points(
     spacing: float,
     offset: np.ndarray,
 ) -> np.ndarray:
-    """Return the triangles that may have points: (n,) intp.
+    """Return the (n,) intp indices of the triangles in which there may be points for this view.
 
     Parameters
     ----------
@@ -152,9 +165,9 @@ def _with_points(
     triangles : (T, 3) int ndarray
     camera : Camera
     spacing : float
-        Pixels.
+        See `progressive_samples`, in pixels.
     offset : (T,) float64 ndarray
-        u of each triangle.
+        The random number u of each triangle; see the module.
     """
     w = np.where(clip[:, 3] > 0, clip[:, 3], np.nan)
     x, y = clip[:, 0] / w, clip[:, 1] / w
@@ -164,7 +177,7 @@ def _with_points(
         a, b, c = triangles[start : start + TRIANGLES_PER_BLOCK].T
         left, bottom = x[a], y[a]
         area = (x[b] - left) * (y[c] - bottom) - (x[c] - left) * (y[b] - bottom)
-        # Those that reach behind the eye are not numbers.
+        # The areas of triangles that reach behind the eye are NaN.
         is_empty = np.abs(area) * points_per_area <= offset[start : start + TRIANGLES_PER_BLOCK]
         chosen.append(start + np.flatnonzero(~is_empty))
     return np.concatenate(chosen)
@@ -185,16 +198,18 @@ def _screen_areas(
     Parameters
     ----------
     corners : (n, 3, 4) float64 ndarray
-        Clip space.
+        Corners in clip space.
     camera : Camera
     spacing : float
-        Pixels.
+        See `progressive_samples`, in pixels.
 
     Returns
     -------
     area : (n,) float64 ndarray
-        Square pixels; 0 if the triangle reaches behind the eye.
+        Areas in square pixels; 0 if the triangle reaches behind the eye.
     is_divided : (n,) bool ndarray
+        Whether each triangle has to be divided, because its scale on screen varies too much, or it is only
+        partly in the frame.
     """
     w = corners[..., 3]
     nearest, farthest = w.min(axis=1), w.max(axis=1)
@@ -212,13 +227,13 @@ def _screen_areas(
 
 
 def matrix_scale(instance: MeshInstance) -> float:
-    """Return the factor by which the matrix of an instance scales lengths, as a mean of all directions."""
+    """Return the factor by which the matrix of an instance scales lengths, averaged over all directions."""
     a, b, c = np.asarray(instance.matrix, dtype=np.float64)[:3, :3]
     return float(np.abs((np.cross(a, b) * c).sum()) ** (1 / 3))
 
 
 def rest_areas(surface: Surface, triangle: np.ndarray | None = None) -> np.ndarray:
-    """Return the (n,) areas of triangles, by default of all, before they deform."""
+    """Return the (n,) areas of triangles in the rest shape, by default of all triangles of the surface."""
     vertices = surface.in_rest_shape().vertices
     corners = surface.triangle_vertex if triangle is None else surface.triangle_vertex[triangle]
     a, b, c = (np.ascontiguousarray(vertices[corner].T) for corner in corners.T)
@@ -228,20 +243,22 @@ def rest_areas(surface: Surface, triangle: np.ndarray | None = None) -> np.ndarr
 
 
 def surface_samples(surface: Surface, density: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Sample all of a surface in its rest shape, evenly.
+    """Sample the whole rest shape of a surface evenly.
 
     Parameters
     ----------
     surface : Surface
     density : float
-        Points per square unit.
+        Points per square unit of object space.
 
     Returns
     -------
     triangle : (P,) int32 ndarray
+        Triangle of each point.
     barycentric : (P, 3) float64 ndarray
+        Barycentric coordinates of each point in its triangle.
     rank : (P,) float64 ndarray
-        See `progressive_samples`; at most the density.
+        Rank of each point, at most `density`; see `progressive_samples`.
     """
     area = rest_areas(surface)
     shuffle = _random_bits(len(area))
@@ -254,9 +271,9 @@ def surface_samples(surface: Surface, density: float) -> tuple[np.ndarray, np.nd
 def _points(
     number: np.ndarray, triangle: np.ndarray, shuffle: np.ndarray, area: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return points, given their (P,) numbers in the sequences of triangles; see `progressive_samples`.
+    """Return points as `progressive_samples` does, given their triangles and their indices in the sequences.
 
-    `shuffle` and `area` are the random bits and the areas of all triangles.
+    `number` holds the (P,) indices. `shuffle` and `area` are the random bits and areas of all triangles.
     """
     shuffle, area = shuffle[triangle], area[triangle]
     rank = (number + _random_offsets(shuffle)) / area
@@ -264,12 +281,12 @@ def _points(
 
 
 def _random_offsets(shuffle: np.ndarray) -> np.ndarray:
-    """Return u of triangles, (n,) float64 from 0 to 1: the upper half of their random bits."""
+    """Return the random number u of triangles, (n,) float64 from 0 to 1: the upper half of their bits."""
     return (shuffle >> np.uint64(32)).astype(np.float64) / 2.0**32
 
 
 def _random_bits(count: int) -> np.ndarray:
-    """Return (count,) uint64 hashes of the numbers from 0 on (SplitMix64)."""
+    """Return (count,) uint64 pseudorandom numbers: SplitMix64 hashes of 0, 1, 2 and so on."""
     bits = np.arange(1, count + 1, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
     for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
         bits ^= bits >> np.uint64(shift)
@@ -278,13 +295,17 @@ def _random_bits(count: int) -> np.ndarray:
 
 
 def _shuffle_bits(shuffle: np.ndarray, depth: int) -> np.ndarray:
-    """Return the (n,) int64 numbers, 0 to 3, by which triangles shuffle their parts after `depth` divisions."""
+    """Return (n,) int64 numbers from 0 to 3, with which triangles shuffle sub-triangles of one depth.
+
+    A digit of an index, XOR this number, is the number of the sub-triangle in `PARTS`.
+    """
     return (shuffle >> np.uint64(2 * depth) & np.uint64(3)).astype(np.int64)
 
 
 def _barycentric(index: np.ndarray, shuffle: np.ndarray) -> np.ndarray:
-    """Return the (n, 3) barycentric coordinates of points, given their indices in the sequences of
-    triangles and the random bits of these triangles.
+    """Return the (n, 3) barycentric coordinates of points, given their (n,) indices in the sequences.
+
+    `shuffle` holds the random bits of the (n,) triangles that contain the points.
     """
     result = np.full((len(index), 3), 1 / 3)
     for depth in reversed(range(DIGITS)):

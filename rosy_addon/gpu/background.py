@@ -1,4 +1,4 @@
-"""What is drawn into a 3D view: pictures over its surfaces, and a color behind everything."""
+"""Drawing into a 3D view: pictures over its surfaces, and a background color behind everything."""
 
 from __future__ import annotations
 
@@ -27,10 +27,11 @@ def draw_texture(
     texture : texture
         The picture. It may have any size, and fills the view.
     batches : sequence of (batch, dict)
-        Where the picture is drawn, with the uniforms of `uniforms.clip_uniforms`.
+        Triangles that the picture is drawn on, each batch with the uniforms of `uniforms.clip_uniforms`.
     opacity : float
+        From 0 to 1.
     depth_bias : float
-        How much closer to the eye, in normalized depth.
+        How much closer to the eye the triangles are drawn, in normalized depth.
     """
     left, bottom, width, height = device.viewport()
     uniforms = {
@@ -43,7 +44,7 @@ def draw_texture(
 
 
 def draw_background(device: Device, background: Background) -> None:
-    """Fill a rectangle of the 3D view that is being drawn, wherever nothing else is in it."""
+    """Fill a rectangle of the 3D view that is being drawn with a color, behind everything else in it."""
     vertices = np.zeros((6, 4), dtype=np.float32)
     vertices[:, :2] = [(0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)]
     uniforms = {

@@ -22,10 +22,10 @@ from .uniforms import NO_CLIP_PLANES, matrix_rows
 
 
 class CpuViewportRenderer(ViewportRenderer):
-    """Draw the pictures of 3D views with numpy.
+    """A renderer that draws the pictures of 3D views with numpy.
 
-    Each picture is one call, for a helper process. The device only composites it over the view. Pictures
-    have no depth, so the meshes must include occluders.
+    Each picture is drawn by one function call, which a helper process can make. The device only composites
+    the picture over the view. Pictures have no depth, so the meshes must include occluders.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class CpuViewportRenderer(ViewportRenderer):
     def texture_steps(
         self, items: Sequence[MeshInstance], view: ViewInput, target_key: Hashable = None
     ) -> Steps[Any]:
-        """Draw a picture by one call, and send it to the device. Clip planes are ignored."""
+        """Draw a picture by one function call, and send it to the device. Clip planes are ignored."""
         try:
             picture = yield Call(bake_picture, (replace(view, instances=tuple(items)), True, 1))
         except NothingInViewError:

@@ -39,28 +39,28 @@ from ..projection.rest_coordinates import BARYCENTRIC_RANGE
 from ..projection.surface_sampling import MIN_FACING_COSINE
 from . import mesh_buffers, surface_records
 
-#: The kernels of `filter_kernel`.
+#: The numbers of the filter kernels (`filter_kernel`) in shaders.
 KERNELS: dict[Kernel, int] = {"box": 0, "taper": 1, "ramp": 2}
 
-#: How streaks drift: not, along the directions of a field, or toward the guiding angle.
+#: Drift of the streaks: none, along the directions of a field, or toward the guiding angle.
 FLOW_NONE, FLOW_ALONG, FLOW_TO_ANGLE = range(3)
 
-#: `Look.tone` in shaders.
+#: The numbers of the values of `Look.tone` in shaders.
 TONE_SOURCES = {"light": 0, "attribute": 1, "image": 2, "picture": 3}
 
-#: Kinds of lights in shaders.
+#: The numbers of the types of lights in shaders.
 SUN_LIGHT, POINT_LIGHT, HEADLIGHT = range(3)
 
-#: Edges of creases in a row of threads, and threads for each edge.
+#: The pass `outline_creases`: edges of creases in each row of threads, and threads for each edge.
 CREASES_PER_ROW, CREASE_SLICES = 1024, 16
 
-#: Bit of a pixel that contains an edge. The bits of borders are in `outline`.
+#: Bit that is set for a pixel that contains an edge. The bits for borders are in `outline`.
 EDGE_BIT = 4
 
-#: Side of the blocks of pixels that one run of `MAX_REDUCE` reduces to one.
+#: Side, in pixels, of the blocks that one run of the pass `max_reduce` reduces to one pixel.
 REDUCE_BLOCK = 16
 
-#: Constants that shaders know by the names that they have in these modules.
+#: Constants that have the same name in shaders as in their Python module, by module.
 SHARED_NAMES: dict[ModuleType, tuple[str, ...]] = {
     compose: ("COLOR_CONTRAST",),
     covering: ("ALL_NEIGHBORS",),
@@ -82,7 +82,7 @@ SHARED_NAMES: dict[ModuleType, tuple[str, ...]] = {
     surface_records: ("MAX_TREE_DEPTH",),
 }
 
-#: Constants of shaders: floats, integers and vectors.
+#: Constants of shaders, by their names there: floats, integers and vectors.
 CONSTANTS: dict[str, float | int | Sequence[float]] = {
     **{name: getattr(module, name) for module, names in SHARED_NAMES.items() for name in names},
     "NOISE_MEAN": NOISE_MEAN,
@@ -142,7 +142,10 @@ def shader_defines() -> str:
 
 
 def _literal(value: float | int | Sequence[float]) -> str:
-    """Return a constant in GLSL; floats as the shortest decimal number of the same single precision number."""
+    """Return the GLSL literal of a constant.
+
+    A float becomes the shortest decimal number that GLSL rounds to the same single precision number.
+    """
     if isinstance(value, (float, np.floating)):
         text = str(np.float32(value))
         return f"({text})" if value < 0 else text

@@ -1,6 +1,6 @@
 """A thin layer over Blender's `gpu` module: textures, batches and shader runs.
 
-Tests and benchmarks have a device with the same methods without Blender.
+Tests and benchmarks use a class with the same methods that needs no Blender.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ NamedValues = Mapping[str, Any]
 #: Name of the uniform block in shaders.
 UNIFORM_BLOCK = "rosy_constants"
 
-#: 32-bit words of each type of uniform.
+#: Number of 32-bit words of each GLSL type of uniform.
 UNIFORM_WORDS = {"vec4": 4, "vec2": 2, "ivec2": 2, "float": 1, "int": 1}
 
 
@@ -34,7 +34,7 @@ class Device:
     Raises
     ------
     DeviceError
-        If Blender has none.
+        If Blender has no graphics context.
     """
 
     def __init__(self) -> None:
@@ -50,11 +50,11 @@ class Device:
         self.max_texture_size: int = gpu.capabilities.max_texture_size_get()
 
     def is_compiled(self, shader: ComputePass | RasterPass) -> bool:
-        """Return whether a shader is compiled. Those that are not are compiled when they are used."""
+        """Return whether a shader is compiled. A shader that is not compiled yet is compiled on first use."""
         return shader in self._shaders
 
     def compile(self, shader: ComputePass | RasterPass) -> None:
-        """Compile a shader. If the driver rejects it, that is an error only when it is used."""
+        """Compile a shader. If the driver rejects the shader, an error is raised only when it is used."""
         with suppress(DeviceError):
             self._program(shader)
 
@@ -66,9 +66,9 @@ class Device:
         layers: int = 0,
         data: np.ndarray | None = None,
     ) -> Any:
-        """Return a texture, an array if it has layers.
+        """Return a new texture. If `layers` is not 0, it is a texture array.
 
-        `data` is its (height, width, 4) float32 contents.
+        `data` is its contents, (height, width, 4) float32. By default, the contents are undefined.
         """
         options = {}
         if data is not None:
@@ -94,9 +94,9 @@ class Device:
         images: NamedValues,
         uniforms: NamedValues,
     ) -> None:
-        """Run a compute shader over width, height and, optionally, layers.
+        """Run a compute shader; `size` is the width, the height and, optionally, the number of layers.
 
-        It has the constants of its switches; see `ComputePass.variant`.
+        A shader with switches must be the result of `ComputePass.variant`.
         """
         program, _block = self._bind(shader, textures, uniforms)
         for name, _ in shader.images:
@@ -120,7 +120,7 @@ class Device:
             framebuffer.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
             self._set_state("LESS", True, "NONE")
             try:
-                # Front faces first: cards skip what is hidden behind them.
+                # Front faces first: graphics cards skip fragments that are hidden behind them.
                 for culled in ("BACK", "FRONT"):
                     state.face_culling_set(culled)
                     self._draw_batches(shader, batches, {}, {})
@@ -135,7 +135,7 @@ class Device:
         textures: NamedValues,
         uniforms: NamedValues,
     ) -> None:
-        """Draw batches into the current view, with its depth test."""
+        """Draw batches into the current 3D view, tested against the depths in it."""
         # With depth writes, the picture is drawn once where surfaces overlap.
         self._set_state("LESS_EQUAL", True, "ALPHA")
         try:
@@ -144,13 +144,13 @@ class Device:
             self._set_state("NONE", False, "NONE")
 
     def _set_state(self, depth_test: str, depth_mask: bool, blend: str) -> None:
-        """Set how triangles are drawn from now on."""
+        """Set the depth test, depth writes and blending for all triangles that are drawn from now on."""
         self._gpu.state.depth_test_set(depth_test)
         self._gpu.state.depth_mask_set(depth_mask)
         self._gpu.state.blend_set(blend)
 
     def viewport(self) -> tuple[int, int, int, int]:
-        """Return left, bottom, width and height of the current view in its frame buffer."""
+        """Return the left and bottom border, width and height of the current view in its frame buffer."""
         return tuple(self._gpu.state.viewport_get())
 
     def _draw_batches(
@@ -171,7 +171,10 @@ class Device:
     def _bind(
         self, shader: ComputePass | RasterPass, textures: NamedValues, uniforms: NamedValues
     ) -> tuple[Any, Any]:
-        """Return the bound program and its uniform block, which must outlive the run."""
+        """Bind a shader with its textures and uniforms.
+
+        Return the program and its uniform block. The caller must keep the block until the run ends.
+        """
         program = self._program(shader)
         program.bind()
         for name in shader.textures:
@@ -187,7 +190,7 @@ class Device:
         Raises
         ------
         DeviceError
-            If the driver rejects it.
+            If the driver rejects the shader.
         """
         if shader not in self._shaders:
             try:
@@ -231,7 +234,7 @@ _device: Device | None = None
 
 
 def blender_device() -> Device:
-    """Return the device. It is created once, and its shaders are compiled once.
+    """Return the one device of this Blender. Later calls return the same object and compiled shaders.
 
     Raises
     ------
@@ -251,12 +254,12 @@ def release() -> None:
 
 
 def _std140_order(uniforms: Uniforms) -> Uniforms:
-    """Return uniforms in an order that std140 aligns without gaps."""
+    """Return uniforms in an order that the std140 layout aligns without gaps."""
     return tuple(sorted(uniforms, key=lambda uniform: -UNIFORM_WORDS[uniform[1]]))
 
 
 def _pack_uniforms(uniforms: Uniforms, values: NamedValues) -> np.ndarray:
-    """Return a uniform block in std140, padded to whole rows of 16 bytes."""
+    """Return the values of a uniform block in the std140 layout, padded to whole rows of 16 bytes."""
     words: list[np.ndarray] = []
     for name, kind in _std140_order(uniforms):
         type_ = np.int32 if kind in ("int", "ivec2") else np.float32
@@ -270,7 +273,7 @@ def _base_name(name: str) -> str:
 
 
 def _is_usable(gpu: Any) -> bool:
-    """Return whether there is a graphics context. Without a window, create one if Blender can."""
+    """Return whether there is a graphics context. If Blender has no window, try to create a context."""
     try:
         gpu.capabilities.max_texture_size_get()
     except SystemError:

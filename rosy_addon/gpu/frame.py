@@ -18,13 +18,13 @@ from .passes import ComputePass, RasterPass
 from .resources import DrawItem, GpuResources
 from .uniforms import camera_uniforms, instance_uniforms
 
-#: Left, bottom, right and top, in pixels; right and top are exclusive.
+#: A rectangle of pixels: left, bottom, right and top; right and top are exclusive.
 Box = tuple[int, int, int, int]
 
 #: The smallest id in the id buffer. Ids are the bits of floats, which are then neither 0 nor subnormal.
 FIRST_TRIANGLE_ID = 0x00800000
 
-#: Above all ids: the bits of infinity.
+#: An integer above all ids: the bits of the float infinity.
 STOP_ID = 0x7F800000
 
 
@@ -34,10 +34,12 @@ class FramePass(NamedTuple):
     Attributes
     ----------
     shader : ComputePass or RasterPass
-        With the constants of its switches.
+        The shader; for a compute pass, with the values of its switches compiled in.
     run : callable
+        Runs the pass on the device.
     pause : float or None
-        If other work may be done before the pass, the fraction of the stage that is drawn until then.
+        If the renderer may pause before the pass, the fraction of the stage that is done by then. None if
+        it may not.
     """
 
     shader: ComputePass | RasterPass
@@ -49,24 +51,25 @@ class FramePass(NamedTuple):
 class Frame:
     """A picture that is being drawn.
 
-    The stages add passes to it, which the renderer then runs; see `take_passes`.
+    The stages add passes to the frame. The renderer takes these passes (`take_passes`) and runs them.
 
     Attributes
     ----------
     resources : GpuResources
-        The device, and what stays on it.
+        The device, and the meshes, images and textures that stay on it.
     items : sequence of DrawItem
     view : ViewInput
     camera : Camera
-        A pixel of the frame is a pixel of the picture, or one of its samples.
+        Camera with the size of the frame. A pixel of the frame is a pixel of the picture, or a sample of
+        such a pixel.
     look : PixelLook
-        In these pixels.
+        Lengths are in pixels of the frame.
     samples : Frame or None
-        The samples of the pixels, if these have several. The pixels are shaded once.
+        The frame whose pixels are the samples, if pixels have several. Each pixel is still shaded once.
     textures : dict of str to texture
         Results of the passes so far, by their names in shaders.
     prepared : dict
-        What was computed from the meshes for this picture, by the keys of the stages.
+        Handles of data that was computed from the meshes for this picture, by the keys of the stages.
     passes : list of FramePass
         The passes that are still to be run, including the passes over the samples.
     """
@@ -98,7 +101,10 @@ class Frame:
 
     @cached_property
     def first_triangle_ids(self) -> list[int]:
-        """The id of the first triangle of each item in the id buffer; those that only occlude are last."""
+        """The id of the first triangle of each item in the id buffer.
+
+        The ids of items without a field, which only occlude, follow after all others.
+        """
         order = sorted(range(len(self.items)), key=lambda index: self.items[index].kind is None)
         counts = [self.items[index].mesh.buffers.triangle_count for index in order]
         # Shaders round the ids of meshes with more triangles than `MAX_TRIANGLES`.
@@ -108,13 +114,16 @@ class Frame:
 
     @property
     def occluder_id(self) -> int:
-        """The first id of triangles without a field, which only occlude. All others are before."""
+        """The smallest id of triangles without a field, which only occlude; `STOP_ID` if there are none.
+
+        All triangles with a field have smaller ids.
+        """
         ids = zip(self.first_triangle_ids, self.items, strict=True)
         return min((first_id for first_id, item in ids if item.kind is None), default=STOP_ID)
 
     @property
     def kinds(self) -> list[FieldKind]:
-        """The kinds of the fields, by degree."""
+        """The `FieldKind` of each degree that the fields have, sorted by degree."""
         kinds = {item.kind for item in self.items} - {None}
         return sorted(kinds, key=lambda kind: kind.degree)
 
@@ -123,17 +132,17 @@ class Frame:
         return {**self.look.settings(), **camera_uniforms(self.camera)}
 
     def image(self, name: str, texel_format: str = "RGBA32F", layers: int = 0) -> Any:
-        """Return the image of a name, of the size of the frame; see `GpuResources.image`."""
+        """Return the image with a name and the size of the frame; see `GpuResources.image`."""
         return self.resources.image(name, *self.size, texel_format, layers)
 
     def box_of_kind(self, kind: FieldKind) -> Box:
-        """Return the box of all instances whose fields are of a kind."""
+        """Return the box of the pixels that instances with a field of this kind can cover."""
         return union_box(
             [screen_box(item, self.camera) for item in self.items if item.kind == kind]
         )
 
     def fields_in_view(self) -> list[tuple[int, DrawItem, Box]]:
-        """Return the id, item and box of each instance that has a field and may be visible."""
+        """Return the index, draw item and box of each instance that has a field and may be visible."""
         boxes = [
             (instance_id, item, screen_box(item, self.camera))
             for instance_id, item in enumerate(self.items)
@@ -142,7 +151,7 @@ class Frame:
         return [entry for entry in boxes if not is_empty(entry[2])]
 
     def take_passes(self) -> list[FramePass]:
-        """Remove and return the passes that are to be run."""
+        """Remove all passes from the frame, and return them in the order in which they must be run."""
         passes = self.passes.copy()
         self.passes.clear()
         return passes
@@ -175,12 +184,12 @@ class Frame:
         self.run(shader, box, {**records, **textures}, images, uniforms)
 
     def instance_uniforms(self, instance_id: int) -> dict[str, Any]:
-        """Return the uniforms of one instance."""
+        """Return the uniforms of passes over the pixels of one instance, given its index."""
         first_triangle_id, item = self.first_triangle_ids[instance_id], self.items[instance_id]
         return instance_uniforms(instance_id, first_triangle_id, item, self.camera)
 
     def clear(self, image: Any, texel_format: str | None = None) -> None:
-        """Set an image of the size of the frame to 0; without a format, it is RGBA32F."""
+        """Add a pass that sets an image of the size of the frame to 0. Its default format is RGBA32F."""
         formats = () if texel_format is None else (("cleared", texel_format),)
         self.run(ComputePass("clear", formats), self.box, {}, {"cleared": image}, {})
 
@@ -201,14 +210,14 @@ class Frame:
         shader : ComputePass
         box : Box
         textures : dict of str to texture
-            What the pass reads besides the ``textures`` of the frame.
+            Textures that the pass reads, besides the ``textures`` of the frame.
         images : dict of str to texture
-            What the pass writes.
+            Images that the pass writes.
         uniforms : dict
-            Further uniforms, besides the uniforms of the camera and the settings of the look, which have
-            their own names.
+            Further uniforms. The uniforms of the camera and all settings of the look are added by their
+            names.
         layers : int
-            Layers of array images.
+            Number of layers of the texture arrays that the pass writes.
         pause : float, optional
             See `FramePass`.
         """
@@ -246,7 +255,8 @@ class Frame:
 def screen_box(item: DrawItem, camera: Camera) -> Box:
     """Return the box of the pixels that a mesh can cover.
 
-    The whole frame if the near plane cuts off a part of the bounds; an empty box if it cuts off all.
+    It is the box of the whole frame if the near plane cuts off a part of the mesh's bounding box, and
+    empty if the near plane cuts off all of it.
     """
     points = np.concatenate([item.mesh.buffers.bounds, np.ones((8, 1))], axis=1)
     clip = points @ (camera.projection @ camera.view @ item.model_matrix).T
@@ -269,7 +279,7 @@ def is_empty(box: Box) -> bool:
 
 
 def union_box(boxes: Iterable[Box]) -> Box:
-    """Return the smallest box around others. Empty boxes are ignored."""
+    """Return the smallest box that contains all given boxes. Empty boxes are ignored."""
     boxes = [box for box in boxes if not is_empty(box)]
     if not boxes:
         return 0, 0, 0, 0
@@ -278,6 +288,6 @@ def union_box(boxes: Iterable[Box]) -> Box:
 
 
 def box_size(box: Box) -> tuple[int, int]:
-    """Return width and height."""
+    """Return the width and the height of a box, in pixels."""
     left, bottom, right, top = box
     return right - left, top - bottom

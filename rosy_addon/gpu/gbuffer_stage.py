@@ -1,4 +1,4 @@
-"""The G-buffer of a picture: the triangle that each pixel sees, and the surface and field there."""
+"""The G-buffer of a picture: the triangle that is visible at each pixel, and the surface and field there."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from .uniforms import clip_uniforms
 
 
 def render_gbuffer(frame: Frame) -> None:
-    """Render the G-buffer: the triangle that each pixel sees, and the surface and field there.
+    """Render the G-buffer: the triangle that is visible at each pixel, and the surface and field there.
 
     The images are put into ``frame.textures``: ``visibility``, ``normals``, ``field_values``,
-    ``depth_slopes`` and ``field_channels``. If pixels have several samples, there is also
-    ``sample_entries``, the pixel whose surface each sample shows; see `projection.pixel_coverage`.
-    The samples have a G-buffer of their own only if outlines need it.
+    ``depth_slopes`` and ``field_channels``. If pixels have several samples, ``sample_entries`` is added:
+    for each sample, the pixel whose surface it shows; see `projection.pixel_coverage`. A G-buffer of the
+    samples themselves is rendered only if outlines need it.
     """
     samples = frame.samples
     if samples is None:
@@ -32,7 +32,7 @@ def render_gbuffer(frame: Frame) -> None:
 
 
 def _visibility(frame: Frame) -> Any:
-    """Return the id of the triangle that is visible at the center of each pixel."""
+    """Return an image with the id of the triangle that is visible at the center of each pixel."""
     batches = [
         (
             item.mesh.batch,
@@ -43,7 +43,7 @@ def _visibility(frame: Frame) -> Any:
         )
         for first_triangle_id, item in zip(frame.first_triangle_ids, frame.items, strict=True)
     ]
-    # The planes take a third of the time.
+    # Testing the clip planes takes a third of the time.
     is_clipped = frame.view.clip_planes is not None
     shader = RasterPass("visibility_clipped" if is_clipped else "visibility")
     visibility = frame.image("visibility", "R32F")
@@ -52,7 +52,10 @@ def _visibility(frame: Frame) -> Any:
 
 
 def _pixel_visibility(frame: Frame, samples: Frame) -> Any:
-    """Return the id of the triangle that each pixel sees, at its center or else at a sample."""
+    """Return an image with the id of the triangle that each pixel shows.
+
+    It is the triangle at the center of the pixel or, if there is none, at the sample nearest to the center.
+    """
     visibility = frame.image("pixel_visibility", "R32F")
     frame.run(
         ComputePass("pixel_visibility"),
@@ -88,7 +91,7 @@ def _render_surfaces(frame: Frame, visibility: Any) -> None:
 
 
 def _sample_entries(frame: Frame, samples: Frame) -> Any:
-    """Return the pixel whose surface each sample shows."""
+    """Return an image of the samples, with the pixel whose surface each sample shows."""
     entries = samples.image("sample_entries", "R32F")
     samples.clear(entries, "R32F")
     textures = {**frame.textures, "sample_visibility": samples.textures["visibility"]}

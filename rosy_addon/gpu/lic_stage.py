@@ -1,7 +1,7 @@
-"""The lines of a picture: evenly spaced ones, or line integral convolution on the covering of a field.
+"""The field in a picture: evenly spaced lines, or line integral convolution on the covering of a field.
 
-Even lines are phases on the surfaces, evaluated at the pixels. Then the picture is drawn: streamlines are
-traced, and what they show becomes light or ink.
+Evenly spaced lines come from phases on the surfaces, which are evaluated at the pixels. Streamlines are
+traced for line integral convolution. The picture is then colored and lit, or drawn in ink.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from .passes import WORKGROUP_SIZE, ComputePass
 from .resources import GpuResources
 from .uniforms import direction_uniforms, even_line_uniforms, look_uniforms
 
-#: Factor of the contrast of streaks whose noise is interpolated between pixels, which makes them a little
-#: stronger. Smooth streaks do not need it.
+#: Factor by which the contrast of streaks is reduced if their noise is interpolated between pixels:
+#: interpolation makes the streaks a little stronger.
 INTERPOLATED_CONTRAST = 0.96
 
 #: Maximum steps, of all streamlines together, in one run of the LIC pass: drivers abort runs that
@@ -32,7 +32,10 @@ MAX_DISPATCH_STEPS = 1 << 29
 
 
 def even_line_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
-    """Return what looks up the lines of the instances, by the keys of `Frame.prepared`."""
+    """Return functions that look up the evenly spaced lines of instances, by the keys of `Frame.prepared`.
+
+    There are none if the look does not draw evenly spaced lines.
+    """
     look = frame.look
     if not is_even(look):
         return {}
@@ -47,10 +50,11 @@ def even_line_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
 
 
 def render_even_lines(frame: Frame) -> None:
-    """Render the lines of all instances into ``frame.textures["line_image"]``.
+    """Render the evenly spaced lines of all instances into ``frame.textures["line_image"]``.
 
-    `even_lines.even_lines` is the same with numpy. The lines that replace crowded ones are in the
-    layers after the others, whether any are crowded or not. Nothing is rendered for other looks.
+    `even_lines.even_lines` does the same with numpy. The image has a layer for each line direction,
+    followed by as many layers for the wider spaced lines that replace crowded ones. If the look does not
+    draw evenly spaced lines, the image is an unused placeholder.
     """
     if not is_even(frame.look):
         frame.textures["line_image"] = frame.resources.image("line_image", 1, 1, "RGBA16F", 1)
@@ -73,7 +77,7 @@ def render_even_lines(frame: Frame) -> None:
 
 
 def render_fields(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> None:
-    """Draw the fields of one kind into a picture, with the textures of the earlier stages.
+    """Draw all fields of one kind into a picture, with the textures of the earlier stages.
 
     Parameters
     ----------
@@ -82,7 +86,7 @@ def render_fields(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> None
     box : Box
         Pixels to draw.
     picture : texture
-        The picture, in the size of the frame.
+        The image to draw into. It has the size of the frame.
     """
     look, resources = frame.look, frame.resources
     is_antialiased = int(frame.samples is not None)
@@ -111,7 +115,10 @@ def render_fields(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> None
 def _streaks(
     frame: Frame, kind: FieldKind, box: Box, textures: dict[str, Any], uniforms: dict[str, Any]
 ) -> Any:
-    """Return the means along the lines of a look with ink; another texture if it needs none."""
+    """Return the filtered noise along the lines, for a look with ink.
+
+    If the look uses no noise or tone along its lines, return an arbitrary texture, which is not read.
+    """
     layers = kind.line_count
     has_streaks = not uniforms["even_lines"] or uniforms["break_steps"] > 0
     if not (has_streaks or uniforms["overshoot_steps"]):
@@ -128,7 +135,7 @@ def _streaks(
 
 
 def _ink_textures(frame: Frame, kind: FieldKind) -> dict[str, Any]:
-    """Return the lookup tables of the ink, and images that the look does not have."""
+    """Return the lookup tables of the ink, and placeholders for images that the look does not use."""
     resources, look = frame.resources, frame.look
     result = {
         "ink_thresholds": lookup_tables.thresholds(resources, look.for_symmetry(kind.symmetry)),
@@ -154,7 +161,11 @@ def _trace(
     uniforms: dict[str, Any],
     layers: int = 1,
 ) -> None:
-    """Trace streamlines by passes over bands: all lines of a pixel, or a layer for each line."""
+    """Add the passes that trace streamlines, each over a band of rows of the box.
+
+    With one layer, a thread traces the streamlines along all line directions at a pixel. Otherwise
+    `layers` is the number of line directions, and a thread traces the streamline along one of them.
+    """
     left, bottom, right, top = box
     half_steps = frame.look.streamline_reach() if uniforms["half_length"] else 0
     row_steps = (right - left) * kind.line_count * 2 * half_steps
@@ -168,7 +179,11 @@ def _trace(
 
 
 def _unfold(frame: Frame, kind: FieldKind, box: Box) -> dict[str, Any]:
-    """Return the images of the covering: its cells, and directions without and with their gradients."""
+    """Render the covering of the fields of one kind, and return its images by name.
+
+    ``cells`` holds the phase and the noise of each pixel, ``directions`` the directions on screen, and
+    ``angle_gradients`` the directions with the gradients of their angles.
+    """
     lines = kind.line_count
     cell_format = "RG32F" if noise_args(frame.look)["channels"] == 1 else "RGBA32F"
     uniforms = direction_uniforms(kind, frame.look, frame.camera)
@@ -184,7 +199,7 @@ def _unfold(frame: Frame, kind: FieldKind, box: Box) -> dict[str, Any]:
 
 
 def _noise_gradients(frame: Frame, box: Box, textures: dict[str, Any]) -> Any:
-    """Return the derivatives of the noise, two channels in a layer."""
+    """Return an image of the derivatives of the noise along x and y. Each layer has two noise channels."""
     layers = 2 if noise_args(frame.look)["channels"] > 1 else 1
     gradients = frame.image("noise_gradients", "RGBA16F", layers)
     images, uniforms = {"noise_gradients": gradients}, {"noise_layers": layers}
@@ -195,9 +210,9 @@ def _noise_gradients(frame: Frame, box: Box, textures: dict[str, Any]) -> Any:
 def largest_magnitude(
     resources: GpuResources, field_values: Any, degree: int, compute: Callable[..., None]
 ) -> Any:
-    """Return a texture of one texel: the largest magnitude of the visible fields of a degree.
+    """Return a texture of one texel: the largest magnitude of the visible fields with a degree.
 
-    Passes are run by a function as `Device.compute` or `Frame.compute`.
+    `compute` runs the passes: `Device.compute` or `Frame.compute`.
     """
     source = field_values
     width, height = source.width, source.height

@@ -1,4 +1,4 @@
-"""Textures that shaders look values up in: colors, inks, thresholds, noise and paper grain."""
+"""Lookup tables of shaders, as textures: colors, inks, thresholds, noise and paper grain."""
 
 from __future__ import annotations
 
@@ -24,26 +24,28 @@ from ..core.color import color_stops
 from .mesh_buffers import FieldKind
 from .resources import GpuResources
 
-#: Noise is computed for whole tiles of this side, so that a frame can grow a little.
+#: Noise is computed for frames whose sides are rounded up to a multiple of this number of pixels, so that it
+#: can be used again if the frame grows a little.
 NOISE_TILE_PIXELS = 256
 
 
 def palette(resources: GpuResources) -> Any:
-    """Return `family_hues.PALETTE`. It is also bound in place of textures that are not read."""
+    """Return `family_hues.PALETTE` as a texture. It is also a placeholder for textures that are not read."""
     return resources.lookup_texture("palette", None, lambda: PALETTE[None])
 
 
 def color_map(resources: GpuResources, look: PixelLook) -> Any:
-    """Return the color map of a look."""
+    """Return the color map of a look as a texture."""
     name = look.color_map
     return resources.lookup_texture("colors", name, lambda: color_stops(name)[None])
 
 
 def thresholds(resources: GpuResources, look: PixelLook) -> Any:
-    """Return the thresholds of `streak_statistics`, in the first channel.
+    """Return a texture of thresholds from `streak_statistics`, in the first channel.
 
-    Row 0 is for streaks, or for even lines the widths of `even_lines.look_width_table`. Row 1 is for
-    undirected texture.
+    Row 0 contains the thresholds of streaks or, for evenly spaced lines, the widths from
+    `even_lines.look_width_table`. Row 1 contains the thresholds of undirected texture. A look without
+    hatching gets the placeholder `palette`.
     """
     if not is_hatched(look):
         return palette(resources)
@@ -54,7 +56,10 @@ def thresholds(resources: GpuResources, look: PixelLook) -> Any:
 
 
 def undirected_offsets(resources: GpuResources, look: PixelLook) -> Any:
-    """Return `undirected.disc_offsets` in the first two channels."""
+    """Return a texture of `undirected.disc_offsets`, in the first two channels.
+
+    A look without hatching gets the placeholder `palette`.
+    """
     if not is_hatched(look):
         return palette(resources)
     return resources.lookup_texture(
@@ -63,23 +68,25 @@ def undirected_offsets(resources: GpuResources, look: PixelLook) -> Any:
 
 
 def ink_table(resources: GpuResources, kind: FieldKind, look: PixelLook) -> Any:
-    """Return the inks of `inks.Inks`: the dark ones, then the light ones."""
+    """Return a texture of the inks of `inks.Inks`: the dark inks, then the light inks."""
     inks = inks_of(look.look, ink_count(look.look, kind.line_count, kind.family_count))
     stops = np.concatenate([inks.dark, inks.light])
     return resources.lookup_texture("inks", stops.tobytes(), lambda: stops[None])
 
 
 def waves(resources: GpuResources) -> Any:
-    """Return the waves of `wobble`."""
+    """Return a texture of the waves that `wobble` sums up."""
     return resources.lookup_texture("waves", None, lambda: wave_table()[None])
 
 
 def picture_grain(
     resources: GpuResources, width: int, height: int, look: PixelLook, line_count: int
 ) -> Any:
-    """Return `paper_grain.picture_paper_grain` in the first channel.
+    """Return a texture of `paper_grain.picture_paper_grain`, in the first channel.
 
-    The texture is for a frame of this size. Each line has its own part of it.
+    It is at least as large as a frame of `width` x `height` pixels. It is wider than the frame, so that
+    each of the `line_count` line directions at a pixel reads another column (`line_offset`). A look
+    without paper grain gets the placeholder `palette`.
     """
     if not has_paper_grain(look):
         return palette(resources)
@@ -93,7 +100,7 @@ def picture_grain(
 
 
 def picture_noise(resources: GpuResources, width: int, height: int, look: PixelLook) -> Any:
-    """Return the noise of `image_noise.image_noise` for a frame of this size."""
+    """Return a texture of the noise of `image_noise.image_noise` for a frame of this size."""
     settings = noise_args(look)
     values_at = partial(image_noise, **settings)
     return _pixel_texture(resources, "noise", settings, width, height, values_at)
@@ -107,7 +114,10 @@ def _pixel_texture(
     height: int,
     values_at: Callable[[np.ndarray, int], np.ndarray],
 ) -> Any:
-    """Return values at the pixels of a frame, given those at (P,) pixels of a width, for whole tiles."""
+    """Return a texture of values at the pixels of a frame, rounded up to whole tiles (`NOISE_TILE_PIXELS`).
+
+    `values_at(pixel, width)` returns the values at (P,) flat indices into a frame of this width.
+    """
     tile = NOISE_TILE_PIXELS
     width, height = -(-width // tile) * tile, -(-height // tile) * tile
 

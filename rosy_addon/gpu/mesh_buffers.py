@@ -21,29 +21,30 @@ from ..projection.field_channel import FieldChannel, rotation_order
 from ..projection.rest_coordinates import rest_positions
 from ..projection.surface_tone import MipMap, SurfaceTone
 
-#: Texels in a row of the record texture: a power of two, with its exponent.
+#: Exponent of the number of texels in a row of the record texture, a power of two (`ROW_TEXELS`).
 ROW_BITS = 13
 ROW_TEXELS = 1 << ROW_BITS
 
-#: Triangles whose records are written at once: more would not stay in the processor's cache.
+#: Number of triangles whose records are written at once. More would not fit the processor's cache.
 RECORDS_PER_BLOCK = 1 << 17
 
 #: Maximum triangles of a mesh: shaders handle their ids in single precision.
 MAX_TRIANGLES = 1 << 24
 
-#: Texels of a record: 3 positions, 3 normals, 2 of the representation, 2 for each channel, 1 for the
-#: numbers of the color map if there are any, 2 for the tone if there is one. The last texel is the z of the rest positions.
+#: First texels of the positions, normals and representation in a record. A record has 3 texels of positions,
+#: 3 of normals, 2 of the representation, 2 for each further channel, 1 of the values for the color map if
+#: there are any, 2 of the tone if there is one, and a last one for z of the rest positions.
 POSITION_TEXEL, NORMAL_TEXEL, VALUE_TEXEL = 0, 3, 6
 
 
 @dataclass(frozen=True, eq=False)
 class MeshBuffers:
-    """A surface in the layout of the shaders, without its transformation.
+    """A surface in the layout of the shaders. Its rotation, uniform scale and translation are not applied.
 
     Attributes
     ----------
     corners : (3 T, 4) float32 ndarray
-        Position of each corner of each triangle, and the id of the triangle.
+        Position of each corner of each triangle relative to `center`, and the id of the triangle.
     center : (3,) float64 ndarray
         Origin of all positions, so that surfaces far from the origin keep their precision.
     triangle_records : (rows, ROW_TEXELS, 4) float32 ndarray or None
@@ -55,9 +56,9 @@ class MeshBuffers:
     has_tone : bool
         Whether the records contain a tone of the surface.
     value_range : (float, float) or None
-        Range of the numbers of the surface for the color map; see `color_values.value_range`.
+        Range of the surface's values for the color map; see `color_values.value_range`.
     values_texel : int
-        The texel of a record that contains these numbers; -1 if there are none.
+        The texel of a record that contains these values; -1 if there are none.
     """
 
     corners: np.ndarray
@@ -76,13 +77,13 @@ class MeshBuffers:
 
     @property
     def channel_count(self) -> int:
-        """Number of channels of the field."""
+        """Number of channels of the field besides its representation."""
         others = record_texels(0, self.has_tone, self.values_texel >= 0)
         return max(self.texels_per_record - others, 0) // 2
 
 
 def split_matrix(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Split a matrix into the part that changes the shape and a similarity.
+    """Split a matrix into a linear map that changes the shape, followed by a similarity.
 
     Parameters
     ----------
@@ -92,8 +93,8 @@ def split_matrix(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Returns
     -------
     linear : (3, 3) ndarray
-        The part that changes the shape. It is the identity if the matrix is a similarity, so that a
-        mesh that is moved stays on the device.
+        The map that changes the shape. It is the identity if the matrix is a similarity, so that a
+        mesh that is only moved, rotated or scaled need not be sent to the device again.
     model_matrix : (4, 4) ndarray
         A rotation, a uniform scale and a translation.
     """
@@ -126,14 +127,15 @@ def field_channels(field: RosyField) -> list[FieldChannel]:
 
 @dataclass(frozen=True)
 class FieldKind:
-    """The shader constants of all fields of one degree.
+    """The properties that all fields of one degree share in shaders, as constants.
 
     Attributes
     ----------
     degree : int
         N.
     channels : tuple of FieldChannel
-        Layers of the image of field channels: harmonics without gaps, then the families.
+        Layers of the image of field channels: harmonics of all orders from the first to the last, then
+        the families.
     symmetry : FieldSymmetry
     """
 
@@ -143,27 +145,27 @@ class FieldKind:
 
     @property
     def harmonic_orders(self) -> list[int]:
-        """Orders j of the harmonics, the first layers. Layers that fill a gap are 0."""
+        """Orders j of the harmonics in the first layers. Harmonics that no field has are 0 there."""
         return [order for kind, order in self.channels if kind == "deviation"]
 
     @property
     def line_count(self) -> int:
-        """M, the number of lines through a pixel."""
+        """M, the number of line directions at a pixel; opposite members of the field share a line."""
         return self.symmetry.line_count
 
     @property
     def sheets_per_turn(self) -> int:
-        """Sheets of a full turn."""
+        """Number of sheets of the covering that correspond to a full turn of the angle."""
         return self.symmetry.sheets_per_turn
 
     @property
     def family_count(self) -> int:
-        """The number of families, 1 without labels."""
+        """Number of families of labeled directions; 1 if the directions have no labels."""
         return self.channels[-1][1] if self.channels and self.channels[-1][0] == "family" else 1
 
 
 def field_kinds(fields: Iterable[RosyField]) -> dict[int, FieldKind]:
-    """Return the kinds of fields, by degree."""
+    """Return a dict from each degree to its `FieldKind`, with the channels of all fields of this degree."""
     channels: dict[int, list[FieldChannel]] = {}
     for field in fields:
         channels.setdefault(field.degree, []).extend(field_channels(field))
@@ -174,7 +176,11 @@ def field_kinds(fields: Iterable[RosyField]) -> dict[int, FieldKind]:
 
 
 def _field_kind(degree: int, channels: Sequence[FieldChannel]) -> FieldKind:
-    """Return a kind with harmonics without gaps, and the first channel of families."""
+    """Return the kind of fields with these channels.
+
+    Harmonics between those of `channels` are added, so that their orders have no gaps. Of channels of
+    families, only the first one is kept.
+    """
     harmonic_orders = [order for kind, order in channels if kind == "deviation"]
     ordered: list[FieldChannel] = []
     if harmonic_orders:
@@ -193,7 +199,7 @@ def mesh_buffers(
     tone: SurfaceTone | None = None,
     color_values: np.ndarray | None = None,
 ) -> MeshBuffers:
-    """Return a surface with its field, tone and numbers in the layout of the shaders.
+    """Return a surface with its field, tone and values for the color map in the layout of the shaders.
 
     Parameters
     ----------
@@ -204,7 +210,7 @@ def mesh_buffers(
         None for a mesh that only occludes.
     display : {"smooth", "flat"}
     channels : sequence of FieldChannel
-        What each layer of the image of field channels contains, for all fields of this degree.
+        The channel in each layer of the image of field channels, the same for all fields of this degree.
     tone : SurfaceTone, optional
     color_values : (C,) float32 ndarray, optional
         See `MeshInstance`.
@@ -250,7 +256,7 @@ def mesh_buffers(
 
 
 def _empty_records(count: int, texels: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return rows of the record texture, filled with zeros, and a (count, texels, 4) view of them."""
+    """Return new rows of the record texture, all zero, and a (count, texels, 4) view of the same memory."""
     row_count = max(-(-count * texels // ROW_TEXELS), 1)
     flat = np.zeros((row_count * ROW_TEXELS, 4), dtype=np.float32)
     return flat.reshape(row_count, ROW_TEXELS, 4), flat[: count * texels].reshape(count, texels, 4)
@@ -267,14 +273,14 @@ def _write_records(
     tone: np.ndarray | None,
     numbers: np.ndarray | None,
 ) -> None:
-    """Fill the (T, texels, 4) float32 records, some triangles at a time.
+    """Fill the (T, texels, 4) float32 records, block by block of triangles.
 
-    Texels 0 to 2 are the positions of the corners, 3 to 5 their normals, 6 and 7 the values of
+    Texels 0 to 2 are the positions of the corners, 3 to 5 the normals there, 6 and 7 the values of
     `CornerField.representation` with the order of its rotation. Each channel has two texels, with
-    the order of its rotation and its layer. The (T, 3) numbers of the color map have one texel, whose
-    last component is 1 if all three are finite. A tone with (T, 3, 1 or 2) values has two texels. The rest
-    positions, (V, 3), are in the fourth components of positions (x) and normals (y), and in the
-    last texel (z).
+    the order of its rotation and its layer. `numbers`, the (T, 3) values for the color map, have one texel.
+    Its last component is 1 if all three values are finite. A tone with (T, 3, 1 or 2) values has two
+    texels. Of the (V, 3) rest positions, x is in the fourth components of the positions, y in the fourth
+    components of the normals, and z in the last texel.
     """
     channel_values = [corner_field.channels.get(channel) for channel in channels]
     for start in range(0, len(records), RECORDS_PER_BLOCK):
@@ -307,7 +313,7 @@ def _write_records(
 
 
 def record_texels(channel_count: int, has_tone: bool = False, has_values: bool = False) -> int:
-    """Return the number of texels of a record."""
+    """Return the number of texels in the record of a triangle; see `_write_records`."""
     return VALUE_TEXEL + 2 * (1 + channel_count) + has_values + 2 * has_tone + 1
 
 
@@ -321,25 +327,28 @@ def _write_values(
 
 
 def to_texture_rows(values: np.ndarray) -> np.ndarray:
-    """Return (n, k) values as (rows, ROW_TEXELS, 4) float32: k of the components of n texels."""
+    """Return (n, k) values as (rows, ROW_TEXELS, 4) float32: the first k components of n texels.
+
+    All other components are 0.
+    """
     rows, texels = _empty_records(len(values), 1)
     texels[:, 0, : values.shape[1]] = values
     return rows
 
 
 def mip_atlas(mip_map: MipMap, max_side: int) -> tuple[np.ndarray, tuple[int, int], int]:
-    """Return all levels of a mip map in one image: the smaller ones are right of level 0, stacked.
+    """Return all levels of a mip map in one image: smaller levels are stacked on the right of level 0.
 
     Parameters
     ----------
     mip_map : MipMap
     max_side : int
-        Levels with a longer side are left out.
+        Levels with a longer side are left out. Level 0 of the image is the first level that is not.
 
     Returns
     -------
     texels : (h, w, 4) float32 ndarray
-        The values in the first channel.
+        Image with the values in the first channel.
     size : (int, int)
         Width and height of level 0.
     max_level : int

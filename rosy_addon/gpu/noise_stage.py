@@ -22,7 +22,10 @@ from .uniforms import surface_cell_uniforms, surface_noise_uniforms, wobble_unif
 
 
 def feature_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
-    """Return what looks up the features of the surfaces, by the keys of `Frame.prepared`."""
+    """Return functions that look up the feature curvatures of surfaces, by the keys of `Frame.prepared`.
+
+    There are none if the noise does not depend on them.
+    """
     if frame.look.anchor != "surface" or not frame.look.detail:
         return {}
     return {
@@ -34,8 +37,8 @@ def feature_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
 def render_noise(frame: Frame) -> None:
     """Render the noise of a picture, its paper grain and wobble into ``frame.textures``.
 
-    Paper grain that is fixed to the picture depends on the number of lines: `lic_stage.render_fields` looks
-    it up.
+    Paper grain that is fixed to the picture, not to the surfaces, is left out: it depends on the number of
+    line directions, so `lic_stage.render_fields` looks it up.
     """
     look = frame.look
     if look.anchor == "surface":
@@ -50,9 +53,9 @@ def render_noise(frame: Frame) -> None:
 
 
 def _render_wobble(frame: Frame) -> None:
-    """Render the angle by which lines wobble, as ``frame.textures["wobble_angles"]``.
+    """Render the angle by which lines wobble at each pixel into ``frame.textures["wobble_angles"]``.
 
-    `wobble.wobble_angle` is the same with numpy.
+    `wobble.wobble_angle` does the same with numpy.
     """
     if not has_wobble(frame.look):
         frame.textures["wobble_angles"] = lookup_tables.palette(frame.resources)
@@ -66,7 +69,7 @@ def _render_wobble(frame: Frame) -> None:
 
 
 def _surface_noise(frame: Frame, settings: dict[str, Any], name: str) -> Any:
-    """Return noise that moves with the surfaces, as `surface_noise.surface_noise`."""
+    """Return an image of noise that moves with the surfaces, as `surface_noise.surface_noise` with numpy."""
     raw_noise = frame.image("raw_noise")
     frame.clear(raw_noise)
     shared_uniforms = surface_noise_uniforms(settings)
@@ -87,7 +90,7 @@ def _surface_noise(frame: Frame, settings: dict[str, Any], name: str) -> Any:
 
 
 def _high_passed(frame: Frame, raw_noise: Any, high_pass: float, name: str) -> Any:
-    """Return centered noise, without its low frequencies if `high_pass` is not 0."""
+    """Return an image of the noise minus its mean; if `high_pass` is not 0, also without low frequencies."""
     blurred = raw_noise
     if high_pass:
         radius = box_radius(BLUR_FACTOR * high_pass)

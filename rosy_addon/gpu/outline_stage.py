@@ -16,7 +16,10 @@ from .uniforms import clip_uniforms, min_normal_cosine
 
 
 def outline_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
-    """Return what looks up the creases of the instances, by the keys of `Frame.prepared`."""
+    """Return functions that look up the creases of instances, by the keys of `Frame.prepared`.
+
+    There are none if the look has no outline.
+    """
     if not has_outline(frame.look):
         return {}
     drawn = frame if frame.samples is None else frame.samples
@@ -28,10 +31,10 @@ def outline_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
 
 
 def render_outline(frame: Frame) -> None:
-    """Render the outline of a look that has one: the share of pixels that it covers.
+    """Render the fraction of each pixel that outlines cover into ``frame.textures["outline_coverage"]``.
 
-    It is ``frame.textures["outline_coverage"]``. `compositor.outline` is the same with numpy. If pixels
-    have several samples, it is drawn at these.
+    Nothing is rendered if the look has no outline. If pixels have several samples, the outline is drawn at
+    the samples, and the result is their mean. `compositor.outline` does the same with numpy.
     """
     if not has_outline(frame.look):
         return
@@ -51,7 +54,7 @@ def render_outline(frame: Frame) -> None:
 
 
 def _coverage(frame: Frame, prepared: dict[Hashable, Any]) -> Any:
-    """Return the share of each pixel, or sample, that outlines cover."""
+    """Return an image of the fraction that outlines cover, for each pixel of the frame."""
     crease_marks = frame.image("crease_marks", "R32F")
     edges = frame.image("outline_edges", "RG32F")
     frame.clear(crease_marks, "R32F")

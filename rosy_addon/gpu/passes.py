@@ -1,8 +1,9 @@
 """The shader passes, with the inputs, outputs and uniforms of each.
 
-The sources are the GLSL files in the folder `glsl`. Each device makes the declarations in its own form, so
-they are read here and left out of the code. Beyond GLSL, sources include others by ``#include "NAME"``, and
-``#pragma constant(NAME, NAME)`` lists integer uniforms whose values are compiled in.
+The sources are the GLSL files in the folder `glsl`. Their declarations are read here and removed from the
+code, because each device writes declarations in its own form. There are two extensions to GLSL: a line
+``#include "NAME"`` is replaced by another source file, and ``#pragma constant(NAME, NAME)`` lists switches:
+integer uniforms whose values are compiled in as constants.
 """
 
 from __future__ import annotations
@@ -32,22 +33,22 @@ _DECLARATION = re.compile(
 
 
 class Source(NamedTuple):
-    """Source files, with what they declare.
+    """The code of source files, and the declarations in them.
 
     Attributes
     ----------
     code : str
         GLSL without declarations.
     textures : tuple of str
-        Textures that are read. Names that end in ``[]`` are texture arrays.
+        Names of the textures that are read. Names that end in ``[]`` are texture arrays.
     images : dict of str to str
         Formats of the images that are written, by name. Names of array images end in ``[]``, too.
     uniforms : tuple of (str, str)
         Names and GLSL types.
     outputs : tuple of (str, str)
-        Names and GLSL types of what a vertex or fragment shader returns.
+        Names and GLSL types of the outputs of a vertex or fragment shader.
     switches : tuple of str
-        Uniforms whose values are compiled in.
+        Names of the integer uniforms whose values are compiled in.
     """
 
     code: str
@@ -60,9 +61,9 @@ class Source(NamedTuple):
 
 @cache
 def read_source(*files: str) -> Source:
-    """Return source files, one after the other."""
+    """Return the code and the declarations of source files, joined in this order."""
     text = "".join(map(_with_includes, files))
-    # By name, as several files may declare what they use together.
+    # By name, because several files may declare the same texture or uniform.
     textures: dict[str, str] = {}
     images: dict[str, str] = {}
     uniforms: dict[str, str] = {}
@@ -102,7 +103,7 @@ class ComputePass:
     name : str
         Name of the source file.
     formats : tuple of (str, str)
-        Names and formats of the images that do not have the format of their declarations.
+        Names and formats of images whose format differs from their declarations.
     constants : tuple of (str, int)
         Names and values of the uniforms that are compiled in; see `variant`.
     """
@@ -112,9 +113,9 @@ class ComputePass:
     constants: tuple[tuple[str, int], ...] = ()
 
     def variant(self, values: Mapping[str, Any]) -> ComputePass:
-        """Return the shader for some values of its uniforms.
+        """Return the shader with its switches compiled in as constants, given the values of all uniforms.
 
-        The values of its switches become constants. What they switch off then costs nothing: its registers
+        The compiler then removes the code that is switched off. Otherwise the registers of that code
         would let fewer threads run at once.
         """
         return replace(self, constants=tuple((name, int(values[name])) for name in self.switches))
@@ -130,12 +131,12 @@ class ComputePass:
 
     @property
     def textures(self) -> tuple[str, ...]:
-        """Textures that it reads. Names that end in ``[]`` are texture arrays."""
+        """Names of the textures that the shader reads. Names that end in ``[]`` are texture arrays."""
         return self._declared.textures
 
     @property
     def images(self) -> tuple[tuple[str, str], ...]:
-        """Images that it writes, with their formats. Names of array images end in ``[]``."""
+        """Names and formats of the images that the shader writes. Names of array images end in ``[]``."""
         return tuple({**self._declared.images, **dict(self.formats)}.items())
 
     @property
@@ -148,7 +149,7 @@ class ComputePass:
 
     @property
     def source(self) -> str:
-        """GLSL without declarations."""
+        """Code of the shader: GLSL without declarations."""
         constants = "".join(f"#define {name} {value}\n" for name, value in self.constants)
         common = read_source("common.glsl")
         return shader_defines() + constants + common.code + self._declared.code
@@ -173,38 +174,38 @@ class RasterPass:
 
     @property
     def textures(self) -> tuple[str, ...]:
-        """Textures that it reads."""
+        """Names of the textures that the shaders read."""
         return read_source(*self._files).textures
 
     @property
     def varyings(self) -> Uniforms:
-        """Names and GLSL types of what the vertices pass on to the fragments."""
+        """Names and GLSL types of the values that the vertex shader passes on to the fragment shader."""
         return read_source(self._files[0]).outputs
 
     @property
     def output(self) -> str:
-        """Name of the fragment's output, a vec4."""
+        """Name of the output variable of the fragment shader, a vec4."""
         return read_source(self._files[1]).outputs[0][0]
 
     @property
     def uniforms(self) -> Uniforms:
-        """Names and GLSL types."""
+        """Names and GLSL types of the uniforms of both shaders."""
         return read_source(*self._files).uniforms
 
     @property
     def vertex_source(self) -> str:
-        """GLSL without declarations."""
+        """Code of the vertex shader: GLSL without declarations."""
         return read_source(self._files[0]).code
 
     @property
     def fragment_source(self) -> str:
-        """GLSL without declarations."""
+        """Code of the fragment shader: GLSL without declarations."""
         return shader_defines() + read_source("common.glsl", self._files[1]).code
 
 
 @cache
 def all_passes() -> tuple[ComputePass | RasterPass, ...]:
-    """Return the passes of all source files."""
+    """Return all shader passes: one for each compute shader, and one for each pair of other shaders."""
     names = sorted(path.name for path in SHADER_FOLDER.glob("*.glsl"))
     kinds = {".comp.glsl": ComputePass, ".vert.glsl": RasterPass}
     return tuple(

@@ -1,4 +1,4 @@
-"""What is done before a picture: shaders are compiled, and meshes prepared for the device."""
+"""Preparation of a picture: compiling shaders, and computing data of meshes and sending it to the device."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from ..worker.job import Call, Step, Steps
 from .device import Device
 from .passes import ComputePass, RasterPass
 
-#: Seconds that may be computed in Blender's process: less than a redraw takes.
+#: Computations of at most this many seconds are made in Blender's process: less than a redraw takes.
 IN_PLACE_SECONDS = 0.05
 
 
 class Preparation(NamedTuple):
-    """Something that has to be computed, and is then sent to the device.
+    """A computation whose result is then sent to the device.
 
     Attributes
     ----------
     call : Call
-        Computes it. It has a label.
+        The function call that computes the result. It has a label, which the user sees meanwhile.
     seconds : float
-        About how long that takes. 0 for what only Blender's process can do.
+        Approximate time that the call takes; 0 if only Blender's process can make it.
     send : callable
-        Sends the result of the call to the device and returns the handle.
+        Function that sends the result of the call to the device and returns the handle of the data there.
     """
 
     call: Call
@@ -33,22 +33,23 @@ class Preparation(NamedTuple):
 
 
 def prepare_steps(lookups: Iterable[Callable[[], Any]]) -> Steps[list[Any]]:
-    """Look up handles, and prepare those that are not there yet.
+    """Look up handles of data on the device, and prepare the data that is not there yet.
 
     Parameters
     ----------
     lookups : iterable of callable
-        Each returns a handle or a `Preparation`, given what was prepared before.
+        Functions without arguments. Each returns a handle, or a `Preparation` if the data is not there.
 
     Yields
     ------
     Call or Step
-        A call if it takes long. Otherwise the call is made here.
+        A `Call` that takes long, to be made by the caller. A call that does not is made here, after its
+        `Step` is yielded.
 
     Returns
     -------
     list
-        The handles.
+        The handles, in the order of `lookups`.
     """
     handles = []
     for look_up in lookups:
@@ -68,7 +69,7 @@ def prepare_steps(lookups: Iterable[Callable[[], Any]]) -> Steps[list[Any]]:
 def compile_lookups(
     device: Device, shaders: Sequence[ComputePass | RasterPass]
 ) -> list[Callable[[], Preparation | None]]:
-    """Return a function for each shader that looks up whether it is compiled."""
+    """Return a function for each shader: it returns None if the shader is compiled, else a `Preparation`."""
     count = len(shaders)
     return [
         partial(_compilation, device, shader, index / count) for index, shader in enumerate(shaders)

@@ -1,7 +1,8 @@
 """The GPU renderer: the passes from meshes, fields and a camera to a picture, in their order.
 
-The numpy rooms have the same stages. Here they work on images instead of lists of pixels. A streamline
-is traced from every pixel and line: unlike `fast_lic`, no averages are shared between pixels.
+The numpy modules have the same stages. Here the stages work on images instead of lists of pixels.
+Streamlines are traced from every pixel along every line direction of its field. Unlike in `fast_lic`, no
+averages are shared between pixels.
 """
 
 from __future__ import annotations
@@ -42,15 +43,15 @@ from .resources import DrawItem, GpuResources
 from .tone_stage import render_target_tones
 from .uniforms import clip_uniforms
 
-#: How much closer to the eye than the surface its picture is drawn, in normalized depth.
+#: Normalized depth by which the picture is drawn closer to the eye than the surface that it covers.
 COMPOSITE_DEPTH_BIAS = 2e-5
 
-#: LIC methods that the card does not have, and the methods that it draws in 3D views instead.
+#: LIC methods without a shader, and for each the method that is drawn in 3D views instead.
 STAND_INS = {"members": "brute", "ibfv": "sheets"}
 
 
 def check_method(look: Look) -> None:
-    """Raise an error if the graphics card does not have the method of a look."""
+    """Check that the renderer has shaders for the LIC method of a look; otherwise raise `DeviceError`."""
     if look.method in STAND_INS:
         raise DeviceError(
             f"the graphics card cannot draw the method '{look.method}': choose another method, or the "
@@ -59,7 +60,7 @@ def check_method(look: Look) -> None:
 
 
 class GpuRenderer(ViewportRenderer):
-    """Draw pictures on a graphics card, for 3D views and for bakes.
+    """A renderer that draws pictures on a graphics card, for 3D views and for bakes.
 
     Parameters
     ----------
@@ -68,7 +69,7 @@ class GpuRenderer(ViewportRenderer):
     Attributes
     ----------
     resources : GpuResources
-        What stays on the device from picture to picture.
+        Meshes, images and textures that stay on the device from picture to picture.
     """
 
     downscale_factors = 2, 1
@@ -87,7 +88,7 @@ class GpuRenderer(ViewportRenderer):
             If an input is invalid, nothing is in view (`draw_picture`), or the driver rejects the
             shaders or the size.
         DeviceError
-            If the card does not have the look's method.
+            If there is no shader for the LIC method of the look.
         """
         look, camera, instances = view.look, view.camera, view.instances
         check_method(look)
@@ -106,26 +107,26 @@ class GpuRenderer(ViewportRenderer):
 
     def prepare_steps(self, instances: Sequence[MeshInstance], display: str) -> Steps[Any]:
         """Compile the shaders without switches, and send the meshes to the device."""
-        # Those with switches are compiled when their values are known.
+        # Shaders with switches are compiled when the values of the switches are known.
         shaders = [shader for shader in all_passes() if not shader.switches]
         meshes = self.resources.mesh_lookups(instances, display)
         return prepare_steps([*compile_lookups(self.device, shaders), *meshes])
 
     def upload(self, instances: Sequence[MeshInstance], display: str) -> list[DrawItem]:
-        """Return draw items of mesh instances. Meshes on the device are not sent again."""
+        """Return a draw item for each mesh instance. Meshes that are on the device are not sent again."""
         return self.resources.upload(instances, display)
 
     def covered_pixels(self, items: Sequence[DrawItem], camera: Camera) -> int:
-        """Return the number of pixels in the box around all meshes on screen."""
+        """Return the number of pixels in the bounding box on screen of all meshes."""
         width, height = box_size(union_box([screen_box(item, camera) for item in items]))
         return width * height
 
     def texture_steps(
         self, items: Sequence[DrawItem], view: ViewInput, target_key: Hashable = None
     ) -> Steps[Any]:
-        """Draw a picture into a texture, which later pictures with the same key reuse.
+        """Draw a picture into a texture. Later pictures with the same `target_key` overwrite this texture.
 
-        Streamlines are traced on the covering, whatever the method of the look is.
+        Streamlines are traced on the covering of the field, whatever the LIC method of the look is.
 
         Raises
         ------
@@ -163,9 +164,10 @@ class GpuRenderer(ViewportRenderer):
     def _stages(
         self, frame: Frame, target_key: Hashable
     ) -> tuple[Any, list[tuple[float, str, Callable[[], None]]]]:
-        """Return the texture of a picture, and the stages that add the passes which draw it.
+        """Return the texture that a picture is drawn into, and the stages of drawing.
 
-        Each stage has the fraction of the picture that is drawn before it, and a label.
+        A stage is a tuple: the fraction of the picture that is done before it, a label for the user, and a
+        function that adds its passes to the frame.
         """
         name = ("picture", target_key) if frame.samples is None else "shaded_picture"
         texture = self.resources.image(name, *frame.size)
@@ -196,7 +198,7 @@ class GpuRenderer(ViewportRenderer):
         return picture, [*stages, (1.0, "averaging samples", blend)]
 
     def _frame(self, items: Sequence[DrawItem], view: ViewInput) -> Frame:
-        """Return the frame of the pixels, and of their samples, if these are several."""
+        """Return the frame of a picture. It contains a frame of the samples if pixels have several."""
         instances = [item.instance for item in items]
         look = pixel_look(view.look, view.camera, instances, drift=view.drift)
         frame = Frame(self.resources, items, view, view.camera, look)
@@ -210,7 +212,7 @@ class GpuRenderer(ViewportRenderer):
     def composite(
         self, texture: Any, items: Sequence[DrawItem], view: ViewInput, opacity: float = 1.0
     ) -> None:
-        """Draw the surfaces again, with the picture on them."""
+        """Draw the surfaces into the current 3D view, with the picture on them."""
         batches = [
             (item.mesh.batch, clip_uniforms(item, view.camera, view.clip_planes))
             for item in items
@@ -219,7 +221,7 @@ class GpuRenderer(ViewportRenderer):
         draw_texture(self.device, texture, batches, opacity, depth_bias=COMPOSITE_DEPTH_BIAS)
 
     def finish(self) -> None:
-        """Wait until the device has done all work: reading a texture waits for it."""
+        """Wait until the device has done all work, by reading a texture."""
         self.device.read(lookup_tables.palette(self.resources), len(PALETTE), 1)
 
     def release(self) -> None:

@@ -30,11 +30,12 @@ from .mesh_buffers import (
 from .preparation import Preparation, prepare_steps
 from .surface_records import feature_records, line_records, outline_records
 
-#: Numbers of uploads, of all views together, for which something that is not used stays on the device: images,
-#: meshes (each frame of an animation has new ones), and tables that are computed from meshes.
+#: Data that is not used is freed after this many uploads, counted over all views: images, meshes (each frame
+#: of an animation has new ones), and tables that are computed from meshes.
 IMAGE_LIFETIME, MESH_LIFETIME, TABLE_LIFETIME = 32, 2, 4
 
-#: Seconds for each triangle of a mesh: of its buffers and outlines, of even lines, and of features.
+#: Computing time for each triangle of a mesh, in seconds: of the buffers and the outline, of evenly spaced
+#: lines, and of feature curvatures.
 BUFFER_SECONDS, LINE_SECONDS, FEATURE_SECONDS = 1e-6, 6e-6, 1e-5
 
 #: Maximum side, in texels, of an image that tones are sampled from.
@@ -50,9 +51,9 @@ class DrawItem:
     instance : MeshInstance
     mesh : GpuMesh
     model_matrix : (4, 4) float64 ndarray
-        From the mesh buffers to world space: a rotation, a uniform scale and a translation.
+        Map from the positions in `mesh` to world space: a rotation, a uniform scale and a translation.
     kind : FieldKind or None
-        None for a mesh that only occludes.
+        Kind of the field. None for a mesh without a field, which only occludes.
     """
 
     instance: MeshInstance
@@ -62,24 +63,27 @@ class DrawItem:
 
     @property
     def object_scale(self) -> float:
-        """Scale of the matrix of the instance."""
+        """Mean scale of the object-to-world matrix of the instance."""
         return matrix_scale(self.instance.matrix)
 
 
 @dataclass(frozen=True, eq=False)
 class GpuMesh:
-    """A mesh with its field on the device.
+    """A mesh on the device, with its field and tone.
 
     Attributes
     ----------
     buffers : MeshBuffers
+        The numpy data that was sent.
     batch : handle
-        A batch of `Device.batch`.
+        The vertex buffer, a result of `Device.batch`.
     records_texture : texture or None
-        The triangle records; None without a field.
+        The triangle records of `buffers`. None for a mesh without a field.
     tone_atlas : MipAtlas or None
+        The image that the tone is sampled from. None if the tone has no image.
     instance : MeshInstance
-        The instance whose mesh was sent. It keeps the arrays alive whose ids are in the key of the mesh.
+        The instance whose mesh was sent. This reference keeps its arrays alive: they are identified by
+        their ids in `GpuResources`, so the ids must not be used again.
     """
 
     buffers: MeshBuffers
@@ -90,15 +94,18 @@ class GpuMesh:
 
 
 class OutlineTextures(NamedTuple):
-    """The creases and parts of a mesh (`outline_mesh.OutlineMesh`) as textures.
+    """The creases and connected components of a mesh (`outline_mesh.OutlineMesh`) as textures.
 
     Attributes
     ----------
     crease_points : texture or None
-        The two ends of each edge, relative to the center of the mesh, in rows of `ROW_TEXELS`.
+        The two ends of each edge of a crease, relative to the center of the mesh, in rows of `ROW_TEXELS`.
+        None if there are no creases.
     crease_count : int
+        Number of edges of creases.
     triangle_parts : texture or None
-        The parts of four triangles in each texel. None if there is only one part.
+        The connected components of the triangles, four triangles in each texel. None if there is only one
+        component.
     """
 
     crease_points: Any
@@ -117,7 +124,7 @@ class MipAtlas:
         Width and height of level 0.
     max_level : int
     skipped_levels : int
-        Levels of the mip map that are larger than level 0 of the atlas.
+        Number of levels of the mip map that are larger than level 0 of the texture, and left out.
     """
 
     texture: Any
@@ -127,7 +134,9 @@ class MipAtlas:
 
 
 class GpuResources:
-    """The meshes, images and textures on a device. What is not used for some uploads is freed.
+    """The meshes, images and textures on a device.
+
+    Those that have not been used during the last uploads are freed; see `MESH_LIFETIME`.
 
     Parameters
     ----------
@@ -140,7 +149,7 @@ class GpuResources:
 
     def __init__(self, device: Device) -> None:
         self.device = device
-        #: What is on the device, and the last upload after which it stays there unused, by key.
+        #: By key: a handle on the device, and the number of the upload until which it stays there unused.
         self._kept: dict[Hashable, tuple[Any, int]] = {}
         self._lookup_textures: dict[str, tuple[Any, Any]] = {}
         self._upload_count = 0
@@ -153,12 +162,12 @@ class GpuResources:
     def mesh_lookups(
         self, instances: Sequence[MeshInstance], display: str
     ) -> list[Callable[[], GpuMesh | Preparation]]:
-        """Return a function for each mesh instance that looks its mesh up; see `prepare_steps`."""
+        """Return for each mesh instance a function that looks up its mesh; see `prepare_steps`."""
         kinds = field_kinds(instance.field for instance in instances if instance.field is not None)
         return [partial(self._mesh, instance, display, kinds) for instance in instances]
 
     def upload(self, instances: Sequence[MeshInstance], display: str) -> list[DrawItem]:
-        """Return draw items of mesh instances. Meshes on the device are not sent again.
+        """Return a draw item for each mesh instance. Meshes that are on the device are not sent again.
 
         Raises
         ------
@@ -182,7 +191,7 @@ class GpuResources:
     def feature_curvature(self, surface: Surface) -> Any:
         """Look up the curvature of features at the corners of each triangle of a surface.
 
-        See `field.feature_curvature`. It is a texture, or a `Preparation` of it.
+        Return a texture, or a `Preparation` of it. See `field.feature_curvature`.
         """
         call = Call(feature_records, (surface,), label="measuring features")
         key = "feature curvature", surface.rest_shape_key
@@ -192,12 +201,12 @@ class GpuResources:
     def outline_textures(
         self, item: DrawItem, crease_angle: float | None
     ) -> OutlineTextures | Preparation:
-        """Look up the creases and parts of the mesh of an item.
+        """Look up the creases and connected components of the mesh of an item, or return a `Preparation`.
 
         Raises
         ------
         RosyError
-            When they are sent: if there are too many for the device.
+            By the function `Preparation.send`, if there are too many creases or triangles for the device.
         """
         surface = item.instance.surface
         linear, _ = split_matrix(item.instance.matrix)
@@ -218,12 +227,14 @@ class GpuResources:
     def line_records(
         self, item: DrawItem, display: str, spacing: float
     ) -> tuple[Any, int] | Preparation:
-        """Look up the texture of `surface_records.line_rows` for an instance, and its node count.
+        """Look up the evenly spaced lines of an instance, or return a `Preparation`.
+
+        The result is a texture with the rows of `surface_records.line_rows`, and the node count.
 
         Parameters
         ----------
         item : DrawItem
-            With a field.
+            An instance with a field.
         display : {"smooth", "flat"}
         spacing : float
             Distance between lines, in Blender units.
@@ -231,7 +242,7 @@ class GpuResources:
         Raises
         ------
         RosyError
-            When it is sent: if the lines do not fit into a texture.
+            By the function `Preparation.send`, if the lines do not fit into a texture.
         """
         surface, matrix, field = item.instance.surface, item.instance.matrix, item.instance.field
 
@@ -253,7 +264,7 @@ class GpuResources:
         texel_format: str = "RGBA32F",
         layers: int = 0,
     ) -> Any:
-        """Return the image of a name, size and format. Its contents are those of its last use."""
+        """Return the image with a name, size and format. Its contents are those of its last use, if any."""
         size_and_format = width, height, texel_format, layers
         key = "image", name, *size_and_format
         texture = self._kept[key][0] if key in self._kept else self.device.texture(*size_and_format)
@@ -266,16 +277,18 @@ class GpuResources:
         create: Callable[[], np.ndarray],
         min_size: tuple[int, int] = (0, 0),
     ) -> Any:
-        """Return a texture of values. Of each name, the last key is kept.
+        """Return a texture of values, created if it does not exist.
+
+        Only one texture is kept for each name: the one with the last key.
 
         Parameters
         ----------
         name : str
         key : any
         create : function
-            Returns (H, W, C) values; the other channels are 0.
+            Returns (H, W, C) values. The texture has four channels; those after the first C are 0.
         min_size : (int, int)
-            Width and height in texels. A smaller texture is created again.
+            Smallest width and height in texels. A texture that is smaller is created again.
         """
         last_key, texture = self._lookup_textures.get(name, (None, None))
         is_kept = (
@@ -290,7 +303,7 @@ class GpuResources:
         return texture
 
     def reference_atlas(self, reference: ReferenceRender) -> MipAtlas:
-        """Return the image that the tone "picture" is sampled from."""
+        """Return the mip map of a reference render's luminance, which the tone "picture" is sampled from."""
         cached = self._lookup_textures.get("rendered")
         if cached is None or cached[0] is not reference:
             cached = reference, self._upload_atlas(reference.mip_map)
@@ -305,20 +318,23 @@ class GpuResources:
         send: Callable[[Any], Any],
         lifetime: int = TABLE_LIFETIME,
     ) -> Any:
-        """Return what is kept under a key, or a `Preparation` of it with the other arguments."""
+        """Return the handle that is kept under a key or, if there is none, a `Preparation`.
+
+        `call`, `seconds` and `send` are the attributes of the preparation.
+        """
         if key in self._kept:
             return self._keep(key, self._kept[key][0], lifetime)
         return Preparation(call, seconds, lambda answer: self._keep(key, send(answer), lifetime))
 
     def _keep(self, key: Hashable, handle: Any, lifetime: int) -> Any:
-        """Keep a handle until it has not been used for a number of uploads, and return it."""
+        """Return a handle, and keep it until it has not been used during `lifetime` uploads."""
         self._kept[key] = handle, self._upload_count + lifetime
         return handle
 
     def _mesh(
         self, instance: MeshInstance, display: str, kinds: dict[int, FieldKind]
     ) -> GpuMesh | Preparation:
-        """Look up the mesh of an instance."""
+        """Look up the mesh of an instance, or return a `Preparation` of it."""
         surface, field, tone = instance.surface, instance.field, instance.tone
         linear, _ = split_matrix(instance.matrix)
         channels = () if field is None else kinds[field.degree].channels
@@ -343,13 +359,13 @@ class GpuResources:
     def _rows_texture(
         self, rows: np.ndarray, surface: Surface, what: str, remedy: str = "choose the processor"
     ) -> Any:
-        """Return rows of `ROW_TEXELS` as a texture, or raise a `RosyError` if there are too many."""
+        """Return (rows, `ROW_TEXELS`, 4) values as a texture; raise a `RosyError` if they do not fit."""
         if len(rows) > self.device.max_texture_size:
             raise RosyError(f"{surface.name}: {what} are too many for this graphics card: {remedy}")
         return self._texture(rows)
 
     def _texture(self, values: np.ndarray) -> Any:
-        """Return (H, W, C) values as a texture; its other channels are 0."""
+        """Return (H, W, C) values as a texture of four channels; those after the first C are 0."""
         height, width, channels = values.shape
         data = np.pad(values, ((0, 0), (0, 0), (0, 4 - channels))) if channels < 4 else values
         return self.device.texture(width, height, "RGBA32F", data=data)

@@ -1,4 +1,4 @@
-"""Choice of the renderer, by device: for pictures and for 3D views."""
+"""Choice of the renderer for pictures and for 3D views: numpy, or the graphics card."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def select_device(device: str, look: Look) -> str:
     Returns
     -------
     {"cpu", "gpu"}
-        A part of cache keys, because the pixels of the two differ slightly.
+        The device. It is a part of cache keys, because the pixels of both devices differ slightly.
 
     Raises
     ------
@@ -65,9 +65,9 @@ def picture_steps(
     ----------
     view : ViewInput
     device : {"cpu", "gpu"}
-        From `select_device`.
+        Result of `select_device`.
     keep_gbuffers, workers
-        As for `bake_picture`.
+        See `bake_picture`.
 
     Returns
     -------
@@ -81,7 +81,7 @@ def picture_steps(
 def image_steps(
     view: ViewInput, device: str, as_float: bool, *, keep_gbuffers: bool = True, workers: int = 0
 ) -> Steps[tuple[Picture, ImageData]]:
-    """Draw a picture as part of a job, and convert it; see `picture_steps` and `picture_image`."""
+    """Draw a picture as part of a job, and convert it to an image; see `picture_steps`, `picture_image`."""
     if device == "cpu":
         return (yield Call(draw_image, (view, as_float, keep_gbuffers, workers)))
     picture = yield from part(picture_steps(view, device), 0.0, CONVERSION_START)
@@ -89,7 +89,7 @@ def image_steps(
 
 
 def automatic_device(look: Look) -> str:
-    """Return which device draws a look if the device is "auto": "cpu" or "gpu"."""
+    """Return the device that draws a look if the user has chosen "auto": "cpu" or "gpu"."""
     return select_device("auto", look)
 
 
@@ -99,14 +99,14 @@ def select_viewport_renderer(device: str) -> ViewportRenderer:
     Raises
     ------
     DeviceError
-        If there is no graphics context: then no picture can be shown.
+        If there is no graphics context, so that no picture can be shown.
     """
     gpu_device = blender_device()
     return CpuViewportRenderer(gpu_device) if device == "cpu" else GpuRenderer(gpu_device)
 
 
 def look_in_view(look: Look, renderer: ViewportRenderer) -> tuple[Look, str | None]:
-    """Return the look that a renderer draws in 3D views, and a line that says so if it is another one.
+    """Return the look that a renderer draws in 3D views, and a message if it differs from the given look.
 
     Parameters
     ----------
@@ -116,8 +116,9 @@ def look_in_view(look: Look, renderer: ViewportRenderer) -> tuple[Look, str | No
     Returns
     -------
     look : Look
-        The look, with a method that the renderer has.
+        The look, with an LIC method that the renderer supports.
     message : str or None
+        A line of text for the user if the method is another one, otherwise None.
     """
     method = renderer.stand_ins.get(look.method)
     if method is None:

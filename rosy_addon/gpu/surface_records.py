@@ -1,6 +1,6 @@
-"""What shaders look up on a surface besides its triangles: even lines, creases and features, as texels.
+"""Data of surfaces in the texel layout of the shaders: evenly spaced lines, creases, feature curvatures.
 
-These functions take long for large meshes, and need no Blender: helper processes call them too.
+These functions take long for large meshes. They do not need Blender, so a helper process can call them.
 """
 
 from __future__ import annotations
@@ -15,22 +15,23 @@ from ..projection.outline_mesh import cached_outline_mesh
 from ..projection.surface_lines import SurfaceLines, cached_surface_lines
 from .mesh_buffers import ROW_TEXELS, to_texture_rows
 
-#: Largest number of bisections between a triangle of a mesh and a leaf.
+#: Largest number of bisections from a triangle of a mesh down to a leaf of its `BisectionTree`.
 MAX_TREE_DEPTH = 96
 
 
 def line_records(
     surface: Surface, matrix: np.ndarray, field: RosyField, display: str, spacing: float
 ) -> tuple[np.ndarray, int, int]:
-    """Compute the evenly spaced lines of a mesh instance, as `surface_lines.cached_surface_lines`.
+    """Compute the evenly spaced lines of a mesh instance with `surface_lines.cached_surface_lines`.
 
     Returns
     -------
     rows : (rows, ROW_TEXELS, 4) float32 ndarray
         See `line_rows`.
     node_count : int
+        See `line_rows`.
     triangle_count : int
-        Triangles of the lines.
+        Number of leaves: triangles on which the phase is linear.
     """
     lines = cached_surface_lines(surface, matrix, field, display, spacing, BAKE_CACHE)
     BAKE_CACHE.evict_over_limit()
@@ -43,11 +44,11 @@ def line_rows(lines: SurfaceLines) -> tuple[np.ndarray, int]:
     Returns
     -------
     rows : (rows, ROW_TEXELS, 4) float32 ndarray
-        A texel for each node of the tree: its first child or -1, its bisected edge, and its leaf.
-        Then 1 + M texels for each leaf: its heading, and for each family of lines the phases at the
-        corners and the index.
+        First, a texel for each node of the `BisectionTree`: the node's first child or -1, its bisected
+        edge, and its leaf. Then 1 + M texels for each leaf: its heading (see `SurfaceLines`), and for each
+        of the M line directions the phases at the corners and the index of the phase.
     node_count : int
-        0 if nothing is bisected; then the nodes are left out.
+        Number of nodes in `rows`; 0 if no triangle is bisected, so that no nodes are needed.
     """
     tree, pattern = lines.tree, lines.pattern
     leaf_count, family_count = pattern.index.shape
@@ -69,7 +70,7 @@ def line_rows(lines: SurfaceLines) -> tuple[np.ndarray, int]:
 def outline_records(
     surface: Surface, linear: np.ndarray, center: np.ndarray, crease_angle: float | None
 ) -> tuple[np.ndarray | None, int, np.ndarray | None]:
-    """Find the creases and parts of a mesh, as `outline_mesh.cached_outline_mesh`.
+    """Find the creases and connected components of a mesh with `outline_mesh.cached_outline_mesh`.
 
     Parameters
     ----------
@@ -83,10 +84,12 @@ def outline_records(
     Returns
     -------
     crease_points : (rows, ROW_TEXELS, 4) float32 ndarray or None
-        The two ends of each edge, relative to the center.
+        The two ends of each edge of a crease, relative to `center`. None if there are no creases.
     crease_count : int
+        Number of edges of creases.
     triangle_parts : (rows, ROW_TEXELS, 4) float32 ndarray or None
-        The parts of four triangles in each texel. None if there is only one part.
+        The connected components of the triangles, four triangles in each texel. None if there is only one
+        component.
     """
     found = cached_outline_mesh(surface, linear, crease_angle, BAKE_CACHE)
     BAKE_CACHE.evict_over_limit()
@@ -100,8 +103,8 @@ def outline_records(
 
 
 def feature_records(surface: Surface) -> np.ndarray:
-    """Compute the curvature of features at the corners of each triangle, one triangle in a texel.
+    """Return the curvature of surface features as (rows, ROW_TEXELS, 4) float32, a texel for each triangle.
 
-    See `field.feature_curvature`. They are (rows, ROW_TEXELS, 4) float32.
+    A texel has the curvatures at the three corners; see `field.feature_curvature`.
     """
     return to_texture_rows(feature_curvature(surface))

@@ -16,10 +16,11 @@ from .uniforms import light_uniforms, light_view_uniforms, shadow_uniforms, tone
 
 
 def render_target_tones(frame: Frame) -> None:
-    """Render the target tone of each pixel, as ``frame.textures["tones"]``.
+    """Render the target tone of each pixel into ``frame.textures["tones"]``.
 
-    `target_tone.target_tone` is the same with numpy. The light alone is in the texture ``lighting``. If
-    numbers are colored, their places in the color map are in the last component, or -1.
+    The light alone is rendered into the texture ``lighting``. If the look colors values of the surface,
+    the last component of ``tones`` is the position of the value in the color map, from 0 to 1, or -1 where
+    there is no value. `target_tone.target_tone` does the same with numpy.
     """
     look, reference = frame.look, frame.view.reference
     tones = frame.image("tones")
@@ -39,7 +40,7 @@ def render_target_tones(frame: Frame) -> None:
         if atlas is not None and look.tone == "picture":
             requested_level = round(reference.mip_level(frame.camera)) - atlas.skipped_levels
             level = min(max(requested_level, 0), atlas.max_level)
-        # The light, if an item has no tone of its own.
+        # An item without a tone of its own has the light as its tone.
         has_own_tone = look.tone == "picture" or item.mesh.buffers.has_tone
         uniforms = {
             **shared_uniforms,
@@ -54,7 +55,7 @@ def render_target_tones(frame: Frame) -> None:
 
 
 def _lighting(frame: Frame) -> Any:
-    """Return the light of all light sources together, as `shading.diffuse` at full strength."""
+    """Return an image of the light of all light sources together, as `shading.diffuse` at full strength."""
     boxes = [screen_box(item, frame.camera) for item in frame.items if item.kind is not None]
     box = union_box(boxes)
     images = [frame.image(f"lighting {index}") for index in range(2)]
@@ -74,7 +75,10 @@ def _lighting(frame: Frame) -> Any:
 
 
 def _shadow_visibility(frame: Frame, light: dict[str, Any], box: Box) -> Any:
-    """Return the share of a light that reaches each pixel, as `shadow_maps.shadow_visibility`."""
+    """Return an image of the fraction of a light that reaches each pixel of a box.
+
+    `shadow_maps.shadow_visibility` does the same with numpy.
+    """
     kind = "sun" if light["light_kind"] == SUN_LIGHT else "point"
     vector = np.array(light["light_vector"][:3])
     images = [frame.image(f"shadow visibility {index}", "RGBA16F") for index in range(2)]

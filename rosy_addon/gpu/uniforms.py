@@ -70,12 +70,12 @@ from .defines import (
 from .mesh_buffers import FieldKind
 from .resources import DrawItem
 
-#: Planes that clip nothing.
+#: Six clip planes (x, y, z, w) that cut nothing away.
 NO_CLIP_PLANES = np.tile([0.0, 0.0, 0.0, 1.0], (6, 1))
 
 
 def matrix_rows(name: str, labels: Iterable[Any], rows: np.ndarray) -> dict[str, tuple[float, ...]]:
-    """Return the rows of a matrix as uniforms, each of which has a label."""
+    """Return each row of a matrix as a uniform, whose name is `name` with one of the labels."""
     return {f"{name}_{label}": tuple(row) for label, row in zip(labels, rows, strict=True)}
 
 
@@ -101,7 +101,7 @@ def camera_uniforms(camera: Camera) -> dict[str, Any]:
 
 
 def camera_to_pixels(camera: Camera) -> tuple[float, ...]:
-    """Return the (2, 2) matrix from the camera plane to pixels, as in `pixel_neighbors`."""
+    """Return the (2, 2) matrix from x and y of camera space to pixels, as in `pixel_neighbors`; 4 floats."""
     scaled = camera.projection[:2, :2] * [[camera.width], [camera.height]]
     return tuple((scaled / (2 * camera.pixels_per_unit)).ravel())
 
@@ -109,7 +109,7 @@ def camera_to_pixels(camera: Camera) -> tuple[float, ...]:
 def look_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
     """Return the uniforms of line integral convolution and ink that are computed from the look.
 
-    Shaders read settings themselves as well; see `Frame.run`.
+    Settings that shaders use unchanged are not included; `Frame.run` adds them.
     """
     look = look.for_symmetry(kind.symmetry)
     kernel, break_length = look.kernel, break_steps(look)
@@ -124,7 +124,7 @@ def look_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
         "half_length": 0 if is_even(look) else look.length,
         "full_samples": full_sample_count(look.length, kernel),
         "crossing_correlation": crossing,
-        # The streaks that drift have one channel, unlike their noise.
+        # Streaks that drift have one channel, although their noise has several.
         "noise_channels": 1 if has_flow(look) else noise_args(look)["channels"],
         "family_count": kind.family_count if look.hue == "families" else 1,
         "family_channel": len(kind.channels) - 1,
@@ -147,7 +147,7 @@ def look_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
         "paper_grain_depth": _paper_grain_depth(look, statistics),
         "paper_grain_channels": PAPER_GRAIN_CHANNELS if look.anchor == "surface" else 0,
         "paper_grain_shift": line_offset(look.line_width),
-        # Not defines: compilers reorder sums with constants, and the result would change.
+        # These are not `#define`s: compilers reorder sums with constants, which would change the result.
         "onset_range": ONSET_RANGE,
         "onset_lead": ONSET_LEAD,
         "even_lines": int(is_even(look)),
@@ -158,7 +158,7 @@ def look_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
 
 
 def _flow_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
-    """Return the uniforms of streaks that drift: which way, and the shifts and weights of the channels."""
+    """Return the uniforms of drifting streaks: the kind of drift, and the shifts and weights of channels."""
     if not has_flow(look):
         return {"flow_mode": FLOW_NONE, "flow_shifts": (0.0,) * 4, "flow_weights": (0.0,) * 4}
     return {
@@ -206,14 +206,14 @@ def tone_uniforms(look: Look, camera: Camera, reference: ReferenceRender | None)
 
 
 def shadow_uniforms(item: DrawItem, light_view: Camera) -> dict[str, Any]:
-    """Return the rows of the matrix from a model to the clip space of a light, and of its depth."""
+    """Return the uniforms that render a shadow map: the matrices from model space to clip space and depth."""
     clip = light_view.projection @ light_view.view @ item.model_matrix
     depth_row = tuple(-(light_view.view @ item.model_matrix)[2])
     return {**matrix_rows("clip", "xyzw", clip), "depth_row": depth_row}
 
 
 def light_view_uniforms(light_view: Camera, camera: Camera) -> dict[str, Any]:
-    """Return the matrices from camera space to the shadow map of a light."""
+    """Return the uniforms that look up a shadow map: the matrices from camera space, and the normal bias."""
     rotation, translation = camera.view[:3, :3], camera.view[:3, 3]
     camera_to_world = np.eye(4)
     camera_to_world[:3, :3], camera_to_world[:3, 3] = rotation.T, -rotation.T @ translation
@@ -250,13 +250,13 @@ def covering_uniforms(kind: FieldKind) -> dict[str, Any]:
 
 
 def min_normal_cosine(look: PixelLook) -> float:
-    """Return the cosine of the largest angle between the normals of pixels that continue each other."""
+    """Return the cosine of the crease angle. Without creases, return -2, which is below all cosines."""
     angle = crease_angle_of(look)
     return -2.0 if angle is None else float(np.cos(angle))
 
 
 def direction_uniforms(kind: FieldKind, look: PixelLook, camera: Camera) -> dict[str, Any]:
-    """Return the uniforms that unfold the covering, and map members to directions on screen."""
+    """Return the uniforms of the pass that computes the covering and the directions of members on screen."""
     orders = kind.harmonic_orders
     return {
         **covering_uniforms(kind),
@@ -269,7 +269,7 @@ def direction_uniforms(kind: FieldKind, look: PixelLook, camera: Camera) -> dict
 
 
 def even_line_uniforms(look: PixelLook, item: DrawItem, camera: Camera) -> dict[str, Any]:
-    """Return the uniforms of the pass that evaluates the even lines of one instance.
+    """Return the uniforms of the pass that evaluates the evenly spaced lines of one instance.
 
     `camera` is the camera of the frame.
     """
@@ -309,7 +309,7 @@ def surface_noise_uniforms(settings: dict[str, Any]) -> dict[str, Any]:
 def surface_cell_uniforms(
     settings: dict[str, Any], item: DrawItem, camera: Camera
 ) -> dict[str, Any]:
-    """Return the size of the noise cells of one surface, in its own units."""
+    """Return the uniforms for the size of the noise cells of one surface, in units of its object space."""
     cell = settings["cell"] * LATTICE_SCALE
     return {
         "pixel_size": cell / (camera.pixels_per_unit * item.object_scale),
@@ -318,7 +318,7 @@ def surface_cell_uniforms(
 
 
 def wobble_uniforms(look: PixelLook, item: DrawItem, camera: Camera) -> dict[str, Any]:
-    """Return the wavelength of the wobble, in pixels or in the units of a surface."""
+    """Return the uniforms for the wavelength of the wobble, in pixels or in units of a surface."""
     wavelength = look.line_width * MEAN_WAVELENGTH_WIDTHS
     cell_size = cell_size_args(look)
     on_surface = look.anchor == "surface"

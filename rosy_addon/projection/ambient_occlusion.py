@@ -24,7 +24,8 @@ DIRECTION_COUNT, DEPTH_MAP_SIZE = 256, 512
 
 #: Sample points are moved from their vertex into the adjacent faces: by this many pixels of the
 #: shadow map, but at most by this fraction of the distance to the mean of the face centers.
-#: Otherwise an adjacent wall would hide half of the filter window of a sample on their common edge.
+#: Otherwise half of the filter window of a sample on an edge between a floor and a wall would lie behind
+#: the wall.
 SAMPLE_INSET_PIXELS, MAX_INSET_FRACTION = 2 * NORMAL_BIAS_PIXELS, 0.3
 
 
@@ -90,9 +91,10 @@ def fibonacci_sphere(count: int) -> np.ndarray:
 
 
 def _sample_points(instance: MeshInstance, inset: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return (K, 3) sample points of the fans, moved into their faces, and (K, 3) unit normals.
+    """Return a (K, 3) sample point and a (K, 3) unit normal for each of K fans of corners.
 
-    Both are in world space. `inset` is a distance in world units; `MAX_INSET_FRACTION` limits it.
+    Both are in world space. The points are moved from the vertices into the faces by `inset`, a distance in
+    world units that `MAX_INSET_FRACTION` limits.
     """
     surface, linear = instance.surface, np.asarray(instance.matrix, dtype=np.float64)[:3, :3]
     vertex = np.empty((len(surface.fan_normal), 3))

@@ -9,10 +9,11 @@ from ..core.progress import report
 #: Triangles, spans or fragments per block. Bounds memory, and fits the caches of the processor.
 BLOCK_SIZE = 1 << 14
 
-#: Sum of barycentric coordinates that is not due to rounding: the pixel center is outside.
+#: Largest sum of nonnegative barycentric coordinates that rounding explains. If the sum is larger, some
+#: coordinates were negative and set to 0, so the pixel center is outside of the triangle.
 MAX_WEIGHT_SUM = 1 + 1e-4
 
-#: Label of the progress.
+#: Text that the user sees while this step runs.
 LABEL = "finding visible pixels"
 
 
@@ -33,8 +34,8 @@ def barycentrics(
     Returns
     -------
     weights : (P, 3) float32 ndarray
-        A point in the triangle, even if the pixel center is outside of it. 1 / 3 each for triangles
-        that have no area on screen.
+        Coordinates of a point in the triangle. If the pixel center is outside of the triangle, this is
+        another point. The coordinates are 1 / 3 each for triangles that have no area on screen.
     front_facing : (P,) bool ndarray
         Whether the corners run counter-clockwise on screen.
     """

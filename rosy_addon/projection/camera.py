@@ -13,7 +13,8 @@ from ..field.frames import normalize
 #: Largest width or height of a picture, in pixels.
 MAX_SIDE_PIXELS = 16384
 
-#: Angle of view over the longer side of Blender's default camera, in radians: a lens of 50 mm, a sensor of 36 mm.
+#: Angle of view over the longer side of the picture, in radians, of Blender's default camera: it has a lens
+#: of 50 mm and a sensor of 36 mm.
 DEFAULT_FOV = float(2 * np.arctan(36 / (2 * 50)))
 
 #: Fraction of the frame that stays empty at each border, where a camera frames points.
@@ -80,7 +81,7 @@ class Camera:
 
     @property
     def key(self) -> Hashable:
-        """The values of the camera without its name, for keys of caches."""
+        """Key for caches: equal for two cameras that differ only in their names."""
         return self.view.tobytes(), self.projection.tobytes(), self.width, self.height
 
     @property
@@ -90,9 +91,10 @@ class Camera:
 
     @property
     def pixels_per_unit(self) -> float:
-        """Pixels per Blender unit, perpendicular to the camera axis; at depth 1 if perspective.
+        """Pixels per Blender unit, perpendicular to the camera axis.
 
-        If pixels are not square, the geometric mean of both directions.
+        A perspective camera has this scale at depth 1, an orthographic camera at any depth. If pixels are
+        not square, it is the geometric mean of the horizontal and the vertical scale.
         """
         scale = _xy_determinant(self.projection) * self.width * self.height / 4
         return float(np.sqrt(scale))
@@ -112,7 +114,7 @@ class Camera:
         return normalize(self.eye - points)
 
     def depths(self, points: np.ndarray) -> np.ndarray:
-        """Return the (...) distances of (..., 3) points in world space along the axis of this camera."""
+        """Return the (...) depths of (..., 3) points in world space, along the axis of this camera."""
         return -(points @ self.view[2, :3] + self.view[2, 3])
 
     def resized(self, width: int, height: int) -> Camera:
@@ -127,8 +129,8 @@ class Camera:
     def clip_to_camera_xy(self) -> np.ndarray:
         """Inverse of the upper left (2, 2) part of the projection matrix.
 
-        Maps x and y of clip space, after the lens shift is removed, to x and y of camera space: at
-        depth 1 if perspective, at any depth if orthographic.
+        It maps x and y of clip space, after the lens shift is removed, to x and y of camera space. They
+        are coordinates at depth 1 for a perspective camera, and at any depth for an orthographic one.
         """
         # In closed form, because linear algebra libraries start all their threads for any system.
         (a, b), (c, d) = self.projection[:2, :2]
@@ -136,7 +138,7 @@ class Camera:
 
 
 def _xy_determinant(projection: np.ndarray) -> float:
-    """Return the determinant of the part of a projection matrix that maps x and y."""
+    """Return the determinant of the upper left (2, 2) part of a projection matrix, which maps x and y."""
     (a, b), (c, d) = projection[:2, :2]
     return float(a * d - b * c)
 
@@ -166,7 +168,7 @@ def _validated_view(view: np.ndarray, name: str) -> np.ndarray:
 
 
 def _validated_projection(projection: np.ndarray, name: str) -> np.ndarray:
-    """Return the projection matrix, scaled as `Camera` states, or raise `RosyError`."""
+    """Return the projection matrix, scaled as described in `Camera`; raise `RosyError` if it is invalid."""
     projection = _validated_matrix(projection, "projection", name)
     w_row, xy_rows = projection[3], projection[:2]
     if w_row[2] < 0 and not w_row[[0, 1, 3]].any() and not xy_rows[:, 3].any():
@@ -181,7 +183,7 @@ def _validated_projection(projection: np.ndarray, name: str) -> np.ndarray:
 
 
 def pixel_rays(camera: Camera, pixel: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return x and y of the rays through the centers of pixels, in camera space.
+    """Return the rays through the centers of pixels, each given by x and y in camera space.
 
     Parameters
     ----------
@@ -328,9 +330,9 @@ def look_at(
 
 
 def _view_from_axes(axes: np.ndarray, eye: np.ndarray) -> np.ndarray:
-    """Return the (4, 4) view matrix of a camera at a point, world space.
+    """Return the (4, 4) view matrix of a camera at the point `eye` in world space.
 
-    The rows of `axes`, (3, 3), are the unit vectors right, up and back.
+    The rows of `axes`, (3, 3), are unit vectors in world space: right, up and back, as seen by the camera.
     """
     view = np.eye(4)
     view[:3, :3], view[:3, 3] = axes, -axes @ eye
@@ -338,7 +340,7 @@ def _view_from_axes(axes: np.ndarray, eye: np.ndarray) -> np.ndarray:
 
 
 def orbit_basis(azimuth: float, elevation: float) -> np.ndarray:
-    """Return (3, 3) rows right, up and back of a camera, given its direction in degrees.
+    """Return a (3, 3) array with the unit vectors right, up and back of a camera, given angles in degrees.
 
     World z is up. Azimuth 0, elevation 0 looks along +y (Blender's front view), azimuth 90 along -x
     (its right view), elevation 90 down along -z (its top view).
@@ -429,17 +431,17 @@ def framing_points(
     *,
     perspective: bool = True,
 ) -> np.ndarray:
-    """Return the few points that determine `orbit_camera`.
+    """Return the few points that determine the result of `orbit_camera`.
 
-    The camera that frames them frames all points. The points of a long animation can so be joined
-    step by step.
+    The camera that frames these points frames all of the given points. So the framing of a long
+    animation can be computed frame by frame, without keeping all of its points.
 
     Parameters
     ----------
     points : (V, 3) ndarray
         World space; at least one.
     azimuth, elevation, width, height, perspective
-        See `orbit_camera`. The margin is its default.
+        See `orbit_camera`. The result is valid for its default margin.
 
     Returns
     -------

@@ -5,9 +5,10 @@ the deformed face (`face_values`). From the faces, the field is transported to t
 averaged over each smooth fan of corners. All steps but the first work on the representation
 z = rho exp(i N t), so that the result does not depend on which of the N members is stored.
 
-A field can have more values than z: the deviations of directions that are not evenly spaced, and
-the line that the stored member is on. They are complex numbers too and take the same steps, but
-they rotate with the frame by other powers (`field_channel.rotation_order`).
+A field can have more values than z: harmonics for directions that are not evenly spaced, and a number
+for the family of the stored member, if the directions are labeled. These channels
+(`field_channel.FieldChannel`) are complex numbers too and are computed by the same steps, but they
+rotate with the frame by other powers (`field_channel.rotation_order`).
 
 Results are in world space without the translation. Vectors are stored by component, each
 component contiguous in memory.
@@ -60,8 +61,8 @@ class CornerField:
     geometric_normal : (3, T) float32 ndarray
         Unit normals of the triangles, oriented by the order of their corners.
     channels : dict of FieldChannel to (3, T) complex64 ndarray
-        z, and the other values of the field, at each corner. The values at corners 1 and 2 are
-        transported along the arc to n_0.
+        z, and the other channels of the field, at each corner. The values at corners 1 and 2 are
+        transported to corner 0, along the shortest arc between the normals.
     """
 
     corner_normals: np.ndarray
@@ -77,12 +78,12 @@ class CornerField:
         return self.channels[REPRESENTATION]
 
     def part(self, triangle: np.ndarray) -> CornerField:
-        """Return the values of (n,) triangles."""
+        """Return the field and the normals of the triangles with (n,) indices."""
         channels = {channel: values[:, triangle] for channel, values in self.channels.items()}
         return replace(part_of(self, (..., triangle)), channels=channels)
 
     def rotated(self, rotation: np.ndarray) -> CornerField:
-        """Return the same values with all vectors rotated by a (3, 3) matrix into another space."""
+        """Return a copy in another space: all vectors are rotated by a (3, 3) matrix."""
         return replace(
             self,
             corner_normals=np.stack(
@@ -144,7 +145,7 @@ def field_at_corners(
 def cached_corner_field(
     instance: MeshInstance, display: str, cache: Cache | None = None
 ) -> CornerField:
-    """Return `field_at_corners` of an instance with a field, stored in a cache if one is given.
+    """Return the result of `field_at_corners` for an instance with a field; store it in a cache if given.
 
     All cameras, and instances that differ only in their location, share one corner field.
     """
@@ -262,9 +263,9 @@ def _fill_triangles(
     custom_normals: np.ndarray | None,
     degree: int,
 ) -> None:
-    """Write the values of one block of triangles into `corner_field`.
+    """Write the field and the normals of one block of triangles into `corner_field`.
 
-    Without fans (flat display), the corners get the values of their faces.
+    If `fans` is None (flat display), the corners get the values and normals of their faces.
     """
     corners = surface.triangles[block].T.astype(np.intp)
     face = surface.triangle_face[block]
@@ -312,7 +313,10 @@ def _fill_triangles(
 def _fill_missing_normals(
     normal: list[np.ndarray], geometric_normal: np.ndarray
 ) -> list[np.ndarray]:
-    """Replace zero normals by the geometric normals, or by the z axis where these are zero too."""
+    """Return normals in which zero normals are replaced by the geometric normals.
+
+    Where these are zero too, the result is the z axis.
+    """
     missing = dot_components(normal, normal) == 0
     if missing.any():
         replacements = geometric_normal[:, missing]
@@ -329,7 +333,7 @@ def _corner_normals(
     fans: TangentValues,
     custom_normals: np.ndarray | None,
 ) -> tuple[list[list[np.ndarray]], list[np.ndarray] | None]:
-    """Return the normals at the three corners of triangles, and the rotations of frames to them.
+    """Return the normals at the three corners of triangles, and the rotations of the tangent frames.
 
     Parameters
     ----------
@@ -339,13 +343,14 @@ def _corner_normals(
         Corners of the triangles.
     fans : TangentValues
     custom_normals : (3, C) ndarray or None
-        Normals that differ within fans, of any length.
+        Custom normals at all corners of the surface, of any length. Corners of one fan may differ.
 
     Returns
     -------
     normals : 3 lists of 3 (n,) float32 ndarrays
     phases : 3 (n,) complex64 ndarrays or None
-        With custom normals, the rotations from the frames of the fan normals to theirs.
+        Unit complex numbers: the rotations from the tangent frames of the fan normals to those of the
+        custom normals. None if there are no custom normals.
     """
     normals = [[component.take(fan_index) for component in fans.normal] for fan_index in fan]
     if custom_normals is None:

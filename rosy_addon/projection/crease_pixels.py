@@ -1,4 +1,4 @@
-"""The pixels at which a line in space is visible, such as an edge of a crease."""
+"""The pixels at which a line segment in space is visible, such as an edge of a crease."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from .camera import Camera
 from .gbuffer import GBuffer
 from .pixel_neighbors import depth_slopes
 
-#: Smallest depth at which a line is drawn, relative to the depth of its farther end.
+#: Smallest depth at which a segment is drawn, as a fraction of the depth of its farther end.
 MIN_RELATIVE_DEPTH = 1e-3
 
 #: Edges that are projected at once, and crossings that are tested at once.
 BLOCK_EDGES, BLOCK_CROSSINGS = 1 << 14, 1 << 16
 
-#: Tolerance of the depth of a visible line, in multiples of the tolerance of `depth_slopes`.
+#: Tolerance of the depth of a visible segment, in multiples of the tolerance of `depth_slopes`.
 LINE_TOLERANCE = 2.0
 
 
@@ -39,18 +39,19 @@ def crease_pixels(
     ----------
     gbuffer : GBuffer
     instance_id : int
-        The instance of the edges. Other instances have no marks.
+        Index of the instance that has the edges. Only pixels of this instance are found.
     points : (n, 2, 3) float64 ndarray
         The ends of the edges in world space.
     entry_of_cell : (cells,) int32 ndarray
-        The entry of the G-buffer in each cell of a frame with a margin, or -1.
+        The frame with a margin, as a grid of cells, row by row: for each cell the index of its pixel in
+        the G-buffer, or -1 if the G-buffer does not contain it.
     origin, stride : int
-        Cell of the lower left pixel, and cells in a row.
+        Index of the cell of the lower left pixel, and number of cells in a row.
 
     Returns
     -------
     (P,) bool ndarray
-        Which pixels of the G-buffer these are.
+        Whether each pixel of the G-buffer is next to a visible edge.
     """
     marks = np.zeros(len(gbuffer.pixel), dtype=bool)
     for start in range(0, len(points), BLOCK_EDGES):
@@ -70,7 +71,11 @@ def crease_pixels(
 
 
 def _on_screen(points: np.ndarray, camera: Camera) -> np.ndarray:
-    """Return (m, 2, 3) ends in pixels, with the depth of `pixel_neighbors.depth_slopes`."""
+    """Return the (m, 2, 3) ends of edges on screen: x, y in pixels, and depth as in `depth_slopes`.
+
+    `points` are their (n, 2, 3) ends in world space. Under perspective, edges are clipped in front of the
+    eye, and edges behind it are left out.
+    """
     view, projection = camera.view, camera.projection
     ends = points @ view[:3, :3].T + view[:3, 3]
     if camera.is_perspective:
@@ -92,7 +97,9 @@ def _on_screen(points: np.ndarray, camera: Camera) -> np.ndarray:
 def _crossings(
     lines: np.ndarray, axis: int, camera: Camera
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield the crossings of lines with pixel rows (axis 0) or columns (axis 1), for the pixels on both sides.
+    """Yield the crossings of segments with the center lines of pixel rows (axis 0) or columns (axis 1).
+
+    Each crossing is yielded for the pixels on both sides of it.
 
     Yields
     ------

@@ -37,7 +37,7 @@ class TangentValues:
     normal : (3, n) float32 ndarray
         Unit normals. Zero for a face without area.
     channels : dict of FieldChannel to (n,) complex64 ndarray
-        z, and the other values of the field, in the tangent frame of the normal
+        z, and the other channels of the field, in the tangent frame of the normal
         (`tangent_frame_components`). Zero for a face without area.
     """
 
@@ -59,6 +59,7 @@ def face_values(
         The vertices, transformed by `linear`.
     field : RosyField
     with_angles : bool
+        Whether to compute the angles of the faces, too.
 
     Returns
     -------
@@ -116,7 +117,7 @@ def face_values(
 
 
 def _faces_by_size(face_start: np.ndarray) -> list[tuple[int, slice | np.ndarray]]:
-    """Return blocks of faces with equally many corners, as the number of corners and the faces."""
+    """Return blocks of faces with equally many corners: pairs of this number and the indices of the faces."""
     corner_counts = np.diff(face_start)
     if (corner_counts == corner_counts[0]).all():
         starts = range(0, len(corner_counts), BLOCK_SIZE)
@@ -134,7 +135,7 @@ def _faces_by_size(face_start: np.ndarray) -> list[tuple[int, slice | np.ndarray
 def similarity_scale(linear: np.ndarray, tolerance: float = SIMILARITY_EPS) -> float | None:
     """Return the scale of a (3, 3) linear map, or None if the map is not a similarity.
 
-    A similarity is a uniform scale with a rotation or reflection. `tolerance` is relative.
+    A similarity is a uniform scale with a rotation or reflection. `tolerance` is a relative error.
     """
     gram = linear.T @ linear
     squared_scale = np.trace(gram) / 3

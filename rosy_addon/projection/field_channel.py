@@ -1,9 +1,10 @@
-"""Field channels: the representation z of a field, and values that it can have in addition."""
+"""Field channels: the representation z of a field, and complex values that it can have in addition."""
 
 from __future__ import annotations
 
-#: Key of a value of a field. ("deviation", j) is the harmonic C_j of `field.directional_field`.
-#: ("family", m) is the representation, of degree N / m, of the line that the stored member is on.
+#: Key of a complex value of a field. ("deviation", j) is the harmonic C_j of `field.directional_field`.
+#: ("family", m) is the representation, of degree N / m, of the line that the stored member is on: a line
+#: is a pair of opposite members.
 FieldChannel = tuple[str, int]
 
 #: The channel of z itself, of degree N, which every field has.

@@ -17,7 +17,7 @@ from .surface_tone import SurfaceTone
 
 @dataclass(frozen=True, eq=False)
 class MeshInstance:
-    """An instance of a mesh in the scene: a surface, its transform, field, tone and numbers.
+    """An instance of a mesh in the scene: surface, transform, field, tone, and values for the color map.
 
     Attributes
     ----------
@@ -30,7 +30,8 @@ class MeshInstance:
     tone : SurfaceTone or None
         The tone of the surface, if it is given: painted, computed or from an image.
     color_values : (C,) float32 ndarray or None
-        Numbers at the C corners of the surface for the color map; NaN where there is none.
+        Values at the C corners of the surface, which the color map turns into colors. NaN at corners
+        without a value. None if the mesh has no such values.
     """
 
     surface: Surface
@@ -40,7 +41,7 @@ class MeshInstance:
     color_values: np.ndarray | None = None
 
     def to_world(self, points: np.ndarray) -> np.ndarray:
-        """Return (..., 3) points of object space in world space."""
+        """Transform (..., 3) points from object space to world space."""
         matrix = np.asarray(self.matrix, dtype=np.float64)
         return points @ matrix[:3, :3].T + matrix[:3, 3]
 
@@ -56,28 +57,31 @@ class MeshInstance:
         return self.to_world(self.surface.box_corners)
 
     def points_in_triangles(self, triangle: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
-        """Return (n, 3) points in world space, given (n,) triangles and (n, 3) coordinates in them."""
+        """Return (n, 3) points in world space, given (n,) triangles and (n, 3) barycentric coordinates."""
         corners = self.to_world(self.surface.vertices[self.surface.triangle_vertex[triangle]])
         return np.einsum("nk,nki->ni", barycentric, corners)
 
     def face_points(self) -> np.ndarray:
-        """Return the (n, 3) float64 vertices that have a face, in world space."""
+        """Return the (n, 3) float64 positions of the vertices that belong to a face, in world space."""
         return self.world_points()[self.surface.used_vertices]
 
 
 class PixelCoverage(NamedTuple):
-    """How much of the pixels the surfaces of P entries of a G-buffer cover.
+    """How much of the frame is covered by the surface that each of the P pixels of a G-buffer shows.
+
+    A surface covers samples of the pixels at whose centers it is visible. Each of E further samples lies
+    in one pixel, but shows the surface of a neighboring pixel.
 
     Attributes
     ----------
     own : (P,) float32 ndarray
-        Fraction of the pixel of the entry. It may be 0, if a triangle shows only at the center.
+        Fraction of the pixel that its surface covers. It may be 0, if a triangle shows only at the center.
     pixel : (E,) int32 ndarray
-        Other pixels, in ascending order, that show a part of the surface of an entry.
+        Pixel that contains the sample, as a flat index into the frame, in ascending order.
     entry : (E,) int32 ndarray
-        The entry.
+        Neighboring pixel whose surface the sample shows, as an index into the G-buffer.
     share : float
-        Fraction of the pixel.
+        Fraction of a pixel that one sample covers.
     """
 
     own: np.ndarray
@@ -87,20 +91,23 @@ class PixelCoverage(NamedTuple):
 
 
 class PixelSamples(NamedTuple):
-    """What is visible at S x S samples of each of the P pixels of a G-buffer.
+    """The visible triangles at S x S samples of each of the P pixels of a G-buffer.
+
+    Most samples show the triangle that the G-buffer stores for their pixel. The E others are listed.
 
     Attributes
     ----------
     side : int
         S.
     own : (P,) uint16 ndarray
-        The samples that show the triangle of the entry: bit ``row * S + column``.
+        Bit field of the samples that show the pixel's stored triangle: bit ``row * S + column``.
     other : (E,) int32 ndarray
         The samples that show another triangle, as flat indices into the frame of all samples.
     other_triangle : (E,) int32 ndarray
-        That triangle, counted over all mesh instances.
+        The triangle that each of these samples shows, counted over all mesh instances.
     other_entry : (E,) int32 ndarray
-        The entry whose surface they show: the entry of their own pixel, or of a pixel beside it.
+        The pixel whose surface each of these samples shows, as an index into the G-buffer: the pixel that
+        contains the sample, or a neighbor of it.
     """
 
     side: int
@@ -114,7 +121,8 @@ class PixelSamples(NamedTuple):
 class GBuffer:
     """The P visible pixels of all surfaces with a field, in ascending order of pixel index.
 
-    Each pixel has one entry in every (P, ...) array. All vectors are in camera space.
+    Each pixel has one element in every (P, ...) array. Other modules call its index an entry of the
+    G-buffer. All vectors are in camera space.
 
     Attributes
     ----------
@@ -151,10 +159,10 @@ class GBuffer:
         `representation`. Instances that do not have a channel have the value that it has for a
         plain RoSy field.
     coverage : PixelCoverage or None
-        How much of the pixels the entries cover, if pixels have several samples. None if each entry
-        covers its pixel.
+        How much of the pixels the surfaces cover, if pixels have several samples. None if each surface
+        covers its whole pixel.
     samples : PixelSamples or None
-        What is visible at these samples.
+        The visible triangles at these samples; None if pixels have one sample.
     """
 
     camera: Camera
@@ -188,7 +196,7 @@ class GBuffer:
     def instance_blocks(
         self,
     ) -> list[tuple[int, list[slice | np.ndarray], tuple[float, float]]]:
-        """Return the visible mesh instances in their order, with their pixels.
+        """Return a tuple for each visible mesh instance, in the order of instances: its pixels, in blocks.
 
         Returns
         -------
@@ -196,7 +204,8 @@ class GBuffer:
         blocks : list of slice or of (n,) intp ndarray
             Blocks of its pixels; see `pixel_blocks`.
         progress : (float, float)
-            Fractions of all pixels: in the instances before this one, and including this one.
+            Fraction of all pixels that belong to instances before this one, and the same fraction with
+            this instance included.
         """
         counts = np.bincount(self.instance_id)
         ends = np.cumsum(counts) / len(self.pixel)

@@ -74,7 +74,7 @@ def _clip_crossing_triangles(
     corners : (K', 3) int32 ndarray
         Vertex indices of the new triangles.
     triangle : (K',) int32 ndarray
-        Index of the original triangle of each.
+        Index of the original triangle that each new triangle is a part of.
     """
     corners = triangles[crossing]
     sides = inside[corners]

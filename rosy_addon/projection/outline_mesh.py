@@ -1,4 +1,4 @@
-"""What the outline of a mesh depends on besides the view: its creases, and its parts."""
+"""Creases and connected components of a mesh, from which its outline is drawn in any view."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from .face_values import similarity_scale
 
 
 class OutlineMesh(NamedTuple):
-    """The creases and the parts of a mesh, which all its deformations share.
+    """The creases and the connected components of a mesh, which all its deformations share.
 
     Attributes
     ----------
     crease_ends : (n, 2) int32 ndarray
         The vertices of each edge of a crease.
     triangle_part : (T,) int32 ndarray or None
-        The part of each triangle. Parts are not connected with each other. None if there is only one.
+        The connected component of each triangle. None if there is only one component.
     """
 
     crease_ends: np.ndarray
@@ -43,7 +43,7 @@ class OutlineMesh(NamedTuple):
 
 
 def outline_mesh(surface: Surface, linear: np.ndarray, crease_angle: float | None) -> OutlineMesh:
-    """Find the creases and the parts of a mesh, in its rest shape.
+    """Find the creases and the connected components of a mesh, in its rest shape.
 
     Creases neither appear nor vanish while a mesh is deformed, so outlines do not flicker.
 
@@ -53,7 +53,7 @@ def outline_mesh(surface: Surface, linear: np.ndarray, crease_angle: float | Non
     linear : (3, 3) ndarray
         Object to world space, without the translation.
     crease_angle : float or None
-        See `find_creases`. None: no creases.
+        See `find_creases`. If it is None, the mesh has no creases.
     """
     ends = np.empty((0, 2), dtype=np.int32)
     if crease_angle is not None:

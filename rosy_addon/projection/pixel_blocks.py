@@ -1,4 +1,4 @@
-"""Blocks of pixels: the unit in which long lists of pixels are processed; and parts of their data.
+"""Blocks of pixels: long lists of pixels are processed block by block.
 
 A block bounds the memory of intermediate results and fits the caches of the processor.
 """
@@ -24,7 +24,7 @@ def pixel_blocks(count: int) -> list[slice]:
 
 
 def part_of(record: Record, index: Any) -> Record:
-    """Return a dataclass with what an index of arrays chooses in each of its arrays."""
+    """Return a copy of a dataclass in which each array is replaced by ``array[index]``."""
     arrays = {
         name: value[index] for name, value in vars(record).items() if isinstance(value, np.ndarray)
     }

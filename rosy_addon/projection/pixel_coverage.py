@@ -1,8 +1,8 @@
 """How much of a pixel each surface covers, from several samples of the pixel.
 
-Only the visible triangle is found at every sample. All else is computed once for a pixel, at its
-center. Most samples show the same surface as the center. At silhouettes and creases, a sample may show the
-surface of a neighboring pixel instead.
+The visible triangle is found at every sample, but normals and field values are computed once for a pixel,
+at its center. Most samples show the same surface as the center. At silhouettes and creases, a sample may
+show the surface of a neighboring pixel instead. An entry is the index of a pixel in the G-buffer.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .rasterized_samples import SampledTriangles
 #: Smallest cosine between the normals of two triangles that show the same surface: 30 degrees.
 MIN_NORMAL_COSINE = np.float32(np.sqrt(0.75))
 
-#: Label of the progress.
+#: Text that the user sees while this step runs.
 LABEL = "finding visible pixels"
 
 
@@ -31,7 +31,7 @@ class _OtherSamples(NamedTuple):
     Attributes
     ----------
     entry : (E,) int32 ndarray
-        Entry of the G-buffer for the pixel.
+        The pixel that contains the sample, as an index into the G-buffer.
     x, y : (E,) float32 ndarray
         Position in pixels.
     depth : (E,) float32 ndarray
@@ -50,12 +50,16 @@ class _OtherSamples(NamedTuple):
     normal: np.ndarray
 
     def part(self, index: np.ndarray | slice) -> _OtherSamples:
-        """Return some of the samples."""
+        """Return the samples with the given indices."""
         return _OtherSamples(*(values[..., index] for values in self))
 
 
 class _Entries(NamedTuple):
-    """What is compared of the entries of a G-buffer: (P,) arrays as in `_OtherSamples`."""
+    """The P pixels of a G-buffer, as arrays that are compared with `_OtherSamples`.
+
+    Most arrays are those of `_OtherSamples`, at the centers of the pixels. `slope_x`, `slope_y` and
+    `tolerance` are results of `pixel_neighbors.depth_slopes`.
+    """
 
     x: np.ndarray
     y: np.ndarray
@@ -67,7 +71,7 @@ class _Entries(NamedTuple):
     normal: np.ndarray
 
     def shows(self, entry: np.ndarray, sample: _OtherSamples) -> np.ndarray:
-        """Return (n,) bool: whether samples are on the surfaces of entries, near their pixels."""
+        """Return (n,) bool: whether each sample is on the surface that its pixel in `entry` shows."""
         x, y = sample.x - self.x.take(entry), sample.y - self.y.take(entry)
         predicted = self.depth.take(entry)
         predicted += x * self.slope_x.take(entry) + y * self.slope_y.take(entry)
@@ -84,17 +88,17 @@ def pixel_coverage(
     instance_id: np.ndarray,
     triangle_normal: np.ndarray,
 ) -> tuple[PixelCoverage, PixelSamples]:
-    """Find the entry of the G-buffer whose surface each sample shows.
+    """Find for each sample the pixel of the G-buffer whose surface it shows.
 
     Parameters
     ----------
     gbuffer : GBuffer
-        At the centers of pixels.
+        The G-buffer at the centers of pixels.
     sampled : SampledTriangles
     samples : int
         Samples along each side of a pixel.
     instance_id, triangle_normal
-        Instances and normals of the other triangles of the samples; see `_OtherSamples`.
+        Mesh instances and normals of ``sampled.other_triangle``; see `_OtherSamples`.
     """
     others = _other_samples(sampled, gbuffer.camera, samples, instance_id, triangle_normal)
     camera = gbuffer.camera
@@ -168,7 +172,7 @@ def _other_samples(
 
 
 def _centers(index: np.ndarray, width: int, samples: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the positions of samples in pixels, (n,) float32 each, from their flat indices."""
+    """Return x and y of the centers of samples in pixels, (n,) float32 each, from their flat indices."""
     row, column = np.divmod(index, np.int32(width))
     scale = np.float32(1 / samples)
     half = np.float32(0.5)

@@ -19,8 +19,8 @@ from .pixel_blocks import BLOCK_PIXELS, pixel_blocks
 #: Corresponds to 88 degrees.
 MAX_SLOPE = 30.0
 
-#: Tolerance of the depth difference between neighbors against the prediction of the tangent planes:
-#: in pixels on a surface that faces the eye, and the increase for each unit of slope.
+#: Largest deviation of the depth difference between neighbors from the prediction of the tangent planes,
+#: in pixels: on a surface that faces the eye, and its increase for each unit of slope.
 DEPTH_TOLERANCE, SLOPE_TOLERANCE = 0.5, 0.5
 
 
@@ -66,7 +66,7 @@ def neighbor_masks(gbuffer: GBuffer, crease_angle: float | None) -> np.ndarray:
     gbuffer : GBuffer
     crease_angle : float or None
         Radians. If the normals of neighboring pixels differ by more, there is a crease between
-        them. None: there are no creases.
+        them. If it is None, there are no creases.
 
     Returns
     -------
@@ -138,16 +138,16 @@ class _PixelGrid(NamedTuple):
         A quantity that is linear on screen for planes: z if orthographic, -1 / z if perspective.
         NaN at empty pixels.
     steps : dict of (int, int) to (h, w) float32 ndarray
-        Change of `depth` on the tangent plane to the neighbor at (dx, dy): of those on one side, as the
-        others have the opposite changes.
+        Change of `depth` on the tangent plane to the neighbor at (dx, dy). Only one of each two opposite
+        neighbors has a key, because the changes to both differ only in their signs.
     tolerance : (h, w) float32 ndarray
         Permitted deviation of `depth` from the prediction, one pixel away.
     normal : 3 (h, w) float32 ndarrays
         Components of the unit shading normal.
     instance_id : (h, w) int32 ndarray or None
-        None if there is only one mesh instance.
+        Index of the visible mesh instance. None if there is only one.
     front_facing : (h, w) bool ndarray or None
-        None if all pixels are front facing.
+        Whether the visible triangle faces the camera. None if all of them do.
     """
 
     depth: np.ndarray
@@ -183,13 +183,13 @@ def _pixel_grid(
 def depth_slopes(
     gbuffer: GBuffer, pixels: slice | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the depth of some pixels, its slopes, and its tolerance.
+    """Return the depth of the surface at pixels, its slopes on screen, and its tolerance.
 
     Parameters
     ----------
     gbuffer : GBuffer
     pixels : slice or ndarray of int
-        Entries of the G-buffer.
+        Indices into the G-buffer.
 
     Returns
     -------
@@ -245,7 +245,7 @@ def _is_continuous(
     ----------
     grid : _PixelGrid
     source, target : (slice, slice)
-        Rows and columns of the grid, of the same shape.
+        Rows and columns of the grid. Both select the same number of cells.
     step : (int, int)
         dx and dy from source to target.
     min_normal_cosine : float32 or None

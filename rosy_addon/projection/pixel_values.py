@@ -17,7 +17,7 @@ HOLONOMY_EPS = 3e-4
 
 
 def _channel_pixels(gbuffer: GBuffer, channel: FieldChannel) -> np.ndarray:
-    """Return the values of a channel in a G-buffer. A new channel has the values of a plain RoSy field."""
+    """Return the values of a channel in a G-buffer; add it with the values of a plain RoSy field if new."""
     if channel == REPRESENTATION:
         return gbuffer.representation
     if channel not in gbuffer.channels:
@@ -72,10 +72,10 @@ def fill_pixels(
 def _interpolated_normal(
     corners: Sequence[Sequence[np.ndarray]], weights: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return (3, P) the unit vector along m = sum b_i n_i, and (P,) the length of m.
+    """Return the (3, P) unit vectors along m = sum b_i n_i, and the (P,) lengths of m.
 
-    b_i are the barycentric `weights`, n_i the corner normals. Both results are 0 where the length
-    is below 1e-6.
+    b_i are the barycentric `weights`, and n_i are the corner normals. Where a length is below 1e-6, the
+    vector and the length are set to 0.
     """
     normal = np.empty_like(weights)
     for component, out in enumerate(normal):
@@ -97,13 +97,13 @@ def _interpolated_values(
     length: np.ndarray,
     order: int,
 ) -> np.ndarray:
-    """Interpolate corner values at pixels, with transport along the arc from each corner normal.
+    """Interpolate corner values at pixels, after parallel transport from the corner normals.
 
     Parameters
     ----------
     corner_field : CornerField
     corner_values : (3, T) complex64 ndarray
-        One of its channels.
+        Values of one channel of `corner_field`.
     triangle : (P,) ndarray of int
     weights : (3, P) float32 ndarray
         Barycentric coordinates b_i.
@@ -129,8 +129,9 @@ def _interpolated_values(
 
     up to a positive factor (Van Oosterom and Strackee, "The Solid Angle of a Plane Triangle",
     1983). All products follow from the products of the corner normals, because n is a combination
-    of these normals. The spherical triangle is part of the triangle of the corner normals, whose area is about
-    half of their triple product. If that area is small everywhere, the correction is skipped.
+    of these normals. The spherical triangle is contained in the spherical triangle of the corner normals.
+    The area of the latter is about half of the triple product of the corner normals. If it is small
+    everywhere, the correction is skipped.
     """
     b0, b1, b2 = weights
     z0, z1, z2 = (corner.take(triangle) for corner in corner_values)
@@ -155,7 +156,7 @@ def _interpolated_values(
 
 
 def _squared_phase(half: np.ndarray) -> np.ndarray:
-    """Return half^2 / |half|^2, the phase of the square; 0 for 0."""
+    """Return half^2 / |half|^2, the phase of the square; 0 where `half` is 0."""
     squared_modulus = half.real * half.real
     squared_modulus += half.imag * half.imag
     np.maximum(squared_modulus, np.float32(1e-30), out=squared_modulus)
@@ -172,7 +173,7 @@ def view_plane_rotation(
     Returns
     -------
     (P,) complex64 ndarray
-        Unit numbers in the frame `field.frames.view_frame` of the view plane.
+        Unit complex numbers in the frame `field.frames.view_frame` of the view plane.
     """
     x, y, z = transport_components(tangent, normal, view_direction)
     # Coordinates in `view_frame`: apply the minimal rotation from `view_direction` to (0, 0, 1).

@@ -55,10 +55,10 @@ def project(
     cache : Cache, optional
         Stores corner fields, which do not depend on the camera.
     samples : int
-        Samples along each side of a pixel. If there are several, the G-buffer has an entry for each
-        pixel where one of them shows a field, and a `coverage`.
+        Samples along each side of a pixel. If there are several, the G-buffer contains each pixel where
+        at least one sample shows a field, and its `coverage` and `samples` are set.
     rows : (int, int), optional
-        The first row of the frame, and the row after the last one, if not all are needed.
+        The first row of the frame to project, and the row after the last one. By default all rows.
 
     Returns
     -------
@@ -119,10 +119,10 @@ def project_samples(
     Returns
     -------
     samples : GBuffer
-        Its frame has a pixel for each sample.
+        G-buffer of Q samples. Its frame has a pixel for each sample.
     home, shown : (Q,) int32 ndarray
-        Two entries of `gbuffer` for each sample: the entry of the pixel that contains the sample, and
-        the entry whose surface it shows.
+        Two pixels for each sample, as indices into `gbuffer`: the pixel that contains the sample, and
+        the pixel whose surface the sample shows.
     """
     report(0.0, LABEL)
     pixel_samples, instances = gbuffer.samples, gbuffer.instances
@@ -130,7 +130,7 @@ def project_samples(
     camera = gbuffer.camera.scaled(side)
     width = np.int32(gbuffer.camera.width)
     first_triangle = first_triangles(instances)
-    # The samples, their two entries of `gbuffer`, and their triangles, counted over all instances.
+    # The samples, their two indices into `gbuffer`, and their triangles, counted over all instances.
     columns = []
     row, column = np.divmod(gbuffer.pixel[entries], width)
     for bit in range(side * side):
@@ -191,7 +191,8 @@ def surface_points(
     Returns
     -------
     GBuffer
-        With an entry for each point, in their order. Several may have the same pixel.
+        It has one element for each point, in the order of `points`. Several points may have the same
+        pixel.
     """
     report(0.0, "finding directions")
     clip, triangles = all_triangles(instances, camera)
@@ -224,7 +225,7 @@ def surface_points(
 def cached_project(
     instances: Sequence[MeshInstance], camera: Camera, display: str, cache: Cache, samples: int = 1
 ) -> GBuffer:
-    """Do the same as `project`, with the G-buffer stored in a cache.
+    """Return the result of `project`, and store it in a cache.
 
     The key consists of the instances (by identity), the camera (by value), the display and the
     number of samples.
@@ -271,7 +272,7 @@ def check_instances(instances: Sequence[MeshInstance], camera: Camera, display: 
 def _visible_pixels(
     instances: Sequence[MeshInstance], camera: Camera, rows: tuple[int, int] | None
 ) -> Fragments:
-    """Find the pixels of some rows where the nearest surface has a field."""
+    """Find the pixels where the nearest surface has a field, in the given rows or all."""
     fragments = rasterize_instances(instances, camera, rows)
     has_field = _triangles_with_field(instances)
     if not has_field.all():
@@ -283,7 +284,7 @@ def _visible_pixels(
 def _visible_samples(
     instances: Sequence[MeshInstance], camera: Camera, samples: int, rows: tuple[int, int] | None
 ) -> tuple[Fragments, SampledTriangles]:
-    """Find what is visible at the center of each pixel, and the visible triangles at all samples."""
+    """Find the visible triangles at the center of each pixel, and those at all samples."""
     clip, triangles = all_triangles(instances, camera)
     has_field = _triangles_with_field(instances)
     with progress(0.0, 0.8):
@@ -306,7 +307,7 @@ def _triangles_with_field(instances: Sequence[MeshInstance]) -> np.ndarray:
 
 
 def first_triangles(instances: Sequence[MeshInstance]) -> np.ndarray:
-    """Return the first triangle of each instance, counted over all instances, (B,) int32."""
+    """Return the index of the first triangle of each instance, counted over all instances, (B,) int32."""
     counts = [len(instance.surface.triangles) for instance in instances]
     return np.cumsum([0, *counts[:-1]]).astype(np.int32)
 
@@ -314,7 +315,10 @@ def first_triangles(instances: Sequence[MeshInstance]) -> np.ndarray:
 def _split_triangles(
     instances: Sequence[MeshInstance], triangle: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the instances of (n,) triangles, and the triangles counted within them, as int32."""
+    """Return the instance of each of (n,) triangles, and the triangle's index in its instance, as int32.
+
+    The indices in `triangle` are counted over all instances.
+    """
     if len(instances) == 1:
         return np.zeros(len(triangle), dtype=np.int32), triangle
     first_triangle = first_triangles(instances)
@@ -327,7 +331,7 @@ def _split_triangles(
 def rasterize_instances(
     instances: Sequence[MeshInstance], camera: Camera, rows: tuple[int, int] | None = None
 ) -> Fragments:
-    """Rasterize all mesh instances together, in all rows of the frame or some.
+    """Rasterize all mesh instances together, in the given rows of the frame or in all.
 
     Triangles are counted over all instances, in their order.
     """
@@ -337,13 +341,14 @@ def rasterize_instances(
 def all_triangles(
     instances: Sequence[MeshInstance], camera: Camera
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the triangles of all instances, in their order.
+    """Return the vertices and triangles of all instances, in the order of instances.
 
     Returns
     -------
     clip : (V, 4) float64 ndarray
         Vertices in clip space.
     triangles : (T, 3) int32 ndarray
+        Indices into `clip`.
     """
     clip = np.concatenate([clip_vertices(instance, camera) for instance in instances], axis=1)
     triangles, vertex_offset = [], 0
@@ -387,7 +392,7 @@ def raise_nothing_in_view(instances: Sequence[MeshInstance], camera: Camera) -> 
 def _new_gbuffer(
     instances: Sequence[MeshInstance], camera: Camera, fragments: Fragments
 ) -> GBuffer:
-    """Return a G-buffer whose normals and representation are not yet initialized."""
+    """Return a G-buffer of rasterized pixels. Its normals and representation are not yet initialized."""
     count = len(fragments.pixel)
     instance_id, triangle = _split_triangles(instances, fragments.triangle)
     face = np.empty(count, dtype=np.int32)

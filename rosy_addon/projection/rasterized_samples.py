@@ -12,24 +12,30 @@ from .rasterizer import MAX_BAND_PIXELS, rasterize_rows, to_screen
 
 
 class SampledTriangles(NamedTuple):
-    """The triangles at S x S samples of each of the P covered pixels, in ascending order of pixel.
+    """The visible triangles at S x S samples of each of the P covered pixels, in ascending order of pixel.
+
+    Each pixel has a main triangle. The E samples that show another triangle than that of their pixel are
+    listed.
 
     Attributes
     ----------
     pixel : (P,) int32 ndarray
         Flat index, ``row * width + column`` from the lower left.
     triangle : (P,) int32 ndarray
-        Triangle that is visible at the center, or else at the sample that is nearest to it.
+        Main triangle: the triangle at the center of the pixel. If there is none, the triangle at the
+        sample that is nearest to the center.
     depth : (P,) float64 ndarray
-        Its z / w there.
+        Depth z / w of the main triangle there.
     own_samples : (P,) uint16 ndarray
-        The samples that show this triangle: bit ``row * S + column``.
+        Bit field of the samples that show the main triangle: bit ``row * S + column``.
     other_entry : (E,) int32 ndarray
-        Index into `pixel`, for each sample that shows another triangle.
+        The pixel that contains each of the E samples, as an index into `pixel`.
     other_sample : (E,) int32 ndarray
-        Flat index of that sample in the frame of all samples.
+        Flat index of each of these samples in the frame of all samples.
     other_triangle : (E,) int32 ndarray
+        Triangle that each of these samples shows.
     other_depth : (E,) float64 ndarray
+        Depth z / w of this triangle at the sample.
     """
 
     pixel: np.ndarray
@@ -58,7 +64,7 @@ def rasterize_samples(
     clip_vertices, triangles, width, height, rows
         See `rasterize`.
     is_drawn : (T,) bool ndarray
-        Triangles that are not drawn only hide others.
+        Whether each triangle is drawn. Triangles that are not drawn only hide others.
     samples : int
         S, the samples along each side of a pixel.
     """
@@ -98,7 +104,7 @@ def _group_samples(
     depth: np.ndarray,
     first_row: int,
 ) -> SampledTriangles:
-    """Group the samples of some rows by pixels.
+    """Group the samples of h rows of pixels, w pixels wide, by pixels.
 
     Parameters
     ----------
@@ -107,8 +113,9 @@ def _group_samples(
     triangle : (h, S, w, S) int32 ndarray
         Triangle at each sample, -1 where there is none.
     center_depth, depth : (h, 1, w, 1) and (h, S, w, S) float64 ndarray
+        Depths z / w of these triangles.
     first_row : int
-        The first of the rows.
+        The first of the h rows, as a row of the frame.
     """
     samples, width = triangle.shape[1:3]
     offset = np.arange(samples) - (samples - 1) / 2

@@ -119,12 +119,12 @@ def rasterize(
     clip_vertices : (V, 4) float64 ndarray
         Clip space, in OpenGL's convention.
     triangles : (T, 3) ndarray of int
-        Vertex indices. Adjacent triangles are drawn without cracks if they share the vertices of
-        the common edge, or these have equal coordinates.
+        Vertex indices. Adjacent triangles are drawn without cracks if the vertices of the common edge
+        are the same, or have equal coordinates.
     width, height : int
         Size of the frame in pixels.
     rows : (int, int), optional
-        The first row, and the row after the last one, if not all are drawn.
+        The first row to draw, and the row after the last one. By default all rows.
 
     Returns
     -------
@@ -170,8 +170,9 @@ def rasterize_rows(
     Returns
     -------
     triangle : (rows * width,) int32 ndarray
-        -1 where there is none.
+        The visible triangle at each pixel, -1 where there is none.
     depth : (rows * width,) float64 ndarray
+        Its z / w; a value just beyond the far plane where there is none.
     """
     screen = screen.clamped_to_rows(row_start, row_stop)
     depth_buffer = np.full(
@@ -231,9 +232,9 @@ def _scan_convert(
 def _edge_x_at_row(
     edges: tuple[np.ndarray, np.ndarray, np.ndarray], edge: np.ndarray, center_y: np.ndarray
 ) -> np.ndarray:
-    """Return x where edges intersect horizontal lines.
+    """Return the x coordinates where edges intersect the horizontal lines at `center_y`.
 
-    `edges` is from `_edge_line`, `edge` holds an index into it for each line at `center_y`.
+    `edges` is the result of `_edge_line`. `edge` holds the index of the edge for each horizontal line.
     """
     x, y, slope = edges
     crossing = center_y - y.take(edge)
@@ -243,9 +244,9 @@ def _edge_x_at_row(
 
 
 def _column_range(x_a: np.ndarray, x_b: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the first column with its center between two intersections, and the last plus one.
+    """Return the columns whose centers lie between two intersections: the first, and the last plus one.
 
-    Both are float64, clamped to 0 to `width`.
+    Both are float64, clamped to the range from 0 to `width`.
     """
     columns = []
     for x in (np.minimum(x_a, x_b), np.maximum(x_a, x_b)):
@@ -264,7 +265,9 @@ def _spans_with_depth(
     depth_plane: tuple[np.ndarray, ...],
     width: int,
 ) -> _Spans:
-    """Return spans with depth. Their triangles are indices within the block.
+    """Return the spans of a block of triangles, with their depths.
+
+    The triangles of the spans are indices within the block.
 
     Parameters
     ----------
@@ -309,7 +312,7 @@ def _depth_test(spans: _Spans, depth_buffer: np.ndarray, triangle_buffer: np.nda
 
     If several fragments write to the same pixel in one assignment, an arbitrary one is kept. The
     fragments that are nearer than the kept one write again, until there are none. Few rounds are
-    needed, because each removes all fragments that are not in front of the kept one.
+    needed, because each round removes all fragments that are not in front of the kept one.
     """
     span = np.repeat(np.arange(len(spans.count)), spans.count)
     pixel = concatenated_ranges(spans.start, spans.count)

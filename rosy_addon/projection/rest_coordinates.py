@@ -17,7 +17,7 @@ from .gbuffer import GBuffer, MeshInstance
 from .pixel_blocks import part_of
 from .project import clip_vertices
 
-#: Label of the progress.
+#: Text that the user sees while this step runs.
 LABEL = "finding points on the surface"
 
 #: Distance of a mesh from its object's origin, in multiples of its size, beyond which positions are
@@ -31,13 +31,13 @@ BARYCENTRIC_RANGE = (-4, 5)
 
 @dataclass(frozen=True, eq=False)
 class RestCoordinates:
-    """Positions on the rest shapes, at the centers of P pixels and at offsets from them.
+    """Positions on the rest shapes of the meshes, at the centers of P pixels and at offsets from the centers.
 
     Attributes
     ----------
     weights, weights_dx, weights_dy : (3, P) float32 ndarray
-        Homogeneous barycentric coordinates at the pixel center, and their change to the next pixel
-        on the right and above, in the plane of the triangle.
+        Homogeneous barycentric coordinates at the pixel center, and their changes to the next pixel on
+        the right and to the next pixel above, in the plane of the triangle.
     rest_corners : 3 (3, P) float32 ndarrays
         The corners of the triangle in the rest shape; see `rest_positions`.
     pixel_size : (P,) float32 ndarray
@@ -52,7 +52,7 @@ class RestCoordinates:
     pixel_size: np.ndarray
 
     def block(self, pixels: slice) -> RestCoordinates:
-        """Return the coordinates of some of the pixels."""
+        """Return the coordinates of a block of pixels."""
         rest_corners = tuple(corner[:, pixels] for corner in self.rest_corners)
         return replace(part_of(self, (..., pixels)), rest_corners=rest_corners)
 
@@ -105,13 +105,13 @@ def rest_coordinates(gbuffer: GBuffer) -> RestCoordinates:
 def rest_positions(surface: Surface) -> np.ndarray:
     """Return the positions of the vertices in the rest shape.
 
-    The rest shape is `Surface.rest_vertices`, or the vertices if there are none.
+    The rest shape is `Surface.rest_vertices`, or `Surface.vertices` if that is None.
 
     Returns
     -------
     (V, 3) float64 ndarray
-        In object space. If the mesh is farther than `FAR_RATIO` times its size from the origin,
-        relative to a point at the mesh.
+        Positions in object space. If the mesh is farther from the origin than `FAR_RATIO` times its size,
+        they are relative to a point at the mesh.
     """
     rest = surface.in_rest_shape().vertices
     corners = box_corners(rest[surface.used_vertices])
@@ -124,7 +124,7 @@ def rest_positions(surface: Surface) -> np.ndarray:
 
 
 def _screen_vertices(camera: Camera, instance: MeshInstance) -> np.ndarray:
-    """Return the (3, V) float64 vertices of an instance: x and y in pixels times w, and w."""
+    """Return (3, V) float64 homogeneous screen coordinates of vertices: x w and y w in pixels, and w."""
     x, y, _, w = clip_vertices(instance, camera)
     return np.stack([(x + w) * (0.5 * camera.width), (y + w) * (0.5 * camera.height), w])
 
@@ -139,7 +139,8 @@ def _fill_pixels(
 ) -> None:
     """Compute the coordinates at some pixels of one mesh instance, in place.
 
-    (V, 3) `rest` are the `rest_positions` of its surface, (3, V) `screen` its `_screen_vertices`.
+    `rest` is the (V, 3) result of `rest_positions` for its surface, and `screen` is the (3, V) result of
+    `_screen_vertices`.
     """
     camera, surface = gbuffer.camera, instance.surface
     vertices = surface.triangle_vertex.take(gbuffer.triangle[pixels], axis=0).T
@@ -180,9 +181,9 @@ def _fill_pixels(
 
 
 def matrix_scale(matrix: np.ndarray) -> float:
-    """Return the mean scale of a (4, 4) matrix: the cube root of its change of volume.
+    """Return the mean scale of a (4, 4) matrix: the cube root of the factor by which it scales volumes.
 
-    1 if the matrix is singular.
+    If the matrix is singular, return 1.
     """
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
     return float(np.cbrt(abs(np.cross(linear[0], linear[1]) @ linear[2]))) or 1.0

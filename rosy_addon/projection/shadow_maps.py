@@ -34,7 +34,7 @@ NORMAL_BIAS_PIXELS = 3.2
 #: used, in radii of the receivers. Nearer lights use six.
 SINGLE_VIEW_MIN_RADII = 1.3
 
-#: Label of the progress.
+#: Text that the user sees while this step runs.
 LABEL = "casting shadows"
 
 
@@ -129,7 +129,7 @@ def _point_cameras(
 
 
 def render_depth_map(instances: Sequence[MeshInstance], camera: Camera) -> np.ndarray:
-    """Return the (H, W) float32 depth of the nearest surface along the camera axis; inf if none."""
+    """Return the (H, W) float32 depths of the nearest surfaces along the camera axis; inf at empty pixels."""
     fragments = rasterize_instances(instances, camera)
     depth = np.full(camera.width * camera.height, np.inf, dtype=np.float32)
     m_z, m_w = camera.projection[2, 2:]
@@ -152,7 +152,7 @@ def shadow_visibility(gbuffer: GBuffer, cameras: Sequence[Camera]) -> np.ndarray
     Returns
     -------
     (P,) float32 ndarray
-        0: in shadow, 1: lit.
+        From 0, in shadow, to 1, lit.
     """
     rotation, translation = gbuffer.camera.view[:3, :3], gbuffer.camera.view[:3, 3]
     result = np.ones(len(gbuffer.pixel), dtype=np.float32)
@@ -173,7 +173,7 @@ def shadow_visibility(gbuffer: GBuffer, cameras: Sequence[Camera]) -> np.ndarray
 def visibility_from(
     camera: Camera, depth_map: np.ndarray, points: np.ndarray, normals: np.ndarray
 ) -> np.ndarray:
-    """Return the filtered visibility of points from a camera.
+    """Return the visibility of points from a camera, averaged over neighboring pixels of its depth map.
 
     Parameters
     ----------
@@ -210,7 +210,7 @@ def visibility_from(
 def _pcf_visibility(
     depth_map: np.ndarray, pixel: np.ndarray, axial_depth: np.ndarray
 ) -> np.ndarray:
-    """Return the (n,) float32 fraction of a filter window in which no surface is nearer.
+    """Return the (n,) float32 fractions of filter windows in which no surface is nearer than `axial_depth`.
 
     Parameters
     ----------
@@ -218,7 +218,7 @@ def _pcf_visibility(
     pixel : (n, 2) ndarray
         Center of the window, column and row in pixels.
     axial_depth : (n,) ndarray
-        Depth to compare with.
+        Depth along the camera axis to compare with the depth map.
     """
     height, width = depth_map.shape
     corner = pixel - 0.5 * PCF_WIDTH

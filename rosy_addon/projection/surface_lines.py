@@ -34,7 +34,7 @@ MAX_EDGE = 1.4
 #: in fewer places.
 MAX_TRIANGLES = 600_000
 
-#: Bytes of a triangle while phases are computed, and of each of its families of lines.
+#: Bytes of memory for a triangle while phases are computed, and for each family of parallel lines on it.
 TRIANGLE_BYTES, FAMILY_BYTES = 210, 610
 
 
@@ -45,12 +45,13 @@ class SurfaceLines:
     Attributes
     ----------
     tree : BisectionTree
-        The triangles of the surface, and the L smaller ones in them on which the phase is linear.
+        The triangles of the surface, and their L leaves: the smaller triangles on which the phase is
+        linear.
     pattern : StripePattern
-        Phases on these L triangles.
+        Phases on the L leaves.
     heading : (2, L) float32 ndarray
-        Direction 0 of the field in each of them, as multiples of the sides of the triangle of the
-        surface from corner 0 to corners 1 and 2. 0 where the field is undefined.
+        Direction 0 of the field in each leaf: a vector, as multiples of two sides of the surface's
+        triangle, from corner 0 to corner 1 and from corner 0 to corner 2. 0 where the field is undefined.
     """
 
     tree: BisectionTree
@@ -59,10 +60,10 @@ class SurfaceLines:
 
 
 def rest_matrix(matrix: np.ndarray) -> np.ndarray:
-    """Return the (3, 3) part of a matrix that changes the shape: a scale along some axes.
+    """Return the (3, 3) part of a matrix that changes the shape: a scale along three orthogonal axes.
 
     It is a uniform scale if the matrix is a similarity. Rotations have no effect, so an object that
-    turns keeps its lines.
+    is rotated keeps its lines.
     """
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
     if similarity_scale(linear, 4 * SIMILARITY_EPS) is not None:
@@ -80,7 +81,7 @@ def cached_surface_lines(
     cache: Cache | None = None,
     max_triangles: int = MAX_TRIANGLES,
 ) -> SurfaceLines:
-    """Do the same as `surface_lines`, with results stored in a cache if one is given.
+    """Return the result of `surface_lines`, and store it in a cache if one is given.
 
     Lines are shared by all cameras, and by instances of equal size.
     """
@@ -115,7 +116,7 @@ def surface_lines(
     ----------
     surface : Surface
     stretch : (3, 3) ndarray
-        A map of the rest shape to the shape on which distances are measured.
+        Linear map from the rest shape to the shape on which distances are measured.
     field : RosyField
     display : {"smooth", "flat"}
         See `field_at_corners`.
@@ -131,7 +132,7 @@ def surface_lines(
     Raises
     ------
     RosyError
-        If that needs more memory than there is.
+        If there is not enough memory.
     """
     label = "spacing lines"
     report(0.0, label)
@@ -180,7 +181,7 @@ def _leaf_directions(
     Returns
     -------
     directions : CornerDirections
-        On the leaves, in the planes of the triangles of the surface.
+        Directions of the field at the corners of the leaves, in the planes of the surface's triangles.
     heading : (2, L) float32 ndarray
         See `SurfaceLines`.
     """
@@ -194,7 +195,10 @@ def _leaf_directions(
     weights = tree.leaf_weights.astype(np.float64)
 
     def at_leaves(values: np.ndarray, order: int) -> np.ndarray:
-        """Return (L, 3) values at the corners of leaves, given (3, T) values that rotate with the frame."""
+        """Interpolate (3, T) values at the corners of triangles to the (L, 3) corners of the leaves.
+
+        The values rotate with the frame by the power `order`.
+        """
         in_plane = np.stack(
             [z * signed_power(phase, order) for z, phase in zip(values, to_plane, strict=True)],
             axis=1,
@@ -233,9 +237,9 @@ def _leaf_directions(
 
 
 def _rotations_to_planes(corner_field: CornerField) -> list[np.ndarray]:
-    """Return 3 (T,) complex128 rotations of corner values to the frames of the planes of triangles.
+    """Return 3 (T,) complex128 rotations of corner values into tangent frames of the flat triangles.
 
-    Values of a corner field were transported to corner 0; this is undone first.
+    Each rotation also undoes the transport of the values of `corner_field` to corner 0.
     """
     plane_frame = tangent_frame_components(corner_field.geometric_normal)
     first_normal = corner_field.corner_normals[0]
@@ -253,7 +257,10 @@ def _rotations_to_planes(corner_field: CornerField) -> list[np.ndarray]:
 def _deviations(
     harmonics: list[tuple[int, np.ndarray]], angle: np.ndarray, degree: int
 ) -> np.ndarray:
-    """Return the (L, 3, N) unit rotations of N directions at corners from a RoSy with (L, 3) angles."""
+    """Return the (L, 3, N) rotations, as unit complex numbers, from members of a RoSy to the directions.
+
+    The RoSy has evenly spaced members; `angle` holds their (L, 3) angles at the corners of the leaves.
+    """
     members = np.exp(1j * (angle[..., None] + 2 * np.pi * np.arange(degree) / degree))
     result = np.ones_like(members)
     for direction in range(degree):

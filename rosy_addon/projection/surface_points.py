@@ -17,7 +17,7 @@ class SurfacePoints(NamedTuple):
     triangle : (P,) int32 ndarray
         Index of the triangle of the instance's surface.
     barycentric : (P, 3) float64 ndarray
-        In that triangle.
+        Barycentric coordinates of the point in that triangle.
     """
 
     instance_id: np.ndarray
@@ -25,7 +25,7 @@ class SurfacePoints(NamedTuple):
     barycentric: np.ndarray
 
     def part(self, chosen: np.ndarray) -> SurfacePoints:
-        """Return those that a mask or indices choose."""
+        """Return the points that a mask or an array of indices selects."""
         return SurfacePoints(*(column[chosen] for column in self))
 
     @staticmethod

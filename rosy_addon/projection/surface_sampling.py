@@ -1,4 +1,4 @@
-"""Sampling of the tones, numbers and feature curvatures of surfaces at the pixels of a G-buffer."""
+"""Sampling of surfaces at the pixels of a G-buffer: tones, values for the color map, feature curvatures."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def surface_tones(gbuffer: GBuffer) -> np.ndarray:
 
 
 def surface_values(gbuffer: GBuffer) -> np.ndarray:
-    """Interpolate the numbers of surfaces (`MeshInstance.color_values`) at the pixels of a G-buffer.
+    """Interpolate the values for the color map (`MeshInstance.color_values`) at the pixels of a G-buffer.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def surface_values(gbuffer: GBuffer) -> np.ndarray:
     Returns
     -------
     (P,) float32 ndarray
-        NaN where there is no number.
+        The values. NaN where the surface has none.
     """
     values = np.full(len(gbuffer.pixel), np.nan, dtype=np.float32)
     for instance_id, blocks, _ in gbuffer.instance_blocks():
@@ -72,19 +72,20 @@ def surface_values(gbuffer: GBuffer) -> np.ndarray:
 def values_in_triangles(
     instance: MeshInstance, triangle: np.ndarray, barycentric: np.ndarray
 ) -> np.ndarray:
-    """Interpolate the numbers of a surface at points of its triangles.
+    """Interpolate the values for the color map at points in triangles of one surface.
 
     Parameters
     ----------
     instance : MeshInstance
-        Its `color_values` are given.
+        An instance that has `color_values`.
     triangle : (n,) ndarray of int
     barycentric : (n, 3) float32 ndarray
 
     Returns
     -------
     (n,) float32 ndarray
-        NaN where a corner has no number. Exact where all corners have the same.
+        The values. NaN where a corner of the triangle has none. Where all corners have equal values, the
+        result is exactly this value.
     """
     corners = instance.surface.triangles.take(triangle, axis=0)
     first, second, third = instance.color_values.take(corners).T
@@ -98,7 +99,7 @@ def feature_curvatures(gbuffer: GBuffer, cache: Cache) -> np.ndarray:
     ----------
     gbuffer : GBuffer
     cache : Cache
-        Stores the curvatures of the surfaces, which a deformed mesh finds again.
+        Stores the curvatures of the surfaces. Deformations of a mesh share them.
 
     Returns
     -------
@@ -122,7 +123,7 @@ def feature_curvatures(gbuffer: GBuffer, cache: Cache) -> np.ndarray:
 def _texel_footprint(
     gbuffer: GBuffer, instance: MeshInstance, pixels: slice | np.ndarray, corners: np.ndarray
 ) -> np.ndarray:
-    """Return the (n,) area that pixels of the picture cover on the image of a tone, in texels."""
+    """Return the (n,) areas, in texels of the image of a tone, that pixels of the picture cover."""
     surface, tone = instance.surface, instance.tone
     linear = np.asarray(instance.matrix, dtype=np.float64)[:3, :3]
     positions = surface.vertices[surface.corner_vertex[corners]] @ linear.T

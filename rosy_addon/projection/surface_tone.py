@@ -1,4 +1,4 @@
-"""The tone of a surface, given at its corners or by an image, which is sampled at several resolutions."""
+"""The tone of a surface, given at its corners or by an image. The image is sampled from a mip map."""
 
 from __future__ import annotations
 
@@ -97,10 +97,10 @@ class SurfaceTone:
     Attributes
     ----------
     values : (C, 1) or (C, 2) float32 ndarray
-        At the C corners of the surface. Without an image the tone, shape (C, 1). With an image the
-        texture coordinates u and v, shape (C, 2).
+        Values at the C corners of the surface. Without an image, they are tones, shape (C, 1). With an
+        image, they are texture coordinates u and v, shape (C, 2).
     image : (H, W) float32 ndarray or None
-        Tones. The bottom row is first.
+        Image of tones. The bottom row is first.
     """
 
     values: np.ndarray

@@ -1,4 +1,4 @@
-"""Vectors stored by component, and the polygons, normals and frames made of them.
+"""Vectors stored by component: arithmetic, and normals, angles and frames of polygons.
 
 Vectors are three contiguous arrays: their x, y and z components. The corners of n polygons with the
 same number of corners are given relative to the first one (`relative_to_first`).
@@ -43,7 +43,7 @@ def normalize_components(vectors: VectorComponents) -> list[np.ndarray]:
 
 
 def tangent_frame_components(normal: VectorComponents) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Return the tangent frame x, y of normals, as `field.frames.tangent_frame`, by components."""
+    """Return the tangent frames x, y of normals: `field.frames.tangent_frame` for vectors by component."""
     nx, ny, nz = normal
     sign = np.copysign(nz.dtype.type(1), nz)
     a = -1 / (sign + nz)
@@ -53,9 +53,9 @@ def tangent_frame_components(normal: VectorComponents) -> tuple[list[np.ndarray]
 
 
 def cofactor_matrix(linear: np.ndarray) -> np.ndarray:
-    """Return the (3, 3) cofactor matrix of a linear map L, det(L) times the inverse transpose.
+    """Return the (3, 3) cofactor matrix of a linear map L: det(L) times its inverse transpose.
 
-    It transforms normals, also if L mirrors or is singular.
+    It transforms normals correctly, even if L mirrors or is singular.
     """
     a, b, c = linear
     return np.array([np.cross(b, c), np.cross(c, a), np.cross(a, b)])
@@ -64,7 +64,9 @@ def cofactor_matrix(linear: np.ndarray) -> np.ndarray:
 def relative_to_first(
     points: np.ndarray, corner_vertex: Sequence[np.ndarray]
 ) -> list[list[np.ndarray]]:
-    """Return the positions of the corners of faces relative to the first corner, which is left out.
+    """Return the positions of the corners of faces relative to the first corner of each face.
+
+    The first corner itself is left out.
 
     Parameters
     ----------
@@ -102,9 +104,10 @@ def polygon_normals(points: Sequence[VectorComponents]) -> list[np.ndarray]:
 def plane_coordinates(
     points: Sequence[VectorComponents], x: VectorComponents, y: VectorComponents
 ) -> list[np.ndarray]:
-    """Return the corners as complex numbers in the frame x, y, relative to their mean.
+    """Return the corners of polygons as complex numbers in the frame x, y, relative to their mean.
 
-    `points` are the corners as returned by `relative_to_first`. The result includes the first one.
+    `points` are the corners as returned by `relative_to_first`, without the first corner of each polygon.
+    The result includes the first corner.
     """
     coordinates = [dot_components(point, x) + 1j * dot_components(point, y) for point in points]
     mean = sum(coordinates) / (len(coordinates) + 1)

@@ -1,7 +1,8 @@
-"""Which points of surfaces a camera sees: exact rays from each of them to the eye, without a depth buffer.
+"""Which points of surfaces a camera sees, by testing the rays from the points to the eye exactly.
 
-A triangle hides a point if it covers its projection, nearer to the eye. Barycentric coordinates come
-from homogeneous clip coordinates, so triangles that reach behind the eye need no clipping; see Marc Olano
+No depth buffer is used. A triangle hides a point if it is nearer to the eye and covers the projection of
+the point. Barycentric coordinates come from homogeneous clip coordinates, so triangles that reach behind
+the eye need no clipping; see Marc Olano
 and Trey Greer, "Triangle Scan Conversion Using 2D Homogeneous Coordinates", 1997.
 """
 
@@ -23,10 +24,10 @@ from .surface_points import SurfacePoints
 #: Surfaces that are nearer to a point than this fraction of the size of the scene do not hide it.
 SAME_POINT = 1e-6
 
-#: Triangles, and pairs of triangles and points that are tested at a time.
+#: Number of triangles, and of pairs of a triangle and a point, that are tested at a time.
 TRIANGLES_PER_BLOCK, PAIRS_PER_BLOCK = 1 << 15, 1 << 20
 
-#: Labels of the progress, for vertices and for points in triangles.
+#: Texts that the user sees while vertices, or points in triangles, are tested.
 LABEL, POINTS_LABEL = "finding visible singularities", "finding places of arrowheads"
 
 
@@ -36,16 +37,17 @@ class ProjectedPoints(NamedTuple):
     Attributes
     ----------
     world : (K, 3) float64 ndarray
-        World space.
+        Positions in world space.
     position : (K, 2) float64 ndarray
-        Pixels from the lower left of the picture. NaN if the point is not in front of the camera.
+        Positions in the picture, in pixels from the lower left. NaN if the point is not in front of the
+        camera.
     depth : (K,) float64 ndarray
-        Distance along the axis of the camera, Blender units.
+        Distances along the axis of the camera, in Blender units.
     is_in_view : (K,) bool ndarray
         Whether the point is between the near and the far plane of the camera, in front of it, and not
         cut away. It may be beside the frame.
     is_visible : (K,) bool ndarray
-        Whether it is in the frame, too, and no surface is in front of it.
+        Whether the point is in view and in the frame, and no surface hides it.
     """
 
     world: np.ndarray
@@ -55,7 +57,7 @@ class ProjectedPoints(NamedTuple):
     is_visible: np.ndarray
 
     def part(self, chosen: np.ndarray) -> ProjectedPoints:
-        """Return those that a mask or indices choose."""
+        """Return the points that a mask or an array of indices selects."""
         return ProjectedPoints(*(column[chosen] for column in self))
 
 
@@ -73,14 +75,14 @@ def project_vertices(
         All of them hide vertices.
     camera : Camera
     vertices : sequence of (n,) int ndarray
-        Indices of vertices, for each instance.
+        For each instance, the indices of the vertices to project.
     clip_planes : (6, 4) float64 ndarray, optional
         World space. The negative side of each plane is cut away.
 
     Returns
     -------
     ProjectedPoints
-        The vertices of all instances, in their order.
+        The vertices of all instances, one instance after the other.
     """
     report(0.0, LABEL)
     scene = _Scene.of(instances, camera, clip_planes)
@@ -147,8 +149,8 @@ def _project(
 ) -> ProjectedPoints:
     """Project K points, given in clip space and in world space, and find the visible ones.
 
-    `touches` tells whether the (n,) triangles of the scene contain (n,) points, by their numbers: they do not
-    hide them.
+    `touches(triangle, point)` returns (n,) bool for (n,) indices of triangles of the scene and of points:
+    whether the triangle contains the point. A triangle does not hide the points that it contains.
     """
     camera = scene.camera
     x, y, z, w = clip.T
@@ -178,18 +180,21 @@ def _project(
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """All triangles of a scene, and what is seen of them.
+    """All triangles of a scene in the view of a camera.
 
     Attributes
     ----------
     clip : (V, 4) float64 ndarray
+        Vertices in clip space.
     world : (V, 3) float64 ndarray
+        Vertices in world space.
     distance : (V,) float64 ndarray
-        Along the axis of the camera.
+        Depths of the vertices, along the axis of the camera.
     triangles : (T, 3) int ndarray
-        Those that hide points.
+        Triangles that can hide points, as indices of vertices.
     camera : Camera
     clip_planes : (6, 4) float64 ndarray or None
+        World space. The negative side of each plane is cut away.
     tolerance : float
         Distance in front of a point at which surfaces begin to hide it.
     """
@@ -206,7 +211,7 @@ class _Scene:
     def of(
         cls, instances: Sequence[MeshInstance], camera: Camera, clip_planes: np.ndarray | None
     ) -> _Scene:
-        """Return the scene of some instances, all of which hide points."""
+        """Return a scene of all triangles of mesh instances, as seen by a camera."""
         clip, triangles = all_triangles(instances, camera)
         world = np.concatenate([instance.world_points() for instance in instances])
         tolerance = SAME_POINT * float(np.ptp(world, axis=0).max(initial=0.0))
@@ -215,18 +220,19 @@ class _Scene:
     def pairs(
         self, triangle: np.ndarray, ndc: np.ndarray
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Find the points in the bounding boxes of some triangles.
+        """Yield pairs of a triangle and a point in its bounding box on screen.
 
         Parameters
         ----------
         triangle : (t,) intp ndarray
+            Indices of the triangles to test.
         ndc : (n, 2) float64 ndarray
-            From -1 to 1.
+            Positions of the points on screen, from -1 to 1.
 
         Returns
         -------
         iterator of (triangle, point)
-            (m,) intp ndarrays, block by block.
+            Indices of triangles and of points, (m,) intp ndarrays, block by block.
         """
         row_count = max(int(len(ndc) ** 0.5), 1)
         point_row = _grid_rows(ndc[:, 1], row_count)
@@ -259,7 +265,7 @@ class _Scene:
         )
 
     def hides(self, triangle: np.ndarray, ndc: np.ndarray, distance: np.ndarray) -> np.ndarray:
-        """Return (n,) bool: whether triangles hide points that are not on them.
+        """Return (n,) bool: whether each triangle hides its point. The point must not be on the triangle.
 
         Parameters
         ----------
@@ -293,18 +299,18 @@ class _Scene:
 
 
 def _grid_rows(y: np.ndarray, row_count: int) -> np.ndarray:
-    """Return the rows of (n,) heights from -1 to 1, of a grid of so many rows."""
+    """Return the row of each of (n,) y coordinates from -1 to 1 in a grid with `row_count` rows."""
     return np.clip((0.5 * (y + 1) * row_count).astype(np.intp), 0, row_count - 1)
 
 
 def is_cut_away(points: np.ndarray, clip_planes: np.ndarray | None) -> np.ndarray:
-    """Return which points are on the negative side of a plane.
+    """Return whether each point is on the negative side of at least one clip plane.
 
     Parameters
     ----------
     points : (n, 3) ndarray
     clip_planes : (6, 4) ndarray or None
-        In the space of the points. None cuts nothing away.
+        Clip planes in the space of the points. If it is None, no point is cut away.
 
     Returns
     -------

@@ -58,17 +58,19 @@ from .texels import (
     texture_frame,
 )
 
-#: Pixels of a look along the side of a square with the area of the surface. Lines are then about as wide as in
-#: a picture of 1000 pixels that the mesh fills.
+#: Lengths of a look in pixels are converted to lengths on the surface: this number of pixels is the side of a
+#: square with the area of the surface. Lines are then about as wide as in a picture of 1000 pixels that the
+#: mesh fills.
 SURFACE_PIXELS = 1024
 
-#: Fraction of the texels in which a step may be longer than one texel, as the UV map is finest there.
+#: Fraction of the texels, those that are smallest on the surface, that may be smaller than a step of a
+#: streamline.
 FINE_FRACTION = 0.05
 
-#: Smallest length of a step, in texels of the mean size.
+#: Smallest length of a step of a streamline, as a multiple of the mean size of a texel on the surface.
 MIN_STEP = 0.25
 
-#: The settings of a look that a texture is drawn with. All others have no effect on it.
+#: Names of the settings of a look that affect a texture. All other settings have no effect.
 TEXTURE_SETTINGS = (
     *("ink", "display", "unit_size", "length", "fade", "flow"),
     *("line_width", "line_distance", "density"),
@@ -83,20 +85,20 @@ DEFAULT_SIZE, MIN_SIZE, MAX_SIZE = 2048, 16, 16384
 #: Margin in texels: default and maximum.
 DEFAULT_MARGIN, MAX_MARGIN = 16, 512
 
-#: What a texture can show, with descriptions.
+#: The possible contents of a texture, with descriptions for the user.
 CONTENTS = {
     "look": "The picture of the look",
     "anisotropy": "The direction of the field as an anisotropy map of glTF, for brushed metal",
     "flow": "The direction of the field as a flow map, for moving textures",
 }
 
-#: The settings of a look that a map of directions is drawn with.
+#: Names of the settings of a look that affect a texture of directions.
 DIRECTION_SETTINGS = ("display", "crease_angle", "guiding_angle")
 
-#: Smallest fraction of overlapping charts that is reported to the user. It is measured in whole texels.
+#: Smallest `Texture.overlap` that is reported to the user. Overlap is measured in whole texels.
 NOTABLE_OVERLAP = 0.05
 
-#: Share of the time after which a texture is drawn.
+#: Fraction of the progress at which a texture is drawn and its conversion to images begins.
 CONVERSION_START = 0.95
 
 
@@ -107,15 +109,16 @@ class Texture:
     Attributes
     ----------
     frame : TextureFrame
+        Size of the texture, and its tiles.
     rgba : (H, W, 4) float32 ndarray
-        Rows from the bottom. The tiles of a UDIM texture are stacked.
+        Pixels. The bottom row is first. The tiles of a UDIM texture are stacked.
     overlap : float
-        Fraction of the area of the UV map that lies under other charts, which show the same texels.
+        Fraction of the area of the UV map that is covered by another chart, so that both share texels.
     is_data : bool
-        Whether the pixels are thresholds of ink (`compositor.ink_thresholds`) or directions, and not
-        linear colors.
+        Whether the pixels are thresholds of ink (`compositor.ink_thresholds`) or directions. Otherwise
+        they are linear colors.
     line_count : int
-        Number of lines of the field through a point.
+        Number of line directions of the field at a point. Opposite directions count as one.
     """
 
     frame: TextureFrame
@@ -155,26 +158,27 @@ def draw_texture(
 ) -> Texture:
     """Draw the field of a mesh as a texture.
 
-    Streamlines run on the surface. Texture and line width do not depend on the charts of the UV map.
+    Streamlines are traced on the surface, not in the UV map, so their shape and width do not depend on the
+    charts of the UV map.
 
     Parameters
     ----------
     instance : MeshInstance
-        With a field. Its numbers are colors, but not in hatching.
+        An instance with a field. Its `color_values` determine the colors if the look asks for it, but not
+        in hatching.
     uv : (C, 2) ndarray
         u and v at the corners of the surface.
     look : Look
-        The light and the settings of a camera have no effect. If its lengths are in pixels, a pixel is that of a
-        square with the area of the surface and `SURFACE_PIXELS` pixels on each side.
+        Settings of light and camera have no effect. Lengths in pixels are converted with `SURFACE_PIXELS`.
     size : int
         Texels on each side of the texture, or of a tile of it.
     margin : int
         Width of the margin around charts, in texels.
     is_udim : bool
-        Whether the tiles of the UV map are pictures of their own.
+        Whether each UDIM tile of the UV map has a picture of its own.
     lights : sequence of Light, optional
-        Lights in world space, whose hatching is drawn as ink. By default, a texture of hatching has
-        thresholds, and its ink is drawn by the material.
+        Lights in world space. If they are given, hatching is drawn as ink under this light. Otherwise a
+        texture of hatching contains thresholds, and the material draws the ink.
     content : str
         One of `CONTENTS`.
     drift : Drift
@@ -189,8 +193,8 @@ def draw_texture(
     Raises
     ------
     RosyError
-        If there is no field, the size or the margin is out of range, the UV map
-        cannot be drawn, the look colors numbers and there are none, or there is not enough memory.
+        If there is no field, the size or the margin is out of range, the UV map cannot be drawn, the look
+        needs `color_values` and there are none, or there is not enough memory.
     """
     name = instance.surface.name
     check_texture_size(size, margin)
@@ -234,7 +238,7 @@ def draw_texture(
 
 
 def texture_colors_values(look: Look, content: str = "look") -> bool:
-    """Return whether numbers on the surface color a texture. Hatching has the colors of its ink instead."""
+    """Return whether a texture is colored by `color_values`. Hatching has the colors of its ink instead."""
     return content == "look" and colors_values(look) and not is_hatched(look)
 
 
@@ -276,7 +280,7 @@ def _check_texture_memory(
 def step_length(mesh: TangentMesh, charts: UvCharts, texels: Texels) -> float:
     """Return the length of a step of streamlines, in Blender units.
 
-    It is a texel where the UV map is fine, so that streamlines step from texel to texel.
+    It is about the size of the smallest texels on the surface, so that streamlines rarely skip a texel.
     """
     texels_per_unit = charts.stretch()[0][texels.triangle] * texels.frame.size
     finest = float(np.quantile(texels_per_unit, 1 - FINE_FRACTION))
@@ -287,7 +291,7 @@ def step_length(mesh: TangentMesh, charts: UvCharts, texels: Texels) -> float:
 def _look_pixels(
     on: TexelSurface, field: PixelField, look: Look, drift: Drift, cache: Cache | None
 ) -> np.ndarray:
-    """Return the (P, 4) thresholds of a look with ink at texels, or the colors of another look."""
+    """Return (P, 4) values at texels: thresholds for a look with ink, linear colors for any other look."""
     is_ink = is_hatched(look)
     step_look = surface_pixel_look(
         sharp_look(look) if is_ink else look,
@@ -301,7 +305,7 @@ def _look_pixels(
 
 
 def _colors(on: TexelSurface, field: PixelField, look: PixelLook) -> np.ndarray:
-    """Return (P, 4): the linear colors of the field at texels, and the opacity 1."""
+    """Return (P, 4) RGBA at texels: the linear colors of the field, and the opacity 1."""
     with progress(0.0, 0.3):
         noise = texel_noise(on, **noise_args(look))
     with progress(0.3, 0.95):
@@ -324,7 +328,7 @@ def _colors(on: TexelSurface, field: PixelField, look: PixelLook) -> np.ndarray:
 
 
 class TextureSettings(NamedTuple):
-    """The settings of `draw_texture` besides the look."""
+    """The arguments of `draw_texture` that the user can set besides the look."""
 
     size: int = DEFAULT_SIZE
     margin: int = DEFAULT_MARGIN
@@ -339,11 +343,11 @@ class TextureImages(NamedTuple):
     Attributes
     ----------
     tiles : dict of int to ImageData
-        By their UDIM numbers.
+        Image of each tile, by its UDIM number.
     is_data, line_count
-        As for `Texture`.
+        See `Texture`.
     note : str
-        See `Texture.overlap_note`.
+        Result of `Texture.overlap_note`.
     """
 
     tiles: dict[int, ImageData]
@@ -360,15 +364,16 @@ def draw_texture_images(
     lights: Sequence[Light] | None,
     as_float: bool,
 ) -> TextureImages:
-    """Draw a texture with the cache of bakes in the process that calls it.
+    """Draw a texture, and convert it to images. Uses the cache of bakes of the current process.
 
     Parameters
     ----------
     instance, uv, look, lights
-        As for `draw_texture`.
+        See `draw_texture`.
     settings : TextureSettings
+        The other arguments of `draw_texture`.
     as_float : bool
-        Store linear values in single precision (.exr) instead of 8 bits (.png).
+        Whether images store linear values in single precision (.exr), or else in 8 bits (.png).
     """
     with progress(0.0, CONVERSION_START):
         texture = draw_texture(

@@ -11,5 +11,5 @@ rendered in slices of time, one slice per redraw.
     overlays       dots at singularities, arrowheads and messages, drawn over the pictures
     progressive    previews and final pictures, within a time budget
     session        handlers, timers and drawing; `start` and `stop`
-    brush_mouse    places under the mouse for the tool *Comb Field*
+    brush_mouse    points under the mouse for the tool *Comb Field*
 """

@@ -1,4 +1,4 @@
-"""Places on an object under the mouse, for the tool *Comb Field* and its operator."""
+"""Points on an object under the mouse, for the tool *Comb Field* and its operator."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ..scene.meshes import mesh_surface, read_attribute
 
 
 class BrushMouse:
-    """Finds places on an object under the mouse, in a region of a 3D view."""
+    """The points of an object under the mouse, in a region of a 3D view."""
 
     def __init__(self, context: bpy.types.Context, obj: bpy.types.Object) -> None:
         self._region, self._view = context.region, context.region_data
@@ -30,13 +30,16 @@ class BrushMouse:
         self._surface = BrushSurface(obj, context.evaluated_depsgraph_get(), surface)
 
     def place(self, mouse: tuple[float, float]) -> np.ndarray | None:
-        """Return the place at rest, (3,) float32 in object space; None beside the object."""
+        """Return the point of the rest shape under the mouse, (3,) float32 in object space.
+
+        Return None if the object is not under the mouse.
+        """
         origin = region_2d_to_origin_3d(self._region, self._view, mouse)
         direction = region_2d_to_vector_3d(self._region, self._view, mouse)
         return self._surface.cast_ray(origin, direction)
 
     def radius(self, place: np.ndarray, pixels: float) -> float:
-        """Return the length in object space of a number of pixels at a place."""
+        """Return the length in object space of a number of pixels at a point of the rest shape."""
         world = self._obj.matrix_world @ Vector(place.tolist())
         x, y = self._region.width / 2, self._region.height / 2
         start, end = (
@@ -46,14 +49,14 @@ class BrushMouse:
         return pixels * (end - start).length / (self._obj.matrix_world.median_scale or 1.0)
 
     def dashes(self, place: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return short lines along the field around a place.
+        """Return short line segments along the field around a point of the rest shape.
 
         Returns
         -------
         ends : (K, 2, 3) float64 ndarray
-            World space.
+            The two ends of each segment in world space.
         is_guided : (K,) bool ndarray
-            Whether there is a firm guide.
+            Whether a firm guide determines the field at each segment.
         """
         mesh = self._obj.data
         if not is_face_vector_field(mesh):
@@ -68,15 +71,15 @@ class BrushMouse:
         return ends @ matrix[:3, :3].T + matrix[:3, 3], is_guided
 
 
-#: The mouse on the object that was read last, by the name of the object and the pointer of the region.
+#: The `BrushMouse` that was created last, after the name of its object and the pointer of its region.
 _current: tuple[tuple[str, int], BrushMouse] | None = None
 
-#: Whether it stays, as a stroke is being drawn, which changes the mesh.
+#: Whether `_current` is kept although the mesh changes, because a stroke is being drawn.
 _is_held = False
 
 
 def current_mouse(context: bpy.types.Context, obj: bpy.types.Object) -> BrushMouse:
-    """Return the mouse on an object in the region of the context, read again after each change."""
+    """Return the `BrushMouse` of an object in the region of the context; a new one after each change."""
     key = obj.name, context.region.as_pointer()
     if _current is None or (_current[0] != key and not _is_held):
         _read(context, obj)
@@ -84,7 +87,7 @@ def current_mouse(context: bpy.types.Context, obj: bpy.types.Object) -> BrushMou
 
 
 def hold_mouse(context: bpy.types.Context, obj: bpy.types.Object) -> BrushMouse:
-    """Read an object for the mouse, and keep it until `release_mouse`, whatever changes."""
+    """Return the `BrushMouse` of an object, and keep it until `release_mouse`, whatever changes."""
     global _is_held
     _read(context, obj)
     _is_held = True
@@ -92,13 +95,13 @@ def hold_mouse(context: bpy.types.Context, obj: bpy.types.Object) -> BrushMouse:
 
 
 def release_mouse(*_: Any) -> None:
-    """Forget the object. Blender calls this also before it loads other data."""
+    """Forget the object that was read. Blender also calls this before it loads other data."""
     global _current, _is_held
     _current, _is_held = None, False
 
 
 def unregister() -> None:
-    """Forget the object, and stop watching for changes."""
+    """Forget the object that was read, and stop watching for changes."""
     release_mouse()
     for handlers, handler in _app_handlers():
         if handler in handlers:
@@ -114,7 +117,7 @@ def _read(context: bpy.types.Context, obj: bpy.types.Object) -> None:
 
 
 def _app_handlers() -> list[tuple[Any, Any]]:
-    """Return the lists of application handlers, and the handler that belongs in each."""
+    """Return pairs of one of Blender's lists of application handlers and the handler that belongs in it."""
     handlers = bpy.app.handlers
     return [
         (handlers.depsgraph_update_post, _after_change),
@@ -125,6 +128,6 @@ def _app_handlers() -> list[tuple[Any, Any]]:
 
 
 def _after_change(*_: Any) -> None:
-    """Let the object be read again at the next redraw of the cursor."""
+    """Forget the object that was read, so that it is read again at the next redraw of the cursor."""
     if not _is_held:
         release_mouse()

@@ -5,8 +5,8 @@ It is not saved: it starts and ends with the session of the live views.
 
 from __future__ import annotations
 
-#: Frames that pass between two pictures, at most. If pictures take longer, streaks drift more slowly:
-#: from one picture to the next they would have gone too far to be followed.
+#: Largest number of frames that pass between two pictures. If pictures take longer, the clock slows down:
+#: otherwise the eye could not follow the streaks from one picture to the next.
 MAX_FRAMES_PER_PICTURE = 2.0
 
 
@@ -17,29 +17,29 @@ class FlowClock:
     ----------
     is_playing : bool
     frames : float
-        Frames that have passed since the start, without those in which the clock stood still.
+        Number of frames that have passed while the clock was running.
     """
 
     def __init__(self) -> None:
         self.is_playing = False
         self.frames = 0.0
-        #: Seconds: when the frames were counted last.
+        #: When the frames were counted last, in seconds of a monotonic clock.
         self._time = 0.0
 
     def play(self, now: float) -> None:
-        """Run from now on, in seconds of a monotonic clock."""
+        """Start the clock. `now` is the current time, in seconds of a monotonic clock."""
         self.is_playing, self._time = True, now
 
     def pause(self) -> None:
-        """Stop. The frames are kept."""
+        """Stop the clock. The number of frames is kept."""
         self.is_playing = False
 
     def skip(self, now: float) -> None:
-        """Let the time until now pass without frames."""
+        """Do not count the frames between the last count and now."""
         self._time = now
 
     def advance(self, now: float, rate: float) -> bool:
-        """Count the frames until now, at a rate in frames per second. Return whether there are any."""
+        """Count the frames until now, at a rate in frames per second. Return whether time has passed."""
         passed = min((now - self._time) * rate, MAX_FRAMES_PER_PICTURE)
         if not self.is_playing or passed <= 0:
             return False

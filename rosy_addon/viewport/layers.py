@@ -1,4 +1,4 @@
-"""What live views read: the meshes of each view layer, and the reference renders of the tone "picture"."""
+"""The data that live views read: meshes of view layers, and reference renders for the tone "picture"."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from ..scene.visible_objects import shown_instances
 #: Types of datablocks that may change a picture if they change.
 RELEVANT_ID_TYPES = ("OBJECT", "MESH", "COLLECTION", "SCENE", "LIGHT", "ARMATURE", "KEY", "IMAGE")
 
-#: Seconds of one slice of reading.
+#: Length of one time slice for reading meshes, in seconds.
 SLICE_SECONDS = 0.08
 
 
@@ -43,13 +43,13 @@ class LayerState:
     instances : list of SceneInstance
         The instances at the last reading.
     stale : bool
-        Whether they must be read again.
+        Whether the instances must be read again.
     request : ReadRequest or None
-        What was read.
+        The request with which the instances were read.
     has_occluders : bool
         Whether meshes without a field were read too, as occluders.
     is_starting : bool
-        Whether the layer was never read completely. It is read in slices of time until then.
+        Whether the layer has not been read completely yet. Until then it is read in slices of time.
     """
 
     reader: SceneReader = field(default_factory=SceneReader)
@@ -63,8 +63,8 @@ class LayerState:
 class LayerStates:
     """The states of all view layers that are shown in live views.
 
-    What Blender cannot read while it draws is read by `resolve_topologies`, which must be called later if
-    `SceneReader.has_unresolved` of a layer is true.
+    Some data cannot be read while Blender draws. If `SceneReader.has_unresolved` of a layer is true,
+    `resolve_topologies` must be called later to read it.
     """
 
     def __init__(self) -> None:
@@ -83,9 +83,9 @@ class LayerStates:
         *,
         include_occluders: bool,
     ) -> LayerState:
-        """Return the state of the context's view layer, up to date unless it is starting.
+        """Return the state of the context's view layer, up to date unless its `is_starting` is true.
 
-        The first call only creates it, so that the view can say what will be done.
+        The first call only creates the state, so that the view can show what is done next.
         """
         key = context.scene.name, context.view_layer.name
         if key not in self._layers:
@@ -106,16 +106,19 @@ class LayerStates:
         return layer
 
     def mark_all_stale(self) -> None:
-        """Mark all layers, so that they are read again."""
+        """Mark all layers as stale, so that they are read again."""
         for layer in self._layers.values():
             layer.stale = True
 
     def clear(self) -> None:
-        """Drop all layers."""
+        """Forget the states of all layers."""
         self._layers.clear()
 
     def forget(self, *_: Any) -> None:
-        """Read everything again, except what is cached by its contents. Called by Blender after an undo."""
+        """Mark everything to be read again, except data that is cached by its contents.
+
+        Blender calls this after an undo.
+        """
         self._layers = {
             key: LayerState(SceneReader(layer.reader.cache), is_starting=layer.is_starting)
             for key, layer in self._layers.items()
@@ -130,7 +133,7 @@ class LayerStates:
         ----------
         scene : bpy.types.Scene
         depsgraph : bpy.types.Depsgraph, optional
-            Its `updates` list what has changed. Without it, anything may have changed.
+            Its `updates` list the datablocks that have changed. If it is None, all may have changed.
         """
         if self._is_resolving:
             return
@@ -161,15 +164,16 @@ class LayerStates:
                 layer.stale = True
 
     def resolve_topologies(self) -> bool:
-        """Read the data that cannot be read while Blender draws, in all windows, for one slice.
+        """Read data that cannot be read while Blender draws, for all windows, during one slice of time.
 
         Returns
         -------
         bool
-            Whether everything was read.
+            Whether all such data was read. If not, this function must be called again.
         """
         deadline = time.monotonic() + SLICE_SECONDS
-        _evaluate_windows()  # notes the changes of the user; the others are temporary attributes
+        # Record the changes of the user first. Later changes are temporary attributes, which are ignored.
+        _evaluate_windows()
         self._is_resolving = True
         try:
             for window in bpy.context.window_manager.windows:
@@ -196,17 +200,17 @@ def _evaluate_windows() -> None:
 
 
 class ReferenceImages:
-    """Loads the picture that a tone comes from, outside of drawing.
+    """The reference renders that the tone "picture" is sampled from, by scene.
 
     Blender may not load files while it draws. If `current` returns None for the tone "picture",
-    `load_pending` must be called later.
+    `load_pending` must be called later, when Blender does not draw.
     """
 
     def __init__(self) -> None:
-        #: By the name of a scene: path and modification time of its file, and the luminance, or the
-        #: message of the error of reading it. None: not loaded.
+        #: By the name of a scene: path and modification time of the file, and its luminance. Instead of the
+        #: luminance, a str is the message of an error, and None says that the file is not loaded yet.
         self._images: dict[str, tuple[tuple, np.ndarray | str | None]] = {}
-        #: By the name of a scene: the last result, and what it depends on.
+        #: By the name of a scene: a key of what the last result depends on, and this result.
         self._current: dict[str, tuple[Hashable, ReferenceRender]] = {}
 
     def load_pending(self) -> None:
@@ -254,7 +258,7 @@ class ReferenceImages:
 
 
 def _modified_time(path: Path) -> float | None:
-    """Return when a file was last modified; None if it does not exist."""
+    """Return when a file was last modified, in seconds; None if it does not exist."""
     try:
         return path.stat().st_mtime
     except OSError:

@@ -1,4 +1,4 @@
-"""What is drawn over the picture of a 3D view: dots at singularities, their labels, arrowheads, messages."""
+"""Overlays over the picture of a 3D view: dots at singularities, their labels, arrowheads, messages."""
 
 from __future__ import annotations
 
@@ -43,22 +43,23 @@ from ..worker.job import Call
 #: Number of sides of the polygon that approximates a disc.
 DISC_SEGMENTS = 20
 
-#: Largest distance at which a surface does not hide a point, as a fraction of the distance that a view shows.
+#: Surfaces in front of a point do not hide it within this distance, as a fraction of the view distance.
 NEAR_SURFACE = 1e-3
 
 #: Height of labels, in diameters of a dot of index 1 / N.
 LABEL_SIZE = 4 / 3
 
-#: Seconds for each triangle of a mesh that finding its singularities takes.
+#: Seconds that finding the singularities takes for each triangle of a mesh.
 SINGULARITY_SECONDS = 1.2e-6
 
-#: Offsets toward the eye, so that surfaces do not hide arrowheads: of arrowheads, and how much less of their
-#: outlines, in lengths of an arrowhead; and an additional offset as a multiple of the distance of an arrowhead
-#: from its place on the surface, for slanted surfaces.
+#: Arrowheads are moved toward the eye, so that surfaces do not hide them. `NEARNESS` is this offset, and
+#: `OUTLINE_DISTANCE` how much smaller it is for their outlines, in lengths of an arrowhead. `SLOPE` is an
+#: additional offset for slanted surfaces, as a multiple of the distance on screen of an arrowhead from its
+#: point on the surface.
 NEARNESS, OUTLINE_DISTANCE, SLOPE = 1.5, 0.5, 2.5
 
-#: Largest number of triangles of a view for which hidden places of arrowheads are found exactly. In views with
-#: more, arrowheads leave gaps.
+#: Largest number of triangles of a view for which the hidden points of arrowheads are found exactly. In views
+#: with more triangles, hidden arrowheads leave gaps.
 MAX_EXACT_TRIANGLES = 200_000
 
 #: Points of the arc around a corner of an outline.
@@ -66,14 +67,15 @@ ARC_POINTS = 4
 
 
 class PixelFrames(NamedTuple):
-    """The steps of a pixel at K points of a view.
+    """Vectors in world space of the size of one pixel, at K points of a view.
 
     Attributes
     ----------
     right, up : (K, 3) float64 ndarray
-        World space, parallel to the view.
+        Vectors that are parallel to the view plane.
     nearer : (K, 3) float64 ndarray
-        A step of the same length toward the eye, along which the point stays at its place in the view.
+        Vectors of the same length toward the eye. A point that moves along its vector does not move on
+        screen.
     """
 
     right: np.ndarray
@@ -82,7 +84,7 @@ class PixelFrames(NamedTuple):
 
 
 def pixel_frames(context: bpy.types.Context, points: np.ndarray) -> PixelFrames:
-    """Return the steps of a pixel at (K, 3) points in world space, in the region that is drawn."""
+    """Return the vectors of one pixel at (K, 3) points in world space, in the region that is drawn."""
     view, window = context.region_data, context.region
     view_to_world = np.array(view.view_matrix.inverted())
     right, up, back, eye = view_to_world[:3].T
@@ -95,8 +97,8 @@ def pixel_frames(context: bpy.types.Context, points: np.ndarray) -> PixelFrames:
 
 
 def _draw_triangles(vertices: np.ndarray, code: str, opacity: float) -> None:
-    """Draw triangles with (n, 3) corners in world space in a color."""
-    if not len(vertices):  # Blender makes no batch without vertices
+    """Draw triangles, given their (n, 3) corners in world space, in a color."""
+    if not len(vertices):  # Blender cannot make a batch without vertices
         return
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     shader.uniform_float("color", (*from_hex(code).tolist(), opacity))
@@ -110,9 +112,9 @@ class SingularityDots:
     Attributes
     ----------
     points : (K, 3) ndarray
-        World space.
+        Positions in world space.
     index : (K,) int ndarray
-        In units of 1 / N.
+        Indices of the singularities, in units of 1 / N.
     degree : int
         N.
     """
@@ -129,13 +131,13 @@ class ViewOverlay:
     Attributes
     ----------
     problem : str or None
-        Why it shows no picture, or one by another method.
+        Why the view shows no picture, or a picture by another method.
     lines : list of str
-        Its text, as it was drawn last.
+        Rows of text in the view, as they were drawn last.
     labeled : (list of SingularityDots, float) or None
-        The dots that have labels, and their size.
+        The dots that have labels, and their size. None if no dots have labels.
     arrowheads : (hashable, ArrowMarks) or None
-        Its arrowheads, after a key of what they depend on.
+        A key of everything that the arrowheads depend on, and the arrowheads.
     """
 
     problem: str | None = None
@@ -147,9 +149,9 @@ class ViewOverlay:
 def look_up_singularities(
     instance: MeshInstance, cache: Cache
 ) -> tuple[np.ndarray, np.ndarray] | Preparation:
-    """Look up the singularities of an instance with a field; see `field.find_singularities`.
+    """Look up the singularities of an instance with a field, or return a `Preparation` that finds them.
 
-    They are the same for all deformations of a mesh.
+    See `field.find_singularities`. All deformations of a mesh have the same singularities.
     """
     surface = instance.surface
     key = "singularities", surface.rest_shape_key, instance.field
@@ -164,7 +166,7 @@ def look_up_singularities(
 def singularity_dots(
     instance: MeshInstance, cache: Cache, clip_planes: np.ndarray | None
 ) -> SingularityDots | None:
-    """Return the singularities of an instance with a field that the view does not cut away.
+    """Return the singularities of an instance with a field, without those that clip planes cut away.
 
     Parameters
     ----------
@@ -177,7 +179,7 @@ def singularity_dots(
     Returns
     -------
     SingularityDots or None
-        None if they are not found yet.
+        None if the singularities have not been computed yet.
     """
     found = look_up_singularities(instance, cache)
     if isinstance(found, Preparation):
@@ -195,16 +197,16 @@ def draw_dots(
     *,
     shows_hidden: bool = False,
 ) -> None:
-    """Draw dots in a view. Surfaces in front hide them.
+    """Draw dots in a view. Surfaces in front of dots hide them.
 
     Parameters
     ----------
     context : bpy.types.Context
     objects : sequence of SingularityDots
     size : float
-        Diameter of the dot of an index of 1 / N, pixels.
+        Diameter of the dot of a singularity of index 1 / N, in pixels.
     shows_hidden : bool
-        Whether hidden dots are drawn as well, fainter.
+        Whether hidden dots are drawn as well, with less opacity.
     """
     if shows_hidden:
         gpu.state.blend_set("ALPHA")
@@ -222,7 +224,7 @@ def draw_singularities(
     overlay: ViewOverlay,
     cache: Cache,
 ) -> None:
-    """Draw the dots of a view, and store the dots that get labels in its overlay."""
+    """Draw the dots of a view, and store in its overlay those that get labels."""
     found = [
         singularity_dots(instance, cache, view_input.clip_planes)
         for instance in view_input.instances
@@ -256,7 +258,7 @@ def _disc_triangles(
 ) -> np.ndarray:
     """Return the (n, 3) corners of the triangles of a disc at each of K points, facing the camera.
 
-    (K,) radii are in pixels, and so are (K,) offsets toward the camera.
+    The (K,) radii and the (K,) offsets toward the camera are in pixels.
     """
     frames = pixel_frames(context, points)
     angles = np.linspace(0, 2 * np.pi, DISC_SEGMENTS + 1)
@@ -273,15 +275,15 @@ def _disc_triangles(
 def draw_labels(
     context: bpy.types.Context, objects: Sequence[SingularityDots], size: float
 ) -> None:
-    """Write the indices beside the dots that nothing hides, where there is room.
+    """Draw the index of each visible dot beside the dot, where there is room for it.
 
     Parameters
     ----------
     context : bpy.types.Context
     objects : sequence of SingularityDots
-        Those with more than `MAX_LABELS` dots have no labels.
+        Objects with more than `MAX_LABELS` dots get no labels.
     size : float
-        Diameter of the dot of an index of 1 / N, pixels.
+        Diameter of the dot of a singularity of index 1 / N, in pixels.
     """
     font_id = 0
     blf.size(font_id, LABEL_SIZE * size)
@@ -334,9 +336,9 @@ def draw_view_arrowheads(
     overlay: ViewOverlay,
     cache: Cache,
 ) -> None:
-    """Draw arrowheads over the lines of a view. Surfaces in front hide them.
+    """Draw arrowheads over the lines of a view. Surfaces in front of arrowheads hide them.
 
-    They are placed again if the key of the view changes.
+    The arrowheads are kept in `overlay`, and are placed again only if `key`, the key of the view, changes.
     """
     if overlay.arrowheads is None or overlay.arrowheads[0] != key:
         triangles = sum(len(instance.surface.triangles) for instance in view.instances)
@@ -357,7 +359,8 @@ def _head_triangles(
 ) -> np.ndarray:
     """Return the (n, 3) float32 corners of the triangles of arrowheads, facing the camera.
 
-    Their outlines are moved outward, and they are moved toward the camera, both in pixels.
+    The outline of each arrowhead is moved outward by `grown` pixels, and the arrowhead is moved toward the
+    camera by `nearness` pixels.
     """
     corners = _outline_triangles(head_outline(marks.size), grown)
     forward, left = marks.direction, marks.direction[:, ::-1] * (-1, 1)
@@ -373,9 +376,9 @@ def _head_triangles(
 
 
 def _outline_triangles(outline: np.ndarray, grown: float) -> np.ndarray:
-    """Return the (n, 2) corners of triangles that fill an arrowhead, enlarged by a margin with round corners.
+    """Return the (n, 2) corners of triangles that fill an arrowhead with a margin of width `grown`.
 
-    See `head_outline`.
+    The margin has round corners. `outline` is the result of `head_outline`.
     """
     tip, barb, notch = outline
     # The sides run counter-clockwise from the tip, so their right sides are outside.
@@ -390,25 +393,25 @@ def _outline_triangles(outline: np.ndarray, grown: float) -> np.ndarray:
 
 
 def _unit_vectors(first: float, last: float) -> np.ndarray:
-    """Return (`ARC_POINTS`, 2) unit vectors at angles from the first to the last, in radians."""
+    """Return (`ARC_POINTS`, 2) unit vectors, at equal steps from the first to the last angle, in radians."""
     angles = np.linspace(first, last, ARC_POINTS)
     return np.stack([np.cos(angles), np.sin(angles)], axis=1)
 
 
-#: RGBA, display values.
+#: Color of messages: RGBA, display values.
 _COLOR = 1.0, 0.6, 0.2, 1.0
 
-#: Pixels at a user interface scale of 1: size of the font, and distances from the view's corner.
+#: In pixels at a user interface scale of 1: font size, line height, and distances from the lower left corner.
 _FONT_SIZE, _LINE_HEIGHT, _LEFT, _BOTTOM = 12, 18, 16, 64
 
-#: Characters of a row in the narrowest view.
+#: Smallest number of characters in a row of text, however narrow the view is.
 _MIN_CHARACTERS = 20
 
 
 def draw_messages(messages: Sequence[str], context: bpy.types.Context) -> None:
     """Draw messages in the lower left corner of the context's region, the first one lowest.
 
-    They are wrapped to the part of the region that the sidebar does not cover.
+    Lines are wrapped to the width of the region that the sidebar does not cover.
     """
     if not messages:
         return
@@ -429,7 +432,7 @@ def draw_messages(messages: Sequence[str], context: bpy.types.Context) -> None:
 
 
 def _uncovered_width(area: bpy.types.Area, region: bpy.types.Region) -> int:
-    """Return the width of a region, in pixels, up to a sidebar that overlaps it."""
+    """Return the width, in pixels, of the part of a region that no sidebar overlaps."""
     sidebars = (
         other.x - region.x
         for other in area.regions

@@ -16,11 +16,12 @@ from ..worker.helper import Helper
 from ..worker.job import Step, Steps
 from ..worker.step_runner import StepRunner
 
-#: Seconds that a redraw may take to render a picture at once, and seconds of one slice of refinement.
+#: Time in seconds that a picture may take that is rendered within one redraw, and that one time slice of the
+#: work on any other picture takes.
 FRAME_BUDGET_SECONDS, SLICE_SECONDS = 0.06, 0.08
 
-#: Seconds of one slice of a picture in which only streaks have drifted: redraws between slices would
-#: slow the streaks down.
+#: Seconds of work in one time slice for a picture in which only streaks have drifted. It is longer, because
+#: redraws between slices would slow the streaks down.
 DRIFT_SLICE_SECONDS = 0.25
 
 #: Seconds without a change after which a view is at rest.
@@ -29,7 +30,7 @@ IDLE_SECONDS = 0.12
 #: Seconds without a redraw after which the refinement of a view is abandoned.
 ABANDON_SECONDS = 1.0
 
-#: Cost of a preview relative to the final picture: half the size each way, streaks half as long.
+#: Cost of a preview relative to the final picture. Its width, its height and its streaks are half as long.
 PREVIEW_COST_RATIO = 0.2
 
 #: Minimum size of a picture in estimates of the cost, in megapixels. The cost of smaller pictures is
@@ -38,17 +39,18 @@ _MIN_MEGAPIXELS = 0.02
 
 
 class Request(NamedTuple):
-    """A request for a picture.
+    """A request for a picture of a view.
 
     Attributes
     ----------
     key : hashable
-        Everything that the picture depends on.
+        Key of everything that the picture depends on.
     still_key : hashable
-        The same without how far streaks have drifted.
+        Key of everything but the drift of the streaks: it is equal for pictures in which only the streaks
+        have drifted.
     view_input : ViewInput
     lookups : sequence of callable
-        What else is prepared; see `prepare_steps`.
+        Functions that look up data that must be prepared besides the meshes; see `prepare_steps`.
     """
 
     key: Hashable
@@ -67,15 +69,15 @@ class Work:
     request : Request
     runner : StepRunner
     is_at_once : bool
-        Whether it is done in one redraw, except for what the helper does.
+        Whether all work of Blender's process is done in one redraw, not in time slices.
     downscale : int
-        View pixels per pixel of the picture, each way.
+        Width of a pixel of the picture, in pixels of the view.
     buffer : int
-        The image of a final picture.
+        For a final picture, which of the two images of the view it is rendered into.
     seconds : float
-        Seconds of work so far, without the work of the helper.
+        Seconds of work so far, without the work of the helper process.
     time : float
-        Seconds, monotonic: when it was worked on last.
+        When it was worked on last, in seconds of a monotonic clock.
     """
 
     view: ViewState
@@ -90,37 +92,37 @@ class Work:
 
 @dataclass(eq=False)
 class ViewState:
-    """The picture of one region of a 3D view, and the work on its next one.
+    """The picture that one region of a 3D view shows, and the work on its next picture.
 
-    A key identifies everything that a picture depends on. A still key leaves out how far streaks have
-    drifted.
+    A key identifies everything that a picture depends on. A still key identifies everything but the drift
+    of the streaks.
 
     Attributes
     ----------
     texture : texture or None
-        The picture that is shown; None also if no field is visible.
+        The picture that is shown. None if there is no picture yet, or no field is visible.
     texture_key : hashable
         The key of the picture that is shown.
     texture_still_key : hashable
-        Its still key.
+        The still key of the picture that is shown.
     downscale : int
-        View pixels per picture pixel, each way, of the picture that is shown.
+        Width of a pixel of the picture that is shown, in pixels of the view.
     buffer : int
-        Which of the two images for final pictures is shown, or was shown last.
+        Which of the view's two images for final pictures is shown, or was shown last.
     items : list
         Draw items of the meshes that are prepared.
     requested_key, requested_still_key : hashable
         The keys of the picture that was requested last.
     requested_time : float
-        Seconds, monotonic: when its still key was requested first.
+        When `requested_still_key` was requested first, in seconds of a monotonic clock.
     picture : Work or None
         The picture that is being rendered.
     progress : Step or None
-        The next step, while there is no picture yet.
+        The step that is done next. Only set while there is no picture yet.
     error : str or None
-        Why the picture of `error_key` could not be rendered.
+        Why the picture with the still key `error_key` could not be rendered.
     error_key : hashable
-        Its still key.
+        The still key of the picture that could not be rendered.
     """
 
     texture: Any = None
@@ -139,7 +141,11 @@ class ViewState:
 
     @property
     def is_rendering(self) -> bool:
-        """Return whether a picture is being rendered. Views that left the screen have stopped."""
+        """Whether a picture is being rendered.
+
+        A picture does not count if it has not been worked on for `ABANDON_SECONDS` and does not wait for the
+        helper process: then its view is no longer on screen.
+        """
         picture = self.picture
         return picture is not None and (
             not picture.runner.poll() or time.monotonic() < picture.time + ABANDON_SECONDS
@@ -153,36 +159,36 @@ class ViewState:
 
 
 class ProgressiveRenderer:
-    """Keeps the pictures of views up to date, as far as the time budget of a redraw allows.
+    """The pictures of all live views, which it keeps up to date within the time budget of a redraw.
 
     Before a picture is rendered, its shaders are compiled and its meshes prepared and uploaded. Until
     the first picture of a view this is done in steps, so that the view can name each step before it
-    begins. A picture that fits into the budget is rendered at once. Otherwise a preview is rendered
-    while the view changes, and the final picture in slices of time once it is at rest. A picture that
-    could not be rendered is not tried again.
+    begins. A picture that fits into the budget is rendered within one redraw. Otherwise a preview is
+    rendered while the view changes, and the final picture is rendered in slices of time once the view is at
+    rest. A picture that could not be rendered is not tried again.
 
-    Calls of numeric functions are made by a helper process; meanwhile the views show their last pictures. If
-    a picture is no longer wanted, previews and preparations are still finished and shown, final pictures are
-    abandoned.
+    A helper process makes the calls of numeric functions; meanwhile the views show their last pictures. If
+    the view changes while a preview or a preparation is in work, it is still finished and shown. A final
+    picture is abandoned instead.
 
-    If only streaks drift, there are no previews, which would flicker between the final pictures. These
-    are rendered one after the other, and none is abandoned for the next one.
+    If only streaks drift, no previews are rendered, because they would flicker between the final pictures.
+    The final pictures are rendered one after the other, and none is abandoned.
 
     Parameters
     ----------
     renderer : ViewportRenderer
     helper : Helper
-        Not closed here.
+        The helper process. The caller closes it.
     schedule_redraw : callable
         Called with a number of seconds, after which the views must be redrawn.
     schedule_poll : callable
-        Called when a helper has begun to work. `poll` must be called from then on until it returns True,
-        and the views be redrawn then.
+        Called when the helper process has begun to work. From then on `poll` must be called repeatedly
+        until it returns True. Then the views must be redrawn.
 
     Attributes
     ----------
     views : dict of (int, int) to ViewState
-        The key has the pointers of space and region.
+        The state of each view, by the pointers of its space and its region.
     is_prepared : bool
         Whether the shaders are compiled, and the meshes of a first picture uploaded.
     """
@@ -199,21 +205,25 @@ class ProgressiveRenderer:
         self.is_prepared = False
         self._helper = helper
         self._schedule_redraw, self._schedule_poll = schedule_redraw, schedule_poll
-        #: What is being prepared. Pictures wait until it is done.
+        #: The preparation that is in work, or None. Pictures wait until it is done.
         self._preparation: Work | None = None
-        #: A view that waits for the picture of another view, and since when (seconds, monotonic).
+        #: A view that waits for the picture of another view, and the time when it began to wait, in seconds.
         self._waiting_view: ViewState | None = None
         self._waiting_time = 0.0
-        #: Estimated cost of a final picture; 0 until one is known.
+        #: Estimated cost of a final picture; 0 until a picture has been measured.
         self._seconds_per_megapixel = 0.0
 
     @property
     def is_rendering(self) -> bool:
-        """Return whether the picture of a view is being rendered."""
+        """Whether the picture of any view is being rendered."""
         return any(view.is_rendering for view in self.views.values())
 
     def poll(self) -> bool:
-        """Return whether the views must be redrawn: the helper has finished a call, or begun another one."""
+        """Ask the helper process how far it is, and return whether the views must be redrawn.
+
+        They must be redrawn if a result has arrived, if no work waits for the helper process any more, or if
+        the helper process has begun a call with another label than a view shows.
+        """
         works = [self._preparation, *(view.picture for view in self.views.values())]
         waiting = [work for work in works if work is not None and not work.runner.poll()]
         if not waiting or any(work is not None and work.runner.has_answer for work in works):
@@ -225,12 +235,12 @@ class ProgressiveRenderer:
         )
 
     def remove_space(self, space_pointer: int) -> None:
-        """Drop the pictures of one 3D view."""
+        """Drop the pictures of all regions of one 3D view, given its pointer."""
         for key in [key for key in self.views if key[0] == space_pointer]:
             self.views.pop(key).stop_rendering()
 
     def release(self) -> None:
-        """Free all resources."""
+        """Stop all work, and free the pictures and the resources of the renderer."""
         for view in self.views.values():
             view.stop_rendering()
         self.views.clear()
@@ -247,25 +257,25 @@ class ProgressiveRenderer:
         still_key: Hashable = None,
         lookups: Sequence[Callable[[], Any]] = (),
     ) -> ViewState:
-        """Bring the picture of a view up to date, as far as there is time for it.
+        """Bring the picture of a view up to date, as far as the time budget allows, and return its state.
 
         Parameters
         ----------
         view_pointers : (int, int)
             Pointers of the space and the region.
         requested_key : hashable
-            Changes whenever the picture would change.
+            A key that changes whenever the picture would change.
         view_input : ViewInput
-            Its camera has the size of the region.
+            Input of the picture. Its camera has the size of the region.
         still_key : hashable, optional
-            The key without how far streaks have drifted.
+            A key that also changes then, except if only streaks have drifted. By default `requested_key`.
         lookups : sequence of callable
-            What is prepared besides the meshes; see `prepare_steps`.
+            Functions that look up data that must be prepared besides the meshes; see `prepare_steps`.
 
         Raises
         ------
         Exception
-            If this picture cannot be rendered. In later calls, a RosyError with the same message.
+            If this picture cannot be rendered. Later calls for it raise a RosyError with the same message.
         """
         view = self.views.setdefault(view_pointers, ViewState())
         still_key = requested_key if still_key is None else still_key
@@ -290,7 +300,7 @@ class ProgressiveRenderer:
     def _prepared(self, view: ViewState, request: Request) -> Request | None:
         """Continue the preparation of a picture. Return the prepared request, or None if it is not done.
 
-        The returned request is an older one if the view has changed in the meantime: meshes may change
+        If the view has changed in the meantime, an older request of it is returned: meshes may change
         faster than they are prepared.
         """
         while True:
@@ -303,7 +313,7 @@ class ProgressiveRenderer:
                     return None
                 self.is_prepared = True
             except Exception:
-                if work.view is view:  # otherwise it is left to the other view
+                if work.view is view:  # otherwise the other view will raise the error
                     raise
             finally:
                 if work.runner.is_done:
@@ -312,13 +322,13 @@ class ProgressiveRenderer:
                 return work.request
 
     def _preparation_steps(self, request: Request) -> Steps[None]:
-        """Do what takes long before a picture."""
+        """Compile the shaders of a picture, prepare its meshes, and look up its other data."""
         view_input = request.view_input
         yield from self.renderer.prepare_steps(view_input.instances, view_input.look.display)
         yield from prepare_steps(request.lookups)
 
     def _update_picture(self, view: ViewState, request: Request) -> None:
-        """Bring the picture of a view up to date, with its meshes prepared."""
+        """Bring the picture of a view up to date. Its meshes must have been prepared."""
         view_input = request.view_input
         preview_downscale, full_downscale = self.renderer.downscale_factors
         view.items = self.renderer.upload(view_input.instances, view_input.look.display)
@@ -349,7 +359,7 @@ class ProgressiveRenderer:
             self._start(view, request, full_downscale)
 
     def _megapixels(self, view: ViewState, request: Request) -> float:
-        """Return the size of the final picture of a view, as far as surfaces cover it."""
+        """Return the number of samples of the final picture that surfaces may cover, in millions."""
         pixels = self.renderer.covered_pixels(view.items, request.view_input.camera)
         samples = request.view_input.look.supersampling**2
         return pixels * samples / (1e6 * self.renderer.downscale_factors[1] ** 2)
@@ -357,10 +367,10 @@ class ProgressiveRenderer:
     def _start(
         self, view: ViewState, request: Request, downscale: int, *, is_at_once: bool = False
     ) -> None:
-        """Begin a picture of a view, at once or in slices of time, when its turn has come.
+        """Begin a picture of a view, or schedule a redraw if another view goes first.
 
-        Pictures are rendered one at a time: they share the renderer's images. Those that are rendered at
-        once go first.
+        Pictures are rendered one at a time, because they share the renderer's images. Pictures that are
+        rendered within one redraw (`is_at_once`) go before those that are rendered in slices of time.
         """
         others = [other for other in self.views.values() if other is not view]
         for other in others:
@@ -377,7 +387,7 @@ class ProgressiveRenderer:
         for other in others:
             other.stop_rendering()
         is_final = downscale == self.renderer.downscale_factors[1]
-        # The picture that is shown stays as it is.
+        # A final picture that is shown must not be overwritten: the other image is used.
         buffer = 1 - view.buffer if _shows(view, downscale) and not is_at_once else view.buffer
         steps = self.renderer.texture_steps(
             view.items,
@@ -389,7 +399,7 @@ class ProgressiveRenderer:
         self._render(view)
 
     def _must_wait(self, view: ViewState) -> bool:
-        """Return whether another view has waited for the last picture of this view. Then it goes first."""
+        """Return whether a view must wait, because another view is already waiting to be rendered."""
         return (
             self._waiting_view in self.views.values()
             and self._waiting_view is not view
@@ -397,7 +407,7 @@ class ProgressiveRenderer:
         )
 
     def _render(self, view: ViewState) -> None:
-        """Continue the picture of a view, in one of its two images, and show it once it is done."""
+        """Continue the picture of a view, and show it once it is done."""
         picture, full_downscale = view.picture, self.renderer.downscale_factors[1]
         shows_final = _shows(view, full_downscale)
         end = self._continue(view, picture, DRIFT_SLICE_SECONDS if shows_final else SLICE_SECONDS)
@@ -414,7 +424,7 @@ class ProgressiveRenderer:
             self._schedule_redraw(0.0)
 
     def _update_estimate(self, seconds: float, megapixels: float) -> None:
-        """Update the estimate of the cost after a picture."""
+        """Update the estimated cost of pictures, given the time and the size of a finished picture."""
         # The minimum keeps the cost of single compilations and uploads out of the estimate.
         cost = seconds / max(megapixels, _MIN_MEGAPIXELS)
         self._seconds_per_megapixel = (
@@ -424,10 +434,11 @@ class ProgressiveRenderer:
         )
 
     def _continue(self, view: ViewState, work: Work, seconds: float) -> StopIteration | None:
-        """Continue work for a view, and return its end if it is done.
+        """Continue work for a view. Return the StopIteration with its result if it is done, otherwise None.
 
-        It goes on for some seconds, or without a limit if it is to be done at once; up to a step that the
-        view has not named yet; or until the helper has a call to make.
+        Work that must be done at once goes on until it is done. Other work stops after `seconds`, or
+        before a step whose label the view has not shown yet. Both stop when the helper process has to make
+        a call.
         """
         start_time = time.monotonic()
         try:
@@ -457,7 +468,7 @@ class ProgressiveRenderer:
         return None
 
     def _schedule(self, work: Work) -> None:
-        """Let the views be redrawn when work can go on."""
+        """Schedule a redraw of the views for the time when work can go on."""
         if work.runner.poll():
             self._schedule_redraw(0.0)
         else:
@@ -465,18 +476,18 @@ class ProgressiveRenderer:
 
 
 def _shows(view: ViewState, downscale: int) -> bool:
-    """Return whether a view shows a picture of a size."""
+    """Return whether a view shows a picture with a given downscale factor."""
     return view.texture is not None and view.downscale == downscale
 
 
 def downscaled(view_input: ViewInput, downscale: int) -> ViewInput:
-    """Return the input of a smaller picture with streaks of about the same size on the view.
+    """Return the input of a smaller picture whose streaks have about the same size in the view.
 
     Parameters
     ----------
     view_input : ViewInput
     downscale : int
-        View pixels per picture pixel, each way.
+        Width of a pixel of the picture, in pixels of the view.
     """
     if downscale == 1:
         return view_input

@@ -51,16 +51,16 @@ from .view3d import (
 #: Seconds between two checks for views that were closed.
 CLOSED_VIEWS_INTERVAL_SECONDS = 1.0
 
-#: Seconds between two questions to the helper process, whether it is done.
+#: Seconds between two checks whether the helper process is done.
 POLL_SECONDS = 0.02
 
-#: Seconds for which a view shows why the CPU draws it.
+#: Seconds for which a view shows the message why the CPU draws it.
 MESSAGE_SECONDS = 10.0
 
-#: Number of unreadable objects that a view names.
+#: Largest number of objects that cannot be read and are named in a view.
 MAX_OBJECT_ERRORS = 4
 
-#: Opacity of the picture. In edit mode the mesh shows through.
+#: Opacity of the picture, in general and in edit mode, where the mesh shows through.
 OPACITY, OPACITY_IN_EDIT_MODE = 1.0, 0.7
 
 #: Pointers of a space and of one of its regions.
@@ -81,7 +81,7 @@ class ViewportSession:
     spaces : set of int
         Pointers of the `SpaceView3D` that are live.
     fallback_reason : str or None
-        Why the CPU draws instead of the graphics card.
+        Why the CPU draws instead of the graphics card. None if it does not, or if the user chose it.
     flow_clock : FlowClock
         Frames by which streaks drift in all views, in addition to the frames of the scene.
 
@@ -98,11 +98,11 @@ class ViewportSession:
         self.fallback_reason: str | None = None
         self._fallback_time = 0.0
         self.flow_clock = FlowClock()
-        #: Whether a view has shown drifting streaks since the clock was advanced.
+        #: Whether a view has shown drifting streaks since the clock was advanced last.
         self._has_shown_flow = False
         self._overlays: defaultdict[ViewPointers, ViewOverlay] = defaultdict(ViewOverlay)
         self.layers = LayerStates()
-        #: Stores the singularities of fields, and the fields at corners for arrowheads.
+        #: Stores the singularities of fields, and the corner fields that arrowheads are placed with.
         self._marks_cache = Cache()
         self._references = ReferenceImages()
         self._draw_handlers = [
@@ -125,7 +125,7 @@ class ViewportSession:
         self._schedule(CLOSED_VIEWS_INTERVAL_SECONDS, self._drop_closed_views)
 
     def _new_progressive(self, device: str) -> ProgressiveRenderer:
-        """Return what draws the views, with a device."""
+        """Return a new `ProgressiveRenderer` that draws the views with a device."""
         return ProgressiveRenderer(
             select_viewport_renderer(device),
             self._helper,
@@ -136,12 +136,12 @@ class ViewportSession:
     # --- switching -------------------------------------------------------------------------------
 
     def add(self, space: bpy.types.SpaceView3D) -> None:
-        """Make a view live."""
+        """Make a view live: from now on, the fields of its objects are drawn over it."""
         self.spaces.add(space.as_pointer())
         redraw()
 
     def remove(self, space_pointer: int) -> None:
-        """Make a view no longer live, given its pointer."""
+        """Stop drawing over a view, given its pointer."""
         self.spaces.discard(space_pointer)
         for pointers in [pointers for pointers in self._overlays if pointers[0] == space_pointer]:
             del self._overlays[pointers]
@@ -165,7 +165,7 @@ class ViewportSession:
         redraw()
 
     def play_flow(self, plays: bool) -> None:
-        """Let streaks drift, or stop them."""
+        """Let streaks drift if `plays` is true, otherwise stop them."""
         if plays:
             self.flow_clock.play(time.monotonic())
             self._schedule(0.0, self._advance_flow)
@@ -180,7 +180,7 @@ class ViewportSession:
         stop()
 
     def _drop_closed_views(self) -> float | None:
-        """Remove views that were closed, and stop the session with the last one."""
+        """Remove views that were closed, and stop the session if no view is left."""
         open_spaces = {space.as_pointer() for space in open_view3d_spaces()}
         for space_pointer in self.spaces - open_spaces:
             self.remove(space_pointer)
@@ -194,7 +194,7 @@ class ViewportSession:
         redraw(self.spaces)
 
     def _poll_helper(self) -> float | None:
-        """Tag the live views for a redraw once the helper process has done something for them."""
+        """Tag the live views for a redraw once `ProgressiveRenderer.poll` returns True."""
         if not self.progressive.poll():
             return POLL_SECONDS
         redraw(self.spaces)
@@ -213,9 +213,9 @@ class ViewportSession:
         redraw(self.spaces)
 
     def _advance_flow(self) -> float | None:
-        """Advance the clock of the streaks by a frame, and redraw. Pictures are not overtaken.
+        """Advance the clock of the streaks, and tag the views for a redraw. Wait while pictures are rendered.
 
-        While the timeline plays, the streaks drift by its frames alone.
+        While the timeline plays, the clock stands still, because streaks drift with the frames of the scene.
         """
         if not self.flow_clock.is_playing:
             return None
@@ -233,7 +233,7 @@ class ViewportSession:
         return 1 / rate
 
     def _schedule(self, seconds: float, function: Callable[[], float | None]) -> None:
-        """Start a timer that calls a function, unless it is running already."""
+        """Start a timer that calls a function after some seconds, unless its timer is running already."""
         timer = self._timers.setdefault(function, function)
         if not bpy.app.timers.is_registered(timer):
             bpy.app.timers.register(timer, first_interval=seconds)
@@ -275,7 +275,7 @@ class ViewportSession:
         self._schedule_redraw(0.0)
 
     def _draw_view(self, context: bpy.types.Context, overlay: ViewOverlay) -> None:
-        """Update the picture of a view and composite it."""
+        """Update the picture of a view, and composite the picture and its overlays over the view."""
         depsgraph = context.evaluated_depsgraph_get()
         look = read_look(context.scene.rosy)
         view_input = self._read_view(context, depsgraph, look, overlay)
@@ -318,7 +318,7 @@ class ViewportSession:
         look: Look,
         overlay: ViewOverlay,
     ) -> ViewInput | None:
-        """Read what a view shows; None if there is nothing to draw yet.
+        """Return the input of the picture of a view, or None if there is nothing to draw yet.
 
         Raises
         ------
@@ -365,13 +365,13 @@ class ViewportSession:
         )
 
     def _drift(self, look: Look, scene: bpy.types.Scene) -> Drift:
-        """Return how far streaks have drifted at the frame of a scene and of the clock."""
+        """Return how far streaks have drifted at the current frame of a scene and of the clock."""
         if has_flow(look):
             self._has_shown_flow = True
         return drift_in_scene(scene, look, scene.frame_current_final + self.flow_clock.frames)
 
     def _draw_text(self) -> None:
-        """Draw the messages and labels of a view."""
+        """Draw the messages and the labels of singularities in a view."""
         context = bpy.context
         pointers = _pointers(context)
         if pointers[0] not in self.spaces:
@@ -386,7 +386,7 @@ class ViewportSession:
             self._schedule(0.0, redraw_sidebars)
 
     def _lines_of_view(self, pointers: ViewPointers, layer: LayerState | None) -> list[str]:
-        """Return the lines of text in a view."""
+        """Return the rows of text that a view shows."""
         lines = []
         if self.fallback_reason and time.monotonic() < self._fallback_time + MESSAGE_SECONDS:
             lines.append(f"drawn on the processor, at reduced size: {self.fallback_reason}")
@@ -404,7 +404,7 @@ class ViewportSession:
         return lines + [f"{counted(rest, 'more object')} cannot be drawn"] * (rest > 0)
 
     def messages(self, area: bpy.types.Area) -> list[str]:
-        """Return the messages in the views of an area, as they were drawn last."""
+        """Return the rows of text in the views of an area, as they were drawn last."""
         space_pointer = area.spaces.active.as_pointer()
         views = ((space_pointer, region.as_pointer()) for region in area.regions)
         lines = (self._overlays[view].lines for view in views if view in self._overlays)
@@ -412,7 +412,7 @@ class ViewportSession:
 
 
 def _pointers(context: bpy.types.Context) -> ViewPointers:
-    """Return the pointers of the view that is drawn."""
+    """Return the pointers of the space and the region that are being drawn."""
     return context.space_data.as_pointer(), context.region.as_pointer()
 
 
@@ -439,12 +439,12 @@ _session: ViewportSession | None = None
 
 
 def is_live(space: bpy.types.SpaceView3D) -> bool:
-    """Return whether a 3D view is live."""
+    """Return whether a 3D view is live, that is, fields are drawn over it."""
     return _session is not None and space.as_pointer() in _session.spaces
 
 
 def messages(area: bpy.types.Area) -> list[str]:
-    """Return the messages in the live views of an area: progress, and why a field is not drawn."""
+    """Return the messages in the live views of an area: progress, and reasons why a field is not drawn."""
     return [] if _session is None else _session.messages(area)
 
 
@@ -454,20 +454,20 @@ def is_flow_playing() -> bool:
 
 
 def play_flow(plays: bool) -> None:
-    """Let streaks drift in the live views, if there are any, or stop them where they are."""
+    """Let streaks drift in the live views if `plays` is true, otherwise stop them where they are."""
     if _session is not None:
         _session.play_flow(plays)
 
 
 def start(space: bpy.types.SpaceView3D, device: str = "auto") -> None:
-    """Make a 3D view live.
+    """Make a 3D view live: from now on, the fields of its objects are drawn over it.
 
     Parameters
     ----------
     space : bpy.types.SpaceView3D
     device : {"auto", "cpu"}
-        Used if this is the first live view; all others share its renderer. "auto" is the graphics
-        card, or the CPU at reduced size if the card rejects the shaders.
+        The device that draws. Only used if this is the first live view; later views share its renderer.
+        "auto" is the graphics card, or the CPU at reduced size if the card rejects the shaders.
 
     Raises
     ------
@@ -481,7 +481,7 @@ def start(space: bpy.types.SpaceView3D, device: str = "auto") -> None:
 
 
 def stop(space: bpy.types.SpaceView3D | None = None) -> None:
-    """Make a 3D view no longer live. By default, all of them."""
+    """Stop drawing over a live 3D view or, if `space` is None, over all live views."""
     global _session
     if _session is None:
         return

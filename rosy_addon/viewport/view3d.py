@@ -34,7 +34,7 @@ def redraw(spaces: set[int] | None = None) -> None:
     Parameters
     ----------
     spaces : set of int, optional
-        Pointers of `SpaceView3D`; all visible views by default.
+        Pointers of the `SpaceView3D` to redraw. By default, all visible views are redrawn.
     """
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
@@ -61,7 +61,7 @@ def is_timeline_playing() -> bool:
 
 
 def shows_surfaces(space: bpy.types.SpaceView3D) -> bool:
-    """Return whether the shading of a view shows surfaces, unlike wireframe shading."""
+    """Return whether the shading mode of a view shows surfaces. Wireframe shading does not."""
     return space.shading.type in {"SOLID", "MATERIAL", "RENDERED"}
 
 
@@ -70,7 +70,7 @@ def is_visible(
 ) -> bool:
     """Return whether a view shows an object as a surface."""
     try:
-        # In some versions only the evaluated object knows which local views it is in.
+        # In some versions of Blender only the evaluated object knows which local views it is in.
         evaluated = obj.evaluated_get(depsgraph)
         is_solid = obj.display_type not in {"BOUNDS", "WIRE"}
         return is_solid and evaluated.visible_in_viewport_get(space)
@@ -96,9 +96,10 @@ def clip_planes(region_3d: bpy.types.RegionView3D) -> np.ndarray | None:
 def view_background(
     context: bpy.types.Context, depsgraph: bpy.types.Depsgraph, camera: Camera, look: Look
 ) -> Background | None:
-    """Return the paper of a view, or None if its scene has no backdrop or no paper.
+    """Return the background of a view in the color of the paper.
 
-    A camera view has it in the frame of the camera.
+    Return None if the backdrop is switched off in the scene, or the look has no paper. In a camera view, the
+    background fills only the frame of the camera.
 
     Parameters
     ----------

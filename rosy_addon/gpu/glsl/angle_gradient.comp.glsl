@@ -7,7 +7,7 @@ uniform ivec2 box_origin;
 layout(rgba16f) uniform writeonly image2DArray angle_gradients;
 #pragma constant(line_count, sheet_count)
 
-// The sine of the angle from a direction to that of the same sheet at a neighbor.
+// The sine of the angle from a direction to the direction of the same sheet at a neighbor.
 float angle_difference(ivec2 pixel, int line, ivec2 offset, vec2 direction, float phase)
 {
   int sheet = neighbor_sheet(pixel, line, offset, phase);

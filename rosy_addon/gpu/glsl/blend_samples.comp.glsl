@@ -1,5 +1,5 @@
 // The picture: the mean of the colors of the surfaces that the samples of a pixel show, weighted by alpha.
-// Pixels without any are transparent black.
+// Pixels of which no sample shows a surface are transparent black.
 
 #include "sample_entry.glsl"
 

@@ -93,7 +93,7 @@ vec3 to_linear(vec3 display)
   return mix(curve, display / 12.92, lessThanEqual(display, vec3(0.04045)));
 }
 
-// The last nine bits of a phase hold which of the 3 x 3 neighbors the surface continues to.
+// The last nine bits of a phase are a mask of the 3 x 3 neighbors on which the surface continues.
 int neighbor_mask(float phase)
 {
   return int(floatBitsToUint(phase) & uint(ALL_NEIGHBORS));

@@ -1,6 +1,6 @@
-// Evenly spaced lines at the pixels of one instance, as `even_lines._evaluate`: the distance from the
-// middle of the nearest line, the distance between lines in pixels, and the width of the lines that
-// grow between them. Lines that replace crowded ones have the distance and the width of these.
+// Evenly spaced lines at the pixels of one instance, as `even_lines._evaluate`: the distance of a pixel from
+// the middle of the nearest line, the distance between lines in pixels, and the width of new lines that grow
+// between these lines.
 
 #include "triangle_record.glsl"
 #include "screen_direction.glsl"
@@ -19,7 +19,7 @@ vec4 line_texel(int index)
   return texelFetch(line_records, ivec2(index & ((1 << ROW_BITS) - 1), index >> ROW_BITS), 0);
 }
 
-// As `stripe_pattern._turn_fraction`.
+// The same function as `stripe_pattern._turn_fraction`.
 float turn_fraction(vec3 weights)
 {
   float smallest = min(weights.x, min(weights.y, weights.z));

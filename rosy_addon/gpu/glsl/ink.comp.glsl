@@ -23,7 +23,8 @@ layout(rgba32f) uniform writeonly image2D picture;
 #pragma constant(flow_mode, colors_magnitude, colors_values, noise_channels, family_count)
 #pragma constant(is_light_ink, is_antialiased, even_lines, ink_count)
 
-// The derivatives of the streaks of a line (x) and of its breaks (y), to the left and per pixel, as `fast_lic`.
+// The derivatives, across a line to the left and per pixel, of its streaks (x) and its breaks (y), as
+// `fast_lic`.
 vec2 streak_slopes(ivec2 pixel, int line, float phase)
 {
   ivec2 along = next_along(pixel, line), left = ivec2(-along.y, along.x);
@@ -47,7 +48,7 @@ void main()
   Families families = families_at(pixel);
   float pixel_tone = tone_at(pixel), value_position = texelFetch(tones, pixel, 0).w;
   vec3 one_ink = vec3(0.0), ink_light = vec3(1.0);
-  // Without a number, the position in the color map is negative.
+  // Where the surface has no value, the position in the color map is negative.
   if (colors_magnitude != 0) {
     one_ink = to_linear(mapped_color(magnitude_share(value.xy)));
   }

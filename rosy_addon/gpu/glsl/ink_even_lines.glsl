@@ -15,7 +15,7 @@ float box_filtered(float position, float width, float edge)
   return covered / edge;
 }
 
-// As `even_lines.EvenLines._relief`.
+// The same function as `even_lines.EvenLines._relief`.
 float even_line_relief(float streak, float period, float growth, float width)
 {
   float position = 0.5 - 0.5 * streak;
@@ -29,7 +29,7 @@ float even_line_relief(float streak, float period, float growth, float width)
          (covered - width);
 }
 
-// As `even_lines.EvenLines.coverage`.
+// The fraction of a pixel that a line covers, as `even_lines.EvenLines.coverage`.
 float even_line_coverage(int line, ivec2 pixel, float width)
 {
   vec4 fine = texelFetch(line_image, ivec3(pixel, line), 0);

@@ -8,15 +8,15 @@ uniform int paper_grain_shift, paper_grain_channels, even_lines;
 uniform vec2 crowded_pixels;
 uniform vec4 paper_color;
 
-// How many lines are closer to the guiding angle than this one, as `hatching._line_ranks`. `first` is
-// the angle from the guiding angle to line 0.
+// The number of lines that are closer to the guiding angle than this line, as `hatching._line_ranks`. `first`
+// is the angle from the guiding angle to line 0.
 float line_rank(int line, float first)
 {
   float angle = first + TAU * float(line) / float(sheet_count);
   return atan(abs(sin(angle)), abs(cos(angle))) * 4.0 * float(line_count) / TAU;
 }
 
-// As `hatching._soft_rank`.
+// A rank with soft transitions between whole numbers, as `hatching._soft_rank`.
 float soft_rank(float rank, int count)
 {
   float position = 0.0;
@@ -26,7 +26,7 @@ float soft_rank(float rank, int count)
   return position;
 }
 
-// As `even_lines.EvenLines.crowding`.
+// How crowded evenly spaced lines are at a pixel, from 0 to 1, as `even_lines.EvenLines.crowding`.
 float line_crowding(int line, ivec2 pixel)
 {
   float period = texelFetch(line_image, ivec3(pixel, line), 0).y;
@@ -34,7 +34,7 @@ float line_crowding(int line, ivec2 pixel)
   return 1.0 - smooth_unit_step((period - low) / (high - low));
 }
 
-// The darkness from which a line is drawn, as `hatching._onset_darkness`. Beyond 1 for a line that
+// The darkness from which on a line is drawn, as `hatching._onset_darkness`. It is above 1 for a line that
 // exceeds the number of layers.
 float onset_darkness(int line, float first, ivec2 pixel)
 {
@@ -48,7 +48,7 @@ float onset_darkness(int line, float first, ivec2 pixel)
   return onset;
 }
 
-// The weight, 0 to 1, of a line whose onset is a delay later than the first one.
+// The weight, 0 to 1, of a line whose onset is later than the onset of the first line by `delay`.
 float onset_weight(float delay, float transmittance)
 {
   return smooth_unit_step((1.0 - transmittance - delay + onset_lead) / (onset_range + onset_lead));
@@ -76,13 +76,13 @@ vec3 complement_if_light(vec3 light)
   return is_light_ink != 0 ? 1.0 - light : light;
 }
 
-// The share of the paper's light, by channel, that an ink lets through.
+// The fraction of the paper's light, by color channel, that an ink lets through.
 vec3 transmittance_of(vec3 ink)
 {
   return complement_if_light(ink) / max(complement_if_light(paper_color.xyz), 1e-3);
 }
 
-// The coverage at which an ink leaves a share of the paper's luminance.
+// The coverage at which an ink leaves a given fraction of the paper's luminance.
 float ink_coverage(float target, vec3 ink)
 {
   float paper_luminance = dot(complement_if_light(paper_color.xyz), LUMINANCE_WEIGHTS);
@@ -116,8 +116,8 @@ float coverage_threshold(float coverage, int row)
   return mix(low, high, position - float(low_index));
 }
 
-// The share of a pixel that has ink, where a streak exceeds a threshold. The edges are soft: over a slope,
-// in streaks per pixel, at least as soft as the mean over a pixel; as `hatching`.
+// The fraction of a pixel that has ink: where a streak exceeds a threshold. The edges are soft, at least as
+// soft as by the mean over a pixel, given the slope of the streak per pixel; as in `hatching`.
 float ink_above_threshold(float streak, float threshold, float slope)
 {
   float half_width = softness;
@@ -130,7 +130,7 @@ float ink_above_threshold(float streak, float threshold, float slope)
   return smooth_unit_step((streak - threshold) / (2.0 * half_width) + 0.5);
 }
 
-// The mean of the noise over a disc around a pixel, around 0, as `undirected_texture`.
+// The mean of the noise over a disc around a pixel, minus the mean of all noise, as in `undirected_texture`.
 vec3 disc_mean(ivec2 pixel)
 {
   ivec2 last = textureSize(cells, 0) - 1;

@@ -58,7 +58,7 @@ void main()
   vec3 tone = noise_channels == 1 ? lic_sum.xxx : lic_sum;
   vec4 light_and_position = texelFetch(tones, pixel, 0);
   vec3 color = tone + NOISE_MEAN;
-  // Without a number, the position in the color map is negative.
+  // Where the surface has no value, the position in the color map is negative.
   if (colors_magnitude != 0) {
     color = mapped_color(relative_magnitude) * (1.0 + COLOR_CONTRAST * tone);
   }

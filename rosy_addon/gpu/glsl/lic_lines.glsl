@@ -1,18 +1,18 @@
-// The filtered noise of the lines through a pixel. Included by lic.comp.glsl and streaks.comp.glsl.
+// Noise that is filtered along the lines through a pixel. Included by lic.comp.glsl and streaks.comp.glsl.
 
 uniform float full_samples, break_samples;
 uniform int line_count, sheet_count, magnitude_length, flow_mode, half_length, break_steps;
 uniform int overshoot_steps, even_lines;
 uniform vec4 flow_shifts;
 
-// How far the noise is filtered at a pixel: over how many steps in each direction, and what has drifted.
+// How far the noise is filtered at a pixel: the numbers of steps in each direction, and the drift of streaks.
 struct Reach {
   int overshoot_count;
   Drift drift;
   Drift break_drift;
 };
 
-// The filtered noise of a line, that of its breaks, and the mean tone along its overshoot.
+// Means along a line: of the noise, of the noise for breaks of the line, and of the tone along the overshoot.
 struct FilteredLine {
   vec3 mean;
   float samples;
@@ -20,7 +20,7 @@ struct FilteredLine {
   float tone;
 };
 
-// `relative_magnitude` is 1 if the magnitude is not drawn.
+// The reach at a pixel. `relative_magnitude` is 1 if the magnitude does not change the length of streaks.
 Reach reach_at(float relative_magnitude)
 {
   Reach reach;
@@ -31,13 +31,13 @@ Reach reach_at(float relative_magnitude)
     break_step_count = int(round(float(break_step_count) * relative_magnitude));
     reach.overshoot_count = int(round(float(overshoot_steps) * relative_magnitude));
   }
-  // Even lines have no streaks, but breaks.
+  // Evenly spaced lines have no streaks, but they have breaks.
   step_count = even_lines != 0 ? break_steps : step_count;
   reach.drift.half_steps = step_count;
   reach.break_drift.half_steps = break_step_count;
   reach.drift.shifts = reach.break_drift.shifts = vec3(0.0);
   if (flow_mode != FLOW_NONE) {
-    // Relative to the steps of lines of the largest magnitude.
+    // Shifts are proportional to the number of steps, which is largest for the largest magnitude.
     int largest_count = max(even_lines != 0 ? break_steps : half_length, 1);
     reach.drift.shifts = flow_shifts.xyz * (float(step_count) / float(largest_count));
     reach.break_drift.shifts =
@@ -46,7 +46,7 @@ Reach reach_at(float relative_magnitude)
   return reach;
 }
 
-// `line_angle` is that of line 0.
+// Filter the noise along a line. `line_angle` is the angle of line 0.
 FilteredLine filtered_line(ivec2 pixel, int line, vec4 cell, Reach reach, float line_angle)
 {
   bool has_opposite_sheet = sheet_count == 2 * line_count;

@@ -9,8 +9,8 @@ uniform int break_steps;
 uniform vec4 flow_weights;
 
 // Sums over the samples of a streamline: of the weighted noise, of the weights and of their squares.
-// Of kernels that move, the weighted noise is around 0 and in all components. `full_square_sum` is what
-// `square_sum` would be if the streamline did not end early.
+// For kernels that move, the noise has its mean subtracted, and uses all components. `full_square_sum` is
+// the value of `square_sum` for a streamline that does not end early.
 struct Sums {
   vec3 weighted_sum;
   float weight;
@@ -18,16 +18,16 @@ struct Sums {
   float full_square_sum;
 };
 
-// A kernel that moves, for a line: its steps in each direction, how far the streaks of the channels have
-// drifted, in steps, and the share of the kernel that drifts forward.
+// A kernel that moves along a line: its steps in each direction, the distances in steps by which the streaks
+// of the channels have drifted, and the fraction of the kernel that drifts forward.
 struct Drift {
   int half_steps;
   vec3 shifts;
   float forward_share;
 };
 
-// Sums over half a streamline: `all` over all its steps, `near` over its first steps with weights of
-// their own. `tones` is the sum of the tones along the overshoot, and their number.
+// Sums over half a streamline: `all` over all its steps, `near` over its first steps with other weights.
+// `tones` is the sum of the tones along the overshoot, and the number of these tones.
 struct Half {
   Sums all;
   Sums near;
@@ -49,7 +49,7 @@ vec3 interpolated_weights(vec3 position, int half_steps)
   return clamp(width - abs(position), 0.0, 1.0);
 }
 
-// The weights of the channels of a sample, as `flow.MovingKernel`.
+// The weights of the noise channels of a sample, as `flow.MovingKernel`.
 vec3 drifting_weights(float position, Drift drift)
 {
   if (flow_mode == FLOW_ALONG) {
@@ -64,7 +64,7 @@ vec3 drifting_weights(float position, Drift drift)
 // The number of steps on one side, forward (1) or backward (-1), beyond which all weights are 0.
 int drifting_steps(Drift drift, float side)
 {
-  // Forward, those kernels reach furthest whose streaks have drifted backward, and vice versa.
+  // Kernels whose streaks have drifted backward reach furthest forward, and vice versa.
   float against = drift.forward_share > 0.0 ? -side : side;
   vec3 reach = against * drift.shifts;
   if (flow_mode != FLOW_ALONG && drift.forward_share > 0.0 && drift.forward_share < 1.0) {
@@ -111,7 +111,7 @@ Sums both_halves(vec3 start, Sums forward, Sums backward, Drift drift)
   return sums;
 }
 
-// The effective samples of a streamline of full length, by a kernel at rest (`filter_kernel`).
+// The effective number of samples of a streamline of full length, for a kernel at rest (`filter_kernel`).
 float samples_at_rest(int half_steps)
 {
   float width = float(half_steps + 1), count = 2.0 * width - 1.0;
@@ -131,7 +131,7 @@ float effective_samples(Sums sums, Drift drift)
   return sums.weight * sums.weight / sums.square_sum;
 }
 
-// How much the weights of the samples of half a streamline fall over its length (`filter_kernel`).
+// The decrease of the weights of the samples over the length of half a streamline (`filter_kernel`).
 // `along` is 1 along the directions of a field without opposites, and -1 against them.
 float weight_slope(float along)
 {
@@ -155,7 +155,7 @@ vec3 noise_near(ivec2 pixel, vec4 cell, vec2 offset)
 
 // Trace half a streamline from a pixel on a sheet. Its state is a pixel and a sheet of the covering;
 // each step is second-order Adams-Bashforth. The sums do not contain the start. `side` is 1 forward and
-// -1 backward. `slope` is that of the weights at rest.
+// -1 backward. `slope` is the decrease of the weights of a kernel at rest.
 Half traced_half(ivec2 pixel, int sheet, float direction_sign, vec4 cell, float side, Drift drift,
                  Drift near_drift, int overshoot_count, float slope)
 {
@@ -181,7 +181,7 @@ Half traced_half(ivec2 pixel, int sheet, float direction_sign, vec4 cell, float 
     velocity *= opposite ? -direction_sign : direction_sign;
     offset += step_index == 0 ? velocity : 1.5 * velocity - 0.5 * previous_velocity;
     previous_velocity = velocity;
-    // At most to an adjacent pixel, however sharply the direction turns.
+    // A step goes at most to an adjacent pixel, however sharply the direction turns.
     vec2 pixel_step = clamp(round(offset), -1.0, 1.0);
     offset -= pixel_step;
     ivec2 pixel_move = ivec2(pixel_step);
@@ -217,7 +217,7 @@ Half traced_half(ivec2 pixel, int sheet, float direction_sign, vec4 cell, float 
     }
   }
   if (flow_mode != FLOW_NONE) {
-    // The samples that are missing.
+    // Add the weights of the samples that are missing because the streamline ended early.
     for (; step_index < step_count; ++step_index) {
       float position = side * float(step_index + 1);
       vec3 weights = drifting_weights(position, drift);
@@ -231,8 +231,8 @@ Half traced_half(ivec2 pixel, int sheet, float direction_sign, vec4 cell, float 
   return result;
 }
 
-// The mean of the noise along a streamline, around 0. Streamlines that end early are scaled to the
-// standard deviation of full ones (`contrast`).
+// The mean of the noise along a streamline, minus the mean of all noise. Streamlines that end early are
+// scaled to the standard deviation of streamlines of full length (`contrast`).
 vec3 normalized_mean(Sums sums, float full_count, Drift drift)
 {
   float sample_count = effective_samples(sums, drift);

@@ -2,8 +2,8 @@ uniform sampler2D wobble_angles;
 uniform float guiding_angle, wobble_strength;
 uniform int degree;
 
-// The angle from the guiding angle to line 0 of a pixel, in the view plane, with wobble. `z` is its
-// representation.
+// The angle from the guiding angle to line 0 of a pixel, in the view plane, with wobble. `z` is the
+// representation of the field at the pixel.
 float line_angle_of(ivec2 pixel, vec2 z)
 {
   // Without wobble, the texture has another size.

@@ -2,7 +2,8 @@ uniform sampler2DArray field_channels;
 uniform float guiding_angle;
 uniform int degree, sheet_count, family_count, family_channel;
 
-// The families of the lines of a pixel: the stored angle, and their number; 1 at a pixel without families.
+// The families of labeled directions at a pixel: the angle of the channel that stores them, and the number of
+// families, which is 1 at a pixel without labels.
 struct Families {
   float angle;
   int count;
@@ -17,7 +18,7 @@ Families families_at(ivec2 pixel)
   return Families(angle_of(value), value == vec2(0.0) ? 1 : family_count);
 }
 
-// The family of a line, as `family_hues`. `line_angle` is that of line 0.
+// The index of the family of a line, as in `family_hues`. `line_angle` is the angle of line 0.
 int line_family(int line, float line_angle, Families families)
 {
   // For odd N, every other line is the opposite half of a member.

@@ -2,7 +2,8 @@ uniform sampler2D cells;
 uniform sampler2DArray directions;
 uniform int line_count, sheet_count;
 
-// The sheet of a neighbor that continues that of a line; -1 where the surface does not continue.
+// The sheet at a neighboring pixel that continues the sheet of a line; -1 where the surface does not
+// continue.
 int neighbor_sheet(ivec2 pixel, int line, ivec2 offset, float phase)
 {
   int bit = offset.x + 3 * offset.y + 4;
@@ -13,7 +14,8 @@ int neighbor_sheet(ivec2 pixel, int line, ivec2 offset, float phase)
   return wrap_once(line + int(round(phase - neighbor_phase)), sheet_count);
 }
 
-// The same in arrays with a layer for each line: its texel, or that of the line itself.
+// The texel of that sheet in an array with a layer for each line. Where the surface does not continue, it is
+// the texel of the line itself.
 ivec3 neighbor_line(ivec2 pixel, int line, ivec2 offset, float phase)
 {
   int sheet = neighbor_sheet(pixel, line, offset, phase);
@@ -21,7 +23,7 @@ ivec3 neighbor_line(ivec2 pixel, int line, ivec2 offset, float phase)
                      ivec3(pixel + offset, sheet >= line_count ? sheet - line_count : sheet);
 }
 
-// The neighbor in the direction of a line.
+// The offset to the neighboring pixel in the direction of a line.
 ivec2 next_along(ivec2 pixel, int line)
 {
   return ivec2(round(unit_or_zero(texelFetch(directions, ivec3(pixel, line), 0).xy)));

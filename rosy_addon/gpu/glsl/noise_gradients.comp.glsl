@@ -1,5 +1,5 @@
-// The derivatives of the noise on screen, by differences over connected neighbors: along x and y for each channel,
-// two channels in a layer.
+// The derivatives of the noise along x and y on screen, as differences between connected neighbors. Each
+// layer of the image has the derivatives of two channels.
 
 uniform sampler2D cells;
 uniform int noise_layers;

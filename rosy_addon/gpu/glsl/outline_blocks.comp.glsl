@@ -1,4 +1,4 @@
-// What each pixel of the finished picture contains of edges: 0, or EDGE_BIT with the bits of borders.
+// The edges in each pixel of the finished picture: EDGE_BIT with the bits of borders, or 0 if there is none.
 
 uniform sampler2D outline_edges;
 uniform int supersampling;

@@ -1,4 +1,4 @@
-// The share of each pixel that outlines along silhouettes and creases cover.
+// The fraction of each pixel that outlines along silhouettes and creases cover.
 
 uniform sampler2D outline_widths, field_values, depth_slopes;
 uniform float outline;

@@ -1,5 +1,5 @@
-// Mark the pixels next to the visible edges of creases: as `crease_pixels`. Each thread takes every
-// CREASE_SLICES-th crossing of one edge.
+// Mark the pixels next to the visible edges of creases, as `crease_pixels` does. Each thread tests every
+// CREASE_SLICES-th crossing of one edge with the rows and columns of pixels.
 
 uniform sampler2D crease_points, field_values, depth_slopes;
 uniform float instance_id;
@@ -12,7 +12,7 @@ vec3 crease_end(int index)
   return texelFetch(crease_points, ivec2(index & ((1 << ROW_BITS) - 1), index >> ROW_BITS), 0).xyz;
 }
 
-// The position in pixels, and the depth of depth_slopes.
+// A point on screen: x and y in pixels, and the depth in the units of depth_slopes.
 vec3 on_screen(vec3 point, float depth)
 {
   vec4 p = vec4(point, 1.0);
@@ -33,7 +33,7 @@ void mark_if_visible(ivec2 pixel, float line_depth, vec2 offset)
   }
 }
 
-// The crossings with the rows of pixels; with the columns if x and y are swapped.
+// Test the crossings of an edge with the rows of pixels, or with the columns if x and y are swapped.
 void mark_crossings(vec3 low, vec3 high, bool swapped, int slice)
 {
   if (low.y > high.y) {

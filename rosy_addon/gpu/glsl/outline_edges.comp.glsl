@@ -1,6 +1,6 @@
-// The width of the outline at the pixels at an edge of their surface, and what begins there: as
-// `outline`. It is 0 at other pixels, and where a surface in front begins: the outline is then drawn
-// on that surface.
+// The width of the outline at pixels on an edge of their surface, and the bits for what lies beyond the edge,
+// as in `outline`. The width is 0 at other pixels, and where a surface in front begins, because the outline
+// is then drawn on the surface in front.
 
 #include "surface_continuity.glsl"
 
@@ -18,7 +18,7 @@ int part_of(ivec2 pixel)
   return int(parts[triangle & 3]);
 }
 
-// How much the depth changes from a pixel to the next; 0 where there is no surface.
+// The change of the depth from a pixel to its neighbor; 0 where the neighbor shows no surface.
 float depth_change(ivec2 pixel, ivec2 offset, float depth)
 {
   ivec2 next = pixel + offset, frame = imageSize(outline_edges);
@@ -70,11 +70,12 @@ void main()
       continue;
     }
     if (same_instance && depth_continues(slope, other_slope, same_side, offset)) {
-      // Where two parts intersect, there is a crease.
+      // Where two connected components intersect, there is a crease.
       if (other_part && dot(normal.xyz, other_normal.xyz) < min_normal_cosine) {
         width = max(width, 0.5 * outline);
       }
-      // A surface that is seen edge-on predicts any depth: a step is much steeper than what is around.
+      // A surface that is seen edge-on can predict any depth: a silhouette is a change of depth that is much
+      // steeper than the changes around it.
       float fall = slope.x - other_slope.x;
       if (fall > MIN_STEP * min(slope.w, other_slope.w) &&
           fall > STEP_RATIO * depth_change(pixel, -offset, slope.x) &&

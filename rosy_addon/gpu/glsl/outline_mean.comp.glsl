@@ -1,5 +1,5 @@
-// The share of the surface that a pixel sees that outlines cover: the mean of the samples that show it. They are
-// in the pixel, and some in those around it.
+// The fraction that outlines cover of the surface at each pixel: the mean of all samples that show this
+// surface. These samples are in the pixel and in the pixels around it.
 
 #include "sample_entry.glsl"
 

@@ -1,6 +1,6 @@
-// The widths of outlines, without marks that are too short: as `outline`. A mark that is shorter than
-// FULL_MARK_LENGTH lies inside of a window around each of its pixels, so it is found from there. The
-// rows of the window are bit fields.
+// The widths of outlines, without marks (connected runs of edge pixels) that are too short, as in `outline`.
+// A mark that is shorter than FULL_MARK_LENGTH fits into a window around any of its pixels, so the length of
+// a mark is measured in a window around each pixel. The rows of the window are bit fields.
 
 uniform sampler2D outline_edges, outline_blocks;
 uniform float outline;
@@ -37,7 +37,7 @@ Mark mark_around(ivec2 block)
   }
   Mark mark;
   mark.long_side = 0;
-  // Sweeps up and down, until nothing is added. Longer marks need not be followed to their ends.
+  // Sweep up and down until no pixel is added. Longer marks need not be followed to their ends.
   bool grows = true;
   for (int sweep = 0; grows && sweep < WINDOW_SIDE * WINDOW_SIDE && mark.long_side < FULL_MARK_LENGTH;
        ++sweep) {

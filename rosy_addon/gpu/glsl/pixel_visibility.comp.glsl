@@ -1,5 +1,6 @@
-// The triangle that each pixel sees at its center. Where there is none, that of the nearest of its samples that
-// sees one, as `rasterizer.SampledTriangles`. Ids from occluder_id on are of triangles that only occlude.
+// The triangle that is visible at the center of each pixel. If there is none, it is the triangle at the
+// sample that is nearest to the center and shows one, as in `rasterized_samples.SampledTriangles`. Ids from
+// occluder_id on belong to triangles that only occlude.
 
 uniform sampler2D center_visibility, sample_visibility;
 uniform int samples_per_side, occluder_id;

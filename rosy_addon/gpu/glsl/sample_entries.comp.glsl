@@ -1,5 +1,6 @@
-// The pixel whose surface each sample of one instance shows, as `pixel_coverage`: the one that it is in, as a
-// rule, and at silhouettes and creases one beside it. One more than the number of the neighbor.
+// For each sample of one instance, the pixel whose surface it shows, as in `pixel_coverage`. Mostly it is the
+// pixel that contains the sample; at silhouettes and creases it can be a neighbor. Stored is the number of
+// the pixel in its 3 x 3 neighborhood, plus one.
 
 #include "triangle_record.glsl"
 
@@ -11,7 +12,8 @@ uniform vec2 lens_shift;
 uniform vec4 clip_to_camera;
 layout(r32f) uniform writeonly image2D sample_entries;
 
-// What is compared: the position in pixels, the depth of depth_slopes, and the normal of the triangle.
+// A visible point, for comparison: its position in pixels, its depth in the units of depth_slopes, and the
+// normal of its triangle.
 struct Point {
   vec2 position;
   float depth;
@@ -67,7 +69,7 @@ void main()
     if (!shows(home, point)) {
       float nearest = 1e9;
       for (int index = 0; index < 8; ++index) {
-        // Beside, above and below before the corners.
+        // Neighbors beside, above and below come before neighbors at the corners.
         ivec2 offset = index < 2 ? ivec2(1 - 2 * index, 0) :
                        index < 4 ? ivec2(0, 5 - 2 * index) :
                                    ivec2(1 - 2 * (index & 1), index < 6 ? 1 : -1);

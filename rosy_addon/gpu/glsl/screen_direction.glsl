@@ -14,8 +14,8 @@ vec2 screen_direction(vec3 tangent, vec3 toward_eye, vec3 normal, vec2 ray)
   return vec2(dot(camera_to_pixels.xy, in_plane), dot(camera_to_pixels.zw, in_plane));
 }
 
-// The direction of a member. For a RoSy it is the member itself. Otherwise its deviation is a function
-// of the member without wobble (`wobble`).
+// The unit direction of the field that belongs to a member. For evenly spaced directions it is the member
+// itself. Otherwise it deviates from the member, by a function of the member without `wobble`.
 vec2 member_direction(vec2 member, float wobble, ivec2 pixel)
 {
   if (harmonic_count == 0) {

@@ -1,5 +1,5 @@
-// The share of a light that reaches a pixel, by percentage-closer filtering of a shadow map, as
-// `shadow_maps`. The results of the views of one light are multiplied.
+// The fraction of a light that reaches a pixel, by percentage-closer filtering of a shadow map, as in
+// `shadow_maps`. If a light has several shadow maps, their results are multiplied.
 
 uniform sampler2D normals, shadow_map, previous_visibility;
 uniform float normal_bias;
@@ -40,7 +40,7 @@ void main()
     for (int row = 0; row <= PCF_WIDTH; ++row) {
       float row_weight = row == 0 ? 1.0 - fraction.y : (row == PCF_WIDTH ? fraction.y : 1.0);
       for (int column = 0; column <= PCF_WIDTH; ++column) {
-        // The first and the last texel are covered in part: together they weigh as much as one.
+        // The window covers the first and the last texel partly; together they weigh as much as one texel.
         float column_weight = column == 0 ? 1.0 - fraction.x : (column == PCF_WIDTH ? fraction.x : 1.0);
         ivec2 texel = clamp(ivec2(first) + ivec2(column, row), ivec2(0), size - 1);
         float occluder_depth = texelFetch(shadow_map, texel, 0).x;

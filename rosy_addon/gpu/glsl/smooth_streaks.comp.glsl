@@ -1,5 +1,6 @@
-// Streaks averaged with those before and behind them, as of antialiased pictures in `fast_lic`: neighbors on one
-// line have streamlines of their own, which differ a little.
+// Average each pixel's streaks with the streaks of its neighbors in both directions of the line, as
+// `fast_lic` does for antialiased pictures. Neighbors on one line have streamlines of their own, which differ
+// a little.
 
 #include "line_neighbor.glsl"
 

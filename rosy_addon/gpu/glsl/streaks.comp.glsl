@@ -1,5 +1,5 @@
-// The streaks of hatching, one thread for each line through a pixel: their filtered noise, that of their
-// breaks, and the tone along the line.
+// The streaks of hatching: means along each line through a pixel, of the noise, of the noise for breaks, and
+// of the tone. There is one thread for each line.
 
 #include "magnitude.glsl"
 #include "line_angle.glsl"

@@ -45,7 +45,7 @@ vec3 apply_curve(vec3 tone)
   return curve_power == 1.0 ? stretched : pow(stretched, vec3(curve_power));
 }
 
-// Where the number of the surface is in the color map, from 0 to 1; -1 if there is none.
+// The position of the surface's value in the color map, from 0 to 1; -1 where the surface has no value.
 float map_position(int triangle, vec2 ray)
 {
   if (values_texel < 0) {

@@ -4,7 +4,8 @@ uniform sampler2D visibility, triangle_records;
 uniform int is_perspective, first_triangle_id, triangle_count, texels_per_record;
 uniform vec4 model_view_x, model_view_y, model_view_z;
 
-// The triangle of the instance that a pixel sees; outside of [0, triangle_count) if it sees another one.
+// The index of the triangle that is visible at a pixel; outside of [0, triangle_count) if the triangle
+// belongs to another instance.
 int visible_triangle(ivec2 pixel)
 {
   return floatBitsToInt(texelFetch(visibility, pixel, 0).x) - first_triangle_id;
@@ -22,7 +23,7 @@ vec4 record_texel(int triangle, int texel)
   return texelFetch(triangle_records, ivec2(index & ((1 << ROW_BITS) - 1), index >> ROW_BITS), 0);
 }
 
-// A point from model to camera space.
+// Transform a point from model space to camera space.
 vec3 to_camera(vec3 point)
 {
   vec4 p = vec4(point, 1.0);
@@ -48,8 +49,8 @@ Corners corner_normals(int triangle)
                  record_texel(triangle, NORMAL_TEXEL + 2).xyz);
 }
 
-// The rest positions: x is the fourth component of positions, y that of normals; z is in the last
-// texel.
+// The rest positions of the corners. In a record, x is in the fourth components of the positions, y in the
+// fourth components of the normals, and z in the last texel.
 Corners rest_positions(int triangle)
 {
   vec3 z = record_texel(triangle, texels_per_record - 1).xyz;
@@ -84,7 +85,7 @@ vec3 edge_functions(Corners corners, vec2 ray)
   return vec3(q.x * r.y - r.x * q.y, r.x * p.y - p.x * r.y, p.x * q.y - q.x * p.y);
 }
 
-// Barycentric coordinates of the point of a triangle that a pixel sees.
+// Barycentric coordinates of the point of a triangle that is visible at a pixel.
 vec3 weights_at(Corners corners, vec2 ray)
 {
   vec3 edges = edge_functions(corners, ray);

@@ -1,4 +1,4 @@
-// As visibility.frag, without the fragments that the clip planes cut away.
+// Does the same as visibility.frag, but discards fragments that the clip planes cut away.
 
 uniform int first_triangle_id;
 in float triangle_id;

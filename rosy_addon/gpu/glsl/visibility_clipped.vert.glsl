@@ -1,4 +1,4 @@
-// As visibility.vert, with distances to the clip planes.
+// Does the same as visibility.vert, and outputs the distances to the clip planes.
 
 uniform vec4 clip_x, clip_y, clip_z, clip_w, plane_0, plane_1, plane_2, plane_3, plane_4, plane_5;
 out float triangle_id;

@@ -10,8 +10,7 @@ uniform vec2 lens_shift;
 uniform vec4 clip_to_camera;
 layout(rgba32f) uniform writeonly image2D wobble_angles;
 
-// The sum of the waves of two octaves at a position. `level` is the logarithm (base 2) of the
-// wavelength.
+// The sum of the waves of two octaves at a position. `level` is the logarithm (base 2) of the wavelength.
 float sum_of_waves(vec3 position, float level)
 {
   float octave = floor(level);

@@ -72,8 +72,8 @@ class EvenLines:
     period : (M, P) float32 ndarray
         Distance between lines on screen, in pixels of the frame. 0 where there are no lines.
     growth : (P,) float32 ndarray or None
-        Width of the further lines that grow between the lines, relative to these: from 0 (no further
-        lines) to 1 (equally wide). None if no further lines grow.
+        New lines appear halfway between the existing lines. Their width as a fraction of the width of the
+        existing lines, from 0 (no new lines) to 1 (equally wide). None if no new lines appear.
     coarse_streaks : (M, P) float32 ndarray or None
         `streaks` of the lines that replace crowded ones. None if no lines are crowded.
     """

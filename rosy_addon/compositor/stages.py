@@ -78,8 +78,8 @@ class ComposeStages:
     ) -> list[LicImages]:
         """Compute the LIC images of a field at the pixels of a strip, or find them in the cache.
 
-        The looks differ in the length of streamlines, and the first has the greatest length. Methods other
-        than "sheets" ignore `strip`.
+        `looks` must differ only in the length of streamlines, the longest first. `strip` is used only if the
+        setting `method` of the looks is "sheets".
         """
         key = "LIC images", self._gbuffer, field.degree, strip, *(look.lic_key() for look in looks)
         return self._cache.get_or_create(key, partial(self._new_lic, field, looks, strip))

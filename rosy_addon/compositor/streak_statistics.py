@@ -185,7 +185,9 @@ def softness(crispness: float) -> float:
 
 
 def _threshold_tables(samples: list[np.ndarray], half_width: float) -> np.ndarray:
-    """Return the (S, COVERAGE_STEPS) thresholds of S samples of streaks, for coverages from 0 to 1.
+    """Return the (S, COVERAGE_STEPS) thresholds above which a fraction 0 to 1 of S streak images is ink.
+
+    `samples` are the values of these images.
 
     `half_width` is half the width of the step from paper to ink, in the unit of the samples.
     """

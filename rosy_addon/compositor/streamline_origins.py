@@ -259,7 +259,10 @@ class Sheets:
         return table.reshape(-1)
 
     def _moved(self, origins: Origins) -> Origins:
-        """Return points relative to the pixels that contain them. Streamlines that cannot step there end."""
+        """Return the same points, each relative to the pixel that it has moved into.
+
+        If the field has no step into that pixel, the point becomes `SINK_CELL`, which ends its streamline.
+        """
         cell, sheet, offset = origins
         column = np.clip(np.rint(offset.real), -1, 1)
         row = np.clip(np.rint(offset.imag), -1, 1)

@@ -241,7 +241,10 @@ def instance_uniforms(
 
 
 def covering_uniforms(kind: FieldKind) -> dict[str, Any]:
-    """Return the uniforms that number the sheets of the covering."""
+    """Return the uniforms from which shaders compute the index of a sheet of the covering surface.
+
+    They are the degree, and the numbers of line directions and sheets.
+    """
     return {
         "degree": kind.degree,
         "line_count": kind.line_count,

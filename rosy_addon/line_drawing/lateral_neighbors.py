@@ -85,7 +85,9 @@ class LateralNeighbors(NamedTuple):
 
 
 class _Pairs(NamedTuple):
-    """m pairs of samples of the same family that are near each other on the surface, not only in space.
+    """m pairs of samples that are near each other on the surface, not only in space.
+
+    The strokes of both belong to the same family: they follow the same line direction; see `families`.
 
     Attributes
     ----------

@@ -312,7 +312,7 @@ def _part_to_trace(
 
 
 def _outline(instance: MeshInstance, index: int, view: _View) -> Strokes:
-    """Return the outline of an instance. It is clipped and smoothed if strokes are clipped.
+    """Return the outline of an instance. If strokes are clipped to the visible parts, so is the outline.
 
     `index` is the index of the instance in the depth buffer.
     """

@@ -14,7 +14,8 @@ REPRESENTATION: FieldChannel = ("family", 1)
 def rotation_order(channel: FieldChannel, degree: int) -> int:
     """Return the power by which a channel rotates with its frame.
 
-    If a unit complex number p rotates z by p^N, it rotates the channel by p to this power.
+    It is k, if a change of frame that multiplies the representation of the field by p^N (N is `degree`)
+    multiplies the channel by p^k.
     """
     kind, number = channel
     return -number if kind == "deviation" else degree // number

@@ -74,8 +74,8 @@ def guide_strokes_and_empties(
     Raises
     ------
     RosyError
-        If an object other than an empty has no stroke or a point that is not finite, if an object is
-        missing in its library, or if the owner is scaled to zero.
+        If an object other than an empty has no stroke, if a point is not finite, if an object is missing in
+        its library, or if the owner is scaled to zero.
     """
     world_to_owner = _world_to_object(owner)
     strokes: list[np.ndarray] = []

@@ -189,8 +189,8 @@ def line_order(mesh: TangentMesh, guiding_angle: float, blend: float) -> LineOrd
 def combed_directions(mesh: TangentMesh, guiding_angle: float) -> CombedDirections:
     """Choose one of the N directions of a field at each point of a mesh, as continuous as possible.
 
-    It is one of the two opposite directions of the first line direction. The choice jumps between these two
-    only where the topology of the field requires it.
+    It points one way or the other along the line direction that `line_order` puts first. The choice jumps
+    between these two only where the topology of the field requires it.
 
     Parameters
     ----------

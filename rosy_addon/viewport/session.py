@@ -365,7 +365,7 @@ class ViewportSession:
         )
 
     def _drift(self, look: Look, scene: bpy.types.Scene) -> Drift:
-        """Return how far streaks have drifted at the current frame of a scene and of the clock."""
+        """Return how far streaks have drifted at the current frame of a scene plus the frames of `flow_clock`."""
         if has_flow(look):
             self._has_shown_flow = True
         return drift_in_scene(scene, look, scene.frame_current_final + self.flow_clock.frames)

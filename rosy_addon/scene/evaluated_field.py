@@ -33,7 +33,7 @@ from .field_attributes import (
     read_rest_shape,
 )
 from .mesh_fields import read_mesh_field
-from .meshes import mesh_surface, read_attribute
+from .meshes import mesh_surface, no_faces_error, polygon_arrays, read_attribute
 
 #: Attribute that exists only while a scene is read: the normal of each original face, to which the vectors of
 #: the field are perpendicular. Modifiers copy it to the evaluated mesh.
@@ -277,3 +277,23 @@ def _prepare_field(
 def _can_modify(mesh: bpy.types.Mesh) -> bool:
     """Return whether attributes can be added to a mesh."""
     return is_editable(mesh) and not mesh.is_editmode
+
+
+def lost_field_error(obj: bpy.types.Object, attribute: str | None) -> RosyError:
+    """Return the error for an object whose modifiers remove an attribute.
+
+    If `attribute` is None, they remove all faces.
+    """
+    if attribute is None and not len(obj.data.polygons):
+        return no_faces_error(obj.data, f"object '{obj.name}'")
+    names = ", ".join(modifier.name for modifier in user_modifiers(obj)) or "none"
+    problem = "has no faces" if attribute is None else f"has no attribute '{attribute}'"
+    return RosyError(f"object '{obj.name}': after its modifiers ({names}) the mesh {problem}")
+
+
+def topology_hash(mesh: bpy.types.Mesh, original: bpy.types.Mesh) -> bytes:
+    """Return a hash of the faces and the field attribute of an evaluated mesh, without positions."""
+    values = None
+    if is_face_vector_field(mesh, attribute_name(original)):
+        values = read_attribute(mesh, attribute_name(original), np.float32, 3)
+    return content_hash(*polygon_arrays(mesh), values)

@@ -18,14 +18,21 @@ from dataclasses import field as dataclass_field
 import bpy
 import numpy as np
 
-from ..core.cache import Cache, content_hash
+from ..core.cache import Cache
 from ..core.errors import REPORTED_ERRORS, RosyError
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface, have_same_polygons
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 from .datablocks import remedy_for_absence, user_modifiers
-from .evaluated_field import Errors, FieldLayout, read_evaluated_field, temp_attributes
+from .evaluated_field import (
+    Errors,
+    FieldLayout,
+    lost_field_error,
+    read_evaluated_field,
+    temp_attributes,
+    topology_hash,
+)
 from .field_attributes import attribute_name, field_degree, is_face_vector_field, surface_key
 from .look_inputs import (
     FIELDS_ONLY,
@@ -41,8 +48,6 @@ from .meshes import (
     REST_ATTRIBUTE,
     evaluated_mesh,
     mesh_surface,
-    no_faces_error,
-    polygon_arrays,
     read_attribute,
 )
 from .visible_objects import Instances, field_objects, rendered_instances
@@ -182,7 +187,7 @@ class SceneInstance:
 #: A surface, its field, its tone and its values for the color map. Occluders have only the surface.
 _MeshData = tuple[Surface, RosyField | None, SurfaceTone | None, np.ndarray | None]
 
-#: The full name (`name_full`) of an object, and the `_topology_hash` of one of its evaluated meshes.
+#: The full name (`name_full`) of an object, and the `topology_hash` of one of its evaluated meshes.
 _TopologyKey = tuple[str, bytes]
 
 #: Rest positions and field of an evaluated mesh, which cannot be read from the original mesh.
@@ -371,7 +376,7 @@ class SceneReader:
             with evaluated_mesh(obj) as mesh:
                 if mesh is None or not layout.is_on(mesh):
                     continue
-                key = owner.name_full, _topology_hash(mesh, owner.data)
+                key = owner.name_full, topology_hash(mesh, owner.data)
                 if key in self._topologies:
                     continue
                 label = f"object '{owner.name}'"
@@ -447,7 +452,7 @@ class SceneReader:
                 cache=self.cache,
             )
             return self._with_rest(surface, original_surface.vertices), field, tone, values
-        key = owner.name_full, _topology_hash(mesh, original)
+        key = owner.name_full, topology_hash(mesh, original)
         topology = self._topologies.get(key)
         if topology is None:
             if self._attempts.get(owner.name_full, 0) >= MAX_ATTEMPTS:
@@ -486,23 +491,3 @@ class SceneReader:
         return self.cache.get_or_create(
             key, lambda: (surface, surface.with_parts(rest_vertices=rest))
         )[1]
-
-
-def lost_field_error(obj: bpy.types.Object, attribute: str | None) -> RosyError:
-    """Return the error for an object whose modifiers remove an attribute.
-
-    If `attribute` is None, they remove all faces.
-    """
-    if attribute is None and not len(obj.data.polygons):
-        return no_faces_error(obj.data, f"object '{obj.name}'")
-    names = ", ".join(modifier.name for modifier in user_modifiers(obj)) or "none"
-    problem = "has no faces" if attribute is None else f"has no attribute '{attribute}'"
-    return RosyError(f"object '{obj.name}': after its modifiers ({names}) the mesh {problem}")
-
-
-def _topology_hash(mesh: bpy.types.Mesh, original: bpy.types.Mesh) -> bytes:
-    """Return a hash of the faces and the field attribute of an evaluated mesh, without positions."""
-    values = None
-    if is_face_vector_field(mesh, attribute_name(original)):
-        values = read_attribute(mesh, attribute_name(original), np.float32, 3)
-    return content_hash(*polygon_arrays(mesh), values)

@@ -198,7 +198,7 @@ def test_an_object_that_is_deleted_between_two_steps(monkey):
 def test_faces_that_differ_at_each_evaluation_end_in_an_error(monkey, monkeypatch):
     monkey.modifiers.new("Subdivision", "SUBSURF")
     salt = iter(range(100))
-    monkeypatch.setattr(scene_reader, "_topology_hash", lambda *_: bytes([next(salt)]))
+    monkeypatch.setattr(scene_reader, "topology_hash", lambda *_: bytes([next(salt)]))
     reader = SceneReader()
     for _ in range(8):
         read_live(reader)

@@ -126,6 +126,7 @@ class Look:
             "ibfv": "Carry noise along the sheets of the covering surface and blend it, as in image based "
             "flow visualization: soft streaks that fade, whose drift takes little time per frame",
         },
+        option_labels={"brute": "Brute Force", "ibfv": "IBFV"},
         panel="quality",
     )
     weights: str = choice(

@@ -49,7 +49,7 @@ def label_families(strokes: Strokes, mesh: TangentMesh, right: np.ndarray | None
     labels = global_labels(mesh)
     reference = reference_members(mesh)
     if labels is None:
-        reference = _members_near_guide(mesh, reference, right)
+        reference = _members_near_guide(mesh, right)
         labels = np.broadcast_to(np.arange(family_count), (len(reference), family_count))
     middle = (strokes.start[:-1] + strokes.start[1:]) // 2
     triangle = strokes.triangle[middle]
@@ -149,7 +149,7 @@ def _order_labels(mesh: TangentMesh, component: np.ndarray, reference: np.ndarra
     family = np.full(int(component.max()) + 1, -1, dtype=np.int64)
     order = np.argsort(component[:, 0], kind="stable")
     _, first_triangle = np.unique(component[order].min(axis=1), return_index=True)
-    guided = _members_near_guide(mesh, reference, None)
+    guided = _members_near_guide(mesh, None)
     shift = member_offset(guided, reference, mesh.degree) % family_count
     for triangle in order[first_triangle]:
         components = component[triangle]
@@ -159,9 +159,7 @@ def _order_labels(mesh: TangentMesh, component: np.ndarray, reference: np.ndarra
     return np.maximum(family, 0)[component]
 
 
-def _members_near_guide(
-    mesh: TangentMesh, reference: np.ndarray, right: np.ndarray | None
-) -> np.ndarray:
+def _members_near_guide(mesh: TangentMesh, right: np.ndarray | None) -> np.ndarray:
     """Return (T,) complex128: the unit member of each triangle that is nearest to a guide direction.
 
     The guide direction is `right`, or the first of `GUIDE_AXES` that is not almost normal to the triangle. It

@@ -18,12 +18,7 @@ from .polygon_arrays import mean_per_face
 from .representation import face_frames, from_representation, to_representation
 from .rosy_field import MAX_DEGREE, RosyField, check_degree
 from .surface import Surface
-from .validate import (
-    MAX_OUTLIER_FRACTION,
-    TOLERANCE_DEG,
-    apply_nonfinite_policy,
-    tangent_normals,
-)
+from .validate import MAX_OUTLIER_FRACTION, TOLERANCE_DEG, apply_nonfinite_policy, tangent_normals
 
 #: Degree of the field made from an array of vectors, if the caller gives none.
 VECTOR_DEGREE = 1

@@ -31,8 +31,7 @@ def blocks_by_count(count: np.ndarray, limit: int) -> list[slice]:
 
 
 def by_rows(
-    function: Callable[..., np.ndarray | tuple[np.ndarray, ...]],
-    *arrays: np.ndarray,
+    function: Callable[..., np.ndarray | tuple[np.ndarray, ...]], *arrays: np.ndarray
 ) -> np.ndarray | tuple[np.ndarray, ...]:
     """Apply a function to blocks of the rows of arrays, and concatenate the results.
 

@@ -147,12 +147,7 @@ class _Neighbors:
         self._is_interior = graph.is_interior
 
     def step(
-        self,
-        added: np.ndarray,
-        given: np.ndarray,
-        unit: float,
-        potential: np.ndarray,
-        share: float,
+        self, added: np.ndarray, given: np.ndarray, unit: float, potential: np.ndarray, share: float
     ) -> np.ndarray:
         """Return (n,) indices of the added singularities after one round of moves.
 

@@ -15,10 +15,7 @@ from .surface import Surface
 
 
 def corner_rotations(
-    face_normal: np.ndarray,
-    face_x: np.ndarray,
-    corner_face: np.ndarray,
-    corner_normal: np.ndarray,
+    face_normal: np.ndarray, face_x: np.ndarray, corner_face: np.ndarray, corner_normal: np.ndarray
 ) -> np.ndarray:
     """Return the rotation from the frame of each face to the frame of each of its corners.
 

@@ -18,12 +18,7 @@ from .directional_field import field_directions, tensor_field
 from .formats.fieldgen import fieldgen_text, read_fieldgen
 from .formats.plain import npy_bytes, read_npy, read_text
 from .formats.polygons import RawField
-from .formats.rosy_rawfield import (
-    rawfield_text,
-    read_rawfield,
-    read_rosy,
-    rosy_text,
-)
+from .formats.rosy_rawfield import rawfield_text, read_rawfield, read_rosy, rosy_text
 from .formats.sings import SINGULARITY_SUFFIXES, sings_text
 from .formats.text_rows import format_lines
 from .frames import dot, normalize, transport
@@ -32,12 +27,7 @@ from .mesh_io import SHARP_ANGLE
 from .rosy_field import RosyField
 from .singularities import find_singularities
 from .surface import Surface, build_surface
-from .validate import (
-    apply_nonfinite_policy,
-    infer_domain,
-    validated_directions,
-    validated_field,
-)
+from .validate import apply_nonfinite_policy, infer_domain, validated_directions, validated_field
 
 #: A face of the target mesh gets the field of the closest source face only within these limits: the distance
 #: relative to `Surface.extent` of the source, and the angle between the normals in radians.

@@ -22,12 +22,7 @@ from ..core.progress import progress, report
 from .blocks import mask
 from .conjugate_gradient import RELATIVE_TOLERANCE, conjugate_gradient
 from .connection import build_connection, laplacian
-from .representation import (
-    complex_bincount,
-    face_frames,
-    from_representation,
-    to_representation,
-)
+from .representation import complex_bincount, face_frames, from_representation, to_representation
 from .rosy_field import RosyField, check_degree
 from .smoothest import smoothest_field
 from .sparse_multigrid import CSRMatrix, Level, add_diagonal, hierarchy, w_cycle

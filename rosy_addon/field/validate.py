@@ -20,12 +20,7 @@ from .directional_field import (
 )
 from .frames import coordinates, dot, normalize, tangent_frame
 from .polygon_arrays import mean_per_face
-from .representation import (
-    face_frames,
-    from_representation,
-    signed_power,
-    to_representation,
-)
+from .representation import face_frames, from_representation, signed_power, to_representation
 from .rosy_field import RosyField, check_degree
 from .surface import Surface
 

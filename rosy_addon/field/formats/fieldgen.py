@@ -95,8 +95,7 @@ def fieldgen_text(surface: Surface, field: RosyField) -> str:
     face_x, face_y = face_frames(surface)
     z = to_representation(field.vectors, face_x, face_y, field.degree)
     rotation = power(
-        corner_rotations(surface.face_normal, face_x, face, normal[vertex]),
-        field.degree,
+        corner_rotations(surface.face_normal, face_x, face, normal[vertex]), field.degree
     )
     mean = complex_bincount(vertex, z[face] * rotation * angle, count)
     member = from_representation(unit_complex(mean), *tangent_frame(normal), field.degree)

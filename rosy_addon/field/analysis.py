@@ -9,14 +9,11 @@ import numpy as np
 from ..core.errors import RosyError
 from ..core.progress import progress, report
 from .blocks import row_blocks
-from .connectivity import build_edges
 from .directional_field import field_directions
 from .frames import coordinates, dot, normalize
 from .representation import (
-    face_frames,
     face_representation,
     matching_angles,
-    to_representation,
     unit_complex,
 )
 from .rosy_field import RosyField
@@ -110,14 +107,11 @@ def dirichlet_energy(surface: Surface, field: RosyField) -> float:
     has an energy of about 4 pi N. The contribution of each singularity grows slowly with the resolution of
     the mesh. Faces where the field is undefined are ignored.
     """
-    x, y = face_frames(surface)
-    z = unit_complex(to_representation(field.vectors, x, y, field.degree))
-    edges = build_edges(surface.corner_vertex, surface.face_start)
-    a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
-    face_a, face_b = surface.corner_face[a], surface.corner_face[b]
-    angle = field.degree * matching_angles(surface, x, y, z, field.degree, a, b)
-    length, center_distance = edge_lengths(surface, a, b)
-    defined = (z[face_a] != 0) & (z[face_b] != 0) & (center_distance > 0)
+    z = unit_complex(face_representation(surface, field))
+    halfedges = surface.edges.halfedges
+    angle = field.degree * matching_angles(surface, z, field.degree)
+    length, center_distance = edge_lengths(surface, *halfedges.T)
+    defined = (z[surface.corner_face[halfedges]] != 0).all(axis=1) & (center_distance > 0)
     weight = np.divide(length, center_distance, out=np.zeros_like(length), where=defined)
     return float((weight * 2 * (1 - np.cos(angle)))[defined].sum())
 
@@ -190,7 +184,7 @@ def _matched_direction_angles(surface: Surface, field: RosyField, other: RosyFie
 
     On each face, the best of the N matchings that keep the order around the normal is used.
     """
-    frames = face_frames(surface)
+    frames = surface.face_frames
     z, other_z = (coordinates(field_directions(surface, f), *frames) for f in (field, other))
     best = np.full(surface.face_count, np.inf)
     for shift in range(field.degree):

@@ -15,7 +15,7 @@ from .field_io import field_from_raw
 from .formats.polygons import RawField
 from .frames import dot
 from .polygon_arrays import mean_per_face
-from .representation import face_frames, from_representation, to_representation
+from .representation import from_representation, to_representation
 from .rosy_field import MAX_DEGREE, RosyField, check_degree
 from .surface import Surface
 from .validate import MAX_OUTLIER_FRACTION, TOLERANCE_DEG, apply_nonfinite_policy, tangent_normals
@@ -282,7 +282,7 @@ def _tangential_on_faces(
         return _tangential(vectors, surface.face_normal)
     vectors = vectors[surface.corner_vertex]
     tangential = _tangential(vectors, surface.face_normal[surface.corner_face])
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     frames = x[surface.corner_face], y[surface.corner_face]
     mean = mean_per_face(to_representation(tangential, *frames, degree), surface.face_start)
     return from_representation(mean, x, y, degree)

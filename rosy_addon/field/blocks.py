@@ -57,6 +57,14 @@ def mask(count: int, index: np.ndarray) -> np.ndarray:
     return result
 
 
+def bincount_rows(index: np.ndarray, rows: np.ndarray, count: int = 0) -> np.ndarray:
+    """Return (count, k) sums of the (m, k) rows of each index: `numpy.bincount` for rows of real weights.
+
+    `count` is raised to the largest index plus 1.
+    """
+    return np.stack([np.bincount(index, column, count) for column in rows.T], axis=1)
+
+
 def neighbors_of_nodes(
     node_count: int, first: np.ndarray, second: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -17,7 +17,7 @@ from .blocks import neighbors_of_nodes
 from .face_graph import LABEL, FaceGraph, face_graph
 from .polygon_arrays import face_area_vectors
 from .prescribed import index_at_nodes
-from .representation import face_frames, from_representation, unit_complex
+from .representation import from_representation, unit_complex
 from .rosy_field import RosyField, check_degree
 from .singularities import find_singularities
 from .smoothest import eigenproblem, spectral_shift
@@ -64,10 +64,10 @@ def cheapest_singularities(
         If a vertex cannot be singular (at a border, or not in the mesh), or if no face has an area.
     """
     degree = check_degree(degree)
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     if not x.any():
         raise RosyError(f"{surface.name}: no face has an area")
-    graph = face_graph(surface, x, y)
+    graph = face_graph(surface)
     area = np.linalg.norm(
         face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start), axis=1
     )

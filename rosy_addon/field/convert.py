@@ -15,7 +15,7 @@ from .directional_field import field_matching
 from .face_graph import spanning_forest
 from .frames import normalize
 from .generate import MIN_SMOOTHING_LENGTH
-from .representation import face_frames, from_representation, to_representation
+from .representation import from_representation, to_representation
 from .rosy_field import RosyField, check_degree
 from .singularity_changes import cancel_pairs
 from .sparse_multigrid import from_coo
@@ -185,7 +185,7 @@ def diffuse_field(surface: Surface, field: RosyField, time: float) -> RosyField:
     field.check_rosy(surface.name)
     if not time > 0 or not np.isfinite(time):
         raise RosyError(f"{surface.name}: the diffusion time must be above 0, not {time}")
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     degree = field.degree
     z = to_representation(field.vectors, x, y, degree)
     connection = build_connection(surface)

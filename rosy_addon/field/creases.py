@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.progress import report
-from .blocks import mask
-from .connectivity import Edges, build_edges, connected_components
+from .blocks import bincount_rows, mask
+from .connectivity import Edges, connected_components
 from .frames import angle_between, dot, normalize
 from .polygon_arrays import face_area_vectors
 from .surface import Surface
@@ -112,9 +112,8 @@ def filtered_normals(
         weight = np.exp(dot(difference, difference) * (-0.5 / FILTER_WIDTH**2))
         weight_a, weight_b = weight * area[face_b], weight * area[face_a]
         total = normals * area[:, None]
-        for axis in range(3):
-            total[:, axis] += np.bincount(face_a, weight_a * normal_b[:, axis], len(area))
-            total[:, axis] += np.bincount(face_b, weight_b * normal_a[:, axis], len(area))
+        total += bincount_rows(face_a, weight_a[:, None] * normal_b, len(area))
+        total += bincount_rows(face_b, weight_b[:, None] * normal_a, len(area))
         normals = normalize(total)
     noise_angle = weighted_median(angle_between(unfiltered, normals), area)
     if region is not None:
@@ -219,7 +218,7 @@ def find_creases(surface: Surface, crease_angle: float) -> Creases:
     """
     none = Creases(np.empty((0, 2), np.int32), np.empty(0, np.int32))
     report(0.0, "finding creases")
-    edges = build_edges(surface.corner_vertex, surface.face_start)
+    edges = surface.edges
     sides = surface.corner_face[edges.halfedges].T
     # Smaller crease angles have no effect.
     crease_angle = max(crease_angle, MIN_CREASE_ANGLE)

@@ -20,9 +20,8 @@ import numpy as np
 from ..core.progress import report
 from .analysis import edge_lengths
 from .blocks import concatenated_ranges, mask, neighbors_of_nodes
-from .connectivity import build_edges, connected_components, connected_corners
+from .connectivity import connected_components, connected_corners
 from .frames import dot
-from .polygon_arrays import next_corners
 from .representation import edge_unfolding
 from .singularities import signed_corner_angles
 from .surface import Surface
@@ -100,29 +99,24 @@ class FaceGraph:
         return potential[self.head] - potential[self.tail]
 
 
-def face_graph(
-    surface: Surface, x: np.ndarray, y: np.ndarray, is_defined: np.ndarray | None = None
-) -> FaceGraph:
+def face_graph(surface: Surface, is_defined: np.ndarray | None = None) -> FaceGraph:
     """Build the graph of the faces of a surface.
 
     Parameters
     ----------
     surface : Surface
-    x, y : (F, 3) ndarray
-        Tangent frames of the faces.
     is_defined : (F,) bool ndarray, optional
         Faces on which the field is defined. By default all faces with an area.
     """
     report(0.0, LABEL)
-    edges = build_edges(surface.corner_vertex, surface.face_start)
     if is_defined is None:
-        is_defined = x.any(axis=1)
-    halfedges = edges.halfedges
+        is_defined = surface.face_frames[0].any(axis=1)
+    halfedges = surface.edges.halfedges
     halfedges = halfedges[is_defined[surface.corner_face[halfedges]].all(axis=1)]
     a, b = halfedges.T
-    following = next_corners(surface.face_start)
+    following = surface.next_corner
     source, target = surface.corner_face[a], surface.corner_face[b]
-    unfolding = edge_unfolding(surface, x, y, a, b)
+    unfolding = edge_unfolding(surface, a, b)
     length, distance = edge_lengths(surface, a, b)
     conductance = distance / np.maximum(length, 1e-300)
     median = max(float(np.median(conductance)), 1e-300) if len(a) else 1.0
@@ -134,7 +128,6 @@ def face_graph(
     is_interior = np.ones(int(corner_node.max(initial=-1)) + 1, dtype=bool)
     is_interior[corner_node[~continues]] = False
     is_interior[corner_node[following[~continues]]] = False
-    corner_angle = signed_corner_angles(surface, x, y)
     component = connected_components(surface.face_count, np.stack([source, target], axis=1))
     node_component = np.zeros(len(is_interior), dtype=component.dtype)
     node_component[corner_node] = component[surface.corner_face]
@@ -148,7 +141,8 @@ def face_graph(
         conductance=conductance,
         corner_node=corner_node,
         is_interior=is_interior,
-        defect=2 * np.pi - np.bincount(corner_node, corner_angle, len(is_interior)),
+        defect=2 * np.pi
+        - np.bincount(corner_node, signed_corner_angles(surface), len(is_interior)),
         component=component,
         node_component=node_component,
     )

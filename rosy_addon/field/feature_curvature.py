@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .blocks import bincount_rows
 from .connection import build_connection
-from .connectivity import Edges, build_edges, smooth_fans
+from .connectivity import Edges, smooth_fans
 from .creases import filtered_normals, salient_edges, weighted_median
 from .curvature import face_curvature, with_smooth_normals
 from .frames import angle_between, dot, normalize
 from .polygon_arrays import face_area_vectors
-from .representation import face_frames
 from .surface import Surface
 from .surface_averages import SurfaceAverages
 
@@ -73,14 +73,14 @@ def of_unit_extent(surface: Surface) -> Surface:
 
 def noisy_curvature(surface: Surface) -> NoisyCurvature:
     """Measure the curvature of a surface, and its change by random noise; see `NoisyCurvature`."""
-    edges = build_edges(surface.corner_vertex, surface.face_start)
+    edges = surface.edges
     normals, noise_angle = filtered_normals(surface, edges)
     ends = salient_edges(surface, edges, normals, noise_angle)
     noise = noise_sample(surface, edges, noise_angle)
     fans = smooth_fans(
         surface.vertices, surface.corner_vertex, surface.face_start, sharp_edges=ends
     )
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     mean, deviator = _bounded_curvature(surface, fans, x, y)
     noisy = surface.with_parts(vertices=surface.vertices + noise)
     normal = noisy.face_normal
@@ -129,10 +129,7 @@ def noise_sample(surface: Surface, edges: Edges, noise_angle: float) -> np.ndarr
         Displacements of the vertices, in object space.
     """
     count = len(surface.vertices)
-    normal = np.stack(
-        [np.bincount(surface.corner_vertex, n, count) for n in surface.corner_normal.T], axis=1
-    )
-    normal = normalize(normal)
+    normal = normalize(bincount_rows(surface.corner_vertex, surface.corner_normal, count))
     sample = np.random.default_rng(SEED).standard_normal(count)[:, None] * normal
     vectors = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
     area = np.sqrt(dot(vectors, vectors))

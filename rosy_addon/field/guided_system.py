@@ -22,7 +22,7 @@ from ..core.progress import progress, report
 from .blocks import mask
 from .conjugate_gradient import RELATIVE_TOLERANCE, conjugate_gradient
 from .connection import build_connection, laplacian
-from .representation import complex_bincount, face_frames, from_representation, to_representation
+from .representation import complex_bincount, from_representation, to_representation
 from .rosy_field import RosyField, check_degree
 from .smoothest import smoothest_field
 from .sparse_multigrid import CSRMatrix, Level, add_diagonal, hierarchy, w_cycle
@@ -303,7 +303,7 @@ def firmness_weights(
 def guided_system(surface: Surface, degree: int) -> GuidedSystem:
     """Build the linear system for guided fields of this degree on a surface."""
     connection = build_connection(surface)
-    averages = SurfaceAverages(surface, connection, *face_frames(surface))
+    averages = SurfaceAverages(surface, connection, *surface.face_frames)
     matrix = laplacian(connection, degree)
     matrix = matrix.plus_diagonal(REGULAR_SHIFT * matrix.diagonal)
     return GuidedSystem(surface, degree, averages, matrix)

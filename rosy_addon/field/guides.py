@@ -13,10 +13,9 @@ import numpy as np
 from ..core.errors import RosyError
 from .blocks import mask
 from .closest_point import closest_triangles
-from .connectivity import build_edges
 from .frames import dot, normalize
 from .polygon_arrays import mean_per_face, sum_per_face
-from .representation import complex_bincount, face_frames, from_representation, to_representation
+from .representation import complex_bincount, from_representation, to_representation
 from .surface import Surface
 
 #: Largest distance of a stroke point from the surface, relative to `Surface.extent`. Points farther
@@ -76,7 +75,7 @@ def feature_edges(surface: Surface, angle: float) -> np.ndarray:
     (E, 2) int32 ndarray
         Pairs of vertices. Nonmanifold edges count as border edges.
     """
-    edges = build_edges(surface.corner_vertex, surface.face_start)
+    edges = surface.edges
     is_feature = ~mask(len(edges.ends), edges.interior)
     normal = surface.face_normal
     normal_a, normal_b = (normal[surface.corner_face[side]] for side in edges.halfedges.T)
@@ -185,7 +184,7 @@ def guides_from_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:
     (F, 3) float64 ndarray
         Unit vectors; zero on faces without area in the map.
     """
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     face = surface.corner_face
     offset = surface.vertices[surface.corner_vertex] - surface.face_center[face]
     position = dot(offset, x[face]) + 1j * dot(offset, y[face])
@@ -231,7 +230,7 @@ def average_guides(
     (F, 3) float64 ndarray
         Unit member vectors of the means; zero on faces without vectors, and where the vectors cancel.
     """
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     z = to_representation(vectors, x[face], y[face], degree)
     total = complex_bincount(face, z, surface.face_count)
     magnitude_sum = np.bincount(face, np.abs(z), surface.face_count)

@@ -7,7 +7,7 @@ import numpy as np
 from ..core.errors import RosyError
 from .directional_field import closest_rosy, field_directions
 from .frames import coordinates
-from .representation import face_frames, face_representation, from_representation
+from .representation import face_representation, from_representation
 from .rosy_field import RosyField
 from .surface import Surface
 
@@ -60,13 +60,13 @@ def interpolate_fields(
         raise RosyError(
             f"{second[0].name}: the field has degree {second[1].degree}, but the one before it {degree}"
         )
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     if all(is_plain(field) for _, field in (first, second)):
         z = _between(*(face_representation(*pair) for pair in (first, second)), share)
         return RosyField(degree, from_representation(z, x, y, degree))
     family_count = min(field.family_count for _, field in (first, second))
     start, stop = (
-        coordinates(field_directions(*pair), *face_frames(pair[0])) for pair in (first, second)
+        coordinates(field_directions(*pair), *pair[0].face_frames) for pair in (first, second)
     )
     angle, rho, ratios = closest_rosy(_between(start, _matched(start, stop, family_count), share))
     vectors = rho[:, None] * (np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y)

@@ -27,7 +27,6 @@ from .frames import normalize
 from .polygon_arrays import face_area_vectors
 from .representation import (
     complex_bincount,
-    face_frames,
     from_representation,
     to_representation,
     unit_complex,
@@ -105,8 +104,8 @@ def prescribed_field(
     """
     degree = check_degree(degree)
     raise_mmap_threshold()
-    x, y = face_frames(surface)
-    graph = face_graph(surface, x, y)
+    x, y = surface.face_frames
+    graph = face_graph(surface)
     angle, direction = _turning(surface, graph, degree, vertex, index, graph.defect)
     z = np.exp(1j * degree * direction) * x.any(axis=1)
     points, face = surface.vertices[surface.corner_vertex], surface.corner_face
@@ -153,11 +152,11 @@ def change_singularities(
     """
     raise_mmap_threshold()
     degree, magnitude = field.degree, np.linalg.norm(field.vectors, axis=1, keepdims=True)
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     z = to_representation(field.vectors, x, y, degree)
     is_defined = z != 0
     z[is_defined] /= np.abs(z[is_defined])
-    graph = face_graph(surface, x, y, is_defined)
+    graph = face_graph(surface, is_defined)
     transported = z[graph.source] * np.exp(1j * degree * graph.unfolding)
     present = np.angle(z[graph.target] * transported.conj()) / degree
     no_defect = np.zeros(graph.node_count)

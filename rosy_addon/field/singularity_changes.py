@@ -7,7 +7,6 @@ import numpy as np
 from ..core.errors import RosyError
 from ..core.progress import progress, report
 from .blocks import concatenated_ranges, mask, neighbors_of_nodes
-from .connectivity import build_edges
 from .prescribed import TurningError, change_singularities
 from .rosy_field import RosyField
 from .singularities import find_singularities, first_pairs
@@ -185,7 +184,7 @@ def _near(
     distance : (n,) float64 ndarray
         Length of the shortest path along edges between them.
     """
-    ends = build_edges(surface.corner_vertex, surface.face_start).ends
+    ends = surface.edges.ends
     count = len(surface.vertices)
     length = np.linalg.norm(surface.vertices[ends[:, 0]] - surface.vertices[ends[:, 1]], axis=1)
     near = length <= max_distance

@@ -15,7 +15,7 @@ from ..core.errors import RosyError
 from ..core.memory import raise_mmap_threshold
 from ..core.progress import progress, report
 from .connection import Connection, build_connection, laplacian
-from .representation import complex_bincount, face_frames, from_representation, unit_complex
+from .representation import complex_bincount, from_representation, unit_complex
 from .rosy_field import RosyField, check_degree
 from .sparse_multigrid import CSRMatrix, Level, hierarchy, w_cycle
 from .surface import Surface
@@ -68,7 +68,7 @@ def smoothest_field(surface: Surface, degree: int) -> RosyField:
         z, _ = smallest_eigenvectors(connection, degree)
     z = _align_to_edges(connection, z, degree)
     report(0.95, "averaging the field on the faces")
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     mean = SurfaceAverages(surface, connection, x, y).face_sums(z, degree)
     return RosyField(degree, from_representation(unit_complex(mean), x, y, degree))
 

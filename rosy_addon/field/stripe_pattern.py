@@ -46,8 +46,9 @@ class CornerDirections:
     ----------
     degree : int
         N.
-    has_opposites : bool
-        Whether direction k + N / 2 is the opposite of direction k (see `FieldSymmetry`).
+    family_count : int
+        M, the number of families of stripes: `FieldSymmetry.line_count`. It is N / 2 if direction k + N / 2 is
+        the opposite of direction k, and N otherwise.
     offset : (T, 3) complex128 ndarray
         Positions of the corners in a frame of the plane of the triangle.
     angle : (T, 3) float64 ndarray
@@ -60,16 +61,11 @@ class CornerDirections:
     """
 
     degree: int
-    has_opposites: bool
+    family_count: int
     offset: np.ndarray
     angle: np.ndarray
     deviation: np.ndarray | None
     defined: np.ndarray
-
-    @property
-    def family_count(self) -> int:
-        """M, the number of families of stripes: N / 2 with opposites, N otherwise."""
-        return self.degree // 2 if self.has_opposites else self.degree
 
     def phase_changes(self, spacing: float) -> np.ndarray:
         """Return the (3 T, M) changes that the phase of each family should have from each corner to the next.

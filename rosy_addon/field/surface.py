@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike
 
 from ..core.cache import content_hash
 from ..core.errors import RosyError, counted
-from .blocks import mask, row_blocks
-from .connectivity import build_edges, smooth_fans
+from .blocks import bincount_rows, mask, row_blocks
+from .connectivity import Edges, build_edges, smooth_fans
 from .frames import dot, normalize
 from .mesh_arrays import mesh_arrays
 from .mesh_io import SHARP_ANGLE, read_uv_map, read_vertex_data
@@ -31,7 +31,6 @@ from .polygon_arrays import (
     fan_normals,
     mean_per_face,
     next_corners,
-    sum_per_fan,
 )
 from .triangulate import triangulate
 from .up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
@@ -216,19 +215,36 @@ class Surface:
         return {}
 
     @cached_property
+    def edges(self) -> Edges:
+        """The edges of the mesh, and the two halfedges of each interior edge."""
+        return build_edges(self.corner_vertex, self.face_start)
+
+    @cached_property
     def face_frames(self) -> tuple[np.ndarray, np.ndarray]:
         """The tangent frames x, y of the faces: x along the first edge of a face, y a quarter turn from x.
 
-        Both are (F, 3) float64. `Field.angles` are measured from x. The frames are the same as those of
+        Both are (F, 3) float64, and zero for faces without area, so that representations are zero there. An
+        edge of length 0 is skipped. `Field.angles` are measured from x. The frames are the same as those of
         ``igl.local_basis``.
         """
-        return face_frames(self)
+        normal = self.face_normal
+        x = np.empty_like(normal)
+        for faces, corners, starts in face_blocks(self.face_start):
+            points = self.vertices.take(self.corner_vertex[corners], axis=0)
+            corner_normal = np.repeat(normal[faces], np.diff(starts), axis=0)
+            edge = points[next_corners(starts)] - points
+            edge -= dot(edge, corner_normal)[:, None] * corner_normal
+            length = np.sqrt(dot(edge, edge))
+            last_corner = np.repeat(starts[1:] - 1, np.diff(starts))
+            candidate = np.where(length > 0, np.arange(len(length)), last_corner)
+            x[faces] = normalize(edge[np.minimum.reduceat(candidate, starts[:-1])])
+        x[~normal.any(axis=1)] = 0.0
+        return x, np.cross(normal, x)
 
     @property
     def euler_characteristic(self) -> int:
         """Number of vertices - edges + faces: 2 for a sphere, 0 for a torus. Unused vertices do not count."""
-        edges = build_edges(self.corner_vertex, self.face_start)
-        return len(self.used_vertices) - len(edges.face_count) + self.face_count
+        return len(self.used_vertices) - len(self.edges.ends) + self.face_count
 
     def in_rest_shape(self) -> Surface:
         """Return the surface before deformation, in the shape to which the vectors of a field are tangent."""
@@ -289,7 +305,7 @@ class Surface:
     @cached_property
     def fan_normal(self) -> np.ndarray:
         """(K, 3) float64: normalized mean of the corner normals of each of the K smooth fans."""
-        return normalize(sum_per_fan(self.corner_normal, self.corner_fan))
+        return normalize(bincount_rows(self.corner_fan, self.corner_normal))
 
     @cached_property
     def fans_share_normals(self) -> bool:
@@ -399,37 +415,13 @@ def _used_vertices(corner_vertex: np.ndarray, vertex_count: int) -> np.ndarray:
     return np.flatnonzero(mask(vertex_count, corner_vertex))
 
 
-def face_frames(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """Return the tangent frame x, y of each face.
-
-    Returns
-    -------
-    x, y : (F, 3) ndarray
-        Unit tangents. x runs along the first edge of nonzero length, y is the cross product of the
-        normal and x. Both are zero for faces without area, so that representations are zero there.
-    """
-    normal = surface.face_normal
-    x = np.empty_like(normal)
-    for faces, corners, starts in face_blocks(surface.face_start):
-        points = surface.vertices.take(surface.corner_vertex[corners], axis=0)
-        corner_normal = np.repeat(normal[faces], np.diff(starts), axis=0)
-        edge = points[next_corners(starts)] - points
-        edge -= dot(edge, corner_normal)[:, None] * corner_normal
-        length = np.sqrt(dot(edge, edge))
-        last_corner = np.repeat(starts[1:] - 1, np.diff(starts))
-        candidate = np.where(length > 0, np.arange(len(length)), last_corner)
-        x[faces] = normalize(edge[np.minimum.reduceat(candidate, starts[:-1])])
-    x[~normal.any(axis=1)] = 0.0
-    return x, np.cross(normal, x)
-
-
 def count_inconsistent_edges(surface: Surface) -> int:
     """Count the inconsistent edges: those between two faces that disagree on which side is outward.
 
     Faces without area are ignored. A field is not continued across such an edge. Flipping faces removes
     inconsistent edges, except on nonorientable surfaces such as a Möbius strip.
     """
-    edges = build_edges(surface.corner_vertex, surface.face_start)
+    edges = surface.edges
     degenerate = ~surface.face_normal.any(axis=1)
     degenerate_edge = edges.corner_edge[degenerate[surface.corner_face]]
     borders_degenerate = mask(len(edges.face_count), degenerate_edge)

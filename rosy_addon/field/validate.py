@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.errors import RosyError, counted
-from .blocks import by_rows, row_blocks
+from .blocks import bincount_rows, by_rows, row_blocks
 from .corner_fans import corner_angles, corner_rotations
 from .directional_field import (
     closest_rosy,
@@ -20,7 +20,7 @@ from .directional_field import (
 )
 from .frames import coordinates, dot, normalize, tangent_frame
 from .polygon_arrays import mean_per_face
-from .representation import face_frames, from_representation, signed_power, to_representation
+from .representation import from_representation, signed_power, to_representation
 from .rosy_field import RosyField, check_degree
 from .surface import Surface
 
@@ -96,10 +96,9 @@ def validated_field(
     vectors = project_to_tangent(vectors, normal, TOLERANCE_DEG[domain], source, domain)
     if domain == "vertex":
         rest = surface.in_rest_shape()
-        x, y = face_frames(rest)
         z = to_representation(vectors, *tangent_frame(normal), degree)
-        face_z = _vertex_averages(rest, normal, x)(z, degree)
-        vectors = from_representation(face_z, x, y, degree)
+        face_z = _vertex_averages(rest, normal)(z, degree)
+        vectors = from_representation(face_z, *rest.face_frames, degree)
     return RosyField(degree, vectors)
 
 
@@ -161,8 +160,7 @@ def validated_directions(
     normal = tangent_normals(surface, domain)
 
     def are_rosys(rows: slice) -> bool:
-        x, y = tangent_frame(normal[rows])
-        return is_rosy(coordinates(usable_directions[rows], x, y))
+        return is_rosy(coordinates(usable_directions[rows], *tangent_frame(normal[rows])))
 
     if all(map(are_rosys, row_blocks(count))):
         vectors = directions[:, 0].copy()
@@ -190,23 +188,21 @@ def _average_directions(surface: Surface, directions: np.ndarray, normal: np.nda
     holds the (V, 3) vertex normals.
     """
     degree = directions.shape[1]
-    x, y = tangent_frame(normal)
-    w = coordinates(directions, x, y)
+    w = coordinates(directions, *tangent_frame(normal))
     first_angle, rho, direction_ratios = by_rows(closest_rosy, w)
-    face_x, face_y = face_frames(surface)
-    average = _vertex_averages(surface, normal, face_x)
+    average = _vertex_averages(surface, normal)
     z = average(rho * np.exp(1j * degree * first_angle), degree)
     member = np.exp(1j * np.angle(z) / degree)
     coefficients = {}
     for j, values in ratio_harmonics(direction_ratios).items():
         mean = average(values * np.exp(-1j * j * first_angle), -j)
         coefficients[j] = mean * signed_power(member, j)
-    vectors = from_representation(z, face_x, face_y, degree)
+    vectors = from_representation(z, *surface.face_frames, degree)
     return RosyField(degree, vectors, ratios_from_harmonics(coefficients, degree))
 
 
 def _vertex_averages(
-    surface: Surface, normal: np.ndarray, face_x: np.ndarray
+    surface: Surface, normal: np.ndarray
 ) -> Callable[[np.ndarray, int], np.ndarray]:
     """Return a function that averages (V,) complex values at the vertices onto the faces.
 
@@ -214,8 +210,7 @@ def _vertex_averages(
     its value is multiplied by exp(i k t). `normal` holds the (V, 3) vertex normals, and `face_x` the (F, 3)
     x axes of the frames of the faces.
     """
-    corner_normal = normal[surface.corner_vertex]
-    rotation = corner_rotations(surface.face_normal, face_x, surface.corner_face, corner_normal)
+    rotation = corner_rotations(surface, normal[surface.corner_vertex])
 
     def average(values: np.ndarray, order: int) -> np.ndarray:
         corner_values = values[surface.corner_vertex] * np.conj(signed_power(rotation, order))
@@ -259,12 +254,8 @@ def vertex_normals(surface: Surface) -> np.ndarray:
     (V, 3) float64 ndarray
         Unit normals; zero on vertices without a face.
     """
-    count = len(surface.vertices)
-    angles = corner_angles(surface)
-    face_normal = surface.face_normal
-    weighted = face_normal[surface.corner_face] * angles[:, None]
-    columns = [np.bincount(surface.corner_vertex, column, count) for column in weighted.T]
-    return normalize(np.stack(columns, axis=1))
+    weighted = surface.face_normal[surface.corner_face] * corner_angles(surface)[:, None]
+    return normalize(bincount_rows(surface.corner_vertex, weighted, len(surface.vertices)))
 
 
 def project_to_tangent(

@@ -14,9 +14,9 @@ from typing import Protocol
 import numpy as np
 
 from ..core.color import REC709_LUMINANCE
+from ..field.blocks import bincount_rows
 from ..field.curvature import face_magnitude
 from ..field.frames import dot, normalize
-from ..field.polygon_arrays import sum_per_fan
 from ..field.surface import Surface
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
@@ -315,7 +315,7 @@ def lambert_tone(instance: MeshInstance, to_light: np.ndarray) -> np.ndarray:
     """
     matrix = np.asarray(instance.matrix, dtype=np.float64)[:3, :3]
     surface = instance.surface
-    fan_normal = sum_per_fan(surface.corner_normal, surface.corner_vertex)
+    fan_normal = bincount_rows(surface.corner_vertex, surface.corner_normal)
     normal = np.zeros_like(surface.vertices)
     normal[: len(fan_normal)] = fan_normal @ cofactor_matrix(matrix).T
     direction = normalize(np.broadcast_to(to_light, normal.shape) + 0.0)

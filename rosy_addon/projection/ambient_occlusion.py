@@ -8,8 +8,8 @@ import numpy as np
 
 from ..core.errors import RosyError
 from ..core.progress import progress
+from ..field.blocks import bincount_rows
 from ..field.frames import dot, normalize
-from ..field.polygon_arrays import sum_per_fan
 from .gbuffer import MeshInstance
 from .shadow_maps import (
     NORMAL_BIAS_PIXELS,
@@ -99,7 +99,7 @@ def _sample_points(instance: MeshInstance, inset: float) -> tuple[np.ndarray, np
     surface, linear = instance.surface, np.asarray(instance.matrix, dtype=np.float64)[:3, :3]
     vertex = np.empty((len(surface.fan_normal), 3))
     vertex[surface.corner_fan] = surface.vertices[surface.corner_vertex]
-    center_sums = sum_per_fan(surface.face_center[surface.corner_face], surface.corner_fan)
+    center_sums = bincount_rows(surface.corner_fan, surface.face_center[surface.corner_face])
     center = instance.to_world(center_sums / np.bincount(surface.corner_fan)[:, None])
     position = instance.to_world(vertex)
     offset = center - position

@@ -222,7 +222,7 @@ def _leaf_directions(
     defined = corner_field.representation.any(axis=0) & (root_area > 0)
     directions = CornerDirections(
         degree,
-        symmetry.has_opposites,
+        symmetry.line_count,
         leaf_offset,
         angle,
         deviation,

@@ -12,7 +12,7 @@ from ..field.blocks import as_float64
 from ..field.directional_field import field_directions
 from ..field.frames import dot, normalize, tangent_frame
 from ..field.polygon_arrays import mean_per_face
-from ..field.representation import face_frames, from_representation, to_representation
+from ..field.representation import from_representation, to_representation
 from ..field.rosy_field import MAX_DEGREE, RosyField, check_degree
 from ..field.surface import Surface
 from ..field.validate import (
@@ -165,7 +165,7 @@ def _field_from_angles(
     surface: Surface, angles: np.ndarray, degree: int, source: str, nonfinite: str
 ) -> RosyField:
     """Return a field from (F,) angles between its members and the first edges of faces, in radians."""
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     report(0.5, "reading the field")
     angles = as_float64(angles)
     defined = np.isfinite(angles)
@@ -295,7 +295,7 @@ def _store(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str) -> bpy.
         attribute = _write_directions(mesh, field, name)
     elif form == "ANGLE":
         attribute = get_or_create_attribute(mesh, name, ANGLE_TYPE)
-        x, y = face_frames(mesh_surface(mesh))
+        x, y = mesh_surface(mesh).face_frames
         angle = np.arctan2(dot(field.vectors, y), dot(field.vectors, x))
         angle[~field.vectors.any(axis=1)] = np.nan
         attribute.data.foreach_set("value", angle.astype(np.float32))

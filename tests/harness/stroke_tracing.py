@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from rosy_addon.field.representation import face_frames
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.line_drawing.families import label_families
 from rosy_addon.line_drawing.lateral_neighbors import SeparationRules
@@ -53,7 +52,7 @@ def write_svg(path: Path, *drawing: object) -> None:
 
 def turned(surface, degree, angle=0.0):
     """Return an instance with a field at an angle to the first edges of its faces."""
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     return MeshInstance(
         surface, np.eye(4), RosyField(degree, np.cos(angle) * x + np.sin(angle) * y)
     )

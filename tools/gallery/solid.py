@@ -16,7 +16,6 @@ from rosy_addon.field.directional_field import field_from_directions, tensor_fie
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, axis_field, generate
 from rosy_addon.field.representation import (
-    face_frames,
     face_representation,
     from_representation,
     power,
@@ -36,7 +35,7 @@ def harmonic_field(surface: Surface, degree: int, axes: np.ndarray) -> RosyField
     On the sphere, the three axes of a cube and N = 4 give a field with singularities at the eight corners of
     the cube. The six axes of an icosahedron and N = 6 give a field with twelve singularities.
     """
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     z = power((x + 1j * y) @ axes.T, degree).sum(axis=1)
     return RosyField(degree, from_representation(z, x, y, degree))
 
@@ -60,8 +59,8 @@ def smoothed(surface: Surface, field: RosyField, rounds: int) -> RosyField:
 
     Pairs of singularities of opposite signs vanish.
     """
-    x, y = face_frames(surface)
-    rotations = corner_rotations(surface.face_normal, x, surface.corner_face, surface.corner_normal)
+    x, y = surface.face_frames
+    rotations = corner_rotations(surface, surface.corner_normal)
     weights, z = corner_angles(surface), face_representation(surface, field)
     for _ in range(rounds):
         z = smooth_face_values(surface, z, rotations, field.degree, weights)

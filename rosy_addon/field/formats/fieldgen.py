@@ -22,10 +22,9 @@ from ..corner_fans import corner_angles, corner_rotations
 from ..frames import tangent_frame
 from ..representation import (
     complex_bincount,
-    face_frames,
+    face_representation,
     from_representation,
     power,
-    to_representation,
     unit_complex,
 )
 from ..rosy_field import RosyField, check_degree
@@ -92,11 +91,8 @@ def fieldgen_text(surface: Surface, field: RosyField) -> str:
     angle = corner_angles(surface)
     face, vertex = surface.corner_face, surface.corner_vertex
     normal = vertex_normals(surface)
-    face_x, face_y = face_frames(surface)
-    z = to_representation(field.vectors, face_x, face_y, field.degree)
-    rotation = power(
-        corner_rotations(surface.face_normal, face_x, face, normal[vertex]), field.degree
-    )
+    z = face_representation(surface, field)
+    rotation = power(corner_rotations(surface, normal[vertex]), field.degree)
     mean = complex_bincount(vertex, z[face] * rotation * angle, count)
     member = from_representation(unit_complex(mean), *tangent_frame(normal), field.degree)
     face_lines = (" ".join(f"{v}//{v}" for v in corners) for corners in _faces(surface))

@@ -11,7 +11,6 @@ from rosy_addon.field.convert import rotate_field
 from rosy_addon.field.directional_field import field_from_directions
 from rosy_addon.field.frames import normalize
 from rosy_addon.field.generate import GeneratorSettings, axis_field, generate
-from rosy_addon.field.representation import face_frames
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import description
 
@@ -90,7 +89,7 @@ def test_percentiles_of_errors_are_weighted_by_area():
 def test_fields_that_are_no_rosys_are_compared_by_their_best_matching():
     """Three directions at free angles, once with the first and once with the second one stored."""
     ball = icosphere(2)
-    x, y = face_frames(ball)
+    x, y = ball.face_frames
     angles = np.array([0.1, 1.0, 4.0])
 
     def field_at(offsets, first):

@@ -12,7 +12,6 @@ from rosy_addon.field.creases import filtered_normals, salient_edges
 from rosy_addon.field.feature_curvature import noise_sample
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import generate
-from rosy_addon.field.representation import face_frames
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.surface import Surface, build_surface
@@ -159,7 +158,7 @@ def test_averages_of_numbers_below_all_normal_ones():
     """They are 0, without an overflow of their inverse."""
     surface = icosphere(1)
     connection = build_connection(surface)
-    averages = SurfaceAverages(surface, connection, *face_frames(surface))
+    averages = SurfaceAverages(surface, connection, *surface.face_frames)
     matrix = laplacian(connection, 0)
     matrix = matrix.with_values(matrix.data.real.astype(np.float32))
     sums = averages.node_sums(np.full(surface.face_count, 1e-320), 0)
@@ -171,7 +170,7 @@ def test_averages_with_an_indefinite_matrix():
     """Obtuse triangles have negative weights: conjugate gradients end at their last good step."""
     surface = icosphere(0)
     connection = build_connection(surface)
-    averages = SurfaceAverages(surface, connection, *face_frames(surface))
+    averages = SurfaceAverages(surface, connection, *surface.face_frames)
     # With unit masses, five neighbors and 4 on the diagonal, the sum of every row is 0.
     matrix = laplacian(connection, 0)
     matrix = matrix.with_values(np.where(matrix.data.real > 0, 4.0, -1.0).astype(np.float32))

@@ -12,7 +12,7 @@ from rosy_addon.core.errors import RosyError
 from rosy_addon.field import prescribed, turning_angles
 from rosy_addon.field.face_graph import face_graph, spanning_forest, triangle_graph
 from rosy_addon.field.prescribed import prescribed_field
-from rosy_addon.field.representation import face_frames, matching_angles, to_representation
+from rosy_addon.field.representation import face_representation, matching_angles
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.surface import Surface, build_surface
 
@@ -62,7 +62,7 @@ def spread_vertices(surface: Surface, count: int, seed: int) -> np.ndarray:
 
 
 def graph_of(surface):
-    return face_graph(surface, *face_frames(surface))
+    return face_graph(surface)
 
 
 @pytest.mark.parametrize("degree", [1, 2, 4, 6])
@@ -252,9 +252,7 @@ def test_the_energy_is_that_of_a_dense_solver(surface, degree, vertex, index):
     assert energies[nearest] == pytest.approx(min(energies), rel=1e-6, abs=1e-9)
     # The field turns by these angles at all edges, also at those that close the loops.
     field = prescribed_field(surface, degree, vertex, index)
-    x, y = face_frames(surface)
-    z = to_representation(field.vectors, x, y, degree)
-    turned = matching_angles(surface, x, y, z, degree, *faces.halfedges.T)
+    turned = matching_angles(surface, face_representation(surface, field), degree)
     np.testing.assert_allclose(turned, angle, atol=1e-9)
 
 

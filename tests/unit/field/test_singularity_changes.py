@@ -11,7 +11,7 @@ from rosy_addon.core.errors import RosyError
 from rosy_addon.field.convert import Conversion, convert
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.prescribed import change_singularities, prescribed_field
-from rosy_addon.field.representation import face_frames, face_representation
+from rosy_addon.field.representation import face_representation
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.singularity_changes import OUTSIDE, move_index, opposite_pairs
@@ -170,7 +170,7 @@ def test_a_field_bends_by_several_members(degree):
     surface = cylinder(48, 48)
     height = surface.face_center[:, 2]
     angle = 2 * np.pi * (height - height.min()) / np.ptp(height)
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     along = np.array([0.0, 0.0, 1.0]) - surface.face_normal * surface.face_normal[:, 2:]
     start = np.arctan2((along * y).sum(axis=1), (along * x).sum(axis=1))
     guides = np.cos(start + angle)[:, None] * x + np.sin(start + angle)[:, None] * y

@@ -24,6 +24,10 @@ from .errors import RosyError
 SWITCH_VALUES = {"true": True, "on": True, "1": True, "false": False, "off": False, "0": False}
 
 
+#: Smallest and largest allowed value of each number of a tuple, by the name of the number in the interface.
+Ranges = Mapping[str, tuple[float, float]]
+
+
 class Stage(IntEnum):
     """The stages of rendering, in their order.
 
@@ -154,7 +158,7 @@ class Numbers(Setting):
         Smallest and largest allowed value of each number, by the name of the number in the interface.
     """
 
-    parts: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    parts: Ranges = field(default_factory=dict)
 
     def check(self, value: Any) -> None:
         """Raise a `RosyError` if a value is not a tuple of numbers within their ranges."""
@@ -231,12 +235,7 @@ def number(default: float, low: float, high: float, text: str, **description: An
     return _field(Number(default=default, low=low, high=high, text=text, **description))
 
 
-def numbers(
-    default: tuple[float, ...],
-    text: str,
-    parts: Mapping[str, tuple[float, float]],
-    **description: Any,
-) -> Any:
+def numbers(default: tuple[float, ...], text: str, parts: Ranges, **description: Any) -> Any:
     """Return a dataclass field for a setting that is a tuple of numbers; see `Numbers` and `Setting`."""
     return _field(Numbers(default=default, text=text, parts=parts, **description))
 

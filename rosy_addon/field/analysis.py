@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.errors import RosyError
 from ..core.progress import progress, report
@@ -26,29 +28,33 @@ DEFAULT_REACH = 0.05
 #: Number of distances that are computed at once, to bound memory.
 DISTANCES_PER_BLOCK = 2_000_000
 
-#: Fraction of the area on which the error is at most `ErrorStatistics.p95`.
+#: Fraction of the area on which the error is at most `Difference.p95`.
 PERCENTILE = 0.95
 
 
-class ErrorStatistics(NamedTuple):
-    """Statistics of the angular errors on the faces of a surface, in radians.
-
-    Faces on which the error is NaN are ignored. If it is NaN on all faces, all statistics are 0.
+@dataclass(frozen=True, eq=False)
+class Difference:
+    """The angle between two fields of the same degree on each face, and statistics of it.
 
     Attributes
     ----------
+    angle : (F,) float64 ndarray
+        Angle between a vector of one field and the nearest vector of the other, in radians from 0 to
+        pi/N. It is the same for all N vectors of a face. NaN where either field is undefined. For
+        directions that are not rotationally symmetric, see `Field.difference`.
     mean, rms : float
-        Mean and root mean square of the error, weighted by area.
+        Mean and root mean square of the angle in radians, weighted by area.
     p95 : float
-        95th percentile of the error, weighted by area.
+        95th percentile of the angle in radians, weighted by area.
     max : float
-        Largest error.
+        Largest angle, in radians.
     worst_face : int
-        The face with the largest error; -1 if the error is NaN on all faces.
+        The face with the largest angle; -1 if there is no face on which both fields are defined.
     compared : float
-        Fraction of the faces on which the error is not NaN.
+        Fraction of the faces on which both fields are defined, from 0 to 1.
     """
 
+    angle: NDArray[np.float64]
     mean: float
     rms: float
     p95: float
@@ -78,18 +84,15 @@ class FieldComparison(NamedTuple):
 
     Attributes
     ----------
-    angles : (F,) float64 ndarray
-        Angle between the fields on each face, in radians; see `angle_errors`.
-    statistics : ErrorStatistics
-        Statistics of the angles.
+    difference : Difference
+        Angle between the fields on each face, and its statistics.
     singularity_count, other_count : int
         Number of singularities of each field.
     matched_count : int
         Number of singularities that occur in both fields with the same index and nearly the same position.
     """
 
-    angles: np.ndarray
-    statistics: ErrorStatistics
+    difference: Difference
     singularity_count: int
     other_count: int
     matched_count: int
@@ -170,7 +173,7 @@ def angle_errors(surface: Surface, field: RosyField, other: RosyField) -> np.nda
             f"{other.degree}"
         )
     if field.direction_ratios is None and other.direction_ratios is None:
-        z, other_z = face_representation(surface, field), face_representation(surface, other)
+        z, other_z = (face_representation(surface, f) for f in (field, other))
         error = np.abs(np.angle(z * other_z.conj())) / field.degree
         error[(z == 0) | (other_z == 0)] = np.nan
         return error
@@ -193,8 +196,10 @@ def _matched_direction_angles(surface: Surface, field: RosyField, other: RosyFie
     return best
 
 
-def error_statistics(surface: Surface, error: np.ndarray) -> ErrorStatistics:
-    """Return statistics of angular errors over the surface, weighted by the areas of the faces.
+def error_statistics(surface: Surface, error: np.ndarray) -> Difference:
+    """Return angular errors with their statistics over the surface, weighted by the areas of the faces.
+
+    If the error is NaN on all faces, all statistics are 0, and `worst_face` is -1.
 
     Parameters
     ----------
@@ -204,12 +209,13 @@ def error_statistics(surface: Surface, error: np.ndarray) -> ErrorStatistics:
     """
     defined = np.flatnonzero(np.isfinite(error))
     if not len(defined):
-        return ErrorStatistics(0.0, 0.0, 0.0, 0.0, -1, 0.0)
+        return Difference(error, 0.0, 0.0, 0.0, 0.0, -1, 0.0)
     area = np.bincount(surface.triangle_face, _triangle_areas(surface), surface.face_count)
     values, weight = error[defined], area[defined] / max(float(area[defined].sum()), 1e-300)
     order = np.argsort(values, kind="stable")
     rank = np.searchsorted(np.cumsum(weight[order]), PERCENTILE)
-    return ErrorStatistics(
+    return Difference(
+        error,
         float(weight @ values),
         float(np.sqrt(weight @ values**2)),
         float(values[order[min(rank, len(order) - 1)]]),
@@ -279,12 +285,11 @@ def match_on_surface(
 def compare_fields(surface: Surface, field: RosyField, other: RosyField) -> FieldComparison:
     """Compare two fields of the same degree on a surface: their angles and their singularities."""
     report(0.0, "comparing the fields")
-    angles = angle_errors(surface, field, other)
+    difference = error_statistics(surface, angle_errors(surface, field, other))
     with progress(0.2, 0.5):
         own = find_singularities(surface, field)
     with progress(0.5, 0.8):
         others = find_singularities(surface, other)
     with progress(0.8, 1.0):
         matching = match_on_surface(surface, own, others)
-    statistics = error_statistics(surface, angles)
-    return FieldComparison(angles, statistics, len(own[0]), len(others[0]), len(matching.distance))
+    return FieldComparison(difference, len(own[0]), len(others[0]), len(matching.distance))

@@ -183,10 +183,11 @@ def _check_count(raw: RawField, surface: Surface, source: str) -> None:
     Some programs write the number of vertices in the header of a field on faces. This is accepted.
     """
     row_count = len(raw.values)
-    vertices_over_faces = (
-        raw.header_count == len(surface.vertices) and row_count == surface.face_count
+    counts, surface_counts = (
+        (raw.header_count, row_count),
+        (len(surface.vertices), surface.face_count),
     )
-    if raw.header_count not in (None, row_count) and not vertices_over_faces:
+    if raw.header_count not in (None, row_count) and counts != surface_counts:
         raise RosyError(
             f"{source}: declares {counted(raw.header_count, 'row')} of {raw.columns} numbers, but contains {row_count}"
         )
@@ -215,10 +216,8 @@ def _source_surface(
         return build_surface(*raw.polygons, name=str(path), sharp_angle=SHARP_ANGLE)
     if count == surface.face_count:
         return None
-    candidates = [
-        path.with_suffix(suffix) for suffix in MESH_READERS if suffix != path.suffix.lower()
-    ]
-    mesh_path = next((candidate for candidate in candidates if candidate.is_file()), None)
+    suffixes = (suffix for suffix in MESH_READERS if suffix != path.suffix.lower())
+    mesh_path = next(filter(Path.is_file, map(path.with_suffix, suffixes)), None)
     if mesh_path is None:
         return None
     source = Surface(mesh_path)
@@ -257,15 +256,7 @@ def field_file(path: str | os.PathLike[str], field: RosyField, surface: Surface)
     RosyError
         If the extension is not in `WRITE_SUFFIXES`, or the format cannot store such a field.
     """
-    path = Path(path)
-    _check_storable(path, field)
-    report(0.0, "writing the file")
-    return _contents(path.suffix.lower(), field, surface)
-
-
-def _check_storable(path: Path, field: RosyField) -> None:
-    """Raise a `RosyError` if the format of a file (given by its suffix) cannot store a field."""
-    suffix = path.suffix.lower()
+    suffix = Path(path).suffix.lower()
     if suffix not in WRITE_SUFFIXES:
         raise RosyError(
             f"{path}: cannot be written as a field: its name must end in {_join_names(WRITE_SUFFIXES)}"
@@ -275,10 +266,7 @@ def _check_storable(path: Path, field: RosyField) -> None:
             f"{path}: a {suffix} file stores one member per row, but the directions of this field "
             "do not form a RoSy: write a .rawfield, .txt or .npy file"
         )
-
-
-def _contents(suffix: str, field: RosyField, surface: Surface) -> bytes:
-    """Return the contents of a field file in the format with this suffix, as bytes."""
+    report(0.0, "writing the file")
     if suffix == ".rosy":
         return rosy_text(field).encode("ascii")
     if suffix == ".obj":
@@ -290,10 +278,9 @@ def _contents(suffix: str, field: RosyField, surface: Surface) -> bytes:
         rows = field_directions(surface, field)
     if suffix == ".npy":
         return npy_bytes(rows)
-    text = (
-        rawfield_text(rows) if suffix == ".rawfield" else format_lines(rows.reshape(len(rows), -1))
-    )
-    return text.encode("ascii")
+    if suffix == ".rawfield":
+        return rawfield_text(rows).encode("ascii")
+    return format_lines(rows.reshape(len(rows), -1)).encode("ascii")
 
 
 def _join_names(names: tuple[str, ...]) -> str:
@@ -327,15 +314,15 @@ def transfer_field(
     RosyError
         If more than `MAX_UNMATCHED_FRACTION` of the faces exceed these limits.
     """
-    points = _face_points(target)
     with progress(0.1, 0.9):
-        triangle, distance = closest_triangles(source, points)
+        triangle, distance = closest_triangles(source, _face_points(target))
     report(0.9, "transferring the field")
     face = source.triangle_face[triangle]
-    extent = max(source.extent, 1e-300)
     normal = target.face_normal
     normal_cosine = dot(normal, source.face_normal[face])
-    undefined = (distance > MAX_DISTANCE * extent) | (normal_cosine < np.cos(MAX_NORMAL_ANGLE))
+    undefined = (distance > MAX_DISTANCE * max(source.extent, 1e-300)) | (
+        normal_cosine < np.cos(MAX_NORMAL_ANGLE)
+    )
     undefined |= ~normal.any(axis=1)
     unmatched = undefined & normal.any(axis=1)
     if unmatched.sum() > MAX_UNMATCHED_FRACTION * len(undefined):
@@ -356,8 +343,7 @@ def _face_points(surface: Surface) -> np.ndarray:
     """Return one (F, 3) point on each face: the centroid of its largest triangle."""
     points = np.empty((surface.face_count, 3))
     for faces in row_blocks(surface.face_count):
-        limits = np.searchsorted(surface.triangle_face, [faces.start, faces.stop])
-        triangles = slice(*limits)
+        triangles = slice(*np.searchsorted(surface.triangle_face, [faces.start, faces.stop]))
         face = surface.triangle_face[triangles]
         corners = surface.vertices[surface.triangle_vertex[triangles]]
         cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

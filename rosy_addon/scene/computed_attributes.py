@@ -157,7 +157,7 @@ def store_difference(
     other_field = read_mesh_field(mesh, other, field.degree, surface)
     comparison = yield Call(compare_fields, (surface, field, other_field))
     attribute = get_or_create_attribute(mesh, name, "FLOAT")
-    attribute.data.foreach_set("value", np.degrees(comparison.angles).astype(np.float32))
+    attribute.data.foreach_set("value", np.degrees(comparison.difference.angle).astype(np.float32))
     mesh.update()
     return other, field.degree, comparison
 

@@ -65,6 +65,13 @@ def bincount_rows(index: np.ndarray, rows: np.ndarray, count: int = 0) -> np.nda
     return np.stack([np.bincount(index, column, count) for column in rows.T], axis=1)
 
 
+def run_starts(values: np.ndarray) -> np.ndarray:
+    """Return the first index of each run of equal values."""
+    is_first = np.ones(len(values), dtype=bool)
+    np.not_equal(values[1:], values[:-1], out=is_first[1:])
+    return np.flatnonzero(is_first)
+
+
 def neighbors_of_nodes(
     node_count: int, first: np.ndarray, second: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -15,7 +15,6 @@ from ..core.errors import RosyError
 from ..core.progress import progress, report
 from .blocks import neighbors_of_nodes
 from .face_graph import LABEL, FaceGraph, face_graph
-from .polygon_arrays import face_area_vectors
 from .prescribed import index_at_nodes
 from .representation import from_representation, unit_complex
 from .rosy_field import RosyField, check_degree
@@ -68,9 +67,7 @@ def cheapest_singularities(
     if not x.any():
         raise RosyError(f"{surface.name}: no face has an area")
     graph = face_graph(surface)
-    area = np.linalg.norm(
-        face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start), axis=1
-    )
+    area = surface.face_area
     given = index_at_nodes(surface, graph, vertex, index)
     required = 2 * np.pi / degree * (given - _spread(surface, graph, area, given))
     with progress(0.1, 0.3):
@@ -86,9 +83,8 @@ def cheapest_singularities(
     with progress(0.65, 1.0):
         added = _settled(graph, degree, given, total - given)
     node = np.flatnonzero(added)
-    vertex_of_node = np.empty(graph.node_count, dtype=np.int64)
-    vertex_of_node[graph.corner_node] = surface.corner_vertex
-    return np.concatenate([vertex, vertex_of_node[node]]), np.concatenate([index, added[node]])
+    added_vertex = graph.vertices_of_nodes(surface)[node]
+    return np.concatenate([vertex, added_vertex]), np.concatenate([index, added[node]])
 
 
 def _spread(surface: Surface, graph: FaceGraph, area: np.ndarray, given: np.ndarray) -> np.ndarray:
@@ -140,9 +136,8 @@ class _Neighbors:
     """The vertex nodes of a graph of faces, and the neighbors of each along edges."""
 
     def __init__(self, graph: FaceGraph) -> None:
-        self._start, self._neighbor, edge = neighbors_of_nodes(
-            graph.node_count, graph.tail, graph.head
-        )
+        csr = neighbors_of_nodes(graph.node_count, graph.tail, graph.head)
+        self._start, self._neighbor, edge = csr
         self._resistance = EDGE_RESISTANCE / np.tile(graph.conductance, 2)[edge]
         self._is_interior = graph.is_interior
 

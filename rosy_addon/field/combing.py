@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -143,17 +144,15 @@ class Combing:
             getattr(self._node_guides, name)[node] = values[node]
 
     def _guides_at_nodes(self, corner: np.ndarray | slice = slice(None)) -> NodeGuides:
-        firmness = np.abs(self.guides)
-        weight, is_exact = firmness_weights(firmness, self.system.surface.mean_edge_length)
-        return self.system.node_guides(unit_complex(self.guides), weight, is_exact, corner)
+        edge_length = self.system.surface.mean_edge_length
+        weights = firmness_weights(np.abs(self.guides), edge_length)
+        return self.system.node_guides(unit_complex(self.guides), *weights, corner)
 
     def _set_face_z(self, z: np.ndarray, face: np.ndarray) -> None:
         """Set the field on (m,) faces to representations, normalized; exact guides take precedence."""
-        z = unit_representations(z)
         guides = self.guides[face]
         is_exact = np.abs(guides) >= EXACT_FIRMNESS
-        z[is_exact] = guides[is_exact] / np.abs(guides[is_exact])
-        self._face_z[face] = z
+        self._face_z[face] = np.where(is_exact, unit_complex(guides), unit_representations(z))
 
 
 def start_combing(
@@ -270,12 +269,8 @@ class BrushStroke:
         self._brush = brush
         self._locate = locate
         self._spacing = max(DAB_SPACING * brush.radius, MIN_SPACING * self._surface.extent)
-        signs = np.array([[1.0, 1.0, 1.0]])
-        for axis in np.flatnonzero(brush.mirror):
-            mirrored = signs.copy()
-            mirrored[:, axis] *= -1
-            signs = np.concatenate([signs, mirrored])
-        self._signs = signs
+        signs = [(1.0, -1.0) if is_mirrored else (1.0,) for is_mirrored in reversed(brush.mirror)]
+        self._signs = np.array(list(product(*signs)))[:, ::-1]
         self._start_arc_length = 0.0
         self._end: _Dab | None = None  # the last point, which need not be a dab
         self._dabs: list[_Dab] = []  # the last dabs that were drawn, and new ones
@@ -312,8 +307,7 @@ class BrushStroke:
         end = self._end
         if end is None:
             return np.empty(0, dtype=np.intp)
-        rest = end.arc_length - self._dabs[-1].arc_length
-        if rest > 1e-3 * self._spacing:
+        if end.arc_length - self._dabs[-1].arc_length > 1e-3 * self._spacing:
             self._dabs.append(end)
         self._dabs.append(self._dabs[-1])  # the end has no later dab
         changed = self._draw()
@@ -449,12 +443,9 @@ class BrushStroke:
         is_closest = distance <= self._least_distance[face]
         face = face[is_closest]
         self._least_distance[face] = distance[is_closest]
-        target = to_representation(
-            normalize(direction[is_closest]),
-            self._system.averages.x[face],
-            self._system.averages.y[face],
-            self._system.degree,
-        )
+        frames = self._system.averages.x[face], self._system.averages.y[face]
+        direction = normalize(direction[is_closest])
+        target = to_representation(direction, *frames, self._system.degree)
         target *= (1.0 if self._brush.is_exact else SOFT_FIRMNESS) / np.abs(target)
         coverage = self._coverage[face]
         self._store(face, (1 - coverage) * self._base[face] + coverage * target)

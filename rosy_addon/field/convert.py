@@ -18,7 +18,6 @@ from .generate import MIN_SMOOTHING_LENGTH
 from .representation import from_representation, to_representation
 from .rosy_field import RosyField, check_degree
 from .singularity_changes import cancel_pairs
-from .sparse_multigrid import from_coo
 from .surface import Surface
 from .surface_averages import SurfaceAverages
 
@@ -193,15 +192,7 @@ def diffuse_field(surface: Surface, field: RosyField, time: float) -> RosyField:
     report(0.1, "smoothing the field")
     rhs = averages.node_sums(z, degree)
     matrix = laplacian(connection, degree)
-    mass = connection.positive_mass
-    nodes = np.arange(connection.node_count)
-    matrix = from_coo(
-        np.concatenate([matrix.row_indices, nodes]),
-        np.concatenate([matrix.indices, nodes]),
-        np.concatenate([matrix.data * time, mass.astype(np.complex128)]),
-        connection.node_count,
-        connection.node_count,
-    )
+    matrix = replace(matrix, data=time * matrix.data).plus_diagonal(connection.positive_mass)
     with progress(0.2, 0.95):
         solution = conjugate_gradient(matrix, rhs)
     report(0.95, "smoothing the field")

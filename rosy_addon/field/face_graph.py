@@ -89,6 +89,12 @@ class FaceGraph:
         """n, the number of vertex nodes."""
         return len(self.is_interior)
 
+    def vertices_of_nodes(self, surface: Surface) -> np.ndarray:
+        """Return (n,) int32: the vertex of the surface at which each vertex node lies."""
+        vertex = np.empty(self.node_count, dtype=surface.corner_vertex.dtype)
+        vertex[self.corner_node] = surface.corner_vertex
+        return vertex
+
     def turn_around_nodes(self, angle: np.ndarray) -> np.ndarray:
         """Return (n,) float64 sums of (I,) angles at the edges, counter-clockwise around each vertex node."""
         count = self.node_count
@@ -120,16 +126,13 @@ def face_graph(surface: Surface, is_defined: np.ndarray | None = None) -> FaceGr
     length, distance = edge_lengths(surface, a, b)
     conductance = distance / np.maximum(length, 1e-300)
     median = max(float(np.median(conductance)), 1e-300) if len(a) else 1.0
-    np.clip(
-        conductance, median / MAX_CONDUCTANCE_RATIO, median * MAX_CONDUCTANCE_RATIO, out=conductance
-    )
+    conductance = conductance.clip(median / MAX_CONDUCTANCE_RATIO, median * MAX_CONDUCTANCE_RATIO)
     corner_node = connected_corners(a, b, following)
-    continues = mask(len(following), halfedges)
-    is_interior = np.ones(int(corner_node.max(initial=-1)) + 1, dtype=bool)
-    is_interior[corner_node[~continues]] = False
-    is_interior[corner_node[following[~continues]]] = False
+    ends = np.flatnonzero(~mask(len(following), halfedges))
+    count = int(corner_node.max(initial=-1)) + 1
+    is_interior = ~mask(count, corner_node[np.concatenate([ends, following[ends]])])
     component = connected_components(surface.face_count, np.stack([source, target], axis=1))
-    node_component = np.zeros(len(is_interior), dtype=component.dtype)
+    node_component = np.zeros(count, dtype=component.dtype)
     node_component[corner_node] = component[surface.corner_face]
     return FaceGraph(
         halfedges=halfedges,
@@ -141,8 +144,7 @@ def face_graph(surface: Surface, is_defined: np.ndarray | None = None) -> FaceGr
         conductance=conductance,
         corner_node=corner_node,
         is_interior=is_interior,
-        defect=2 * np.pi
-        - np.bincount(corner_node, signed_corner_angles(surface), len(is_interior)),
+        defect=2 * np.pi - np.bincount(corner_node, signed_corner_angles(surface), count),
         component=component,
         node_component=node_component,
     )
@@ -210,15 +212,13 @@ def spanning_forest(node_count: int, first: np.ndarray, second: np.ndarray) -> S
     parent, parent_edge = np.arange(node_count), np.full(node_count, -1)
     parent_sign = np.zeros(node_count)
     is_reached = mask(node_count, roots)
-    front, done = roots, 0
+    front = roots
     while len(front):
-        done += len(front)
-        counts = start[front + 1] - start[front]
-        entry = concatenated_ranges(start[front], counts)
+        entry = concatenated_ranges(start[front], start[front + 1] - start[front])
         entry = entry[~is_reached[neighbor[entry]]]
-        source = edge[entry]
         front, kept = np.unique(neighbor[entry], return_index=True)
-        entry, source = entry[kept], source[kept]
+        entry = entry[kept]
+        source = edge[entry]
         is_reached[front] = True
         parent_edge[front], parent_sign[front] = source, sign[entry]
         parent[front] = np.where(sign[entry] > 0, first[source], second[source])
@@ -339,15 +339,14 @@ def triangle_graph(surface: Surface, faces: FaceGraph) -> TriangleGraph:
     triangles = [np.concatenate(pair) for pair in zip(triangles, (inner - 1, inner), strict=True)]
     inner_weights = cotangent[inner - 1, 1] / 2, cotangent[inner, 2] / 2
     weights = [np.concatenate(pair) for pair in zip(weights, inner_weights, strict=True)]
-    tail, head = faces.corner_node[corner[inner, 1]], faces.corner_node[apex[inner]]
     weight = np.stack(weights, axis=1)
     graph = replace(
         faces,
         source=triangles[0],
         target=triangles[1],
         unfolding=np.concatenate([faces.unfolding, np.zeros(len(inner))]),
-        tail=np.concatenate([faces.tail, tail]),
-        head=np.concatenate([faces.head, head]),
+        tail=np.concatenate([faces.tail, faces.corner_node[corner[inner, 1]]]),
+        head=np.concatenate([faces.head, faces.corner_node[apex[inner]]]),
         conductance=weight.sum(axis=1),
         component=faces.component[face],
     )

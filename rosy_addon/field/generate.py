@@ -242,9 +242,8 @@ def _prescribed(surface: Surface, settings: GeneratorSettings, degree: int) -> R
 def _features(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyField:
     """Return a field along the edges in the settings or, if there are none, along border and sharp edges."""
     degree = check_degree(degree)
-    ends = settings.edges
-    if ends is None:
-        ends = feature_edges(surface, settings.sharp_angle)
+    angle, ends = settings.sharp_angle, settings.edges
+    ends = feature_edges(surface, angle) if ends is None else ends
     if not len(ends):
         raise NoFeaturesError(
             f"{surface.name}: has no border or sharp edge: reduce the sharp angle, or mark edges"

@@ -22,7 +22,7 @@ from ..core.progress import progress, report
 from .blocks import mask
 from .conjugate_gradient import RELATIVE_TOLERANCE, conjugate_gradient
 from .connection import build_connection, laplacian
-from .representation import complex_bincount, from_representation, to_representation
+from .representation import complex_bincount, from_representation, to_representation, unit_complex
 from .rosy_field import RosyField, check_degree
 from .smoothest import smoothest_field
 from .sparse_multigrid import CSRMatrix, Level, add_diagonal, hierarchy, w_cycle
@@ -123,9 +123,7 @@ class GuidedSystem:
         fixed = sums(is_hard * target, self.degree, corner)
         max_modulus = sums(is_hard * np.abs(target), 0, corner)
         is_fixed = np.abs(fixed) > 1e-6 * max_modulus
-        fixed[~is_fixed] = 0
-        fixed[is_fixed] /= np.abs(fixed[is_fixed])
-        return NodeGuides(penalty, rhs, is_fixed, fixed)
+        return NodeGuides(penalty, rhs, is_fixed, unit_complex(np.where(is_fixed, fixed, 0)))
 
     def solve(
         self,
@@ -156,16 +154,9 @@ class GuidedSystem:
         report(0.5, label)
         levels = add_diagonal(self.levels, diagonal)
         start = guides.fixed if start is None else np.where(guides.is_fixed, guides.fixed, start)
+        matrix, cycle, is_fixed = levels[0].matrix, partial(w_cycle, levels), guides.is_fixed
         with progress(0.5, 1.0, label):
-            return conjugate_gradient(
-                levels[0].matrix,
-                guides.rhs,
-                tolerance,
-                partial(w_cycle, levels),
-                label,
-                start,
-                guides.is_fixed,
-            )
+            return conjugate_gradient(matrix, guides.rhs, tolerance, cycle, label, start, is_fixed)
 
     def solve_near(
         self, guides: NodeGuides, z: np.ndarray, nodes: np.ndarray, max_iterations: int
@@ -294,10 +285,8 @@ def firmness_weights(
     """
     is_exact = (firmness >= EXACT_FIRMNESS) & (reach == 0)
     firmness = np.where(is_exact, 0.0, np.minimum(firmness, 1.0))
-    weight = firmness / np.maximum(
-        reach**2 * firmness + edge_length**2 * (1 - firmness), np.finfo(np.float64).tiny
-    )
-    return weight, is_exact
+    area = reach**2 * firmness + edge_length**2 * (1 - firmness)
+    return firmness / np.maximum(area, np.finfo(np.float64).tiny), is_exact
 
 
 def guided_system(surface: Surface, degree: int) -> GuidedSystem:
@@ -362,7 +351,7 @@ def guided_field(
         z = system.solve(node_guides, tolerance=tolerance)
     report(0.75, "averaging the field on the faces")
     face_z = unit_representations(system.averages.face_sums(z, degree))
-    face_z[is_hard] = target[is_hard] / np.abs(target[is_hard])
+    face_z[is_hard] = unit_complex(target[is_hard])
     vectors = system.to_vectors(face_z)
     del system  # it is large
     unguided = (face_z == 0) & surface.face_normal.any(axis=1)
@@ -375,5 +364,4 @@ def guided_field(
 def unit_representations(z: np.ndarray) -> np.ndarray:
     """Return (F,) representations divided by their moduli; 0 where the modulus is only a rounding error."""
     modulus = np.abs(z)
-    is_defined = modulus > 1e-9 * max(float(modulus.max()), 1e-300)
-    return np.divide(z, modulus, out=np.zeros_like(z), where=is_defined)
+    return unit_complex(np.where(modulus > 1e-9 * max(float(modulus.max()), 1e-300), z, 0))

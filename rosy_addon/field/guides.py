@@ -15,7 +15,7 @@ from .blocks import mask
 from .closest_point import closest_triangles
 from .frames import dot, normalize
 from .polygon_arrays import mean_per_face, sum_per_face
-from .representation import complex_bincount, from_representation, to_representation
+from .representation import complex_bincount, from_representation, to_representation, unit_complex
 from .surface import Surface
 
 #: Largest distance of a stroke point from the surface, relative to `Surface.extent`. Points farther
@@ -112,10 +112,7 @@ def guides_from_strokes(surface: Surface, strokes: Sequence[np.ndarray], degree:
         the strokes need more than `MAX_STROKE_SAMPLES` samples in total.
     """
     spacing = max(0.5 * surface.mean_edge_length, MIN_STROKE_SPACING * surface.extent)
-    polylines = [
-        _polyline(np.asarray(stroke, dtype=np.float64).reshape(-1, 3)) for stroke in strokes
-    ]
-    polylines = [(points, arc_length) for points, arc_length in polylines if len(points) > 1]
+    polylines = [polyline for polyline in map(_polyline, strokes) if len(polyline[0]) > 1]
     if not polylines:
         raise RosyError(f"{surface.name}: no stroke has two different points")
     length = sum(arc_length[-1] for _, arc_length in polylines)
@@ -185,16 +182,13 @@ def guides_from_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:
         Unit vectors; zero on faces without area in the map.
     """
     x, y = surface.face_frames
-    face = surface.corner_face
+    face, uv = surface.corner_face, np.asarray(uv, dtype=np.float64)
     offset = surface.vertices[surface.corner_vertex] - surface.face_center[face]
     position = dot(offset, x[face]) + 1j * dot(offset, y[face])
-    mean_uv = mean_per_face(np.asarray(uv, dtype=np.float64), surface.face_start)
-    u, v = (np.asarray(uv, dtype=np.float64) - mean_uv[face]).T
+    u, v = (uv - mean_per_face(uv, surface.face_start)[face]).T
     # Least squares fit of the linear map from (u, v) to the face plane.
-    uu, uv_sum, vv = (
-        sum_per_face(product, surface.face_start) for product in (u * u, u * v, v * v)
-    )
-    up, vp = (sum_per_face(axis * position, surface.face_start) for axis in (u, v))
+    products = u * u, u * v, v * v, u * position, v * position
+    uu, uv_sum, vv, up, vp = (sum_per_face(product, surface.face_start) for product in products)
     area = uu * vv - uv_sum**2
     degenerate = area <= 1e-12 * np.maximum(uu * vv, 1e-300)
     along_u, along_v = vv * up - uv_sum * vp, uu * vp - uv_sum * up
@@ -203,8 +197,7 @@ def guides_from_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:
         mirrored = (np.conj(along_u) * along_v).imag < 0
         size = np.maximum(np.abs(along_u), 1e-300), np.maximum(np.abs(along_v), 1e-300)
         along_u = along_u / size[0] - 1j * np.where(mirrored, -1, 1) * along_v / size[1]
-    size = np.abs(along_u)
-    along_u = np.where(degenerate | (size == 0), 0, along_u / np.where(size > 0, size, 1))
+    along_u = np.where(degenerate, 0, unit_complex(along_u))
     return along_u.real[:, None] * x + along_u.imag[:, None] * y
 
 
@@ -241,10 +234,10 @@ def average_guides(
 
 def _polyline(stroke: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the (m, 3) points of a stroke without consecutive duplicates, and their (m,) arc lengths."""
+    stroke = np.asarray(stroke, dtype=np.float64).reshape(-1, 3)
     with np.errstate(over="ignore"):  # a length may be infinite
         length = np.sqrt((np.diff(stroke, axis=0) ** 2).sum(axis=1))
-    is_kept = np.ones(len(stroke), dtype=bool)
-    is_kept[1:] = length > 0
+    is_kept = np.concatenate([[True], length > 0])
     return stroke[is_kept], np.concatenate([[0], np.cumsum(length[length > 0])])
 
 

@@ -21,10 +21,10 @@ import numpy as np
 from ..core.errors import RosyError
 from ..core.memory import raise_mmap_threshold
 from ..core.progress import progress, report
+from .blocks import mask
 from .conjugate_gradient import conjugate_gradient
 from .face_graph import LABEL, FaceGraph, face_graph
 from .frames import normalize
-from .polygon_arrays import face_area_vectors
 from .representation import (
     complex_bincount,
     from_representation,
@@ -153,9 +153,8 @@ def change_singularities(
     raise_mmap_threshold()
     degree, magnitude = field.degree, np.linalg.norm(field.vectors, axis=1, keepdims=True)
     x, y = surface.face_frames
-    z = to_representation(field.vectors, x, y, degree)
+    z = unit_complex(to_representation(field.vectors, x, y, degree))
     is_defined = z != 0
-    z[is_defined] /= np.abs(z[is_defined])
     graph = face_graph(surface, is_defined)
     transported = z[graph.source] * np.exp(1j * degree * graph.unfolding)
     present = np.angle(z[graph.target] * transported.conj()) / degree
@@ -202,8 +201,7 @@ def _bent(
     reach: float,
 ) -> np.ndarray:
     """Return (F,) representations z after rotating them toward a target, with the same singularities."""
-    area = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
-    penalty = np.linalg.norm(area, axis=1) / reach / reach
+    penalty = surface.face_area / reach / reach
     angle = guided_rotation(graph, degree, turning, z, target, penalty)
     _check_angles(surface, graph, degree, turning + angle[graph.target] - angle[graph.source])
     return z * np.exp(1j * degree * angle)
@@ -252,8 +250,7 @@ def _check_sums(
     """
     component = graph.node_component
     count = int(component.max(initial=-1)) + 1
-    is_closed = np.ones(count, dtype=bool)
-    is_closed[component[~graph.is_interior]] = False
+    is_closed = ~mask(count, component[~graph.is_interior])
     needed = np.rint(np.bincount(component, needed, count)).astype(int)
     given = np.rint(np.bincount(component, given, count)).astype(int)
     wrong = np.flatnonzero(is_closed & (needed != given))
@@ -279,8 +276,7 @@ def _check_angles(surface: Surface, graph: FaceGraph, degree: int, angle: np.nda
     """
     if not len(angle) or np.abs(angle).max() < np.pi / degree:
         return
-    vertex_of_node = np.empty(graph.node_count, dtype=np.intp)
-    vertex_of_node[graph.corner_node[::-1]] = surface.corner_vertex[::-1]
+    vertex_of_node = graph.vertices_of_nodes(surface)
     is_fast = np.abs(angle) >= np.pi / degree
     vertices = np.unique(vertex_of_node[np.concatenate([graph.tail[is_fast], graph.head[is_fast]])])
     worst = vertex_of_node[graph.head[np.abs(angle).argmax()]]
@@ -401,6 +397,5 @@ def _initial_angle(
 def _solve(matrix: CSRMatrix, rhs: np.ndarray, levels: list[Level] | None) -> np.ndarray:
     """Solve a linear system by the conjugate gradient method, with multigrid as preconditioner if given."""
     precondition = None if levels is None else partial(w_cycle, levels)
-    return conjugate_gradient(
-        matrix, rhs, TOLERANCE, precondition, "turning the field to the guides"
-    )
+    label = "turning the field to the guides"
+    return conjugate_gradient(matrix, rhs, TOLERANCE, precondition, label)

@@ -171,9 +171,8 @@ class Surface:
 
     def __repr__(self) -> str:
         faces = counted(self.face_count, "face")
-        return (
-            f"<Surface {self.name!r}: {faces}, {counted(len(self.vertices), 'vertex', 'vertices')}>"
-        )
+        vertices = counted(len(self.vertices), "vertex", "vertices")
+        return f"<Surface {self.name!r}: {faces}, {vertices}>"
 
     def with_parts(self, **parts: Any) -> Surface:
         """Return a copy of the surface in which some attributes are replaced; they must fit the others."""
@@ -248,9 +247,8 @@ class Surface:
 
     def in_rest_shape(self) -> Surface:
         """Return the surface before deformation, in the shape to which the vectors of a field are tangent."""
-        if self.rest_vertices is None:
-            return self
-        return self.with_vertices(self.rest_vertices)
+        rest = self.rest_vertices
+        return self if rest is None else self.with_vertices(rest)
 
     def with_vertices(self, vertices: np.ndarray) -> Surface:
         """Return the surface with other (V, 3) positions, and without a rest shape.
@@ -310,17 +308,22 @@ class Surface:
     @cached_property
     def fans_share_normals(self) -> bool:
         """Whether all corner normals equal the mean normal of their fan; custom normals may differ."""
-        normals = self.fan_normal
-        return all(
-            np.abs(self.corner_normal[block] - normals.take(self.corner_fan[block], axis=0)).max()
-            <= NORMAL_TOLERANCE
-            for block in row_blocks(len(self.corner_fan), BLOCK_ELEMENTS)
-        )
+        for block in row_blocks(len(self.corner_fan), BLOCK_ELEMENTS):
+            mean = self.fan_normal.take(self.corner_fan[block], axis=0)
+            if np.abs(self.corner_normal[block] - mean).max() > NORMAL_TOLERANCE:
+                return False
+        return True
 
     @cached_property
     def face_normal(self) -> np.ndarray:
         """(F, 3) float64: unit normals of the faces by Newell's formula; zero for a face without area."""
         return normalize(face_area_vectors(self.vertices, self.corner_vertex, self.face_start))
+
+    @cached_property
+    def face_area(self) -> np.ndarray:
+        """(F,) float64: areas of the faces, in object space, by Newell's formula."""
+        area = face_area_vectors(self.vertices, self.corner_vertex, self.face_start)
+        return np.linalg.norm(area, axis=1)
 
     @cached_property
     def face_center(self) -> np.ndarray:
@@ -388,6 +391,8 @@ def build_surface(
         )
     if corner_normal is None:
         corner_normal = fan_normals(vertices, corner_vertex, face_start, corner_fan)
+    if rest_vertices is not None:
+        rest_vertices = np.ascontiguousarray(rest_vertices, dtype=np.float64)
     return _surface_of_parts(
         name=name,
         vertices=vertices,
@@ -397,9 +402,7 @@ def build_surface(
         triangle_face=np.ascontiguousarray(triangle_face, dtype=np.int32).ravel(),
         corner_normal=np.ascontiguousarray(corner_normal, dtype=np.float64),
         corner_fan=corner_fan,
-        rest_vertices=None
-        if rest_vertices is None
-        else np.ascontiguousarray(rest_vertices, dtype=np.float64),
+        rest_vertices=rest_vertices,
     )
 
 
@@ -422,10 +425,9 @@ def count_inconsistent_edges(surface: Surface) -> int:
     inconsistent edges, except on nonorientable surfaces such as a Möbius strip.
     """
     edges = surface.edges
-    degenerate = ~surface.face_normal.any(axis=1)
-    degenerate_edge = edges.corner_edge[degenerate[surface.corner_face]]
-    borders_degenerate = mask(len(edges.face_count), degenerate_edge)
-    inconsistent = (edges.face_count == 2) & ~borders_degenerate
+    degenerate = ~surface.face_normal.any(axis=1)[surface.corner_face]
+    inconsistent = edges.face_count == 2
+    inconsistent[edges.corner_edge[degenerate]] = False
     inconsistent[edges.interior] = False
     return int(np.count_nonzero(inconsistent))
 

@@ -21,6 +21,7 @@ from functools import partial
 import numpy as np
 
 from ..core.progress import progress, report
+from .blocks import mask
 from .conjugate_gradient import conjugate_gradient
 from .connectivity import connected_components
 from .face_graph import LABEL, FaceGraph, SpanningForest, spanning_forest, triangle_graph
@@ -97,19 +98,16 @@ def turning_angles(
             break
         factor = added_resistance(angle, present, limit)
         triangles = triangles.with_resistance(factor)
-        start, stop = 1 - 0.2 * 0.5**attempt, 1 - 0.1 * 0.5**attempt
-        with progress(start, stop):
-            changed = _least_angles_near(
-                triangles.graph, required, loops, between, np.flatnonzero(factor > 1)
-            )
+        edges = np.flatnonzero(factor > 1)
+        with progress(1 - 0.2 * 0.5**attempt, 1 - 0.1 * 0.5**attempt):
+            changed = _least_angles_near(triangles.graph, required, loops, between, edges)
             if changed is None:
                 changed = triangles.graph.conductance * least_angles(
                     triangles.graph, degree, required, loops, present_between
                 )
         # The resistances apply to the angles between triangles, not to those from triangles to face centers.
-        is_changed = changed != between
-        to_center[triangles.graph.source[is_changed]] = 0
-        to_center[triangles.graph.target[is_changed]] = 0
+        for triangle in (triangles.graph.source, triangles.graph.target):
+            to_center[triangle[changed != between]] = 0
         between, angle = changed, triangles.on_faces(changed, to_center)
     direction = tree.sums_from_root(triangles.graph.unfolding + present_between + between)
     return angle, triangles.directions_of_faces(direction, between, to_center)
@@ -127,8 +125,7 @@ def _least_angles_near(
     The result is None if the sum of the angles around a loop would change. That can happen if the changed
     neighborhood surrounds a part of the surface.
     """
-    is_near = np.zeros(graph.node_count, dtype=bool)
-    is_near[graph.tail[changed]] = is_near[graph.head[changed]] = True
+    is_near = mask(graph.node_count, np.stack([graph.tail[changed], graph.head[changed]]))
     for step in range(REACH):
         report(0.2 * step / REACH, LABEL)
         touches = is_near[graph.tail] | is_near[graph.head]
@@ -151,7 +148,7 @@ def _least_angles_near(
         solver = potential_solver(near)
     with progress(0.5, 1.0):
         fixed[edges] = near.conductance * near.drop(solver(rest))
-    change = [(signs * (fixed - angle)[crossed]).sum() for crossed, signs in loops]
+    change = _sums_around(loops, fixed - angle)
     return fixed if np.abs(change).max(initial=0.0) < MAX_LOOP_CHANGE else None
 
 
@@ -192,17 +189,17 @@ def least_angles(
     if loops:
         turn = 2 * np.pi / degree
         total = graph.conductance * drop + present + graph.unfolding
-        sums = np.array([(signs * total[edges]).sum() for edges, signs in loops])
-        matrix_of_loops = np.array(
-            [
-                [(signs * (graph.conductance * harmonic)[edges]).sum() for harmonic in harmonics]
-                for edges, signs in loops
-            ]
-        )
-        coefficients = _nearest_lattice_coefficients(matrix_of_loops, -sums, turn)
+        matrix = [_sums_around(loops, graph.conductance * harmonic) for harmonic in harmonics]
+        sums = _sums_around(loops, total)
+        coefficients = _nearest_lattice_coefficients(np.transpose(matrix), -sums, turn)
         for coefficient, harmonic in zip(coefficients, harmonics, strict=True):
             drop += coefficient * harmonic
     return drop
+
+
+def _sums_around(loops: list[tuple[np.ndarray, np.ndarray]], angle: np.ndarray) -> np.ndarray:
+    """Return the sum of (I,) angles around each of the loops, as a float64 array."""
+    return np.array([(signs * angle[edges]).sum() for edges, signs in loops])
 
 
 def potential_solver(
@@ -223,10 +220,9 @@ def potential_solver(
     def solve(sums: np.ndarray) -> np.ndarray:
         potential = np.zeros(graph.node_count)
         if matrix is not None:
-            rhs, precondition = sums[graph.is_interior], partial(w_cycle, levels)
-            potential[graph.is_interior] = conjugate_gradient(
-                matrix, rhs, tolerance, precondition, LABEL
-            )
+            rhs = sums[graph.is_interior]
+            solution = conjugate_gradient(matrix, rhs, tolerance, partial(w_cycle, levels), LABEL)
+            potential[graph.is_interior] = solution
         return potential
 
     return solve
@@ -243,9 +239,7 @@ def _potential_matrix(graph: FaceGraph) -> CSRMatrix:
     tail, head, conductance = graph.tail, graph.head, graph.conductance
     diagonal = np.bincount(np.concatenate([tail, head]), np.tile(conductance, 2), graph.node_count)
     _, first = np.unique(graph.node_component, return_index=True)
-    is_open = np.zeros(len(first), dtype=bool)
-    is_open[graph.node_component[~graph.is_interior]] = True
-    tied = first[~is_open]
+    tied = first[~mask(len(first), graph.node_component[~graph.is_interior])]
     diagonal[tied] += diagonal[tied] / 6
     inside = graph.is_interior[tail] & graph.is_interior[head]
     tail, head = unknown[tail[inside]], unknown[head[inside]]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from shapes import cube, cylinder, icosphere, plane, torus
@@ -160,7 +162,7 @@ def test_averages_of_numbers_below_all_normal_ones():
     connection = build_connection(surface)
     averages = SurfaceAverages(surface, connection, *surface.face_frames)
     matrix = laplacian(connection, 0)
-    matrix = matrix.with_values(matrix.data.real.astype(np.float32))
+    matrix = replace(matrix, data=matrix.data.real.astype(np.float32))
     sums = averages.node_sums(np.full(surface.face_count, 1e-320), 0)
     assert sums.any()
     assert not averages.smooth(matrix, 0.1, sums).any()
@@ -173,7 +175,7 @@ def test_averages_with_an_indefinite_matrix():
     averages = SurfaceAverages(surface, connection, *surface.face_frames)
     # With unit masses, five neighbors and 4 on the diagonal, the sum of every row is 0.
     matrix = laplacian(connection, 0)
-    matrix = matrix.with_values(np.where(matrix.data.real > 0, 4.0, -1.0).astype(np.float32))
+    matrix = replace(matrix, data=np.where(matrix.data.real > 0, 4.0, -1.0).astype(np.float32))
     sums = np.ones(connection.node_count)
     area = float(averages.mass.mean())
     assert not averages.smooth(matrix, area, sums).any()

@@ -126,9 +126,8 @@ def check_parsing_memory(path: str | os.PathLike[str], binary_memory: float) -> 
     if b"\0" not in head[:HEAD_BYTES]:
         words, lines = len(head.split()), head.count(b"\n")
         memory_per_byte = (WORD_MEMORY * words + LINE_MEMORY * lines) / max(len(head), 1)
-    check_memory(
-        size * memory_per_byte, f"{path}: a file of {format_bytes(size)}", "choose a smaller file"
-    )
+    subject = f"{path}: a file of {format_bytes(size)}"
+    check_memory(size * memory_per_byte, subject, "choose a smaller file")
 
 
 def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:

@@ -13,11 +13,7 @@ from ..core.progress import progress, report
 from .blocks import row_blocks
 from .directional_field import field_directions
 from .frames import coordinates, dot, normalize
-from .representation import (
-    face_representation,
-    matching_angles,
-    unit_complex,
-)
+from .representation import face_representation, matching_angles, unit_complex
 from .rosy_field import RosyField
 from .singularities import find_singularities, first_pairs
 from .surface import Surface

@@ -195,10 +195,8 @@ class _Leaves:
         self.vertex = _replaced(self.vertex, parent, *halves)
         self.weights = _replaced(self.weights, parent, *weight_halves)
         none = np.full_like(middle, -1)
-        first, second = (
-            np.stack(rows, axis=1) for rows in ((none, none, on_ca), (none, on_bc, none))
-        )
-        return _replaced(midpoint, parent, first, second)
+        halves = np.stack([none, none, on_ca], axis=1), np.stack([none, on_bc, none], axis=1)
+        return _replaced(midpoint, parent, *halves)
 
     def tree(self) -> BisectionTree:
         """Return the `BisectionTree` with these leaves."""

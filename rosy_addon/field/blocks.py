@@ -10,6 +10,10 @@ import numpy as np
 ROWS_PER_BLOCK = 1 << 16
 
 
+#: One or several arrays, as the result of a function.
+Arrays = np.ndarray | tuple[np.ndarray, ...]
+
+
 def row_blocks(count: int, size: int | None = None) -> list[slice]:
     """Return slices that split `count` rows into consecutive blocks of `size`; an empty slice for no rows."""
     size = ROWS_PER_BLOCK if size is None else size
@@ -30,9 +34,7 @@ def blocks_by_count(count: np.ndarray, limit: int) -> list[slice]:
     return blocks
 
 
-def by_rows(
-    function: Callable[..., np.ndarray | tuple[np.ndarray, ...]], *arrays: np.ndarray
-) -> np.ndarray | tuple[np.ndarray, ...]:
+def by_rows(function: Callable[..., Arrays], *arrays: np.ndarray) -> Arrays:
     """Apply a function to blocks of the rows of arrays, and concatenate the results.
 
     Parameters

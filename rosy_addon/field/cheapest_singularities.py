@@ -67,32 +67,32 @@ def cheapest_singularities(
     if not x.any():
         raise RosyError(f"{surface.name}: no face has an area")
     graph = face_graph(surface)
-    area = surface.face_area
-    given = index_at_nodes(surface, graph, vertex, index)
-    required = 2 * np.pi / degree * (given - _spread(surface, graph, area, given))
+    given = index_at_nodes(graph, vertex, index)
+    required = 2 * np.pi / degree * (given - _spread(graph, given))
     with progress(0.1, 0.3):
         angle = graph.conductance * least_angles(graph, degree, required, [], 0.0)
-    mass = np.maximum(area, 1e-12 * area.mean())
+    mass = np.maximum(surface.face_area, 1e-12 * surface.face_area.mean())
     matrix = _energy(graph, degree, angle, spectral_shift(mass) * mass)
     with progress(0.35, 0.6):
         z, _ = eigenproblem(matrix, mass, graph.component)
     field = RosyField(degree, from_representation(unit_complex(z), x, y, degree))
     with progress(0.6, 0.65):
         found, found_index = find_singularities(surface, field)
-    total = index_at_nodes(surface, graph, found, found_index)
+    total = index_at_nodes(graph, found, found_index)
     with progress(0.65, 1.0):
         added = _settled(graph, degree, given, total - given)
     node = np.flatnonzero(added)
-    added_vertex = graph.vertices_of_nodes(surface)[node]
+    added_vertex = graph.node_vertex[node]
     return np.concatenate([vertex, added_vertex]), np.concatenate([index, added[node]])
 
 
-def _spread(surface: Surface, graph: FaceGraph, area: np.ndarray, given: np.ndarray) -> np.ndarray:
+def _spread(graph: FaceGraph, given: np.ndarray) -> np.ndarray:
     """Return (n,) values at the nodes: the sum of the given indices on a component, distributed by area.
 
     They are 0 on components with a border.
     """
-    corner_area = (area / np.diff(surface.face_start))[surface.corner_face]
+    surface = graph.surface
+    corner_area = (surface.face_area / np.diff(surface.face_start))[surface.corner_face]
     node_area = np.bincount(graph.corner_node, corner_area, graph.node_count)
     component = graph.node_component
     count = int(component.max(initial=-1)) + 1

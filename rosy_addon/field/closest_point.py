@@ -171,9 +171,8 @@ class _ClosestSearch:
         for block in row_blocks(len(owner), MAX_PAIRS):
             point, triangle = owner[block], candidate[block]
             distance = point_triangle_distances(self.points[point], self.corners[triangle])
-            is_closer = (distance < self.distance[point]) | (
-                (distance == self.distance[point]) & (triangle < self.triangle[point])
-            )
+            is_tied = (distance == self.distance[point]) & (triangle < self.triangle[point])
+            is_closer = (distance < self.distance[point]) | is_tied
             point, triangle, distance = point[is_closer], triangle[is_closer], distance[is_closer]
             # Sort so that the best candidate of a point is stored last.
             order = np.lexsort((triangle, distance))[::-1]

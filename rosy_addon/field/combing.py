@@ -18,13 +18,7 @@ from ..core.errors import RosyError
 from ..core.progress import progress
 from .conjugate_gradient import RELATIVE_TOLERANCE
 from .frames import dot, normalize
-from .guided_system import (
-    EXACT_FIRMNESS,
-    GuidedSystem,
-    NodeGuides,
-    firmness_weights,
-    unit_representations,
-)
+from .guided_system import GuidedSystem, NodeGuides, firmness_weights, unit_representations
 from .representation import to_representation, unit_complex
 from .rosy_field import RosyField
 
@@ -151,7 +145,7 @@ class Combing:
     def _set_face_z(self, z: np.ndarray, face: np.ndarray) -> None:
         """Set the field on (m,) faces to representations, normalized; exact guides take precedence."""
         guides = self.guides[face]
-        is_exact = np.abs(guides) >= EXACT_FIRMNESS
+        _, is_exact = firmness_weights(np.abs(guides), self.system.surface.mean_edge_length)
         self._face_z[face] = np.where(is_exact, unit_complex(guides), unit_representations(z))
 
 
@@ -349,21 +343,14 @@ class BrushStroke:
         positions = np.array([dab.position for dab in dabs])
         tangents = normalize(positions[2:] - positions[:-2])
         inner = positions[1:-1]
-        faces = [self._locate(inner * sign) for sign in self._signs]
-        near = [
-            self._near_faces(inner * sign, located)
-            for sign, located in zip(self._signs, faces, strict=True)
-        ]
+        copies = [inner * sign for sign in self._signs]
+        faces = list(map(self._locate, copies))
+        near = list(map(self._near_faces, copies, faces))
         for first in range(max(len(inner) - 1, 1)):
             segment = slice(first, first + 2)
             for sign, candidates, located in zip(self._signs, near, faces, strict=True):
-                self._draw_segment(
-                    candidates,
-                    inner[segment] * sign,
-                    tangents[segment] * sign,
-                    dabs[1:-1][segment],
-                    located[segment],
-                )
+                path = inner[segment] * sign, tangents[segment] * sign, dabs[1:-1][segment]
+                self._draw_segment(candidates, *path, located[segment])
         self._dabs = dabs[-3:]
         return np.unique(np.concatenate(near))
 

@@ -189,9 +189,8 @@ def _corner_geometry(
             corner_angle[block, k] = np.arctan2(double_area, cosine_term)
             exceeds_limit = np.abs(cosine_term) >= MAX_COTANGENT * double_area
             limit = np.where(double_area > 0, np.sign(cosine_term) * MAX_COTANGENT, 0)
-            cotangent[block, k] = np.where(
-                exceeds_limit, limit, cosine_term / np.where(exceeds_limit, 1, double_area)
-            )
+            ratio = cosine_term / np.where(exceeds_limit, 1, double_area)
+            cotangent[block, k] = np.where(exceeds_limit, limit, ratio)
     return corner_angle.ravel(), cotangent.ravel(), area
 
 

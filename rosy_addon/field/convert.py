@@ -149,11 +149,8 @@ def rotate_field(surface: Surface, field: RosyField, angle: np.ndarray | float) 
     """
     angle = np.broadcast_to(angle, (len(field.vectors),))[:, None]
     perpendicular = np.cross(surface.face_normal, field.vectors)
-    return replace(
-        field,
-        vectors=np.cos(angle) * field.vectors + np.sin(angle) * perpendicular,
-        source_directions=None,
-    )
+    vectors = np.cos(angle) * field.vectors + np.sin(angle) * perpendicular
+    return replace(field, vectors=vectors, source_directions=None)
 
 
 def diffuse_field(surface: Surface, field: RosyField, time: float) -> RosyField:

@@ -6,12 +6,13 @@ import numpy as np
 
 from ..core.errors import RosyError
 from ..core.progress import report
+from .connectivity import smooth_fans
 from .corner_fans import corner_angles, corner_rotations, smooth_face_values
 from .frames import dot
-from .polygon_arrays import sum_per_face
+from .polygon_arrays import fan_normals, sum_per_face
 from .representation import from_representation
 from .rosy_field import RosyField, check_degree
-from .surface import Surface, build_surface
+from .surface import Surface
 
 #: The smallest normal floating-point number. Its inverse is finite.
 TINY = float(np.finfo(np.float64).tiny)
@@ -59,15 +60,10 @@ def with_smooth_normals(surface: Surface, corner_fan: np.ndarray | None = None) 
 
     If no fans are given, normals are smooth everywhere. `corner_fan` is as in `Surface`.
     """
-    return build_surface(
-        surface.vertices,
-        surface.corner_vertex,
-        surface.face_start,
-        name=surface.name,
-        corner_fan=corner_fan,
-        triangles=surface.triangles,
-        triangle_face=surface.triangle_face,
-    )
+    mesh = surface.vertices, surface.corner_vertex, surface.face_start
+    fan = smooth_fans(*mesh) if corner_fan is None else corner_fan
+    normal = fan_normals(*mesh, fan)
+    return surface.with_parts(corner_fan=fan, corner_normal=normal, rest_vertices=None)
 
 
 def curvature_field(surface: Surface, degree: int) -> RosyField:

@@ -71,13 +71,11 @@ def field_from_directions(surface: Surface, directions: np.ndarray) -> RosyField
     x, y = surface.face_frames
     w = by_rows(coordinates, directions, x, y)
     within_tolerance = all(is_rosy(w[rows]) for rows in row_blocks(len(w)))
-    first_angle, rho, direction_ratios = by_rows(closest_rosy, w)
+    angle, rho, direction_ratios = by_rows(closest_rosy, w)
     if within_tolerance:
         vectors, direction_ratios = directions[:, 0] * (rho > 0)[:, None], None
     else:
-        vectors = rho[:, None] * (
-            np.cos(first_angle)[:, None] * x + np.sin(first_angle)[:, None] * y
-        )
+        vectors = rho[:, None] * (np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y)
     field = RosyField(directions.shape[1], vectors, direction_ratios)
     return detect_families(surface, field)
 

@@ -47,6 +47,7 @@ class FaceGraph:
 
     Attributes
     ----------
+    surface : Surface
     halfedges : (I, 2) int32 ndarray
         For the source and the target face of each edge, the corner at which the edge starts in that face.
     source, target : (I,) int32 ndarray
@@ -71,6 +72,7 @@ class FaceGraph:
         Connected component of the faces at each vertex node.
     """
 
+    surface: Surface
     halfedges: np.ndarray
     source: np.ndarray
     target: np.ndarray
@@ -89,10 +91,11 @@ class FaceGraph:
         """n, the number of vertex nodes."""
         return len(self.is_interior)
 
-    def vertices_of_nodes(self, surface: Surface) -> np.ndarray:
-        """Return (n,) int32: the vertex of the surface at which each vertex node lies."""
-        vertex = np.empty(self.node_count, dtype=surface.corner_vertex.dtype)
-        vertex[self.corner_node] = surface.corner_vertex
+    @property
+    def node_vertex(self) -> np.ndarray:
+        """(n,) int32: the vertex of the surface at which each vertex node lies."""
+        vertex = np.empty(self.node_count, dtype=np.int32)
+        vertex[self.corner_node] = self.surface.corner_vertex
         return vertex
 
     def turn_around_nodes(self, angle: np.ndarray) -> np.ndarray:
@@ -135,6 +138,7 @@ def face_graph(surface: Surface, is_defined: np.ndarray | None = None) -> FaceGr
     node_component = np.zeros(count, dtype=component.dtype)
     node_component[corner_node] = component[surface.corner_face]
     return FaceGraph(
+        surface=surface,
         halfedges=halfedges,
         source=source,
         target=target,
@@ -314,9 +318,9 @@ class TriangleGraph:
         return replace(self, graph=replace(graph, conductance=conductance))
 
 
-def triangle_graph(surface: Surface, faces: FaceGraph) -> TriangleGraph:
+def triangle_graph(faces: FaceGraph) -> TriangleGraph:
     """Return the graph of the triangles of a surface, given the graph of its faces."""
-    size = np.diff(surface.face_start)
+    surface, size = faces.surface, np.diff(faces.surface.face_start)
     face = np.repeat(np.arange(len(size)), size - 2)
     first_triangle = np.cumsum(size - 2) - (size - 2)
     rank = np.arange(len(face)) - first_triangle[face]

@@ -8,7 +8,7 @@ import numpy as np
 
 from .blocks import bincount_rows
 from .connection import build_connection
-from .connectivity import Edges, smooth_fans
+from .connectivity import smooth_fans
 from .creases import filtered_normals, salient_edges, weighted_median
 from .curvature import face_curvature, with_smooth_normals
 from .frames import angle_between, dot, normalize
@@ -73,13 +73,10 @@ def of_unit_extent(surface: Surface) -> Surface:
 
 def noisy_curvature(surface: Surface) -> NoisyCurvature:
     """Measure the curvature of a surface, and its change by random noise; see `NoisyCurvature`."""
-    edges = surface.edges
-    normals, noise_angle = filtered_normals(surface, edges)
-    ends = salient_edges(surface, edges, normals, noise_angle)
-    noise = noise_sample(surface, edges, noise_angle)
-    fans = smooth_fans(
-        surface.vertices, surface.corner_vertex, surface.face_start, sharp_edges=ends
-    )
+    normals, noise_angle = filtered_normals(surface)
+    ends = salient_edges(surface, normals, noise_angle)
+    noise = noise_sample(surface, noise_angle)
+    fans = smooth_fans(surface.vertices, surface.corner_vertex, surface.face_start, ends)
     x, y = surface.face_frames
     mean, deviator = _bounded_curvature(surface, fans, x, y)
     noisy = surface.with_parts(vertices=surface.vertices + noise)
@@ -87,9 +84,8 @@ def noisy_curvature(surface: Surface) -> NoisyCurvature:
     x_noisy = normalize(x - dot(x, normal)[:, None] * normal)
     mean_noisy, deviator_noisy = _bounded_curvature(noisy, fans, x_noisy, np.cross(normal, x_noisy))
     averages = SurfaceAverages(surface, build_connection(surface), x, y)
-    return NoisyCurvature(
-        ends, averages, mean, deviator, mean_noisy - mean, deviator_noisy - deviator
-    )
+    noise = mean_noisy - mean, deviator_noisy - deviator
+    return NoisyCurvature(ends, averages, mean, deviator, *noise)
 
 
 def _bounded_curvature(
@@ -108,7 +104,7 @@ def _bounded_curvature(
     return np.clip(mean, -limit, limit), deviator
 
 
-def noise_sample(surface: Surface, edges: Edges, noise_angle: float) -> np.ndarray:
+def noise_sample(surface: Surface, noise_angle: float) -> np.ndarray:
     """Return random displacements of the vertices along their normals, as strong as the noise of the mesh.
 
     The noise is white. Its amplitude is estimated in two ways, by comparing the mesh with a mesh that has
@@ -119,7 +115,6 @@ def noise_sample(surface: Surface, edges: Edges, noise_angle: float) -> np.ndarr
     Parameters
     ----------
     surface : Surface
-    edges : Edges
     noise_angle : float
         Result of `creases.filtered_normals`.
 
@@ -131,15 +126,14 @@ def noise_sample(surface: Surface, edges: Edges, noise_angle: float) -> np.ndarr
     count = len(surface.vertices)
     normal = normalize(bincount_rows(surface.corner_vertex, surface.corner_normal, count))
     sample = np.random.default_rng(SEED).standard_normal(count)[:, None] * normal
-    vectors = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
+    faces = surface.corner_vertex, surface.face_start
+    vectors = face_area_vectors(surface.vertices, *faces)
     area = np.sqrt(dot(vectors, vectors))
     probe = PROBE * np.sqrt(area.mean())
-    displaced = face_area_vectors(
-        surface.vertices + probe * sample, surface.corner_vertex, surface.face_start
-    )
+    displaced = face_area_vectors(surface.vertices + probe * sample, *faces)
     turn = weighted_median(angle_between(vectors, displaced), area)
     by_angle = probe * noise_angle / turn if turn > 0 else 0.0
-    used = surface.used_vertices
+    edges, used = surface.edges, surface.used_vertices
     actual = np.median(np.abs(_roughness(surface.vertices, normal, edges.ends)[used]))
     unit = np.median(np.abs(_roughness(sample, normal, edges.ends)[used]))
     by_roughness = actual / unit if unit > 0 else 0.0

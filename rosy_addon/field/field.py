@@ -77,9 +77,8 @@ class Field(RosyField):
     @classmethod
     def of(cls, surface: Surface, field: RosyField) -> Field:
         """Return a `Field` with the values of a `RosyField` and this surface."""
-        return cls(
-            **{each.name: getattr(field, each.name) for each in fields(RosyField)}, surface=surface
-        )
+        values = {each.name: getattr(field, each.name) for each in fields(RosyField)}
+        return cls(**values, surface=surface)
 
     def __repr__(self) -> str:
         kind = f"{self.degree}-RoSy field" if self.is_rosy else f"field of {self.degree} directions"

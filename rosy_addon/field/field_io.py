@@ -182,11 +182,8 @@ def _check_count(raw: RawField, surface: Surface, source: str) -> None:
 
     Some programs write the number of vertices in the header of a field on faces. This is accepted.
     """
-    row_count = len(raw.values)
-    counts, surface_counts = (
-        (raw.header_count, row_count),
-        (len(surface.vertices), surface.face_count),
-    )
+    row_count, vertex_count = len(raw.values), len(surface.vertices)
+    counts, surface_counts = (raw.header_count, row_count), (vertex_count, surface.face_count)
     if raw.header_count not in (None, row_count) and counts != surface_counts:
         raise RosyError(
             f"{source}: declares {counted(raw.header_count, 'row')} of {raw.columns} numbers, but contains {row_count}"
@@ -194,8 +191,7 @@ def _check_count(raw: RawField, surface: Surface, source: str) -> None:
     if raw.domain is None and infer_domain(surface, row_count) is None:
         raise RosyError(
             f"{source}: contains {counted(row_count, 'row')}, but {surface.name} has "
-            f"{counted(surface.face_count, 'face')} and "
-            f"{counted(len(surface.vertices), 'vertex', 'vertices')}"
+            f"{counted(surface.face_count, 'face')} and {counted(vertex_count, 'vertex', 'vertices')}"
         )
 
 
@@ -320,10 +316,8 @@ def transfer_field(
     face = source.triangle_face[triangle]
     normal = target.face_normal
     normal_cosine = dot(normal, source.face_normal[face])
-    undefined = (distance > MAX_DISTANCE * max(source.extent, 1e-300)) | (
-        normal_cosine < np.cos(MAX_NORMAL_ANGLE)
-    )
-    undefined |= ~normal.any(axis=1)
+    undefined = distance > MAX_DISTANCE * max(source.extent, 1e-300)
+    undefined |= (normal_cosine < np.cos(MAX_NORMAL_ANGLE)) | ~normal.any(axis=1)
     unmatched = undefined & normal.any(axis=1)
     if unmatched.sum() > MAX_UNMATCHED_FRACTION * len(undefined):
         raise RosyError(

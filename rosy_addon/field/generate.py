@@ -229,14 +229,12 @@ def _prescribed(surface: Surface, settings: GeneratorSettings, degree: int) -> R
         raise RosyError(
             f"{surface.name}: no singularities are given: give their vertices and indices"
         )
-    singularities, start = settings.singularities, 0.0
+    singularities, start, reach = settings.singularities, 0.0, settings.reach * surface.extent
     if settings.add_missing:
         with progress(0.0, 0.5):
             singularities, start = cheapest_singularities(surface, degree, *singularities), 0.5
     with progress(start, 1.0):
-        return prescribed_field(
-            surface, degree, *singularities, settings.vectors, settings.reach * surface.extent
-        )
+        return prescribed_field(surface, degree, *singularities, settings.vectors, reach)
 
 
 def _features(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyField:
@@ -271,10 +269,9 @@ def _guided(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyF
     if settings.strokes:
         guide_sets.append(guides_from_strokes(surface, settings.strokes, degree))
     if settings.axis_guides:
-        position, axis, radius = (
-            np.array(column, dtype=np.float64) for column in zip(*settings.axis_guides, strict=True)
-        )
-        guide_sets.append(guides_from_axes(surface, position, axis, radius, degree))
+        columns = zip(*settings.axis_guides, strict=True)
+        given = (np.array(column, dtype=np.float64) for column in columns)
+        guide_sets.append(guides_from_axes(surface, *given, degree))
     if settings.uv is not None:
         guide_sets.append(guides_from_uv(surface, settings.uv, degree))
     if settings.vectors is not None:

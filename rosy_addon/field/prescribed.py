@@ -25,12 +25,7 @@ from .blocks import mask
 from .conjugate_gradient import conjugate_gradient
 from .face_graph import LABEL, FaceGraph, face_graph
 from .frames import normalize
-from .representation import (
-    complex_bincount,
-    from_representation,
-    to_representation,
-    unit_complex,
-)
+from .representation import complex_bincount, from_representation, to_representation, unit_complex
 from .rosy_field import RosyField, check_degree
 from .sparse_multigrid import CSRMatrix, Level, from_edges, hierarchy, w_cycle
 from .surface import Surface
@@ -106,7 +101,7 @@ def prescribed_field(
     raise_mmap_threshold()
     x, y = surface.face_frames
     graph = face_graph(surface)
-    angle, direction = _turning(surface, graph, degree, vertex, index, graph.defect)
+    angle, direction = _turning(graph, degree, vertex, index, graph.defect)
     z = np.exp(1j * degree * direction) * x.any(axis=1)
     points, face = surface.vertices[surface.corner_vertex], surface.corner_face
     edge_z = to_representation(points[surface.next_corner] - points, x[face], y[face], degree)
@@ -116,7 +111,7 @@ def prescribed_field(
         z *= _rotation_to(target, z, graph.component)
         if reach > 0:
             with progress(0.9, 1.0):
-                z = _bent(surface, graph, degree, angle, z, target, reach)
+                z = _bent(graph, degree, angle, z, target, reach)
     return RosyField(degree, from_representation(z, x, y, degree))
 
 
@@ -159,16 +154,15 @@ def change_singularities(
     transported = z[graph.source] * np.exp(1j * degree * graph.unfolding)
     present = np.angle(z[graph.target] * transported.conj()) / degree
     no_defect = np.zeros(graph.node_count)
-    added, direction = _turning(surface, graph, degree, vertex, change, no_defect, present)
+    added, direction = _turning(graph, degree, vertex, change, no_defect, present)
     turned = np.exp(1j * degree * direction) * is_defined
     turned *= _rotation_to(z, turned, graph.component)
     with progress(0.9, 1.0):
-        turned = _bent(surface, graph, degree, present + added, turned, z, reach)
+        turned = _bent(graph, degree, present + added, turned, z, reach)
     return RosyField(degree, magnitude * from_representation(turned, x, y, degree))
 
 
 def _turning(
-    surface: Surface,
     graph: FaceGraph,
     degree: int,
     vertex: np.ndarray,
@@ -181,18 +175,17 @@ def _turning(
     See `turning_angles` for the result. `defect` holds the (n,) angle defects of the vertex nodes. If an
     existing field is changed, `present` holds its turning angles.
     """
-    node_index = index_at_nodes(surface, graph, vertex, index)
-    _check_sums(surface, graph, defect * (degree / (2 * np.pi)), node_index, degree)
+    node_index = index_at_nodes(graph, vertex, index)
+    _check_sums(graph, defect * (degree / (2 * np.pi)), node_index, degree)
     required = 2 * np.pi / degree * node_index - defect
     with progress(0.2, 0.85):
-        angle, direction = turning_angles(surface, graph, degree, required, present)
-    _check_angles(surface, graph, degree, present + angle)
+        angle, direction = turning_angles(graph, degree, required, present)
+    _check_angles(graph, degree, present + angle)
     report(0.85, LABEL)
     return angle, direction
 
 
 def _bent(
-    surface: Surface,
     graph: FaceGraph,
     degree: int,
     turning: np.ndarray,
@@ -201,21 +194,20 @@ def _bent(
     reach: float,
 ) -> np.ndarray:
     """Return (F,) representations z after rotating them toward a target, with the same singularities."""
-    penalty = surface.face_area / reach / reach
+    penalty = graph.surface.face_area / reach / reach
     angle = guided_rotation(graph, degree, turning, z, target, penalty)
-    _check_angles(surface, graph, degree, turning + angle[graph.target] - angle[graph.source])
+    _check_angles(graph, degree, turning + angle[graph.target] - angle[graph.source])
     return z * np.exp(1j * degree * angle)
 
 
-def index_at_nodes(
-    surface: Surface, graph: FaceGraph, vertex: np.ndarray, index: np.ndarray
-) -> np.ndarray:
+def index_at_nodes(graph: FaceGraph, vertex: np.ndarray, index: np.ndarray) -> np.ndarray:
     """Return the (n,) int64 singularity indices of the vertex nodes, given those of vertices.
 
     A vertex whose faces are not connected around it has several nodes. Its index is given to the first of
     them.
     """
-    vertex, vertex_count = np.asarray(vertex, dtype=np.int64), len(surface.vertices)
+    surface, vertex_count = graph.surface, len(graph.surface.vertices)
+    vertex = np.asarray(vertex, dtype=np.int64)
     out_of_range = (vertex < 0) | (vertex >= vertex_count)
     if out_of_range.any():
         raise RosyError(
@@ -236,9 +228,7 @@ def index_at_nodes(
     return result
 
 
-def _check_sums(
-    surface: Surface, graph: FaceGraph, needed: np.ndarray, given: np.ndarray, degree: int
-) -> None:
+def _check_sums(graph: FaceGraph, needed: np.ndarray, given: np.ndarray, degree: int) -> None:
     """Check that the singularity indices on each closed component have the sum that it needs.
 
     `needed` and `given` are values at the nodes; their sums over a component must be equal.
@@ -257,15 +247,15 @@ def _check_sums(
     if not len(wrong):
         return
     first = wrong[0]
-    vertices = surface.corner_vertex[component[graph.corner_node] == first]
+    vertices = graph.node_vertex[component == first]
     part = "" if count == 1 else f"the part with vertex {vertices.min()}: "
     raise RosyError(
-        f"{surface.name}: {part}the singularity indices add up to {given[first]}/{degree}, but this "
+        f"{graph.surface.name}: {part}the singularity indices add up to {given[first]}/{degree}, but this "
         f"closed surface needs {needed[first]}/{degree}: change them, or add the missing ones"
     )
 
 
-def _check_angles(surface: Surface, graph: FaceGraph, degree: int, angle: np.ndarray) -> None:
+def _check_angles(graph: FaceGraph, degree: int, angle: np.ndarray) -> None:
     """Check that a field turns by less than pi / N (half the angle between two members) from face to face.
 
     Raises
@@ -276,13 +266,12 @@ def _check_angles(surface: Surface, graph: FaceGraph, degree: int, angle: np.nda
     """
     if not len(angle) or np.abs(angle).max() < np.pi / degree:
         return
-    vertex_of_node = graph.vertices_of_nodes(surface)
     is_fast = np.abs(angle) >= np.pi / degree
-    vertices = np.unique(vertex_of_node[np.concatenate([graph.tail[is_fast], graph.head[is_fast]])])
-    worst = vertex_of_node[graph.head[np.abs(angle).argmax()]]
+    ends = np.stack([graph.tail, graph.head])[:, is_fast]
+    worst = graph.node_vertex[graph.head[np.abs(angle).argmax()]]
     raise TurningError(
-        vertices,
-        f"{surface.name}: near vertex {worst}, a field of degree {degree} with these singularities would "
+        np.unique(graph.node_vertex[ends]),
+        f"{graph.surface.name}: near vertex {worst}, a field of degree {degree} with these singularities would "
         "turn too fast for the size of the faces: subdivide the mesh, move singularities apart, or choose "
         "smaller indices",
     )

@@ -266,9 +266,8 @@ def _rayleigh_ritz(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray
     """
     eigenvalue, basis = np.linalg.eigh(b)
     usable = eigenvalue > 1e-10 * eigenvalue[:, -1:]
-    whitening = (
-        basis * np.where(usable, 1 / np.sqrt(np.where(usable, eigenvalue, 1)), 0)[:, None, :]
-    )
+    scale = np.where(usable, 1 / np.sqrt(np.where(usable, eigenvalue, 1)), 0)
+    whitening = basis * scale[:, None, :]
     reduced = whitening.conj().swapaxes(1, 2) @ a @ whitening
     penalty = np.abs(reduced).max(axis=(1, 2)) * 10 + 1
     reduced += np.einsum("pk,kl->pkl", np.where(usable, 0, penalty[:, None]), np.eye(a.shape[1]))

@@ -424,12 +424,10 @@ def _aggregates(matrix: CSRMatrix) -> tuple[np.ndarray, int, np.ndarray]:
     strength = np.where(row == column, 0, np.abs(matrix.data))
     largest = np.maximum.reduceat(strength, matrix.indptr[:-1])
     strength[strength < STRENGTH_THRESHOLD * np.minimum(largest[row], largest[column])] = 0
-    strong = strength > 0
+    linked = (strength > 0) | (row == column)
 
     def max_over_neighbors(values: np.ndarray) -> np.ndarray:
-        return np.maximum.reduceat(
-            np.where(strong | (row == column), values.take(column), -1), matrix.indptr[:-1]
-        )
+        return np.maximum.reduceat(np.where(linked, values.take(column), -1), matrix.indptr[:-1])
 
     # A root of a new aggregate is a free unknown whose random priority is the largest among the free unknowns
     # that are at most two steps away.

@@ -237,7 +237,7 @@ def _gluing(triangle_vertex: np.ndarray, directions: CornerDirections) -> _Gluin
     unfolding = np.angle(-edge[b] * edge[a].conj())
     turn = (angle[a] + unfolding - angle[b]) * directions.degree / (2 * np.pi)
     shift_from_a = np.rint(turn).astype(np.int32) % directions.degree
-    twin, shift = np.full(len(corner_vertex), -1, dtype=np.int32), np.zeros_like(corner_vertex)
+    twin, shift = np.full_like(corner_vertex, -1), np.zeros_like(corner_vertex)
     twin[a], twin[b] = b, a
     shift[a], shift[b] = shift_from_a, (-shift_from_a) % directions.degree
     return _Gluing(twin, shift, next_corners(start))

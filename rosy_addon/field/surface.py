@@ -157,9 +157,7 @@ class Surface:
             raise RosyError(f"{name}: up is {up!r}: choose 'y' or 'z'")
         arrays = mesh_arrays(vertices, faces, name, uv, step)
         built = build_surface(
-            arrays.vertices,
-            arrays.corner_vertex,
-            arrays.face_start,
+            *arrays.polygons,
             name=name,
             sharp_angle=SHARP_ANGLE if sharp_angle is None else sharp_angle,
             sharp_edges=None if sharp_edges is None else np.asarray(sharp_edges),

@@ -72,11 +72,9 @@ def _triangle_fans(face_start: np.ndarray, apex: np.ndarray) -> tuple[np.ndarray
     first_triangle = (np.cumsum(count) - count)[triangle_face]
     step = np.arange(len(triangle_face), dtype=np.int32) - first_triangle
     first, size, apex = face_start[triangle_face], size[triangle_face], apex[triangle_face]
-    local_corners = np.stack([apex, apex + step + 1, apex + step + 2], axis=1)
-    local_corners -= np.where(local_corners >= size[:, None], size[:, None], 0).astype(
-        local_corners.dtype
-    )
-    return (first[:, None] + local_corners).astype(np.int32), triangle_face
+    local, size = np.stack([apex, apex + step + 1, apex + step + 2], axis=1), size[:, None]
+    np.subtract(local, size, out=local, where=local >= size)
+    return (first[:, None] + local).astype(np.int32), triangle_face
 
 
 def _fan_apexes(

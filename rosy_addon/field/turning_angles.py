@@ -26,7 +26,6 @@ from .conjugate_gradient import conjugate_gradient
 from .connectivity import connected_components
 from .face_graph import LABEL, FaceGraph, SpanningForest, spanning_forest, triangle_graph
 from .sparse_multigrid import CSRMatrix, from_edges, hierarchy, w_cycle
-from .surface import Surface
 
 #: Residual norm at which the solver stops, relative to the norm of the right-hand side.
 TOLERANCE = 1e-10
@@ -52,20 +51,20 @@ MIN_EIGENVALUE = 1e-8
 MAX_PAIRED_LOOPS = 20
 
 
+#: Loops of faces. Each is an array of the edges that it crosses, and an array of signs: 1 for an edge that is
+#: crossed from its source to its target, -1 otherwise.
+Loops = list[tuple[np.ndarray, np.ndarray]]
+
+
 def turning_angles(
-    surface: Surface,
-    graph: FaceGraph,
-    degree: int,
-    required: np.ndarray,
-    present: np.ndarray | float = 0.0,
+    graph: FaceGraph, degree: int, required: np.ndarray, present: np.ndarray | float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute turning angles at the interior edges that have given sums around the vertices.
 
     Parameters
     ----------
-    surface : Surface
     graph : FaceGraph
-        Graph of the faces of the surface. Its n nodes are the vertices (several for a nonmanifold vertex).
+        Graph of the faces of a surface. Its n nodes are the vertices (several for a nonmanifold vertex).
     degree : int
         N.
     required : (n,) ndarray
@@ -83,7 +82,7 @@ def turning_angles(
         Direction on each face of the field that turns by the present angles plus these angles, in radians in
         the frame of the face.
     """
-    triangles = triangle_graph(surface, graph)
+    triangles = triangle_graph(graph)
     present_between = triangles.on_triangles(present)
     count = len(triangles.area)
     tree = spanning_forest(count, triangles.graph.source, triangles.graph.target)
@@ -102,9 +101,8 @@ def turning_angles(
         with progress(1 - 0.2 * 0.5**attempt, 1 - 0.1 * 0.5**attempt):
             changed = _least_angles_near(triangles.graph, required, loops, between, edges)
             if changed is None:
-                changed = triangles.graph.conductance * least_angles(
-                    triangles.graph, degree, required, loops, present_between
-                )
+                drop = least_angles(triangles.graph, degree, required, loops, present_between)
+                changed = triangles.graph.conductance * drop
         # The resistances apply to the angles between triangles, not to those from triangles to face centers.
         for triangle in (triangles.graph.source, triangles.graph.target):
             to_center[triangle[changed != between]] = 0
@@ -114,11 +112,7 @@ def turning_angles(
 
 
 def _least_angles_near(
-    graph: FaceGraph,
-    required: np.ndarray,
-    loops: list[tuple[np.ndarray, np.ndarray]],
-    angle: np.ndarray,
-    changed: np.ndarray,
+    graph: FaceGraph, required: np.ndarray, loops: Loops, angle: np.ndarray, changed: np.ndarray
 ) -> np.ndarray | None:
     """Return (I,) least-squares angles that differ from `angle` only near the edges `changed`.
 
@@ -163,11 +157,7 @@ def added_resistance(angle: np.ndarray, present: np.ndarray | float, limit: floa
 
 
 def least_angles(
-    graph: FaceGraph,
-    degree: int,
-    required: np.ndarray,
-    loops: list[tuple[np.ndarray, np.ndarray]],
-    present: np.ndarray | float,
+    graph: FaceGraph, degree: int, required: np.ndarray, loops: Loops, present: np.ndarray | float
 ) -> np.ndarray:
     """Return (I,) least-squares angles divided by the conductances of the edges, for a graph of triangles.
 
@@ -197,7 +187,7 @@ def least_angles(
     return drop
 
 
-def _sums_around(loops: list[tuple[np.ndarray, np.ndarray]], angle: np.ndarray) -> np.ndarray:
+def _sums_around(loops: Loops, angle: np.ndarray) -> np.ndarray:
     """Return the sum of (I,) angles around each of the loops, as a float64 array."""
     return np.array([(signs * angle[edges]).sum() for edges, signs in loops])
 
@@ -276,7 +266,7 @@ def _nearest_lattice_coefficients(matrix: np.ndarray, sums: np.ndarray, turn: fl
     return inverse @ (sums + turn * multiple)
 
 
-def _loops(graph: FaceGraph, tree: SpanningForest) -> list[tuple[np.ndarray, np.ndarray]]:
+def _loops(graph: FaceGraph, tree: SpanningForest) -> Loops:
     """Find the loops of faces that cannot be contracted to a vertex, by a tree-cotree decomposition.
 
     The result has, for each loop, the edges that it crosses, and the direction of each crossing as 1 or -1.

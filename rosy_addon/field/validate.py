@@ -166,14 +166,12 @@ def validated_directions(
         vectors = directions[:, 0].copy()
         vectors[~unusable & ~directions.any(axis=2).all(axis=1)] = 0
         field = validated_field(surface, vectors, degree, source, nonfinite, domain)
-        return replace(
-            detect_families(surface.in_rest_shape(), field), source_directions=source_directions
-        )
+        field = detect_families(surface.in_rest_shape(), field)
+        return replace(field, source_directions=source_directions)
     apply_nonfinite_policy(directions.reshape(count, -1), source, domain, nonfinite)
-    flat_directions, normals = directions.reshape(-1, 3), np.repeat(normal, degree, axis=0)
-    directions = project_to_tangent(
-        flat_directions, normals, TOLERANCE_DEG[domain], source, domain
-    ).reshape(count, degree, 3)
+    rows, normals = directions.reshape(-1, 3), np.repeat(normal, degree, axis=0)
+    rows = project_to_tangent(rows, normals, TOLERANCE_DEG[domain], source, domain)
+    directions = rows.reshape(count, degree, 3)
     surface = surface.in_rest_shape()
     if domain == "face":
         field = field_from_directions(surface, directions)
@@ -300,15 +298,11 @@ def _project(vectors: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.nd
     Further results are the angles between vectors and planes in degrees, and whether each vector is zero.
     """
     length = np.sqrt(dot(vectors, vectors))
-    normal_component = dot(vectors, normal)
-    sine = np.divide(
-        np.abs(normal_component), length, out=np.zeros_like(normal_component), where=length > 0
-    )
+    component = dot(vectors, normal)
+    sine = np.divide(np.abs(component), length, out=np.zeros_like(component), where=length > 0)
     angle = np.degrees(np.arcsin(np.minimum(sine, 1.0)))
     # If a vector is parallel to the normal, its projection is only a rounding error.
-    tangent = np.where(
-        (sine < 1 - 1e-12)[:, None], vectors - normal_component[:, None] * normal, 0.0
-    )
+    tangent = np.where((sine < 1 - 1e-12)[:, None], vectors - component[:, None] * normal, 0.0)
     tangent = np.where(
         (sine > ROUNDING_SINE)[:, None], normalize(tangent) * length[:, None], vectors
     )

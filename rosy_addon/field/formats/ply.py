@@ -207,9 +207,8 @@ def _text_columns(rows: TextRows, element: _Element) -> _Columns:
         _check_row_lengths(rows, element, position + count, starts)
         list_starts = offsets_from_sizes(count)
         index = np.arange(list_starts[-1]) + np.repeat(position - list_starts[:-1], count)
-        columns[prop.name] = (
-            values[index] if prop.count_type is None else (values[index], list_starts)
-        )
+        part = values[index]
+        columns[prop.name] = part if prop.count_type is None else (part, list_starts)
         position = position + count
     return columns
 

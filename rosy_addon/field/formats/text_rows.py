@@ -43,11 +43,8 @@ class TextRows:
     def select(self, is_selected: np.ndarray, words: slice) -> TextRows:
         """Return the rows for which the (rows,) bool array is True, each reduced to a slice of its words."""
         rows = np.flatnonzero(is_selected).tolist()
-        return TextRows(
-            self.path,
-            [self.words[row][words] for row in rows],
-            [self.line_numbers[row] for row in rows],
-        )
+        line_numbers = [self.line_numbers[row] for row in rows]
+        return TextRows(self.path, [self.words[row][words] for row in rows], line_numbers)
 
     def with_words(self, words: list[Sequence[bytes]]) -> TextRows:
         """Return the rows with other words."""

@@ -9,7 +9,6 @@ import pytest
 from shapes import cube, cylinder, icosphere, plane, torus
 
 from rosy_addon.field.connection import build_connection, laplacian
-from rosy_addon.field.connectivity import build_edges
 from rosy_addon.field.creases import filtered_normals, salient_edges
 from rosy_addon.field.feature_curvature import noise_sample
 from rosy_addon.field.frames import dot, normalize
@@ -64,9 +63,7 @@ def cross_errors(surface: Surface, field: RosyField, expected: np.ndarray) -> np
 
 
 def salient(surface: Surface) -> np.ndarray:
-    edges = build_edges(surface.corner_vertex, surface.face_start)
-    filtered = filtered_normals(surface, edges)
-    return salient_edges(surface, edges, *filtered)
+    return salient_edges(surface, *filtered_normals(surface))
 
 
 @pytest.mark.slow
@@ -94,9 +91,8 @@ def test_lines_run_around_a_torus_tube():
 def test_noise_is_measured():
     for surface, share in ((torus(200, 100), 0.002), (ellipsoid(), 0.0005)):
         noisy = with_noise(surface, share)
-        edges = build_edges(noisy.corner_vertex, noisy.face_start)
-        _, angle = filtered_normals(noisy, edges)
-        sample = noise_sample(noisy, edges, angle)
+        _, angle = filtered_normals(noisy)
+        sample = noise_sample(noisy, angle)
         expected = share * np.linalg.norm(np.ptp(surface.vertices, axis=0))
         assert np.sqrt(dot(sample, sample).mean()) == pytest.approx(expected, rel=0.2)
 

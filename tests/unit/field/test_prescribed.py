@@ -216,15 +216,13 @@ def least_squares(system: np.ndarray, sums: np.ndarray) -> np.ndarray:
 def test_the_energy_is_that_of_a_dense_solver(surface, degree, vertex, index):
     """Which tries all multiples of a turn around the loops."""
     faces = graph_of(surface)
-    triangles = triangle_graph(surface, faces)
+    triangles = triangle_graph(faces)
     graph = triangles.graph
     edge = np.arange(len(graph.source))
     sums = np.zeros((graph.node_count, len(edge)))
     sums[graph.head, edge] += 1
     sums[graph.tail, edge] -= 1
-    node_index = prescribed.index_at_nodes(
-        surface, faces, np.array(vertex, dtype=int), np.array(index, dtype=int)
-    )
+    node_index = prescribed.index_at_nodes(faces, np.array(vertex, int), np.array(index, int))
     turn = 2 * np.pi / degree
     required = turn * node_index - faces.defect
     loops = turning_angles._loops(
@@ -246,7 +244,7 @@ def test_the_energy_is_that_of_a_dense_solver(surface, degree, vertex, index):
         energies.append(solution @ solution)
         to_center = triangles.turns_to_centers(solution / root)
         angles.append(triangles.on_faces(root * solution, to_center))
-    angle, _ = turning_angles.turning_angles(surface, faces, degree, required)
+    angle, _ = turning_angles.turning_angles(faces, degree, required)
     nearest = int(np.argmin([np.abs(other - angle).max() for other in angles]))
     np.testing.assert_allclose(angle, angles[nearest], atol=1e-6)
     assert energies[nearest] == pytest.approx(min(energies), rel=1e-6, abs=1e-9)

@@ -116,20 +116,22 @@ def dirichlet_energy(surface: Surface, field: RosyField) -> float:
 
 
 def edge_lengths(surface: Surface, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lengths of interior edges, and the distances between the face centers on their two sides.
+    """Return the lengths of I interior edges, and how far the centers of their two faces are from them.
 
     Parameters
     ----------
     surface : Surface
     a, b : (I,) int ndarray
-        The columns of `Edges.halfedges`: for both faces of each edge, the corner at which the edge starts.
+        For the first and the second face of each edge, the corner at which the edge starts (the columns of
+        `Edges.halfedges`).
 
     Returns
     -------
     length : (I,) float64 ndarray
-        Length of each edge.
+        Length of each edge, in object space.
     center_distance : (I,) float64 ndarray
-        Distance of the center of one face from the edge, plus that of the center of the other face.
+        Distance of the center of the first face from the line of the edge, plus the distance of the center
+        of the second face from this line, in object space.
     """
     start = surface.vertices[surface.corner_vertex[a]]
     edge = surface.vertices[surface.corner_vertex[b]] - start
@@ -153,10 +155,10 @@ def angle_errors(surface: Surface, field: RosyField, other: RosyField) -> np.nda
     Returns
     -------
     (F,) float64 ndarray
-        Angle in radians between a member of `field` and the nearest member of `other`, from 0 to pi / N. If
-        one of the fields is not a RoSy, its directions are matched with those of the other field, in their
-        order around the normal. There are N such matchings. The angle is then the least mean angle between
-        matched directions. NaN on faces where either field is undefined.
+        Angle in radians between a member of `field` and the nearest member of `other`, from 0 to pi / N. NaN
+        on faces where either field is undefined. If `field` or `other` has `direction_ratios`, the N
+        directions of one field are matched with the N directions of the other, in their order around the
+        normal. There are N such matchings. The angle is then the least mean angle between matched directions.
 
     Raises
     ------

@@ -88,10 +88,11 @@ def phase_graph(
 
 
 def synchronize(graph: PhaseGraph, depth: int = 0) -> np.ndarray:
-    """Return (n,) complex128 values of modulus 1 at the nodes that nearly satisfy the entries of a graph.
+    """Return (n,) complex128 values of modulus 1, one for each node, that nearly satisfy all relations.
 
     First, the nodes are grouped into clusters, and this function is called for the graph of the clusters. Its
-    result is the initial value of the nodes, which are then smoothed. `depth` is the depth of this recursion.
+    result gives the initial values of the nodes, which are then smoothed. `depth` counts these recursive
+    calls; other callers leave it 0.
     """
     clustering = _clustering(graph) if graph.node_count > MIN_LEVEL_NODES else None
     if clustering is None or clustering.count * MIN_COARSENING > graph.node_count:
@@ -189,7 +190,11 @@ def _clustering(graph: PhaseGraph) -> _Clustering:
 
 
 def _strongest_of_row(row: np.ndarray, strength: np.ndarray, entry: np.ndarray) -> np.ndarray:
-    """Return, for each row, the strongest of the given entries. `entry` is in ascending order."""
+    """Return the index of the strongest given entry of each row that has one of them.
+
+    `row` and `strength` hold the row and the strength of all entries of a graph. `entry` holds the indices of
+    the given entries, in ascending order.
+    """
     first = run_starts(row[entry])
     largest = np.maximum.reduceat(strength[entry], first)
     is_largest = strength[entry] == np.repeat(largest, np.diff(first, append=len(entry)))

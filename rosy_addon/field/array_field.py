@@ -246,7 +246,10 @@ def array_field(
 
 
 def _raw_field(array: FieldArray, source: str) -> RawField:
-    """Return the rows of an array as a `RawField` of vectors, directions or tensors."""
+    """Return the rows of an array as a `RawField` of vectors, directions or tensors.
+
+    `source` is the name of the array in error messages.
+    """
     count, columns = len(array.values), array.columns
     values = as_float64(array.values.reshape(count, columns))
     if columns == 2:

@@ -15,7 +15,10 @@ Arrays = np.ndarray | tuple[np.ndarray, ...]
 
 
 def row_blocks(count: int, size: int | None = None) -> list[slice]:
-    """Return slices that split `count` rows into consecutive blocks of `size`; an empty slice for no rows."""
+    """Return slices that split `count` rows into consecutive blocks of `size`; an empty slice for no rows.
+
+    By default, blocks have `ROWS_PER_BLOCK` rows.
+    """
     size = ROWS_PER_BLOCK if size is None else size
     return [slice(start, min(start + size, count)) for start in range(0, max(count, 1), size)]
 

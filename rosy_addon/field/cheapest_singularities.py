@@ -87,9 +87,10 @@ def cheapest_singularities(
 
 
 def _spread(graph: FaceGraph, given: np.ndarray) -> np.ndarray:
-    """Return (n,) values at the nodes: the sum of the given indices on a component, distributed by area.
+    """Return (n,) float64 indices: on each connected component, the sum of the given ones, spread by area.
 
-    They are 0 on components with a border.
+    `given` holds the index at each vertex node of the graph. Each node gets a part of the sum in proportion to
+    the area around it. On components with a border, the result is 0.
     """
     surface = graph.surface
     corner_area = (surface.face_area / np.diff(surface.face_start))[surface.corner_face]
@@ -133,7 +134,10 @@ def _settled(graph: FaceGraph, degree: int, given: np.ndarray, added: np.ndarray
 
 
 class _Neighbors:
-    """The vertex nodes of a graph of faces, and the neighbors of each along edges."""
+    """The vertices to which the singularity at a vertex can move: its neighbors along mesh edges.
+
+    Vertices are represented by the *vertex nodes* of a `FaceGraph`.
+    """
 
     def __init__(self, graph: FaceGraph) -> None:
         csr = neighbors_of_nodes(graph.node_count, graph.tail, graph.head)
@@ -144,10 +148,22 @@ class _Neighbors:
     def step(
         self, added: np.ndarray, given: np.ndarray, unit: float, potential: np.ndarray, share: float
     ) -> np.ndarray:
-        """Return (n,) indices of the added singularities after one round of moves.
+        """Return (n,) int64 indices of the added singularities after one round of moves.
 
-        A share of the singularities that would reduce the energy are moved to their best neighbor. Those at
-        a given singularity must leave it, and are moved first.
+        Singularities whose move to a neighbor reduces the energy are moved to the best neighbor. Added
+        singularities at a given one must leave it, and are moved first.
+
+        Parameters
+        ----------
+        added, given : (n,) int ndarray
+            Index of the added and of the given singularity at each vertex node; 0 if there is none.
+        unit : float
+            Angle in radians that an index of 1 stands for: 2 pi / N.
+        potential : (n,) float64 ndarray
+            Solution of the Poisson equation whose right-hand side is the angle of each singularity, see
+            `turning_angles.potential_solver`. Its difference between two nodes says how the energy changes.
+        share : float
+            Fraction of these singularities that are moved, from 0 to 1; at least one is.
         """
         moves = []
         for node in np.flatnonzero(added).tolist():
@@ -172,9 +188,10 @@ class _Neighbors:
 
 
 def _energy(graph: FaceGraph, degree: int, angle: np.ndarray, diagonal: np.ndarray) -> CSRMatrix:
-    """Return the matrix of the Dirichlet energy of (F,) representations, relative to given turning angles.
+    """Return a matrix A such that z* A z is the energy of a field with (F,) representations z.
 
-    The energy is 0 for a field that turns by `angle` across the edges.
+    It is the Dirichlet energy relative to given turning angles: it is 0 for a field that turns by `angle`, (I,)
+    in radians, across the edges. `diagonal` holds (F,) values that are added to the diagonal of the matrix.
     """
     source, target, weight = graph.source, graph.target, 1 / graph.conductance
     transport = np.exp(1j * degree * (graph.unfolding + angle))

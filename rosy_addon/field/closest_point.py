@@ -126,7 +126,10 @@ class _ClosestSearch:
         return (cell[:, 0] * self.shape[1] + cell[:, 1]) * self.shape[2] + cell[:, 2]
 
     def distance_to_cell_border(self, selection: np.ndarray) -> np.ndarray:
-        """Return (k,) distances of selected points from the sides of their cells; 0 outside of the grid."""
+        """Return (k,) distances, in object space, of selected points from the nearest side of their cell.
+
+        They are 0 for points outside of the grid.
+        """
         points = self.points[selection]
         fraction = self._in_cells(points) - self._cells_of(points)
         return np.maximum(np.minimum(fraction, 1 - fraction).min(axis=1), 0) * self.cell_size

@@ -143,7 +143,10 @@ class Combing:
         return self.system.node_guides(unit_complex(self.guides), *weights, corner)
 
     def _set_face_z(self, z: np.ndarray, face: np.ndarray) -> None:
-        """Set the field on (m,) faces to representations, normalized; exact guides take precedence."""
+        """Normalize (m,) representations, and set the field on the given faces to them.
+
+        A face with a guide of firmness 1, which is followed exactly, gets the representation of its guide.
+        """
         guides = self.guides[face]
         _, is_exact = firmness_weights(np.abs(guides), self.system.surface.mean_edge_length)
         self._face_z[face] = np.where(is_exact, unit_complex(guides), unit_representations(z))
@@ -375,7 +378,20 @@ class BrushStroke:
         dabs: Sequence[_Dab],
         located: np.ndarray,
     ) -> None:
-        """Apply the effect of the brush to faces near the segment between two dabs, or near a single dab."""
+        """Apply the effect of the brush to faces near the segment between two dabs, or near a single dab.
+
+        Parameters
+        ----------
+        near : (m,) intp ndarray
+            Faces that may be within the radius of the segment.
+        positions, tangents : (k, 3) float64 ndarray
+            Positions and unit directions of the stroke at its k dabs (1 or 2), in object space. For a mirrored
+            copy of the stroke, they are mirrored.
+        dabs : sequence of _Dab
+            The k dabs. Their pressures and arc lengths are used, and not their positions.
+        located : (k,) int ndarray
+            The face under each dab; -1 if there is none.
+        """
         brush, normal = self._brush, self._surface.face_normal
         on_face = located[located >= 0]
         if not len(on_face):
@@ -426,7 +442,12 @@ class BrushStroke:
         self._coverage[is_new] = 0
 
     def _comb(self, face: np.ndarray, distance: np.ndarray, direction: np.ndarray) -> None:
-        """Turn the guides of faces to the direction of the stroke, at its part nearest to the face so far."""
+        """Turn the guides of faces to the direction of the stroke where the stroke is nearest to the face.
+
+        `distance` and `direction` hold, for each of m faces, its distance from the segment that is drawn, and
+        the (m, 3) directions of the stroke there. In the same pass, a face that an earlier segment passed more
+        closely keeps its guide.
+        """
         is_closest = distance <= self._least_distance[face]
         face = face[is_closest]
         self._least_distance[face] = distance[is_closest]

@@ -148,7 +148,8 @@ def connected_components(count: int, pairs: np.ndarray) -> np.ndarray:
 def _lower(values: np.ndarray, index: np.ndarray, limits: np.ndarray) -> None:
     """Do the same as ``np.minimum.at(values, index, limits)``, but faster, for limits below the values.
 
-    Two plain assignments are enough for indices that occur once or twice, and most indices do.
+    Two plain assignments are enough for indices that occur once or twice, and most indices do. The others are
+    left to ``np.minimum.at``.
     """
     for _ in range(2):
         values[index] = limits

@@ -301,11 +301,12 @@ class TriangleGraph:
         return turn - mean[face]
 
     def with_resistance(self, factor: np.ndarray) -> TriangleGraph:
-        """Return a graph in which squared turning angles at edges between faces have greater weights.
+        """Return a graph whose edges have smaller conductances, so that large turning angles cost more.
 
-        `factor` holds (I,) factors of at least 1 by which the weights grow. Edges within a face get the
-        largest factor of the edges around the face. Negative conductances are replaced by small positive
-        ones, because they could make the matrix indefinite.
+        The energy of a field is the sum of its squared turning angles, each divided by the conductance of the
+        edge. The conductances of the edges between faces are divided by `factor`, (I,) numbers of at least 1.
+        Edges within a face get the largest factor of the edges around the face. Negative conductances are
+        replaced by small positive ones, because they could make the matrix indefinite.
         """
         graph, face, outer = self.graph, self.triangle_face, slice(self.face_edge_count)
         face_factor = np.ones(len(np.bincount(face)))

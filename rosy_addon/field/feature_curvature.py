@@ -43,12 +43,13 @@ class NoisyCurvature:
     averages : SurfaceAverages
         Averages between faces and vertices, in the frames of the faces.
     mean : (F,) float64 ndarray
-        Mean curvature of each face.
+        Mean curvature of each face, in units of 1 / length in object space.
     deviator : (F,) complex128 ndarray
         Deviator of each face: half the difference of the principal curvatures, and their directions.
-    mean_noise, deviator_noise : (F,) ndarray
-        By how much the mean curvature and the deviator change if random displacements as strong as the noise
-        of the mesh are added to the vertices.
+    mean_noise : (F,) float64 ndarray
+    deviator_noise : (F,) complex128 ndarray
+        Mean curvature and deviator after random displacements of the vertices that are as strong as the noise
+        of the mesh, minus `mean` and `deviator`.
     """
 
     salient_ends: np.ndarray
@@ -157,9 +158,9 @@ def _roughness(points: np.ndarray, normal: np.ndarray, ends: np.ndarray) -> np.n
 def feature_curvature(surface: Surface) -> np.ndarray:
     """Compute the curvature of the features of a surface at the corners of its triangles.
 
-    It is the larger absolute principal curvature, averaged over the distance `SCALE`. The curvature of
-    noise is subtracted, and the bend at sharp edges does not count. The rest shape is used if there is one,
-    so that a deformation does not change the result.
+    It is the larger absolute principal curvature, averaged over the distance `SCALE`, a fraction of
+    `Surface.extent`. The curvature of noise is subtracted, and the bend at sharp edges does not count. The
+    rest shape is used if there is one, so that a deformation does not change the result.
 
     Parameters
     ----------

@@ -178,7 +178,7 @@ def field_from_raw(
 
 
 def _check_count(raw: RawField, surface: Surface, source: str) -> None:
-    """Raise a `RosyError` if the number of rows is not that in the header, or does not fit the surface.
+    """Raise a `RosyError` if the number of rows differs from the header, or does not fit the surface.
 
     Some programs write the number of vertices in the header of a field on faces. This is accepted.
     """
@@ -302,13 +302,14 @@ def transfer_field(
     Returns
     -------
     RosyField
-        Field on the faces of `target`. It is zero on faces that exceed `MAX_DISTANCE` or `MAX_NORMAL_ANGLE`,
-        and on faces without area.
+        Field on the faces of `target`. It is zero on faces without area, and on faces that have no source face
+        near them: the closest one is farther away than `MAX_DISTANCE`, a fraction of the extent of `source`,
+        or the angle between the two normals is above `MAX_NORMAL_ANGLE`.
 
     Raises
     ------
     RosyError
-        If more than `MAX_UNMATCHED_FRACTION` of the faces exceed these limits.
+        If more than `MAX_UNMATCHED_FRACTION` of the faces have no source face near them.
     """
     with progress(0.1, 0.9):
         triangle, distance = closest_triangles(source, _face_points(target))

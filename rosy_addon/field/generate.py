@@ -209,8 +209,8 @@ def generate(surface: Surface, settings: GeneratorSettings | str, degree: int) -
 def _curvature(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyField:
     """Return a field along principal curvature directions.
 
-    Where they are not well defined, as on flat parts, the field extends smoothly from the parts where they
-    are.
+    Where the two principal curvatures are nearly equal, as on flat parts, these directions are arbitrary. If
+    `settings.reach` is above 0, the field there is a smooth continuation of the field around these parts.
     """
     split = 0.4 if settings.reach else 1.0
     with progress(0.0, split):

@@ -114,7 +114,8 @@ class GuidedSystem:
         is_hard : (F,) bool ndarray
             Faces whose guides are followed exactly.
         corner : (m,) int ndarray or slice
-            Corners of triangles that are included; all by default. Values at nodes without one are 0.
+            Corners of triangles that are included; all by default. A node gets the value 0 if none of its
+            corners is included.
         """
         sums = self.averages.node_sums
         penalty = sums(weight, 0, corner)
@@ -131,7 +132,7 @@ class GuidedSystem:
         start: np.ndarray | None = None,
         tolerance: float = RELATIVE_TOLERANCE,
     ) -> np.ndarray:
-        """Return the representations at the nodes of the field that follows the guides: solve the system.
+        """Solve the linear system: return the field that follows the guides, as representations at the nodes.
 
         Parameters
         ----------
@@ -272,9 +273,9 @@ def firmness_weights(
     firmness : (F,) ndarray
         Firmness of the guide of each face, from 0 to 1.
     edge_length : float
-        Mean length of the edges.
+        Mean length of the edges, in object space.
     reach : float
-        Distance over which guides are smoothed in addition.
+        Distance over which guides are smoothed, in object space. It adds to the effect of the firmness.
 
     Returns
     -------

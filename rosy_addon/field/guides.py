@@ -172,9 +172,9 @@ def guides_from_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:
     uv : (C, 2) float ndarray
         Texture coordinates of each corner.
     degree : int
-        N of the field. If it is a multiple of 4, members follow the u axis and the v axis equally well: the
-        axes of the rotation nearest to the map. For other degrees, the guide is the direction of increasing
-        u.
+        N of the field. If it is a multiple of 4, members follow the u axis and the v axis. Where these two
+        axes are not perpendicular on the surface, members follow two perpendicular directions that deviate
+        equally from them. For other degrees, the guide is the direction of increasing u.
 
     Returns
     -------

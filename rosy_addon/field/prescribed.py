@@ -201,10 +201,10 @@ def _bent(
 
 
 def index_at_nodes(graph: FaceGraph, vertex: np.ndarray, index: np.ndarray) -> np.ndarray:
-    """Return the (n,) int64 singularity indices of the vertex nodes, given those of vertices.
+    """Return (n,) int64: the singularity index of each vertex node; `index` holds the indices of some vertices.
 
-    A vertex whose faces are not connected around it has several nodes. Its index is given to the first of
-    them.
+    A vertex whose faces are not connected around it has several nodes. The first of these nodes gets the index
+    of the vertex.
     """
     surface, vertex_count = graph.surface, len(graph.surface.vertices)
     vertex = np.asarray(vertex, dtype=np.int64)
@@ -348,7 +348,10 @@ def guided_rotation(
 
 
 def _system(graph: FaceGraph, stiffness: np.ndarray, penalty: np.ndarray) -> CSRMatrix:
-    """Return the matrix of the Laplacian of the graph of faces, with the penalty added to its diagonal."""
+    """Return the matrix of the Laplacian of the graph of faces, with the penalty added to its diagonal.
+
+    `stiffness` holds the (I,) weights of the edges, and `penalty` the (F,) weights of the guides.
+    """
     ends = np.concatenate([graph.source, graph.target])
     diagonal = np.bincount(ends, np.tile(stiffness, 2), len(penalty))
     diagonal += penalty + REGULARIZATION * np.where(diagonal > 0, diagonal, 1.0)
@@ -365,8 +368,24 @@ def _initial_angle(
 ) -> np.ndarray:
     """Return a first estimate of N times the (F,) angles that `guided_rotation` computes.
 
-    The phases by which z must be rotated to the guides are smoothed. The estimate is the least-squares phase
-    unwrapping of the result.
+    The phase by which z must be rotated to reach the guide is known on faces with a guide, up to multiples of
+    2 pi. First, unit complex numbers with these phases are smoothed over all faces. Then the phases of the
+    result are unwrapped: the estimate has the differences between neighboring faces that fit them best, in the
+    sense of least squares.
+
+    Parameters
+    ----------
+    graph : FaceGraph
+    stiffness : (I,) float64 ndarray
+        Weights of the edges.
+    matrix : CSRMatrix
+        Result of `_system`, with the penalty.
+    levels : list of Level
+        Multigrid levels of `matrix`.
+    offset : (F,) complex128 ndarray
+        Numbers whose phase takes z to the guide; 0 on faces without a guide.
+    penalty : (F,) float64 ndarray
+        Weights of the guides; 0 on faces without a guide.
     """
     unit = unit_complex(offset)
     with progress(0.0, 0.3):

@@ -81,7 +81,10 @@ def move_index(
 
 
 def _distance(surface: Surface, ends: np.ndarray) -> float:
-    """Return the distance between two vertices; 0 if one of them is `OUTSIDE` or not in the mesh."""
+    """Return the straight-line distance between two vertices, in object space.
+
+    It is 0 if one of them is `OUTSIDE` or not in the mesh.
+    """
     if (ends < 0).any() or (ends >= len(surface.vertices)).any():
         return 0.0
     return float(np.linalg.norm(np.diff(surface.vertices[ends].astype(np.float64), axis=0)))
@@ -133,7 +136,8 @@ def cancel_pairs(surface: Surface, field: RosyField, max_distance: float) -> Ros
 def _are_near(surface: Surface, pairs: np.ndarray, vertices: np.ndarray) -> np.ndarray:
     """Return (P,) bool: which of the (P, 2) pairs of vertices are nearest to the given other vertices.
 
-    Distances are counted in faces. All pairs with the smallest distance are marked.
+    The distance of a pair is the number of rings of faces from the given vertices to the nearer vertex of the
+    pair. All pairs with the smallest distance are marked.
     """
     is_near = mask(len(surface.vertices), vertices)
     corner_vertex, corner_face = surface.corner_vertex, surface.corner_face

@@ -93,7 +93,10 @@ def smallest_eigenvectors(connection: Connection, degree: int) -> tuple[np.ndarr
 
 
 def spectral_shift(mass: np.ndarray) -> float:
-    """Return the factor of the mass matrix to add to an energy matrix, so that multigrid can solve it."""
+    """Return the factor s for which multigrid converges well for A + s M, where A is the matrix of an energy.
+
+    M is the mass matrix: the diagonal matrix of the masses of the nodes.
+    """
     return SPECTRAL_SHIFT * 4 * np.pi / float(mass.sum())
 
 
@@ -196,7 +199,11 @@ def _lobpcg(
 
 
 class _ComponentProducts:
-    """Inner products and linear combinations of vectors, separately on each connected component."""
+    """Inner products and linear combinations of vectors, separately on each connected component.
+
+    Some methods take a *pair*: a (2, n) array of a vector and its image, which is the product of the matrix
+    and the vector.
+    """
 
     def __init__(self, mass: np.ndarray, component: np.ndarray) -> None:
         self._mass, self._component = mass, component
@@ -215,19 +222,16 @@ class _ComponentProducts:
         return np.sqrt(self.sums(self._mass * (vector.real**2 + vector.imag**2)).real)
 
     def normalize(self, pair: np.ndarray) -> np.ndarray:
-        """Divide a vector and its image, given as a (2, n) pair, in place by the norm of the vector.
+        """Divide a vector and its image in place by the norm of the vector, on each component; return the pair.
 
-        The norm is that of `norms`, separate for each component. The pair is also returned.
+        See `norms`. A component on which the norm is 0 stays 0.
         """
         norm = self.norms(pair[0])
         pair *= self.at_nodes(1 / np.where(norm > 0, norm, 1))
         return pair
 
     def combine(self, pairs: list[np.ndarray], coefficients: np.ndarray) -> np.ndarray:
-        """Return the linear combination of k (2, n) pairs of vector and image, as a new pair.
-
-        The coefficients are (components, k).
-        """
+        """Return a linear combination of k pairs, as a new pair; `coefficients` is (components, k)."""
         total = pairs[0] * self.at_nodes(coefficients[:, 0])
         for index, pair in enumerate(pairs[1:], 1):
             total += pair * self.at_nodes(coefficients[:, index])

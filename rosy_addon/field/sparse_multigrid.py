@@ -110,9 +110,9 @@ class CSRMatrix:
         return CSRMatrix(indptr, self.indices[entries], self.data[entries], self.column_count)
 
     def columns(self, columns: np.ndarray) -> CSRMatrix:
-        """Return the matrix that consists of the given columns, without duplicates.
+        """Return the matrix that consists of the given columns, in their order.
 
-        Each row of the result must have an entry.
+        No column may be given twice, and each row of the result must have an entry.
         """
         new_column = np.full(self.column_count, -1)
         new_column[columns] = np.arange(len(columns))
@@ -207,7 +207,7 @@ def _assemble_by_rows(
         Number of columns of the result.
     entries : callable
         Function that takes a slice of the entries of `matrix`. It returns the rows, columns and values of the
-        entries of the result that they contribute. Values at the same position are summed.
+        entries of the result to which this slice contributes. Values at the same position are summed.
     """
     bits = int(column_count).bit_length()
     row_counts, index_blocks, value_blocks = [], [], []

@@ -9,8 +9,8 @@ spacing. On a curved surface, no phase satisfies this exactly. `stripe_pattern` 
 least squared error of exp(2 pi i phase). Where stripes diverge too much, new stripes begin, at triangles
 around which the phase changes by an integer.
 
-The energy, the covering and the interpolation are those of Knöppel, Crane, Pinkall and Schröder, "Stripe
-Patterns on Surfaces" (SIGGRAPH 2015). But the energy is minimized over numbers of modulus 1
+The energy, the covering and the interpolation are described in Knöppel, Crane, Pinkall and Schröder, "Stripe
+Patterns on Surfaces" (SIGGRAPH 2015). But here the energy is minimized over numbers of modulus 1
 (`angular_synchronization`) instead of eigenvectors, because an eigenvector would be small on most parts of
 the surface, and would take longer to compute.
 
@@ -95,7 +95,8 @@ class StripePattern:
     phase : (T, M, 3) float32 ndarray
         The linear part of the phase, at the corners (see `evaluate`).
     index : (T, M) float32 ndarray
-        Number of stripes that end in each triangle: an integer, 0 in most triangles.
+        Number of stripes that begin or end in each triangle: the integer by which the phase grows on the way
+        around the triangle, counter-clockwise. It may be negative, and is 0 in most triangles.
     """
 
     phase: np.ndarray

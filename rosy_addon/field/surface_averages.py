@@ -25,7 +25,7 @@ MAX_STEPS = 500
 class SurfaceAverages:
     """Operators that average RoSy representations from F faces to n nodes, and from nodes to faces.
 
-    The nodes are those of a `Connection`: the vertices, with several nodes for a nonmanifold vertex.
+    The nodes are defined by a `Connection`: a node for each vertex, and several for a nonmanifold vertex.
 
     Attributes
     ----------

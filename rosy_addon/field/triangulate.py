@@ -129,7 +129,7 @@ def _corner_sines(points: np.ndarray) -> np.ndarray:
 
 
 def _project_to_plane(points: np.ndarray) -> np.ndarray:
-    """Return the (k, 2) corners of a polygon projected along its normal, which are counter-clockwise."""
+    """Return the (k, 2) corners of a polygon, projected along its normal. They run counter-clockwise."""
     relative = points - points[0]
     normal = np.cross(relative, np.roll(relative, -1, axis=0)).sum(axis=0)
     axis = np.zeros(3)

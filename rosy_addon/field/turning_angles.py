@@ -159,9 +159,11 @@ def added_resistance(angle: np.ndarray, present: np.ndarray | float, limit: floa
 def least_angles(
     graph: FaceGraph, degree: int, required: np.ndarray, loops: Loops, present: np.ndarray | float
 ) -> np.ndarray:
-    """Return (I,) least-squares angles divided by the conductances of the edges, for a graph of triangles.
+    """Return (M,) float64, each turning angle divided by the conductance of its edge.
 
-    `loops` is the result of `_loops`. For the other parameters, see `turning_angles`.
+    The angles have the least sum of squares, each divided by the conductance. `graph` is the graph of triangles
+    with M edges (see `TriangleGraph`), and `loops` is the result of `_loops`. For the other parameters, see
+    `turning_angles`.
     """
     with progress(0.0, 0.5):
         solver = potential_solver(graph)

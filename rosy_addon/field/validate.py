@@ -85,8 +85,8 @@ def validated_field(
     Raises
     ------
     RosyError
-        If the number of vectors is neither that of the faces nor that of the vertices, if a vector is not
-        finite, or if more than `MAX_OUTLIER_FRACTION` of the vectors are off the tangent plane.
+        If there is neither one vector for each face nor one for each vertex, if a vector is not finite, or if
+        more than `MAX_OUTLIER_FRACTION` of the vectors are off the tangent plane.
     """
     degree = check_degree(degree)
     vectors = np.array(vectors, dtype=np.float64).reshape(-1, 3)
@@ -146,8 +146,8 @@ def validated_directions(
     Raises
     ------
     RosyError
-        If the number of rows is neither that of the faces nor that of the vertices, if a direction is not
-        finite, or if more than `MAX_OUTLIER_FRACTION` of the directions are off the tangent plane.
+        If there is neither one row for each face nor one for each vertex, if a direction is not finite, or if
+        more than `MAX_OUTLIER_FRACTION` of the directions are off the tangent plane.
     """
     directions = np.array(directions, dtype=np.float64)
     count, degree = len(directions), check_degree(directions.shape[1])
@@ -245,7 +245,8 @@ def tangent_normals(surface: Surface, domain: str) -> np.ndarray:
 def vertex_normals(surface: Surface) -> np.ndarray:
     """Return vertex normals: the face normals around each vertex, averaged with the corner angles as weights.
 
-    Sharp edges are ignored. The normals are those of the deformed shape, `Surface.vertices`.
+    Sharp edges are ignored. The normals are perpendicular to the shape `Surface.vertices`. For the rest shape,
+    pass `surface.in_rest_shape()`.
 
     Returns
     -------
@@ -310,10 +311,11 @@ def _project(vectors: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def apply_nonfinite_policy(values: np.ndarray, source: str, domain: str, nonfinite: str) -> None:
-    """Check in place that values are finite: raise an error, or set those that are not finite to zero.
+    """Raise an error if a value is not finite, or set values that are not finite to zero, in place.
 
-    Values of modulus `MAX_COMPONENT` or more count as infinite. Vectors whose components are all below
-    `MIN_COMPONENT` are set to zero as well.
+    A value is an angle, a vector or a tensor. It is not finite if one of its components is NaN, or has a
+    modulus of `MAX_COMPONENT` or more. All of its components are then set to zero. Vectors and tensors whose
+    components are all smaller than `MIN_COMPONENT` are set to zero as well.
 
     Parameters
     ----------

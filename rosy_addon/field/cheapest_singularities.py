@@ -89,8 +89,8 @@ def cheapest_singularities(
 def _spread(graph: FaceGraph, given: np.ndarray) -> np.ndarray:
     """Return (n,) float64 indices: on each connected component, the sum of the given ones, spread by area.
 
-    `given` holds the index at each vertex node of the graph. Each node gets a part of the sum in proportion to
-    the area around it. On components with a border, the result is 0.
+    `given` holds the index at each vertex node of the graph. Each node gets a part of the sum in proportion
+    to the area around it. On components with a border, the result is 0.
     """
     surface = graph.surface
     corner_area = (surface.face_area / np.diff(surface.face_start))[surface.corner_face]
@@ -190,8 +190,9 @@ class _Neighbors:
 def _energy(graph: FaceGraph, degree: int, angle: np.ndarray, diagonal: np.ndarray) -> CSRMatrix:
     """Return a matrix A such that z* A z is the energy of a field with (F,) representations z.
 
-    It is the Dirichlet energy relative to given turning angles: it is 0 for a field that turns by `angle`, (I,)
-    in radians, across the edges. `diagonal` holds (F,) values that are added to the diagonal of the matrix.
+    It is the Dirichlet energy relative to given turning angles: it is 0 for a field that turns by `angle`,
+    (I,) in radians, across the edges. `diagonal` holds (F,) values that are added to the diagonal of the
+    matrix.
     """
     source, target, weight = graph.source, graph.target, 1 / graph.conductance
     transport = np.exp(1j * degree * (graph.unfolding + angle))

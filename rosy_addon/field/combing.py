@@ -385,8 +385,8 @@ class BrushStroke:
         near : (m,) intp ndarray
             Faces that may be within the radius of the segment.
         positions, tangents : (k, 3) float64 ndarray
-            Positions and unit directions of the stroke at its k dabs (1 or 2), in object space. For a mirrored
-            copy of the stroke, they are mirrored.
+            Positions and unit directions of the stroke at its k dabs (1 or 2), in object space. For a
+            mirrored copy of the stroke, they are mirrored.
         dabs : sequence of _Dab
             The k dabs. Their pressures and arc lengths are used, and not their positions.
         located : (k,) int ndarray
@@ -445,8 +445,8 @@ class BrushStroke:
         """Turn the guides of faces to the direction of the stroke where the stroke is nearest to the face.
 
         `distance` and `direction` hold, for each of m faces, its distance from the segment that is drawn, and
-        the (m, 3) directions of the stroke there. In the same pass, a face that an earlier segment passed more
-        closely keeps its guide.
+        the (m, 3) directions of the stroke there. In the same pass, a face that an earlier segment passed
+        more closely keeps its guide.
         """
         is_closest = distance <= self._least_distance[face]
         face = face[is_closest]

@@ -172,10 +172,10 @@ def field_harmonics(field: RosyField) -> dict[int, np.ndarray]:
     Returns
     -------
     dict of int to (F,) complex128 ndarray
-        For each order j, from -((N - 1) // 2) to N // 2, the product C_j exp(i j t) on each face: the harmonic
-        C_j, relative to the angle t of the stored member (see the module docstring). The order 0 is always
-        there. Another order is left out if the modulus is at most `MIN_HARMONIC` on all faces. For a field
-        without `direction_ratios`, the dict is empty.
+        For each order j, from -((N - 1) // 2) to N // 2, the product C_j exp(i j t) on each face: the
+        harmonic C_j, relative to the angle t of the stored member (see the module docstring). The order 0 is
+        always there. Another order is left out if the modulus is at most `MIN_HARMONIC` on all faces. For a
+        field without `direction_ratios`, the dict is empty.
     """
     return {} if field.direction_ratios is None else ratio_harmonics(field.direction_ratios)
 

@@ -302,9 +302,9 @@ def transfer_field(
     Returns
     -------
     RosyField
-        Field on the faces of `target`. It is zero on faces without area, and on faces that have no source face
-        near them: the closest one is farther away than `MAX_DISTANCE`, a fraction of the extent of `source`,
-        or the angle between the two normals is above `MAX_NORMAL_ANGLE`.
+        Field on the faces of `target`. It is zero on faces without area, and on faces that have no source
+        face near them: the closest one is farther away than `MAX_DISTANCE`, a fraction of the extent of
+        `source`, or the angle between the two normals is above `MAX_NORMAL_ANGLE`.
 
     Raises
     ------

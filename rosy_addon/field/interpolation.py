@@ -21,8 +21,9 @@ def interpolate_fields(
     """Return the field at a given share of the way between two fields of the same degree.
 
     RoSy fields are interpolated by their representations z = rho exp(i N t) in `Surface.face_frames`: the
-    result has the directions of (1 - s) z + s z'. So each member turns by at most pi / N, to the nearest member
-    of the second field. Singularities move continuously if the magnitude of the fields vanishes at them.
+    result has the directions of (1 - s) z + s z'. So each member turns by at most pi / N, to the nearest
+    member of the second field. Singularities move continuously if the magnitude of the fields vanishes at
+    them.
 
     Where members turn by nearly pi / N, the shorter turn may be to the left on one face and to the right on
     the next one. If angles were interpolated, the directions of these two faces would differ by up to

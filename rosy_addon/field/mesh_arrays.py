@@ -111,7 +111,7 @@ def mesh_arrays(
 def _corner_uv(
     uv: ArrayLike, vertex_count: int, corner_vertex: NDArray[Any], name: str
 ) -> NDArray[np.float64]:
-    """Return (C, 2) texture coordinates of the corners; `uv` has one row for each vertex or for each corner."""
+    """Return (C, 2) texture coordinates of corners; `uv` has a row for each vertex or for each corner."""
     array = np.asarray(uv, dtype=np.float64)
     if array.shape not in ((vertex_count, 2), (len(corner_vertex), 2)):
         raise RosyError(

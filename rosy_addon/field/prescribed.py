@@ -201,10 +201,10 @@ def _bent(
 
 
 def index_at_nodes(graph: FaceGraph, vertex: np.ndarray, index: np.ndarray) -> np.ndarray:
-    """Return (n,) int64: the singularity index of each vertex node; `index` holds the indices of some vertices.
+    """Return (n,) int64: the singularity index of each vertex node, from the indices of some vertices.
 
-    A vertex whose faces are not connected around it has several nodes. The first of these nodes gets the index
-    of the vertex.
+    A vertex whose faces are not connected around it has several nodes. The first of these nodes gets the
+    index of the vertex.
     """
     surface, vertex_count = graph.surface, len(graph.surface.vertices)
     vertex = np.asarray(vertex, dtype=np.int64)
@@ -370,8 +370,8 @@ def _initial_angle(
 
     The phase by which z must be rotated to reach the guide is known on faces with a guide, up to multiples of
     2 pi. First, unit complex numbers with these phases are smoothed over all faces. Then the phases of the
-    result are unwrapped: the estimate has the differences between neighboring faces that fit them best, in the
-    sense of least squares.
+    result are unwrapped: the estimate has the differences between neighboring faces that fit them best, in
+    the sense of least squares.
 
     Parameters
     ----------

@@ -31,8 +31,8 @@ def power(base: np.ndarray, degree: int) -> np.ndarray:
 def signed_power(base: np.ndarray, exponent: int) -> np.ndarray | int:
     """Return `base` ** `exponent` for complex numbers of modulus 1 or 0 and any integer exponent.
 
-    Negative powers are computed as conjugates of positive powers, so negative powers of 0 are 0. The result for
-    the exponent 0 is the number 1, not an array.
+    Negative powers are computed as conjugates of positive powers, so negative powers of 0 are 0. The result
+    for the exponent 0 is the number 1, not an array.
     """
     if exponent == 0:
         return 1

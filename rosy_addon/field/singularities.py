@@ -118,8 +118,8 @@ def first_pairs(pairs: np.ndarray) -> np.ndarray:
 def signed_corner_angles(surface: Surface) -> np.ndarray:
     """Return (C,) interior angles at the corners of the faces, in radians from 0 to 2 pi.
 
-    Angles are measured in the plane of each face, from the next edge counter-clockwise to the previous edge. So
-    concave corners have angles above pi.
+    Angles are measured in the plane of each face, from the next edge counter-clockwise to the previous edge.
+    So concave corners have angles above pi.
     """
     x, y = surface.face_frames
     angles = np.empty(len(surface.corner_vertex))

@@ -222,7 +222,7 @@ class _ComponentProducts:
         return np.sqrt(self.sums(self._mass * (vector.real**2 + vector.imag**2)).real)
 
     def normalize(self, pair: np.ndarray) -> np.ndarray:
-        """Divide a vector and its image in place by the norm of the vector, on each component; return the pair.
+        """Divide a pair in place by the norm of the vector, on each component, and return it.
 
         See `norms`. A component on which the norm is 0 stays 0.
         """

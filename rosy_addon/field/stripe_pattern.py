@@ -9,8 +9,8 @@ spacing. On a curved surface, no phase satisfies this exactly. `stripe_pattern` 
 least squared error of exp(2 pi i phase). Where stripes diverge too much, new stripes begin, at triangles
 around which the phase changes by an integer.
 
-The energy, the covering and the interpolation are described in Knöppel, Crane, Pinkall and Schröder, "Stripe
-Patterns on Surfaces" (SIGGRAPH 2015). But here the energy is minimized over numbers of modulus 1
+For the energy, the covering and the interpolation, see Knöppel, Crane, Pinkall and Schröder, "Stripe Patterns
+on Surfaces" (SIGGRAPH 2015). But here the energy is minimized over numbers of modulus 1
 (`angular_synchronization`) instead of eigenvectors, because an eigenvector would be small on most parts of
 the surface, and would take longer to compute.
 
@@ -47,8 +47,8 @@ class CornerDirections:
     degree : int
         N.
     family_count : int
-        M, the number of families of stripes: `FieldSymmetry.line_count`. It is N / 2 if direction k + N / 2 is
-        the opposite of direction k, and N otherwise.
+        M, the number of families of stripes: `FieldSymmetry.line_count`. It is N / 2 if direction k + N / 2
+        is the opposite of direction k, and N otherwise.
     offset : (T, 3) complex128 ndarray
         Positions of the corners in a frame of the plane of the triangle.
     angle : (T, 3) float64 ndarray

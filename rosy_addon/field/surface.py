@@ -65,8 +65,9 @@ class Surface:
         The axis that points up in pictures. By default "y" for ``.obj`` and ``.off`` files, otherwise
         "z".
     uv : (V, 2) or (C, 2) array_like, optional
-        Texture coordinates of the vertices, or of the corners, face by face. By default they are read from the
-        ``.obj`` file, or from the mesh object of trimesh, PyVista or Open3D, if it has texture coordinates.
+        Texture coordinates of the vertices, or of the corners, face by face. By default they are read from
+        the ``.obj`` file, or from the mesh object of trimesh, PyVista or Open3D, if it has texture
+        coordinates.
     sharp_angle : float, optional
         Angle in radians between the normals of two faces above which their edge is sharp. Field values
         and normals do not mix across sharp edges. By default 60 degrees.
@@ -199,8 +200,8 @@ class Surface:
     def vertex_data(self) -> Mapping[str, np.ndarray]:
         """Named arrays with a row for each vertex.
 
-        They come from a ``.ply`` file, from the file of a simulation, or from a mesh object of another library,
-        such as PyVista.
+        They come from a ``.ply`` file, from the file of a simulation, or from a mesh object of another
+        library, such as PyVista.
         """
         return {} if self._path is None else read_vertex_data(self._path)
 

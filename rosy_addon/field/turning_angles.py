@@ -161,9 +161,9 @@ def least_angles(
 ) -> np.ndarray:
     """Return (M,) float64, each turning angle divided by the conductance of its edge.
 
-    The angles have the least sum of squares, each divided by the conductance. `graph` is the graph of triangles
-    with M edges (see `TriangleGraph`), and `loops` is the result of `_loops`. For the other parameters, see
-    `turning_angles`.
+    The angles have the least sum of squares, each divided by the conductance. `graph` is the graph of
+    triangles with M edges (see `TriangleGraph`), and `loops` is the result of `_loops`. For the other
+    parameters, see `turning_angles`.
     """
     with progress(0.0, 0.5):
         solver = potential_solver(graph)

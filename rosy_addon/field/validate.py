@@ -245,8 +245,8 @@ def tangent_normals(surface: Surface, domain: str) -> np.ndarray:
 def vertex_normals(surface: Surface) -> np.ndarray:
     """Return vertex normals: the face normals around each vertex, averaged with the corner angles as weights.
 
-    Sharp edges are ignored. The normals are perpendicular to the shape `Surface.vertices`. For the rest shape,
-    pass `surface.in_rest_shape()`.
+    Sharp edges are ignored. The normals are perpendicular to the shape `Surface.vertices`. For the rest
+    shape, pass `surface.in_rest_shape()`.
 
     Returns
     -------

@@ -68,7 +68,7 @@ class RawField:
 
 
 def offsets_from_sizes(sizes: np.ndarray | list[int]) -> np.ndarray:
-    """Return (n + 1,) int64: where each of n consecutive ranges of these sizes starts, and where the last ends.
+    """Return (n + 1,) int64: where n consecutive ranges of these sizes start, and where the last one ends.
 
     Examples
     --------

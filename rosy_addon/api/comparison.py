@@ -13,11 +13,12 @@ import numpy as np
 from ..core.errors import RosyError
 from ..field.analysis import (
     DEFAULT_REACH,
+    Difference,
     SingularityMatching,
     format_degrees,
     match_on_surface,
 )
-from ..field.field import Difference, Field
+from ..field.field import Field
 
 #: Replacements for characters that LaTeX interprets.
 _LATEX = {

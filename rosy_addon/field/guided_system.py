@@ -75,7 +75,7 @@ class GuidedSystem:
     degree : int
         N.
     averages : SurfaceAverages
-        Averages between faces and nodes, in the frames of `face_frames`.
+        Averages between faces and nodes, in the frames `Surface.face_frames`.
     laplacian : (n, n) CSRMatrix
         The connection Laplacian.
     levels : list of Level

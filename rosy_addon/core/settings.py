@@ -23,7 +23,6 @@ from .errors import RosyError
 #: Texts that are accepted for switches on the command line, and their values.
 SWITCH_VALUES = {"true": True, "on": True, "1": True, "false": False, "off": False, "0": False}
 
-
 #: Smallest and largest allowed value of each number of a tuple, by the name of the number in the interface.
 Ranges = Mapping[str, tuple[float, float]]
 

@@ -9,7 +9,6 @@ import numpy as np
 #: Number of rows of an array (faces, corners, edges) in a block. A block takes hundredths of a second.
 ROWS_PER_BLOCK = 1 << 16
 
-
 #: One or several arrays, as the result of a function.
 Arrays = np.ndarray | tuple[np.ndarray, ...]
 

@@ -97,8 +97,8 @@ def _matched(first: np.ndarray, second: np.ndarray, family_count: int) -> np.nda
     """Return the (F, N) directions of the second field in the order in which they match the first field best.
 
     `first` and `second` hold the N directions of each face as complex numbers in `Surface.face_frames`. The
-    directions of a face are shifted cyclically by a multiple of the number of
-    families, so that each direction keeps its family.
+    directions of a face are shifted cyclically by a multiple of the number of families, so that each
+    direction keeps its family.
     """
     best, best_order = second, np.full(len(second), -np.inf)
     for shift in range(0, first.shape[1], family_count if family_count > 1 else 1):

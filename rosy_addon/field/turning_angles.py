@@ -50,7 +50,6 @@ MIN_EIGENVALUE = 1e-8
 #: With at most this number of loops, the search also changes the multiples of 2 pi / N of two loops at once.
 MAX_PAIRED_LOOPS = 20
 
-
 #: Loops of faces. Each is an array of the edges that it crosses, and an array of signs: 1 for an edge that is
 #: crossed from its source to its target, -1 otherwise.
 Loops = list[tuple[np.ndarray, np.ndarray]]

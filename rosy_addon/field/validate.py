@@ -205,8 +205,7 @@ def _vertex_averages(
     """Return a function that averages (V,) complex values at the vertices onto the faces.
 
     The second argument of the function is the order k of the values: if a tangent vector is rotated by t,
-    its value is multiplied by exp(i k t). `normal` holds the (V, 3) vertex normals, and `face_x` the (F, 3)
-    x axes of the frames of the faces.
+    its value is multiplied by exp(i k t). `normal` holds the (V, 3) vertex normals.
     """
     rotation = corner_rotations(surface, normal[surface.corner_vertex])
 

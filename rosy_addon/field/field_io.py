@@ -27,7 +27,7 @@ from .mesh_io import SHARP_ANGLE
 from .rosy_field import RosyField
 from .singularities import find_singularities
 from .surface import Surface, build_surface
-from .validate import apply_nonfinite_policy, infer_domain, validated_directions, validated_field
+from .validate import apply_nonfinite_policy, checked_domain, validated_directions, validated_field
 
 #: A face of the target mesh gets the field of the closest source face only within these limits: the distance
 #: relative to `Surface.extent` of the source, and the angle between the normals in radians.
@@ -162,10 +162,10 @@ def field_from_raw(
     RosyError
         If the rows belong to another mesh, or a vector is not finite or not tangent to the surface.
     """
-    _check_count(raw, surface, source)
+    _check_header(raw, surface, source)
     values = raw.values
     if raw.tensors:
-        if len(values) != surface.face_count:
+        if checked_domain(surface, len(values), raw.domain, source) != "face":
             raise RosyError(
                 f"{source}: contains tensors on vertices; only tensors on faces are supported"
             )
@@ -177,21 +177,16 @@ def field_from_raw(
     return validated_directions(surface, values, source, nonfinite, raw.domain)
 
 
-def _check_count(raw: RawField, surface: Surface, source: str) -> None:
-    """Raise a `RosyError` if the number of rows differs from the header, or does not fit the surface.
+def _check_header(raw: RawField, surface: Surface, source: str) -> None:
+    """Raise a `RosyError` if a file does not have the number of rows that its header declares.
 
     Some programs write the number of vertices in the header of a field on faces. This is accepted.
     """
     row_count, vertex_count = len(raw.values), len(surface.vertices)
-    counts, surface_counts = (raw.header_count, row_count), (vertex_count, surface.face_count)
-    if raw.header_count not in (None, row_count) and counts != surface_counts:
+    is_mixed = (raw.header_count, row_count) == (vertex_count, surface.face_count)
+    if raw.header_count not in (None, row_count) and not is_mixed:
         raise RosyError(
             f"{source}: declares {counted(raw.header_count, 'row')} of {raw.columns} numbers, but contains {row_count}"
-        )
-    if raw.domain is None and infer_domain(surface, row_count) is None:
-        raise RosyError(
-            f"{source}: contains {counted(row_count, 'row')}, but {surface.name} has "
-            f"{counted(surface.face_count, 'face')} and {counted(vertex_count, 'vertex', 'vertices')}"
         )
 
 
@@ -218,7 +213,7 @@ def _source_surface(
         return None
     source = Surface(mesh_path)
     # The number of rows may fit the vertices of `surface` although the rows belong to faces of the mesh file.
-    return source if count == source.face_count or infer_domain(surface, count) is None else None
+    return source if count == source.face_count or count != len(surface.vertices) else None
 
 
 def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface) -> None:

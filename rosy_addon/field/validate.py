@@ -90,7 +90,7 @@ def validated_field(
     """
     degree = check_degree(degree)
     vectors = np.array(vectors, dtype=np.float64).reshape(-1, 3)
-    domain = _checked_domain(surface, len(vectors), domain, source)
+    domain = checked_domain(surface, len(vectors), domain, source)
     apply_nonfinite_policy(vectors, source, domain, nonfinite)
     normal = tangent_normals(surface, domain)
     vectors = project_to_tangent(vectors, normal, TOLERANCE_DEG[domain], source, domain)
@@ -102,18 +102,19 @@ def validated_field(
     return RosyField(degree, vectors)
 
 
-def _checked_domain(surface: Surface, count: int, domain: str | None, source: str) -> str:
-    """Return the domain ("face" or "vertex") of `count` vectors, or raise an error if the count does not fit.
+def checked_domain(surface: Surface, count: int, domain: str | None, source: str) -> str:
+    """Return the domain ("face" or "vertex") of `count` rows, or raise an error if the count does not fit.
 
-    If `domain` is given, `count` must fit it.
+    If `domain` is given, `count` must fit it. Otherwise, it is "face" if the mesh has `count` faces, even if it
+    has as many vertices.
     """
-    domain = infer_domain(surface, count) if domain is None else domain
     faces, vertices = surface.face_count, len(surface.vertices)
+    if domain is None:
+        domain = "face" if count == faces else "vertex"
     if count != {"face": faces, "vertex": vertices}.get(domain):
         raise RosyError(
-            f"{source}: contains {counted(count, 'vector')}, "
-            f"but {surface.name} has {counted(faces, 'face')} and "
-            f"{counted(vertices, 'vertex', 'vertices')}"
+            f"{source}: contains {counted(count, 'row')}, but {surface.name} has "
+            f"{counted(faces, 'face')} and {counted(vertices, 'vertex', 'vertices')}"
         )
     return domain
 
@@ -151,7 +152,7 @@ def validated_directions(
     """
     directions = np.array(directions, dtype=np.float64)
     count, degree = len(directions), check_degree(directions.shape[1])
-    domain = _checked_domain(surface, count, domain, source)
+    domain = checked_domain(surface, count, domain, source)
     with np.errstate(invalid="ignore"):
         unusable = ~(np.abs(directions) < MAX_COMPONENT).all(axis=(1, 2))
     usable_directions = np.where(unusable[:, None, None], 0.0, directions)
@@ -214,16 +215,6 @@ def _vertex_averages(
         return mean_per_face(corner_values, surface.face_start)
 
     return average
-
-
-def infer_domain(surface: Surface, count: int) -> str | None:
-    """Return "face" or "vertex" if the mesh has `count` faces or vertices; None if it has neither.
-
-    If the mesh has as many faces as vertices, it is "face".
-    """
-    if count == surface.face_count:
-        return "face"
-    return "vertex" if count == len(surface.vertices) else None
 
 
 def tangent_normals(surface: Surface, domain: str) -> np.ndarray:

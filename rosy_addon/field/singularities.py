@@ -49,8 +49,8 @@ def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, 
     # A counter-clockwise loop around the head of an edge crosses the edge from side a to side b. A loop
     # around its tail crosses it from side b to side a.
     angle_sum = np.bincount(head, matching, count) - np.bincount(tail, matching, count)
-    angle_sum += 2 * np.pi - np.bincount(corner_vertex, signed_corner_angles(surface), count)
-    index = np.rint(angle_sum * field.degree / (2 * np.pi)).astype(np.int32)
+    defect = 2 * np.pi - np.bincount(corner_vertex, signed_corner_angles(surface), count)
+    index = np.rint((angle_sum + defect) * field.degree / (2 * np.pi)).astype(np.int32)
 
     has_index = mask(count, corner_vertex)
     has_index[edges.ends[~mask(len(edges.ends), edges.interior)]] = False

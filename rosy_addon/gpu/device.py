@@ -106,11 +106,7 @@ class Device:
         self._gpu.compute.dispatch(program, *groups)
 
     def draw(
-        self,
-        shader: RasterPass,
-        batches: Sequence[tuple[Any, NamedValues]],
-        color: Any,
-        depth: Any,
+        self, shader: RasterPass, batches: Sequence[tuple[Any, NamedValues]], color: Any, depth: Any
     ) -> None:
         """Draw batches, each with its own uniforms, into a color and a depth texture."""
         state = self._gpu.state

@@ -240,10 +240,7 @@ class Frame:
         self.passes.append(FramePass(shader, run, pause))
 
     def draw(
-        self,
-        shader: RasterPass,
-        batches: Sequence[tuple[Any, dict[str, Any]]],
-        target: Any,
+        self, shader: RasterPass, batches: Sequence[tuple[Any, dict[str, Any]]], target: Any
     ) -> None:
         """Add a pass that draws triangles; see `Device.draw`."""
         size = target.width, target.height

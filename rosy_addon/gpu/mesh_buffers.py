@@ -245,7 +245,7 @@ def mesh_buffers(
         rows, records = _empty_records(count, texels)
         _write_records(
             records, corners, rest_positions(surface), surface, corner_field, field.degree, channels,
-            tone_values, None if values is None else values[surface.triangles],
+            tone_values, None if values is None else values[surface.triangles]
         )  # fmt: skip
     has_tone = field is not None and tone is not None
     numbers = (None, -1)

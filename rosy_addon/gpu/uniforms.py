@@ -8,12 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..compositor.contrast import expected_std, streak_args
-from ..compositor.even_lines import (
-    FADE_PIXELS,
-    MAX_EDGE_WIDTH,
-    WOBBLE_SHIFT,
-    crowded_pixels,
-)
+from ..compositor.even_lines import FADE_PIXELS, MAX_EDGE_WIDTH, WOBBLE_SHIFT, crowded_pixels
 from ..compositor.family_hues import SOFTMAX_SHARPNESS
 from ..compositor.filter_kernel import full_sample_count
 from ..compositor.flow import channel_shifts, channel_weights
@@ -48,12 +43,7 @@ from ..compositor.streak_statistics import (
     look_streak_statistics,
     softness,
 )
-from ..compositor.surface_noise import (
-    FEATURE_CELLS,
-    LATTICE_SCALE,
-    SUBPIXEL_OFFSETS,
-    lattice_axes,
-)
+from ..compositor.surface_noise import FEATURE_CELLS, LATTICE_SCALE, SUBPIXEL_OFFSETS, lattice_axes
 from ..compositor.target_tone import ReferenceRender, tone_curve
 from ..compositor.wobble import MEAN_WAVELENGTH_WIDTHS, WOBBLE_STD, has_wobble
 from ..projection.camera import Camera

@@ -72,12 +72,7 @@ def png_bytes(rgba: np.ndarray, *, is_color: bool = True) -> bytes:
     compressed.append(compressor.flush())
     header = struct.pack(">IIBBBBB", width, height, _BIT_DEPTH, _RGBA_COLOR_TYPE, 0, 0, 0)
     color_space = [(b"sRGB", bytes([_PERCEPTUAL_INTENT]))] if is_color else []
-    chunks = [
-        (b"IHDR", header),
-        *color_space,
-        (b"IDAT", b"".join(compressed)),
-        (b"IEND", b""),
-    ]
+    chunks = [(b"IHDR", header), *color_space, (b"IDAT", b"".join(compressed)), (b"IEND", b"")]
     return _SIGNATURE + b"".join(_pack_chunk(kind, data) for kind, data in chunks)
 
 

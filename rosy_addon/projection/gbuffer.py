@@ -193,9 +193,7 @@ class GBuffer:
         channels = {channel: values[extent] for channel, values in self.channels.items()}
         return replace(part_of(self, extent), channels=channels, coverage=None, samples=None)
 
-    def instance_blocks(
-        self,
-    ) -> list[tuple[int, list[slice | np.ndarray], tuple[float, float]]]:
+    def instance_blocks(self) -> list[tuple[int, list[slice | np.ndarray], tuple[float, float]]]:
         """Return a tuple for each visible mesh instance, in the order of instances: its pixels, in blocks.
 
         Returns

@@ -39,10 +39,7 @@ LABEL = "casting shadows"
 
 
 def light_cameras(
-    instances: Sequence[MeshInstance],
-    camera: Camera,
-    kind: str,
-    vector: np.ndarray,
+    instances: Sequence[MeshInstance], camera: Camera, kind: str, vector: np.ndarray
 ) -> list[Camera]:
     """Return the cameras of the shadow maps of a light.
 

@@ -221,12 +221,7 @@ def _leaf_directions(
     root_area = (offset[:, 1].conj() * offset[:, 2]).imag
     defined = corner_field.representation.any(axis=0) & (root_area > 0)
     directions = CornerDirections(
-        degree,
-        symmetry.has_opposites,
-        leaf_offset,
-        angle,
-        deviation,
-        defined[tree.leaf_root],
+        degree, symmetry.has_opposites, leaf_offset, angle, deviation, defined[tree.leaf_root]
     )
     unit = np.exp(1j * mean_angle)
     first, second = (offset[:, corner].take(tree.leaf_root) for corner in (1, 2))

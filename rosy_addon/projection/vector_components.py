@@ -23,11 +23,7 @@ VectorComponents = Sequence[np.ndarray]
 
 def cross_components(a: VectorComponents, b: VectorComponents) -> list[np.ndarray]:
     """Return the components of the cross products of vectors."""
-    return [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 def subtract_components(a: VectorComponents, b: VectorComponents) -> list[np.ndarray]:

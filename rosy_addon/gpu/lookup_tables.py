@@ -62,9 +62,8 @@ def undirected_offsets(resources: GpuResources, look: PixelLook) -> Any:
     """
     if not is_hatched(look):
         return palette(resources)
-    return resources.lookup_texture(
-        "disc_offsets", look.line_width, lambda: disc_offsets(look.line_width)[None]
-    )
+    width = look.line_width
+    return resources.lookup_texture("disc_offsets", width, lambda: disc_offsets(width)[None])
 
 
 def ink_table(resources: GpuResources, kind: FieldKind, look: PixelLook) -> Any:
@@ -80,46 +79,43 @@ def waves(resources: GpuResources) -> Any:
 
 
 def picture_grain(
-    resources: GpuResources, width: int, height: int, look: PixelLook, line_count: int
+    resources: GpuResources, size: tuple[int, int], look: PixelLook, line_count: int
 ) -> Any:
     """Return a texture of `paper_grain.picture_paper_grain`, in the first channel.
 
-    It is at least as large as a frame of `width` x `height` pixels. It is wider than the frame, so that
+    It is at least as large as a frame with a `size` in pixels. It is wider than the frame, so that
     each of the `line_count` line directions at a pixel reads another column (`line_offset`). A look
     without paper grain gets the placeholder `palette`.
     """
     if not has_paper_grain(look):
         return palette(resources)
-    width += (line_count - 1) * line_offset(look.line_width)
+    size = size[0] + (line_count - 1) * line_offset(look.line_width), size[1]
 
     def values_at(pixel: np.ndarray, width: int) -> np.ndarray:
         return picture_paper_grain(pixel, width, look.line_width, look.seed)
 
     key = look.line_width, look.seed
-    return _pixel_texture(resources, "paper_grain", key, width, height, values_at)
+    return _pixel_texture(resources, "paper_grain", key, size, values_at)
 
 
-def picture_noise(resources: GpuResources, width: int, height: int, look: PixelLook) -> Any:
+def picture_noise(resources: GpuResources, size: tuple[int, int], look: PixelLook) -> Any:
     """Return a texture of the noise of `image_noise.image_noise` for a frame of this size."""
     settings = noise_args(look)
-    values_at = partial(image_noise, **settings)
-    return _pixel_texture(resources, "noise", settings, width, height, values_at)
+    return _pixel_texture(resources, "noise", settings, size, partial(image_noise, **settings))
 
 
 def _pixel_texture(
     resources: GpuResources,
     name: str,
     key: Any,
-    width: int,
-    height: int,
+    size: tuple[int, int],
     values_at: Callable[[np.ndarray, int], np.ndarray],
 ) -> Any:
     """Return a texture of values at the pixels of a frame, rounded up to whole tiles (`NOISE_TILE_PIXELS`).
 
     `values_at(pixel, width)` returns the values at (P,) flat indices into a frame of this width.
     """
-    tile = NOISE_TILE_PIXELS
-    width, height = -(-width // tile) * tile, -(-height // tile) * tile
+    width, height = (-(-side // NOISE_TILE_PIXELS) * NOISE_TILE_PIXELS for side in size)
 
     def create() -> np.ndarray:
         pixel = np.arange(width * height, dtype=np.int32)

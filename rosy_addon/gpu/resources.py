@@ -257,18 +257,13 @@ class GpuResources:
         return self._look_up(key, call, LINE_SECONDS * len(surface.triangles), send)
 
     def image(
-        self,
-        name: Hashable,
-        width: int,
-        height: int,
-        texel_format: str = "RGBA32F",
-        layers: int = 0,
+        self, name: Hashable, size: tuple[int, int], texel_format: str = "RGBA32F", layers: int = 0
     ) -> Any:
-        """Return the image with a name, size and format. Its contents are those of its last use, if any."""
-        size_and_format = width, height, texel_format, layers
-        key = "image", name, *size_and_format
-        texture = self._kept[key][0] if key in self._kept else self.device.texture(*size_and_format)
-        return self._keep(key, texture, IMAGE_LIFETIME)
+        """Return the image with a name, size and format. It has the contents of its last use, if any."""
+        key = "image", name, size, texel_format, layers
+        if key not in self._kept:
+            self._keep(key, self.device.texture(size, texel_format, layers), IMAGE_LIFETIME)
+        return self._keep(key, self._kept[key][0], IMAGE_LIFETIME)
 
     def lookup_texture(
         self,
@@ -291,13 +286,8 @@ class GpuResources:
             Smallest width and height in texels. A texture that is smaller is created again.
         """
         last_key, texture = self._lookup_textures.get(name, (None, None))
-        is_kept = (
-            texture is not None
-            and last_key == key
-            and texture.width >= min_size[0]
-            and texture.height >= min_size[1]
-        )
-        if not is_kept:
+        is_kept = texture is not None and last_key == key
+        if not is_kept or texture.width < min_size[0] or texture.height < min_size[1]:
             texture = self._texture(create())
             self._lookup_textures[name] = key, texture
         return texture
@@ -368,11 +358,10 @@ class GpuResources:
         """Return (H, W, C) values as a texture of four channels; those after the first C are 0."""
         height, width, channels = values.shape
         data = np.pad(values, ((0, 0), (0, 0), (0, 4 - channels))) if channels < 4 else values
-        return self.device.texture(width, height, "RGBA32F", data=data)
+        return self.device.texture((width, height), "RGBA32F", data=data)
 
     def _upload_atlas(self, mip_map: MipMap) -> MipAtlas:
         max_side = min(MAX_TONE_IMAGE_SIDE, self.device.max_texture_size // 2)
         texels, size, max_level = mip_atlas(mip_map, max_side)
-        height, width = texels.shape[:2]
-        texture = self.device.texture(width, height, "RGBA16F", data=texels)
+        texture = self.device.texture(texels.shape[1::-1], "RGBA16F", data=texels)
         return MipAtlas(texture, size, max_level, len(mip_map.levels) - 1 - max_level)

@@ -238,7 +238,7 @@ def covering_uniforms(kind: FieldKind) -> dict[str, Any]:
     return {
         "degree": kind.degree,
         "line_count": kind.line_count,
-        "sheet_count": kind.sheets_per_turn,
+        "sheet_count": kind.symmetry.sheets_per_turn,
     }
 
 

@@ -228,7 +228,7 @@ def mesh_buffers(
     numbers = None if color_values is None else color_values[surface.triangles]
     texels = record_texels(len(channels), tones is not None, numbers is not None)
     rows, records = empty_records(count, texels)
-    _write_records(records, corners, surface, corner_field, field.degree, channels, tones, numbers)
+    _write_records(records, corners, surface, corner_field, channels, tones, numbers)
     values = () if color_values is None else (value_range(color_values), _values_texel(channels))
     return MeshBuffers(*arrays, rows, texels, len(channels), tone is not None, *values)
 
@@ -245,7 +245,6 @@ def _write_records(
     corners: np.ndarray,
     surface: Surface,
     corner_field: CornerField,
-    degree: int,
     channels: Sequence[FieldChannel],
     tone: np.ndarray | None,
     numbers: np.ndarray | None,
@@ -270,13 +269,17 @@ def _write_records(
         part[:, NORMAL_TEXEL:VALUE_TEXEL, :3] = normals.transpose(2, 0, 1)
         part[:, NORMAL_TEXEL:VALUE_TEXEL, 3] = rest_corners[..., 1]
         part[:, -1, :3] = rest_corners[..., 2]
-        _write_values(part, VALUE_TEXEL, corner_field.representation[:, extent], degree, 0)
+        _write_values(
+            part, VALUE_TEXEL, corner_field.representation[:, extent], corner_field.degree, 0
+        )
         for layer, (channel, values) in enumerate(zip(channels, channel_values, strict=True)):
             # A RoSy has the constant harmonic 1.
             default = np.complex64(1 if channel == ("deviation", 0) else 0)
             part_values = (default,) * 3 if values is None else values[:, extent]
             texel = VALUE_TEXEL + 2 + 2 * layer
-            _write_values(part, texel, part_values, rotation_order(channel, degree), layer)
+            _write_values(
+                part, texel, part_values, rotation_order(channel, corner_field.degree), layer
+            )
         if numbers is not None:
             texel = _values_texel(channels)
             known = np.isfinite(numbers[extent]).all(axis=1)

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.progress import report
-
-#: Triangles, spans or fragments per block. Bounds memory, and fits the caches of the processor.
-BLOCK_SIZE = 1 << 14
+from .pixel_blocks import pixel_blocks
 
 #: Largest sum of nonnegative barycentric coordinates that rounding explains. If the sum is larger, some
 #: coordinates were negative and set to 0, so the pixel center is outside of the triangle.
@@ -44,9 +42,8 @@ def barycentrics(
     corners = np.ascontiguousarray(triangles.T)
     weights = np.empty((3, len(pixel)), dtype=np.float32)
     front_facing = np.empty(len(pixel), dtype=bool)
-    for start in range(0, len(pixel), BLOCK_SIZE):
-        report(start / len(pixel), LABEL)
-        block = slice(start, start + BLOCK_SIZE)
+    for block in pixel_blocks(len(pixel)):
+        report(block.start / len(pixel), LABEL)
         row, column = np.divmod(pixel[block], np.int32(width))
         column, row = column + 0.5, row + 0.5
         offsets = []

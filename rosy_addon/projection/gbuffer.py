@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -64,6 +65,10 @@ class MeshInstance:
     def face_points(self) -> np.ndarray:
         """Return the (n, 3) float64 positions of the vertices that belong to a face, in world space."""
         return self.world_points()[self.surface.used_vertices]
+
+
+#: The mesh instances of a scene.
+Instances = Sequence[MeshInstance]
 
 
 class PixelCoverage(NamedTuple):

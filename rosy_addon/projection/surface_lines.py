@@ -15,12 +15,13 @@ from ..core.cache import Cache, content_hash
 from ..core.memory import check_memory
 from ..core.progress import progress, report
 from ..field.bisection import BisectionTree, bisect
+from ..field.curvature import with_smooth_normals
 from ..field.directional_field import evaluate_harmonics, field_symmetry
 from ..field.frames import dot_components, transform_components
 from ..field.representation import signed_power
 from ..field.rosy_field import RosyField
 from ..field.stripe_pattern import CornerDirections, StripePattern, stripe_pattern
-from ..field.surface import Surface, build_surface
+from ..field.surface import Surface
 from .corner_field import CornerField, field_at_corners, transport_phase
 from .face_values import SIMILARITY_EPS, similarity_scale
 from .field_channel import rotation_order
@@ -139,19 +140,9 @@ def surface_lines(
     rest = surface
     if surface.rest_vertices is not None:
         with progress(0.0, 0.05, label):
-            rest = build_surface(
-                surface.rest_vertices,
-                surface.corner_vertex,
-                surface.face_start,
-                name=surface.name,
-                corner_fan=surface.corner_fan,
-                triangles=surface.triangles,
-                triangle_face=surface.triangle_face,
-            )
-    matrix = np.eye(4)
-    matrix[:3, :3] = stretch
+            rest = with_smooth_normals(surface.in_rest_shape(), surface.corner_fan)
     with progress(0.05, 0.1, label):
-        corner_field = field_at_corners(rest, matrix, field, display)
+        corner_field = field_at_corners(rest, stretch, field, display)
     points = transform_components(np.ascontiguousarray(rest.vertices.T), stretch).T
     max_triangles = max(max_triangles, len(rest.triangles))
     report(0.1, label)
@@ -163,20 +154,19 @@ def surface_lines(
         "choose wider lines or streaks instead of even lines",
     )
     report(0.2, label)
-    directions, heading = _leaf_directions(tree, points, rest, corner_field, field)
+    corners = points.take(rest.triangle_vertex, axis=0)
+    directions, heading = _leaf_directions(tree, corners, corner_field, field)
     with progress(0.25, 1.0, label):
         pattern = stripe_pattern(tree.leaf_vertex, directions, spacing)
     return SurfaceLines(tree, pattern, heading)
 
 
 def _leaf_directions(
-    tree: BisectionTree,
-    points: np.ndarray,
-    surface: Surface,
-    corner_field: CornerField,
-    field: RosyField,
+    tree: BisectionTree, corners: np.ndarray, corner_field: CornerField, field: RosyField
 ) -> tuple[CornerDirections, np.ndarray]:
     """Interpolate a field to the corners of the leaves of a tree.
+
+    `corners` are the (T, 3, 3) positions of the corners of the surface's triangles.
 
     Returns
     -------
@@ -186,7 +176,6 @@ def _leaf_directions(
         See `SurfaceLines`.
     """
     x, y = tangent_frame_components(corner_field.geometric_normal)
-    corners = points.take(surface.triangle_vertex, axis=0)
     sides = (corners - corners[:, :1]).transpose(1, 2, 0)
     offset = np.stack(
         [dot_components(side, x) + 1j * dot_components(side, y) for side in sides], axis=1
@@ -199,10 +188,8 @@ def _leaf_directions(
 
         The values rotate with the frame by the power `order`.
         """
-        in_plane = np.stack(
-            [z * signed_power(phase, order) for z, phase in zip(values, to_plane, strict=True)],
-            axis=1,
-        )
+        pairs = zip(values, to_plane, strict=True)
+        in_plane = np.stack([z * signed_power(phase, order) for z, phase in pairs], axis=1)
         return np.einsum("lcr,lr->lc", weights, in_plane.take(tree.leaf_root, axis=0))
 
     degree = field.degree

@@ -73,17 +73,14 @@ def _sample_bilinear(image: np.ndarray, u: np.ndarray, v: np.ndarray, repeat: bo
     height, width = image.shape
     neighbors, fractions = [], []
     for position, size in ((v, height), (u, width)):
-        position = (
-            position - np.floor(position) if repeat else np.clip(position, 0, 1)
-        ) * size - 0.5
+        position = position - np.floor(position) if repeat else np.clip(position, 0, 1)
+        position = position * size - 0.5
         first = np.floor(position)
         fractions.append((position - first).astype(np.float32))
         first = first.astype(np.intp)
-        pair = first, first + 1
-        neighbors.append(
-            [index % size if repeat else np.clip(index, 0, size - 1) for index in pair]
-        )
-    (low, high), (left, right) = neighbors
+        for index in (first, first + 1):
+            neighbors.append(index % size if repeat else np.clip(index, 0, size - 1))
+    low, high, left, right = neighbors
     fraction_y, fraction_x = fractions
     below = image[low, left] * (1 - fraction_x) + image[low, right] * fraction_x
     above = image[high, left] * (1 - fraction_x) + image[high, right] * fraction_x

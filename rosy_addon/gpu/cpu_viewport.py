@@ -41,10 +41,8 @@ class CpuViewportRenderer(ViewportRenderer):
         vertices = np.zeros((6, 4), dtype=np.float32)
         vertices[:, :2] = [(-1, -1), (1, -1), (1, 1), (-1, -1), (1, 1), (-1, 1)]
         vertices[:, 2] = -0.9999
-        uniforms = {
-            **matrix_rows("clip", "xyzw", np.eye(4)),
-            **matrix_rows("plane", range(6), NO_CLIP_PLANES),
-        }
+        uniforms = matrix_rows("clip", "xyzw", np.eye(4))
+        uniforms |= matrix_rows("plane", range(6), NO_CLIP_PLANES)
         self._fullscreen_batch = device.batch(vertices), uniforms
 
     def prepare_steps(self, instances: Sequence[MeshInstance], display: str) -> Steps[Any]:

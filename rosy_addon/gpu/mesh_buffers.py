@@ -79,6 +79,10 @@ class MeshBuffers:
         """Number of triangles."""
         return len(self.corners) // 3
 
+    def model_matrix(self, matrix: np.ndarray) -> np.ndarray:
+        """Return the (4, 4) map from `corners` to world space, given the map from object space."""
+        return split_matrix(matrix)[1] @ translation_matrix(self.center)
+
 
 def split_matrix(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Split a matrix into a linear map that changes the shape, followed by a similarity.

@@ -18,15 +18,7 @@ from ..projection.surface_lines import rest_matrix
 from ..projection.surface_tone import MipMap
 from ..worker.job import Call, run
 from .device import Device
-from .mesh_buffers import (
-    FieldKind,
-    MeshBuffers,
-    field_kinds,
-    mesh_buffers,
-    mip_atlas,
-    split_matrix,
-    translation_matrix,
-)
+from .mesh_buffers import FieldKind, MeshBuffers, field_kinds, mesh_buffers, mip_atlas, split_matrix
 from .preparation import Preparation, prepare_steps
 from .surface_records import feature_records, line_records, outline_records
 
@@ -180,12 +172,10 @@ class GpuResources:
         items = []
         for instance, mesh in zip(instances, meshes, strict=True):
             kind = None if instance.field is None else kinds[instance.field.degree]
-            _, model_matrix = split_matrix(instance.matrix)
-            model_matrix = model_matrix @ translation_matrix(mesh.buffers.center)
+            model_matrix = mesh.buffers.model_matrix(instance.matrix)
             items.append(DrawItem(instance, mesh, model_matrix, kind))
-        self._kept = {
-            key: kept for key, kept in self._kept.items() if kept[1] >= self._upload_count
-        }
+        for key in [key for key, kept in self._kept.items() if kept[1] < self._upload_count]:
+            del self._kept[key]
         return items
 
     def feature_curvature(self, surface: Surface) -> Any:
@@ -266,11 +256,7 @@ class GpuResources:
         return self._keep(key, self._kept[key][0], IMAGE_LIFETIME)
 
     def lookup_texture(
-        self,
-        name: str,
-        key: Any,
-        create: Callable[[], np.ndarray],
-        min_size: tuple[int, int] = (0, 0),
+        self, name: str, key: Any, create: Callable[[], Any], min_size: tuple[int, int] = (0, 0)
     ) -> Any:
         """Return a texture of values, created if it does not exist.
 

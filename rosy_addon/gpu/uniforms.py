@@ -48,15 +48,7 @@ from ..compositor.target_tone import ReferenceRender, tone_curve
 from ..compositor.wobble import MEAN_WAVELENGTH_WIDTHS, WOBBLE_STD, has_wobble
 from ..projection.camera import Camera
 from ..projection.shadow_maps import NORMAL_BIAS_PIXELS
-from .defines import (
-    FLOW_ALONG,
-    FLOW_NONE,
-    FLOW_TO_ANGLE,
-    HEADLIGHT,
-    KERNELS,
-    POINT_LIGHT,
-    SUN_LIGHT,
-)
+from . import defines
 from .mesh_buffers import FieldKind
 from .resources import DrawItem
 
@@ -109,7 +101,7 @@ def look_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
     ends = magnitude_range(look)
     return {
         **covering_uniforms(kind),
-        "kernel": KERNELS[kernel],
+        "kernel": defines.KERNELS[kernel],
         **_flow_uniforms(kind, look),
         "half_length": 0 if is_even(look) else look.length,
         "full_samples": full_sample_count(look.length, kernel),
@@ -150,9 +142,10 @@ def look_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
 def _flow_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
     """Return the uniforms of drifting streaks: the kind of drift, and the shifts and weights of channels."""
     if not has_flow(look):
-        return {"flow_mode": FLOW_NONE, "flow_shifts": (0.0,) * 4, "flow_weights": (0.0,) * 4}
+        zeros = (0.0,) * 4
+        return {"flow_mode": defines.FLOW_NONE, "flow_shifts": zeros, "flow_weights": zeros}
     return {
-        "flow_mode": FLOW_TO_ANGLE if kind.symmetry.has_opposites else FLOW_ALONG,
+        "flow_mode": defines.FLOW_TO_ANGLE if kind.symmetry.has_opposites else defines.FLOW_ALONG,
         "flow_shifts": (*channel_shifts(look.flow_phase, look.flow_distance), 0.0),
         "flow_weights": (*channel_weights(look.flow_phase), 0.0),
     }
@@ -166,19 +159,18 @@ def _paper_grain_depth(look: PixelLook, statistics: StreakStatistics | None) -> 
 
 def light_uniforms(look: Look, lights: Sequence[Light]) -> list[dict[str, Any]]:
     """Return the uniforms of each light; if there is none, the uniforms of a black headlight."""
+    headlight = {"light_kind": defines.HEADLIGHT, "light_vector": (0.0,) * 4}
     if look.light == "headlight":
-        return [{"light_kind": HEADLIGHT, "light_vector": (0.0,) * 4, "light_color": (1.0,) * 4}]
+        return [{**headlight, "light_color": (1.0,) * 4}]
     result = [
         {
-            "light_kind": SUN_LIGHT if light.kind == "sun" else POINT_LIGHT,
+            "light_kind": defines.SUN_LIGHT if light.kind == "sun" else defines.POINT_LIGHT,
             "light_vector": (*np.asarray(light.vector, dtype=float), 0.0),
             "light_color": (*np.asarray(light.color) * light.strength, 1.0),
         }
         for light in lights_of(look, lights)
     ]
-    return result or [
-        {"light_kind": HEADLIGHT, "light_vector": (0.0,) * 4, "light_color": (0.0,) * 4}
-    ]
+    return result or [{**headlight, "light_color": (0.0,) * 4}]
 
 
 def tone_uniforms(look: Look, camera: Camera, reference: ReferenceRender | None) -> dict[str, Any]:

@@ -133,7 +133,10 @@ class Device:
         self._gpu.state.blend_set(blend)
 
     def viewport(self) -> tuple[int, int, int, int]:
-        """Return the left and bottom border, width and height of the current view in its frame buffer."""
+        """Return x and y of the lower left corner, width and height of the current view, in pixels.
+
+        The corner is relative to the frame buffer.
+        """
         return tuple(self._gpu.state.viewport_get())
 
     def _draw_batches(

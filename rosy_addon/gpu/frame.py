@@ -70,7 +70,8 @@ class Frame:
     textures : dict of str to texture
         Results of the passes so far, by their names in shaders.
     prepared : dict
-        Handles of data that was computed from the meshes for this picture, by the keys of the stages.
+        Handles of data that was computed from the meshes for this picture. The keys are defined by the
+        functions of the stages that return lookups, such as `noise_stage.feature_lookups`.
     passes : list of FramePass
         The passes that are still to be run, including the passes over the samples.
     """

@@ -34,7 +34,8 @@ MAX_DISPATCH_STEPS = 1 << 29
 def even_line_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
     """Return functions that look up the evenly spaced lines of instances, by the keys of `Frame.prepared`.
 
-    There are none if the look does not draw evenly spaced lines.
+    Each calls `GpuResources.line_records`: it returns the lines, or a `Preparation` if they are not on the
+    device. There are no functions if the look does not draw evenly spaced lines.
     """
     look = frame.look
     if not is_even(look):
@@ -175,8 +176,9 @@ def _trace(
 def _unfold(frame: Frame, kind: FieldKind, box: Box) -> dict[str, Any]:
     """Render the covering of the fields of one kind, and return its images by name.
 
-    ``cells`` holds the phase and the noise of each pixel, ``directions`` the directions on screen, and
-    ``angle_gradients`` the directions with the gradients of their angles.
+    ``cells`` holds the phase and the noise of each pixel. ``directions`` has a layer for each line
+    direction, with its vector on screen. ``angle_gradients`` has the same layers: x and y of the vector,
+    and the derivatives of its angle along x and y, in radians per pixel.
     """
     lines = kind.line_count
     cell_format = "RG32F" if noise_args(frame.look)["channels"] == 1 else "RGBA32F"

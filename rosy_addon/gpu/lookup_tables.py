@@ -41,11 +41,11 @@ def color_map(resources: GpuResources, look: PixelLook) -> Any:
 
 
 def thresholds(resources: GpuResources, look: PixelLook) -> Any:
-    """Return a texture of thresholds from `streak_statistics`, in the first channel.
+    """Return a texture of the ink thresholds for each coverage from 0 to 1, in the first channel.
 
-    Row 0 contains the thresholds of streaks or, for evenly spaced lines, the widths from
-    `even_lines.look_width_table`. Row 1 contains the thresholds of undirected texture. A look without
-    hatching gets the placeholder `palette`.
+    Row 0 contains `StreakStatistics.threshold` or, for evenly spaced lines, the widths from
+    `even_lines.look_width_table`. Row 1 contains `StreakStatistics.disc_threshold`, for the texture where
+    the field is undefined. A look without hatching gets the placeholder `palette`.
     """
     if not is_hatched(look):
         return palette(resources)
@@ -56,9 +56,10 @@ def thresholds(resources: GpuResources, look: PixelLook) -> Any:
 
 
 def undirected_offsets(resources: GpuResources, look: PixelLook) -> Any:
-    """Return a texture of `undirected.disc_offsets`, in the first two channels.
+    """Return a texture of sample positions in a disc, in the first two channels.
 
-    A look without hatching gets the placeholder `palette`.
+    They are `undirected.disc_offsets`: offsets in pixels from the center of the disc over which the noise is
+    averaged where the field is undefined. A look without hatching gets the placeholder `palette`.
     """
     if not is_hatched(look):
         return palette(resources)
@@ -111,8 +112,9 @@ def _pixel_texture(
     size: tuple[int, int],
     values_at: Callable[[np.ndarray, int], np.ndarray],
 ) -> Any:
-    """Return a texture of values at the pixels of a frame, rounded up to whole tiles (`NOISE_TILE_PIXELS`).
+    """Return a texture of values at the pixels of a frame.
 
+    Width and height of the texture are rounded up to multiples of `NOISE_TILE_PIXELS`.
     `values_at(pixel, width)` returns the values at (P,) flat indices into a frame of this width.
     """
     width, height = (-(-side // NOISE_TILE_PIXELS) * NOISE_TILE_PIXELS for side in size)

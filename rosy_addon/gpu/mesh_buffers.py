@@ -132,8 +132,8 @@ class FieldKind:
     degree : int
         N.
     channels : tuple of FieldChannel
-        Layers of the image of field channels: harmonics of all orders from the first to the last, then
-        the families.
+        Layers of the image of field channels: the harmonics of the deviation from a RoSy (see
+        `field.directional_field`) of all orders from the first to the last, then the families.
     symmetry : FieldSymmetry
     """
 
@@ -255,11 +255,12 @@ def _write_records(
 ) -> None:
     """Fill the (T, texels, 4) float32 records, block by block of triangles.
 
-    Texels 0 to 2 are the positions of the corners, 3 to 5 the normals there, 6 and 7 the values of
-    `CornerField.representation` with the order of its rotation. Each channel has two texels, with
-    the order of its rotation and its layer. `numbers`, the (T, 3) values for the color map, have one texel.
-    Its last component is 1 if all three values are finite. A tone with (T, 3, 1 or 2) values has two
-    texels. Of the `rest_positions`, x is in the fourth components of the positions, y in the fourth
+    Texels 0 to 2 are the positions of the corners, 3 to 5 the normals there. Texels 6 and 7 contain
+    `CornerField.representation`, and each channel has two further texels: six components are the real and
+    imaginary parts at the three corners, the seventh is the result of `field_channel.rotation_order`, and
+    the eighth is the layer of the channel (0 for the representation). `numbers`, the (T, 3) values for the
+    color map, have one texel. Its last component is 1 if all three values are finite. A tone with
+    (T, 3, 1 or 2) values has two texels. Of the `rest_positions`, x is in the fourth components of the positions, y in the fourth
     components of the normals, and z in the last texel.
     """
     rest = rest_positions(surface)

@@ -22,9 +22,10 @@ from .uniforms import surface_cell_uniforms, surface_noise_uniforms, wobble_unif
 
 
 def feature_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
-    """Return functions that look up the feature curvatures of surfaces, by the keys of `Frame.prepared`.
+    """Return functions that look up the curvatures of surfaces, by the keys of `Frame.prepared`.
 
-    There are none if the noise does not depend on them.
+    Each calls `GpuResources.feature_curvature`: it returns a texture, or a `Preparation` if the curvature is
+    not on the device. There are no functions if the noise does not depend on the curvature.
     """
     if frame.look.anchor != "surface" or not frame.look.detail:
         return {}
@@ -53,7 +54,7 @@ def render_noise(frame: Frame) -> None:
 
 
 def _render_wobble(frame: Frame) -> None:
-    """Render the angle by which lines wobble at each pixel into ``frame.textures["wobble_angles"]``.
+    """Render the angle in radians by which lines wobble at each pixel to ``frame.textures["wobble_angles"]``.
 
     `wobble.wobble_angle` does the same with numpy.
     """

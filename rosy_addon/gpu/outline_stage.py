@@ -18,7 +18,8 @@ from .uniforms import clip_uniforms, min_normal_cosine
 def outline_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
     """Return functions that look up the creases of instances, by the keys of `Frame.prepared`.
 
-    There are none if the look has no outline.
+    Each calls `GpuResources.outline_textures`: it returns `OutlineTextures`, or a `Preparation` if they are
+    not on the device. There are no functions if the look has no outline.
     """
     if not has_outline(frame.look):
         return {}

@@ -42,8 +42,8 @@ def prepare_steps(lookups: Iterable[Callable[[], Any]]) -> Steps[list[Any]]:
     Yields
     ------
     Call or Step
-        A `Call` that takes long, to be made by the caller. A call that does not is made here, after its
-        `Step` is yielded.
+        For a call that takes longer than `IN_PLACE_SECONDS`, the `Call`. The caller makes it, and sends its
+        result. For a shorter call, a `Step` with its label; then the call is made here.
 
     Returns
     -------

@@ -223,7 +223,7 @@ class GpuRenderer(ViewportRenderer):
     def _color_range(
         self, items: Sequence[DrawItem], view: ViewInput
     ) -> tuple[float, float] | None:
-        """Return `Picture.color_range` of the last picture."""
+        """Return `Picture.color_range` of a picture. It must be the last one that was drawn."""
         if not colors_magnitude(view.look) or magnitude_range(view.look):
             return fixed_color_range(view.look, view.instances)
         frame, tops = self._frame(items, view), set()

@@ -128,7 +128,7 @@ class MipAtlas:
 class GpuResources:
     """The meshes, images and textures on a device.
 
-    Those that have not been used during the last uploads are freed; see `MESH_LIFETIME`.
+    A resource is freed if it was not used during a number of uploads, such as `MESH_LIFETIME`.
 
     Parameters
     ----------
@@ -179,9 +179,10 @@ class GpuResources:
         return items
 
     def feature_curvature(self, surface: Surface) -> Any:
-        """Look up the curvature of features at the corners of each triangle of a surface.
+        """Look up the curvature of a surface at the corners of each triangle.
 
-        Return a texture, or a `Preparation` of it. See `field.feature_curvature`.
+        It is in units of 1 / length in object space; see `field.feature_curvature`. Return a texture, or a
+        `Preparation` of it.
         """
         call = Call(feature_records, (surface,), label="measuring features")
         key = "feature curvature", surface.rest_shape_key

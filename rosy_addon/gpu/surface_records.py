@@ -46,7 +46,8 @@ def line_rows(lines: SurfaceLines) -> tuple[np.ndarray, int]:
     rows : (rows, ROW_TEXELS, 4) float32 ndarray
         First, a texel for each node of the `BisectionTree`: the node's first child or -1, its bisected
         edge, and its leaf. Then 1 + M texels for each leaf: its heading (see `SurfaceLines`), and for each
-        of the M line directions the phases at the corners and the index of the phase.
+        of the M line directions the phases at the corners and the number of lines that end in the leaf
+        (see `StripePattern`).
     node_count : int
         Number of nodes in `rows`; 0 if no triangle is bisected, so that no nodes are needed.
     """
@@ -78,6 +79,7 @@ def outline_records(
     center : (3,) ndarray
         `MeshBuffers.center`.
     crease_angle : float or None
+        Smallest angle between the normals of the faces at a crease, in radians. None: there are no creases.
 
     Returns
     -------

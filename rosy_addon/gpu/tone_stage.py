@@ -18,9 +18,9 @@ from .uniforms import light_uniforms, light_view_uniforms, shadow_uniforms, tone
 def render_target_tones(frame: Frame) -> None:
     """Render the target tone of each pixel into ``frame.textures["tones"]``.
 
-    The light alone is rendered into the texture ``lighting``. If the look colors values of the surface,
-    the last component of ``tones`` is the position of the value in the color map, from 0 to 1, or -1 where
-    there is no value. `target_tone.target_tone` does the same with numpy.
+    The light alone is rendered into the texture ``lighting``. If the look shows values of the surface by a
+    color map, the last component of ``tones`` is the position of the value in the color map, from 0 to 1,
+    or -1 where there is no value. `target_tone.target_tone` does the same with numpy.
     """
     look, reference = frame.look, frame.view.reference
     tones = frame.image("tones")

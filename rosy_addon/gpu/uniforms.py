@@ -140,7 +140,11 @@ def look_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
 
 
 def _flow_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
-    """Return the uniforms of drifting streaks: the kind of drift, and the shifts and weights of channels."""
+    """Return the uniforms of drifting streaks: the kind of drift, and the state of the noise channels.
+
+    For each of the three channels, these are the shift along the line, in steps of the streamline, and the
+    weight; see `flow.channel_shifts` and `flow.channel_weights`.
+    """
     if not has_flow(look):
         zeros = (0.0,) * 4
         return {"flow_mode": defines.FLOW_NONE, "flow_shifts": zeros, "flow_weights": zeros}
@@ -188,14 +192,22 @@ def tone_uniforms(look: Look, camera: Camera, reference: ReferenceRender | None)
 
 
 def shadow_uniforms(item: DrawItem, light_view: Camera) -> dict[str, Any]:
-    """Return the uniforms that render a shadow map: the matrices from model space to clip space and depth."""
+    """Return the uniforms that render a shadow map, as rows of matrices.
+
+    They are the matrix from model space to the clip space of the light, and the row that maps model space to
+    the depth along the axis of the light's camera.
+    """
     clip = light_view.projection @ light_view.view @ item.model_matrix
     depth_row = tuple(-(light_view.view @ item.model_matrix)[2])
     return {**matrix_rows("clip", "xyzw", clip), "depth_row": depth_row}
 
 
 def light_view_uniforms(light_view: Camera, camera: Camera) -> dict[str, Any]:
-    """Return the uniforms that look up a shadow map: the matrices from camera space, and the normal bias."""
+    """Return the uniforms that look up a shadow map: two matrices, as rows, and the normal bias.
+
+    The first matrix maps camera space to the camera space of the light, the second maps the latter to x and y
+    of the light's clip space. The bias is in Blender units, for a perspective light at depth 1.
+    """
     rotation, translation = camera.view[:3, :3], camera.view[:3, 3]
     camera_to_world = np.eye(4)
     camera_to_world[:3, :3], camera_to_world[:3, 3] = rotation.T, -rotation.T @ translation
@@ -303,7 +315,10 @@ def surface_cell_uniforms(
 
 
 def wobble_uniforms(look: PixelLook, item: DrawItem, camera: Camera) -> dict[str, Any]:
-    """Return the uniforms for the wavelength of the wobble, in pixels or in units of a surface."""
+    """Return the uniforms for the wavelength of the wobble.
+
+    It is in units of the object space of the item if the noise is anchored to surfaces, otherwise in pixels.
+    """
     wavelength = look.line_width * MEAN_WAVELENGTH_WIDTHS
     cell_size = cell_size_args(look)
     on_surface = look.anchor == "surface"

@@ -29,11 +29,25 @@ def barycentrics(
     Coordinates", 1997), which are also valid for triangles that extend behind the eye. They are
     evaluated relative to the pixel center, so that small triangles lose no precision.
 
+    Parameters
+    ----------
+    vertices : (V, 4) float64 ndarray
+        Clip space.
+    triangles : (T, 3) ndarray of int
+        Indices into `vertices`.
+    pixel : (P,) int32 ndarray
+        Flat indices into the frame.
+    triangle : (P,) ndarray of int
+        For each pixel, the index of the triangle whose coordinates are computed.
+    width, height : int
+        Size of the frame in pixels.
+
     Returns
     -------
     weights : (P, 3) float32 ndarray
-        Coordinates of a point in the triangle. If the pixel center is outside of the triangle, this is
-        another point. The coordinates are 1 / 3 each for triangles that have no area on screen.
+        Barycentric coordinates, not negative, with sum 1. If the pixel center is outside of the triangle,
+        negative coordinates are set to 0, and the others are scaled to the sum 1. The coordinates are
+        1 / 3 each for triangles that have no area on screen.
     front_facing : (P,) bool ndarray
         Whether the corners run counter-clockwise on screen.
     """

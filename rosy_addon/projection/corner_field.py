@@ -325,8 +325,8 @@ def _corner_normals(
     -------
     normals : 3 (3, n) float32 ndarrays
     phases : 3 (n,) complex64 ndarrays or None
-        Unit complex numbers: the rotations from the tangent frames of the fan normals to those of the
-        custom normals. None if there are no custom normals.
+        Unit complex numbers: the rotations from the tangent frames of the fan normals to the tangent
+        frames of the custom normals. None if there are no custom normals.
     """
     normals = [fans.normal.take(index, axis=1) for index in fan]
     if custom is None:

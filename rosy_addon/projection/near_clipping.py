@@ -23,7 +23,16 @@ class ClippedTriangles(NamedTuple):
 
 
 def clip_near(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, ClippedTriangles]:
-    """Clip triangles at the near plane. Triangles behind it are removed.
+    """Clip triangles at the near plane, and remove the parts between this plane and the eye.
+
+    Triangles that are wholly between the near plane and the eye, or behind the eye, are left out.
+
+    Parameters
+    ----------
+    vertices : (V, 4) float64 ndarray
+        Clip space. The near plane is z = -w.
+    triangles : (T, 3) int32 ndarray
+        Indices into `vertices`.
 
     Returns
     -------
@@ -53,17 +62,18 @@ def clip_near(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, 
 def _clip_crossing_triangles(
     vertices: np.ndarray, triangles: np.ndarray, inside: np.ndarray, crossing: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Clip K triangles that cross the near plane, and triangulate what is in front of it.
+    """Clip K triangles that cross the near plane, and triangulate the parts beyond the plane.
 
     In each crossing triangle, one vertex (`apex`) is on one side of the plane and two are on the
-    other. If the apex is in front, a triangle remains, otherwise a quadrilateral.
+    other. If the apex is beyond the plane, a triangle remains, otherwise a quadrilateral.
 
     Parameters
     ----------
     vertices : (V, 4) float64 ndarray
+        Clip space.
     triangles : (T, 3) int32 ndarray
     inside : (V,) bool ndarray
-        Whether each vertex is in front of the near plane.
+        Whether each vertex is beyond the near plane as seen from the eye, or on it: z >= -w.
     crossing : (K,) int32 ndarray
         Indices of the crossing triangles.
 

@@ -55,8 +55,8 @@ class _OtherSamples(NamedTuple):
 class _Entries(NamedTuple):
     """The P pixels of a G-buffer, as arrays that are compared with `_OtherSamples`.
 
-    Most arrays are those of `_OtherSamples`, at the centers of the pixels. `slope_x`, `slope_y` and
-    `tolerance` are results of `pixel_neighbors.depth_slopes`.
+    `x`, `y`, `depth`, `instance_id` and `normal` are as in `_OtherSamples`, at the centers of the pixels.
+    `slope_x`, `slope_y` and `tolerance` are results of `pixel_neighbors.depth_slopes`.
     """
 
     x: np.ndarray

@@ -161,7 +161,10 @@ class _PixelGrid(NamedTuple):
 def _pixel_grid(
     gbuffer: GBuffer, pixels: slice, grid_index: np.ndarray, shape: tuple[int, int]
 ) -> _PixelGrid:
-    """Return some pixels of a G-buffer as a grid; `grid_index` holds their flat indices in it."""
+    """Return some pixels of a G-buffer as a grid of the given `shape`, rows and columns.
+
+    `grid_index` holds the flat index of each of these pixels into the grid.
+    """
 
     def scatter(values: np.ndarray, fill_value: float = 0) -> np.ndarray:
         grid = np.full(shape, fill_value, dtype=values.dtype)

@@ -17,7 +17,11 @@ HOLONOMY_EPS = 3e-4
 
 
 def _channel_pixels(gbuffer: GBuffer, channel: FieldChannel) -> np.ndarray:
-    """Return the values of a channel in a G-buffer; add it with the values of a plain RoSy field if new."""
+    """Return the (P,) values of a channel in a G-buffer.
+
+    If the G-buffer does not have the channel yet, it is added, with the values for evenly spaced directions
+    without labels: 1 for the harmonic of order 0, otherwise 0.
+    """
     if channel == REPRESENTATION:
         return gbuffer.representation
     if channel not in gbuffer.channels:

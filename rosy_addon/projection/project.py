@@ -49,8 +49,8 @@ def project(
         Instances without a field only occlude others.
     camera : Camera
     display : {"smooth", "flat"}
-        Average values and normals over smooth fans and interpolate them, or keep those of each
-        face.
+        "smooth": average values and normals over smooth fans, and interpolate them. "flat": keep the
+        values and the normal of each face.
     cache : Cache, optional
         Stores corner fields, which do not depend on the camera.
     samples : int

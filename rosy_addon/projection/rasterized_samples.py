@@ -14,8 +14,8 @@ from .rasterizer import MAX_BAND_PIXELS, Rows, rasterize_rows, to_screen
 class SampledTriangles(NamedTuple):
     """The visible triangles at S x S samples of each of the P covered pixels, in ascending order of pixel.
 
-    Each pixel has a main triangle. The E samples that show another triangle than that of their pixel are
-    listed.
+    Each pixel has a main triangle. The E samples that show another triangle than the main triangle of
+    their pixel are listed.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class SampledTriangles(NamedTuple):
         Main triangle: the triangle at the center of the pixel. If there is none, the triangle at the
         sample that is nearest to the center.
     depth : (P,) float64 ndarray
-        Depth z / w of the main triangle there.
+        Depth z / w of the main triangle, at the center or sample where it was found.
     own_samples : (P,) uint16 ndarray
         Bit field of the samples that show the main triangle: bit ``row * S + column``.
     other_entry : (E,) int32 ndarray

@@ -51,8 +51,10 @@ class SurfaceLines:
     pattern : StripePattern
         Phases on the L leaves.
     heading : (2, L) float32 ndarray
-        Direction 0 of the field in each leaf: a vector, as multiples of two sides of the surface's
-        triangle, from corner 0 to corner 1 and from corner 0 to corner 2. 0 where the field is undefined.
+        The direction in each leaf from which the lines of `pattern` are counted, counter-clockwise: one
+        member of the field, as a unit vector. Its two components are multiples of two sides of the
+        surface's triangle, from corner 0 to corner 1 and from corner 0 to corner 2. 0 where the field is
+        undefined.
     """
 
     tree: BisectionTree
@@ -61,10 +63,11 @@ class SurfaceLines:
 
 
 def rest_matrix(matrix: np.ndarray) -> np.ndarray:
-    """Return the (3, 3) part of a matrix that changes the shape: a scale along three orthogonal axes.
+    """Return the (3, 3) stretch of a matrix: the symmetric factor of the polar decomposition.
 
-    It is a uniform scale if the matrix is a similarity. Rotations have no effect, so an object that
-    is rotated keeps its lines.
+    The upper left (3, 3) block of a matrix is a rotation or reflection times the stretch, which scales along
+    three orthogonal axes. It is a uniform scale if the matrix is a similarity. An object that is rotated
+    keeps its lines, as a rotation does not change the stretch.
     """
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
     if similarity_scale(linear, 4 * SIMILARITY_EPS) is not None:

@@ -93,7 +93,9 @@ def values_in_triangles(
 
 
 def feature_curvatures(gbuffer: GBuffer, cache: Cache) -> np.ndarray:
-    """Interpolate the curvature of features at the pixels of a G-buffer.
+    """Interpolate the curvature of surfaces between sharp edges at the pixels of a G-buffer.
+
+    It is the larger absolute principal curvature, without noise; see `field.feature_curvature`.
 
     Parameters
     ----------

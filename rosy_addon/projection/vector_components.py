@@ -108,7 +108,7 @@ def plane_coordinates(
 
 
 def polygon_angles(points: Sequence[VectorComponents]) -> list[np.ndarray]:
-    """Return the interior angle at each corner of polygons, in radians, float32.
+    """Return the interior angles of n polygons with k corners, in radians: k (n,) float32 ndarrays.
 
     `points` are the corners as returned by `relative_to_first`.
     """

@@ -44,8 +44,8 @@ class ProjectedPoints(NamedTuple):
     depth : (K,) float64 ndarray
         Distances along the axis of the camera, in Blender units.
     is_in_view : (K,) bool ndarray
-        Whether the point is between the near and the far plane of the camera, in front of it, and not
-        cut away. It may be beside the frame.
+        Whether the point is between the near and the far plane of the camera, and no clip plane cuts it
+        away. It may be beside the frame.
     is_visible : (K,) bool ndarray
         Whether the point is in view and in the frame, and no surface hides it.
     """
@@ -147,7 +147,10 @@ def _project(
     touches: Callable[[np.ndarray, np.ndarray], np.ndarray],
     label: str,
 ) -> ProjectedPoints:
-    """Project K points, given in clip space and in world space, and find the visible ones.
+    """Project K points, and find the visible ones.
+
+    `clip`, (K, 4), and `world`, (K, 3), are their positions in clip space and in world space. `label` is the
+    text that the user sees meanwhile.
 
     `touches(triangle, point)` returns (n,) bool for (n,) indices of triangles of the scene and of points:
     whether the triangle contains the point. A triangle does not hide the points that it contains.

@@ -260,8 +260,8 @@ def _write_records(
     imaginary parts at the three corners, the seventh is the result of `field_channel.rotation_order`, and
     the eighth is the layer of the channel (0 for the representation). `numbers`, the (T, 3) values for the
     color map, have one texel. Its last component is 1 if all three values are finite. A tone with
-    (T, 3, 1 or 2) values has two texels. Of the `rest_positions`, x is in the fourth components of the positions, y in the fourth
-    components of the normals, and z in the last texel.
+    (T, 3, 1 or 2) values has two texels. Of the `rest_positions`, x is in the fourth
+    components of the positions, y in the fourth components of the normals, and z in the last texel.
     """
     rest = rest_positions(surface)
     channel_values = [corner_field.channels.get(channel) for channel in channels]

@@ -8,7 +8,7 @@ from ..core.errors import RosyError
 from ..core.progress import progress
 from ..field.frames import dot, normalize
 from ..field.polygon_arrays import sum_per_fan
-from .gbuffer import Instances, MeshInstance
+from .gbuffer import MeshInstance, MeshInstances
 from .shadow_maps import NORMAL_BIAS_PIXELS, render_depth_map, sun_camera, visibility_from
 from .vector_components import cofactor_matrix
 
@@ -23,7 +23,7 @@ SAMPLE_INSET_PIXELS, MAX_INSET_FRACTION = 2 * NORMAL_BIAS_PIXELS, 0.3
 
 
 def ambient_occlusion(
-    instances: Instances, instance_id: int, direction_count: int = DIRECTION_COUNT
+    instances: MeshInstances, instance_id: int, direction_count: int = DIRECTION_COUNT
 ) -> np.ndarray:
     """Compute the ambient occlusion at the corners of one mesh instance.
 

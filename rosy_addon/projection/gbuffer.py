@@ -68,7 +68,7 @@ class MeshInstance:
 
 
 #: The mesh instances of a scene.
-Instances = Sequence[MeshInstance]
+MeshInstances = Sequence[MeshInstance]
 
 
 class PixelCoverage(NamedTuple):

@@ -21,7 +21,7 @@ from ..field.frames import transform_components
 from .barycentrics import LABEL, barycentrics
 from .camera import Camera, pixel_rays, z_at_depth
 from .corner_field import cached_corner_field
-from .gbuffer import GBuffer, Instances, MeshInstance
+from .gbuffer import GBuffer, MeshInstance, MeshInstances
 from .pixel_blocks import pixel_blocks
 from .pixel_coverage import pixel_coverage
 from .pixel_values import fill_pixels
@@ -34,7 +34,7 @@ DISPLAYS = ("smooth", "flat")
 
 
 def project(
-    instances: Instances,
+    instances: MeshInstances,
     camera: Camera,
     display: str = "smooth",
     cache: Cache | None = None,
@@ -164,7 +164,7 @@ def project_samples(
 
 
 def surface_points(
-    instances: Instances,
+    instances: MeshInstances,
     camera: Camera,
     display: str,
     points: SurfacePoints,
@@ -213,7 +213,7 @@ def surface_points(
 
 
 def cached_project(
-    instances: Instances, camera: Camera, display: str, cache: Cache, samples: int = 1
+    instances: MeshInstances, camera: Camera, display: str, cache: Cache, samples: int = 1
 ) -> GBuffer:
     """Return the result of `project`, and store it in a cache.
 
@@ -226,7 +226,7 @@ def cached_project(
     )
 
 
-def check_instances(instances: Instances, camera: Camera, display: str) -> None:
+def check_instances(instances: MeshInstances, camera: Camera, display: str) -> None:
     """Check that mesh instances can be projected.
 
     Raises
@@ -259,7 +259,7 @@ def check_instances(instances: Instances, camera: Camera, display: str) -> None:
 # --- visibility --------------------------------------------------------------------------------
 
 
-def _visible_pixels(instances: Instances, camera: Camera, rows: Rows) -> Fragments:
+def _visible_pixels(instances: MeshInstances, camera: Camera, rows: Rows) -> Fragments:
     """Find the pixels where the nearest surface has a field, in the given rows or all."""
     fragments = rasterize_instances(instances, camera, rows)
     has_field = _triangles_with_field(instances)
@@ -270,7 +270,7 @@ def _visible_pixels(instances: Instances, camera: Camera, rows: Rows) -> Fragmen
 
 
 def _visible_samples(
-    instances: Instances, camera: Camera, samples: int, rows: Rows
+    instances: MeshInstances, camera: Camera, samples: int, rows: Rows
 ) -> tuple[Fragments, SampledTriangles]:
     """Find the visible triangles at the center of each pixel, and those at all samples."""
     clip, triangles = all_triangles(instances, camera)
@@ -287,20 +287,22 @@ def _visible_samples(
     return Fragments(pixel, triangle, weights, front_facing, sampled.depth), sampled
 
 
-def _triangles_with_field(instances: Instances) -> np.ndarray:
+def _triangles_with_field(instances: MeshInstances) -> np.ndarray:
     """Return (T,) bool: which triangles of all instances have a field."""
     return np.concatenate(
         [np.full(len(part.surface.triangles), part.field is not None) for part in instances]
     )
 
 
-def first_triangles(instances: Instances) -> np.ndarray:
+def first_triangles(instances: MeshInstances) -> np.ndarray:
     """Return the index of the first triangle of each instance, counted over all instances, (B,) int32."""
     counts = [len(instance.surface.triangles) for instance in instances]
     return np.cumsum([0, *counts[:-1]]).astype(np.int32)
 
 
-def _split_triangles(instances: Instances, triangle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _split_triangles(
+    instances: MeshInstances, triangle: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the instance of each of (n,) triangles, and the triangle's index in its instance, as int32.
 
     The indices in `triangle` are counted over all instances.
@@ -314,7 +316,7 @@ def _split_triangles(instances: Instances, triangle: np.ndarray) -> tuple[np.nda
     return instance_id, triangle - first_triangle[instance_id]
 
 
-def rasterize_instances(instances: Instances, camera: Camera, rows: Rows = None) -> Fragments:
+def rasterize_instances(instances: MeshInstances, camera: Camera, rows: Rows = None) -> Fragments:
     """Rasterize all mesh instances together, in the given rows of the frame or in all.
 
     Triangles are counted over all instances, in their order.
@@ -322,7 +324,7 @@ def rasterize_instances(instances: Instances, camera: Camera, rows: Rows = None)
     return rasterize(*all_triangles(instances, camera), camera.width, camera.height, rows)
 
 
-def all_triangles(instances: Instances, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
+def all_triangles(instances: MeshInstances, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
     """Return the vertices and triangles of all instances, in the order of instances.
 
     Returns
@@ -348,7 +350,7 @@ def clip_vertices(instance: MeshInstance, camera: Camera) -> np.ndarray:
     )
 
 
-def raise_nothing_in_view(instances: Instances, camera: Camera) -> None:
+def raise_nothing_in_view(instances: MeshInstances, camera: Camera) -> None:
     """Raise the error for a camera that sees no surface with a field.
 
     Raises
@@ -371,7 +373,7 @@ def raise_nothing_in_view(instances: Instances, camera: Camera) -> None:
     )
 
 
-def _new_gbuffer(instances: Instances, camera: Camera, fragments: Fragments) -> GBuffer:
+def _new_gbuffer(instances: MeshInstances, camera: Camera, fragments: Fragments) -> GBuffer:
     """Return a G-buffer of rasterized pixels. Its normals and representation are not yet initialized."""
     count = len(fragments.pixel)
     instance_id, triangle = _split_triangles(instances, fragments.triangle)

@@ -16,7 +16,7 @@ import numpy as np
 from ..core.progress import progress, report
 from ..field.frames import normalize
 from .camera import Camera, look_at, orthographic_camera, perspective_camera
-from .gbuffer import GBuffer, Instances
+from .gbuffer import GBuffer, MeshInstances
 from .pixel_blocks import pixel_blocks
 from .project import rasterize_instances
 
@@ -39,7 +39,7 @@ LABEL = "casting shadows"
 
 
 def light_cameras(
-    instances: Instances, camera: Camera, kind: str, vector: np.ndarray
+    instances: MeshInstances, camera: Camera, kind: str, vector: np.ndarray
 ) -> list[Camera]:
     """Return the cameras of the shadow maps of a light.
 
@@ -125,7 +125,7 @@ def _point_cameras(
     return [perspective_camera(view, size, size, fov=fov, clip=clip, name="lamp") for view in views]
 
 
-def render_depth_map(instances: Instances, camera: Camera) -> np.ndarray:
+def render_depth_map(instances: MeshInstances, camera: Camera) -> np.ndarray:
     """Return the (H, W) float32 depths of the nearest surfaces along the camera axis; inf at empty pixels."""
     fragments = rasterize_instances(instances, camera)
     depth = np.full(camera.width * camera.height, np.inf, dtype=np.float32)

@@ -17,7 +17,7 @@ import numpy as np
 from ..core.progress import report
 from ..field.blocks import blocks_by_count, concatenated_ranges
 from .camera import Camera
-from .gbuffer import Instances
+from .gbuffer import MeshInstances
 from .project import all_triangles, first_triangles
 from .surface_points import SurfacePoints
 
@@ -62,7 +62,7 @@ class ProjectedPoints(NamedTuple):
 
 
 def project_vertices(
-    instances: Instances,
+    instances: MeshInstances,
     camera: Camera,
     vertices: Sequence[np.ndarray],
     clip_planes: np.ndarray | None = None,
@@ -98,7 +98,7 @@ def project_vertices(
 
 
 def project_points(
-    instances: Instances,
+    instances: MeshInstances,
     camera: Camera,
     points: SurfacePoints,
     clip_planes: np.ndarray | None = None,
@@ -211,7 +211,7 @@ class _Scene:
     tolerance: float
 
     @classmethod
-    def of(cls, instances: Instances, camera: Camera, clip_planes: np.ndarray | None) -> _Scene:
+    def of(cls, instances: MeshInstances, camera: Camera, clip_planes: np.ndarray | None) -> _Scene:
         """Return a scene of all triangles of mesh instances, as seen by a camera."""
         clip, triangles = all_triangles(instances, camera)
         world = np.concatenate([instance.world_points() for instance in instances])

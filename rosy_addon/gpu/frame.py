@@ -17,7 +17,7 @@ from .device import Batches, NamedValues
 from .mesh_buffers import MAX_TRIANGLES, FieldKind
 from .passes import ComputePass, RasterPass
 from .resources import DrawItem, GpuResources
-from .uniforms import camera_uniforms, instance_uniforms
+from .uniforms import camera_uniforms, matrix_rows
 
 #: A rectangle of pixels: left, bottom, right and top; right and top are exclusive.
 Box = tuple[int, int, int, int]
@@ -183,8 +183,15 @@ class Frame:
 
     def instance_uniforms(self, instance_id: int) -> dict[str, Any]:
         """Return the uniforms of passes over the pixels of one instance, given its index."""
-        first_triangle_id, item = self.first_triangle_ids[instance_id], self.items[instance_id]
-        return instance_uniforms(instance_id, first_triangle_id, item, self.camera)
+        item = self.items[instance_id]
+        model_to_camera = self.camera.view @ item.model_matrix
+        return {
+            "instance_id": float(instance_id),
+            "first_triangle_id": self.first_triangle_ids[instance_id],
+            "triangle_count": item.mesh.buffers.triangle_count,
+            "texels_per_record": item.mesh.buffers.texels_per_record,
+            **matrix_rows("model_view", "xyz", model_to_camera[:3]),
+        }
 
     def clear(self, image: Any, texel_format: str | None = None) -> None:
         """Add a pass that sets an image of the size of the frame to 0. Its default format is RGBA32F."""

@@ -101,7 +101,7 @@ def render_fields(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> None
         textures["noise_gradients"] = _noise_gradients(frame, box, textures)
         uniforms["gain"] = look.gain * INTERPOLATED_CONTRAST
     if not is_hatched(look):
-        _trace(frame, kind, box, ComputePass("lic"), textures, uniforms)
+        _trace(frame, box, "lic", textures, uniforms)
         return
     textures["line_means"] = _streaks(frame, kind, box, textures, uniforms)
     textures |= _ink_textures(frame, kind)
@@ -121,7 +121,7 @@ def _streaks(
         return textures["directions"]
     means = frame.image("line_means", "RGBA16F", layers)
     textures = {**textures, "line_means": means}
-    _trace(frame, kind, box, ComputePass("streaks"), textures, uniforms, layers)
+    _trace(frame, box, "streaks", textures, uniforms, layers)
     if frame.samples is None or not has_streaks:
         return means
     smooth = frame.image("smooth_means", "RGBA16F", layers)
@@ -148,29 +148,24 @@ def _ink_textures(frame: Frame, kind: FieldKind) -> dict[str, Any]:
 
 
 def _trace(
-    frame: Frame,
-    kind: FieldKind,
-    box: Box,
-    shader: ComputePass,
-    textures: NamedValues,
-    uniforms: NamedValues,
-    layers: int = 1,
+    frame: Frame, box: Box, name: str, textures: NamedValues, uniforms: NamedValues, layers: int = 1
 ) -> None:
-    """Add the passes that trace streamlines, each over a band of rows of the box.
+    """Add the passes of a shader that traces streamlines, each over a band of rows of the box.
 
+    `name` is the name of the shader, and `uniforms` include the result of `look_uniforms`.
     With one layer, a thread traces the streamlines along all line directions at a pixel. Otherwise
     `layers` is the number of line directions, and a thread traces the streamline along one of them.
     """
     left, bottom, right, top = box
     half_steps = frame.look.streamline_reach() if uniforms["half_length"] else 0
-    row_steps = (right - left) * kind.line_count * 2 * half_steps
+    row_steps = (right - left) * uniforms["line_count"] * 2 * half_steps
     # Whole work groups: a partial one would reach into rows that belong to the next band.
     groups = max(MAX_DISPATCH_STEPS // max(row_steps, 1) // WORKGROUP_SIZE[1], 1)
     band_rows = groups * WORKGROUP_SIZE[1]
     for start in range(bottom, top, band_rows):
         band = left, start, right, min(start + band_rows, top)
         done = (start - bottom) / (top - bottom)
-        frame.run(shader, band, textures, uniforms, layers, pause=done)
+        frame.run(ComputePass(name), band, textures, uniforms, layers, pause=done)
 
 
 def _unfold(frame: Frame, kind: FieldKind, box: Box) -> dict[str, Any]:

@@ -106,21 +106,17 @@ def picture_noise(resources: GpuResources, size: tuple[int, int], look: PixelLoo
 
 
 def _pixel_texture(
-    resources: GpuResources,
-    name: str,
-    key: Any,
-    size: tuple[int, int],
-    values_at: Callable[[np.ndarray, int], np.ndarray],
+    resources: GpuResources, name: str, key: Any, size: tuple[int, int], values: Callable[..., Any]
 ) -> Any:
     """Return a texture of values at the pixels of a frame.
 
     Width and height of the texture are rounded up to multiples of `NOISE_TILE_PIXELS`.
-    `values_at(pixel, width)` returns the values at (P,) flat indices into a frame of this width.
+    `values(pixel, width)` returns the values at (P,) flat indices into a frame of this width.
     """
     width, height = (-(-side // NOISE_TILE_PIXELS) * NOISE_TILE_PIXELS for side in size)
 
     def create() -> np.ndarray:
         pixel = np.arange(width * height, dtype=np.int32)
-        return values_at(pixel, width).reshape(height, width, -1)
+        return values(pixel, width).reshape(height, width, -1)
 
     return resources.lookup_texture(name, key, create, (width, height))

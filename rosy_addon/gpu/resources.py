@@ -187,7 +187,7 @@ class GpuResources:
         call = Call(feature_records, (surface,), label="measuring features")
         key = "feature curvature", surface.rest_shape_key
         seconds = FEATURE_SECONDS * len(surface.triangles)
-        return self._look_up(key, call, seconds, self._texture)
+        return self._look_up(key, Preparation(call, seconds, self._texture))
 
     def outline_textures(
         self, item: DrawItem, crease_angle: float | None
@@ -213,7 +213,8 @@ class GpuResources:
         arguments = surface, linear, item.mesh.buffers.center, crease_angle
         call = Call(outline_records, arguments, label="finding outlines")
         key = "outline", surface, linear.tobytes(), crease_angle
-        return self._look_up(key, call, BUFFER_SECONDS * len(surface.triangles), send)
+        seconds = BUFFER_SECONDS * len(surface.triangles)
+        return self._look_up(key, Preparation(call, seconds, send))
 
     def line_records(
         self, item: DrawItem, display: str, spacing: float
@@ -245,7 +246,8 @@ class GpuResources:
 
         call = Call(line_records, (surface, matrix, field, display, spacing), label="spacing lines")
         key = "lines", surface, field, rest_matrix(matrix).tobytes(), display, spacing
-        return self._look_up(key, call, LINE_SECONDS * len(surface.triangles), send)
+        seconds = LINE_SECONDS * len(surface.triangles)
+        return self._look_up(key, Preparation(call, seconds, send))
 
     def image(
         self, name: Hashable, size: tuple[int, int], texel_format: str = "RGBA32F", layers: int = 0
@@ -287,21 +289,15 @@ class GpuResources:
             self._lookup_textures["rendered"] = cached
         return cached[1]
 
-    def _look_up(
-        self,
-        key: Hashable,
-        call: Call,
-        seconds: float,
-        send: Callable[[Any], Any],
-        lifetime: int = TABLE_LIFETIME,
-    ) -> Any:
-        """Return the handle that is kept under a key or, if there is none, a `Preparation`.
+    def _look_up(self, key: Hashable, missing: Preparation, lifetime: int = TABLE_LIFETIME) -> Any:
+        """Return the handle that is kept under a key or, if there is none, the preparation `missing`.
 
-        `call`, `seconds` and `send` are the attributes of the preparation.
+        After the preparation, the handle is kept.
         """
         if key in self._kept:
             return self._keep(key, self._kept[key][0], lifetime)
-        return Preparation(call, seconds, lambda answer: self._keep(key, send(answer), lifetime))
+        send = missing.send
+        return missing._replace(send=lambda answer: self._keep(key, send(answer), lifetime))
 
     def _keep(self, key: Hashable, handle: Any, lifetime: int) -> Any:
         """Return a handle, and keep it until it has not been used during `lifetime` uploads."""
@@ -331,7 +327,7 @@ class GpuResources:
         sources = surface, field, tone, instance.color_values
         key = "mesh", *map(id, sources), linear.tobytes(), display, channels
         seconds = BUFFER_SECONDS * len(surface.triangles)
-        return self._look_up(key, call, seconds, send, MESH_LIFETIME)
+        return self._look_up(key, Preparation(call, seconds, send), MESH_LIFETIME)
 
     def _rows_texture(
         self, rows: np.ndarray, surface: Surface, what: str, remedy: str = "choose the processor"

@@ -220,20 +220,6 @@ def light_view_uniforms(light_view: Camera, camera: Camera) -> dict[str, Any]:
     }
 
 
-def instance_uniforms(
-    instance_id: int, first_triangle_id: int, item: DrawItem, camera: Camera
-) -> dict[str, Any]:
-    """Return the uniforms of passes over the pixels of one instance."""
-    model_to_camera = camera.view @ item.model_matrix
-    return {
-        "instance_id": float(instance_id),
-        "first_triangle_id": first_triangle_id,
-        "triangle_count": item.mesh.buffers.triangle_count,
-        "texels_per_record": item.mesh.buffers.texels_per_record,
-        **matrix_rows("model_view", "xyz", model_to_camera[:3]),
-    }
-
-
 def covering_uniforms(kind: FieldKind) -> dict[str, Any]:
     """Return the uniforms from which shaders compute the index of a sheet of the covering surface.
 

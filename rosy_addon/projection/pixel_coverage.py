@@ -80,11 +80,7 @@ class _Entries(NamedTuple):
 
 
 def pixel_coverage(
-    gbuffer: GBuffer,
-    sampled: SampledTriangles,
-    side: int,
-    instance_id: np.ndarray,
-    triangle_normal: np.ndarray,
+    gbuffer: GBuffer, sampled: SampledTriangles, side: int, instance: np.ndarray, normal: np.ndarray
 ) -> tuple[PixelCoverage, PixelSamples]:
     """Find for each sample the pixel of the G-buffer whose surface it shows.
 
@@ -95,10 +91,10 @@ def pixel_coverage(
     sampled : SampledTriangles
     side : int
         Samples along each side of a pixel.
-    instance_id, triangle_normal
+    instance, normal
         Mesh instances and normals of ``sampled.other_triangle``; see `_OtherSamples`.
     """
-    others = _other_samples(sampled, gbuffer.camera, side, instance_id, triangle_normal)
+    others = _other_samples(sampled, gbuffer.camera, side, instance, normal)
     camera = gbuffer.camera
     count = len(gbuffer.pixel)
     stride = np.int32(camera.width + 2)

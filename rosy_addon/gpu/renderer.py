@@ -143,9 +143,8 @@ class GpuRenderer(ViewportRenderer):
         handles = yield from prepare_steps(lookups.values())
         frame.prepared.update(zip(lookups, handles, strict=True))
         texture, stages = self._stages(frame, target_key)
-        for (start, label, stage), stop in zip(
-            stages, [*(start for start, _, _ in stages[1:]), 1.0], strict=True
-        ):
+        stops = [*(start for start, _, _ in stages[1:]), 1.0]
+        for (start, label, stage), stop in zip(stages, stops, strict=True):
             yield Step(start, label)
             stage()
             for shader, run, pause in frame.take_passes():

@@ -405,10 +405,8 @@ def orbit_camera(
     frame_fraction = 1 - 2 * margin
     extent = max(np.ptp(u), np.ptp(v), np.ptp(w)) or 1.0
     if not perspective:
-        scale = (
-            max(np.ptp(u) * longer_side / width, np.ptp(v) * longer_side / height) / frame_fraction
-            or extent
-        )
+        scale = max(np.ptp(u) * longer_side / width, np.ptp(v) * longer_side / height)
+        scale = scale / frame_fraction or extent
         back = w.max() + extent
         eye = np.array([(u.min() + u.max()) / 2, (v.min() + v.max()) / 2, back]) @ basis
         clip = (0.5 * extent, back - w.min() + 0.5 * extent)

@@ -257,39 +257,37 @@ def _fill_triangles(
         vertices = [surface.corner_vertex.take(corner) for corner in corners]
         geometric_normal[:] = polygon_normals(relative_to_first(deformed, vertices))
     if fans is None:
+        values, index = faces, [face] * 3
         normals, phases = [faces.normal.take(face, axis=1)] * 3, None
     else:
-        fan = [surface.corner_fan.take(corner).astype(np.intp) for corner in corners]
-        normals, phases = _corner_normals(fan, corners, fans, custom_normals)
+        values, index = (
+            fans,
+            [surface.corner_fan.take(corner).astype(np.intp) for corner in corners],
+        )
+        normals, phases = _corner_normals(index, corners, fans, custom_normals)
     normals = [_fill_missing_normals(normal, geometric_normal) for normal in normals]
     x, y = tangent_frame_components(normals[0])
     # Where the field of a face is undefined, it is undefined at all corners of the face.
     defined = faces.channels[REPRESENTATION].take(face) != 0
     for corner, normal in enumerate(normals):
         corner_field.corner_normals[corner, :, block] = normal
-        to_reference = (
-            transport_phase(normal, normals[0], x, y) if corner and fans is not None else None
-        )
+        rotations = [] if phases is None else [phases[corner]]
+        if corner and fans is not None:
+            rotations.append(transport_phase(normal, normals[0], x, y))
         for channel, out in corner_field.channels.items():
             order = rotation_order(channel, corner_field.degree)
-            if fans is None:
-                z = faces.channels[channel].take(face)
-            else:
-                z = fans.channels[channel].take(fan[corner])
-            if phases is not None:
-                z *= signed_power(phases[corner], order)
-            if to_reference is not None:
-                z *= signed_power(to_reference, order)
+            z = values.channels[channel].take(index[corner])
+            for rotation in rotations:
+                z *= signed_power(rotation, order)
             np.multiply(z, defined, out=out[corner, block])
     corner_field.reference_tangent[:, block] = x
     corner_field.geometric_normal[:, block] = geometric_normal
-    for pair_index, (first_corner, second_corner) in enumerate(((0, 1), (0, 2), (1, 2))):
-        corner_field.normal_dots[pair_index, block] = dot_components(
-            normals[first_corner], normals[second_corner]
-        )
-    corner_field.normal_triple_product[block] = dot_components(
-        normals[0], cross_components(normals[1], normals[2])
-    )
+    for out, (first, second) in zip(
+        corner_field.normal_dots, ((0, 1), (0, 2), (1, 2)), strict=True
+    ):
+        out[block] = dot_components(normals[first], normals[second])
+    cross_products = cross_components(normals[1], normals[2])
+    corner_field.normal_triple_product[block] = dot_components(normals[0], cross_products)
 
 
 def _fill_missing_normals(normal: np.ndarray, geometric_normal: np.ndarray) -> np.ndarray:

@@ -93,9 +93,8 @@ def face_values(
             vectors = transform_components(vectors, linear * (1 / scale))
             member = dot_components(vectors, x) + 1j * dot_components(vectors, y)
         else:
-            member = _transport_member(
-                relative_to_first(rest, corner_vertex), points, vectors, x, y
-            )
+            rest_points = relative_to_first(rest, corner_vertex)
+            member = _transport_member(rest_points, points, vectors, x, y)
         rho = np.abs(member)
         member /= np.maximum(rho, np.finfo(np.float64).tiny)
         has_area = np.logical_or.reduce(normal)

@@ -53,10 +53,8 @@ def clip_near(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, 
     triangle = np.concatenate([unclipped, new_triangle])
     order = np.argsort(triangle, kind="stable")
     corners = np.concatenate([triangles[unclipped], new_corners])[order]
-    return (
-        np.concatenate([vertices, new_vertices]),
-        ClippedTriangles(tuple(np.ascontiguousarray(corners.T)), triangle[order]),
-    )
+    clipped = ClippedTriangles(tuple(np.ascontiguousarray(corners.T)), triangle[order])
+    return np.concatenate([vertices, new_vertices]), clipped
 
 
 def _clip_crossing_triangles(
@@ -92,9 +90,7 @@ def _clip_crossing_triangles(
     lone_corner = np.argmax(sides == one_inside[:, None], axis=1)
     rotated_corners = (lone_corner[:, None] + np.arange(3)) % 3
     apex, left, right = np.take_along_axis(corners, rotated_corners, axis=1).T
-    new_vertices = np.concatenate(
-        [_intersect_near(vertices, apex, left), _intersect_near(vertices, apex, right)]
-    )
+    new_vertices = [_intersect_near(vertices, apex, end) for end in (left, right)]
     on_left = np.arange(len(crossing), dtype=np.int32) + len(vertices)
     on_right = on_left + len(crossing)
     tip, base = one_inside, ~one_inside
@@ -105,11 +101,8 @@ def _clip_crossing_triangles(
             np.stack([on_left, right, on_right], axis=1)[base],
         ]
     )
-    return (
-        new_vertices,
-        new_corners.astype(np.int32),
-        np.concatenate([crossing[tip], crossing[base], crossing[base]]),
-    )
+    triangle = np.concatenate([crossing[tip], crossing[base], crossing[base]])
+    return np.concatenate(new_vertices), new_corners.astype(np.int32), triangle
 
 
 def _intersect_near(vertices: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:

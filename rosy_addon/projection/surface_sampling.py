@@ -63,9 +63,8 @@ def surface_values(gbuffer: GBuffer) -> np.ndarray:
         instance = gbuffer.instances[instance_id]
         if instance.color_values is not None:
             for block in blocks:
-                values[block] = values_in_triangles(
-                    instance, gbuffer.triangle[block], gbuffer.barycentric[block]
-                )
+                place = gbuffer.triangle[block], gbuffer.barycentric[block]
+                values[block] = values_in_triangles(instance, *place)
     return values
 
 

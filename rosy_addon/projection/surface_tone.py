@@ -49,18 +49,16 @@ class MipMap:
         level_index = np.clip(np.rint(level), 0, len(self.levels) - 1).astype(np.int32)
         for index in np.flatnonzero(np.bincount(level_index)).tolist():
             selected = np.flatnonzero(level_index == index)
-            result[selected] = _sample_bilinear(
-                self.levels[index], u[selected], v[selected], repeat
-            )
+            image = self.levels[index]
+            result[selected] = _sample_bilinear(image, u[selected], v[selected], repeat)
         return result
 
 
 def _downsample(image: np.ndarray) -> np.ndarray:
     """Halve an image by averaging 2 x 2 pixels; an odd last row or column is repeated."""
     height, width = image.shape
-    result = np.pad(
-        image, ((0, height % 2 if height > 1 else 0), (0, width % 2 if width > 1 else 0)), "edge"
-    )
+    added = [(0, size % 2 if size > 1 else 0) for size in (height, width)]
+    result = np.pad(image, added, "edge")
     if height > 1:
         result = 0.5 * (result[::2] + result[1::2])
     if width > 1:

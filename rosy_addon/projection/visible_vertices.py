@@ -230,10 +230,10 @@ class _Scene:
         ndc : (n, 2) float64 ndarray
             Positions of the points on screen, from -1 to 1.
 
-        Returns
-        -------
-        iterator of (triangle, point)
-            Indices of triangles and of points, (m,) intp ndarrays, block by block.
+        Yields
+        ------
+        triangle, point : (m,) intp ndarray
+            Indices of triangles and of points, block by block.
         """
         row_count = max(int(len(ndc) ** 0.5), 1)
         point_row = _grid_rows(ndc[:, 1], row_count)
@@ -257,13 +257,9 @@ class _Scene:
         first = np.searchsorted(key, 4.0 * row + low[box, 0])
         count = np.searchsorted(key, 4.0 * row + high[box, 0], side="right") - first
         box, first, count = (array[count > 0] for array in (box, first, count))
-        return (
-            (
-                triangle[kept[np.repeat(box[part], count[part])]],
-                order[concatenated_ranges(first[part], count[part])],
-            )
-            for part in blocks_by_count(count, PAIRS_PER_BLOCK)
-        )
+        for part in blocks_by_count(count, PAIRS_PER_BLOCK):
+            point = order[concatenated_ranges(first[part], count[part])]
+            yield triangle[kept[np.repeat(box[part], count[part])]], point
 
     def hides(self, triangle: np.ndarray, ndc: np.ndarray, distance: np.ndarray) -> np.ndarray:
         """Return (n,) bool: whether each triangle hides its point. The point must not be on the triangle.
@@ -280,9 +276,8 @@ class _Scene:
         a, b, c = np.moveaxis(self.clip[corner][..., (0, 1, 3)], 1, 0)
         point = np.concatenate([ndc, np.ones((len(ndc), 1))], axis=1)
         area = (a * np.cross(b, c)).sum(axis=1)
-        weights = np.stack(
-            [(point * np.cross(*pair)).sum(axis=1) for pair in ((b, c), (c, a), (a, b))], axis=1
-        )
+        edges = (b, c), (c, a), (a, b)
+        weights = np.stack([(point * np.cross(*edge)).sum(axis=1) for edge in edges], axis=1)
         weights = np.divide(weights, area[:, None], out=weights, where=area[:, None] != 0)
         covers = np.flatnonzero((weights >= 0).all(axis=1) & (area != 0))
         corner, weights = corner[covers], weights[covers]

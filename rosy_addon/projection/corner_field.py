@@ -181,24 +181,26 @@ def _fan_values(
     frames = tangent_frame_components(normal)
     count, fan_count = len(surface.corner_vertex), normal.shape[1]
     weight = np.empty(count)
-    weighted = {channel: np.empty(count, dtype=np.complex64) for channel in faces.channels}
+    weighted = {channel: np.empty((2, count)) for channel in faces.channels}
     for block in pixel_blocks(count):
         face, fan = surface.corner_face[block], surface.corner_fan[block].astype(np.intp)
         x, y = ([component.take(fan) for component in axis] for axis in frames)
         phase = transport_phase(faces.normal.take(face, axis=1), normal.take(fan, axis=1), x, y)
         is_defined = faces.channels[REPRESENTATION].take(face) != 0
         np.multiply(angle[block], is_defined, out=weight[block])
-        for channel, out in weighted.items():
+        for channel, parts in weighted.items():
             z = faces.channels[channel].take(face)
             z *= signed_power(phase, rotation_order(channel, degree))
-            np.multiply(z, weight[block], out=out[block])
+            z *= weight[block]
+            parts[:, block] = z.real, z.imag
     total = np.bincount(surface.corner_fan, weight, fan_count)
     total[total == 0] = np.inf
     averages = {}
-    for channel, values in weighted.items():
+    for channel, parts in weighted.items():
         averages[channel] = z = np.empty(fan_count, dtype=np.complex64)
-        z.real = np.bincount(surface.corner_fan, values.real, fan_count) / total
-        z.imag = np.bincount(surface.corner_fan, values.imag, fan_count) / total
+        z.real, z.imag = (
+            np.bincount(surface.corner_fan, part, fan_count) / total for part in parts
+        )
     return TangentValues(normal, averages)
 
 

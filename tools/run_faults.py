@@ -21,7 +21,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+from working_tree import ROOT, copy_working_tree
 
 #: The environment whose Python runs the tests of each lane. Those of lane "blender" build a zip and run it in
 #: a full Blender.
@@ -66,13 +66,8 @@ def copy_tree(folder: Path) -> Path:
 
     Return the copy.
     """
-    listed = ("git", "ls-files", "-z", "--cached", "--others", "--exclude-standard")
-    names = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout
     copy = folder / "main"
-    for name in filter(None, names.split("\0")):
-        if (ROOT / name).is_file():
-            (copy / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(ROOT / name, copy / name)
+    copy_working_tree(copy)
     for environment in ROOT.glob(".venv*"):
         (copy / environment.name).symlink_to(environment)
     if (ROOT.parent / "shared").is_dir():

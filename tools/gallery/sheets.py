@@ -23,6 +23,7 @@ from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.camera import Camera, look_at, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
+from rosy_addon.projection.surface_tone import SurfaceTone
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.turntable import draw_next, turntable, turntable_views
 from rosy_addon.rendering.view_input import ViewInput
@@ -30,7 +31,7 @@ from rosy_addon.rendering.view_input import ViewInput
 from . import shapes, table_scene
 from .page import ROOT
 from .sheet import Panel, display, save, sheet
-from .solid import MADE_FIELDS, curve_through, points_on_surface, view
+from .solid import MADE_FIELDS, TONES, VALUES, curve_through, points_on_surface, view
 
 PAGES: dict[str, Any] = tomllib.loads(
     Path(__file__).with_name("pictures.toml").read_text(encoding="utf-8")
@@ -79,23 +80,36 @@ def draw_panel(*specs: dict[str, Any]) -> Panel:
     if spec["mesh"] == "table":
         instances = table_scene.instances(spec.get("tone", ""))
     else:
-        surface = _surface(spec["mesh"])
-        field = _field(surface, spec)
-        instances = [MeshInstance(surface, np.eye(4), field)]
+        instances = [_instance(spec)]
     camera = _camera(spec, instances[0].surface, samples)
+    lights = (_sun(camera, spec["sun"]),) if "sun" in spec else ()
     if spec.get("finished"):
-        rgba = draw_picture(ViewInput(tuple(instances), camera, look)).rgba
+        rgba = draw_picture(ViewInput(tuple(instances), camera, look, lights)).rgba
     else:
-        lights = [_sun(camera, spec["sun"])] if "sun" in spec else ()
         rgba = compose(project(instances, camera, look.display), look, lights).rgba
     picture = display(rgba)
     if "crop" in spec:
         left, top, width, height = spec["crop"]
-        picture = picture[top : top + height, left : left + width]
+        enlarged = np.ones((spec.get("enlarge", 1),) * 2 + (1,), np.uint8)
+        picture = np.kron(picture[top : top + height, left : left + width], enlarged)
     for stroke in spec.get("strokes", ()):
         picture = with_line(picture, curve_through(*stroke), 8, PAPER)
         picture = with_line(picture, curve_through(*stroke), 4, INK)
-    return Panel(picture, spec["label"])
+    return Panel(picture, spec.get("label", ""))
+
+
+def _instance(spec: dict[str, Any]) -> MeshInstance:
+    """Return the mesh that a table describes, with its field, and its numbers and tone if it has any."""
+    surface = _surface(spec["mesh"])
+    field = _field(surface, spec)
+    if "families" in spec:
+        field = replace(field, family_count=spec["families"])
+    values, tone = (
+        made[spec[key]](surface).astype(np.float32) if key in spec else None
+        for key, made in (("values", VALUES), ("tone", TONES))
+    )
+    tone = None if tone is None else SurfaceTone(tone[:, None])
+    return MeshInstance(surface, np.eye(4), field, color_values=values, tone=tone)
 
 
 @lru_cache
@@ -119,7 +133,8 @@ def _field(surface: Surface, spec: dict[str, Any]) -> RosyField:
 def _camera(spec: dict[str, Any], surface: Surface, samples: int) -> Camera:
     width, height = spec["size"]
     if "eye" not in spec:
-        return view(surface, tuple(spec["view"]), (width, height), samples)
+        is_perspective = spec.get("perspective", True)
+        return view(surface, tuple(spec["view"]), (width, height), samples, is_perspective)
     matrix = look_at(spec["eye"], spec.get("target", (0, 0, 0)))
     return perspective_camera(
         matrix, width * samples, height * samples, fov=np.radians(spec["angle"])

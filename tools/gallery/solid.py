@@ -10,6 +10,7 @@ from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.picture import Picture
 from rosy_addon.core.color import from_hex, to_linear
+from rosy_addon.field.analysis import angle_errors
 from rosy_addon.field.corner_fans import corner_angles, corner_rotations, smooth_face_values
 from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.directional_field import field_from_directions, tensor_field
@@ -128,10 +129,58 @@ def ring_of_singularities(
     return generate(ball, settings, degree)
 
 
+def planar_field(
+    square: Surface, degree: int, z_of: Callable[[np.ndarray], np.ndarray]
+) -> RosyField:
+    """Return a field in the plane z = 0, given a member as a function of points, as complex numbers."""
+    z = z_of(square.face_center[:, 0] + 1j * square.face_center[:, 1])
+    return RosyField(degree, np.stack([z.real, z.imag, np.zeros(len(z))], axis=1))
+
+
+def vortices(p: np.ndarray) -> np.ndarray:
+    """Return a member of a cross field with one positive and one negative singularity."""
+    z = (p + 0.35) * (p - 0.35).conj()
+    return (z / np.abs(z) * np.exp(0.6j)) ** (1 / 4)
+
+
+def wind(p: np.ndarray) -> np.ndarray:
+    """Return a vector field with a vortex and a saddle."""
+    z = 1j * (p + 0.4) * (p - 0.6).conj()
+    return z / np.abs(z)
+
+
+def height(surface: Surface) -> np.ndarray:
+    """Return the (C,) z coordinates of the corners of a surface."""
+    return surface.vertices[surface.corner_vertex, 2]
+
+
+def height_on_the_left(surface: Surface) -> np.ndarray:
+    """Return the (C,) z coordinates of corners on the left side of a surface, NaN on the right side."""
+    is_left = surface.vertices[surface.corner_vertex, 0] < 0.2
+    return np.where(is_left, height(surface), np.nan)
+
+
+def angle_to_curvature(surface: Surface) -> np.ndarray:
+    """Return the (C,) angles, in degrees, between the fields of the generators form and curvature."""
+    errors = angle_errors(surface, generate(surface, "form", 4), curvature_field(surface, 4))
+    return np.degrees(errors)[surface.corner_face]
+
+
+#: Numbers for the color map, by name: functions of a surface that return a number for each corner.
+VALUES = {"height": height, "left": height_on_the_left, "angle": angle_to_curvature}
+
+#: Tones of surfaces, by name: functions of a surface that return a tone for each corner.
+TONES = {"waves": lambda surface: 0.55 + 0.4 * np.sin(9 * height(surface))}
+
 #: Fields that no generator of RoSy makes, by name: functions of a surface and a degree.
 MADE_FIELDS: dict[str, Callable[[Surface, int], RosyField]] = {
     "around": around_field,
     "even-curvature": even_curvature,
+    "vortices": lambda plane, degree: planar_field(plane, degree, vortices),
+    "wind": lambda plane, degree: planar_field(plane, degree, wind),
+    "gusts": lambda plane, degree: planar_field(
+        plane, degree, lambda p: wind(p) * (p.real + 1.1) / 2.1
+    ),
     "pairs": pairs_of_directions,
     "force": stress_of_force,
     "two-in-front": lambda ball, degree: ring_of_singularities(ball, 2, 1.7, degree),

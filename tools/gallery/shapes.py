@@ -22,6 +22,11 @@ def fine_plane() -> Surface:
     return plane(96)
 
 
+def fine_sphere() -> Surface:
+    """Return a sphere of many faces."""
+    return sphere(64)
+
+
 def coarse_sphere() -> Surface:
     """Return a sphere of few faces."""
     return sphere(5)

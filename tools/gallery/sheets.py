@@ -71,22 +71,13 @@ def draw_panel(*specs: dict[str, Any]) -> Panel:
     Keys of later tables replace those of earlier ones.
     """
     spec = {key: value for part in specs for key, value in part.items()}
-    look = load_preset(spec["preset"]).look if "preset" in spec else Look()
-    for part in specs:
-        look = look.with_settings(part.get("look", {}))
-    if spec.get("turn"):
-        look = replace(look, guiding_angle=float(np.radians(spec["turn"])))
-    samples = 1 if spec.get("finished") else look.supersampling
-    if spec["mesh"] == "table":
-        instances = table_scene.instances(spec.get("tone", ""))
-    else:
-        instances = [_instance(spec)]
-    camera = _camera(spec, instances[0].surface, samples)
-    lights = (_sun(camera, spec["sun"]),) if "sun" in spec else ()
+    view_input = described(*specs)
+    look, camera = view_input.look, view_input.camera
     if spec.get("finished"):
-        rgba = draw_picture(ViewInput(tuple(instances), camera, look, lights)).rgba
+        rgba = draw_picture(view_input).rgba
     else:
-        rgba = compose(project(instances, camera, look.display), look, lights).rgba
+        gbuffer = project(view_input.instances, camera.scaled(look.supersampling), look.display)
+        rgba = compose(gbuffer, look, view_input.lights).rgba
     picture = display(rgba)
     if "crop" in spec:
         left, top, width, height = spec["crop"]
@@ -96,6 +87,23 @@ def draw_panel(*specs: dict[str, Any]) -> Panel:
         picture = with_line(picture, curve_through(*stroke), 8, PAPER)
         picture = with_line(picture, curve_through(*stroke), 4, INK)
     return Panel(picture, spec.get("label", ""))
+
+
+def described(*specs: dict[str, Any]) -> ViewInput:
+    """Return the meshes, the camera, the look and the lights that tables of `pictures.toml` describe."""
+    spec = {key: value for part in specs for key, value in part.items()}
+    look = load_preset(spec["preset"]).look if "preset" in spec else Look()
+    for part in specs:
+        look = look.with_settings(part.get("look", {}))
+    if spec.get("turn"):
+        look = replace(look, guiding_angle=float(np.radians(spec["turn"])))
+    if spec["mesh"] == "table":
+        instances = table_scene.instances(spec.get("tone", ""))
+    else:
+        instances = [_instance(spec)]
+    camera = _camera(spec, instances[0].surface)
+    lights = (_sun(camera, spec["sun"]),) if "sun" in spec else ()
+    return ViewInput(tuple(instances), camera, look, lights)
 
 
 def _instance(spec: dict[str, Any]) -> MeshInstance:
@@ -124,21 +132,18 @@ def _field(surface: Surface, spec: dict[str, Any]) -> RosyField:
         return MADE_FIELDS[kind](surface, int(degree))
     options = dict(spec.get("options", {}))
     if "strokes" in spec:
-        camera = _camera(spec, surface, 2)
+        camera = _camera(spec, surface).scaled(2)
         curves = [curve_through(*stroke) for stroke in spec["strokes"]]
         options["strokes"] = [points_on_surface(surface, camera, curve) for curve in curves]
     return generate(surface, GeneratorSettings(kind, **options), int(degree))
 
 
-def _camera(spec: dict[str, Any], surface: Surface, samples: int) -> Camera:
-    width, height = spec["size"]
+def _camera(spec: dict[str, Any], surface: Surface) -> Camera:
     if "eye" not in spec:
         is_perspective = spec.get("perspective", True)
-        return view(surface, tuple(spec["view"]), (width, height), samples, is_perspective)
+        return view(surface, tuple(spec["view"]), tuple(spec["size"]), 1, is_perspective)
     matrix = look_at(spec["eye"], spec.get("target", (0, 0, 0)))
-    return perspective_camera(
-        matrix, width * samples, height * samples, fov=np.radians(spec["angle"])
-    )
+    return perspective_camera(matrix, *spec["size"], fov=np.radians(spec["angle"]))
 
 
 def _sun(camera: Camera, direction: Sequence[float]) -> Light:

@@ -25,7 +25,7 @@ from rosy_addon.field.representation import (
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface
 from rosy_addon.projection.camera import Camera, orbit_camera
-from rosy_addon.projection.gbuffer import GBuffer, MeshInstance
+from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 from tests.harness.planar import DegreeLayer, degree_layers
 
@@ -80,9 +80,9 @@ def even_curvature(surface: Surface, degree: int) -> RosyField:
     return smoothed_a_little(surface, curvature_field(surface, degree))
 
 
-def ring_curvature(rings: Surface) -> RosyField:
-    """Return a smooth 4-RoSy field along the principal curvature directions of the triple torus."""
-    return smoothed(rings, curvature_field(rings, 4), 200)
+def ring_curvature(rings: Surface, degree: int = 4) -> RosyField:
+    """Return a smooth field along the principal curvature directions of the triple torus."""
+    return smoothed(rings, curvature_field(rings, degree), 200)
 
 
 def pairs_of_directions(ball: Surface, degree: int) -> RosyField:
@@ -175,6 +175,8 @@ TONES = {"waves": lambda surface: 0.55 + 0.4 * np.sin(9 * height(surface))}
 #: Fields that no generator of RoSy makes, by name: functions of a surface and a degree.
 MADE_FIELDS: dict[str, Callable[[Surface, int], RosyField]] = {
     "around": around_field,
+    "icosahedral": lambda ball, degree: harmonic_field(ball, degree, icosahedron_axes()),
+    "ring-curvature": ring_curvature,
     "even-curvature": even_curvature,
     "vortices": lambda plane, degree: planar_field(plane, degree, vortices),
     "wind": lambda plane, degree: planar_field(plane, degree, wind),
@@ -248,7 +250,9 @@ def points_on_surface(surface: Surface, camera: Camera, curve: np.ndarray) -> np
 
     Fractions at which the camera does not see the surface are left out.
     """
-    buffer = _visible_pixels(surface, camera)
+    # A G-buffer needs some field.
+    field = RosyField(1, np.broadcast_to([1.0, 0.0, 0.0], (surface.face_count, 3)))
+    buffer = project([MeshInstance(surface, np.eye(4), field)], camera)
     position = np.full((camera.height * camera.width, 3), np.nan)
     position[buffer.pixel] = (
         buffer.position @ camera.view[:3, :3] - camera.view[:3, 3] @ camera.view[:3, :3]
@@ -256,29 +260,6 @@ def points_on_surface(surface: Surface, camera: Camera, curve: np.ndarray) -> np
     column, row = (curve * (camera.width, camera.height)).astype(int).T
     points = position.reshape(camera.height, camera.width, 3)[camera.height - 1 - row, column]
     return points[np.isfinite(points).all(axis=1)]
-
-
-def visible_points(
-    points: np.ndarray, normals: np.ndarray, camera: Camera, supersampling: int
-) -> list[tuple[float, float]]:
-    """Return (x, y) of those points of a convex surface that are visible, in pixels from the upper left.
-
-    `supersampling` is the number of camera pixels per picture pixel.
-    """
-    camera_points = points @ camera.view[:3, :3].T + camera.view[:3, 3]
-    facing = np.sum(camera_points * (normals @ camera.view[:3, :3].T), axis=1) < 0
-    clip = (
-        np.append(camera_points[facing], np.ones((facing.sum(), 1)), axis=1) @ camera.projection.T
-    )
-    across, upward = (clip[:, :2] / clip[:, 3:] / 2 + 0.5).T
-    width, height = camera.width / supersampling, camera.height / supersampling
-    return [(x * width, (1 - y) * height) for x, y in zip(across, upward, strict=True)]
-
-
-def _visible_pixels(surface: Surface, camera: Camera) -> GBuffer:
-    """Return the G-buffer of a surface. It has some field, as a G-buffer needs one."""
-    field = RosyField(1, np.broadcast_to([1.0, 0.0, 0.0], (surface.face_count, 3)))
-    return project([MeshInstance(surface, np.eye(4), field)], camera)
 
 
 def frame_of(values: np.ndarray, pixel: np.ndarray, shape: Sequence[int]) -> np.ndarray:

@@ -69,8 +69,8 @@ def _strip(name: str) -> Image.Image:
     """Return an image with a picture for each value of a setting, side by side in rows."""
     table = {"scene": "head", "preset": "default", **TABLES["settings"][name]}
     frame = {"size": [SIDE, SIDE], "sun": SUN, "finished": True, "look": {"supersampling": 2}}
-    panels = []
-    for value in table["values"]:
+    values, panels = table.pop("values"), []
+    for value in values:
         look = value if isinstance(value, dict) else {name: value}
         shown = {"look": look, "label": _label(name, value)}
         panels.append(draw_panel(TABLES["scenes"][table["scene"]], frame, table, shown))

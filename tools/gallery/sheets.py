@@ -130,7 +130,10 @@ def _field(surface: Surface, spec: dict[str, Any]) -> RosyField:
     kind, degree = spec["field"].split()
     if kind in MADE_FIELDS:
         return MADE_FIELDS[kind](surface, int(degree))
-    options = dict(spec.get("options", {}))
+    options: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value
+        for name, value in spec.get("options", {}).items()
+    }
     if "strokes" in spec:
         camera = _camera(spec, surface).scaled(2)
         curves = [curve_through(*stroke) for stroke in spec["strokes"]]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rosy_addon.compositor.contrast import expected_std
+from rosy_addon.compositor.look_units import pixel_look
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.surface import Surface
@@ -23,19 +24,19 @@ def write() -> None:
         for panel in sheet["rows"][0]:
             view = described(page, sheet, panel)
             spread.append([panel["label"], *_spread(view)])
-            (instance,), name = view.instances, sheet.get("mesh", panel.get("mesh"))
-            census[name] = _census(name.replace("_", " "), instance.surface, instance.field)
+            (instance,) = view.instances
+            census[instance.surface.name] = _census(instance.surface, instance.field)
     fill_tables("figure-11", list(census.values()), spread)
 
 
-def _census(name: str, surface: Surface, field: RosyField) -> list[object]:
+def _census(surface: Surface, field: RosyField) -> list[object]:
     """Return a table row: counts of singularities by index, sum of the indices, and sum by Poincaré-Hopf."""
     _, index = find_singularities(surface, field)
     kinds, counts = np.unique(index, return_counts=True)
     shown = [f"{count} of {signed(kind)}" for kind, count in zip(kinds, counts, strict=True)]
     expected = field.degree * surface.euler_characteristic
     listed = ", ".join(shown) or "none"
-    return [name, surface.face_count, field.degree, listed, int(index.sum()), expected]
+    return [surface.name, surface.face_count, field.degree, listed, int(index.sum()), expected]
 
 
 def _spread(view: ViewInput) -> list[object]:
@@ -43,5 +44,5 @@ def _spread(view: ViewInput) -> list[object]:
     (instance,), look = view.instances, view.look
     camera = view.camera.scaled(look.supersampling)
     tone = layer_in_view(instance.surface, instance.field, look, camera).tone
-    theory = look.gain * expected_std(enlarged(look, look.supersampling))
+    theory = look.gain * expected_std(pixel_look(enlarged(look, look.supersampling)))
     return [float(tone.mean()), float(tone.std()), theory]

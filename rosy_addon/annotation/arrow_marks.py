@@ -28,12 +28,7 @@ from ..projection.pixel_neighbors import screen_jacobians
 from ..projection.project import surface_points
 from ..projection.surface_points import SurfacePoints
 from ..projection.visible_vertices import ProjectedPoints, project_points
-from .progressive_samples import (
-    matrix_scale,
-    progressive_samples,
-    rest_areas,
-    surface_samples,
-)
+from .progressive_samples import matrix_scale, progressive_samples, rest_areas, surface_samples
 
 #: Colors of arrowheads and of their outlines.
 FILL_COLOR, OUTLINE_COLOR = "#141414", "#ffffff"

@@ -150,11 +150,7 @@ def progressive_samples(
 
 
 def _with_points(
-    clip: np.ndarray,
-    triangles: np.ndarray,
-    camera: Camera,
-    spacing: float,
-    offset: np.ndarray,
+    clip: np.ndarray, triangles: np.ndarray, camera: Camera, spacing: float, offset: np.ndarray
 ) -> np.ndarray:
     """Return the (n,) intp indices of the triangles in which there may be points for this view.
 

@@ -20,13 +20,7 @@ from ..projection.gbuffer import MeshInstance
 from ..projection.vector_components import cofactor_matrix
 from .stroke_set import Strokes
 from .tangent_mesh import CREASE_ANGLE, is_sharp_edge
-from .visibility import (
-    DepthBuffer,
-    pixel_size,
-    planes_around,
-    project_to_pixels,
-    visible_runs,
-)
+from .visibility import DepthBuffer, pixel_size, planes_around, project_to_pixels, visible_runs
 
 #: Names of the families in outlines; see `Strokes.names`.
 OUTLINE_KINDS = ("silhouettes", "creases", "borders")

@@ -12,16 +12,7 @@ from ..field.frames import dot, normalize
 from .tangent_mesh import TangentMesh
 
 #: The attributes of `Strokes` that have a row for each point.
-POINT_COLUMNS = (
-    "points",
-    "face",
-    "triangle",
-    "weights",
-    "normal",
-    "member",
-    "spacing",
-    "width",
-)
+POINT_COLUMNS = ("points", "face", "triangle", "weights", "normal", "member", "spacing", "width")
 
 
 @dataclass(frozen=True, eq=False)

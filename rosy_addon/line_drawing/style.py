@@ -5,10 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..annotation.singularity_settings import (
-    singularity_dots_choice,
-    singularity_size_number,
-)
+from ..annotation.singularity_settings import singularity_dots_choice, singularity_size_number
 from ..core.errors import RosyError
 from ..core.settings import check_settings, choice, number, settings_of, switch
 

@@ -363,9 +363,7 @@ def take_triangles(mesh: TangentMesh, kept: np.ndarray) -> TangentMesh:
         name: values[kept] for name, values in vars(mesh).items() if isinstance(values, np.ndarray)
     }
     taken = replace(
-        mesh,
-        harmonics=tuple((j, values[kept]) for j, values in mesh.harmonics),
-        **kept_arrays,
+        mesh, harmonics=tuple((j, values[kept]) for j, values in mesh.harmonics), **kept_arrays
     )
     neighbor = np.where(taken.neighbor >= 0, number[taken.neighbor], np.int32(-1))
     return replace(taken, neighbor=neighbor)

@@ -11,12 +11,7 @@ from ..core.progress import progress, report
 from ..field.frames import dot, normalize
 from .lateral_neighbors import SeparationRules
 from .placement import StreamlinePlacer
-from .seeding import (
-    candidate_seeds,
-    seeds_around_singularities,
-    thinned_seeds,
-    uncovered_seeds,
-)
+from .seeding import candidate_seeds, seeds_around_singularities, thinned_seeds, uncovered_seeds
 from .separation import enforce_separation
 from .spacing import CornerSpacing
 from .stroke_set import Strokes

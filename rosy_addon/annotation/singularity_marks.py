@@ -136,7 +136,7 @@ def singularity_marks(
     with progress(0.5, 1.0):
         projected = project_vertices(instances, camera, vertices, clip_planes)
     kept = projected.is_in_view if shows_hidden_singularities(settings) else projected.is_visible
-    marks = SingularityMarks(
+    return SingularityMarks(
         projected.position,
         np.concatenate(indices),
         np.concatenate(degrees),
@@ -145,8 +145,7 @@ def singularity_marks(
         (camera.width, camera.height),
         settings.singularity_size,
         shows_indices(settings),
-    )
-    return marks.part(kept)
+    ).part(kept)
 
 
 def cached_singularities(instance: MeshInstance, cache: Cache) -> tuple[np.ndarray, np.ndarray]:

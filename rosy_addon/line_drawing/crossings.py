@@ -91,13 +91,9 @@ def _first_of_each(stroke: np.ndarray, arc: np.ndarray, tolerance: np.ndarray) -
     order = np.lexsort((arc[:, 0], stroke[:, 1], stroke[:, 0]))
     stroke, arc = stroke[order], arc[order]
     is_new = np.ones(len(order), dtype=bool)
-    is_new[1:] = (np.diff(stroke, axis=0) != 0).any(axis=1) | (
-        np.abs(np.diff(arc, axis=0)) > tolerance[order[1:], None]
-    ).any(axis=1)
-    group = np.cumsum(is_new) - 1
-    first = np.full(int(is_new.sum()), len(order))
-    np.minimum.at(first, group, order)
-    return np.sort(first)
+    is_far = np.abs(np.diff(arc, axis=0)) > tolerance[order[1:], None]
+    is_new[1:] = ((np.diff(stroke, axis=0) != 0) | is_far).any(axis=1)
+    return np.sort(np.minimum.reduceat(order, np.flatnonzero(is_new)))
 
 
 def _close_pairs(
@@ -235,9 +231,8 @@ def _alternating_under(crossings: Crossings) -> np.ndarray:
     order = np.lexsort((crossings.arc[:, 0], crossings.stroke[:, 0]))
     stroke = crossings.stroke[order, 0]
     count = np.unique(stroke, return_counts=True)[1]
-    rank = concatenated_ranges(np.zeros_like(count), count)
     under = np.empty(len(order), dtype=np.int64)
-    under[order] = (rank + stroke) % 2
+    under[order] = (concatenated_ranges(np.zeros_like(count), count) + stroke) % 2
     return under
 
 
@@ -263,20 +258,17 @@ def cut_intervals(
     arc, point_stroke = strokes.arc, strokes.stroke
     stride = 2 * (float(arc.max(initial=0)) + float(np.max(high - low, initial=0))) + 1
     stroke_length = strokes.length[stroke]
-    reaches_start, reaches_end = low <= 0, high >= stroke_length
+    reaches_end = np.concatenate([low <= 0, high >= stroke_length])
     owner = np.concatenate([point_stroke, stroke, stroke])
-    key = owner * stride + np.concatenate(
-        [arc, np.maximum(low, 0), np.minimum(high, stroke_length)]
-    )
+    position = [arc, np.maximum(low, 0), np.minimum(high, stroke_length)]
+    key = owner * stride + np.concatenate(position)
     # Order at equal arc length: ends of intervals, points, beginnings of intervals. An interval
     # that reaches an end of the stroke also removes the point there.
     point_count, interval_count = len(point_stroke), len(stroke)
     event = np.repeat([0, 1, -1], [point_count, interval_count, interval_count])
     tie_break, survives = event.copy(), event == 0
-    tie_break[point_count:] = np.where(
-        np.concatenate([reaches_start, reaches_end]), -2 * event[point_count:], event[point_count:]
-    )
-    survives[point_count:] = ~np.concatenate([reaches_start, reaches_end])
+    tie_break[point_count:][reaches_end] *= -2
+    survives[point_count:] = ~reaches_end
     order = np.lexsort((tie_break, key))
     event, survives, owner = event[order], survives[order], owner[order]
     depth = np.cumsum(event)
@@ -293,9 +285,7 @@ def cut_intervals(
     cut = strokes.take_points(np.where(event == 0, order, 0))
     for name in POINT_COLUMNS:
         getattr(cut, name)[new] = getattr(inserted, name)
-    counts = np.bincount(owner, minlength=len(strokes))
-    with_cuts = replace(
-        cut, normal=normalize(cut.normal), start=np.concatenate([[0], np.cumsum(counts)])
-    )
+    start = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=len(strokes)))])
+    with_cuts = replace(cut, normal=normalize(cut.normal), start=start)
     # Split at each interval, also where no point lies inside it.
     return with_cuts.runs_where(kept, split_labels=np.cumsum(event == -1), free_at_removed=False)

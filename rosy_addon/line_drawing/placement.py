@@ -145,13 +145,8 @@ class GrowingStrokes(ColumnTable):
 
     def add(self, parent_side: np.ndarray, spacing: np.ndarray) -> np.ndarray:
         """Add n strokes with two growing ends each, and return their indices."""
-        count = len(parent_side)
-        return self.append(
-            alive=np.ones(count, dtype=bool),
-            spacing=spacing,
-            parent_side=parent_side,
-            tip_count=np.full(count, 2),
-        )
+        columns = {"spacing": spacing, "parent_side": parent_side}
+        return self.append(len(spacing), alive=True, tip_count=2, **columns)
 
     def set_seeds(self, stroke: np.ndarray, sample: np.ndarray) -> None:
         """Set the samples at the seeds of new strokes. They are also the samples at both ends."""
@@ -212,10 +207,8 @@ class GrowingStrokes(ColumnTable):
         stroke, end : (k,) int64 ndarray
             Strokes, and their ends (0 or 1) that have to grow again.
         """
-        rows = slice(self.count)
-        stroke, end = np.nonzero(
-            self.end_yielded[rows] & self.alive[rows, None] & self.end_done[rows]
-        )
+        resumes = self.end_yielded & self.alive[:, None] & self.end_done
+        stroke, end = np.nonzero(resumes[: self.count])
         self.parent_side[stroke[self.tip_count[stroke] == 0]] = -1
         np.add.at(self.tip_count, stroke, 1)
         return stroke, end
@@ -309,9 +302,8 @@ class StreamlinePlacer:
 
         `sample` and `previous` are as in `find_lateral_neighbors`.
         """
-        neighbors = find_lateral_neighbors(
-            self.samples, sample, self.rules.min_separation, self.rules.max_gap, previous
-        )
+        min_separation, max_gap = self.rules.min_separation, self.rules.max_gap
+        neighbors = find_lateral_neighbors(self.samples, sample, min_separation, max_gap, previous)
         self.samples.remove(sample[neighbors.rejected])
         self.samples.mark_covered(neighbors.covering)
         self.samples.add_open_sides(sample[~neighbors.rejected])
@@ -335,13 +327,9 @@ class StreamlinePlacer:
         left = self.rules.max_length * strokes.spacing[tips.stroke] - strokes.length(tips.stroke)
         count = np.where(tips.step_scale < 1, min(sample_count, MAX_RETRIED_SAMPLES), sample_count)
         count = np.minimum(count, 1 + np.maximum(left / (2 * step), 0)).astype(np.intp)
-        max_segments = max(MIN_SEGMENTS, SEGMENTS_PER_SAMPLE * int(count.max()))
+        largest, limit = SAMPLES_PER_SEGMENT * step, SEGMENTS_PER_SAMPLE * int(count.max())
         _, _, ended, path = advance(
-            mesh,
-            tips.particles,
-            count * step,
-            max_segment_length=SAMPLES_PER_SEGMENT * step,
-            max_segments=max_segments,
+            mesh, tips.particles, count * step, None, largest, max(MIN_SEGMENTS, limit)
         )
         path = SampledPath(path, tips.sign)
 
@@ -353,11 +341,9 @@ class StreamlinePlacer:
         start = mesh.points_at(tips.triangle, tips.weights)
         points = mesh.points_at(traced.position.triangle, traced.position.weights)
         is_first = traced.previous < 0
-        chord = points - np.where(
-            is_first[:, None], start[traced.particle], points[traced.previous]
-        )
+        before = np.where(is_first[:, None], start[traced.particle], points[traced.previous])
         walked = traced.arc - np.where(is_first, 0, traced.arc[traced.previous])
-        least = MIN_MOVED_RATIO * step[traced.particle]
+        least, chord = MIN_MOVED_RATIO * step[traced.particle], points - before
         has_moved = (walked > least) & (dot(chord, chord) > least * least)
         ended |= np.bincount(traced.particle, minlength=len(tips)) == 0
         if not has_moved.all():

@@ -55,9 +55,8 @@ class ColumnTable:
             column = getattr(self, name)
             setattr(self, name, np.zeros((INITIAL_CAPACITY, *column.shape[1:]), column.dtype))
 
-    def append(self, **values: np.ndarray) -> np.ndarray:
+    def append(self, row_count: int, **values: np.ndarray | float) -> np.ndarray:
         """Append rows with the given columns and return their indices. Other columns are 0 there."""
-        row_count = len(next(iter(values.values())))
         first, self.count = self.count, self.count + row_count
         for name in self._column_names:
             column = getattr(self, name)
@@ -154,14 +153,12 @@ class StrokeSamples(ColumnTable):
         super().__init__()
         self.mesh, self.required_spacing = mesh, spacing
         mean_spacing = np.einsum("tk->t", spacing.values) / 3
-        self.expected_count = (
-            float((mesh.area / mean_spacing**2).sum()) * mesh.family_count / SAMPLE_STEP
-        )
+        squares = float((mesh.area / mean_spacing**2).sum())
+        self.expected_count = squares * mesh.family_count / SAMPLE_STEP
         if not self.expected_count < MAX_EXPECTED_SAMPLES:
             raise RosyError("there would be too many strokes: increase the spacing")
-        self.grid = PointGrid(
-            1.01 * SEARCH_RADIUS * float(np.median(mean_spacing)), int(self.expected_count)
-        )
+        cell = 1.01 * SEARCH_RADIUS * float(np.median(mean_spacing))
+        self.grid = PointGrid(cell, int(self.expected_count))
         self.current_step = 0
         # Open sides, as 2 * sample + side. Some of them may have been covered later. The next call of
         # `open_sides` removes these.
@@ -224,7 +221,7 @@ class StrokeSamples(ColumnTable):
         (n,) ndarray of int
             Indices of the new samples.
         """
-        sample = self._append_at(particles, stroke, arc, step)
+        sample = self._append_at(particles, stroke=stroke, arc=arc, step=step)
         self.grid.add(self.position[sample], SEARCH_RADIUS * self.spacing[sample])
         return sample
 
@@ -237,15 +234,11 @@ class StrokeSamples(ColumnTable):
         """
         count = self.count
         try:
-            minus_one = np.full(len(particles), -1, dtype=np.int32)
-            step = np.full(len(particles), self.current_step)
-            yield self._append_at(particles, minus_one, np.zeros(len(particles)), step)
+            yield self._append_at(particles, stroke=-1, arc=0.0, step=self.current_step)
         finally:
             self.count = count
 
-    def _append_at(
-        self, particles: SurfaceParticles, stroke: np.ndarray, arc: np.ndarray, step: np.ndarray
-    ) -> np.ndarray:
+    def _append_at(self, particles: SurfaceParticles, **columns: np.ndarray | float) -> np.ndarray:
         """Append samples at particles to the table, but not to the grid. Return their indices; see `add`."""
         mesh, triangle, weights = self.mesh, particles.triangle, particles.weights
         member = mesh.members_at(triangle, weights, particles.member)
@@ -258,17 +251,16 @@ class StrokeSamples(ColumnTable):
         if direction is not member:
             world_member = transport(mesh.to_world(triangle, member), flat, normal)
         return self.append(
+            len(triangle),
             frame=np.stack([position, normal, world_direction, world_member], axis=1),
             spacing=self.spacing_at(particles),
-            stroke=stroke,
-            arc=arc,
-            step=step,
-            alive=np.ones(len(triangle), dtype=bool),
-            side_neighbor=np.full((len(triangle), 2), -1),
+            alive=True,
+            side_neighbor=-1,
             triangle=triangle,
             weights=weights,
             local_member=member,
             local_direction=direction,
+            **columns,
         )
 
     def remove(self, sample: np.ndarray) -> None:
@@ -309,8 +301,8 @@ class StrokeSamples(ColumnTable):
     def add_open_sides(self, sample: np.ndarray) -> None:
         """Add the uncovered sides of the given samples to the list of open sides."""
         covered = self.covered[sample]
-        added = np.concatenate([2 * sample[~covered[:, 0]], 2 * sample[~covered[:, 1]] + 1])
-        self._open_sides = np.concatenate([self._open_sides, added])
+        added = 2 * sample[~covered[:, 0]], 2 * sample[~covered[:, 1]] + 1
+        self._open_sides = np.concatenate([self._open_sides, *added])
 
     @property
     def coverage(self) -> float:

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.progress import report
-from ..field.blocks import row_blocks
+from ..field.blocks import mask, row_blocks
 from ..field.frames import dot
 from .lateral_neighbors import MAX_COVERED_GAP, find_lateral_neighbors
 from .point_grid import LEVEL_RATIO, PointGrid, grid_levels
@@ -102,14 +102,12 @@ def seeds_around_singularities(mesh: TangentMesh, spacing: np.ndarray) -> Surfac
     """
     triangle, weights, index = singularities(mesh)
     local_spacing = np.einsum("nk,nk->n", weights, spacing[triangle])
-    isolated = np.flatnonzero(
-        _is_isolated(mesh.points_at(triangle, weights), MIN_ISOLATION * local_spacing) & (index < 1)
-    )
+    is_isolated = _is_isolated(mesh.points_at(triangle, weights), MIN_ISOLATION * local_spacing)
+    isolated = np.flatnonzero(is_isolated & (index < 1))
     distance = (seed_distance(index[isolated]) * local_spacing[isolated]).repeat(RAY_COUNT)
     ray = np.tile(np.exp(2j * np.pi * np.arange(RAY_COUNT) / RAY_COUNT), len(isolated))
-    triangle, weights = (
-        column[isolated].repeat(RAY_COUNT, axis=0) for column in (triangle, weights)
-    )
+    triangle = triangle[isolated].repeat(RAY_COUNT)
+    weights = weights[isolated].repeat(RAY_COUNT, axis=0)
     particles = SurfaceParticles(triangle, weights, 1j * ray, np.ones(len(ray)))
     arrived, _, walked = trace_geodesics(mesh, particles, ray, distance)
     radial = mesh.points_at(arrived.triangle, arrived.weights) - mesh.points_at(triangle, weights)
@@ -146,9 +144,7 @@ def _is_isolated(points: np.ndarray, radius: np.ndarray) -> np.ndarray:
     grid = PointGrid(float(np.median(radius)), len(points))
     grid.add(points, radius)
     query, other = grid.pairs_within(points, radius)
-    isolated = np.ones(len(points), dtype=bool)
-    isolated[query[query != other]] = False
-    return isolated
+    return ~mask(len(points), query[query != other])
 
 
 # --- on the mesh ----------------------------------------------------------------------------------
@@ -177,14 +173,11 @@ def candidate_seeds(mesh: TangentMesh, corner_spacing: np.ndarray) -> SurfacePar
     u, v = np.where(fold, 1 - u, u), np.where(fold, 1 - v, v)
     weights = np.stack([1 - u - v, u, v], axis=1)
     member = mesh.members_at(triangle, weights, np.ones(count, dtype=complex))
-    rotations = np.exp(2j * np.pi * np.arange(mesh.family_count) / mesh.degree)
-    seeds = SurfaceParticles(
-        np.repeat(triangle, mesh.family_count),
-        np.repeat(weights, mesh.family_count, axis=0),
-        (member[:, None] * rotations).ravel(),
-        np.ones(count * mesh.family_count),
-    )
-    return seeds.take(np.flatnonzero(seeds.member != 0))
+    family = np.arange(mesh.family_count)
+    member = (member[:, None] * np.exp(2j * np.pi * family / mesh.degree)).ravel()
+    point = np.repeat(np.arange(count), len(family))
+    seeds = SurfaceParticles(triangle[point], weights[point], member, np.ones(len(point)))
+    return seeds.take(np.flatnonzero(member != 0))
 
 
 def uncovered_seeds(samples: StrokeSamples, seeds: SurfaceParticles) -> SurfaceParticles:
@@ -239,8 +232,7 @@ def _is_nearest_to_cell_center(position: np.ndarray, cell_size: float) -> np.nda
     cell_index = (cell[:, 0] * cell_counts[1] + cell[:, 1]) * cell_counts[2] + cell[:, 2]
     order = np.lexsort((np.round(dot(center_offset, center_offset), 9), cell_index))
     first = order[np.unique(cell_index[order], return_index=True)[1]]
-    cell_rank = np.searchsorted(cell_index[first], cell_index)
-    to_chosen = position - position[first[cell_rank]]
+    to_chosen = position - position[first[np.searchsorted(cell_index[first], cell_index)]]
     return dot(to_chosen, to_chosen) == 0
 
 
@@ -273,14 +265,12 @@ def longest_open_runs(
     order = np.lexsort((arc, key))
     sample, side, arc, key = sample[order], side[order], arc[order], key[order]
     starts_run = np.ones(len(key), dtype=bool)
-    starts_run[1:] = (key[1:] != key[:-1]) | (
-        np.diff(arc) > MAX_RUN_STEP * SAMPLE_STEP * samples.spacing[sample[1:]]
-    )
+    is_gap = np.diff(arc) > MAX_RUN_STEP * SAMPLE_STEP * samples.spacing[sample[1:]]
+    starts_run[1:] = (key[1:] != key[:-1]) | is_gap
     first = np.flatnonzero(starts_run)
     length = np.diff(np.append(first, len(key)))
     by_length = np.lexsort((-length, key[first]))
-    longest = np.unique(key[first][by_length], return_index=True)[1]
-    run = by_length[longest]
+    run = by_length[np.unique(key[first][by_length], return_index=True)[1]]
     middle = first[run] + length[run] // 2
     run_middle = middle[np.searchsorted(key[middle], key)]
     is_nearby = np.abs(arc - arc[run_middle]) <= RETRY_ARC * samples.spacing[sample]
@@ -312,11 +302,9 @@ def lateral_seeds(
     free_gap = _free_gap(samples, sample, seeds, has_room)
     bounded = np.flatnonzero(np.isfinite(free_gap))
     full_gap = 1 + free_gap[bounded]
-    shared_distance = full_gap / np.where(full_gap > MIN_TWO_STROKE_GAP, 3, 2)
-    moved_seeds, has_room[bounded] = _lateral_points(
-        samples, sample[bounded], side[bounded], shared_distance
-    )
-    seeds.assign(bounded, moved_seeds)
+    distance = full_gap / np.where(full_gap > MIN_TWO_STROKE_GAP, 3, 2)
+    moved, has_room[bounded] = _lateral_points(samples, sample[bounded], side[bounded], distance)
+    seeds.assign(bounded, moved)
     return seeds, has_room
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from ..field.polygon_arrays import sum_per_fan
 from ..field.surface import Surface
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
+from ..projection.pixel_blocks import part_of
 from ..projection.vector_components import cofactor_matrix
 from .stroke_set import Strokes
 from .tangent_mesh import TangentMesh, unit
@@ -88,8 +89,7 @@ class CornerSpacing:
 
     def take(self, kept: np.ndarray) -> CornerSpacing:
         """Return the spacing on the triangles for which `kept`, (T,) bool, is true."""
-        columns = vars(self).values()
-        return CornerSpacing(*(None if column is None else column[kept] for column in columns))
+        return part_of(self, kept)
 
     def at(self, triangle: np.ndarray, weights: np.ndarray, direction: np.ndarray) -> np.ndarray:
         """Return (n,) float64: the spacing at points of triangles, for strokes in given directions.
@@ -136,9 +136,8 @@ def spacing_in_picture(mesh: TangentMesh, camera: Camera, pixels: float) -> Corn
     relative = MIN_PICTURE_RATIO / factor
     # On a surface of curvature k, c is below a limit in a band as wide as limit^2 / (2 k).
     band = 2 * SILHOUETTE_SPACINGS * facing_values * _curvature(mesh)[:, None]
-    steepness = relative**2 * (
-        1 / np.maximum(cosine, np.clip(np.sqrt(band), *MIN_COSINES)) ** 2 - 1
-    )
+    limit = np.clip(np.sqrt(band), *MIN_COSINES)
+    steepness = relative**2 * (1 / np.maximum(cosine, limit) ** 2 - 1)
     tangent = dot(to_eye, mesh.x[:, None]) + 1j * dot(to_eye, mesh.y[:, None])
     double = steepness / 2 * unit(tangent, np.zeros_like(tangent)) ** 2
     is_directional = (relative**2 + steepness > 1).any(axis=1)
@@ -163,30 +162,6 @@ def _curvature(mesh: TangentMesh) -> np.ndarray:
 # --- by tone and curvature ------------------------------------------------------------------------------
 
 
-class LightSource(Protocol):
-    """A light in camera space.
-
-    Attributes
-    ----------
-    kind : {"sun", "point"}
-    vector : (3,) ndarray
-        Unit direction to a sun, or position of a point light.
-    color : (3,) ndarray
-        Linear RGB.
-    strength : float
-        Radiance of a white surface that faces the light; for a point light, at distance 1.
-    """
-
-    @property
-    def kind(self) -> str: ...
-    @property
-    def vector(self) -> np.ndarray: ...
-    @property
-    def color(self) -> np.ndarray: ...
-    @property
-    def strength(self) -> float: ...
-
-
 def with_vertices_of_fans(instance: MeshInstance) -> MeshInstance:
     """Return a mesh instance with a vertex for each smooth fan, so that each vertex has one normal.
 
@@ -201,11 +176,8 @@ def with_vertices_of_fans(instance: MeshInstance) -> MeshInstance:
         Vertex k is at the vertex of fan k. Faces, corners and triangles are the same.
     """
     surface = instance.surface
-    split = surface.with_parts(
-        vertices=surface.vertices[fan_vertices(surface)],
-        corner_vertex=surface.corner_fan,
-        rest_vertices=None,
-    )
+    vertices, fan = surface.vertices[fan_vertices(surface)], surface.corner_fan
+    split = surface.with_parts(vertices=vertices, corner_vertex=fan, rest_vertices=None)
     return replace(instance, surface=split)
 
 
@@ -238,8 +210,7 @@ def spacing_by_tone(
     ndarray
         A spacing for each tone.
     """
-    ink = np.maximum(1 - np.clip(tone, 0, 1), 1 / max_ratio)
-    return np.asarray(spacing) / ink
+    return np.asarray(spacing) / np.maximum(1 - np.clip(tone, 0, 1), 1 / max_ratio)
 
 
 def spacing_by_curvature(
@@ -273,7 +244,7 @@ def spacing_by_curvature(
     return np.asarray(spacing) * np.clip(relative**-exponent, MIN_SPACING_RATIO, MAX_SPACING_RATIO)
 
 
-def lit_tone(instance: MeshInstance, camera: Camera, lights: Sequence[LightSource]) -> np.ndarray:
+def lit_tone(instance: MeshInstance, camera: Camera, lights: Sequence[Any]) -> np.ndarray:
     """Return the tones of a matte surface under several lights, without shadows.
 
     Parameters

@@ -141,6 +141,5 @@ class StrokeStyle:
         if unknown:
             raise RosyError(f"unknown setting '{unknown[0]}' of strokes: choose {', '.join(known)}")
         if settings.keys() & {"spacing", "distance"}:
-            unit = "world" if "distance" in settings else "pixels"
-            settings = {"unit": unit} | settings
+            settings = {"unit": "world" if "distance" in settings else "pixels"} | settings
         return replace(self, **settings)

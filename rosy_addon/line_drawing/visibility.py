@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.progress import progress, report
-from ..field.blocks import row_blocks
+from ..field.blocks import mask, row_blocks
 from ..field.frames import dot, normalize
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
@@ -197,9 +197,8 @@ def _from_hidden_points(strokes: Strokes, visible: np.ndarray) -> np.ndarray:
         if len(hidden):
             # The last point is the same as the first.
             begin = first + hidden[0]
-            order[first : last + 1] = np.concatenate(
-                [np.arange(begin, last + 1), np.arange(first + 1, begin + 1)]
-            )
+            parts = np.arange(begin, last + 1), np.arange(first + 1, begin + 1)
+            order[first : last + 1] = np.concatenate(parts)
     return order
 
 
@@ -362,8 +361,7 @@ def planes_around(
                 steepness = np.sqrt(np.maximum(length**2 / facing**2 - 1, 0))
             # NaN if the square of `facing` is 0 and the length as well.
             steepness = np.minimum(np.nan_to_num(steepness), MAX_BIAS_STEEPNESS)
-            bias = footprint * (DEPTH_BIAS_PX + steepness)
-            hides = (triangle >= 0) & (distance > bias)
+            hides = (triangle >= 0) & (distance > footprint * (DEPTH_BIAS_PX + steepness))
             yield PlanesAround(triangle, facing, distance, hides)
 
 
@@ -416,8 +414,7 @@ def clean_runs(
         flip = (visible[first] == value) & (arc[last] - arc[first] < min_length)
         if not value:
             # Hidden runs at the ends of strokes are not gaps between visible runs.
-            ends = np.zeros(len(visible) + 1, dtype=bool)
-            ends[start] = True
+            ends = mask(len(visible) + 1, start)
             flip &= ~ends[first] & ~ends[last + 1]
         visible = visible ^ flip[np.cumsum(starts_run) - 1]
     return visible

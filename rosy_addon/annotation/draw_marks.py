@@ -209,7 +209,7 @@ def head_distance(x: np.ndarray, y: np.ndarray, direction: np.ndarray, size: flo
 
 
 def head_outline(size: float) -> np.ndarray:
-    """Return (3, 2) float64: the tip, the left barb and the notch of an arrowhead of a length.
+    """Return (3, 2) float64: the tip, the left barb and the notch of an arrowhead that is `size` long.
 
     The first coordinate is forward and the second to the left, from the middle of the arrowhead.
     """

@@ -157,7 +157,8 @@ def lay_out_key(
     text_width : callable
         Function that returns the width of a line of text, as a multiple of the text size.
     text_size : float
-        Text size in pixels. It is reduced until the parts fit. 0: the fraction `TEXT_SIZE` of the frame.
+        Text size in pixels. It is reduced until the parts fit. 0: the fraction `TEXT_SIZE` of the smaller
+        side of the frame.
 
     Returns
     -------
@@ -229,10 +230,10 @@ class _Arrangement:
         return self.size * max((self.text_width(text) for text in texts), default=0.0)
 
     def _bottom(self, left: float, width: float) -> float:
-        """Return the lowest y coordinate, in pixels, for the bottom of a background rectangle.
+        """Return the smallest y coordinate, in pixels, at which the bottom of a background rectangle may be.
 
-        `left` and `width` are those of the rectangle. The bottom is above the caption if the rectangle is not
-        beside it, and at the margin of the frame otherwise.
+        The rectangle is given by its left edge and its width, in pixels. If it would overlap the caption
+        horizontally, its bottom is above the caption, otherwise at the margin of the frame.
         """
         gap = PLATE_GAP * self.size
         if self.parts.caption.strip():

@@ -28,7 +28,10 @@ def round_above(least: float) -> float:
 
 
 def _round_near(number: float) -> list[float]:
-    """Return the round numbers (1, 2 or 5 times a power of ten) around a positive number."""
+    """Return nine round numbers (1, 2 or 5 times a power of ten), ascending.
+
+    They are in three decades: the decade of `number`, which is positive, the one before it and the one after.
+    """
     exponent = math.floor(math.log10(number))
     powers = (exponent - 1, exponent, exponent + 1)
     return [float(f"{mantissa}e{power}") for power in powers for mantissa in MANTISSAS]

@@ -111,8 +111,8 @@ def singularity_marks(
         Instances without a field can only hide singularities.
     camera : Camera
     settings : Look or StrokeStyle
-        Settings that select the singularities and the style of their dots. Only those of
-        `singularity_settings` are read.
+        Only the settings `singularity_dots` and `singularity_size` are read. They select the singularities
+        and the style of their dots.
     clip_planes : (6, 4) float64 ndarray, optional
         Planes in world space. The negative side of each plane is cut away.
     cache : Cache, optional
@@ -151,8 +151,8 @@ def singularity_marks(
 def cached_singularities(instance: MeshInstance, cache: Cache) -> tuple[np.ndarray, np.ndarray]:
     """Return the vertices and the indices of the singularities of an instance, from the cache if possible.
 
-    The instance must have a field. All deformations of a mesh have the same singularities. The values are
-    those of `field.singularities.find_singularities`.
+    The instance must have a field. All deformations of a mesh have the same singularities. The result is a
+    pair of (K,) int32 arrays; indices are in units of 1 / N.
     """
     surface, field = instance.surface, instance.field
     return cache.get_or_create(

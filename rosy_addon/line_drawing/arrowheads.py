@@ -20,16 +20,17 @@ def arrowheads(strokes: Strokes, distance: float, has_direction: np.ndarray) -> 
     """Return arrowheads along strokes, as additional strokes.
 
     They point from the first point of a stroke to its last, which is the direction of the field. Each is a
-    stroke of three points, from barb to tip to barb, in the tangent plane of the surface.
+    stroke of three points, from barb to tip to barb, in the tangent plane of the surface. The length of its
+    barbs is `BARB_LENGTH` times the spacing at the arrowhead.
 
     Parameters
     ----------
     strokes : Strokes
     distance : float
-        Distance between the arrowheads of a stroke, in spacings. Every stroke that is long enough gets at
-        least one.
+        Distance between the arrowheads of a stroke, as a multiple of the spacing at the middle of the stroke.
+        Every stroke that is long enough gets at least one arrowhead.
     has_direction : (S,) bool ndarray
-        Whether a stroke gets arrowheads, because the directions of its field have no opposite direction.
+        Whether a stroke gets arrowheads: its field contains no direction together with the opposite one.
 
     Returns
     -------

@@ -75,7 +75,7 @@ def find_crossings(strokes: Strokes) -> Crossings:
 
 
 def _first_of_each(stroke: np.ndarray, arc: np.ndarray, tolerance: np.ndarray) -> np.ndarray:
-    """Return the indices of m crossings, without repetitions of an earlier crossing.
+    """Return the indices of the crossings that do not repeat an earlier crossing, in ascending order.
 
     Parameters
     ----------
@@ -135,10 +135,23 @@ def _close_pairs(
 
 
 def _strip_keys(strokes: Strokes, segment_end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (m,) sort keys of segments, and the (m,) largest difference of the keys of two that cross.
+    """Return keys by which segments are sorted, and the largest difference of the keys of crossing segments.
 
-    The key is the number of the strip times `STRIP_STRIDE`, plus the position along the strip, 0 to 1. Strips
-    are described in `_close_pairs`.
+    Strips are described in `_close_pairs`.
+
+    Parameters
+    ----------
+    strokes : Strokes
+    segment_end : (m,) ndarray of int
+        Index of the point at which each segment ends, sorted by the triangle of the segment.
+
+    Returns
+    -------
+    key : (m,) float64 ndarray
+        Number of the strip times `STRIP_STRIDE`, plus the position along the strip, 0 to 1.
+    window : (m,) float64 ndarray
+        For each segment, the largest difference between its key and the key of a segment in the same strip
+        that crosses it. If the other segment is in the next strip, `STRIP_STRIDE` is added.
     """
     start, end = strokes.points[segment_end - 1], strokes.points[segment_end]
     middle = (start + end) / 2

@@ -72,18 +72,20 @@ def reference_members(mesh: TangentMesh) -> np.ndarray:
 
 
 def _members_at_centers(mesh: TangentMesh, near: np.ndarray) -> np.ndarray:
-    """Return (T,) complex128: the unit member at the center of each triangle nearest to the tangent `near`.
+    """Return (T,) complex128: for each triangle, the unit member at its center that is nearest to a tangent.
 
-    Where the field is zero, the result is an arbitrary unit tangent.
+    `near`, (T,) complex, holds the tangents in the frames of the triangles. Where the field is zero, the
+    result is an arbitrary unit tangent.
     """
     z = mesh.z.sum(axis=1)
     return nearest_member(near, np.where(z != 0, z, 1), mesh.degree)
 
 
 def member_offset(member: np.ndarray, reference: np.ndarray, degree: int) -> np.ndarray:
-    """Return (n,) int64: how many members of the field `member` is counter-clockwise from `reference`.
+    """Return (n,) int64: by how many steps of 2 pi / N `member` is counter-clockwise from `reference`.
 
-    The result is from 0 to the degree - 1. Both are members, as complex numbers in the same frame.
+    The steps are from 0 to N - 1, where N is `degree`. Both arguments are members of the field, as complex
+    numbers in the same frame.
     """
     angle = np.angle(member * reference.conj())
     return np.rint(angle * degree / (2 * np.pi)).astype(np.int64) % degree
@@ -117,11 +119,12 @@ def global_labels(mesh: TangentMesh) -> np.ndarray | None:
 
 
 def _order_labels(mesh: TangentMesh, component: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Assign the families 0 to M - 1 to the connected components of line directions.
+    """Return the family, 0 to M - 1, of each line direction, given the components of line directions.
 
     A component consists of the line directions that are matched across edges. In each connected part of the
-    surface, the line directions of its first triangle are numbered counter-clockwise, beginning with the
-    nearest to the guide direction. The number of a line direction is the family of its component.
+    surface, the line directions of its first triangle are numbered counter-clockwise. Number 0 is nearest to
+    the first of `GUIDE_AXES` that is not almost normal to the triangle. The number of a line direction is the
+    family of its component.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Cut from a tangent mesh the part on which strokes are traced: it is in the frame and visible.
 
-Beyond the frame and behind the camera, the size of a pixel has no lower limit, so the number of strokes
-there would have no upper limit.
+Without this cut, there would be no limit to the number of strokes outside the frame: toward the plane through
+the eye, the size of a pixel in world space falls to zero, and the spacing of strokes falls with it.
 
 Strokes on hidden triangles are not traced either. On most models, these are half of all strokes. A stroke
 keeps its distance only from the strokes beside it. So visible strokes are the same as on the whole mesh if
@@ -86,7 +86,7 @@ class MeshInView(Parts):
 
 
 def mesh_in_view(mesh: TangentMesh, camera: Camera) -> MeshInView:
-    """Cut off what is outside the frame and its margin, or in front of the near plane.
+    """Cut off what is outside the frame and its margin, or nearer to the camera than the near plane.
 
     Parameters
     ----------
@@ -126,9 +126,12 @@ def whole_mesh(mesh: TangentMesh) -> MeshInView:
 
 
 def _depths_of_cuts(depth: np.ndarray) -> np.ndarray:
-    """Return the depths at which triangles are cut, given the (T, 3) depths of their corners.
+    """Return the depths of the planes at which triangles are cut, given the (T, 3) depths of their corners.
 
-    The result is empty if no triangle has depths that differ by more than the factor `MAX_DEPTH_RATIO`.
+    The planes are parallel to the image plane, and depths are in Blender units. After the cuts, the depth
+    changes so little in each triangle that the spacing can be interpolated; see `DEPTH_STEP`. The result has
+    one dimension. It is empty if no triangle has depths that differ by more than the factor
+    `MAX_DEPTH_RATIO`.
     """
     low, high = np.maximum(depth.min(axis=1), 1e-300), depth.max(axis=1)
     is_deep = high > MAX_DEPTH_RATIO * low

@@ -89,8 +89,8 @@ def outline_strokes(instance: MeshInstance, camera: Camera) -> Strokes:
     ----------
     instance : MeshInstance
     camera : Camera
-        Camera for which the silhouettes are found. Creases that are too short and blunt in its pixels are
-        left out.
+        Camera for which the silhouettes are found. Creases whose length in its pixels is too small for their
+        angle are left out; see `MIN_CREASE_PX`.
 
     Returns
     -------
@@ -409,12 +409,13 @@ class _OutlineTest:
         return visible
 
     def _ring_depth(self, triangle: np.ndarray) -> np.ndarray:
-        """Return (n,) float64: the depth within which adjacent triangles do not hide a silhouette.
+        """Return (n,) float64: tolerances of the depth test for the silhouettes in n triangles.
 
-        It is `MAX_RING_DEPTH` times the longest edge of the triangle, in world space, if the surface does not
-        hide its own silhouette. Then its radial curvature is positive: n . w (normal times the direction to
-        the camera) grows toward the camera. Otherwise, and in triangles that no silhouette crosses, the
-        result is negative.
+        Adjacent triangles do not hide a point of a silhouette that is behind them by less than the tolerance,
+        a distance along the view ray in world space. It is `MAX_RING_DEPTH` times the longest edge of the
+        triangle if the radial curvature of the surface is positive: n . w (normal times the direction to the
+        camera) grows toward the camera. There the surface itself does not hide its silhouette. Elsewhere, and
+        in triangles that no silhouette crosses, the tolerance is -1, so that all triangles are tested.
         """
         a, b, c = (self.points[self.triangle_vertex[triangle, k]] for k in range(3))
         to_eye = self.depth_buffer.camera.view_directions((a + b + c) / 3)
@@ -433,10 +434,10 @@ class _OutlineTest:
     def _is_hidden(
         self, points: np.ndarray, pixels: np.ndarray, triangle: np.ndarray, ring_depth: np.ndarray
     ) -> np.ndarray:
-        """Return (n,) bool: whether points are hidden by the triangles visible at all four pixels around.
+        """Return (n,) bool: whether each point is hidden by the triangles at all four pixels around it.
 
-        Triangles that share a vertex with the triangle of the point do not hide it if the distance behind
-        them is less than `ring_depth`, (n,).
+        A triangle that shares a vertex with the triangle of the point does not hide the point if the point is
+        behind it by less than `ring_depth`, (n,), along the view ray, in world space.
         """
         hidden = np.ones(len(points), dtype=bool)
         for plane in planes_around(points, pixels, self.depth_buffer):

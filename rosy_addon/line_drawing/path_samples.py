@@ -75,8 +75,8 @@ class SampledPath:
     ) -> PathSamples:
         """Return samples along the paths, each one step after the sample before it.
 
-        A path that is shorter than its first step has a sample at its end. So has a path whose particle
-        ended.
+        A path also has a sample at its end if it is shorter than its first step, or if its particle cannot
+        continue there.
 
         Parameters
         ----------

@@ -129,7 +129,7 @@ def draw_instances(
     camera : Camera
         Camera of the drawing. Its resolution also sets the length of a pixel.
     style : StrokeStyle
-    lights : sequence of LightSource
+    lights : sequence of compositor.shading.Light
         Lights in camera space, from which the tone is computed. If there are none, the light is at the
         camera.
     clip_to_frame : bool

@@ -200,7 +200,8 @@ class GrowingStrokes(ColumnTable):
     def resume_yielded_ends(self) -> tuple[np.ndarray, np.ndarray]:
         """Let the ends that have yielded grow again.
 
-        Strokes that had no growing end left are no longer counted as children of the stroke beside them.
+        A stroke that had no growing end left has already been subtracted from `active_children` of the stroke
+        beside which it was seeded. Its `parent_side` becomes -1, so that it is not subtracted again.
 
         Returns
         -------
@@ -389,7 +390,8 @@ class StreamlinePlacer:
     def rescan(self, rules: SeparationRules) -> None:
         """Change the rules, and allow seeds again where strokes were removed or earlier seeds did not fit.
 
-        Sides of samples that had been treated as covered there are open again if no stroke is beside them.
+        The sides of samples that removed strokes covered, or that were closed after a seed did not fit, are
+        open again if no stroke is beside them.
         """
         self.rules = rules
         samples = self.samples

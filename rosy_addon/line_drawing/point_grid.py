@@ -147,8 +147,9 @@ class PointGrid:
             Radii of the queries. Points that are farther away than `MAX_RINGS` cells of their level may be
             missed.
         direction : (n, 3) ndarray, optional
-            Unit direction of each query. The query is then restricted to a small ball and a band
-            perpendicular to the direction; see `INNER_RATIO`.
+            Unit direction of each query. The query is then restricted to two parts of its ball: a smaller
+            ball of `INNER_RATIO` times the radius, and a slab perpendicular to the direction, `BAND_RATIO`
+            times the radius to both sides of the center.
 
         Returns
         -------

@@ -128,8 +128,9 @@ class StrokeSamples(ColumnTable):
     covered : (2,) bool
         Whether the left and the right side are covered.
     side_neighbor : (2,) int32
-        Index of the neighbor that covers the left and the right side, or -1. If there are several, it is the
-        one found last. If this sample is removed, the side of the neighbor may be open again.
+        Index of the sample that covers the left and the right side, or -1. If there are several, it is the
+        one found last. When the sample of this row is removed, the sides of these neighbors are tested again,
+        because they may have become open.
     triangle, weights : int32, (3,) float64
         Position as a triangle and barycentric coordinates in it.
     local_member, local_direction : complex128
@@ -193,9 +194,10 @@ class StrokeSamples(ColumnTable):
     # --- adding and removing ----------------------------------------------------------------------
 
     def next_steps(self, step: np.ndarray) -> np.ndarray:
-        """Begin new steps of growth.
+        """Begin new steps of growth, and return their numbers among all steps so far.
 
-        `step` counts them from 0. The result counts them from the first step of all growth.
+        `step`, (n,) int, numbers the new steps from 0. The result, (n,) int, continues the numbers of earlier
+        steps. `current_step` becomes the number of the last new step.
         """
         first = self.current_step + 1
         self.current_step = first + int(step.max(initial=0))

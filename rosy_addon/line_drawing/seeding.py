@@ -4,10 +4,11 @@ Seeds beside strokes follow Jobard and Lefer (1997). Along each side of a stroke
 time, in the middle of the longest open run: consecutive samples of the stroke that have no stroke beside them
 on that side yet.
 
-Around singularities, there is one seed in each sector, all at the same distance. Near a singularity of
-index i, the streamlines of the field are parallel lines on a cone, which z -> z^(1 - i) unrolls. A streamline
-is nearest to the apex where its tangent is perpendicular to the direction from the apex. If the nearest
-streamlines have the same distance in all sectors, the spacing is consistent all around the singularity.
+Around singularities, there is one seed in each sector (the region between two streamlines that end at the
+singularity), all at the same distance. For a singularity of index i at z = 0 of the complex plane, the map
+z -> z^(1 - i) turns nearby streamlines into parallel straight lines on a cone. A streamline is nearest to the
+apex where its tangent is perpendicular to the direction from the apex. If the nearest streamlines have the
+same distance in all sectors, the spacing is consistent all around the singularity.
 Without these seeds, strokes would reach the singularity from elsewhere, at different distances in different
 sectors.
 """
@@ -138,7 +139,7 @@ def seed_distance(index: np.ndarray) -> np.ndarray:
 
 
 def _is_isolated(points: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """Return (n,) bool: whether each point is isolated. No other point is within its `radius`, (n,), then."""
+    """Return (n,) bool: whether no other point is within the distance `radius`, (n,), of each point."""
     if not len(points):
         return np.zeros(0, dtype=bool)
     grid = PointGrid(float(np.median(radius)), len(points))
@@ -194,9 +195,9 @@ def uncovered_seeds(samples: StrokeSamples, seeds: SurfaceParticles) -> SurfaceP
 def thinned_seeds(
     mesh: TangentMesh, seeds: SurfaceParticles, cell_size: float, spacing_ratio: np.ndarray
 ) -> SurfaceParticles:
-    """Return fewer seeds: all those at points that are chosen about `cell_size` apart in world space.
+    """Choose points of seeds about `cell_size` apart in world space, and return all seeds at these points.
 
-    Each point has a seed for each line direction of the field. All seeds at a chosen point are returned.
+    Each point has a seed for each line direction of the field.
 
     Parameters
     ----------
@@ -205,8 +206,9 @@ def thinned_seeds(
     cell_size : float
         Distance of the points where `spacing_ratio` is 1.
     spacing_ratio : (n,) ndarray
-        Spacing of strokes at the seeds, relative to their usual spacing. Where it is very different from 1,
-        the chosen points are farther apart or nearer accordingly; see `point_grid.grid_levels`.
+        Spacing of strokes at the seeds, relative to their usual spacing. Where it is much larger than 1, the
+        chosen points are farther apart, and where it is much smaller, they are closer: by the powers of
+        `LEVEL_RATIO` that `point_grid.grid_levels` returns.
     """
     position = mesh.points_at(seeds.triangle, seeds.weights)
     level = grid_levels(spacing_ratio, 1.0)

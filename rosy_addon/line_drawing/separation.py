@@ -60,7 +60,7 @@ def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -
     mesh : TangentMesh
         The mesh on which the strokes were traced.
     strokes : Strokes
-        Strokes before `label_families`, with the same value of `Strokes.family`.
+        Strokes before `label_families`, all with the same value of `Strokes.family`.
     min_length : float
         Remaining parts of cut strokes that are shorter than this are removed, in spacings.
 

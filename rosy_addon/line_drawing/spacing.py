@@ -252,8 +252,8 @@ def lit_tone(instance: MeshInstance, camera: Camera, lights: Sequence[Any]) -> n
     instance : MeshInstance
     camera : Camera
         Camera. The lights are in its space.
-    lights : sequence of LightSource
-        If there are none, the light is at the camera.
+    lights : sequence of compositor.shading.Light
+        In camera space. If there are none, the light is at the camera.
 
     Returns
     -------
@@ -298,9 +298,10 @@ def weight_by_tone(
 ) -> Strokes:
     """Reduce the width of strokes in light areas, and remove strokes in the lightest areas.
 
-    As the tone gets darker, the families begin one after another. In lighter and lighter areas, the width of
-    the first family begins to fall where `spacing_by_tone` reaches its largest factor. So the ink coverage
-    falls continuously to zero.
+    With the darkness d = 1 - tone, the strokes of family k have the width 0 where d <= k * `layering`. Above
+    that, their width grows linearly, and they have their full width from d = k * `layering` + 1 / `max_ratio`
+    on. `spacing_by_tone` reaches its largest factor at d = 1 / `max_ratio`. Where d is smaller, only the
+    width of the first family still falls, so the ink coverage falls continuously to zero.
 
     Parameters
     ----------

@@ -148,8 +148,8 @@ class Strokes:
         split_labels : (n,) ndarray, optional
             Strokes are also split between points with different labels.
         free_at_removed : bool or (n,) bool ndarray
-            Whether the ends of runs next to a removed point become free ends: one value for all, or one value
-            for each removed point.
+            Whether the ends of runs next to a removed point become free ends: one value for all, or a value
+            for each point, of which only the values of removed points are used.
 
         Returns
         -------
@@ -299,7 +299,7 @@ class Strokes:
 
     @staticmethod
     def concatenate(first: Strokes, second: Strokes) -> Strokes:
-        """Return the strokes of both sets, with the families of the second set after those of the first."""
+        """Return the strokes of both sets. The families of the second set are numbered after the others."""
         renumbered = replace(second, family=second.family + np.int32(len(first.names)))
         return replace(Strokes.join([first, renumbered]), names=first.names + second.names)
 

@@ -129,7 +129,10 @@ class StrokeStyle:
         check_settings(self)
 
     def with_settings(self, settings: dict[str, Any]) -> StrokeStyle:
-        """Return the style with some settings changed. The unit follows from `spacing` or `distance`.
+        """Return the style with some settings changed.
+
+        If `distance` is changed, the setting `unit` becomes "world". If only `spacing` is changed, it becomes
+        "pixels". A value of `unit` in `settings` takes precedence.
 
         Raises
         ------

@@ -80,7 +80,7 @@ class SurfaceParticles:
             column[indices] = values
 
     def join(self, other: Self) -> Self:
-        """Return the particles of both sets, those of `other` last."""
+        """Return the particles of both sets: first these, then the particles of `other`."""
         pairs = zip(self.columns, other.columns, strict=True)
         return type(self)(*(np.concatenate(pair) for pair in pairs))
 

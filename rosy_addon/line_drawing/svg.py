@@ -130,8 +130,8 @@ def svg_text(
     Returns
     -------
     str
-        A document of SVG 1.1. Each family is a group, which is a layer in Inkscape. So are the paper and the
-        singularities. Each stroke is one path.
+        A document of SVG 1.1. Each family is a group, which is a layer in Inkscape. The paper and the
+        singularities are layers of their own. Each stroke is one path.
     """
     pen = pen or Pen()
     pixels, _ = project_to_pixels(strokes.points, camera)

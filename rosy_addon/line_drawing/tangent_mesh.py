@@ -398,12 +398,14 @@ def _barycentric_gradients(
 def _rotations_to_planes(
     axis: np.ndarray, corner_normal: np.ndarray, normal: np.ndarray, x: np.ndarray, y: np.ndarray
 ) -> np.ndarray:
-    """Return (T, 3) complex128: the reference tangent of the value at each corner, in the triangle's frame.
+    """Return (T, 3) complex128: rotations of the field values at corners to the frames of the triangles.
 
-    `CornerField` transports the values of all three corners to the first corner, and stores them relative
-    to one reference tangent there. This function undoes that transport: the reference tangent is transported
-    from the first corner to the corner of the value, and from there directly to the plane of the triangle.
-    Then the values along an edge depend only on its two ends.
+    `CornerField` stores the field at the three corners of a triangle relative to one reference tangent at the
+    first corner. The result is this tangent after transport, by minimal rotations, from the normal at the
+    first corner to the normal at each corner, and from there to the normal of the triangle. It is a unit
+    number in the frame of the triangle. A member of the field at a corner is multiplied by it, so a
+    representation of degree N is multiplied by its power N. Then two triangles that share an edge have
+    the same interpolated field along it.
 
     Parameters
     ----------

@@ -231,7 +231,7 @@ def close_loops(mesh: TangentMesh, strokes: Strokes, spacing: CornerSpacing) -> 
     mesh : TangentMesh
         The mesh on which the strokes were traced.
     strokes : Strokes
-        Strokes before `label_families`, with the same value of `Strokes.family`.
+        Strokes before `label_families`, all with the same value of `Strokes.family`.
     spacing : CornerSpacing
 
     Returns

@@ -114,8 +114,9 @@ def clip_to_visible(strokes: Strokes, camera: Camera, depth_buffer: DepthBuffer 
     -----
     A point is compared with the triangles that are visible at the four pixel centers around it. It
     is hidden if the planes of all four triangles are in front of it by more than a bias: `DEPTH_BIAS_PX` plus
-    the steepness of the plane, in pixels. Planes are used because the depth at a pixel center
-    differs from the depth at the point, by the slope times up to half a pixel. A point is also hidden by a
+    the tangent of the angle between the view ray and the normal of the plane, times the size of a pixel in
+    world space at the point. Planes are used because the depth at a pixel center differs from the depth
+    at the point, by the slope times up to half a pixel. A point is also hidden by a
     single triangle in front of it if the triangle faces the camera and the surface at the point faces away,
     or the reverse.
     """
@@ -179,8 +180,8 @@ def visible_runs(
 def _stroke_blocks(point_count: np.ndarray, size: int) -> Iterator[tuple[int, int]]:
     """Return the ranges ``(first, stop)`` of consecutive strokes that have about `size` points together.
 
-    `point_count` is the number of points up to the end of each stroke. Each block ends before the stroke
-    whose points reach the next multiple of `size`.
+    `point_count`, (S,), is the cumulative number of points: of each stroke and all strokes before it. A new
+    block begins with each stroke at which this number reaches the next multiple of `size`.
     """
     return pairwise([0, *np.flatnonzero(np.diff(point_count // size)) + 1, len(point_count)])
 
@@ -317,8 +318,8 @@ class PlanesAround(NamedTuple):
     facing : (n,) float64 ndarray
         Positive if the triangle faces the camera, negative if it faces away.
     distance : (n,) float64 ndarray
-        Distance from the plane back to the point, along the ray from the camera; negative if the point is in
-        front.
+        Distance, in world space, from the plane to the point along the ray from the camera. It is positive
+        if the point is behind the plane, and negative if it is in front.
     hides : (n,) bool ndarray
         Whether the plane hides the point: the distance is larger than a bias.
     """

@@ -332,22 +332,16 @@ def _join_at_junction(junction: np.ndarray, outward: np.ndarray, mate: np.ndarra
 # --- visibility --------------------------------------------------------------------------------------
 
 
-def clip_outline(
-    lines: Strokes,
-    instance: MeshInstance,
-    index: int,
-    camera: Camera,
-    depth_buffer: DepthBuffer | None,
+def visible_outline(
+    instance: MeshInstance, index: int, camera: Camera, depth_buffer: DepthBuffer | None
 ) -> Strokes:
-    """Return the parts of outlines that are in the frame and not hidden.
+    """Return the parts of the `outline_strokes` of an instance that are in the frame and not hidden.
 
     Outlines need another depth test than strokes, because silhouettes lie on triangles that may face away
     from the camera where the smooth surface does not.
 
     Parameters
     ----------
-    lines : Strokes
-        The `outline_strokes` of an instance.
     instance : MeshInstance
     index : int
         Index of the instance in the depth buffer.
@@ -360,6 +354,7 @@ def clip_outline(
     Strokes
         With a depth buffer, visible parts that are shorter than `MIN_MARK_PX` are left out.
     """
+    lines = outline_strokes(instance, camera)
     test = None if depth_buffer is None else _OutlineTest(instance, index, depth_buffer).is_visible
     return visible_runs(lines, camera, test, MAX_GAP_PX, MIN_MARK_PX)
 

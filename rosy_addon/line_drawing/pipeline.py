@@ -22,7 +22,7 @@ from .arrowheads import arrowheads
 from .crossings import with_crossing_gaps
 from .families import label_families
 from .mesh_in_view import MeshInView, mesh_in_view, seen_triangles, triangles_near, whole_mesh
-from .outline import OUTLINE_KINDS, clip_outline, outline_strokes
+from .outline import OUTLINE_KINDS, outline_strokes, visible_outline
 from .spacing import (
     MAX_SPACING_RATIO,
     CornerSpacing,
@@ -299,10 +299,9 @@ def _outline(instance: MeshInstance, index: int, view: _View) -> Strokes:
 
     `index` is the index of the instance in the depth buffer.
     """
-    lines = outline_strokes(instance, view.camera)
     if not view.clips:
-        return lines
-    lines = clip_outline(lines, instance, index, view.camera, view.depth_buffer)
+        return outline_strokes(instance, view.camera)
+    lines = visible_outline(instance, index, view.camera, view.depth_buffer)
     return smooth(lines, view.camera)
 
 

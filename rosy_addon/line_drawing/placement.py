@@ -148,11 +148,6 @@ class GrowingStrokes(ColumnTable):
         columns = {"spacing": spacing, "parent_side": parent_side}
         return self.append(len(spacing), alive=True, tip_count=2, **columns)
 
-    def set_seeds(self, stroke: np.ndarray, sample: np.ndarray) -> None:
-        """Set the samples at the seeds of new strokes. They are also the samples at both ends."""
-        self.seed_sample[stroke] = sample
-        self.end_sample[stroke] = sample[:, None]
-
     def add_active_children(self, parent_side: np.ndarray, change: int) -> None:
         """Add `change` to the number of growing strokes seeded beside each given side of a stroke.
 
@@ -175,18 +170,6 @@ class GrowingStrokes(ColumnTable):
     def length(self, stroke: np.ndarray) -> np.ndarray:
         """Return (n,) float64: the lengths of strokes, in world space."""
         return self.max_arc[stroke] - self.min_arc[stroke]
-
-    def is_clear_of_tips(
-        self, stroke: np.ndarray, arc: np.ndarray, distance: np.ndarray
-    ) -> np.ndarray:
-        """Return (n,) bool: whether points on strokes are at least `distance` from each growing end.
-
-        All parameters are (n,): indices of strokes, signed arc lengths of the points, and distances along the
-        stroke, in world space.
-        """
-        is_clear = (arc <= self.max_arc[stroke] - distance) | self.end_done[stroke, 1]
-        is_clear &= (arc >= self.min_arc[stroke] + distance) | self.end_done[stroke, 0]
-        return is_clear
 
     def finish_ends(self, stroke: np.ndarray, end: np.ndarray) -> np.ndarray:
         """Mark n ends as finished. Return the indices of strokes that have no growing end left."""
@@ -328,10 +311,9 @@ class StreamlinePlacer:
         left = self.rules.max_length * strokes.spacing[tips.stroke] - strokes.length(tips.stroke)
         count = np.where(tips.step_scale < 1, min(sample_count, MAX_RETRIED_SAMPLES), sample_count)
         count = np.minimum(count, 1 + np.maximum(left / (2 * step), 0)).astype(np.intp)
-        largest, limit = SAMPLES_PER_SEGMENT * step, SEGMENTS_PER_SAMPLE * int(count.max())
-        _, _, ended, path = advance(
-            mesh, tips.particles, count * step, None, largest, max(MIN_SEGMENTS, limit)
-        )
+        limit = max(MIN_SEGMENTS, SEGMENTS_PER_SAMPLE * int(count.max()))
+        longest = SAMPLES_PER_SEGMENT * step
+        _, _, ended, path = advance(mesh, tips.particles, count * step, None, longest, limit)
         path = SampledPath(path, tips.sign)
 
         def next_step(position: SurfaceParticles, tip: np.ndarray) -> np.ndarray:
@@ -421,7 +403,7 @@ class StreamlinePlacer:
         stroke = strokes.add(parent_side, samples.spacing_at(particles))
         step = samples.next_steps(np.zeros(count, dtype=np.int32))
         sample = samples.add(particles, stroke, np.zeros(count), step)
-        strokes.set_seeds(stroke, sample)
+        strokes.seed_sample[stroke], strokes.end_sample[stroke] = sample, sample[:, None]
         is_accepted = ~self._compare(sample).rejected
         strokes.alive[stroke] = is_accepted
         accepted = np.flatnonzero(is_accepted)
@@ -446,9 +428,9 @@ class StreamlinePlacer:
         stroke = samples.stroke[sample]
         ready = strokes.active_children[stroke, side] == 0
         ready &= strokes.length(stroke) >= self.rules.min_length * strokes.spacing[stroke]
-        ready &= strokes.is_clear_of_tips(
-            stroke, samples.arc[sample], PARENT_LEAD * samples.spacing[sample]
-        )
+        arc, lead = samples.arc[sample], PARENT_LEAD * samples.spacing[sample]
+        ready &= (arc <= strokes.max_arc[stroke] - lead) | strokes.end_done[stroke, 1]
+        ready &= (arc >= strokes.min_arc[stroke] + lead) | strokes.end_done[stroke, 0]
         sample, side = sample[ready], side[ready]
         if not len(sample):
             return 0

@@ -219,10 +219,10 @@ def _instance_strokes(
     max_ratio = MAX_SPACING_RATIO ** (1 - style.swell)
     factor = np.ones(len(by_fan.surface.vertices))
     if tone is not None:
-        factor = spacing_by_tone(factor, tone, max_ratio)
+        factor = spacing_by_tone(tone, max_ratio)
     if style.curvature:
         with progress(0.01, 0.02):
-            at_vertices = spacing_by_curvature(instance.surface, 1.0, style.curvature)
+            at_vertices = spacing_by_curvature(instance.surface, style.curvature)
         factor = factor * at_vertices[fan_vertices(instance.surface)]
     with progress(0.02, 0.08):
         crease_angle = None if style.cross_creases else CREASE_ANGLE

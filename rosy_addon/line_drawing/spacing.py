@@ -32,9 +32,6 @@ MAX_SPACING_RATIO, MIN_SPACING_RATIO = 3.0, 0.5
 #: Strokes end where the tone reduces their width to this fraction.
 MIN_STROKE_WIDTH = 0.12
 
-#: Luminance of linear red, green and blue, in double precision.
-LUMINANCE_WEIGHTS = np.array(REC709_LUMINANCE)
-
 
 # --- in the picture -------------------------------------------------------------------------------------
 
@@ -188,51 +185,38 @@ def fan_vertices(surface: Surface) -> np.ndarray:
     return vertex
 
 
-def spacing_by_tone(
-    spacing: np.ndarray | float, tone: np.ndarray, max_ratio: float = MAX_SPACING_RATIO
-) -> np.ndarray:
-    """Return the spacing for a tone: the spacing for black over the darkness, 1 - tone.
+def spacing_by_tone(tone: np.ndarray, max_ratio: float) -> np.ndarray:
+    """Return the factor of the spacing for each tone: 1 over the darkness, 1 - tone.
 
     The fraction of the paper that is covered with ink, the width of strokes over their spacing, is then
-    proportional to the darkness.
+    proportional to the darkness. The factor is 1 for black.
 
     Parameters
     ----------
-    spacing : float or ndarray
-        Spacing where the tone is black.
     tone : ndarray
         Tones at vertices or faces, from 0 (black) to 1 (white).
     max_ratio : float
-        Largest factor of the spacing.
-
-    Returns
-    -------
-    ndarray
-        A spacing for each tone.
+        Largest factor.
     """
-    return np.asarray(spacing) / np.maximum(1 - np.clip(tone, 0, 1), 1 / max_ratio)
+    return 1 / np.maximum(1 - np.clip(tone, 0, 1), 1 / max_ratio)
 
 
-def spacing_by_curvature(
-    surface: Surface, spacing: np.ndarray | float, exponent: float = 0.5
-) -> np.ndarray:
-    """Return spacings that are smaller where the surface is more curved.
+def spacing_by_curvature(surface: Surface, exponent: float) -> np.ndarray:
+    """Return factors of the spacing, which are smaller where the surface is more curved.
 
-    The spacing is divided by a power of the ratio of the curvature to its median. The factor by which it
-    changes is limited to the range from `MIN_SPACING_RATIO` to `MAX_SPACING_RATIO`.
+    The spacing is divided by a power of the ratio of the curvature to its median. The factor is limited to
+    the range from `MIN_SPACING_RATIO` to `MAX_SPACING_RATIO`.
 
     Parameters
     ----------
     surface : Surface
-    spacing : float or (V,) ndarray
-        Spacing at the median curvature.
     exponent : float
         The power. 0 changes nothing; with 1 the spacing is proportional to the radius of curvature.
 
     Returns
     -------
     (V,) float64 ndarray
-        Spacing at each vertex.
+        Factor at each vertex.
     """
     curvature = face_magnitude(surface, "curvature")
     corner = surface.corner_vertex
@@ -241,7 +225,7 @@ def spacing_by_curvature(
     vertex_curvature = vertex_curvature / np.maximum(count, 1)
     median = float(np.median(vertex_curvature[count > 0]))
     relative = np.maximum(vertex_curvature, 1e-3 * max(median, 1e-9)) / max(median, 1e-9)
-    return np.asarray(spacing) * np.clip(relative**-exponent, MIN_SPACING_RATIO, MAX_SPACING_RATIO)
+    return np.clip(relative**-exponent, MIN_SPACING_RATIO, MAX_SPACING_RATIO)
 
 
 def lit_tone(instance: MeshInstance, camera: Camera, lights: Sequence[Any]) -> np.ndarray:
@@ -265,7 +249,7 @@ def lit_tone(instance: MeshInstance, camera: Camera, lights: Sequence[Any]) -> n
     rotation = camera.view[:3, :3]
     tone = np.zeros(len(instance.surface.vertices))
     for light in lights:
-        strength = light.strength * float(LUMINANCE_WEIGHTS @ light.color)
+        strength = light.strength * float(np.array(REC709_LUMINANCE) @ light.color)
         if light.kind == "sun":
             tone += strength * lambert_tone(instance, rotation.T @ light.vector)
             continue

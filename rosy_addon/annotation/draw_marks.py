@@ -58,7 +58,8 @@ def draw_marks(rgba: np.ndarray, marks: SingularityMarks) -> np.ndarray:
         The picture with dots and labels.
     """
     rgba = rgba.copy()
-    marks, outline = marks.in_drawing_order(), singularity_marks.OUTLINE * marks.size
+    marks = marks.in_drawing_order()
+    outline = singularity_marks.OUTLINE * marks.size
     rows = zip(marks.position, marks.radius.tolist(), marks.index, marks.is_visible, strict=True)
     for number, (center, radius, index, is_visible) in enumerate(rows):
         if number % DOTS_PER_BLOCK == 0:

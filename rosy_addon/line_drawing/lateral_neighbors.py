@@ -156,8 +156,9 @@ def find_lateral_neighbors(
     else:
         first, step = sample.min(initial=samples.count), samples.step[sample]
     index = np.maximum(pairs.neighbor - first, -1)
-    near, beside = (near_query, np.maximum(near_neighbor - first, -1)), (pairs.query, index, side)
-    gap, yielded, rejected = _judge(step, previous, near, (*beside, lateral_gap), max_gap)
+    near = near_query, np.maximum(near_neighbor - first, -1)
+    beside = pairs.query, index, side, lateral_gap
+    gap, yielded, rejected = _judge(step, previous, near, beside, max_gap)
     covers &= ~np.append(rejected, False)[index]
     covers &= ~rejected[pairs.query]
     columns = pairs.sample, pairs.neighbor, side, neighbor_side

@@ -326,7 +326,8 @@ class StreamlinePlacer:
         is_first = traced.previous < 0
         before = np.where(is_first[:, None], start[traced.particle], points[traced.previous])
         walked = traced.arc - np.where(is_first, 0, traced.arc[traced.previous])
-        least, chord = MIN_MOVED_RATIO * step[traced.particle], points - before
+        chord = points - before
+        least = MIN_MOVED_RATIO * step[traced.particle]
         has_moved = (walked > least) & (dot(chord, chord) > least * least)
         ended |= np.bincount(traced.particle, minlength=len(tips)) == 0
         if not has_moved.all():

@@ -56,7 +56,10 @@ class ColumnTable:
             setattr(self, name, np.zeros((INITIAL_CAPACITY, *column.shape[1:]), column.dtype))
 
     def append(self, row_count: int, **values: np.ndarray | float) -> np.ndarray:
-        """Append rows with the given columns and return their indices. Other columns are 0 there."""
+        """Append rows with the given columns, and return their indices.
+
+        Each value is an array with a value for each row, or one value for all. Other columns are 0 there.
+        """
         first, self.count = self.count, self.count + row_count
         for name in self._column_names:
             column = getattr(self, name)
@@ -241,7 +244,10 @@ class StrokeSamples(ColumnTable):
             self.count = count
 
     def _append_at(self, particles: SurfaceParticles, **columns: np.ndarray | float) -> np.ndarray:
-        """Append samples at particles to the table, but not to the grid. Return their indices; see `add`."""
+        """Append samples at particles to the table, but not to the grid, and return their indices.
+
+        `columns` are the columns `stroke`, `arc` and `step`.
+        """
         mesh, triangle, weights = self.mesh, particles.triangle, particles.weights
         member = mesh.members_at(triangle, weights, particles.member)
         member = np.where(member == 0, particles.member, member)

@@ -171,7 +171,8 @@ class Strokes:
         owner = stroke[first]
         ends = np.stack([first, first + count[is_long] - 1], axis=1)
         stroke_ends = np.stack([self.start[owner], self.start[owner + 1] - 1], axis=1)
-        outside, free = np.clip(ends + (-1, 1), 0, len(kept) - 1), free_at_removed & ~kept
+        outside = np.clip(ends + (-1, 1), 0, len(kept) - 1)
+        free = free_at_removed & ~kept
         is_whole = count[is_long] == np.diff(self.start)[owner]
         return replace(
             self.take_points(point),

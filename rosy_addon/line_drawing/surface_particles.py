@@ -275,7 +275,8 @@ def _next_segment(
     pending = np.flatnonzero(~stuck)
     for _ in range(MAX_HALVINGS):
         allowed = np.minimum(length, max_step)[pending]
-        start, half = particles.take(pending), 0.5 * np.minimum(edge_distance[pending], allowed)
+        start = particles.take(pending)
+        half = 0.5 * np.minimum(edge_distance[pending], allowed)
         midpoint = _moved_weights(start.weights, slope[pending], half)
         trial, is_straight = _midpoint_segments(mesh, start, midpoint, rotation[pending], allowed)
         for column, values in zip(segments, trial, strict=True):
@@ -369,21 +370,24 @@ def _cross_edges(
     particles : SurfaceParticles
     edge : (n,) ndarray of int
         Edge, 0 to 2, that each particle has reached, or -1.
-    rotation : (n,) complex128 ndarray, optional
-        Changed in place: for particles that cross an edge, it is set to the factor that transports tangents
-        across the edge.
 
     Returns
     -------
-    (n,) bool ndarray
+    stopped : (n,) bool ndarray
         Whether the particle is stopped by a border or a crease at its edge.
+    crossed : (k,) intp ndarray
+        Indices of the particles that crossed an edge.
+    transport : (k,) complex128 ndarray
+        Factors that transport tangents across these edges.
     """
     neighbor = mesh.neighbor[particles.triangle, edge]
-    stopped, crossed = (edge >= 0) & (neighbor < 0), np.flatnonzero((edge >= 0) & (neighbor >= 0))
+    stopped = (edge >= 0) & (neighbor < 0)
+    crossed = np.flatnonzero((edge >= 0) & (neighbor >= 0))
     triangle, k = particles.triangle[crossed], edge[crossed]
     j = mesh.neighbor_edge[triangle, k].astype(np.intp)
     transport = mesh.edge_transport[triangle, k]
-    weights, row = particles.weights[crossed], np.arange(len(crossed))
+    weights = particles.weights[crossed]
+    row = np.arange(len(crossed))
     new_weights = np.zeros_like(weights)
     # Neighboring triangles have opposite directions along their common edge.
     new_weights[row, (j + 1) % 3] = weights[row, (k + 2) % 3]

@@ -255,7 +255,8 @@ def close_loops(mesh: TangentMesh, strokes: Strokes, spacing: CornerSpacing) -> 
             path, offset, passed = _trace_loops(mesh, strokes, candidates, angle)
         if (np.abs(offset) <= tolerance).all():
             break
-        change, step = offset - offset_before, -offset * (angle - angle_before)
+        change = offset - offset_before
+        step = -offset * (angle - angle_before)
         correction = np.divide(step, change, out=np.zeros_like(angle), where=change != 0)
         angle_before, offset_before = angle, offset
         angle = angle + np.clip(correction, -MAX_CLOSING_ANGLE, MAX_CLOSING_ANGLE)

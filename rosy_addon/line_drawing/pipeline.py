@@ -180,9 +180,8 @@ def draw_instances(
             outlines = [(index, _outline(instances[index], index, view)) for index, _ in parts]
         strokes = reduce(Strokes.concatenate, [lines for _, lines in outlines], strokes)
         parts += outlines
-    family_counts = [len(lines.names) for _, lines in parts]
-    instance = np.array([index for index, _ in parts], dtype=np.int32)
-    instance_of_family = np.repeat(instance, family_counts)
+    owner = np.array([index for index, _ in parts], dtype=np.int32)
+    instance_of_family = np.repeat(owner, [len(lines.names) for _, lines in parts])
     heads = []
     if style.arrows:
         points_one_way = np.array([has_arrows(instance) for instance in instances])
@@ -199,8 +198,8 @@ def draw_instances(
     if shows_singularities(style):
         with progress(0.98, 1.0):
             marks = singularity_marks(instances, camera, style)
-    instance = instance_of_family[strokes.family]
-    return StrokeDrawing(_merge_families_by_name(strokes), instance, style.hidden, marks)
+    owner = instance_of_family[strokes.family]
+    return StrokeDrawing(_merge_families_by_name(strokes), owner, style.hidden, marks)
 
 
 def _instance_strokes(

@@ -217,7 +217,7 @@ def trace_geodesics(
         if not len(active):
             break
         current = result.take(active)
-        slope = _barycentric_slopes(mesh, current.triangle, direction[active])
+        slope = _weight_slopes(mesh, current.triangle, direction[active])
         edge_distance, edge = _distance_to_edge(current.weights, slope)
         step = np.minimum(edge_distance, remaining[active])
         edge = np.where(edge_distance <= remaining[active], edge, -1)
@@ -263,7 +263,7 @@ def _next_segment(
     member = nearest_member(particles.member, np.where(stuck, 1, z), mesh.degree)
     particles = replace(particles, member=member)
     direction = rotation * mesh.directions_at(particles.triangle, particles.weights, member)
-    slope = _barycentric_slopes(mesh, particles.triangle, direction)
+    slope = _weight_slopes(mesh, particles.triangle, direction)
     edge_distance, _ = _distance_to_edge(particles.weights, slope)
     turn_rate = np.abs((np.einsum("nk,nk->n", slope, corner_z) * z.conj()).imag)
     max_step = np.full(len(z), np.inf)
@@ -321,7 +321,7 @@ def _midpoint_segments(
     z = mesh.z[start.triangle]
     member = nearest_member(start.member, np.einsum("nk,nk->n", midpoint, z), mesh.degree)
     direction = rotation * mesh.directions_at(start.triangle, midpoint, member)
-    slope = _barycentric_slopes(mesh, start.triangle, direction)
+    slope = _weight_slopes(mesh, start.triangle, direction)
     edge_distance, edge = _distance_to_edge(start.weights, slope)
     step = np.minimum(edge_distance, allowed)
     weights = _moved_weights(start.weights, slope, step)
@@ -331,9 +331,7 @@ def _midpoint_segments(
     return (weights, direction, member, edge, step), cosine >= np.cos(MAX_DIRECTION_ERROR)
 
 
-def _barycentric_slopes(
-    mesh: TangentMesh, triangle: np.ndarray, direction: np.ndarray
-) -> np.ndarray:
+def _weight_slopes(mesh: TangentMesh, triangle: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Return the (n, 3) derivatives of the barycentric coordinates along unit directions."""
     gradient = mesh.gradient[triangle]
     return gradient.real * direction.real[:, None] + gradient.imag * direction.imag[:, None]

@@ -225,7 +225,8 @@ def trace_geodesics(
         remaining[active] -= step
         stopped, crossed, transport = _cross_edges(mesh, current, edge)
         result.assign(active, current)
-        direction[active[crossed]] *= transport
+        crossing = active[crossed]
+        direction[crossing] = direction[crossing] * transport
         active = active[~stopped & (remaining[active] > 1e-9 * length[active])]
     result.member = mesh.members_at(result.triangle, result.weights, result.member)
     return result, direction, length - remaining

@@ -171,7 +171,8 @@ def offset_toward_camera(strokes: Strokes, camera: Camera, width: float) -> np.n
 
     Their positions in the picture do not change. Ribbons of the given width that face the camera
     are then in front of the surface. The offset along the view ray grows with the angle between the surface
-    and the image plane, so that the points are between 1 and 1.5 ribbon widths above the surface.
+    and the image plane, so that points are between 1 and 1.5 ribbon widths above the surface. Only where it
+    is seen almost edge-on, they are lower; see `MAX_OFFSET_STEEPNESS`.
 
     Parameters
     ----------

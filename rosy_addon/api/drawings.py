@@ -118,7 +118,8 @@ def strokes(
     Parameters
     ----------
     surface, field, view, size, orthographic
-        See `render`. Lengths in pixels are relative to this size.
+        See `render`. All lengths in pixels, such as the setting `spacing`, are pixels of a picture of this
+        `size`.
     width : float
         Full width of a stroke in pixels.
     colors : sequence of str
@@ -167,7 +168,7 @@ def draw_strokes(
     orthographic: bool,
 ) -> Drawing:
     """Draw strokes with a style and a pen; see `strokes`."""
-    instance = upright_instance(surface, field, None)
+    instance = upright_instance(surface, field)
     camera = orbit_camera(
         instance.face_points(), *view, *check_size(*size), perspective=not orthographic
     )

@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..api.drawings import draw_strokes
+from .. import api
 from ..api.pictures import DEFAULT_SIZE
 from ..core.errors import RosyError
 from ..field.mesh_io import READERS
@@ -25,6 +25,9 @@ from .mesh_field import add_field_options, load_mesh_and_field
 from .options import Options, add_subcommand, float_between
 from .scene import find_camera, open_scene, print_warnings, requested_objects
 from .streams import print_line
+
+#: Attributes of `Pen` that are arguments of `api.strokes`.
+PEN_ARGUMENTS = ("width", "colors", "paper", "millimeters", "plotter")
 
 #: Names of kinds of files. Some options apply only to one of these; see `CommandParser.only_for`.
 MESH_FILES, SCENES, PICTURES = "mesh files", ".blend files", ".svg files"
@@ -77,9 +80,11 @@ def run_strokes(options: Options) -> None:
     options.check_only_for(SCENES, options.mesh)
     pen = pen_of(options, Pen())
     check_light(style.light, str(options.mesh))
-    size, is_ortho = check_size(*(options.size or DEFAULT_SIZE)), bool(options.orthographic)
+    size = check_size(*(options.size or DEFAULT_SIZE))
+    arguments = {"view": options.view, "size": size, "orthographic": bool(options.orthographic)}
+    arguments |= {name: getattr(pen, name) for name in PEN_ARGUMENTS}
     surface, field = load_mesh_and_field(options)
-    drawing = draw_strokes(surface, field, style, pen, options.view, size, is_ortho)
+    drawing = api.strokes(surface, field, **arguments, **options.requested_settings())
     drawing.save(options.output)
 
 

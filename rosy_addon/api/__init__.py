@@ -18,7 +18,7 @@ that are imported here are public; `rosy_addon.__all__` lists them.
 from ..compositor.picture import Picture as Picture
 from ..core.errors import RosyError as RosyError
 from ..core.errors import RosyWarning as RosyWarning
-from ..field.analysis import Difference as Difference
+from ..field.field import Difference as Difference
 from ..field.field import Field as Field
 from ..field.field import Singularities as Singularities
 from ..field.surface import Surface as Surface

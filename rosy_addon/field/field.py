@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.errors import RosyError
-from .analysis import Difference, angle_errors, dirichlet_energy, error_statistics
+from .analysis import Difference as Difference
+from .analysis import angle_errors, dirichlet_energy, error_statistics
 from .convert import Conversion, convert
 from .directional_field import field_directions
 from .field_io import write_field

@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from ..core.errors import RosyError
 from ..core.progress import progress
 from ..field.blocks import bincount_rows
 from ..field.frames import dot, normalize
-from .gbuffer import MeshInstance
-from .shadow_maps import (
-    NORMAL_BIAS_PIXELS,
-    render_depth_map,
-    sun_camera,
-    visibility_from,
-)
+from .gbuffer import MeshInstance, MeshInstances
+from .shadow_maps import NORMAL_BIAS_PIXELS, render_depth_map, sun_camera, visibility_from
 from .vector_components import cofactor_matrix
 
 #: Number of light directions by default, and width and height of each shadow map in pixels.
@@ -30,9 +23,7 @@ SAMPLE_INSET_PIXELS, MAX_INSET_FRACTION = 2 * NORMAL_BIAS_PIXELS, 0.3
 
 
 def ambient_occlusion(
-    instances: Sequence[MeshInstance],
-    instance_id: int,
-    direction_count: int = DIRECTION_COUNT,
+    instances: MeshInstances, instance_id: int, direction_count: int = DIRECTION_COUNT
 ) -> np.ndarray:
     """Compute the ambient occlusion at the corners of one mesh instance.
 

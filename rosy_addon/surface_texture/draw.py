@@ -204,11 +204,7 @@ def draw_texture(
     crease_angle = crease_angle_of(look)
     with progress(0.0, 0.05):
         mesh = build_tangent_mesh(
-            instance,
-            display=look.display,
-            cross_creases=crease_angle is None,
-            crease_angle=look.crease_angle,
-            cache=cache,
+            instance, display=look.display, crease_angle=crease_angle, cache=cache
         )
     with progress(0.05, 0.1):
         charts = uv_charts(instance.surface, mesh, uv)

@@ -145,7 +145,7 @@ def test_a_rejected_shader_is_an_error_of_one_line(rosy, card, capfd):
     class Broken(passes.ComputePass):
         source = "void main() { nonsense }"
 
-    image = card.device.texture(8, 8, "RGBA32F")
+    image = card.device.texture((8, 8), "RGBA32F")
     with pytest.raises(errors.RosyError, match="'clear'"):
-        card.device.compute(Broken("clear"), (8, 8), {}, {"cleared": image}, {"box_origin": (0, 0)})
+        card.device.compute(Broken("clear"), (8, 8, 1), {"cleared": image}, {"box_origin": (0, 0)})
     capfd.readouterr()

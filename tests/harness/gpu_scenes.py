@@ -165,7 +165,7 @@ def card_rgba(card, instances, look=LOOK, camera=None, **others):
     camera = view() if camera is None else camera
     items = card.upload(instances, look.display)
     texture = run(card.texture_steps(items, ViewInput((), camera, look, **others)))
-    return card.read(texture, camera.width, camera.height).copy()
+    return card.device.read(texture).copy()
 
 
 def assert_parity(

@@ -255,8 +255,7 @@ def _resampled(
     """
 
     def points_at(place: np.ndarray) -> np.ndarray:
-        columns = [np.interp(place, arc_length, column) for column in points.T]
-        return np.stack(columns, axis=1)
+        return np.stack([np.interp(place, arc_length, column) for column in points.T], axis=1)
 
     count = max(int(arc_length[-1] / spacing), 1)
     middle = (np.arange(count) + 0.5) * (arc_length[-1] / count)

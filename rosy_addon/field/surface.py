@@ -19,9 +19,11 @@ from ..core.cache import content_hash
 from ..core.errors import RosyError, counted
 from .blocks import bincount_rows, mask, row_blocks
 from .connectivity import Edges, build_edges, smooth_fans
+from .formats.obj import read_uv
+from .formats.ply import read_vertex_values
 from .frames import dot, normalize
 from .mesh_arrays import mesh_arrays
-from .mesh_io import SHARP_ANGLE, read_uv_map, read_vertex_data
+from .mesh_io import SHARP_ANGLE
 from .polygon_arrays import (
     BLOCK_ELEMENTS,
     box_corners,
@@ -135,9 +137,9 @@ class Surface:
     rest_vertices: np.ndarray | None = None
     up: str = "z"
 
-    #: Path of the file that the surface was read from. Like `uv` and the arrays below, this is not a field of
-    #: the dataclass, so it is not passed to other processes.
-    _path = None
+    #: Path of the file that the surface was read from; empty if there is none. Like `uv` and the arrays below,
+    #: this is not a field of the dataclass, so it is not passed to other processes.
+    _path = Path()
 
     def __init__(
         self,
@@ -164,7 +166,7 @@ class Surface:
             sharp_edges=None if sharp_edges is None else np.asarray(sharp_edges),
         )
         own = vars(self)
-        own.update(vars(built), up=up, _path=Path(vertices) if is_path else None)
+        own.update(vars(built), up=up, _path=Path(vertices) if is_path else Path())
         given = {"uv": arrays.uv, "vertex_data": arrays.vertex_data, "face_data": arrays.face_data}
         own.update((key, value) for key, value in given.items() if value is not None)
 
@@ -194,7 +196,7 @@ class Surface:
     @cached_property
     def uv(self) -> np.ndarray | None:
         """(C, 2) float64: texture coordinates of the corners, face by face; None if there is no UV map."""
-        return None if self._path is None else read_uv_map(self._path)
+        return read_uv(self._path) if self._path.suffix.lower() == ".obj" else None
 
     @cached_property
     def vertex_data(self) -> Mapping[str, np.ndarray]:
@@ -203,7 +205,7 @@ class Surface:
         They come from a ``.ply`` file, from the file of a simulation, or from a mesh object of another
         library, such as PyVista.
         """
-        return {} if self._path is None else read_vertex_data(self._path)
+        return read_vertex_values(self._path) if self._path.suffix.lower() == ".ply" else {}
 
     @cached_property
     def face_data(self) -> Mapping[str, np.ndarray]:

@@ -185,8 +185,7 @@ def _clustering(graph: PhaseGraph) -> _Clustering:
     keeps = np.abs(a) >= np.abs(b)
     value = unit_complex(np.where(keeps, a, b), otherwise=1)
     p[follower], q[follower] = np.where(keeps, value, 0), np.where(keeps, 0, value)
-    number = np.cumsum(is_root) - 1
-    return _Clustering(number[root], p, q, int(np.count_nonzero(is_root)))
+    return _Clustering((np.cumsum(is_root) - 1)[root], p, q, int(np.count_nonzero(is_root)))
 
 
 def _strongest_of_row(row: np.ndarray, strength: np.ndarray, entry: np.ndarray) -> np.ndarray:

@@ -232,8 +232,7 @@ def array_field(
     report(0.0, _LABEL)
     if raw.tensors and raw.domain == "vertex":
         apply_nonfinite_policy(raw.values, source, "vertex", nonfinite)
-        corner_values = raw.values.reshape(-1, 9)[surface.corner_vertex]
-        means = mean_per_face(corner_values, surface.face_start)
+        means = mean_per_face(raw.values.reshape(-1, 9)[surface.corner_vertex], surface.face_start)
         raw = replace(raw, values=means.reshape(-1, 3, 3), domain="face")
     elif not raw.tensors and raw.values.shape[1] == 1:
         vectors = raw.values[:, 0]

@@ -47,8 +47,7 @@ def by_rows(function: Callable[..., Arrays], *arrays: np.ndarray) -> Arrays:
     arrays : (n, ...) ndarray
         Arrays with the same number of rows.
     """
-    blocks = row_blocks(len(arrays[0]))
-    parts = [function(*(array[block] for array in arrays)) for block in blocks]
+    parts = [function(*(array[block] for array in arrays)) for block in row_blocks(len(arrays[0]))]
     if isinstance(parts[0], tuple):
         return tuple(np.concatenate(columns) for columns in zip(*parts, strict=True))
     return np.concatenate(parts)

@@ -90,8 +90,7 @@ def vectors_on_rest_shape(
     --------
     rosy_addon.projection.face_values : Transport to the deformed mesh.
     """
-    rest = surface.with_vertices(rest_vertices)
-    (rest_x, rest_y), w = _planar_corners(rest)
+    (rest_x, rest_y), w = _planar_corners(surface.with_vertices(rest_vertices))
     (x, y), u = _planar_corners(surface)
     face, count = surface.corner_face, surface.face_count
     # Rotations are relative to the first corner of the face, as in `projection.face_values`.

@@ -82,8 +82,7 @@ def cheapest_singularities(
     with progress(0.65, 1.0):
         added = _settled(graph, degree, given, total - given)
     node = np.flatnonzero(added)
-    added_vertex = graph.node_vertex[node]
-    return np.concatenate([vertex, added_vertex]), np.concatenate([index, added[node]])
+    return np.concatenate([vertex, graph.node_vertex[node]]), np.concatenate([index, added[node]])
 
 
 def _spread(graph: FaceGraph, given: np.ndarray) -> np.ndarray:

@@ -188,8 +188,7 @@ def point_triangle_distances(points: np.ndarray, corners: np.ndarray) -> np.ndar
     a, b, c = (corners[:, k] for k in range(3))
     normal = np.cross(b - a, c - a)
     size = np.sqrt(dot(normal, normal))
-    safe_size = np.where(size > 0, size, 1)
-    plane_distance = np.abs(dot(points - a, normal)) / safe_size
+    plane_distance = np.abs(dot(points - a, normal)) / np.where(size > 0, size, 1)
     inside = size > 0
     edge_distance = np.full(len(points), np.inf)
     for start, stop in ((a, b), (b, c), (c, a)):

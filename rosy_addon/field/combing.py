@@ -132,14 +132,12 @@ class Combing:
         if self._node_guides is None:
             self._node_guides = self._guides_at_nodes()
             return
-        corner = self.system.corners_of_nodes(node)
-        new = self._guides_at_nodes(corner)
+        new = self._guides_at_nodes(self.system.corners_of_nodes(node))
         for name, values in vars(new).items():
             getattr(self._node_guides, name)[node] = values[node]
 
     def _guides_at_nodes(self, corner: np.ndarray | slice = slice(None)) -> NodeGuides:
-        edge_length = self.system.surface.mean_edge_length
-        weights = firmness_weights(np.abs(self.guides), edge_length)
+        weights = firmness_weights(np.abs(self.guides), self.system.surface.mean_edge_length)
         return self.system.node_guides(unit_complex(self.guides), *weights, corner)
 
     def _set_face_z(self, z: np.ndarray, face: np.ndarray) -> None:

@@ -76,8 +76,7 @@ def field_from_directions(surface: Surface, directions: np.ndarray) -> RosyField
         vectors, direction_ratios = directions[:, 0] * (rho > 0)[:, None], None
     else:
         vectors = rho[:, None] * (np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y)
-    field = RosyField(directions.shape[1], vectors, direction_ratios)
-    return detect_families(surface, field)
+    return detect_families(surface, RosyField(directions.shape[1], vectors, direction_ratios))
 
 
 def closest_rosy(w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

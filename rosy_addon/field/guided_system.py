@@ -122,8 +122,7 @@ class GuidedSystem:
         rhs = sums(weight * target, self.degree, corner)
         # Nodes of faces with hard guides are fixed at the mean guide, unless the guides cancel.
         fixed = sums(is_hard * target, self.degree, corner)
-        max_modulus = sums(is_hard * np.abs(target), 0, corner)
-        is_fixed = np.abs(fixed) > 1e-6 * max_modulus
+        is_fixed = np.abs(fixed) > 1e-6 * sums(is_hard * np.abs(target), 0, corner)
         return NodeGuides(penalty, rhs, is_fixed, unit_complex(np.where(is_fixed, fixed, 0)))
 
     def solve(
@@ -230,8 +229,7 @@ class GuidedSystem:
 
     def corners_of_nodes(self, node: np.ndarray) -> np.ndarray:
         """Return the (k,) intp corners of triangles that lie at the given nodes, in ascending order."""
-        corner_node = self.averages.connection.corner_node
-        return np.flatnonzero(mask(len(self.laplacian), node)[corner_node])
+        return np.flatnonzero(mask(len(self.laplacian), node)[self.averages.connection.corner_node])
 
     def nodes_near(self, node: np.ndarray, count: int) -> np.ndarray:
         """Add rings of neighbors to a set of nodes until it has at least `count` nodes.

@@ -48,8 +48,7 @@ def unit_complex(z: np.ndarray, otherwise: int = 0) -> np.ndarray:
 
 def complex_bincount(index: np.ndarray, weights: np.ndarray, count: int) -> np.ndarray:
     """Return (count,) complex128 sums of the weights of each index: `numpy.bincount` for complex weights."""
-    real = np.bincount(index, weights.real, count)
-    return real + 1j * np.bincount(index, weights.imag, count)
+    return np.bincount(index, weights.real, count) + 1j * np.bincount(index, weights.imag, count)
 
 
 def to_representation(vectors: np.ndarray, x: np.ndarray, y: np.ndarray, degree: int) -> np.ndarray:

@@ -87,8 +87,7 @@ def smallest_eigenvectors(connection: Connection, degree: int) -> tuple[np.ndarr
     """
     mass = connection.positive_mass
     shift = spectral_shift(mass)
-    matrix = laplacian(connection, degree, shift)
-    z, energy = eigenproblem(matrix, mass, connection.component)
+    z, energy = eigenproblem(laplacian(connection, degree, shift), mass, connection.component)
     return z, energy - shift
 
 

@@ -229,8 +229,7 @@ def _gluing(triangle_vertex: np.ndarray, directions: CornerDirections) -> _Gluin
     """Match the directions of neighboring triangles, after unfolding the two triangles into one plane."""
     corner_vertex = np.ascontiguousarray(triangle_vertex, dtype=np.int32).reshape(-1)
     start = np.arange(0, len(corner_vertex) + 1, 3, dtype=np.int32)
-    edges = build_edges(corner_vertex, start)
-    a, b = edges.halfedges.T
+    a, b = build_edges(corner_vertex, start).halfedges.T
     is_defined = directions.defined[a // 3] & directions.defined[b // 3]
     a, b = a[is_defined], b[is_defined]
     edge = (np.roll(directions.offset, -1, axis=1) - directions.offset).reshape(-1)

@@ -83,8 +83,7 @@ def turning_angles(
     """
     triangles = triangle_graph(graph)
     present_between = triangles.on_triangles(present)
-    count = len(triangles.area)
-    tree = spanning_forest(count, triangles.graph.source, triangles.graph.target)
+    tree = spanning_forest(len(triangles.area), triangles.graph.source, triangles.graph.target)
     with progress(0.0, 0.2):
         loops = _loops(triangles.graph, tree)
     with progress(0.2, 0.8):

@@ -42,8 +42,7 @@ def read_off(path: Path) -> Polygons:
             f"{counted(face_count, 'face')}, but ends after {counted(len(body), 'row')}"
         )
     vertices = body[:vertex_count].points("vertex")
-    face_rows = body[vertex_count : vertex_count + face_count]
-    return Polygons(vertices, *_faces(face_rows, vertex_count))
+    return Polygons(vertices, *_faces(body[vertex_count : vertex_count + face_count], vertex_count))
 
 
 def _after_keyword(rows: TextRows) -> TextRows:

@@ -125,11 +125,7 @@ class ROSY_OT_bake_animation(DialogJobMixin, bpy.types.Operator):
         # file.
         settings = replace(read_output_settings(scene), folder=output_folder(scene))
         return bake_animation.begin(
-            scene,
-            frames,
-            cameras=cameras,
-            settings=settings,
-            workers=worker_count(context),
+            scene, frames, cameras=cameras, settings=settings, workers=worker_count(context)
         )
 
     def _frame_settings(self, scene: bpy.types.Scene) -> dict[str, int]:

@@ -113,9 +113,7 @@ class ROSY_OT_field_convert(_FieldsJobMixin, bpy.types.Operator):
         max=2 * pi,
     )
     smooth: fraction(
-        "Smooth",
-        "Smooth the field over this fraction of the size of the mesh",
-        soft_max=0.2,
+        "Smooth", "Smooth the field over this fraction of the size of the mesh", soft_max=0.2
     )
     pair_distance: fraction(
         "Cancel Pairs",

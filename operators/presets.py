@@ -79,9 +79,7 @@ class _DescribedPreset(RosyOperator):
 
     name: text("Name", "Name of the preset", maxlen=MAX_NAME_LENGTH)
     sentence: text(
-        "Description",
-        "What the look is like, or what it is for",
-        maxlen=MAX_DESCRIPTION_LENGTH,
+        "Description", "What the look is like, or what it is for", maxlen=MAX_DESCRIPTION_LENGTH
     )
 
     def ask(self, context: bpy.types.Context, entry: preset_library.PresetEntry | None) -> set[str]:

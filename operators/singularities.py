@@ -116,10 +116,7 @@ class ROSY_OT_field_singularities(ActiveMeshMixin, ModalJobMixin, bpy.types.Oper
         default=OUTSIDE,
     )
     index: integer(
-        "Index",
-        "What is moved, in units of 1/N. 0: the whole index",
-        soft_min=-4,
-        soft_max=4,
+        "Index", "What is moved, in units of 1/N. 0: the whole index", soft_min=-4, soft_max=4
     )
     reach: _reach()
 

@@ -19,11 +19,7 @@ from ..scene.picture_state import bakes_light, read_texture_state
 from ..scene.pictures import OutputSettings, apply_texture, check_targets, read_output_settings
 from ..scene.read_view import read_lights, read_texture_input, scene_depsgraph
 from ..scene.texture_nodes import Hatching
-from ..surface_texture.draw import (
-    TextureSettings,
-    draw_texture_images,
-    texture_colors_values,
-)
+from ..surface_texture.draw import TextureSettings, draw_texture_images, texture_colors_values
 from ..worker.job import Call, Step, Steps, job
 
 

@@ -330,11 +330,7 @@ def is_occluded(context: bpy.types.Context, point: np.ndarray) -> bool:
 
 
 def draw_view_arrowheads(
-    context: bpy.types.Context,
-    view: ViewInput,
-    key: Hashable,
-    overlay: ViewOverlay,
-    cache: Cache,
+    context: bpy.types.Context, view: ViewInput, key: Hashable, overlay: ViewOverlay, cache: Cache
 ) -> None:
     """Draw arrowheads over the lines of a view. Surfaces in front of arrowheads hide them.
 

@@ -19,6 +19,7 @@ from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.ui import job_status
 from ..rosy_addon.ui.preferences import uses_helper
 from ..rosy_addon.ui.property_makers import toggle
+from ..rosy_addon.viewport.app_handlers import add_handlers, remove_handlers
 from ..rosy_addon.viewport.view3d import redraw_sidebars
 from ..rosy_addon.worker.helper import HELPER, HelperLostError
 from ..rosy_addon.worker.job import Step, Steps, run
@@ -94,12 +95,11 @@ class Job:
         self.window_manager = context.window_manager
         self.timer = self.window_manager.event_timer_add(TIMER_SECONDS, window=context.window)
         self.window_manager.progress_begin(0, 100)
-        self.handlers = [
-            (getattr(bpy.app.handlers, name), lambda *_, reason=reason: self.stop(reason))
+        self.handlers = {
+            name: lambda *_, reason=reason: self.stop(reason)
             for name, reason in INTERRUPT_REASONS.items()
-        ]
-        for handlers, handler in self.handlers:
-            handlers.append(handler)
+        }
+        add_handlers(self.handlers)
         _current_job = self
         self._show_progress(context, Step(0.0, "starting"))
 
@@ -213,8 +213,7 @@ class Job:
 
     def _cleanup(self) -> None:
         """Remove the handlers, the timer and the progress display."""
-        for handlers, handler in self.handlers:
-            handlers.remove(handler)
+        remove_handlers(self.handlers)
         self.window_manager.event_timer_remove(self.timer)
         self.window_manager.progress_end()
         for workspace in self.workspaces:

@@ -9,6 +9,7 @@ from bpy.app.handlers import persistent
 
 from ..core.errors import RosyError
 from ..viewport import session
+from ..viewport.app_handlers import add_handlers, remove_handlers
 from .preferences import addon_preferences
 
 #: Scenes, by `session_uid`, in which the user has switched a live view off.
@@ -70,19 +71,16 @@ def _restore_live_views(*_: Any) -> None:
                         return  # the graphics card can no longer be used
 
 
+_HANDLERS = {"save_pre": _save_live_views, "load_post": _restore_live_views}
+
+
 def register() -> None:
     """Add the handlers that store live views in files. If Blender runs without windows, add none."""
     if not bpy.app.background:
-        bpy.app.handlers.save_pre.append(_save_live_views)
-        bpy.app.handlers.load_post.append(_restore_live_views)
+        add_handlers(_HANDLERS)
 
 
 def unregister() -> None:
     """Remove the handlers."""
-    for handlers, handler in (
-        (bpy.app.handlers.save_pre, _save_live_views),
-        (bpy.app.handlers.load_post, _restore_live_views),
-    ):
-        if handler in handlers:
-            handlers.remove(handler)
+    remove_handlers(_HANDLERS)
     _declined_scenes.clear()

@@ -12,6 +12,7 @@ from ..compositor.picture_key import fixed_color_range
 from ..core.errors import as_sentence
 from ..core.settings import Numbers, Setting, Switch, panel_settings, settings_of
 from . import preset_library
+from .operator_settings import draw_settings
 from .sidebar import (
     SidebarPanel,
     draw_cycles_hint,
@@ -117,18 +118,13 @@ class VIEW3D_MT_rosy_presets(bpy.types.Menu):
         layout.operator("rosy.preset_save", text="Save Look as Preset...", icon="ADD")
         column = layout.column()
         column.enabled = entry is not None and entry.is_user
-        for verb, text, icon in (
-            ("rename", "Rename...", "GREASEPENCIL"),
-            ("remove", "Delete...", "TRASH"),
-        ):
-            operator = column.operator(f"rosy.preset_{verb}", text=text, icon=icon)
-            operator.preset = settings.preset_name
+        column.operator("rosy.preset_rename", text="Rename...", icon="GREASEPENCIL")
+        column.operator("rosy.preset_remove", text="Delete...", icon="TRASH")
         layout.separator()
         layout.operator("rosy.preset_import", text="Import...", icon="IMPORT")
         row = layout.row()
         row.enabled = entry is not None
-        export = row.operator("rosy.preset_export", text="Export...", icon="EXPORT")
-        export.preset = settings.preset_name
+        row.operator("rosy.preset_export", text="Export...", icon="EXPORT")
         for error in preset_library.load_errors():
             layout.label(text=as_sentence(error), icon="ERROR")
 
@@ -151,8 +147,8 @@ def _make_settings_panel(
             part = column.column()
             part.active = setting.applies(settings.look)
             _draw_setting(part, settings.look, setting)
-            if name == "hue":
-                _draw_color_source(column, context)
+            if name == "hue" and settings.look.hue == "values":
+                _draw_name(column.row(), settings, "color_attribute", _active_mesh_object(context))
             if name == "tone":
                 _draw_tone_source(column, context)
         unused = _unused_output(settings)
@@ -200,14 +196,6 @@ def _draw_setting(
     label_row.label(text=label)
     split.use_property_split = False
     split.prop(look, setting.name, text="")
-
-
-def _draw_color_source(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw the name of the attribute with values for the color map, if the look colors lines by values."""
-    settings = context.scene.rosy
-    if settings.look.hue != "values":
-        return
-    _draw_name(column.row(), settings, "color_attribute", _active_mesh_object(context))
 
 
 def _active_mesh_object(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -265,14 +253,10 @@ class VIEW3D_PT_rosy_look_key(SidebarPanel, bpy.types.Panel):
                 row = column.row()
                 row.active = getattr(settings, part)
                 row.prop(settings, name)
-        column.prop(settings, "key_caption")
-        column.prop(settings, "key_size")
+        draw_settings(column, settings, "key_caption", "key_size")
         if settings.key and settings.key_bar and _range_may_differ(settings):
-            draw_wrapped(
-                layout,
-                context,
-                ["For numbers on the color bar of animations, set Color > Top Value"],
-            )
+            hint = "For numbers on the color bar of animations, set Color > Top Value"
+            draw_wrapped(layout, context, [hint])
 
 
 def _range_may_differ(settings: bpy.types.PropertyGroup) -> bool:

@@ -15,14 +15,7 @@ from ..scene.camera_planes import update_backdrops
 from ..scene.datablocks import has_rosy_properties
 from ..scene.field_attributes import DEFAULT_DEGREE, DEFAULT_FIELD_NAME
 from ..scene.keys import update_keys
-from ..surface_texture.draw import (
-    CONTENTS,
-    DEFAULT_MARGIN,
-    DEFAULT_SIZE,
-    MAX_MARGIN,
-    MAX_SIZE,
-    MIN_SIZE,
-)
+from ..surface_texture import draw as texture_drawing
 from . import preset_library
 from .property_makers import (
     PATH_OPTIONS,
@@ -70,7 +63,9 @@ INK_ITEMS = [
 #: Items of the property that chooses the camera of strokes. Strokes are drawn from only one camera at a time,
 #: so there is no item for all cameras.
 STROKE_CAMERA_ITEMS = [item for item in CAMERA_ITEMS if item[0] != "ALL"]
-TEXTURE_CONTENT_ITEMS = [(name.upper(), name.capitalize(), text) for name, text in CONTENTS.items()]
+TEXTURE_CONTENT_ITEMS = [
+    (name.upper(), name.capitalize(), text) for name, text in texture_drawing.CONTENTS.items()
+]
 IMAGE_FORMAT_ITEMS = [
     ("BYTE", "8-Bit sRGB", "Display values in a .png file: small, and readable by most programs"),
     ("FLOAT", "Float", "Linear values in an .exr file"),
@@ -271,17 +266,17 @@ class RosyScene(bpy.types.PropertyGroup):
         "Size",
         "Width and height of textures in texels",
         subtype="PIXEL",
-        min=MIN_SIZE,
-        max=MAX_SIZE,
-        default=DEFAULT_SIZE,
+        min=texture_drawing.MIN_SIZE,
+        max=texture_drawing.MAX_SIZE,
+        default=texture_drawing.DEFAULT_SIZE,
     )
     texture_margin: integer(
         "Margin",
         "Width of the margin around the charts of textures, in texels",
         subtype="PIXEL",
         min=0,
-        max=MAX_MARGIN,
-        default=DEFAULT_MARGIN,
+        max=texture_drawing.MAX_MARGIN,
+        default=texture_drawing.DEFAULT_MARGIN,
     )
     backdrop: toggle(
         "Backdrop",

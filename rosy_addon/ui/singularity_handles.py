@@ -18,8 +18,9 @@ from ..scene.field_attributes import has_field
 from ..scene.meshes import vertex_positions
 from ..scene.singularity_points import mesh_of_own_vertices, read_editable_singularities
 from ..viewport.overlays import is_occluded
-from ..viewport.view3d import redraw
+from ..viewport.view3d import redraw, to_world
 from . import overlay
+from .comb_brush import key_press
 from .view_lines import draw_lines, to_pixels
 
 #: Largest distance in pixels between the mouse and a handle that is grabbed.
@@ -72,7 +73,7 @@ class Drag:
         context = bpy.context
         if context.region != self._region:
             return
-        points = to_pixels(context.region, context.region_data, _to_world(self._obj, self._ends))
+        points = to_pixels(context.region, context.region_data, to_world(self._obj, self._ends))
         angle = np.linspace(0, 2 * np.pi, RING_SEGMENTS + 1)
         ring = RING_RADIUS * np.stack([np.cos(angle), np.sin(angle)], axis=1)
         scale = context.preferences.system.ui_scale
@@ -163,12 +164,6 @@ def _handle_under(
     return None
 
 
-def _to_world(obj: bpy.types.Object, points: np.ndarray) -> np.ndarray:
-    """Transform (K, 3) points from object space to world space."""
-    matrix = np.array(obj.matrix_world)
-    return points @ matrix[:3, :3].T + matrix[:3, 3]
-
-
 class VIEW3D_TOOL_rosy_singularities(bpy.types.WorkSpaceTool):
     """Move the singularities of a field"""
 
@@ -182,12 +177,8 @@ class VIEW3D_TOOL_rosy_singularities(bpy.types.WorkSpaceTool):
     )
     bl_icon = str(Path(__file__).parent / "icons" / "singularities")  # Blender adds .dat
     bl_keymap = (
-        ("rosy.drag_singularity", {"type": "LEFTMOUSE", "value": "PRESS"}, None),
-        (
-            "rosy.drag_singularity",
-            {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True},
-            {"properties": [("make_pair", True)]},
-        ),
+        key_press("rosy.drag_singularity"),
+        key_press("rosy.drag_singularity", "ctrl", make_pair=True),
         # A drag that starts beside the singularities selects. Blender's own keymap would move the object.
         ("view3d.select_box", {"type": "LEFTMOUSE", "value": "CLICK_DRAG"}, None),
     )

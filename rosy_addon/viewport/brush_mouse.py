@@ -18,6 +18,8 @@ from ..scene.brush_surface import BrushSurface
 from ..scene.field_attributes import attribute_name, field_degree, is_face_vector_field
 from ..scene.guides import GUIDE_ATTRIBUTE, STROKE_FIRMNESS
 from ..scene.meshes import mesh_surface, read_attribute
+from .app_handlers import add_handlers, remove_handlers
+from .view3d import to_world
 
 
 class BrushMouse:
@@ -67,8 +69,7 @@ class BrushMouse:
         if is_face_vector_field(mesh, GUIDE_ATTRIBUTE):
             guides = read_attribute(mesh, GUIDE_ATTRIBUTE, np.float32, 3)
             is_guided = np.linalg.norm(guides[face], axis=1) > STROKE_FIRMNESS
-        matrix = np.array(self._obj.matrix_world)
-        return ends @ matrix[:3, :3].T + matrix[:3, 3], is_guided
+        return to_world(self._obj, ends), is_guided
 
 
 #: The `BrushMouse` that was created last, after the name of its object and the pointer of its region.
@@ -103,31 +104,22 @@ def release_mouse(*_: Any) -> None:
 def unregister() -> None:
     """Forget the object that was read, and stop watching for changes."""
     release_mouse()
-    for handlers, handler in _app_handlers():
-        if handler in handlers:
-            handlers.remove(handler)
+    remove_handlers(_HANDLERS)
 
 
 def _read(context: bpy.types.Context, obj: bpy.types.Object) -> None:
     global _current
     _current = (obj.name, context.region.as_pointer()), BrushMouse(context, obj)
-    for handlers, handler in _app_handlers():
-        if handler not in handlers:
-            handlers.append(handler)
-
-
-def _app_handlers() -> list[tuple[Any, Any]]:
-    """Return pairs of one of Blender's lists of application handlers and the handler that belongs in it."""
-    handlers = bpy.app.handlers
-    return [
-        (handlers.depsgraph_update_post, _after_change),
-        (handlers.load_pre, release_mouse),
-        (handlers.undo_pre, release_mouse),
-        (handlers.redo_pre, release_mouse),
-    ]
+    add_handlers(_HANDLERS)
 
 
 def _after_change(*_: Any) -> None:
     """Forget the object that was read, so that it is read again at the next redraw of the cursor."""
     if not _is_held:
         release_mouse()
+
+
+_HANDLERS = {
+    "depsgraph_update_post": _after_change,
+    **dict.fromkeys(("load_pre", "undo_pre", "redo_pre"), release_mouse),
+}

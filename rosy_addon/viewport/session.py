@@ -26,6 +26,7 @@ from ..scene.look_inputs import check_sources, read_request
 from ..scene.look_properties import drift_in_scene, read_look
 from ..scene.read_view import read_lights
 from ..worker.helper import Helper
+from .app_handlers import add_handlers, remove_handlers
 from .flow_clock import FlowClock
 from .layers import LayerState, LayerStates, ReferenceImages
 from .overlays import (
@@ -109,16 +110,14 @@ class ViewportSession:
             bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW"),
             bpy.types.SpaceView3D.draw_handler_add(self._draw_text, (), "WINDOW", "POST_PIXEL"),
         ]
-        handlers = bpy.app.handlers
-        self._app_handlers = [
-            (handlers.depsgraph_update_post, self.layers.invalidate),
-            (handlers.frame_change_post, self.layers.invalidate),
-            (handlers.undo_post, self.layers.forget),
-            (handlers.redo_post, self.layers.forget),
-            (handlers.load_pre, self._on_load),
-        ]
-        for handler_list, handler in self._app_handlers:
-            handler_list.append(handler)
+        self._app_handlers = {
+            "depsgraph_update_post": self.layers.invalidate,
+            "frame_change_post": self.layers.invalidate,
+            "undo_post": self.layers.forget,
+            "redo_post": self.layers.forget,
+            "load_pre": self._on_load,
+        }
+        add_handlers(self._app_handlers)
         #: The methods that timers call. Blender identifies a timer by its function object, and each access to
         #: a method makes a new one.
         self._timers: dict[Callable[[], float | None], Callable[[], float | None]] = {}
@@ -152,12 +151,10 @@ class ViewportSession:
         """Remove all handlers and timers, and free all resources."""
         for handler in self._draw_handlers:
             bpy.types.SpaceView3D.draw_handler_remove(handler, "WINDOW")
-        for handler_list, handler in self._app_handlers:
-            handler_list.remove(handler)
+        remove_handlers(self._app_handlers)
         for timer in self._timers.values():
             if bpy.app.timers.is_registered(timer):
                 bpy.app.timers.unregister(timer)
-        self._draw_handlers, self._app_handlers = [], []
         self.layers.clear()
         self.spaces.clear()
         self.progressive.release()

@@ -61,6 +61,9 @@ EDITABLE_FIELD = (*EDITABLE, ACTIVE_FIELD)
 class RosyOperator:
     """Mixin of all operators: checks their conditions, and reports errors as sentences."""
 
+    #: Blender's options: the operator is listed in the info editor, and can be undone.
+    bl_options = {"REGISTER", "UNDO"}
+
     #: The conditions, which are checked in this order.
     conditions: tuple[Condition, ...] = ()
 

@@ -32,7 +32,6 @@ class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
 
     bl_idname = "rosy.field_compare"
     bl_label = "Compare"
-    bl_options = {"REGISTER", "UNDO"}
 
     other: text(
         "With",

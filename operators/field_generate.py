@@ -82,7 +82,6 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
 
     bl_idname = "rosy.field_generate"
     bl_label = "Make Field"
-    bl_options = {"REGISTER", "UNDO"}
     conditions = EDITABLE
 
     __annotations__ = setting_properties(GeneratorSettings) | {
@@ -153,7 +152,9 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
                 errors.append(error)
                 continue
             if surface.face_count and not field.vectors.any():
-                errors.append(self._no_direction_error(surface))
+                kind = self.properties.bl_rna.properties["kind"].enum_items[self.kind].name
+                reason = "gives no direction on any face: choose another kind, such as Form"
+                errors.append(RosyError(f"{surface.name}: {kind} {reason}"))
                 continue
             fields[mesh] = field
             label = "checking orientations"
@@ -173,14 +174,6 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
         names = [obj.name for obj in selected_mesh_objects(context) if obj.data in fields]
         target = f"'{names[0]}'" if len(fields) == 1 else counted(len(fields), "mesh", "meshes")
         return f"a field of degree {self.degree} on {target}{notes and ': '}{notes}"
-
-    def _no_direction_error(self, surface: Surface) -> RosyError:
-        """Return the error for a mesh on which this kind of field is undefined everywhere."""
-        kind = self.properties.bl_rna.properties["kind"].enum_items[self.kind].name
-        return RosyError(
-            f"{surface.name}: {kind} gives no direction on any face: choose another kind, such as "
-            "Form"
-        )
 
     def _generator_settings(
         self, context: bpy.types.Context, mesh: bpy.types.Mesh, surface: Surface

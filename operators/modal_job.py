@@ -155,13 +155,11 @@ class Job:
         global _has_said_no_helper
         if uses_helper(context) and not _has_said_no_helper:
             self.note, _has_said_no_helper = NO_HELPER, True
-        if context.window is not None:
-            context.window.cursor_modal_set("WAIT")
+        context.window.cursor_modal_set("WAIT")
         try:
             yield
         finally:
-            if context.window is not None:
-                context.window.cursor_modal_restore()
+            context.window.cursor_modal_restore()
 
     def _abort_reason(self, context: bpy.types.Context) -> str | None:
         """Return why the job cannot continue; None if it can."""
@@ -182,13 +180,11 @@ class Job:
         if step is None or step == job_status.current:
             return
         job_status.current = step
-        percent = int(100 * step.fraction)
+        percent, label = int(100 * step.fraction), as_sentence(step.label)
         self.window_manager.progress_update(percent)
-        if context.workspace is not None:
-            if context.workspace not in self.workspaces:
-                self.workspaces.append(context.workspace)
-            label = as_sentence(step.label)
-            context.workspace.status_text_set(f"RoSy: {label}, {percent} %     ESC: Cancel")
+        if context.workspace not in self.workspaces:
+            self.workspaces.append(context.workspace)
+        context.workspace.status_text_set(f"RoSy: {label}, {percent} %     ESC: Cancel")
         redraw_sidebars()
 
     def stop(self, reason: str) -> None:

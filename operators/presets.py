@@ -46,7 +46,6 @@ class ROSY_OT_preset_apply(RosyOperator, bpy.types.Operator):
 
     bl_idname = "rosy.preset_apply"
     bl_label = "Apply Preset"
-    bl_options = {"REGISTER", "UNDO"}
 
     preset: text(
         "Preset",

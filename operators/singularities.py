@@ -38,7 +38,6 @@ class ROSY_OT_singularities(RosyOperator, bpy.types.Operator):
 
     bl_idname = "rosy.singularities"
     bl_label = "Singularities"
-    bl_options = {"REGISTER", "UNDO"}
     conditions = (IDLE, ACTIVE_FIELD)
 
     show: choice(
@@ -100,7 +99,6 @@ class ROSY_OT_field_singularities(ActiveMeshMixin, ModalJobMixin, bpy.types.Oper
 
     bl_idname = "rosy.field_singularities"
     bl_label = "Move Singularity"
-    bl_options = {"REGISTER", "UNDO"}
 
     source: integer(
         "From",

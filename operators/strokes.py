@@ -122,7 +122,6 @@ class ROSY_OT_strokes_remove(RosyOperator, bpy.types.Operator):
 
     bl_idname = "rosy.strokes_remove"
     bl_label = "Remove Strokes"
-    bl_options = {"REGISTER", "UNDO"}
     conditions = (
         IDLE,
         Condition(lambda context: stroke_objects(context.scene), "This scene has no strokes"),

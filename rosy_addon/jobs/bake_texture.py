@@ -88,12 +88,9 @@ def bake_texture(
     depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
     lights = _lights_to_bake(scene, depsgraph) if bakes_light(scene.rosy, look) else None
     is_udim = scene.rosy.texture_udim
+    drift = drift_in_scene(scene, look, scene.frame_current_final)
     texture_settings = TextureSettings(
-        scene.rosy.texture_size,
-        scene.rosy.texture_margin,
-        is_udim,
-        content,
-        drift_in_scene(scene, look, scene.frame_current_final),
+        scene.rosy.texture_size, scene.rosy.texture_margin, is_udim, content, drift
     )
     colors = texture_colors_values(look, content)
     color_attribute = color_attribute_of(scene, look) if colors else None
@@ -107,23 +104,14 @@ def bake_texture(
         state = read_texture_state(scene, depsgraph, obj)
         inputs = instance, uv, look, texture_settings, lights, settings.as_float
         texture = yield Call(draw_texture_images, inputs, start, stop)
-        hatching = None
-        if content == "look" and texture.is_data:
-            hatching = Hatching(look, texture.line_count)
-        drawn.append((obj, texture, state, hatching))
+        is_hatching = content == "look" and texture.is_data
+        hatching = Hatching(look, texture.line_count) if is_hatching else None
+        drawn.append((obj, uv_map, texture, state, hatching))
     yield Step(0.98, "applying the textures")
     results = []
-    for obj, texture, state, hatching in drawn:
+    for obj, uv_map, texture, state, hatching in drawn:
         image = apply_texture(
-            scene,
-            obj,
-            uv_maps[obj],
-            texture.tiles,
-            settings,
-            state,
-            content,
-            hatching,
-            is_udim=is_udim,
+            scene, obj, uv_map, texture.tiles, settings, state, content, hatching, is_udim=is_udim
         )
         results.append(TextureResult(obj, image, (texture.note,) if texture.note else ()))
     return results

@@ -118,9 +118,8 @@ def draw_strokes(
     view = resolve_camera(scene, depsgraph, source, render_size(scene) if size is None else size)
     scene_data = read_scene(depsgraph, objects, ReadRequest(nonfinite_policy(scene)), BAKE_CACHE)
     BAKE_CACHE.evict_over_limit()
-    followed = None
-    if kind == "CURVES" and settings.follow:
-        followed = _followed_instance(scene_data)
+    is_following = kind == "CURVES" and settings.follow
+    followed = _followed_instance(scene_data) if is_following else None
     lights = lights_of(style, read_lights(depsgraph, view.view))
     inputs = scene_data.instances, view, style, pen, lights
     if kind == "FILE":
@@ -131,18 +130,10 @@ def draw_strokes(
     yield Step(0.97, "storing the strokes")
     # The strokes move with the drawn object, if there is only one.
     parent = scene_data.objects[0] if len(scene_data.objects) == 1 else None
-    obj = store_strokes(
-        scene,
-        kind,
-        curves,
-        view.name,
-        parent,
-        collection,
-        0 if followed is None else len(followed.surface.vertices),
-    )
-    return StrokeResult(
-        view.name, drawing, obj, notes=(*scene_data.warnings, *_notes(scene, obj, style))
-    )
+    vertex_count = 0 if followed is None else len(followed.surface.vertices)
+    obj = store_strokes(scene, kind, curves, view.name, parent, collection, vertex_count)
+    notes = (*scene_data.warnings, *_notes(scene, obj, style))
+    return StrokeResult(view.name, drawing, obj, notes=notes)
 
 
 def drawing_path(path: Path | str) -> Path:

@@ -413,10 +413,12 @@ POINTER_PROPERTIES = (
 )
 
 
+_register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
+
+
 def register() -> None:
     """Add the properties to Blender."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
+    _register_classes()
     for id_type, group in POINTER_PROPERTIES:
         id_type.rosy = bpy.props.PointerProperty(type=group, name="RoSy")
 
@@ -425,8 +427,7 @@ def unregister() -> None:
     """Remove the properties."""
     for id_type, _ in POINTER_PROPERTIES:
         del id_type.rosy
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+    _unregister_classes()
 
 
 def ensure_registered() -> None:

@@ -60,7 +60,7 @@ class SequenceResult:
         Name of the camera. If the camera may change from frame to frame, the name of the scene.
     rendered, skipped : tuple of int
         Frames that were drawn, and frames that were up to date and kept.
-    sequence : pictures.ImageSequence
+    sequence : ImageSequence
     warnings : tuple of str
         Messages for the user.
     """
@@ -98,7 +98,7 @@ def bake_animation(
         from the camera that renders it, which timeline markers may change.
     objects, look, size, workers : optional
         See `bake`. If `look` is not given, the settings of the scene's look may be animated.
-    settings : pictures.OutputSettings, optional
+    settings : OutputSettings, optional
         How the pictures are stored and applied, with a folder. By default the settings of the scene.
     show : bool
         Whether the objects get a material that plays the sequence.

@@ -92,8 +92,8 @@ def bake_texture(
     texture_settings = TextureSettings(
         scene.rosy.texture_size, scene.rosy.texture_margin, is_udim, content, drift
     )
-    colors = texture_colors_values(look, content)
-    color_attribute = color_attribute_of(scene, look) if colors else None
+    has_colors = texture_colors_values(look, content)
+    color_attribute = color_attribute_of(scene, look) if has_colors else None
     drawn = []
     for index, (obj, uv_map) in enumerate(uv_maps.items()):
         start, stop = (0.98 * done / len(objects) for done in (index, index + 1))

@@ -6,11 +6,7 @@ from typing import Any
 
 import bpy
 import numpy as np
-from bpy_extras.view3d_utils import (
-    region_2d_to_location_3d,
-    region_2d_to_origin_3d,
-    region_2d_to_vector_3d,
-)
+from bpy_extras import view3d_utils
 from mathutils import Vector
 
 from ..core.cache import BAKE_CACHE
@@ -36,8 +32,8 @@ class BrushMouse:
 
         Return None if the object is not under the mouse.
         """
-        origin = region_2d_to_origin_3d(self._region, self._view, mouse)
-        direction = region_2d_to_vector_3d(self._region, self._view, mouse)
+        origin = view3d_utils.region_2d_to_origin_3d(self._region, self._view, mouse)
+        direction = view3d_utils.region_2d_to_vector_3d(self._region, self._view, mouse)
         return self._surface.cast_ray(origin, direction)
 
     def radius(self, place: np.ndarray, pixels: float) -> float:
@@ -45,7 +41,7 @@ class BrushMouse:
         world = self._obj.matrix_world @ Vector(place.tolist())
         x, y = self._region.width / 2, self._region.height / 2
         start, end = (
-            region_2d_to_location_3d(self._region, self._view, position, world)
+            view3d_utils.region_2d_to_location_3d(self._region, self._view, position, world)
             for position in ((x, y), (x + 1, y))
         )
         return pixels * (end - start).length / (self._obj.matrix_world.median_scale or 1.0)

@@ -16,17 +16,10 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
-from ..annotation import arrow_marks
+from ..annotation import arrow_marks, singularity_marks
 from ..annotation.arrow_marks import ArrowMarks
 from ..annotation.draw_marks import head_outline
 from ..annotation.index_labels import MAX_LABELS, place_indices
-from ..annotation.singularity_marks import (
-    COLOR_BY_SIGN,
-    HIDDEN_OPACITY,
-    OUTLINE,
-    OUTLINE_COLOR,
-    dot_diameters,
-)
 from ..annotation.singularity_settings import shows_hidden_singularities, shows_indices
 from ..compositor.look import Look
 from ..core.cache import Cache
@@ -210,7 +203,7 @@ def draw_dots(
     """
     if shows_hidden:
         gpu.state.blend_set("ALPHA")
-        _draw_all(context, objects, size, HIDDEN_OPACITY)
+        _draw_all(context, objects, size, singularity_marks.HIDDEN_OPACITY)
         gpu.state.blend_set("NONE")
     gpu.state.depth_test_set("LESS_EQUAL")
     _draw_all(context, objects, size, 1.0)
@@ -239,14 +232,15 @@ def draw_singularities(
 def _draw_all(
     context: bpy.types.Context, objects: Sequence[SingularityDots], size: float, opacity: float
 ) -> None:
+    outline = singularity_marks.OUTLINE * size
     for dots in objects:
-        radii = dot_diameters(dots.index, size) / 2
-        for sign, code in COLOR_BY_SIGN.items():
+        radii = singularity_marks.dot_diameters(dots.index, size) / 2
+        for sign, code in singularity_marks.COLOR_BY_SIGN.items():
             chosen = np.sign(dots.index) == sign
             points, radius = dots.points[chosen], radii[chosen]
             # The outline first, slightly behind the dot.
             for part_radius, depth_offset, color in (
-                (radius + OUTLINE * size, 2 * radius, OUTLINE_COLOR),
+                (radius + outline, 2 * radius, singularity_marks.OUTLINE_COLOR),
                 (radius, 3 * radius, code),
             ):
                 vertices = _disc_triangles(context, points, part_radius, depth_offset)
@@ -319,11 +313,9 @@ def is_occluded(context: bpy.types.Context, point: np.ndarray) -> bool:
     """
     point = Vector(point)
     view_to_world = context.region_data.view_matrix.inverted()
-    view_direction = (
-        view_to_world.translation - point
-        if context.region_data.is_perspective
-        else view_to_world.col[2].xyz
-    )
+    view_direction = view_to_world.col[2].xyz
+    if context.region_data.is_perspective:
+        view_direction = view_to_world.translation - point
     view_direction.normalize()
     start = point + NEAR_SURFACE * context.region_data.view_distance * view_direction
     return context.scene.ray_cast(context.view_layer.depsgraph, start, view_direction)[0]

@@ -343,6 +343,7 @@ class ProgressiveRenderer:
                 return
             view.stop_rendering()
         seconds = self._seconds_per_megapixel * self._megapixels(view, request)
+        is_at_rest = time.monotonic() - view.requested_time >= IDLE_SECONDS
         if not self._seconds_per_megapixel:
             self._start(view, request, full_downscale)
         elif seconds <= FRAME_BUDGET_SECONDS:
@@ -350,10 +351,7 @@ class ProgressiveRenderer:
         elif view.texture_still_key != request.still_key:
             self._start(view, request, preview_downscale, is_at_once=True)
             self._schedule_redraw(IDLE_SECONDS)
-        elif (
-            view.downscale != full_downscale
-            and time.monotonic() - view.requested_time < IDLE_SECONDS
-        ):
+        elif view.downscale != full_downscale and not is_at_rest:
             self._schedule_redraw(IDLE_SECONDS)
         else:
             self._start(view, request, full_downscale)
@@ -427,11 +425,8 @@ class ProgressiveRenderer:
         """Update the estimated cost of pictures, given the time and the size of a finished picture."""
         # The minimum keeps the cost of single compilations and uploads out of the estimate.
         cost = seconds / max(megapixels, _MIN_MEGAPIXELS)
-        self._seconds_per_megapixel = (
-            cost
-            if not self._seconds_per_megapixel
-            else min(cost, 0.5 * (self._seconds_per_megapixel + cost))
-        )
+        old_cost = self._seconds_per_megapixel or cost
+        self._seconds_per_megapixel = min(cost, 0.5 * (old_cost + cost))
 
     def _continue(self, view: ViewState, work: Work, seconds: float) -> StopIteration | None:
         """Continue work for a view. Return the StopIteration with its result if it is done, otherwise None.

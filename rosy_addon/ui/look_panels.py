@@ -11,15 +11,8 @@ from ..compositor.look import Look, colors_magnitude, colors_values, is_hatched
 from ..compositor.picture_key import fixed_color_range
 from ..core.errors import as_sentence
 from ..core.settings import Numbers, Setting, Switch, panel_settings, settings_of
-from . import preset_library
+from . import preset_library, sidebar
 from .operator_settings import draw_settings
-from .sidebar import (
-    SidebarPanel,
-    draw_cycles_hint,
-    draw_wrapped,
-    use_property_columns,
-    wrap_to_sidebar,
-)
 
 #: Labels of the panels with settings of a look, from top to bottom. Settings refer to panels by these keys.
 LOOK_PANELS = {
@@ -74,7 +67,7 @@ SEARCH_COLLECTIONS = {
 }
 
 
-class VIEW3D_PT_rosy_look(SidebarPanel, bpy.types.Panel):
+class VIEW3D_PT_rosy_look(sidebar.SidebarPanel, bpy.types.Panel):
     """How fields are drawn."""
 
     bl_label = "Look"
@@ -98,7 +91,7 @@ class VIEW3D_PT_rosy_look(SidebarPanel, bpy.types.Panel):
         if entry is not None:
             lines = column.column(align=True)
             lines.scale_y, lines.active = 0.8, False
-            for line in wrap_to_sidebar(entry.preset.description, context):
+            for line in sidebar.wrap_to_sidebar(entry.preset.description, context):
                 lines.label(text=line)
 
 
@@ -139,7 +132,7 @@ def _make_settings_panel(
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
-        use_property_columns(layout)
+        sidebar.use_property_columns(layout)
         column = layout.column()
         settings = context.scene.rosy
         for name in look_names:
@@ -157,7 +150,7 @@ def _make_settings_panel(
             row.active = name not in unused
             row.prop(settings, name)
             if name == "relight" and name not in unused and settings.relight:
-                draw_cycles_hint(column, context)
+                sidebar.draw_cycles_hint(column, context)
         if "tone" in look_names:
             column.operator("rosy.occlusion", icon="SHADING_RENDERED")
 
@@ -168,7 +161,7 @@ def _make_settings_panel(
         "bl_options": {"DEFAULT_CLOSED"},
         "draw": draw,
     }
-    return type(f"VIEW3D_PT_rosy_{suffix}", (SidebarPanel, bpy.types.Panel), namespace)
+    return type(f"VIEW3D_PT_rosy_{suffix}", (sidebar.SidebarPanel, bpy.types.Panel), namespace)
 
 
 def _unused_output(settings: bpy.types.PropertyGroup) -> tuple[str, ...]:
@@ -232,7 +225,7 @@ def _draw_tone_source(column: bpy.types.UILayout, context: bpy.types.Context) ->
             _draw_name(row, owner, name, mesh_object)
 
 
-class VIEW3D_PT_rosy_look_key(SidebarPanel, bpy.types.Panel):
+class VIEW3D_PT_rosy_look_key(sidebar.SidebarPanel, bpy.types.Panel):
     """The key (legend) that explains a picture in renders."""
 
     bl_label = "Key"
@@ -244,7 +237,7 @@ class VIEW3D_PT_rosy_look_key(SidebarPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, context.scene.rosy
-        use_property_columns(layout)
+        sidebar.use_property_columns(layout)
         layout.active = settings.key
         column = layout.column()
         for part, names in KEY_PARTS.items():
@@ -256,7 +249,7 @@ class VIEW3D_PT_rosy_look_key(SidebarPanel, bpy.types.Panel):
         draw_settings(column, settings, "key_caption", "key_size")
         if settings.key and settings.key_bar and _range_may_differ(settings):
             hint = "For numbers on the color bar of animations, set Color > Top Value"
-            draw_wrapped(layout, context, [hint])
+            sidebar.draw_wrapped(layout, context, [hint])
 
 
 def _range_may_differ(settings: bpy.types.PropertyGroup) -> bool:

@@ -15,22 +15,14 @@ from ..scene.staleness import SCENE_STATES
 from ..scene.visible_objects import field_objects
 from ..viewport import session
 from ..viewport.view3d import redraw
-from . import job_status, overlay
+from . import job_status, overlay, sidebar
 from .operator_settings import draw_convert_settings, draw_generator_settings, draw_settings
-from .sidebar import (
-    SidebarPanel,
-    closed_panel,
-    draw_cycles_hint,
-    draw_progress,
-    draw_wrapped,
-    use_property_columns,
-)
 
 #: Types of viewport shading in which a 3D view does not show baked pictures.
 SHADING_WITHOUT_MATERIALS = ("WIREFRAME", "SOLID")
 
 
-class VIEW3D_PT_rosy(SidebarPanel, bpy.types.Panel):
+class VIEW3D_PT_rosy(sidebar.SidebarPanel, bpy.types.Panel):
     """Make a field, bake its picture and look at it."""
 
     bl_label = "RoSy"
@@ -38,7 +30,7 @@ class VIEW3D_PT_rosy(SidebarPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         job_status.start_helper_once(context)
         layout = self.layout
-        use_property_columns(layout)
+        sidebar.use_property_columns(layout)
         _draw_field_section(layout, context)
         layout.separator()
         _draw_picture_section(layout, context)
@@ -73,12 +65,13 @@ def _draw_existing_field(
     is_shown = overlay.shown(obj.name) is not None
     button = row.operator("rosy.singularities", icon="OVERLAY", depress=is_shown)
     button.show = "NONE" if is_shown else "OVERLAY"
-    if (body := closed_panel(layout, "convert_field", "Convert")) is not None:
+    if (body := sidebar.closed_panel(layout, "convert_field", "Convert")) is not None:
         _draw_convert_settings(body, context)
     other_fields = other_field_names(mesh)
-    if other_fields and (body := closed_panel(layout, "compare_field", "Compare")) is not None:
+    body = sidebar.closed_panel(layout, "compare_field", "Compare") if other_fields else None
+    if body is not None:
         _draw_compare_settings(body, context, other_fields)
-    if (body := closed_panel(layout, "another_field", "Make Another Field")) is not None:
+    if (body := sidebar.closed_panel(layout, "another_field", "Make Another Field")) is not None:
         _draw_new_field(body, context)
 
 
@@ -123,11 +116,11 @@ def _draw_picture_section(layout: bpy.types.UILayout, context: bpy.types.Context
             text = "Pause" if session.is_flow_playing() else "Play"
             layout.operator("rosy.flow_play", text=text, icon=text.upper())
     if job_status.current is not None:
-        draw_progress(layout)
+        sidebar.draw_progress(layout)
     else:
         _draw_bakes(layout, context)
     # Messages are below the buttons, so that buttons do not move when messages come and go.
-    draw_wrapped(layout, context, session.messages(context.area))
+    sidebar.draw_wrapped(layout, context, session.messages(context.area))
 
 
 def _draw_bakes(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -166,7 +159,7 @@ def bake_label(bake_infos: list[BakeInfo]) -> str:
 
 def _draw_texture_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the settings and the button that bake textures."""
-    if (body := closed_panel(layout, "texture", "Texture")) is None:
+    if (body := sidebar.closed_panel(layout, "texture", "Texture")) is None:
         return
     obj = context.view_layer.objects.active
     column = body.column()
@@ -179,7 +172,7 @@ def _draw_texture_settings(layout: bpy.types.UILayout, context: bpy.types.Contex
     elif is_hatched(settings.look):
         column.prop(settings, "texture_bake_light")
         if not settings.texture_bake_light:
-            draw_cycles_hint(column, context)
+            sidebar.draw_cycles_hint(column, context)
     draw_settings(column, settings, "texture_udim", "texture_size", "texture_margin")
     column.operator("rosy.bake_texture", icon="TEXTURE")
     if settings.texture_content == "ANISOTROPY" and context.scene.render.engine != "CYCLES":
@@ -215,10 +208,10 @@ def _draw_bake_info(
     elif several:
         row.operator("rosy.show", text="Show").camera = bake.camera
     if bake.stale_reason:
-        draw_wrapped(box, context, [f"Out of date: {bake.stale_reason}"], "ERROR")
+        sidebar.draw_wrapped(box, context, [f"Out of date: {bake.stale_reason}"], "ERROR")
     elif bake.unknown_reason:
         reason = f"Not known to be up to date: {bake.unknown_reason}"
-        draw_wrapped(box, context, [reason], "QUESTION")
+        sidebar.draw_wrapped(box, context, [reason], "QUESTION")
     else:
         text = "Up to date at this frame" if bake.frame_range else "Up to date"
         box.label(text=text, icon="CHECKMARK")

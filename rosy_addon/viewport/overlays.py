@@ -6,7 +6,6 @@ import textwrap
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import NamedTuple
 
 import blf
 import bpy
@@ -59,25 +58,19 @@ MAX_EXACT_TRIANGLES = 200_000
 ARC_POINTS = 4
 
 
-class PixelFrames(NamedTuple):
-    """Vectors in world space of the size of one pixel, at K points of a view.
+def pixel_frames(
+    context: bpy.types.Context, points: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the vectors of one pixel at (K, 3) points in world space, in the region that is drawn.
 
-    Attributes
-    ----------
+    Returns
+    -------
     right, up : (K, 3) float64 ndarray
-        Vectors that are parallel to the view plane.
+        Vectors in world space that are as long as a pixel and parallel to the view plane.
     nearer : (K, 3) float64 ndarray
         Vectors of the same length toward the eye. A point that moves along its vector does not move on
         screen.
     """
-
-    right: np.ndarray
-    up: np.ndarray
-    nearer: np.ndarray
-
-
-def pixel_frames(context: bpy.types.Context, points: np.ndarray) -> PixelFrames:
-    """Return the vectors of one pixel at (K, 3) points in world space, in the region that is drawn."""
     view, window = context.region_data, context.region
     view_to_world = np.array(view.view_matrix.inverted())
     right, up, back, eye = view_to_world[:3].T
@@ -86,7 +79,7 @@ def pixel_frames(context: bpy.types.Context, points: np.ndarray) -> PixelFrames:
         depth = (eye - points) @ back
         toward_eye = (eye - points) / depth[:, None]
     pixel = (depth * (2 / (view.window_matrix[0][0] * window.width)))[:, None]
-    return PixelFrames(pixel * right, pixel * up, pixel * toward_eye)
+    return pixel * right, pixel * up, pixel * toward_eye
 
 
 def _draw_triangles(vertices: np.ndarray, code: str, opacity: float) -> None:
@@ -254,14 +247,14 @@ def _disc_triangles(
 
     The (K,) radii and the (K,) offsets toward the camera are in pixels.
     """
-    frames = pixel_frames(context, points)
+    right, up, nearer = pixel_frames(context, points)
     angles = np.linspace(0, 2 * np.pi, DISC_SEGMENTS + 1)
     x, y = (
         np.stack([np.zeros(DISC_SEGMENTS), values[:-1], values[1:]], axis=1).reshape(-1, 1)
         for values in (np.cos(angles), np.sin(angles))
     )
-    center = points + depth_offset[:, None] * frames.nearer
-    circle = x * frames.right[:, None] + y * frames.up[:, None]
+    center = points + depth_offset[:, None] * nearer
+    circle = x * right[:, None] + y * up[:, None]
     vertices = center[:, None] + radius[:, None, None] * circle
     return vertices.reshape(-1, 3).astype(np.float32)
 
@@ -355,10 +348,10 @@ def _head_triangles(
     offset = (marks.position - marks.place)[:, None] + (
         corners[:, :1] * forward[:, None] + corners[:, 1:] * left[:, None]
     )
-    frames = pixel_frames(context, marks.anchor)
+    right, up, nearer = pixel_frames(context, marks.anchor)
     nearness = nearness + SLOPE * np.hypot(*(marks.position - marks.place).T)[:, None]
-    vertices = (marks.anchor + nearness * frames.nearer)[:, None] + (
-        offset[..., :1] * frames.right[:, None] + offset[..., 1:] * frames.up[:, None]
+    vertices = (marks.anchor + nearness * nearer)[:, None] + (
+        offset[..., :1] * right[:, None] + offset[..., 1:] * up[:, None]
     )
     return vertices.reshape(-1, 3).astype(np.float32)
 

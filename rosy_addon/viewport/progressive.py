@@ -44,11 +44,12 @@ class Request(NamedTuple):
     Attributes
     ----------
     key : hashable
-        Key of everything that the picture depends on.
+        Key of everything that the picture depends on. It changes whenever the picture would change.
     still_key : hashable
         Key of everything but the drift of the streaks: it is equal for pictures in which only the streaks
         have drifted.
     view_input : ViewInput
+        Input of the picture. Its camera has the size of the region.
     lookups : sequence of callable
         Functions that look up data that must be prepared besides the meshes; see `prepare_steps`.
     """
@@ -56,7 +57,7 @@ class Request(NamedTuple):
     key: Hashable
     still_key: Hashable
     view_input: ViewInput
-    lookups: Sequence[Callable[[], Any]]
+    lookups: Sequence[Callable[[], Any]] = ()
 
 
 @dataclass(eq=False)
@@ -249,28 +250,14 @@ class ProgressiveRenderer:
             self._preparation = None
         self.renderer.release()
 
-    def update(
-        self,
-        view_pointers: tuple[int, int],
-        requested_key: Hashable,
-        view_input: ViewInput,
-        still_key: Hashable = None,
-        lookups: Sequence[Callable[[], Any]] = (),
-    ) -> ViewState:
+    def update(self, view_pointers: tuple[int, int], request: Request) -> ViewState:
         """Bring the picture of a view up to date, as far as the time budget allows, and return its state.
 
         Parameters
         ----------
         view_pointers : (int, int)
             Pointers of the space and the region.
-        requested_key : hashable
-            A key that changes whenever the picture would change.
-        view_input : ViewInput
-            Input of the picture. Its camera has the size of the region.
-        still_key : hashable, optional
-            A key that also changes then, except if only streaks have drifted. By default `requested_key`.
-        lookups : sequence of callable
-            Functions that look up data that must be prepared besides the meshes; see `prepare_steps`.
+        request : Request
 
         Raises
         ------
@@ -278,20 +265,18 @@ class ProgressiveRenderer:
             If this picture cannot be rendered. Later calls for it raise a RosyError with the same message.
         """
         view = self.views.setdefault(view_pointers, ViewState())
-        still_key = requested_key if still_key is None else still_key
-        view.requested_key = requested_key
-        if still_key != view.requested_still_key:
-            view.requested_still_key, view.requested_time = still_key, time.monotonic()
-        if view.error is not None and view.error_key == still_key:
+        view.requested_key = request.key
+        if request.still_key != view.requested_still_key:
+            view.requested_still_key, view.requested_time = request.still_key, time.monotonic()
+        if view.error is not None and view.error_key == request.still_key:
             raise RosyError(view.error)
         view.error = None
         try:
-            request = Request(requested_key, still_key, view_input, lookups)
             prepared = self._prepared(view, request)
             if prepared is not None:
                 self._update_picture(view, prepared)
         except Exception as error:
-            view.error, view.error_key = error_text(error), still_key
+            view.error, view.error_key = error_text(error), request.still_key
             view.stop_rendering()
             view.texture = view.texture_key = view.texture_still_key = None
             raise

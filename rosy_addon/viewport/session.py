@@ -31,7 +31,7 @@ from .app_handlers import add_handlers, remove_handlers
 from .flow_clock import FlowClock
 from .layers import LayerState, LayerStates, ReferenceImages
 from .overlays import ViewOverlay
-from .progressive import ProgressiveRenderer
+from .progressive import ProgressiveRenderer, Request
 
 #: Seconds between two checks for views that were closed.
 CLOSED_VIEWS_INTERVAL_SECONDS = 1.0
@@ -269,9 +269,8 @@ class ViewportSession:
             for instance in view_input.instances
             if shows_dots and instance.field is not None
         ]
-        view = self.progressive.update(
-            _pointers(context), _picture_key(view_input), view_input, still_key, lookups
-        )
+        request = Request(_picture_key(view_input), still_key, view_input, lookups)
+        view = self.progressive.update(_pointers(context), request)
         renderer = self.progressive.renderer
         if self.progressive.is_prepared:
             background = view3d.view_background(context, depsgraph, view_input.camera, look)

@@ -67,14 +67,11 @@ def _search_points(_operator: Any, context: bpy.types.Context, _typed: str) -> l
 
 
 def _search_uv_maps(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
-    return [
-        layer.name for obj in selected_mesh_objects(context)[:1] for layer in obj.data.uv_layers
-    ]
+    return selected_mesh_objects(context)[0].data.uv_layers.keys()
 
 
 def _search_attributes(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
-    objects = selected_mesh_objects(context)[:1]
-    return [attribute.name for obj in objects for attribute in obj.data.attributes]
+    return selected_mesh_objects(context)[0].data.attributes.keys()
 
 
 class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):

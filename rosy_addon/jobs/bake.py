@@ -24,7 +24,6 @@ from ..worker.job import Step, Steps, job, part
 @job
 def bake(
     scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph | None = None,
     *,
     objects: Sequence[bpy.types.Object] | None = None,
     cameras: Sequence[CameraSource] | None = None,
@@ -41,8 +40,6 @@ def bake(
     Parameters
     ----------
     scene : bpy.types.Scene
-    depsgraph : bpy.types.Depsgraph, optional
-        Evaluated depsgraph of a view layer of the scene. By default the result of `scene_depsgraph`.
     objects : sequence of bpy.types.Object, optional
         Objects whose fields are drawn. By default all visible objects with a field. All other objects only
         hide what is behind them.
@@ -77,7 +74,7 @@ def bake(
     if draws_thresholds:
         look, settings = unlit_look(look), replace(settings, device="cpu")
     sources = [render_camera(scene)] if cameras is None else list(cameras)
-    depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
+    depsgraph = scene_depsgraph(scene)
     views, scene_data = read_views(
         scene, depsgraph, sources, look, objects=objects, size=size, cache=BAKE_CACHE
     )

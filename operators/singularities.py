@@ -22,14 +22,7 @@ from ..rosy_addon.ui import overlay, singularity_handles
 from ..rosy_addon.ui.operator_settings import draw_settings
 from ..rosy_addon.ui.property_makers import choice, fraction, integer, toggle
 from ..rosy_addon.worker.job import Call, Steps
-from .base import (
-    ACTIVE_FIELD,
-    EDITABLE_FIELD,
-    IDLE,
-    IN_3D_VIEW,
-    RosyOperator,
-    selected_mesh_objects,
-)
+from .base import ACTIVE_FIELD, IDLE, IN_3D_VIEW, RosyOperator, selected_mesh_objects
 from .modal_job import ActiveMeshMixin, ModalJobMixin
 
 
@@ -138,7 +131,7 @@ class ROSY_OT_drag_singularity(RosyOperator, bpy.types.Operator):
     bl_idname = "rosy.drag_singularity"
     bl_label = "Drag Singularity"
     bl_options = {"INTERNAL"}
-    conditions = (IN_3D_VIEW, *EDITABLE_FIELD)
+    conditions = (IN_3D_VIEW, *ActiveMeshMixin.conditions)
 
     make_pair: toggle(
         "Make Pair",

@@ -10,34 +10,16 @@ import bpy
 from ..compositor.look import Look, colors_magnitude, colors_values, is_hatched
 from ..compositor.picture_key import fixed_color_range
 from ..core.errors import as_sentence
-from ..core.settings import Numbers, Setting, Switch, panel_settings, settings_of
+from ..core.settings import Numbers, Setting, Switch, panel_settings, settings_of, title
 from . import preset_library, sidebar
 from .operator_settings import draw_settings
 
-#: Labels of the panels with settings of a look, from top to bottom. Settings refer to panels by these keys.
-LOOK_PANELS = {
-    "streaks": "Streaks",
-    "color": "Color",
-    "light": "Light",
-    "tone": "Tone",
-    "ink": "Ink",
-    "singularities": "Singularities",
-    "quality": "Quality",
-}
+#: Keys of the panels with settings of a look, from top to bottom. Settings refer to panels by these keys.
+LOOK_PANELS = ("streaks", "color", "light", "tone", "ink", "singularities", "quality")
 
-#: Properties of `Scene.rosy` that determine how the picture is made, stored and shown.
-OUTPUT_SETTINGS = (
-    "percentage",
-    "device",
-    "placement",
-    "relight",
-    "emission",
-    "diffuse",
-    "backdrop",
-    "store",
-    "directory",
-    "image_format",
-)
+#: Properties of `Scene.rosy` that determine how the picture is made and shown, and how it is stored.
+OUTPUT_SETTINGS = "percentage", "device", "placement", "relight", "emission", "diffuse", "backdrop"
+STORAGE_SETTINGS = "store", "directory", "image_format"
 
 #: Height of the picture of a preset, in the panel and in the pop-up to choose one, in units of Blender's
 #: layout. At a resolution scale of 1, it is 128 screen pixels: half the size of the picture.
@@ -264,10 +246,14 @@ CLASSES = (
     VIEW3D_MT_rosy_presets,
     VIEW3D_PT_rosy_look,
     *(
-        _make_settings_panel(label, "VIEW3D_PT_rosy_look", f"look_{key}", panel_settings(Look, key))
-        for key, label in LOOK_PANELS.items()
+        _make_settings_panel(
+            title(key), "VIEW3D_PT_rosy_look", f"look_{key}", panel_settings(Look, key)
+        )
+        for key in LOOK_PANELS
     ),
-    _make_settings_panel("Output", "VIEW3D_PT_rosy", "output", (), OUTPUT_SETTINGS),
+    _make_settings_panel(
+        "Output", "VIEW3D_PT_rosy", "output", (), OUTPUT_SETTINGS + STORAGE_SETTINGS
+    ),
     _make_settings_panel(
         "Advanced", "VIEW3D_PT_rosy", "advanced", panel_settings(Look, ""), ("undefined",)
     ),

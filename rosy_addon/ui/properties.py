@@ -392,18 +392,11 @@ class RosyObject(bpy.types.PropertyGroup):
     texture_uv_map: text("UV Map", "UV map of the texture. Empty: the active UV map")
 
 
-CLASSES = (
-    RosyLook,
-    RosyComb,
-    RosyFrameState,
-    RosyBake,
-    RosyProjection,
-    RosyNodeTree,
-    RosyStrokeObject,
-    RosyStrokes,
-    RosyScene,
-    RosyMesh,
-    RosyObject,
+#: The classes of this module, in the order of their definition.
+CLASSES = tuple(
+    value
+    for value in list(globals().values())
+    if isinstance(value, type) and issubclass(value, bpy.types.PropertyGroup)
 )
 POINTER_PROPERTIES = (
     (bpy.types.Scene, RosyScene),

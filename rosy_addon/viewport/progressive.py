@@ -372,11 +372,9 @@ class ProgressiveRenderer:
         is_final = downscale == self.renderer.downscale_factors[1]
         # A final picture that is shown must not be overwritten: the other image is used.
         buffer = 1 - view.buffer if _shows(view, downscale) and not is_at_once else view.buffer
-        steps = self.renderer.texture_steps(
-            view.items,
-            downscaled(request.view_input, downscale),
-            (id(view), downscale, buffer if is_final else 0),
-        )
+        view_input = downscaled(request.view_input, downscale)
+        target = id(view), downscale, buffer if is_final else 0
+        steps = self.renderer.texture_steps(view.items, view_input, target)
         runner = StepRunner(steps, self._helper)
         view.picture = Work(view, request, runner, is_at_once, downscale, buffer)
         self._render(view)

@@ -144,7 +144,10 @@ class ROSY_OT_field_export(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Ex
     )
 
     def check(self, context: bpy.types.Context) -> bool:
-        """Set the suffix of the file name to that of the chosen format. The file browser calls this."""
+        """Give the file name the suffix of the chosen format. Return whether the name has changed.
+
+        The file browser calls this.
+        """
         return sync_suffix(self, self.file_format)
 
     def begin(self, context: bpy.types.Context) -> Steps[Path]:

@@ -316,7 +316,7 @@ class DialogJobMixin(ModalJobMixin):
         raise NotImplementedError
 
     def take_answer(self, context: bpy.types.Context) -> None:
-        """Set the properties with which the operator is called again to do the work, without asking."""
+        """Set the properties for the second call of the operator, so that it does not ask again."""
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if bpy.app.background or context.window is None:

@@ -74,9 +74,9 @@ def _hide(context: bpy.types.Context, objects: list[bpy.types.Object]) -> None:
 
 
 def _reach() -> Any:
-    """Return the property for the distance over which directions change.
+    """Return the property for the distance over which directions change, relative to the size of the mesh.
 
-    Two operators have it: the one of the tool passes its value on to the one that moves singularities.
+    ``rosy.drag_singularity`` passes its value on to ``rosy.field_singularities``.
     """
     return fraction(
         "Reach",

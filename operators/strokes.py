@@ -76,7 +76,10 @@ class ROSY_OT_strokes(DialogJobMixin, bpy.types.Operator):
             self.replace = True
 
     def check(self, context: bpy.types.Context) -> bool:
-        """Set the suffix .svg in the file browser, unless the file already has a suffix of stroke files."""
+        """Give the file name the suffix .svg, unless it ends with .svg, .ply, .obj or .csv.
+
+        Return whether the name has changed. The file browser calls this.
+        """
         return not self.filepath.lower().endswith(DRAWING_SUFFIXES) and sync_suffix(self, ".svg")
 
     def draw(self, context: bpy.types.Context) -> None:

@@ -108,6 +108,11 @@ def bake_animation(
     Call or Step
         The parts of the job. Their label has the frame number and the remaining time.
 
+    Returns
+    -------
+    list of SequenceResult
+        One result per image sequence.
+
     Raises
     ------
     RosyError
@@ -299,7 +304,7 @@ def _frame_steps(
 def _path_of_frame(
     settings: pictures.OutputSettings, name: str, cameras: Sequence[CameraSource] | None, frame: int
 ) -> Path:
-    """Return the path of a frame. `name` is that of a camera, or of the scene if `cameras` is None."""
+    """Return the path of a frame. `name` is the name of the camera, or of the scene if `cameras` is None."""
     stem = settings.folder / picture_stem(name, "scene" if cameras is None else "camera")
     return frame_path(stem, frame, settings.as_float)
 

@@ -151,7 +151,7 @@ def _drawing_path(path: Path | str) -> tuple[Path, str]:
 
 
 def _followed_instance(scene_data: SceneData) -> MeshInstance:
-    """Return the only mesh instance with a field, whose surface the strokes will follow.
+    """Return the only mesh instance with a field. When it deforms, the strokes will deform with it.
 
     Raises
     ------

@@ -29,8 +29,9 @@ BACKGROUND = "#292929"
 def draw_preview(look: Look) -> np.ndarray:
     """Draw the preview picture of a look: a trefoil knot with a field along its principal curvatures.
 
-    The tone is that of the light, whatever the look takes it from. The values for the color map increase from
-    left to right. A preview takes about a second for any look, because expensive settings are reduced.
+    The tone always comes from the light, even if the look has another source of the tone. The values for the
+    color map increase from left to right. A preview takes about a second for any look, because expensive
+    settings are reduced.
 
     Parameters
     ----------

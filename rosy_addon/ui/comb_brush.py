@@ -53,7 +53,7 @@ def key_press(
 
 
 class CombTool:
-    """Base class of the tool: what it has in common in Object Mode and in Sculpt Mode."""
+    """Base class of the tools for Object Mode and Sculpt Mode: Blender needs one class for each mode."""
 
     bl_space_type = "VIEW_3D"
     bl_label = "Comb Field"

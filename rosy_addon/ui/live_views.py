@@ -17,7 +17,10 @@ _declined_scenes: set[int] = set()
 
 
 def decline(scene: bpy.types.Scene) -> None:
-    """Note that the user has switched off a live view in a scene. Its first field then starts none."""
+    """Note that the user has switched off a live view in a scene.
+
+    The first field of this scene then does not switch on a live view.
+    """
     _declined_scenes.add(scene.session_uid)
 
 
@@ -71,6 +74,7 @@ def _restore_live_views(*_: Any) -> None:
                         return  # the graphics card can no longer be used
 
 
+#: Handlers of Blender's events, by the names of their lists in `bpy.app.handlers`.
 _HANDLERS = {"save_pre": _save_live_views, "load_post": _restore_live_views}
 
 

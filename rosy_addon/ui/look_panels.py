@@ -107,9 +107,20 @@ class VIEW3D_MT_rosy_presets(bpy.types.Menu):
 def _make_settings_panel(
     label: str, parent: str, suffix: str, look_names: tuple[str, ...], names: tuple[str, ...] = ()
 ) -> type:
-    """Return the class of a subpanel that shows settings of a look, then properties of `Scene.rosy`.
+    """Return the class of a subpanel with settings. It is closed by default.
 
-    It is closed by default.
+    Parameters
+    ----------
+    label : str
+        Title of the panel.
+    parent : str
+        Class name of the panel that contains it.
+    suffix : str
+        End of the class name, after ``VIEW3D_PT_rosy_``.
+    look_names : tuple of str
+        Names of settings of the look, shown first.
+    names : tuple of str
+        Names of properties of `Scene.rosy`, shown below them.
     """
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -182,9 +193,10 @@ def _active_mesh_object(context: bpy.types.Context) -> bpy.types.Object | None:
 def _draw_name(
     row: bpy.types.UILayout, owner: Any, name: str, mesh_object: bpy.types.Object | None
 ) -> None:
-    """Draw a property that holds a name.
+    """Draw a text property.
 
-    If there is a mesh, and `SEARCH_COLLECTIONS` has the property, the field can search the names of the mesh.
+    If it names an attribute or UV map (see `SEARCH_COLLECTIONS`), and there is a mesh, its text box suggests
+    the names of the attributes or UV maps of the mesh.
     """
     if name in SEARCH_COLLECTIONS and mesh_object is not None:
         row.prop_search(owner, name, mesh_object.data, SEARCH_COLLECTIONS[name])
@@ -235,7 +247,10 @@ class VIEW3D_PT_rosy_look_key(sidebar.SidebarPanel, bpy.types.Panel):
 
 
 def _range_may_differ(settings: bpy.types.PropertyGroup) -> bool:
-    """Return whether a scene has an animation whose frames may have different ranges of the color map."""
+    """Return whether the frames of a baked animation may have different ranges of the color map.
+
+    `settings` is the `Scene.rosy` of the scene with the animation.
+    """
     look = settings.look
     is_animated = any(record.frames for record in settings.bakes)
     has_colors = colors_magnitude(look) or colors_values(look)

@@ -89,7 +89,7 @@ def _read_again(*_: Any) -> None:
     refresh(context, {obj.data for obj in context.view_layer.objects if obj.type == "MESH"})
 
 
-#: Handlers of Blender's events while something is shown; see `add_handlers`.
+#: Handlers of Blender's events while something is shown, by the names of their lists in `bpy.app.handlers`.
 _APP_HANDLERS = {"load_pre": _clear_on_load, "undo_post": _read_again, "redo_post": _read_again}
 
 

@@ -361,7 +361,7 @@ class RosyScene(bpy.types.PropertyGroup):
 
 
 class RosyMesh(bpy.types.PropertyGroup):
-    """The field of a mesh."""
+    """How the field of a mesh is stored: its degree, and the attribute that holds it."""
 
     degree: integer(
         "Degree",
@@ -376,7 +376,7 @@ class RosyMesh(bpy.types.PropertyGroup):
 
 
 class RosyObject(bpy.types.PropertyGroup):
-    """An object with a field."""
+    """Settings of an object with a field: whether it is drawn, its tone image, and its UV maps."""
 
     include: toggle(
         "Draw the Field",

@@ -120,7 +120,10 @@ def show_handles(context: bpy.types.Context, obj: bpy.types.Object) -> None:
 
 
 def _own_points(context: bpy.types.Context, obj: bpy.types.Object) -> np.ndarray:
-    """Return (V, 3) positions of an object's own vertices, as modifiers move them, in object space."""
+    """Return the (V, 3) vertices of an object's original mesh, moved by its modifiers, in object space.
+
+    Vertices that modifiers add are left out.
+    """
     evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
     return vertex_positions(mesh_of_own_vertices(obj, evaluated.data))[: len(obj.data.vertices)]
 

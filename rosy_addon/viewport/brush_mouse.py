@@ -30,7 +30,8 @@ class BrushMouse:
     def place(self, mouse: tuple[float, float]) -> np.ndarray | None:
         """Return the point of the rest shape under the mouse, (3,) float32 in object space.
 
-        Return None if the object is not under the mouse.
+        `mouse` is in pixels from the lower left corner of the region. Return None if the object is not under
+        the mouse.
         """
         origin = view3d_utils.region_2d_to_origin_3d(self._region, self._view, mouse)
         direction = view3d_utils.region_2d_to_vector_3d(self._region, self._view, mouse)
@@ -76,7 +77,10 @@ _is_held = False
 
 
 def current_mouse(context: bpy.types.Context, obj: bpy.types.Object) -> BrushMouse:
-    """Return the `BrushMouse` of an object in the region of the context; a new one after each change."""
+    """Return the `BrushMouse` of an object in the region of the context.
+
+    It is created again after each change of the scene, unless `hold_mouse` keeps it.
+    """
     key = obj.name, context.region.as_pointer()
     if _current is None or (_current[0] != key and not _is_held):
         _read(context, obj)
@@ -115,6 +119,7 @@ def _after_change(*_: Any) -> None:
         release_mouse()
 
 
+#: Handlers of Blender's events, by the names of their lists in `bpy.app.handlers`.
 _HANDLERS = {
     "depsgraph_update_post": _after_change,
     **dict.fromkeys(("load_pre", "undo_pre", "redo_pre"), release_mouse),

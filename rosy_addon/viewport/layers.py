@@ -79,7 +79,8 @@ class LayerStates:
     ) -> LayerState:
         """Return the state of the context's view layer, up to date unless its `is_starting` is true.
 
-        The first call only creates the state, so that the view can show what is done next.
+        Reading may be slow. So the first call only creates the state: the view can first draw the message
+        that meshes are being read.
         """
         key = context.scene.name, context.view_layer.name
         if key not in self._layers:

@@ -117,11 +117,12 @@ class ViewOverlay:
     Attributes
     ----------
     problem : str or None
-        Why the view shows no picture, or a picture by another method.
+        Why the view shows no picture, or a picture by another LIC method than the look has.
     lines : list of str
         Rows of text in the view, as they were drawn last.
     labeled : (list of SingularityDots, float) or None
-        The dots that have labels, and their size. None if no dots have labels.
+        The dots that have labels, and the diameter in pixels of the dot of a singularity of index 1 / N. None
+        if no dots have labels.
     arrowheads : (hashable, ArrowMarks) or None
         A key of everything that the arrowheads depend on, and the arrowheads.
     """
@@ -357,9 +358,9 @@ def _head_triangles(
 
 
 def _outline_triangles(outline: np.ndarray, grown: float) -> np.ndarray:
-    """Return the (n, 2) corners of triangles that fill an arrowhead with a margin of width `grown`.
+    """Return the (n, 2) corners, in pixels, of triangles that fill an arrowhead and a margin around it.
 
-    The margin has round corners. `outline` is the result of `head_outline`.
+    The margin is `grown` pixels wide and has round corners. `outline` is the result of `head_outline`.
     """
     tip, barb, notch = outline
     # The sides run counter-clockwise from the tip, so their right sides are outside.

@@ -169,8 +169,8 @@ class ProgressiveRenderer:
     rest. A picture that could not be rendered is not tried again.
 
     A helper process makes the calls of numeric functions; meanwhile the views show their last pictures. If
-    the view changes while a preview or a preparation is in work, it is still finished and shown. A final
-    picture is abandoned instead.
+    the view changes in the meantime, a final picture is abandoned. A preview that was begun is finished and
+    shown, although it is outdated, and a preparation is finished.
 
     If only streaks drift, no previews are rendered, because they would flicker between the final pictures.
     The final pictures are rendered one after the other, and none is abandoned.

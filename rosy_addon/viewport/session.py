@@ -161,7 +161,10 @@ class ViewportSession:
         stop()
 
     def _drop_closed_views(self) -> float | None:
-        """Remove views that were closed, and stop the session if no view is left."""
+        """Timer: remove views that were closed, and stop the session if no view is left.
+
+        Return the seconds until the next call; None to end the timer.
+        """
         open_spaces = {space.as_pointer() for space in view3d.open_view3d_spaces()}
         for space_pointer in self.spaces - open_spaces:
             self.remove(space_pointer)
@@ -175,14 +178,20 @@ class ViewportSession:
         view3d.redraw(self.spaces)
 
     def _poll_helper(self) -> float | None:
-        """Tag the live views for a redraw once `ProgressiveRenderer.poll` returns True."""
+        """Timer: tag the live views for a redraw once `ProgressiveRenderer.poll` returns True.
+
+        Return the seconds until the next call; None to end the timer.
+        """
         if not self.progressive.poll():
             return POLL_SECONDS
         view3d.redraw(self.spaces)
         return None
 
     def _resolve_topologies(self) -> float | None:
-        """Read the data that cannot be read while Blender draws, in slices of time."""
+        """Timer: call `LayerStates.resolve_topologies` until all data is read that views wait for.
+
+        Return the seconds until the next call; None to end the timer.
+        """
         if not self.layers.resolve_topologies():
             return 0.0
         view3d.redraw(self.spaces)
@@ -194,9 +203,11 @@ class ViewportSession:
         view3d.redraw(self.spaces)
 
     def _advance_flow(self) -> float | None:
-        """Advance the clock of the streaks, and tag the views for a redraw. Wait while pictures are rendered.
+        """Timer: advance the clock of the streaks, and tag the views for a redraw.
 
-        While the timeline plays, the clock stands still, because streaks drift with the frames of the scene.
+        While pictures are rendered, the clock is not advanced. While the timeline plays, it stands still, as
+        streaks drift with the frames of the scene. Return the seconds until the next call; None to end the
+        timer.
         """
         if not self.flow_clock.is_playing:
             return None

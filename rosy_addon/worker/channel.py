@@ -225,8 +225,8 @@ class _Unpickler(pickle.Unpickler):
 
 
 def _keep(number: int, kind: type, state: dict[str, Any]) -> Any:
-    """Stand in pickles for the function that creates an object and keeps it.
+    """Placeholder that is never called: pickles name it as the function that creates an object.
 
-    It is never called: `_Unpickler` calls its method `_keep` instead.
+    In its place, `_Unpickler` calls its own method `_keep`, which creates the object and keeps it.
     """
     raise NotImplementedError

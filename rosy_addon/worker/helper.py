@@ -36,7 +36,7 @@ class HelperLostError(Exception):
 class _RemoteTracebackError(Exception):
     """The traceback of an error in a helper process, as text.
 
-    It is the cause of the error that is raised here.
+    This process raises the error again, with this exception as its ``__cause__``.
     """
 
 
@@ -206,7 +206,16 @@ class Helper:
 
 
 def _outcome(kind: str, answer: Any, traceback: str = "") -> Any:
-    """Return the result of a call, or raise its error. The traceback in the helper is its cause."""
+    """Return the result of a function call in the helper process, or raise its error.
+
+    Parameters
+    ----------
+    kind : {"result", "error"}
+    answer : object
+        The result, or the exception.
+    traceback : str
+        Traceback of the exception in the helper process. It becomes the ``__cause__`` of the exception.
+    """
     if kind == "error":
         raise answer from _RemoteTracebackError(f"\n{traceback}")
     return answer

@@ -22,9 +22,7 @@ from .modal_job import ActiveMeshMixin, ModalJobMixin
 
 
 def _search_fields(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
-    return [
-        name for obj in selected_mesh_objects(context)[:1] for name in other_field_names(obj.data)
-    ]
+    return other_field_names(selected_mesh_objects(context)[0].data)
 
 
 class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
@@ -32,7 +30,6 @@ class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
 
     bl_idname = "rosy.field_compare"
     bl_label = "Compare"
-    bl_options = {"REGISTER", "UNDO"}
 
     other: text(
         "With",

@@ -16,11 +16,7 @@ from ..field.blocks import as_float64
 from ..field.frames import dot, normalize, transport
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
-from ..field.validate import (
-    apply_nonfinite_policy,
-    project_to_tangent,
-    tangent_normals,
-)
+from ..field.validate import apply_nonfinite_policy, project_to_tangent, tangent_normals
 from .datablocks import is_editable, user_modifiers
 from .field_attributes import (
     VECTOR_TYPE,

@@ -168,10 +168,7 @@ def tone_image_key(owner: bpy.types.Object, tone_request: ToneRequest | None) ->
 
 
 def read_color_values(
-    mesh: bpy.types.Mesh,
-    name: str | None,
-    label: str,
-    cache: Cache | None = None,
+    mesh: bpy.types.Mesh, name: str | None, label: str, cache: Cache | None = None
 ) -> np.ndarray | None:
     """Read the values for the color map from a mesh attribute.
 

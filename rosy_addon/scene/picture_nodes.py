@@ -163,9 +163,7 @@ def _add_projection(
     projection.matrix = (np.zeros(16) if matrix is None else matrix.ravel()).tolist()
 
 
-def projections_of_group(
-    group: bpy.types.NodeTree,
-) -> dict[bpy.types.Material, np.ndarray | None]:
+def projections_of_group(group: bpy.types.NodeTree) -> dict[bpy.types.Material, np.ndarray | None]:
     """Return the projections of the pictures that an object can show, by the materials of the pictures.
 
     The values are (4, 4) object-to-clip matrices, or None if the object has several instances.

@@ -44,12 +44,7 @@ from .look_inputs import (
 )
 from .mesh_fields import read_mesh_field
 from .mesh_states import MeshStates, mesh_state_key, read_mesh_state
-from .meshes import (
-    REST_ATTRIBUTE,
-    evaluated_mesh,
-    mesh_surface,
-    read_attribute,
-)
+from .meshes import REST_ATTRIBUTE, evaluated_mesh, mesh_surface, read_attribute
 from .visible_objects import Instances, field_objects, rendered_instances
 
 #: Cache key of the mesh instances of the last call of `SceneReader.read`.
@@ -253,10 +248,7 @@ class SceneReader:
                 del by_name[name]
 
     def read(
-        self,
-        instances: Instances,
-        request: ReadRequest = FIELDS_ONLY,
-        deadline: float = math.inf,
+        self, instances: Instances, request: ReadRequest = FIELDS_ONLY, deadline: float = math.inf
     ) -> list[SceneInstance]:
         """Return the mesh instances of a scene in their current state.
 

@@ -15,13 +15,7 @@ from ..field.validate import vertex_normals
 from .datablocks import OWNED_TAG, user_modifiers
 from .look_inputs import ReadRequest
 from .mesh_fields import read_mesh_field
-from .meshes import (
-    evaluated_mesh,
-    mesh_surface,
-    read_attribute,
-    read_collection,
-    vertex_positions,
-)
+from .meshes import evaluated_mesh, mesh_surface, read_attribute, read_collection, vertex_positions
 from .scene_reader import read_scene
 
 #: Names of attributes of the points: the singularity index in units of 1 / N, and the degree N of the field.

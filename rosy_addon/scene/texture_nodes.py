@@ -64,10 +64,7 @@ def color_shader(build: NodeBuilder, image_node: bpy.types.Node) -> bpy.types.No
 
 
 def hatching_shader(
-    build: NodeBuilder,
-    image_node: bpy.types.Node,
-    hatching: Hatching,
-    created: list[bpy.types.ID],
+    build: NodeBuilder, image_node: bpy.types.Node, hatching: Hatching, created: list[bpy.types.ID]
 ) -> bpy.types.NodeSocket:
     """Add nodes that draw hatching from an image of thresholds. The darker the surface, the denser it is.
 

@@ -23,7 +23,7 @@ from ..core.errors import RosyError
 from ..core.file_io import check_readable
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
-from .cameras import camera_of_object, render_size
+from .cameras import camera_of_object
 from .datablocks import has_rosy_properties
 from .face_values import COLOR_TYPES, corner_scalars, filled_attribute
 from .meshes import read_uvs
@@ -241,27 +241,20 @@ def check_sources(
     names = ", ".join(f"'{owner.name}'" for owner in owners)
     if tone is not None and all(instance.tone is None for instance, _ in with_field):
         if tone.kind == "image":
-            raise RosyError(
-                f"{names}: choose an image for the tone, in the properties of the object"
-            )
-        if not tone.attribute:
-            raise RosyError(
-                f"{names}: there is no color attribute: choose an attribute for the tone"
-            )
-        listing = _attribute_listing(owners, ("FLOAT", *COLOR_TYPES))
-        raise RosyError(
-            f"{names}: there is no attribute '{tone.attribute}' for the tone, only {listing}"
-        )
+            problem = "choose an image for the tone, in the properties of the object"
+        elif not tone.attribute:
+            problem = "there is no color attribute: choose an attribute for the tone"
+        else:
+            listing = _attribute_listing(owners, ("FLOAT", *COLOR_TYPES))
+            problem = f"there is no attribute '{tone.attribute}' for the tone, only {listing}"
+        raise RosyError(f"{names}: {problem}")
     if numbers is not None and all(instance.color_values is None for instance, _ in with_field):
         # Boolean attributes are not listed, as most of them are Blender's own.
         listing = _attribute_listing(owners, ("FLOAT", "INT", *COLOR_TYPES))
+        problem = f"there is no attribute '{numbers}' for the colors, only {listing}"
         if not numbers:
-            raise RosyError(
-                f"{names}: choose an attribute for the colors, under Look > Color: {listing}"
-            )
-        raise RosyError(
-            f"{names}: there is no attribute '{numbers}' for the colors, only {listing}"
-        )
+            problem = f"choose an attribute for the colors, under Look > Color: {listing}"
+        raise RosyError(f"{names}: {problem}")
 
 
 def _attribute_listing(owners: Sequence[bpy.types.Object], types: Sequence[str]) -> str:
@@ -327,12 +320,10 @@ def load_reference(
     if look.tone != "picture":
         return None
     path = reference_path(scene)
-    reference_camera = camera_of_object(scene, depsgraph, camera, *render_size(scene))
-    return ReferenceRender(
-        load_luminance(path) if picture_luminance is None else picture_luminance,
-        reference_camera,
-        str(path),
-    )
+    reference_camera = camera_of_object(scene, depsgraph, camera)
+    if picture_luminance is None:
+        picture_luminance = load_luminance(path)
+    return ReferenceRender(picture_luminance, reference_camera, str(path))
 
 
 def load_luminance(path: Path) -> np.ndarray:

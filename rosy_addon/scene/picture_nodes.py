@@ -13,7 +13,7 @@ import numpy as np
 
 from ..projection.camera import Camera
 from ..rendering.picture_images import NEUTRAL_GRAY
-from .datablocks import KEY_TAG, OWNED_TAG, is_editable, is_rosy_modifier
+from .datablocks import KEY_TAG, OWNED_TAG, is_editable, rosy_modifiers
 from .meshes import read_attribute
 from .node_builder import NodeBuilder, new_empty_material, new_modifier_group
 from .texture_nodes import Hatching, hatching_shader
@@ -211,7 +211,7 @@ def set_picture_modifier(
     The previous group may have projections of other pictures. Those of materials in `pictures` are copied to
     the new group, so that the object can show these pictures again.
     """
-    existing = [modifier for modifier in obj.modifiers if is_rosy_modifier(modifier)]
+    existing = rosy_modifiers(obj)
     modifier = existing[0] if existing else obj.modifiers.new(MODIFIER_NAME, "NODES")
     modifier.show_expanded = False
     old_group, modifier.node_group = modifier.node_group, node_group
@@ -242,8 +242,7 @@ def applied_materials(data: bpy.types.ID | None) -> list[bpy.types.Material]:
 
 def shown_materials(obj: bpy.types.Object) -> set[bpy.types.Material]:
     """Return the materials of the pictures that an object shows, by a modifier or in its slots."""
-    modifiers = [modifier for modifier in obj.modifiers if is_rosy_modifier(modifier)]
-    materials = {material_of_group(modifier.node_group) for modifier in modifiers}
+    materials = {material_of_group(modifier.node_group) for modifier in rosy_modifiers(obj)}
     return (materials | set(applied_materials(obj.data))) - {None}
 
 

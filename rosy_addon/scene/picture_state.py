@@ -21,7 +21,7 @@ from ..core.file_io import read_bytes
 from ..core.settings import settings_of
 from ..projection.camera import Camera
 from ..surface_texture.draw import DIRECTION_SETTINGS, TEXTURE_SETTINGS, texture_colors_values
-from .cameras import CameraSource, camera_of_object, render_camera, render_size, resolve_camera
+from .cameras import CameraSource, camera_of_object, render_camera, resolve_camera
 from .field_attributes import attribute_name, field_degree
 from .look_inputs import ReadRequest, color_values_digest, read_request, reference_path
 from .look_properties import read_look
@@ -366,7 +366,7 @@ def _reference_digest(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) ->
     """
     try:
         path = reference_path(scene)
-        camera = camera_of_object(scene, depsgraph, render_camera(scene), *render_size(scene))
+        camera = camera_of_object(scene, depsgraph, render_camera(scene))
         contents = np.frombuffer(read_bytes(path), dtype=np.uint8)
     except (RosyError, OSError) as error:
         return f"{error}"

@@ -16,6 +16,7 @@ from ..core.color import from_hex, to_linear
 from ..line_drawing.drawing_outputs import StrokeGeometry, SurfaceAttachment
 from ..line_drawing.outline import OUTLINE_KINDS
 from .datablocks import OWNED_TAG, STROKES_TAG
+from .meshes import write_attribute
 from .node_builder import NodeBuilder, enabled_output, new_emissive_material, new_modifier_group
 
 #: A function that is called with each new datablock and the name that it should have.
@@ -73,9 +74,7 @@ def new_curves(
 def set_attribute(data: Any, name: str, data_type: str, domain: str, values: np.ndarray) -> None:
     """Write an attribute of Curves or of a Grease Pencil drawing, and create it if it is missing."""
     attribute = data.attributes.get(name) or data.attributes.new(name, data_type, domain)
-    key = {"FLOAT_VECTOR": "vector", "FLOAT_COLOR": "color"}.get(data_type, "value")
-    dtype = {"INT": np.int32, "INT8": np.int8}.get(data_type, np.float32)
-    attribute.data.foreach_set(key, np.ascontiguousarray(values, dtype=dtype).ravel())
+    write_attribute(attribute, values)
 
 
 #: Name of the Grease Pencil layer for outlines: silhouettes, creases and borders.
@@ -115,13 +114,11 @@ def new_grease_pencil(
     add_strokes = _add_to_drawing if has_grease_pencil_drawings() else _add_to_frame
     strokes = geometry.strokes
     layer_names = [
-        OUTLINE_LAYER if family_name in OUTLINE_KINDS else family_name.capitalize()
-        for family_name in strokes.names
+        OUTLINE_LAYER if name in OUTLINE_KINDS else name.capitalize() for name in strokes.names
     ]
     for material_index, layer_name in enumerate(dict.fromkeys(layer_names)):
-        material = _new_material(
-            f"RoSy {layer_name}", geometry.colors[layer_names.index(layer_name)]
-        )
+        color = geometry.colors[layer_names.index(layer_name)]
+        material = _new_material(f"RoSy {layer_name}", color)
         register(material, f"RoSy {layer_name}")
         data.materials.append(material)
         layer = data.layers.new(layer_name)
@@ -142,29 +139,21 @@ def new_grease_pencil(
 
 
 def _add_to_drawing(
-    frame: Any,
-    point_counts: np.ndarray,
-    points: np.ndarray,
-    radius: np.ndarray,
-    material_index: int,
+    frame: Any, counts: np.ndarray, points: np.ndarray, radius: np.ndarray, material_index: int
 ) -> None:
     """Add strokes to a frame of a Grease Pencil layer, in Blender 4.3 and later."""
     drawing = frame.drawing
-    drawing.add_strokes(point_counts.tolist())
+    drawing.add_strokes(counts.tolist())
     set_attribute(drawing, "position", "FLOAT_VECTOR", "POINT", points)
     set_attribute(drawing, "radius", "FLOAT", "POINT", radius)
     set_attribute(drawing, "opacity", "FLOAT", "POINT", np.ones(len(points)))
-    materials = np.full(len(point_counts), material_index)
+    materials = np.full(len(counts), material_index)
     set_attribute(drawing, "material_index", "INT", "CURVE", materials)
     drawing.tag_positions_changed()
 
 
 def _add_to_frame(
-    frame: Any,
-    point_counts: np.ndarray,
-    points: np.ndarray,
-    radius: np.ndarray,
-    material_index: int,
+    frame: Any, counts: np.ndarray, points: np.ndarray, radius: np.ndarray, material_index: int
 ) -> None:
     """Add strokes to a frame of a Grease Pencil layer, before Blender 4.3.
 
@@ -172,14 +161,13 @@ def _add_to_frame(
     point.
     """
     line_width = int(np.clip(np.ceil(LEGACY_WIDTH_PER_UNIT * radius.max()), 1, MAX_LEGACY_WIDTH))
-    ends = np.cumsum(point_counts)
-    for start, end in zip((ends - point_counts).tolist(), ends.tolist(), strict=True):
+    pressure = radius * (LEGACY_WIDTH_PER_UNIT / line_width)
+    ends = np.cumsum(counts)
+    for start, end in zip((ends - counts).tolist(), ends.tolist(), strict=True):
         stroke = frame.strokes.new()
         stroke.points.add(end - start)
         stroke.points.foreach_set("co", points[start:end].ravel())
-        stroke.points.foreach_set(
-            "pressure", radius[start:end] * (LEGACY_WIDTH_PER_UNIT / line_width)
-        )
+        stroke.points.foreach_set("pressure", pressure[start:end])
         stroke.points.foreach_set("strength", np.ones(end - start, dtype=np.float32))
         stroke.line_width, stroke.material_index = line_width, material_index
 

@@ -269,12 +269,13 @@ def list_bakes(
     """
     recorded = [record for record in scene.rosy.bakes if record.image is not None]
     shown = {material for obj in baked_objects(scene) for material in shown_materials(obj)}
-    if for_panel and not recorded:
-        SCENE_STATES.clear()
     state = None
-    if recorded:
-        depsgraph = scene_depsgraph(scene)
-        state = SCENE_STATES.get(scene, depsgraph) if for_panel else SceneState(scene, depsgraph)
+    if recorded and for_panel:
+        state = SCENE_STATES.get(scene, scene_depsgraph(scene))
+    elif recorded:
+        state = SceneState(scene, scene_depsgraph(scene), {})
+    elif for_panel:
+        SCENE_STATES.clear()
     infos = [
         BakeInfo(
             camera_name(record),

@@ -21,7 +21,7 @@ from .datablocks import is_editable, user_modifiers
 from .field_attributes import (
     VECTOR_TYPE,
     attribute_name,
-    cached_field,
+    cached_for_surface,
     field_degree,
     field_values,
     follow_mesh,
@@ -128,7 +128,7 @@ def read_evaluated_field(
 
     key_parts = values, original_normals, *ratio_parts, layout, source, nonfinite
     if cache is None or surface.rest_vertices is None:
-        return cached_field(cache, surface, build, "evaluated", *key_parts)
+        return cached_for_surface(cache, surface, build, "evaluated", *key_parts)
     # The field depends only on the rest shape, so the key leaves out the deformed shape of each frame.
     shape = surface.rest_vertices, surface.corner_vertex, surface.face_start
     return cache.get_or_create(("evaluated field", content_hash(*shape, *key_parts)), build)

@@ -20,7 +20,8 @@ rotated with their faces.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
+from typing import TypeVar
 
 import bpy
 import numpy as np
@@ -28,10 +29,11 @@ import numpy as np
 from ..core.cache import Cache, content_hash
 from ..core.errors import RosyError
 from ..field.carry import carried_vectors
-from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from .datablocks import has_rosy_properties
 from .meshes import read_attribute, read_collection, write_attribute
+
+Result = TypeVar("Result")
 
 DEFAULT_FIELD_NAME = "rosy"
 DEFAULT_DEGREE = 4
@@ -157,23 +159,18 @@ def store_attribute(
     return attribute
 
 
-def cached_field(
-    cache: Cache | None, surface: Surface, build_field: Callable[[], RosyField], *key_parts: object
-) -> RosyField:
-    """Return the field that is cached for a surface and the other parts of a key, or build and cache it."""
-    if cache is None:
-        return build_field()
-    key = surface_key(surface, *key_parts)
-    return cache.get_or_create(key, lambda: (surface, build_field()))[1]
+def cached_for_surface(
+    cache: Cache | None, surface: Surface, build: Callable[[], Result], *key_parts: object
+) -> Result:
+    """Return a result that is cached for a surface and other values, or build and cache it.
 
-
-def surface_key(surface: Surface, *key_parts: object) -> Hashable:
-    """Return the cache key of a result that depends on a surface and on other values.
-
-    The key contains the id of the surface. So the cached result must keep a reference to the surface: no
-    other object can then have the same id.
+    The key contains the id of the surface. So the cache also keeps the surface: no other object can then have
+    the same id.
     """
-    return "field", id(surface), content_hash(*key_parts)
+    if cache is None:
+        return build()
+    key = "field", id(surface), content_hash(*key_parts)
+    return cache.get_or_create(key, lambda: (surface, build()))[1]
 
 
 #: Coefficients of the checksum of a vector, which is a linear combination of its components. As it is linear,

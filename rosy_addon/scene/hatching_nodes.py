@@ -74,12 +74,9 @@ _INPUTS = (
 def hatching_group(created: list[bpy.types.ID]) -> bpy.types.NodeTree:
     """Return the node group of this file. If it is missing, it is created and appended to `created`."""
     for group in bpy.data.node_groups:
-        if (
-            group.bl_idname == "ShaderNodeTree"
-            and group.library is None
-            and group.get(OWNED_TAG)
-            and group.name.startswith(GROUP_NAME)
-        ):
+        is_own = group.library is None and group.get(OWNED_TAG)
+        is_hatching = group.bl_idname == "ShaderNodeTree" and group.name.startswith(GROUP_NAME)
+        if is_own and is_hatching:
             return group
     created.append(_new_hatching_group())
     return created[-1]
@@ -162,10 +159,8 @@ def _build_hatching(build: NodeBuilder, source: Any) -> None:
     solid = reduce(Number.at_least, [transmittance(source[name]) for name in INK_NAMES])
     required = solid + complement_if_light(tone) * (1 - solid)
     highlights = number("Highlights") * tone
-    inks = [
-        build.mix("RGBA", highlights.socket, source[name], source["Highlight Color"])
-        for name in INK_NAMES
-    ]
+    light_ink = source["Highlight Color"]
+    inks = [build.mix("RGBA", highlights.socket, source[name], light_ink) for name in INK_NAMES]
     # For each ink, the fraction of light that black ink would have to leave to give the same tone.
     left = [
         1 - ((1 - required) / (1 - transmittance(ink)).at_least(MIN_TRANSMITTANCE)).at_most(1.0)

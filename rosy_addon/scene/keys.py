@@ -201,9 +201,8 @@ def _new_material(name: str, image: bpy.types.Image, strength: float) -> bpy.typ
     emission = build("ShaderNodeEmission", {"Color": color, "Strength": strength})
     transparent = build("ShaderNodeBsdfTransparent")
     backfacing = build("ShaderNodeNewGeometry").outputs["Backfacing"]
-    opacity = build.math(
-        "MULTIPLY", image_node.outputs["Alpha"], build.math("SUBTRACT", 1.0, backfacing)
-    )
+    is_front = build.math("SUBTRACT", 1.0, backfacing)
+    opacity = build.math("MULTIPLY", image_node.outputs["Alpha"], is_front)
     shader = build.mix_shaders(opacity, transparent.outputs["BSDF"], emission.outputs["Emission"])
     build("ShaderNodeOutputMaterial", {"Surface": shader})
     return material

@@ -23,7 +23,7 @@ from ..core.errors import RosyError
 from ..core.file_io import check_readable
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
-from .cameras import camera_of_object
+from .cameras import camera_of_object, render_camera
 from .datablocks import has_rosy_properties
 from .face_values import COLOR_TYPES, corner_scalars, filled_attribute
 from .meshes import read_uvs
@@ -294,7 +294,7 @@ def reference_path(scene: bpy.types.Scene) -> Path:
 def load_reference(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
-    camera: bpy.types.Object,
+    camera: bpy.types.Object | None,
     look: Look,
     picture_luminance: np.ndarray | None = None,
 ) -> ReferenceRender | None:
@@ -305,8 +305,8 @@ def load_reference(
     scene : bpy.types.Scene
         The scene, at the frame of the reference render.
     depsgraph : bpy.types.Depsgraph
-    camera : bpy.types.Object
-        The camera that the reference render was rendered from.
+    camera : bpy.types.Object or None
+        The camera that the reference render was rendered from. None: the active camera of the scene.
     look : Look
     picture_luminance : (H, W) ndarray, optional
         The luminance of the reference render. By default it is read from the file.
@@ -314,11 +314,12 @@ def load_reference(
     Raises
     ------
     RosyError
-        If no file is chosen, the file cannot be read, or the picture does not have the aspect ratio of
-        renders.
+        If the scene has no active camera, no file is chosen, the file cannot be read, or the picture does not
+        have the aspect ratio of renders.
     """
     if look.tone != "picture":
         return None
+    camera = camera or render_camera(scene)
     path = reference_path(scene)
     reference_camera = camera_of_object(scene, depsgraph, camera)
     if picture_luminance is None:

@@ -29,7 +29,7 @@ from .field_attributes import (
     DEFAULT_FIELD_NAME,
     VECTOR_TYPE,
     attribute_name,
-    cached_field,
+    cached_for_surface,
     check_attribute_type,
     describe_type,
     field_degree,
@@ -119,7 +119,7 @@ def read_mesh_field(
 
     key_parts = "attribute", domain, data_type, values, degree, source, nonfinite
     with progress(0.5, 1.0, "reading the field"):
-        return cached_field(cache, surface, build, *key_parts)
+        return cached_for_surface(cache, surface, build, *key_parts)
 
 
 def _field_from_directions(
@@ -152,7 +152,7 @@ def _field_from_directions(
     arguments = directions, source, nonfinite, ELEMENTS[domain]
     build = partial(validated_directions, surface, *arguments)
     with progress(0.0, 1.0, "reading the field"):
-        return cached_field(cache, surface, build, "directions", *arguments)
+        return cached_for_surface(cache, surface, build, "directions", *arguments)
 
 
 def _field_from_angles(

@@ -13,7 +13,7 @@ from ..core.cache import Cache
 from ..core.errors import RosyError
 from ..projection.gbuffer import MeshInstance
 from ..rendering.view_input import ViewInput
-from .cameras import CameraSource, render_camera, resolve_camera
+from .cameras import CameraSource, resolve_camera
 from .look_inputs import ReadRequest, load_reference, nonfinite_policy, read_request
 from .meshes import evaluated_mesh, read_uvs
 from .scene_reader import SceneData, read_scene
@@ -73,10 +73,7 @@ def read_views(
             "rename them in their libraries, or draw from one"
         )
     scene_data = read_scene(depsgraph, objects, read_request(scene, look), cache)
-    reference = None
-    if look.tone == "picture":
-        reference_camera = reference_camera or render_camera(scene)
-        reference = load_reference(scene, depsgraph, reference_camera, look)
+    reference = load_reference(scene, depsgraph, reference_camera, look)
     instances = tuple(scene_data.instances)
     views = []
     for camera in resolved_cameras:
@@ -154,20 +151,15 @@ def rendered_lights(
 
 def _convert_light(data: bpy.types.Light, matrix: np.ndarray) -> Light:
     """Convert a light of Blender to a `Light`. `matrix` transforms its local space to camera space."""
-    color = np.array(data.color) * _temperature_color(data)
+    color = np.array(data.color, dtype=np.float64)
+    if getattr(data, "use_temperature", False):
+        color *= np.array(data.temperature_color)
     energy = data.energy * 2.0 ** getattr(data, "exposure", 0.0)
     if data.type == "SUN":
         direction = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
         return Light("sun", direction, color, energy / np.pi)
     axial_gain = 4.0 if data.type == "AREA" else 1.0
     return Light("point", matrix[:3, 3].copy(), color, axial_gain * energy / (4 * np.pi**2))
-
-
-def _temperature_color(data: bpy.types.Light) -> np.ndarray:
-    """Return the RGB factor of the color temperature of a light; ones if the light does not use one."""
-    if not getattr(data, "use_temperature", False):
-        return np.ones(3)
-    return np.array(data.temperature_color)
 
 
 def read_texture_input(

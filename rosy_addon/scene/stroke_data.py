@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from ..core.color import from_hex, to_linear
-from ..line_drawing.drawing_outputs import StrokeGeometry, SurfaceAttachment
+from ..line_drawing.drawing_outputs import StrokeGeometry
 from ..line_drawing.outline import OUTLINE_KINDS
 from .datablocks import OWNED_TAG, STROKES_TAG
 from .meshes import write_attribute
@@ -63,8 +63,11 @@ def new_curves(
     set_attribute(data, "surface_normal", "FLOAT_VECTOR", "POINT", strokes.normal)
     set_attribute(data, "face_index", "INT", "POINT", strokes.face)
     if geometry.attachment is not None:
-        for key, (data_type, column) in attribute_values(geometry.attachment).items():
-            set_attribute(data, key, data_type, "POINT", column)
+        for key, vertices in zip(VERTEX_ATTRIBUTES, geometry.attachment.vertices.T, strict=True):
+            set_attribute(data, key, "INT", "POINT", vertices)
+        weights, height = geometry.attachment.weights, geometry.attachment.height
+        set_attribute(data, WEIGHTS_ATTRIBUTE, "FLOAT_VECTOR", "POINT", weights)
+        set_attribute(data, HEIGHT_ATTRIBUTE, "FLOAT", "POINT", height)
     material = new_emissive_material(name, INK_ATTRIBUTE)
     register(material, name)
     data.materials.append(material)
@@ -189,23 +192,13 @@ VERTEX_ATTRIBUTES = ("surface_vertex_0", "surface_vertex_1", "surface_vertex_2")
 WEIGHTS_ATTRIBUTE, HEIGHT_ATTRIBUTE = "surface_weights", "surface_height"
 
 
-def attribute_values(attachment: SurfaceAttachment) -> dict[str, tuple[str, object]]:
-    """Return the attributes that attach points to a surface: data types and values, by name."""
-    values: dict[str, tuple[str, object]] = {
-        name: ("INT", attachment.vertices[:, index]) for index, name in enumerate(VERTEX_ATTRIBUTES)
-    }
-    values[WEIGHTS_ATTRIBUTE] = ("FLOAT_VECTOR", attachment.weights)
-    values[HEIGHT_ATTRIBUTE] = ("FLOAT", attachment.height)
-    return values
-
-
 def follow_surface(obj: bpy.types.Object, surface: bpy.types.Object, vertex_count: int) -> None:
     """Add a modifier to strokes with which they follow the surface of an object. It replaces an earlier one.
 
     Parameters
     ----------
     obj : bpy.types.Object
-        The strokes: Curves that have the attributes of `attribute_values`.
+        The strokes: Curves with the attributes `VERTEX_ATTRIBUTES`, `WEIGHTS_ATTRIBUTE` and `HEIGHT_ATTRIBUTE`.
     surface : bpy.types.Object
         The object that the strokes were drawn on.
     vertex_count : int
@@ -250,23 +243,16 @@ def _new_group(name: str, surface: bpy.types.Object, vertex_count: int) -> bpy.t
     info = build("GeometryNodeObjectInfo", {"Object": surface}, transform_space="RELATIVE")
     mesh = info.outputs["Geometry"]
     weights = build("ShaderNodeSeparateXYZ", {0: _named(build, WEIGHTS_ATTRIBUTE, "FLOAT_VECTOR")})
-    position, normal = (
-        _weighted_mean(build, mesh, build(kind).outputs[0], weights)
-        for kind in ("GeometryNodeInputPosition", "GeometryNodeInputNormal")
-    )
+    position = _weighted_mean(build, mesh, "GeometryNodeInputPosition", weights)
+    normal = _weighted_mean(build, mesh, "GeometryNodeInputNormal", weights)
     unit_normal = build.vector_math("NORMALIZE", normal)
     height = build.scaled(unit_normal, _named(build, HEIGHT_ATTRIBUTE, "FLOAT"))
     size = build("GeometryNodeAttributeDomainSize", {0: mesh}).outputs["Point Count"]
     inputs = {"A": size, "B": vertex_count}
     is_same = build("FunctionNodeCompare", inputs, data_type="INT", operation="EQUAL")
-    moved = build(
-        "GeometryNodeSetPosition",
-        {
-            "Geometry": strokes,
-            "Selection": is_same.outputs[0],
-            "Position": build.vector_math("ADD", position, height),
-        },
-    )
+    place = build.vector_math("ADD", position, height)
+    inputs = {"Geometry": strokes, "Selection": is_same.outputs[0], "Position": place}
+    moved = build("GeometryNodeSetPosition", inputs)
     build("NodeGroupOutput", {"Geometry": moved.outputs["Geometry"]})
     return group
 
@@ -278,16 +264,16 @@ def _named(build: NodeBuilder, name: str, data_type: str) -> bpy.types.NodeSocke
 
 
 def _weighted_mean(
-    build: NodeBuilder,
-    mesh: bpy.types.NodeSocket,
-    value: bpy.types.NodeSocket,
-    weights: bpy.types.Node,
+    build: NodeBuilder, mesh: bpy.types.NodeSocket, kind: str, weights: bpy.types.Node
 ) -> bpy.types.NodeSocket:
-    """Add nodes that interpolate a vector in the triangle of each point, and return their output."""
-    terms = []
+    """Add nodes that interpolate a vector of a mesh in the triangle of each point, and return their output.
+
+    `kind` is the type of the input node of the vector.
+    """
+    value, terms = build(kind).outputs[0], []
+    types = {"data_type": "FLOAT_VECTOR", "domain": "POINT"}
     for name, weight in zip(VERTEX_ATTRIBUTES, weights.outputs, strict=True):
         inputs = {"Geometry": mesh, "Value": value, "Index": _named(build, name, "INT")}
-        kind = "GeometryNodeSampleIndex"
-        sample = build(kind, inputs, data_type="FLOAT_VECTOR", domain="POINT")
+        sample = build("GeometryNodeSampleIndex", inputs, **types)
         terms.append(build.scaled(enabled_output(sample), weight))
     return reduce(partial(build.vector_math, "ADD"), terms)

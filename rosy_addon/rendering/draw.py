@@ -153,7 +153,8 @@ def _draw_strips(
 ) -> Picture:
     """Draw neighboring strips, and return a picture of their rows.
 
-    The mesh is also projected to some rows above and below, which streamlines of these rows may reach.
+    The meshes are also projected to some rows above and below the strips, because streamlines that begin in
+    the strips may reach them.
     """
     camera, look = view.shaded_camera, view.look
     scene = view.instances, camera, look.display

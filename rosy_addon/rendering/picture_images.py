@@ -48,7 +48,7 @@ def picture_image(picture: Picture, as_float: bool) -> ImageData:
     Parameters
     ----------
     picture : Picture
-        If it has thresholds of ink, their spread is stored as the alpha of the image.
+        If it has thresholds of ink, `Picture.spread` is stored as the alpha of the image.
     as_float : bool
         Whether linear values in single precision are stored (for .exr), instead of 8-bit sRGB (.png).
 

@@ -244,7 +244,7 @@ def _all_records() -> list[bpy.types.PropertyGroup]:
 
 
 def recorded_materials(*, textures: bool = True) -> set[bpy.types.Material]:
-    """Return the materials of the records of all scenes. Those of textures are included by default."""
+    """Return the materials of the pictures that all scenes record. `textures` says whether textures count."""
     records = _all_records()
     return {record.material for record in records if textures or record.view != TEXTURE_VIEW}
 
@@ -304,9 +304,23 @@ def _present_reason(
     state: SceneState,
     automatic_device: Callable[[Look], str] | None,
 ) -> dict[str, str]:
-    """Return the ``stale_reason`` or the ``unknown_reason`` of a picture, as an argument of `BakeInfo`.
+    """Return why a picture is out of date, or why this is not known, as a keyword argument of `BakeInfo`.
 
-    `state` is the present state of the scene. See `list_bakes` for the other parameters.
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    record : bpy.types.PropertyGroup
+        The record of the picture.
+    state : SceneState
+        The present state of the scene.
+    automatic_device : callable or None
+        See `list_bakes`.
+
+    Returns
+    -------
+    dict of str to str
+        One item, with the key ``stale_reason`` or ``unknown_reason``. An empty ``stale_reason`` says that the
+        picture is up to date.
     """
     text, frame = record.state, scene.frame_current
     if record.frames and record.frame_states:
@@ -350,9 +364,9 @@ def has_pictures(scene: bpy.types.Scene) -> bool:
 
 
 def baked_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """Return the objects with pictures that are in a scene, or in no scene at all.
+    """Return the objects with a picture that belong to a scene, including objects of instanced collections.
 
-    Objects of instanced collections are included.
+    Objects that are in no scene are included too, so that their pictures can be removed.
     """
     baked = [
         obj for obj in bpy.data.objects if removable_modifiers(obj) or has_applied_picture(obj.data)
@@ -365,7 +379,7 @@ def baked_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 
 def _reached_objects(scene: bpy.types.Scene) -> set[bpy.types.Object]:
-    """Return the objects of a scene, and those of the collections that its objects instance."""
+    """Return the objects of a scene, and the objects of all collections that these objects instance."""
     reached: set[bpy.types.Object] = set()
 
     def add_objects(collection: bpy.types.Collection) -> None:

@@ -23,8 +23,8 @@ def new_image(
     name : str
         Name of the datablock.
     image_data : ImageData
-        The bytes of a PNG file for an image with 8 bits per channel; an array of linear values for an image in
-        single precision.
+        The bytes of a PNG file for an image with 8 bits per channel, or an array of linear values for an
+        image in single precision.
     is_color : bool
         Whether 8-bit values are colors (sRGB). Otherwise they are data, which Blender does not convert.
     stem : Path, optional

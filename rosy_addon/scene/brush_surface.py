@@ -81,7 +81,8 @@ class BrushSurface:
         """Return dashes (short line segments) along a field around a point, on the evaluated mesh.
 
         For an even degree there is one dash for each pair of opposite members, centered on the face. For an
-        odd degree there is one for each member, from the center of the face.
+        odd degree there is one for each member, from the center of the face. The length of a dash follows
+        from the size of its face; see `DASH_LENGTH`.
 
         Parameters
         ----------
@@ -92,14 +93,15 @@ class BrushSurface:
         place : (3,) ndarray
             Center of the brush: a point of the original mesh, object space.
         radius : float
-            Radius around `place` in which faces get dashes, object space.
+            Faces of the original mesh get dashes if their centers are nearer to `place` than this, object
+            space.
 
         Returns
         -------
         ends : (K, 2, 3) float64 ndarray
-            Both end points of each dash, object space.
+            Both end points of each dash on the evaluated mesh, object space.
         face : (K,) intp ndarray
-            Face of each dash.
+            The face of the original mesh that each dash belongs to.
         """
         surface = self._surface
         offset = surface.face_center - place
@@ -162,7 +164,20 @@ def _deformed(
 
 
 def closest_faces(mesh: bpy.types.Mesh, surface: Surface, cache: Cache) -> FaceLocator:
-    """Return a function that finds the (n,) faces of a mesh that are closest to (n, 3) points."""
+    """Return a function that finds the faces of a mesh closest to points in object space.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+    surface : Surface
+        The surface of the mesh. It is the key of the search tree in the cache.
+    cache : Cache
+
+    Returns
+    -------
+    callable
+        For (n, 3) points it returns the (n,) indices of the closest faces; -1 if there is none.
+    """
 
     def create() -> BVHTree:
         copy = bmesh.new()

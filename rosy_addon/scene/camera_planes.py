@@ -29,8 +29,8 @@ HIDDEN_FROM = (
 def pictured_cameras(scene: bpy.types.Scene) -> dict[bpy.types.Object, bpy.types.PropertyGroup]:
     """Return the cameras from which pictures were baked, each with the record of one of its pictures.
 
-    If a camera has several pictures, one that objects show is preferred. An animation that is
-    drawn from the cameras of its frames counts as one of the active camera of the scene.
+    If a camera has several pictures, one that objects show is preferred. An animation in which each frame is
+    drawn from the camera that renders it counts as a picture of the active camera.
     """
     shown = {material for obj in scene.objects for material in shown_materials(obj)}
     cameras: dict[bpy.types.Object, bpy.types.PropertyGroup] = {}
@@ -43,12 +43,12 @@ def pictured_cameras(scene: bpy.types.Scene) -> dict[bpy.types.Object, bpy.types
 
 
 def remove_camera_planes(scene: bpy.types.Scene, tag: str) -> list[bpy.types.Image]:
-    """Remove the planes that have a tag from a scene, and their meshes and materials.
+    """Delete the planes of a scene that have the custom property `tag`, with their meshes and materials.
 
     Returns
     -------
     list of bpy.types.Image
-        The images of the deleted materials that nothing uses now.
+        Images of the deleted materials. Only images without any user are returned.
     """
     images = []
     for obj in [obj for obj in scene.objects if obj.get(tag)]:

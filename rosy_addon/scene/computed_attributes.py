@@ -1,7 +1,7 @@
 """Jobs that compute mesh attributes: tangents, the angles between two fields, ambient occlusion.
 
-Each job reads meshes, computes the values, and stores them. If an attribute cannot be stored, an error is
-raised before anything is computed or changed.
+The jobs read meshes, compute values, and store them; `assign_tangents` stores the tangents. If an attribute
+cannot be stored, an error is raised before anything is computed or changed.
 """
 
 from __future__ import annotations
@@ -45,8 +45,9 @@ def mesh_tangents(mesh: bpy.types.Mesh, guiding_angle: float, name: str = "") ->
     ----------
     mesh : bpy.types.Mesh
     guiding_angle : float
-        Decides which member of the field is stored: one near the direction at this angle from the horizontal,
-        in radians.
+        Which direction of the field is stored: one near this angle, in radians. On each face the angle is
+        measured from the direction in the face that is horizontal in object space, counter-clockwise as seen
+        from outside; see `line_order`.
     name : str
         Name of the attribute in which the tangents will be stored; see `assign_tangents`. It is only checked
         here, and nothing is stored.

@@ -115,9 +115,9 @@ def check_not_missing(obj: bpy.types.Object) -> None:
 
 
 def remedy_for_absence(otherwise: str) -> str:
-    """Return advice for a message that something is absent.
+    """Return advice for a message that an object is absent: to relink missing libraries, if there are any.
 
-    If libraries are missing, it is to relink them. If not, it is `otherwise`.
+    If no library is missing, return the advice `otherwise`.
     """
     paths = [library.filepath for library in bpy.data.libraries if library.is_missing]
     return f"relink the missing library {', '.join(paths)}" if paths else otherwise

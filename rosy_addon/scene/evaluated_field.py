@@ -50,13 +50,14 @@ class FieldLayout:
     Attributes
     ----------
     name : str
-        Name of the attribute with one member vector per face. If there are deviations, the attribute
-        ``name_k`` has the k-th of the direction ratios per face.
+        Name of the attribute with one member vector per face.
     degree : int
+        Degree N of the field.
     has_deviations : bool
-        Whether the field has `RosyField.direction_ratios`: its directions deviate from equal angles.
+        Whether the directions deviate from equal angles. The attributes ``name_0`` ... ``name_{N-1}`` then
+        have the real and imaginary parts of the N ratios of each face; see `RosyField.direction_ratios`.
     family_count : int
-        `RosyField.family_count`.
+        Number of families of directions; see `RosyField.family_count`.
     """
 
     name: str
@@ -66,7 +67,7 @@ class FieldLayout:
 
     @property
     def attribute_names(self) -> list[str]:
-        """Names of all attributes: first that of the member vectors, then those of the direction ratios."""
+        """Names of all attributes: first the one of member vectors, then one for each direction ratio."""
         indices = range(self.degree if self.has_deviations else 0)
         return [self.name, *(f"{self.name}_{index}" for index in indices)]
 
@@ -170,12 +171,12 @@ def temp_attributes(
 ) -> Iterator[dict[bpy.types.Object, FieldLayout]]:
     """Context manager: add temporary attributes, which modifiers copy to evaluated meshes.
 
-    They are removed at the end of the block. The attributes are the rest positions, the normals of the
-    original faces, and the fields as vectors on faces if they are stored in another form. All fields are
+    They are removed at the end of the block. The attributes are the rest positions and the normals of the
+    original faces. A field that is not stored as vectors on faces is added in this form. All fields are
     checked on the original meshes.
 
-    Inside another such context with the same objects, nothing is added again. Around many calls of
-    `read_scene`, keep one context open.
+    Inside another such context with the same objects, nothing is added again. A caller that calls
+    `read_scene` many times is faster if it opens one context around all calls.
 
     Parameters
     ----------
@@ -267,7 +268,10 @@ def lost_field_error(obj: bpy.types.Object, attribute: str | None) -> RosyError:
 
 
 def topology_hash(mesh: bpy.types.Mesh, original: bpy.types.Mesh) -> bytes:
-    """Return a hash of the faces and the field attribute of an evaluated mesh, without positions."""
+    """Return a hash of the faces and the field attribute of an evaluated mesh, without positions.
+
+    The name of the field attribute is a setting of the original mesh, `original`.
+    """
     name, values = attribute_name(original), None
     if is_face_vector_field(mesh, name):
         values = read_attribute(mesh, name, np.float32, 3)

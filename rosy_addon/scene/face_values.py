@@ -76,7 +76,7 @@ def read_face_scalars(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
 
 
 def _face_means(values: np.ndarray, domain: str, mesh: bpy.types.Mesh) -> np.ndarray:
-    """Return (F, ...) values of faces as they are, and values of points or corners averaged over each face."""
+    """Return values of faces, (F, ...), as they are; average values of points or corners over each face."""
     if domain == "FACE":
         return values
     corner_vertex, face_start = polygon_arrays(mesh)

@@ -220,13 +220,14 @@ def follow_mesh(
     vectors : (F, 3) or (F, N, 3) ndarray
         Values of the attribute. If it is ``dir0``, the values of ``dir0`` ... ``dir{N-1}``.
     surface : Surface
-        The surface of the mesh. If it has a rest shape, the vectors are rotated to this.
+        The surface of the mesh. If it has `rest_vertices`, these are the present shape.
 
     Returns
     -------
     ndarray
-        `vectors` itself if no vertex has moved, or the shape is not known. A vector that does not fit its checksum, because it was
-        changed since, for example by a script, is not rotated. `carried_vectors` lists further exceptions.
+        The rotated vectors; see `carried_vectors`. A vector is not rotated if its checksum shows that it was
+        changed after it was stored, for example by a script. If no vertex has moved, or if the stored shape
+        is not known, `vectors` itself is returned.
     """
     rest_name, check_name = _attribute_names(name)
     # Users can convert attributes to other types.

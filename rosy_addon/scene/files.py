@@ -66,8 +66,8 @@ PLAIN_KINDS = ("camera", "scene")
 def picture_stem(name: str, kind: str = "camera") -> str:
     """Return the stem of the names of picture files, such as ``RoSy_Camera`` or ``RoSy_Cube_texture``.
 
-    `name` is that of a camera, of a scene or (for a texture) of an object. For a texture, `kind` is its kind,
-    which ends the stem.
+    `name` is the name of a camera (`kind` "camera"), of a scene (`kind` "scene") or of an object with a
+    texture. For a texture, `kind` says what it shows, such as "texture" or "flow", and ends the stem.
 
     Characters that file systems do not allow become underscores, and long names are cut. Two names may then
     have the same stem, perhaps except for case, which some file systems ignore. In that case the first of

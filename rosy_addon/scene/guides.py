@@ -45,7 +45,7 @@ EmptyGuide = tuple[np.ndarray, np.ndarray, float]
 
 
 def guide_objects(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
-    """Return those of the objects that can guide a field, by their types."""
+    """Return the objects that can guide a field: Grease Pencil, curves, hair curves and empties."""
     return [obj for obj in objects if obj.type in GUIDE_TYPES]
 
 
@@ -159,7 +159,8 @@ def _world_to_object(obj: bpy.types.Object) -> np.ndarray:
 def guide_vectors(mesh: bpy.types.Mesh, name: str, surface: Surface) -> np.ndarray:
     """Read a vector attribute as one guide per face; see `read_face_vectors`.
 
-    If RoSy has stored the attribute, its vectors have followed later changes of the mesh; see `follow_mesh`.
+    If RoSy has stored the attribute and the mesh was deformed since, the vectors are rotated with their
+    faces; see `follow_mesh`.
 
     Parameters
     ----------

@@ -72,7 +72,7 @@ _INPUTS = (
 
 
 def hatching_group(created: list[bpy.types.ID]) -> bpy.types.NodeTree:
-    """Return the node group of this file. If it is missing, it is created and appended to `created`."""
+    """Return the node group in the open .blend file. A missing one is created and appended to `created`."""
     for group in bpy.data.node_groups:
         is_own = group.library is None and group.get(OWNED_TAG)
         is_hatching = group.bl_idname == "ShaderNodeTree" and group.name.startswith(GROUP_NAME)
@@ -90,7 +90,7 @@ def set_hatching_look(node: bpy.types.Node, look: Look, line_count: int) -> None
     node : bpy.types.Node
     look : Look
     line_count : int
-        Number of undirected directions of the field through a point.
+        Number of lines (pairs of opposite directions of the field) through a point.
     """
     layers, inks = layer_inks(look, line_count)
     ramp = look.ink_color_light if has_tone_inks(look) else look.ink_color

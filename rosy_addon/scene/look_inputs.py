@@ -258,7 +258,7 @@ def check_sources(
 
 
 def _attribute_listing(owners: Sequence[bpy.types.Object], types: Sequence[str]) -> str:
-    """Return a list for a message: the names of all attributes of the meshes that have one of some types."""
+    """Return the names of all attributes of objects with a data type in `types`, as text for a message."""
     available = dict.fromkeys(
         attribute.name
         for owner in owners

@@ -46,7 +46,7 @@ from .meshes import flush_edit_mode, mesh_label, mesh_surface, read_attribute, w
 #: such vectors may be tangent to the smooth surface rather than to the face.
 CORNER_TOLERANCE = 30.0
 
-#: The elements of a mesh that have a vector each, as `field.validate` calls them, by the domain of the attribute.
+#: Names of the elements of a mesh in `field.validate`, by the domain of an attribute.
 ELEMENTS = {"FACE": "face", "POINT": "vertex"}
 
 

@@ -217,13 +217,13 @@ def evaluated_mesh(obj: bpy.types.Object) -> Iterator[bpy.types.Mesh | None]:
 
 
 def marked_edges(mesh: bpy.types.Mesh, mark: str) -> np.ndarray:
-    """Return the vertex indices of the edges that are marked in a way.
+    """Return the vertex indices of the edges that are selected, marked sharp, or marked as seams.
 
     Parameters
     ----------
     mesh : bpy.types.Mesh
-    mark : str
-        A key of `EDGE_MARKS`.
+    mark : {"SELECTED", "SHARP", "SEAM"}
+        See `EDGE_MARKS`.
 
     Returns
     -------

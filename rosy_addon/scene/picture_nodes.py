@@ -128,7 +128,10 @@ def new_material(
 
 
 def set_sequence_frames(material: bpy.types.Material, first: int, last: int) -> None:
-    """Set the frames at which a material plays its image sequence: each file at the frame of its number."""
+    """Let a material show its image sequence: at each frame, the file with the number of the frame.
+
+    `first` and `last` are the numbers of the first and the last file.
+    """
     for node in material.node_tree.nodes:
         if node.bl_idname == "ShaderNodeTexImage":
             image_user = node.image_user
@@ -222,8 +225,8 @@ def set_picture_modifier(
 ) -> None:
     """Set the node group of RoSy's modifier, and move the modifier to the end of the object's stack.
 
-    The previous group may have projections of other pictures. Those of materials in `pictures` are copied to
-    the new group, so that the object can show these pictures again.
+    The previous group may have projections of other pictures. A projection is copied to the new group if its
+    material is in `pictures`, so that the object can show this picture again.
     """
     existing = rosy_modifiers(obj)
     modifier = existing[0] if existing else obj.modifiers.new(MODIFIER_NAME, "NODES")

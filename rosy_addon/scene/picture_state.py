@@ -266,7 +266,16 @@ def read_picture_states(
 
 
 def bakes_light(settings: bpy.types.PropertyGroup, look: Look) -> bool:
-    """Return whether the hatching of textures is baked in the light of the scene, with its settings."""
+    """Return whether textures show hatching that was drawn in the light of the scene.
+
+    Otherwise, a texture of hatching stores thresholds, and its material draws the ink in the present light.
+
+    Parameters
+    ----------
+    settings : bpy.types.PropertyGroup
+        ``scene.rosy``.
+    look : Look
+    """
     return settings.texture_bake_light and settings.texture_content == "LOOK" and is_hatched(look)
 
 

@@ -291,7 +291,7 @@ def apply_texture(
     uv_map : str
         Name of the UV map.
     tiles : mapping of int to ImageData
-        The UDIM tiles by their numbers, or one picture by any number if there are no UDIM tiles.
+        The UDIM tiles by their numbers. If `is_udim` is False, only the first item is used.
     settings : OutputSettings
     state : PictureState
         The state of the scene that the texture was drawn from.
@@ -353,7 +353,9 @@ def _show_on_objects(
 ) -> None:
     """Show a recorded picture on objects, with one new node group for each, and delete the earlier groups.
 
-    The earlier groups cannot be kept: `store_record` has made them refer to the new picture.
+    `keep_textures` says whether an object can still show an earlier texture; see `set_picture_modifier`. The
+    earlier groups are not used again, because `store_record` has replaced the material in them by the new
+    one.
     """
     materials = recorded_materials(textures=keep_textures)
     for obj, node_group in node_groups.items():

@@ -106,8 +106,7 @@ def read_turntable(
 def scene_depsgraph(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
     """Return the evaluated depsgraph of a scene.
 
-    It is that of the view layer in the context if this belongs to the scene, otherwise that of the first view
-    layer of the scene.
+    If the scene is the current one, its current view layer is evaluated, otherwise its first view layer.
     """
     context = bpy.context
     if context.scene == scene:
@@ -121,7 +120,8 @@ def read_lights(depsgraph: bpy.types.Depsgraph, view_matrix: np.ndarray) -> list
 
     A white diffuse surface that faces a sun with a strength of pi W/m2 has a radiance of 1. At the distance r
     from a point light of power P, it has a radiance of P / (4 pi^2 r^2). Spots and area lights are treated as
-    point lights. Area lights are four times as bright, as they are along their axes.
+    point lights. An area light counts as a point light of four times its power: on the axis of the area
+    light, this gives the same radiance.
 
     Parameters
     ----------

@@ -93,7 +93,8 @@ def read_editable_singularities(
 ) -> Singularities:
     """Find the singularities of the field of an object's original mesh, which can be edited.
 
-    Their positions are those of their vertices on the evaluated mesh. The evaluated field may have others.
+    A singularity is at a vertex. Its position is the position of this vertex on the evaluated mesh. The
+    evaluated field may have other singularities.
 
     Raises
     ------

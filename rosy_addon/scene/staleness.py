@@ -47,7 +47,11 @@ class SceneStateCache:
         self._next_reading = 0.0
 
     def get(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> SceneState:
-        """Return the state of the view layer of a depsgraph. It may be a moment old; see `TTL_READINGS`."""
+        """Return the state of the view layer of a depsgraph.
+
+        After a change, the scene is read again, but only after a pause of `TTL_READINGS` times the duration
+        of the last reading. Until then, the earlier state is returned.
+        """
         view_layer = depsgraph.view_layer
         key = scene.session_uid, view_layer.name, settings_key(scene, view_layer)
         if key != self._key or not self._is_watching():

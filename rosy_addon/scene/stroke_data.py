@@ -198,11 +198,12 @@ def follow_surface(obj: bpy.types.Object, surface: bpy.types.Object, vertex_coun
     Parameters
     ----------
     obj : bpy.types.Object
-        The strokes: Curves with the attributes `VERTEX_ATTRIBUTES`, `WEIGHTS_ATTRIBUTE` and `HEIGHT_ATTRIBUTE`.
+        The strokes: Curves with `VERTEX_ATTRIBUTES`, `WEIGHTS_ATTRIBUTE` and `HEIGHT_ATTRIBUTE`.
     surface : bpy.types.Object
         The object that the strokes were drawn on.
     vertex_count : int
-        Number of vertices of the evaluated mesh of `surface`. While it is another one, strokes do not follow.
+        Number of vertices of the evaluated mesh of `surface`. While the mesh has another number of vertices,
+        the strokes stay where they were drawn.
     """
     group = _new_group(f"{obj.name} {MODIFIER_NAME}", surface, vertex_count)
     modifier = _modifier_of(obj)

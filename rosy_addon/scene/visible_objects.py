@@ -27,7 +27,7 @@ def field_objects(
     Raises
     ------
     RosyError
-        If `names` has a name of no object, or of an object that has no field, is hidden, or is switched off.
+        If there is no object with one of the names, or the object has no field, is hidden or is switched off.
     """
     candidates = {obj.name: obj for obj in _visible_objects(view_layer) if _draws_field(obj)}
     if names is None:

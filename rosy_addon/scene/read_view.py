@@ -151,9 +151,9 @@ def rendered_lights(
 
 def _convert_light(data: bpy.types.Light, matrix: np.ndarray) -> Light:
     """Convert a light of Blender to a `Light`. `matrix` transforms its local space to camera space."""
-    color = np.array(data.color, dtype=np.float64)
-    if getattr(data, "use_temperature", False):
-        color *= np.array(data.temperature_color)
+    has_temperature = getattr(data, "use_temperature", False)
+    temperature_color = data.temperature_color if has_temperature else np.ones(3)
+    color = np.array(data.color) * np.array(temperature_color)
     energy = data.energy * 2.0 ** getattr(data, "exposure", 0.0)
     if data.type == "SUN":
         direction = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])

@@ -13,7 +13,6 @@ import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from dataclasses import field as dataclass_field
 from functools import partial
 
 import bpy
@@ -74,8 +73,8 @@ class SceneData:
 
     instances: list[MeshInstance]
     objects: list[bpy.types.Object]
-    warnings: tuple[str, ...] = ()
-    mesh_states: MeshStates = dataclass_field(default_factory=dict)
+    warnings: tuple[str, ...]
+    mesh_states: MeshStates
 
 
 def read_scene(

@@ -71,9 +71,7 @@ def with_marks(picture: Picture, view: ViewInput, cache: Cache | None = BAKE_CAC
     return picture
 
 
-def view_arrows(
-    view: ViewInput, cache: Cache | None = None, *, is_exact: bool = True
-) -> ArrowMarks:
+def view_arrows(view: ViewInput, cache: Cache | None, *, is_exact: bool = True) -> ArrowMarks:
     """Return the arrowheads of a view. Its look must draw them (`Look.arrows` above 0); see `arrow_marks`."""
     look = pixel_look(view.look, view.camera, view.instances)
     return arrow_marks(

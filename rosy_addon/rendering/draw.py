@@ -167,9 +167,9 @@ def _draw_strips(
             gbuffer = cached_project(*scene, gbuffer_cache, view.samples_per_side)
         else:
             gbuffer = project(*scene, cache, view.samples_per_side, rows)
-    inputs, caches = (gbuffer, look, view.lights, view.reference), (gbuffer_cache, cache)
+    inputs = gbuffer, look, view.lights, view.reference, gbuffer_cache, cache, strips
     with progress(PROJECTION_SHARE, 1.0):
-        return compose(*inputs, *caches, strips, view.draws_thresholds, view.drift)
+        return compose(*inputs, view.draws_thresholds, view.drift)
 
 
 def _whole(strips: Sequence[Strip]) -> Strip:

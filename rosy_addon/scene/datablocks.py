@@ -106,12 +106,10 @@ def check_not_missing(obj: bpy.types.Object) -> None:
     """Raise an error if an object or its data is a placeholder for data missing in a library."""
     for datablock in (obj, obj.data):
         if datablock is not None and datablock.is_missing:
-            path = datablock.library.filepath
+            path, problem = datablock.library.filepath, f"does not contain '{datablock.name}'"
             if datablock.library.is_missing:
-                raise RosyError(f"object '{obj.name}': its library {path} is missing: relink it")
-            raise RosyError(
-                f"object '{obj.name}': its library {path} does not contain '{datablock.name}': relink it"
-            )
+                problem = "is missing"
+            raise RosyError(f"object '{obj.name}': its library {path} {problem}: relink it")
 
 
 def remedy_for_absence(otherwise: str) -> str:

@@ -314,11 +314,7 @@ def _prepare_layer(stages: ComposeStages, canvas: _Canvas, degree: int, look: Pi
     with progress(0.9, 1.0):
         undirected = stages.undirected_texture(field, look)
     lines = HatchedLines(
-        look,
-        paper_grain=paper_grain,
-        outline=outline,
-        undirected=undirected,
-        even_lines=even_lines,
+        look, paper_grain=paper_grain, outline=outline, undirected=undirected, even_lines=even_lines
     )
     if even_lines is None or undirected is not None or has_breaks(look) or has_paper_grain(look):
         look_streak_statistics(

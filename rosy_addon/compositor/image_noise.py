@@ -139,9 +139,7 @@ def _round_outward(start: int, stop: int) -> tuple[int, int]:
 
 
 def cached_tiles(
-    create: Callable[..., np.ndarray],
-    rectangle: TileRectangle,
-    *settings: Hashable,
+    create: Callable[..., np.ndarray], rectangle: TileRectangle, *settings: Hashable
 ) -> np.ndarray:
     """Return the result of ``create(rectangle, *settings)``, from the cache if it is there.
 
@@ -203,12 +201,7 @@ def image_noise(
 
 
 def _noise_tiles(
-    rectangle: TileRectangle,
-    cell: float,
-    seed: int,
-    channel: int,
-    density: float,
-    high_pass: float,
+    rectangle: TileRectangle, cell: float, seed: int, channel: int, density: float, high_pass: float
 ) -> np.ndarray:
     """Return the flat float32 noise of one channel in a rectangle, row by row, averaged over each pixel."""
     full_margin = high_pass_margin(high_pass)

@@ -22,22 +22,12 @@ from dataclasses import replace
 import numpy as np
 
 from .even_lines import COARSE_RATIO, EvenLines, resolved_share, uneven_width
-from .hatching import (
-    HatchedLines,
-    line_ranks,
-    onset_weights,
-    soft_rank_of,
-    standard_streak,
-)
+from .hatching import HatchedLines, line_ranks, onset_weights, soft_rank_of, standard_streak
 from .lic_images import LicImages
 from .look import Look
 from .look_units import PixelLook
 from .pixel_field import PixelField
-from .streak_statistics import (
-    COVERAGE_STEPS,
-    break_amount,
-    look_streak_statistics,
-)
+from .streak_statistics import COVERAGE_STEPS, break_amount, look_streak_statistics
 
 #: Number of lines whose thresholds are stored.
 MAX_LAYERS = 3

@@ -335,11 +335,7 @@ class Look:
         **_shading("color", lambda look: colors_magnitude(look) or colors_values(look)),
     )
     shading: float = number(
-        0.7,
-        0.0,
-        1.0,
-        "Strength of the diffuse shading in the picture",
-        **_shading("light"),
+        0.7, 0.0, 1.0, "Strength of the diffuse shading in the picture", **_shading("light")
     )
     light: str = choice(
         "headlight",
@@ -405,10 +401,7 @@ class Look:
         **_ink(lambda look: is_hatched(look) and not colors_magnitude(look)),
     )
     ink_color_light: str = color(
-        "#b06a3c",
-        "Color of the ink in the lights",
-        label="Highlight Color",
-        **_ink(has_tone_inks),
+        "#b06a3c", "Color of the ink in the lights", label="Highlight Color", **_ink(has_tone_inks)
     )
     paper_color: str = color(
         "#ffffff",

@@ -10,13 +10,7 @@ import numpy as np
 from ..field.symmetry import FieldSymmetry
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
-from .hatching import (
-    has_breaks,
-    has_outline,
-    has_overshoot,
-    has_paper_grain,
-    overshoot_steps,
-)
+from .hatching import has_breaks, has_outline, has_overshoot, has_paper_grain, overshoot_steps
 from .image_noise import MAX_MARGIN, high_pass_margin
 from .look import Look, is_even, magnitude_range, uses_magnitude
 from .look_units import PixelLook, pixel_look

@@ -8,24 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compositor.color_values import (
-    check_color_values,
-    scaled_positions,
-    value_range,
-    value_scale,
-)
+from ..compositor.color_values import check_color_values, scaled_positions, value_range, value_scale
 from ..compositor.compose import colorize, streak_tone
 from ..compositor.flow import NO_DRIFT, Drift, noise_channel_count
 from ..compositor.ink_thresholds import sharp_look
 from ..compositor.lic import lic_lengths, noise_args
 from ..compositor.lic_images import with_magnitude_range
-from ..compositor.look import (
-    Look,
-    colors_magnitude,
-    colors_values,
-    crease_angle_of,
-    is_hatched,
-)
+from ..compositor.look import Look, colors_magnitude, colors_values, crease_angle_of, is_hatched
 from ..compositor.look_units import PixelLook, surface_pixel_look
 from ..compositor.pixel_field import PixelField
 from ..compositor.shading import Light
@@ -49,14 +38,7 @@ from .charts import UvCharts, uv_charts
 from .hatching import lit_ink, thresholds
 from .line_order import direction_map
 from .texel_field import texel_field, texel_noise
-from .texels import (
-    Texels,
-    TexelSurface,
-    TextureFrame,
-    fill_margin,
-    rasterize_charts,
-    texture_frame,
-)
+from .texels import Texels, TexelSurface, TextureFrame, fill_margin, rasterize_charts, texture_frame
 
 #: Lengths of a look in pixels are converted to lengths on the surface: this number of pixels is the side of a
 #: square with the area of the surface. Lines are then about as wide as in a picture of 1000 pixels that the
@@ -271,9 +253,7 @@ def _check_texture_memory(
     needed += samples_memory(used, mesh.family_count, many_images)
     tiles = f"{len(frame.tiles)} tiles of " if frame.is_udim and len(frame.tiles) > 1 else ""
     check_memory(
-        needed,
-        f"a texture of {tiles}{frame.size} x {frame.size} texels",
-        "choose a smaller size",
+        needed, f"a texture of {tiles}{frame.size} x {frame.size} texels", "choose a smaller size"
     )
 
 

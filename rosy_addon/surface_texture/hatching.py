@@ -9,11 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..compositor.even_lines import (
-    WOBBLE_SHIFT,
-    EvenLines,
-    resolved_share,
-)
+from ..compositor.even_lines import WOBBLE_SHIFT, EvenLines, resolved_share
 from ..compositor.hatching import HatchedLines, has_breaks, has_paper_grain
 from ..compositor.image_noise import NOISE_MEAN
 from ..compositor.ink_from_thresholds import ink_of_thresholds
@@ -30,10 +26,7 @@ from ..compositor.look_units import PixelLook
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, surface_paper_grain_args
 from ..compositor.pixel_field import PixelField, all_members
 from ..compositor.shading import Light
-from ..compositor.streak_statistics import (
-    break_steps,
-    look_streak_statistics,
-)
+from ..compositor.streak_statistics import break_steps, look_streak_statistics
 from ..compositor.target_tone import apply_tone_curve
 from ..compositor.undirected import undirected_texture
 from ..compositor.wobble import WOBBLE_STD, has_wobble, rotate_pixel_field, solid_wobble_angle

@@ -1,7 +1,7 @@
 """Declarative settings: dataclass fields with a range, a label and a help text.
 
-A settings class is a frozen dataclass whose fields are made by `number`, `numbers`, `choice`,
-`switch` and `color`. Each field is described by a `Setting`: default, range, label, help text, position in
+A settings class is a frozen dataclass whose fields are made by `number`, `fraction`, `numbers`,
+`choice`, `switch` and `color`. Each field is described by a `Setting`: default, range, label, help text, position in
 the panels, the stage of rendering that it affects, and when it has an effect. Properties, panels, validation,
 command line options, tables of the documentation and cache keys are derived from these descriptions. Other
 fields of the class, such as arrays, have no description.
@@ -229,6 +229,11 @@ class Color(Setting):
 def number(default: float, low: float, high: float, text: str, **description: Any) -> Any:
     """Return a dataclass field for a setting that is a number; see `Number` and `Setting`."""
     return _field(Number(default=default, low=low, high=high, text=text, **description))
+
+
+def fraction(default: float, text: str, **description: Any) -> Any:
+    """Return a dataclass field for a setting that is a number from 0 to 1; see `Number` and `Setting`."""
+    return number(default, 0.0, 1.0, text, **description)
 
 
 def numbers(

@@ -16,7 +16,7 @@ they do not change the tone.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,13 +27,14 @@ from .family_hues import line_families
 from .image_noise import NOISE_MEAN
 from .inks import MAX_INKS, has_ink_per_line, ink_count, inks_of
 from .lic_images import LicImages, magnitude_ends, relative_magnitude
-from .look import colors_magnitude, is_hatched
+from .look import colors_magnitude, is_even, is_hatched
 from .look_units import PixelLook
 from .paper_grain import PAPER_GRAIN_STRENGTH
 from .pixel_field import PixelField, all_members
 from .streak_statistics import (
     COVERAGE_STEPS,
     break_amount,
+    break_steps,
     look_streak_statistics,
     smoothstep,
     softness,
@@ -307,6 +308,30 @@ def _above_threshold(
 def has_breaks(look: Any) -> bool:
     """Return whether lines are broken into pieces, or vary in width as drawn by hand."""
     return is_hatched(look) and (look.breaks > 0 or look.wobble > 0)
+
+
+def line_images(
+    look: PixelLook, convolve: Callable[[list[PixelLook]], list[LicImages]]
+) -> tuple[LicImages | None, LicImages | None]:
+    """Compute the LIC images that the lines of a look are drawn with.
+
+    Parameters
+    ----------
+    look : PixelLook
+    convolve : callable
+        Function that computes LIC images for looks that differ in the length of streamlines, the longest
+        first.
+
+    Returns
+    -------
+    images, break_images : LicImages or None
+        See `HatchedLines`.
+    """
+    looks = [] if is_even(look) else [look]
+    if has_breaks(look):
+        looks.append(look.with_length(break_steps(look)))
+    images = convolve(looks) if looks else []
+    return None if is_even(look) else images[0], images[-1] if has_breaks(look) else None
 
 
 def has_overshoot(look: Any) -> bool:

@@ -13,7 +13,7 @@ from ..field.directional_field import evaluate_harmonics
 from ..field.symmetry import FieldSymmetry
 from ..projection.field_channel import FieldChannel
 from ..projection.gbuffer import GBuffer
-from ..projection.pixel_blocks import BLOCK_PIXELS, pixel_blocks
+from ..projection.pixel_blocks import BLOCK_PIXELS, part_of, pixel_blocks
 from ..projection.pixel_neighbors import neighbor_masks, screen_jacobians
 from .reported_blocks import reported_blocks
 
@@ -140,24 +140,16 @@ class PixelField:
 
         The `neighbor_mask` of the result may refer to pixels that are left out.
         """
-        index = self.gbuffer_index
-        if not isinstance(index, slice):
-            index = index[extent]
-        elif isinstance(extent, slice):
-            index = slice((index.start or 0) + extent.start, (index.start or 0) + extent.stop)
-        else:
-            index = (index.start or 0) + extent
-        return replace(
-            self,
-            pixel=self.pixel[extent],
-            representation=self.representation[extent],
-            screen_jacobian=self.screen_jacobian[extent],
-            neighbor_mask=self.neighbor_mask[extent],
-            channels={channel: values[extent] for channel, values in self.channels.items()},
-            gbuffer_index=index,
-            seam_steps=None,
-            map_position=None if self.map_position is None else self.map_position[extent],
-        )
+        part = part_of(self, extent)
+        index = part.gbuffer_index
+        if isinstance(index, slice):
+            first = index.start or 0
+            if isinstance(extent, slice):
+                index = slice(first + extent.start, first + extent.stop)
+            else:
+                index = first + extent
+        channels = {channel: values[extent] for channel, values in self.channels.items()}
+        return replace(part, channels=channels, gbuffer_index=index, seam_steps=None)
 
     def member_direction(self, member: np.ndarray) -> np.ndarray:
         """Compute the directions of the field from the members of the RoSy that they deviate from.
@@ -193,10 +185,7 @@ class PixelField:
             x + i y in pixels.
         """
         # Double precision makes the float32 result the same with all versions of numpy.
-        x, y = (
-            self.screen_jacobian[:, 0].astype(np.complex128),
-            self.screen_jacobian[:, 1].astype(np.complex128),
-        )
+        x, y = self.screen_jacobian.astype(np.complex128).T
         direction = x * member.real + y * member.imag
         return direction.astype(np.complex64) if foreshorten else normalized(direction)
 

@@ -34,7 +34,6 @@ from .lic import lic_lengths
 from .lic_images import LicImages, magnitude_ends, relative_magnitude, with_magnitude_range
 from .look import Look, colors_magnitude, colors_values, is_even, is_hatched
 from .look_units import PixelLook, pixel_look
-from .paper_grain import picture_paper_grain, surface_paper_grain
 from .picture import Picture, common_color_range
 from .pixel_field import PixelField, entries_of_rows
 from .reported_blocks import reported_blocks
@@ -291,7 +290,7 @@ def _prepare_layer(stages: ComposeStages, canvas: _Canvas, degree: int, look: Pi
         return _Layer(field, HatchedLines(look))
     if has_paper_grain(look):
         with progress(0.6, 0.7):
-            paper_grain = _paper_grain(stages, field, look)
+            paper_grain = stages.paper_grain(field, look)
     if has_outline(look):
         with progress(0.7, 0.9):
             outline = stages.outline(field, look)
@@ -335,9 +334,8 @@ def _draw_layer(stages: ComposeStages, canvas: _Canvas, layer: _Layer, strip: St
             pixels = picture_thresholds(part, part_lines, samples)
             canvas.color[entries], canvas.spread[entries] = pixels[:, :3], pixels[:, 3:]
         else:
-            canvas.color[entries], canvas.alpha[entries] = render_hatching(
-                part, part_lines, tone[block]
-            )
+            color, alpha = render_hatching(part, part_lines, tone[block])
+            canvas.color[entries], canvas.alpha[entries] = color, alpha
 
 
 def _tone_along_lines(layer: _Layer, strip: Strip) -> np.ndarray:
@@ -351,31 +349,13 @@ def _tone_along_lines(layer: _Layer, strip: Strip) -> np.ndarray:
     channels = np.ones((len(layer.tone), 3), dtype=np.float32)
     channels[:, 0] = layer.tone
     look = layer.lines.look.for_means(overshoot_steps(layer.lines.look))
-    # The weights of the method "ibfv" fall exponentially: they would reach too far.
-    method = "sheets" if look.method == "ibfv" else look.method
-    (images,) = lic_lengths(layer.field, [look], channels, strip, method)
+    (images,) = lic_lengths(layer.field, [look], channels, strip)
     means = np.empty(images.members.shape[:2], dtype=np.float32)
     for block in reported_blocks(means.shape[1], "finding tones", 1.0, 1.0):
         centered = images.members[:, block] - np.float32(NOISE_MEAN)
         scaled = np.float32(1 - NOISE_MEAN) * centered[..., 0]
         means[:, block] = NOISE_MEAN + scaled / centered[..., 1]
     return np.clip(means, 0, 1, out=means)
-
-
-def _paper_grain(stages: ComposeStages, field: PixelField, look: PixelLook) -> np.ndarray:
-    """Return the (M, P) heights of the paper grain for each of the M directions of the field.
-
-    The mean is 0, the standard deviation 1.
-    """
-    if look.anchor == "picture":
-        subpixels = look.supersampling
-        line_width = look.line_width / subpixels
-        return picture_paper_grain(
-            field.pixel, field.width, line_width, look.seed, subpixels, field.line_count
-        )
-    noise = stages.surface_paper_grain(field, look)
-    std = look_streak_statistics(look).paper_grain_std
-    return surface_paper_grain(noise, std, field.line_count)
 
 
 def streak_tone(field: PixelField, look: PixelLook, images: LicImages) -> np.ndarray:

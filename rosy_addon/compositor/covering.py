@@ -191,9 +191,8 @@ class Covering:
         if self.seams is not None:
             return np.full(len(state), 0.5, dtype=np.float32)
         sheet, cell = np.divmod(state, np.int32(self.cell_count))
-        angle = (self.packed_phase.take(cell) - np.float32(2) + sheet) * np.float32(
-            2 * np.pi / self.sheets_per_turn
-        )
+        spacing = np.float32(2 * np.pi / self.sheets_per_turn)
+        angle = (self.packed_phase.take(cell) - np.float32(2) + sheet) * spacing
         return forward_share(np.cos(angle))
 
     def neighbor_lines(
@@ -241,11 +240,8 @@ def member_lines(field: PixelField) -> np.ndarray:
     Lines are pairs of opposite sheets of the covering surface, numbered from 0 to M - 1. For an odd degree N,
     sheet 2 i is member i of the field, and sheet 2 i - N is the opposite direction.
     """
-    return (
-        np.arange(field.line_count)
-        * (field.symmetry.sheets_per_turn // field.degree)
-        % field.line_count
-    )
+    spacing = field.symmetry.sheets_per_turn // field.degree
+    return np.arange(field.line_count) * spacing % field.line_count
 
 
 def build_covering(field: PixelField, look: PixelLook, noise: np.ndarray) -> Covering:
@@ -417,10 +413,8 @@ def _apply_harmonics(
     """
     if not field.harmonics:
         return x, y
-    member = x + 1j * y
-    direction = normalized(
-        member * evaluate_harmonics([(j, c[block]) for j, c in field.harmonics], member)
-    )
+    member, harmonics = x + 1j * y, [(j, c[block]) for j, c in field.harmonics]
+    direction = normalized(member * evaluate_harmonics(harmonics, member))
     return direction.real, direction.imag
 
 
@@ -435,11 +429,8 @@ def _to_screen(
     screen_x = x_axis.real * x + y_axis.real * y
     screen_y = x_axis.imag * x + y_axis.imag * y
     if not foreshorten:
-        norm = screen_x * screen_x
-        norm += screen_y * screen_y
-        np.sqrt(norm, out=norm)
+        norm = np.sqrt(screen_x * screen_x + screen_y * screen_y)
         norm[norm == 0] = 1
-        np.divide(1, norm, out=norm)
-        screen_x *= norm
-        screen_y *= norm
+        scale = 1 / norm
+        screen_x, screen_y = screen_x * scale, screen_y * scale
     return screen_x, screen_y

@@ -166,9 +166,8 @@ class HatchedLines(NamedTuple):
             spots = self.spots(line)
             undefined = np.flatnonzero(~np.isnan(spots))
             thresholds = look_streak_statistics(look).disc_threshold
-            coverage[undefined] = _above_threshold(
-                spots[undefined], target_coverage[undefined], thresholds, look
-            )
+            spots, target = spots[undefined], target_coverage[undefined]
+            coverage[undefined] = _above_threshold(spots, target, thresholds, look)
         return coverage
 
 
@@ -253,9 +252,8 @@ def _render_many_inks(
     shares = line_shares(field, look, transmittance, lines.even_lines)
     for line, share in enumerate(shares):
         ink = inks.ink_at_tone(ink_indices[line], tone)
-        target_coverage = inks.required_coverage(
-            target_transmittance[line % len(target_transmittance)] ** share, ink
-        )
+        line_transmittance = target_transmittance[line % len(target_transmittance)] ** share
+        target_coverage = inks.required_coverage(line_transmittance, ink)
         coverage = lines.coverage(line, target_coverage)
         transmitted *= 1 - coverage[:, None] * (1 - inks.transmittance(ink))
         bare_paper *= 1 - coverage
@@ -458,9 +456,8 @@ def onset_weights(darkness: np.ndarray, delays: Sequence[np.ndarray | float]) ->
 
     `delays` are the darkness at which each line joins. The result has an array for each line.
     """
-    return [
-        smoothstep((darkness - delay + ONSET_LEAD) / (ONSET_RANGE + ONSET_LEAD)) for delay in delays
-    ]
+    extent = ONSET_RANGE + ONSET_LEAD
+    return [smoothstep((darkness - delay + ONSET_LEAD) / extent) for delay in delays]
 
 
 def _onset_darkness(

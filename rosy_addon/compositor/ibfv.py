@@ -141,10 +141,8 @@ def streak_waves(
         with progress(start, stop):
             origins = _doubled(sheets, sums, 1 << doubling, origins, doubling == doublings - 1)
     with progress(0.9, 1.0):
-        return [
-            _line_waves(field, covering, each, total)
-            for each, total in zip(looks, sums, strict=True)
-        ]
+        pairs = zip(looks, sums, strict=True)
+        return [_line_waves(field, covering, each, total) for each, total in pairs]
 
 
 def _noise_sources(noise: np.ndarray, look: PixelLook) -> list[np.ndarray]:
@@ -346,9 +344,8 @@ class _Sums:
         ]
         weight = values[0].imag
         decay = self.decay[block] if np.ndim(self.decay) else self.decay
-        rest = 1 - (weight - np.float32(OWN_WEIGHT)) * (1 - decay) / np.maximum(
-            decay, np.float32(1e-6)
-        )
+        other_weight = weight - np.float32(OWN_WEIGHT)
+        rest = 1 - other_weight * (1 - decay) / np.maximum(decay, np.float32(1e-6))
         return values, weight, _square_sum(np.clip(rest, 0, 1), decay).astype(np.float32)
 
 
@@ -389,9 +386,8 @@ def _line_waves(field: PixelField, covering: Covering, look: PixelLook, sums: _S
     effective_samples = np.zeros(count, dtype=np.float32)
     for line, first_sheet in enumerate(member_lines(field).tolist()):
         for block in reported_blocks(count, "blending lines", line / lines, (line + 1) / lines):
-            state = first_sheet * covering.cell_count + covering.cell_of_pixel[block].astype(
-                np.intp
-            )
+            cell = covering.cell_of_pixel[block].astype(np.intp)
+            state = first_sheet * covering.cell_count + cell
             if covering.has_directions:
                 is_along = bool(covering.is_along_member(state[:1])[0])
                 opposite = first_sheet + (lines if is_along == (look.kernel != "ramp") else 0)

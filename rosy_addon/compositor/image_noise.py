@@ -128,9 +128,8 @@ def tile_rectangle(
     column = pixel % np.int32(width)
     left, right = int(column.min()) // subpixels, int(column.max()) // subpixels + 1
     bottom, top = (int(end) // width // subpixels for end in pixel[[0, -1]])
-    return TileRectangle(
-        *_round_outward(left, right + extra_columns), *_round_outward(bottom, top + 1)
-    )
+    columns, rows = _round_outward(left, right + extra_columns), _round_outward(bottom, top + 1)
+    return TileRectangle(*columns, *rows)
 
 
 def _round_outward(start: int, stop: int) -> tuple[int, int]:
@@ -337,18 +336,14 @@ def streak_moments(
     k, dk = np.linspace(0, 4 / (1 + cell), 700, retstep=True)
     angle = np.arange(1440) * np.pi / 1440
     kx, ky = np.outer(k, np.cos(angle)), np.outer(k, np.sin(angle))
-    cx, cy = (
-        np.cos(LATTICE_ANGLE) * kx - np.sin(LATTICE_ANGLE) * ky,
-        np.sin(LATTICE_ANGLE) * kx + np.cos(LATTICE_ANGLE) * ky,
-    )
+    cosine, sine = np.cos(LATTICE_ANGLE), np.sin(LATTICE_ANGLE)
+    cx, cy = cosine * kx - sine * ky, sine * kx + cosine * ky
     amplitude = np.sinc(cell * cx) * np.sinc(cell * cy) * np.sinc(kx) * np.sinc(ky)
     if average > 1:
         amplitude *= np.sinc(average * kx) * np.sinc(average * ky)
     power = (cell * NOISE_STD * amplitude) ** 2
-    high_pass_gain = (
-        1 - np.exp(-2 * (np.pi * BLUR_FACTOR * high_pass * k) ** 2) if high_pass else 1.0
-    )
-    weight = power.mean(axis=1) * high_pass_gain**2 * k * dk * (2 * np.pi / len(angle))
+    blur = np.exp(-2 * (np.pi * BLUR_FACTOR * high_pass * k) ** 2) if high_pass else 0.0
+    weight = power.mean(axis=1) * (1 - blur) ** 2 * k * dk * (2 * np.pi / len(angle))
     response = _line_response(length * kx, kernel)
     variance = weight @ np.sum(np.abs(response) ** 2, axis=1)
     correlation_sum = 0.0

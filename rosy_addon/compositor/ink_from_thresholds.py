@@ -80,10 +80,8 @@ def ink_of_thresholds(
     """
     layers, inks = layer_inks(look, line_count)
     required = inks.target_transmittance(inks.complement_if_light(tone))
-    colors = [
-        inks.ink_at_tone(np.full(len(tone), min(layer, len(inks.dark) - 1)), tone)
-        for layer in range(layers)
-    ]
+    indices = [min(layer, len(inks.dark) - 1) for layer in range(layers)]
+    colors = [inks.ink_at_tone(np.full(len(tone), index), tone) for index in indices]
     left = [1 - inks.required_coverage(required, ink) for ink in colors]
     shares = layer_shares(1 - left[0], layers, look.layering)
     thresholds = [pixels[:, layer].view(_Values) for layer in range(MAX_LAYERS)]
@@ -94,10 +92,8 @@ def ink_of_thresholds(
     bare = np.ones(len(tone), dtype=np.float32)
     # The first layer is drawn last, on top of the others.
     for layer in reversed(range(layers)):
-        left_by_layer = left[layer].view(_Values)
-        covered = np.asarray(
-            layer_coverage(left_by_layer, shares[layer], thresholds[layer], filtered, edge_factor)
-        )
+        parameters = left[layer].view(_Values), shares[layer], thresholds[layer]
+        covered = np.asarray(layer_coverage(*parameters, filtered, edge_factor))
         bare *= 1 - covered
         part = covered / np.maximum(1 - bare, np.float32(1e-6)) if not is_opaque else covered
         color = color + part[:, None] * (colors[layer] - color)

@@ -371,10 +371,8 @@ def picture_thresholds(
             sample, period = _even_sample(even_lines, crowding > level, node)
             part = part._replace(even_lines=sample)
             resolved = np.einsum("klp,lp->kp", places, resolved_share(period, samples_per_side))
-        part = part._replace(
-            images=_streak_sample(images, node),
-            break_images=_streak_sample(part.break_images, node),
-        )
+        sampled, broken = (_streak_sample(each, node) for each in (images, lines.break_images))
+        part = part._replace(images=sampled, break_images=broken)
         thresholds = np.stack([line_thresholds(line, part) for line in range(len(rank))])
         ordered = ordered_thresholds(thresholds, places, field.representation == 0, look)
         if lines.outline is not None:

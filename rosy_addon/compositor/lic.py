@@ -22,11 +22,7 @@ from .strips import Strip
 
 
 def lic_lengths(
-    field: PixelField,
-    looks: Sequence[PixelLook],
-    noise: np.ndarray,
-    strip: Strip | None = None,
-    method: str = "",
+    field: PixelField, looks: Sequence[PixelLook], noise: np.ndarray, strip: Strip | None = None
 ) -> list[LicImages]:
     """Compute LIC images: average noise along the streamlines of each member of the field.
 
@@ -39,8 +35,6 @@ def lic_lengths(
     strip : Strip, optional
         Rows to draw. With the method "sheets", the images have the pixels of its `averaged_rows`; other
         methods draw all pixels.
-    method : str
-        LIC method; by default the `method` of the looks.
 
     Returns
     -------
@@ -48,7 +42,7 @@ def lic_lengths(
         One for each look.
     """
     raise_mmap_threshold()
-    method = method or looks[0].method
+    method = looks[0].method
     if method == "sheets":
         return fast_lic(field, looks, noise, strip)
     if method == "ibfv":

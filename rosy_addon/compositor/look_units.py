@@ -128,8 +128,12 @@ class PixelLook:
         return replace(self, length=length)
 
     def for_means(self, length: int) -> PixelLook:
-        """Return the look for unweighted means over `length` steps in each direction: no fading, no drift."""
-        still = replace(self.look, flow=0.0)
+        """Return the look for unweighted means over `length` steps in each direction: no fading, no drift.
+
+        The weights of the method "ibfv" fall exponentially and would reach too far, so "sheets" replaces it.
+        """
+        method = "sheets" if self.method == "ibfv" else self.method
+        still = replace(self.look, flow=0.0, method=method)
         return replace(self, look=still, length=length, kernel="box", is_antialiased=False)
 
     def in_samples(self, side: int) -> PixelLook:
@@ -171,9 +175,8 @@ def pixel_look(
     bounds = [instance.world_bounds() for instance in instances if instance.field is not None]
     scale = 1.0
     if look.unit_size and bounds:
-        exact_scale = look.unit_size / (
-            pixel_world_size(np.concatenate(bounds), camera) * supersampling
-        )
+        pixel = pixel_world_size(np.concatenate(bounds), camera)
+        exact_scale = look.unit_size / (pixel * supersampling)
         scale = 2 ** (np.rint(np.log2(exact_scale) * STEPS_PER_OCTAVE) / STEPS_PER_OCTAVE)
     in_picture = _scaled_pixel_look(look, scale, look.unit_size, drift)
     return replace(in_picture.in_samples(supersampling), is_antialiased=is_antialiased)
@@ -233,9 +236,8 @@ def _possible_scale(look: Look, scale: float) -> float:
 
     Noise cells stay at least as large as a pixel, as smaller ones are not visible.
     """
-    max_scale = min(
-        setting.high / max(getattr(look, setting.name), 1e-9) for setting in pixel_lengths(Look)
-    )
+    lengths = pixel_lengths(Look)
+    max_scale = min(item.high / max(getattr(look, item.name), 1e-9) for item in lengths)
     min_scale = 1.0 / look.line_width
     return float(np.clip(scale, min(min_scale, 1.0), max(max_scale, 1.0)))
 

@@ -213,9 +213,8 @@ class _Edges:
         gbuffer, look, depth = self._gbuffer, self._look, self._depth
         edge = np.flatnonzero(self.line_width)
         with progress(0.0, 0.5, STEP_LABEL):
-            strength = _mark_strength(
-                gbuffer.pixel[edge], self._border[edge], gbuffer.camera.width, look.supersampling
-            )
+            marks = gbuffer.pixel[edge], self._border[edge]
+            strength = _mark_strength(*marks, gbuffer.camera.width, look.supersampling)
         edge, strength = edge[strength > 0], strength[strength > 0]
         line_width = np.minimum(self.line_width[edge], np.float32(look.outline) * strength)
         depth_slack = np.float32(DEPTH_JUMP) * self._tolerance[edge]
@@ -255,9 +254,8 @@ class _Edges:
             points = mesh.crease_points(instance.surface, instance.matrix)
             points += np.asarray(instance.matrix, dtype=np.float64)[:3, 3]
             with progress(0.5, 0.8):
-                marks = crease_pixels(
-                    gbuffer, instance_id, points, self._entry_of_cell, origin, self._stride
-                )
+                frame = self._entry_of_cell, origin, self._stride
+                marks = crease_pixels(gbuffer, instance_id, points, *frame)
             self.line_width[marks & defined] = look.outline / 2
         if mesh.triangle_part is None:
             return
@@ -318,9 +316,8 @@ class _Edges:
                 first = np.flatnonzero(self._is_linked(block, bit)) + block.start
                 second = self._neighbor(first, dx, dy)
                 jump = np.abs(depth[second] - depth[first])
-                steep = jump > np.float32(MIN_STEP) * np.minimum(
-                    tolerance[first], tolerance[second]
-                )
+                least = np.minimum(tolerance[first], tolerance[second])
+                steep = jump > np.float32(MIN_STEP) * least
                 first, second, jump = first[steep], second[steep], jump[steep]
                 is_step = np.ones(len(first), dtype=bool)
                 for near, side in ((first, -1), (second, 1)):
@@ -363,9 +360,8 @@ def _mark_strength(
         return np.zeros(0, dtype=np.float32)
     row, column = np.divmod(pixel.astype(np.int64), width)
     stride = width // block_side + 2
-    block, block_of_pixel = np.unique(
-        row // block_side * stride + column // block_side, return_inverse=True
-    )
+    block = row // block_side * stride + column // block_side
+    block, block_of_pixel = np.unique(block, return_inverse=True)
     pairs = []
     for offset in (1, stride - 1, stride, stride + 1):
         target = np.searchsorted(block, block + offset)

@@ -111,11 +111,8 @@ class PixelField:
 
         See `field.directional_field`.
         """
-        return [
-            (number, values)
-            for (kind, number), values in self.channels.items()
-            if kind == "deviation"
-        ]
+        channels = self.channels.items()
+        return [(number, values) for (kind, number), values in channels if kind == "deviation"]
 
     @property
     def symmetry(self) -> FieldSymmetry:
@@ -250,6 +247,7 @@ def surface_pixel_field(gbuffer: GBuffer, degree: int, crease_angle: float | Non
     if not z.all():
         with progress(0.9, 1.0):
             mask = mask_undefined(mask, pixel, camera.width, camera.height, z != 0)
+    channels = {channel: values[selected] for channel, values in gbuffer.channels.items()}
     return PixelField(
         degree=degree,
         width=camera.width,
@@ -258,9 +256,7 @@ def surface_pixel_field(gbuffer: GBuffer, degree: int, crease_angle: float | Non
         representation=z,
         screen_jacobian=jacobians[selected],
         neighbor_mask=mask,
-        channels=_channels_of_degree(
-            {channel: values[selected] for channel, values in gbuffer.channels.items()}
-        ),
+        channels=_channels_of_degree(channels),
         gbuffer_index=selected,
     )
 

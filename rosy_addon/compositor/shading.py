@@ -144,10 +144,7 @@ def light_visibility(
     for light in lights_of(look, lights):
         vector = np.asarray(light.vector, dtype=np.float64)
         cameras = light_cameras(gbuffer.instances, gbuffer.camera, light.kind, vector)
-        visibility.append(
-            cache.get_or_create(
-                ("shadow", gbuffer, light.kind, vector.tobytes()),
-                functools.partial(shadow_visibility, gbuffer, cameras),
-            )
-        )
+        compute = functools.partial(shadow_visibility, gbuffer, cameras)
+        key = "shadow", gbuffer, light.kind, vector.tobytes()
+        visibility.append(cache.get_or_create(key, compute))
     return visibility

@@ -129,26 +129,17 @@ def _measured(look: PixelLook) -> StreakStatistics:
         paper_relief = amplitude * heights[0].reshape(streaks.shape)
     coverages = np.linspace(0, 1, COVERAGE_STEPS)
     break_amounts = break_amount(coverages, look.breaks, look.wobble)
-    break_levels = np.linspace(
-        break_amounts.min(), break_amounts.max(), BREAK_LEVELS if look.breaks else 1
-    )
-    samples = [
-        streaks + amount * (break_streaks - streaks) + paper_relief for amount in break_levels
-    ]
+    levels = BREAK_LEVELS if look.breaks else 1
+    break_levels = np.linspace(break_amounts.min(), break_amounts.max(), levels)
+    change = break_streaks - streaks
+    samples = [streaks + amount * change + paper_relief for amount in break_levels]
     half_width = softness(look.crispness)
     threshold_tables = _threshold_tables(samples, half_width)
     (disc_threshold,) = _threshold_tables([spots + paper_relief], half_width)
+    columns = zip(break_amounts, threshold_tables.T, strict=True)
+    thresholds = [np.interp(amount, break_levels, column) for amount, column in columns]
     stds = streak_std, break_std, disc_threshold, disc_std, paper_grain_std
-    if len(break_levels) == 1:
-        return StreakStatistics(threshold_tables[0], *stds)
-    level = (
-        (break_amounts - break_levels[0])
-        / (break_levels[-1] - break_levels[0])
-        * (BREAK_LEVELS - 1)
-    )
-    lower = np.minimum(level.astype(int), BREAK_LEVELS - 2)
-    low, high = (threshold_tables[row, np.arange(COVERAGE_STEPS)] for row in (lower, lower + 1))
-    return StreakStatistics(low + (level - lower) * (high - low), *stds)
+    return StreakStatistics(np.array(thresholds), *stds)
 
 
 def break_amount(target_coverage: np.ndarray, breaks: float, wobble: float) -> np.ndarray:
@@ -194,9 +185,8 @@ def _threshold_tables(samples: list[np.ndarray], half_width: float) -> np.ndarra
     lowest, highest = min(map(np.min, samples)), max(map(np.max, samples))
     edges = np.linspace(lowest, highest, HISTOGRAM_BINS + 1)
     thresholds = np.linspace(highest + half_width, lowest - half_width, 4 * COVERAGE_STEPS)
-    ink_fraction = smoothstep(
-        ((edges[:-1] + edges[1:]) / 2 - thresholds[:, None]) / (2 * half_width) + 0.5
-    )
+    middles = (edges[:-1] + edges[1:]) / 2
+    ink_fraction = smoothstep((middles - thresholds[:, None]) / (2 * half_width) + 0.5)
     coverages = np.linspace(0, 1, COVERAGE_STEPS)
     tables = []
     for sample in samples:
@@ -214,10 +204,9 @@ def _noise_sample(
     """
     pixel = np.arange(shape[0] * shape[1], dtype=np.int32)
     octave_offsets = np.arange(OCTAVES) - OCTAVES // 2 if anchored else np.zeros(1)
+    weights = octave_weights(octave_offsets) if anchored else (1.0,)
     noise = np.zeros(shape, dtype=np.float32)
-    for octave_offset, weight in zip(
-        octave_offsets, octave_weights(octave_offsets) if anchored else (1.0,), strict=True
-    ):
+    for octave_offset, weight in zip(octave_offsets, weights, strict=True):
         cell_size = cell * 2.0**octave_offset
         cells = image_noise(pixel, shape[1], cell_size, 1, 1, density=density, high_pass=high_pass)
         noise += np.float32(weight) * cells.reshape(shape)

@@ -19,15 +19,7 @@ import numpy as np
 from ..core.progress import progress
 from ..projection.gbuffer import GBuffer
 from ..projection.rest_coordinates import RestCoordinates, matrix_scale, rest_coordinates
-from .image_noise import (
-    BLUR_FACTOR,
-    NOISE_MEAN,
-    NOISE_STD,
-    STEP_LABEL,
-    box_radius,
-    gaussian_blur,
-    hash_bits,
-)
+from .image_noise import BLUR_FACTOR, NOISE_MEAN, NOISE_STD, box_radius, gaussian_blur, hash_bits
 from .pixel_field import pixel_window
 from .reported_blocks import reported_blocks
 
@@ -56,6 +48,9 @@ FEATURE_CELLS = 32.0
 
 #: Maximum number of bits of the index of a cell.
 MAX_CELL_BITS = 28
+
+#: Label of all steps.
+STEP_LABEL = "making noise"
 
 #: Added to octave indices, so that positive integers are hashed.
 OCTAVE_OFFSET = 64
@@ -191,9 +186,8 @@ def instance_units(gbuffer: GBuffer, unit: float) -> np.ndarray | None:
     """
     if not unit:
         return None
-    return np.array(
-        [unit / matrix_scale(instance.matrix) for instance in gbuffer.instances], dtype=np.float32
-    )
+    units = [unit / matrix_scale(instance.matrix) for instance in gbuffer.instances]
+    return np.array(units, dtype=np.float32)
 
 
 def cell_scale(

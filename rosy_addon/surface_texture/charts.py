@@ -211,9 +211,8 @@ def _averaged_at_corners(
         group = connected_components(len(fan), pairs)
     report(0.6, LABEL)
     vector = mesh.to_world(np.arange(len(direction)), direction) * mesh.area[:, None]
-    total = np.stack(
-        [np.bincount(group, np.repeat(component, 3)) for component in vector.T], axis=1
-    )
+    sums = [np.bincount(group, np.repeat(component, 3)) for component in vector.T]
+    total = np.stack(sums, axis=1)
     frame = np.empty((len(direction), 3), dtype=np.complex128)
     for corner in range(3):
         report(0.7 + 0.1 * corner, LABEL)

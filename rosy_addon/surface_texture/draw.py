@@ -214,7 +214,7 @@ def draw_texture(
             pixels = lit_ink(on, pixels, lights, look)
     # Directions are relative to their chart.
     with progress(0.95, 1.0):
-        rgba = fill_margin(frame, field, pixels, margin, crosses_seams=not is_direction)
+        rgba = fill_margin(frame, field, pixels, margin, not is_direction)
     is_data = is_direction or (is_ink and not is_lit)
     return Texture(frame, rgba, texels.overlap, is_data, mesh.family_count)
 
@@ -232,14 +232,11 @@ def check_texture_size(size: int, margin: int) -> None:
     RosyError
         If one of them is out of range.
     """
-    for value, low, high, what in (
-        (size, MIN_SIZE, MAX_SIZE, "a size"),
-        (margin, 0, MAX_MARGIN, "a margin"),
-    ):
+    ranges = (size, MIN_SIZE, MAX_SIZE, "a size"), (margin, 0, MAX_MARGIN, "a margin")
+    for value, low, high, what in ranges:
         if not low <= value <= high:
-            raise RosyError(
-                f"a texture cannot have {what} of {value} texels: choose {low} to {high}"
-            )
+            what = f"{what} of {value} texels"
+            raise RosyError(f"a texture cannot have {what}: choose {low} to {high}")
 
 
 def _check_texture_memory(

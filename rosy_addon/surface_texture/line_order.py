@@ -98,9 +98,8 @@ class LineOrder:
             Barycentric coordinates of the points in their triangles.
         """
         leaf, weights = self.tree.locate(triangle, weights)
-        return sum(
-            weight * corner.take(leaf) for weight, corner in zip(weights, self.first.T, strict=True)
-        )
+        corners = zip(weights, self.first.T, strict=True)
+        return sum(weight * corner.take(leaf) for weight, corner in corners)
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,9 +256,8 @@ def _first_lines(
     """
     degree = mesh.degree // mesh.family_count
     tree = refined.tree
-    z = np.einsum(
-        "lck,lk->l", tree.leaf_weights / np.float32(3), mesh.z.take(tree.leaf_root, axis=0)
-    )
+    weights = tree.leaf_weights / np.float32(3)
+    z = np.einsum("lck,lk->l", weights, mesh.z.take(tree.leaf_root, axis=0))
     if mesh.family_z is None:
         first, lengths = _guide(mesh, guiding_angle, degree)[tree.leaf_root], AVERAGE_LENGTHS
     else:  # the field marks its first line direction

@@ -245,12 +245,7 @@ def _reaches_tile(corners: np.ndarray) -> np.ndarray:
 
 
 def fill_margin(
-    frame: TextureFrame,
-    field: PixelField,
-    color: np.ndarray,
-    margin: int,
-    *,
-    crosses_seams: bool = True,
+    frame: TextureFrame, field: PixelField, color: np.ndarray, margin: int, crosses_seams: bool
 ) -> np.ndarray:
     """Return the picture of a texture: the colors of texels, with a margin around charts.
 

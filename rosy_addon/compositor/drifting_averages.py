@@ -63,17 +63,14 @@ class MovingKernel:
             share = level / (levels - 1) if levels > 1 else 1.0
             length = float(round(share * self.length))
             self.full_samples[level] = kernel_weights(*[length] * 3, self.kind).effective_samples
-            rows = np.stack(
-                [
-                    weight * _shifted_weights(position, share * shift, length, self.kind)
-                    for shift, weight in zip(self.shifts, self.weights, strict=True)
-                ]
-            )
+            shifted = [
+                _shifted_weights(position, share * shift, length, self.kind)
+                for shift in self.shifts
+            ]
+            rows = self.weights[:, None] * np.stack(shifted)
             mirrored = rows[:, ::-1]
-            for total, products in zip(
-                self.energies[:, level], (rows**2, mirrored**2, rows * mirrored), strict=True
-            ):
-                np.cumsum(products.sum(axis=0), out=total[1:])
+            products = np.stack([rows**2, mirrored**2, rows * mirrored]).sum(axis=1)
+            np.cumsum(products, axis=1, out=self.energies[:, level, 1:])
 
     def effective_samples(
         self, share: np.ndarray, forward: np.ndarray, behind: np.ndarray, ahead: np.ndarray
@@ -116,9 +113,8 @@ def _shifted_weights(position: np.ndarray, shift: float, length: float, kind: Ke
     """
     whole = math.floor(shift)
     fraction = shift - whole
-    return (1 - fraction) * sample_weights(position + whole, length, kind) + fraction * (
-        sample_weights(position + whole + 1, length, kind)
-    )
+    low, high = (sample_weights(position + whole + step, length, kind) for step in (0, 1))
+    return (1 - fraction) * low + fraction * high
 
 
 class DriftingAverages:
@@ -184,47 +180,25 @@ class DriftingAverages:
                 continue
             part = slice(None) if len(columns) == len(weight) else columns
             drifted = np.zeros(len(columns), dtype=np.complex64)
-            for channel, (shift, amount) in enumerate(
-                zip(kernel.shifts, kernel.weights, strict=True)
-            ):
-                if amount:
-                    place = center[part] - np.float32(direction * shift) * share[part]
-                    lengths = None if length is None else length[part]
-                    drifted += np.float32(amount) * self._sums_at(
-                        channel, place, columns, lengths, direction < 0
+            for channel in np.flatnonzero(kernel.weights).tolist():
+                shift = np.float32(direction * kernel.shifts[channel])
+                place = center[part] - shift * share[part]
+                whole = np.floor(place)
+                step, fraction = whole.astype(np.intp), place - whole
+                if length is None:
+                    sums = self._full(direction < 0)[channel]
+                    index = (step + len(sums) // 2) * sums.shape[1] + columns
+                    low, high = (sums.reshape(-1).take(index + i) for i in (0, sums.shape[1]))
+                else:
+                    terms = _kernel_terms(kernel.kind, length[part], direction < 0)
+                    low, high = (
+                        self._sums(channel, each, columns, terms) for each in (step, step + 1)
                     )
+                drifted += np.float32(kernel.weights[channel]) * (low + fraction * (high - low))
             total[part] += weight[part] * drifted
         samples, factor = kernel.effective_samples(share, forward, behind, ahead)
-        return (
-            total * factor.astype(np.float32),
-            np.maximum(samples, MIN_EFFECTIVE_SAMPLES).astype(np.float32),
-        )
-
-    def _sums_at(
-        self,
-        channel: int,
-        place: np.ndarray,
-        columns: np.ndarray,
-        length: np.ndarray | None,
-        is_mirrored: bool,
-    ) -> np.ndarray:
-        """Return the (n,) complex64 weighted sums around positions between steps.
-
-        `place` is the position in steps, `columns` the streamline, one of each for each sum.
-        """
-        whole = np.floor(place)
-        fraction = place - whole
-        step = whole.astype(np.intp)
-        if length is None:
-            sums = self._full(is_mirrored)[channel]
-            index = (step + len(sums) // 2) * sums.shape[1] + columns
-            low, high = sums.reshape(-1).take(index), sums.reshape(-1).take(index + sums.shape[1])
-        else:
-            low, high = (
-                self._sums_of_length(channel, each, columns, length, is_mirrored)
-                for each in (step, step + 1)
-            )
-        return low + fraction * (high - low)
+        samples = np.maximum(samples, MIN_EFFECTIVE_SAMPLES).astype(np.float32)
+        return total * factor.astype(np.float32), samples
 
     def _full(self, is_mirrored: bool) -> np.ndarray:
         """Return the (3, 2 Q + 1, n) complex64 weighted sums around each step from -Q to Q.
@@ -244,18 +218,16 @@ class DriftingAverages:
                 self._full_sums[not is_mirrored] = sums
         return self._full_sums[is_mirrored]
 
-    def _sums_of_length(
-        self,
-        channel: int,
-        step: np.ndarray,
-        columns: np.ndarray,
-        length: np.ndarray,
-        is_mirrored: bool,
+    def _sums(
+        self, channel: int, step: np.ndarray, columns: np.ndarray, terms: list[tuple]
     ) -> np.ndarray:
-        """Return the (n,) complex64 weighted sums around steps, with a different kernel length for each."""
+        """Return the (n,) complex64 weighted sums around steps of the streamlines `columns`.
+
+        `terms` are the `_kernel_terms` of the kernels, whose lengths may differ.
+        """
         flat, stride = self._second_sums[channel].reshape(-1), self._second_sums.shape[2]
         total = np.zeros(len(step), dtype=np.complex64)
-        for offset, weight in _kernel_terms(self._kernel.kind, length, is_mirrored):
+        for offset, weight in terms:
             index = (self._middle + step + offset) * stride + columns
             total += np.asarray(weight, dtype=np.float32) * flat.take(index)
         return total

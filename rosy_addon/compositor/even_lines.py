@@ -105,35 +105,27 @@ class EvenLines:
         (P,) float32 ndarray
         """
         width = np.asarray(target_coverage, dtype=np.float32)
+        relief = self._relief(line, width, look)
         if self.coarse_streaks is None:
-            return width + self._relief(self.streaks[line], self.period[line], width, look)
+            return width + relief
         crowding = self.crowding(line, look)
-        covered = width + (1 - crowding) * self._relief(
-            self.streaks[line], self.period[line], width, look
-        )
+        covered = width + (1 - crowding) * relief
         crowded = np.flatnonzero(crowding)
-        coarse_period = np.float32(COARSE_RATIO) * self.period[line, crowded]
-        streak, width = self.coarse_streaks[line, crowded], width[crowded]
-        relief = self._relief(streak, coarse_period, width, look, crowded)
-        covered[crowded] += crowding[crowded] * relief
+        streak, period = self.coarse_streaks[line, crowded], self.period[line, crowded]
+        growth = None if self.growth is None else self.growth[crowded]
+        coarse = EvenLines(streak[None], np.float32(COARSE_RATIO) * period[None], growth)
+        covered[crowded] += crowding[crowded] * coarse._relief(0, width[crowded], look)
         return covered
 
-    def _relief(
-        self,
-        streak: np.ndarray,
-        period: np.ndarray,
-        width: np.ndarray,
-        look: PixelLook,
-        pixels: np.ndarray | slice = slice(None),
-    ) -> np.ndarray:
-        """Return the (n,) coverage of each of `pixels` by lines, minus their mean coverage `width`."""
-        position = np.float32(0.5) - np.float32(0.5) * streak
+    def _relief(self, line: int, width: np.ndarray, look: PixelLook) -> np.ndarray:
+        """Return the (P,) coverage of each pixel by lines, minus their mean coverage `width`."""
+        position, period = np.float32(0.5) - np.float32(0.5) * self.streaks[line], self.period[line]
         min_edge = np.float32(MAX_EDGE_WIDTH * (1 - look.crispness) ** 2)
         edge = np.clip(1 / np.maximum(period, np.float32(1e-6)), min_edge, 1)
         if self.growth is None:
             covered = _box_filtered(position, width, edge)
         else:
-            between = np.float32(0.5) * self.growth[pixels] * width
+            between = np.float32(0.5) * self.growth * width
             covered = _box_filtered(position, width - between, edge)
             covered += _box_filtered(np.float32(0.5) - position, between, edge)
         return resolved_share(period, look.supersampling) * (covered - width)
@@ -353,14 +345,8 @@ class _InstanceLines:
             See `EvenLines`; 0 where no further lines grow.
         """
         instance, look = self._instance, self._look
-        lines = cached_surface_lines(
-            instance.surface,
-            instance.matrix,
-            instance.field,
-            look.display,
-            ratio * self._spacing,
-            self._cache,
-        )
+        geometry = instance.surface, instance.matrix, instance.field, look.display
+        lines = cached_surface_lines(*geometry, ratio * self._spacing, self._cache)
         streaks, period = np.empty((2, self._field.line_count, len(pixels)), dtype=np.float32)
         growth = np.zeros(len(pixels), dtype=np.float32)
         for block in reported_blocks(len(pixels), STEP_LABEL, 1.0, 1.0):
@@ -431,10 +417,7 @@ class _InstanceLines:
         """
         gbuffer = self._gbuffer
         triangle = gbuffer.triangle[entries]
-        tangent = [
-            heading[0] * first.take(triangle) + heading[1] * second.take(triangle)
-            for first, second in zip(*self._sides, strict=True)
-        ]
-        return view_plane_rotation(
-            tangent, gbuffer.geometric_normal[entries].T, gbuffer.view_direction[entries].T
-        )
+        first, second = self._sides.take(triangle, axis=2)
+        tangent = heading[0] * first + heading[1] * second
+        normal, view = gbuffer.geometric_normal[entries].T, gbuffer.view_direction[entries].T
+        return view_plane_rotation(tangent, normal, view)

@@ -13,7 +13,7 @@ from ..field.directional_field import evaluate_harmonics
 from ..field.symmetry import FieldSymmetry
 from ..projection.field_channel import FieldChannel
 from ..projection.gbuffer import GBuffer
-from ..projection.pixel_blocks import BLOCK_PIXELS, part_of, pixel_blocks
+from ..projection.pixel_blocks import BLOCK_PIXELS, part_of
 from ..projection.pixel_neighbors import neighbor_masks, screen_jacobians
 from .reported_blocks import reported_blocks
 
@@ -194,28 +194,6 @@ def normalized(values: np.ndarray) -> np.ndarray:
     return np.divide(values, norm, out=values, where=norm > 0).astype(np.complex64)
 
 
-def neighbor_table(field: PixelField) -> np.ndarray:
-    """Tabulate the neighbors of the pixels of a field.
-
-    Returns
-    -------
-    (9, P + 1) int32 ndarray
-        Index of the neighbor of each pixel at each of `NEIGHBOR_OFFSETS`. The index is P where streamlines
-        cannot step to the neighbor, and in column P. There is one row per offset, because a streamline
-        mostly steps in one direction and then reads adjacent elements of a row.
-    """
-    count = len(field.pixel)
-    entry = np.full(field.height * field.width, count, dtype=np.int32)
-    entry[field.pixel] = np.arange(count, dtype=np.int32)
-    table = np.full((9, count + 1), count, dtype=np.int32)
-    for block in pixel_blocks(count):
-        pixel, mask = field.pixel[block], field.neighbor_mask[block]
-        for bit, (dx, dy) in enumerate(NEIGHBOR_OFFSETS):
-            linked = np.flatnonzero(mask >> bit & 1)
-            table[bit, block.start + linked] = entry[pixel[linked] + (dy * field.width + dx)]
-    return table
-
-
 def surface_pixel_field(gbuffer: GBuffer, degree: int, crease_angle: float | None) -> PixelField:
     """Extract the field of one degree from a G-buffer.
 
@@ -340,16 +318,6 @@ def mask_undefined(
         band = entries_of_rows(pixel, width, (start, start + band_rows))
         result[band] = mask[band] & open_bits[row[band] - start, column[band]]
     return result
-
-
-def blend_weights(field: PixelField, guiding_angle: float) -> np.ndarray:
-    """Return the (P,) float32 weight of the first set of member images, cos^2(N (t - phi) / 2).
-
-    phi is the guiding angle, and t is the angle of a member. The weight is 0 at the breaking points
-    of the first set and 1 at the breaking points of the second.
-    """
-    relative = rotated(normalized(field.representation), -field.degree * guiding_angle)
-    return (0.5 + 0.5 * relative.real).astype(np.float32)
 
 
 def nearest_member(field: PixelField, guiding_angle: float) -> np.ndarray:

@@ -249,9 +249,8 @@ def _check_texture_memory(
     needed = PROCESS_BYTES + PIXEL_BYTES * texels + TRIANGLE_BYTES * len(mesh.area)
     needed += samples_memory(used, mesh.family_count, many_images)
     tiles = f"{len(frame.tiles)} tiles of " if frame.is_udim and len(frame.tiles) > 1 else ""
-    check_memory(
-        needed, f"a texture of {tiles}{frame.size} x {frame.size} texels", "choose a smaller size"
-    )
+    texture = f"a texture of {tiles}{frame.size} x {frame.size} texels"
+    check_memory(needed, texture, "choose a smaller size")
 
 
 def step_length(mesh: TangentMesh, charts: UvCharts, texels: Texels) -> float:

@@ -31,8 +31,6 @@ class MovingKernel:
     ----------
     look : PixelLook
         A look that has flow.
-    levels : int
-        Number of different lengths of streamlines, if the length depends on the magnitude.
 
     Attributes
     ----------
@@ -46,13 +44,15 @@ class MovingKernel:
     energies : (3, L, 2 R + 2) float64 ndarray
         Prefix sums over the samples from -R - 1 to R of three products: the squares of the weights of the
         kernel that drifts forward, the squares for the kernel that drifts backward, and the products of both
-        weights. Level l is for kernels of the full length times l / (L - 1).
+        weights. Level l is for kernels of the full length times l / (L - 1). There is one level if the length
+        of streamlines does not depend on the magnitude.
     full_samples : (L,) float64 ndarray
         `filter_kernel.KernelWeights.effective_samples` of the kernels at rest.
     """
 
-    def __init__(self, look: PixelLook, levels: int = 1) -> None:
+    def __init__(self, look: PixelLook) -> None:
         self.length, self.kind = look.length, look.kernel
+        levels = min(look.length + 1, MAX_LEVELS) if look.magnitude_length else 1
         self.shifts = channel_shifts(look.flow_phase, look.flow_distance)
         self.weights = channel_weights(look.flow_phase)
         self.reach = look.streamline_reach()
@@ -86,7 +86,7 @@ class MovingKernel:
         forward : (n,) float32 ndarray
             Share of the kernel that drifts forward.
         behind, ahead : (n,) intp ndarray
-            Steps to the ends of the streamlines.
+            Steps to the ends of the streamlines. Negative numbers count as 0.
 
         Returns
         -------
@@ -98,8 +98,8 @@ class MovingKernel:
         width, levels = self.energies.shape[2], len(self.full_samples)
         level = np.rint(share * (levels - 1)).astype(np.intp)
         center = level * width + (self.reach + 1)
-        available = table.take(center + np.minimum(ahead, self.reach), axis=1)
-        available -= table.take(center - np.minimum(behind, self.reach) - 1, axis=1)
+        available = table.take(center + np.clip(ahead, 0, self.reach), axis=1)
+        available -= table.take(center - np.clip(behind, 0, self.reach) - 1, axis=1)
         shares = np.stack([forward**2, (1 - forward) ** 2, 2 * forward * (1 - forward)])
         full = (shares * self.energies[:, level, -1]).sum(axis=0)
         samples = self.full_samples[level]
@@ -130,8 +130,7 @@ class DriftingAverages:
     """
 
     def __init__(self, kernel: MovingKernel, second_sums: np.ndarray) -> None:
-        self._kernel = kernel
-        self._second_sums = second_sums
+        self._kernel, self._second_sums = kernel, second_sums
         #: Row of `second_sums` for step 0.
         self._middle = second_sums.shape[1] // 2 + 1
         #: Weighted sums around all steps with kernels of full length. Key: whether the kernel is mirrored.

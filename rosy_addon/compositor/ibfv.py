@@ -286,12 +286,10 @@ class _Sums:
     def __init__(
         self, sheets: Sheets, sources: list[np.ndarray], decay: np.ndarray, turn: float
     ) -> None:
-        self._sheets = sheets
-        self.sources = sources
-        self.decay = decay
+        self._sheets, self._turn = sheets, turn
+        self.sources, self.decay = sources, decay
         # q^D, the weight of the D steps by which the next doubling extends the sums.
         self.weight = decay
-        self._turn = turn
         size = sheets.count * sheets.cell_count
         self.values = [np.zeros(size, dtype=np.complex64) for _ in sources]
         for _, block, state in sheets.blocks():

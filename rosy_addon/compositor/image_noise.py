@@ -257,32 +257,26 @@ def gaussian_blur(
     (H, W) float32 ndarray
     """
     radius = box_radius(sigma)
-    for index, axis in enumerate((0, 1, 0, 1, 0, 1)):
-        blurred = np.empty(image.shape, dtype=np.float32)
-        for start in range(0, image.shape[1 - axis], BLUR_LINES):
-            report((index + start / image.shape[1 - axis]) / 6, STEP_LABEL)
-            lines = [slice(None), slice(None)]
-            lines[1 - axis] = slice(start, start + BLUR_LINES)
-            blurred[tuple(lines)] = _box_filter(image[tuple(lines)], radius, axis, outside)
+    for index in range(6):
+        # Blur along the columns, and transpose.
+        blurred = np.empty(image.shape[::-1], dtype=np.float32)
+        for start in range(0, image.shape[1], BLUR_LINES):
+            report((index + start / image.shape[1]) / 6, STEP_LABEL)
+            lines = slice(start, start + BLUR_LINES)
+            blurred[lines] = _box_filter(image[:, lines], radius, outside).T
         image = blurred
     return image
 
 
-def _box_filter(image: np.ndarray, radius: int, axis: int, outside: str) -> np.ndarray:
-    """Return the mean over 2 * radius + 1 pixels along an axis; `outside` as in `gaussian_blur`."""
-    pads = [(0, 0), (0, 0)]
-    pads[axis] = (radius + 1, radius)
+def _box_filter(image: np.ndarray, radius: int, outside: str) -> np.ndarray:
+    """Return the mean over 2 * radius + 1 pixels along the columns; `outside` as in `gaussian_blur`."""
     fill = {"mode": "edge"} if outside == "edge" else {"constant_values": NOISE_MEAN}
-    prefix_sum = np.pad(image, pads, **fill).astype(np.float64)
+    prefix_sum = np.pad(image, ((radius + 1, radius), (0, 0)), **fill).astype(np.float64)
     prefix_sum *= 1 / BLUR_QUANTUM
     np.rint(prefix_sum, out=prefix_sum)
-    np.cumsum(prefix_sum, axis=axis, out=prefix_sum)
-    size, window = image.shape[axis], 2 * radius + 1
-    after, before = (
-        prefix_sum[:, start : start + size] if axis else prefix_sum[start : start + size]
-        for start in (window, 0)
-    )
-    mean = after - before
+    np.cumsum(prefix_sum, axis=0, out=prefix_sum)
+    window = 2 * radius + 1
+    mean = prefix_sum[window:] - prefix_sum[:-window]
     mean *= BLUR_QUANTUM / window
     return mean
 

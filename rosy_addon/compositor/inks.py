@@ -94,8 +94,7 @@ class Inks:
         upper = np.minimum(lower + 1, len(self.dark) - 1)
         fraction = (index - lower).astype(np.float32)[:, None]
         dark, light = (
-            colors[lower] + fraction * (colors[upper] - colors[lower])
-            for colors in (self.dark, self.light)
+            ink[lower] + fraction * (ink[upper] - ink[lower]) for ink in (self.dark, self.light)
         )
         return dark + tone[:, None] * (light - dark)
 

@@ -85,8 +85,7 @@ def outline_coverage(gbuffer: GBuffer, look: PixelLook, cache: Cache | None = No
     entries = np.flatnonzero(_dilated(gbuffer, is_near, 1))
     sums, counts = np.zeros((2, len(gbuffer.pixel)))
     for band, core in _bands(gbuffer, entries, reach + FULL_MARK_LENGTH):
-        start = 0.3 + 0.7 * core.start / len(entries)
-        stop = 0.3 + 0.7 * core.stop / len(entries)
+        start, stop = (0.3 + 0.7 * end / len(entries) for end in (core.start, core.stop))
         with progress(start, stop, STEP_LABEL):
             home, shown, coverage = _sample_outline(gbuffer, look, entries[band], is_near, cache)
         first, last = entries[core.start], entries[core.stop - 1]

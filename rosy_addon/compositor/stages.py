@@ -48,9 +48,7 @@ class ComposeStages:
     """
 
     def __init__(self, gbuffer: GBuffer, cache: Cache, mesh_cache: Cache) -> None:
-        self._gbuffer = gbuffer
-        self._cache = cache
-        self._mesh_cache = mesh_cache
+        self._gbuffer, self._cache, self._mesh_cache = gbuffer, cache, mesh_cache
 
     def pixel_field(self, degree: int, look: PixelLook) -> PixelField:
         """Return the `PixelField` of one degree, with its directions rotated by the wobble of the look."""

@@ -17,6 +17,7 @@ from ..compositor.lic_images import with_magnitude_range
 from ..compositor.look import Look, colors_magnitude, colors_values, crease_angle_of, is_hatched
 from ..compositor.look_units import PixelLook, surface_pixel_look
 from ..compositor.pixel_field import PixelField
+from ..compositor.reported_blocks import reported_blocks
 from ..compositor.shading import Light
 from ..core.cache import BAKE_CACHE, Cache
 from ..core.errors import RosyError
@@ -28,11 +29,10 @@ from ..core.memory import (
     raise_mmap_threshold,
     samples_memory,
 )
-from ..core.progress import progress, report
+from ..core.progress import progress
 from ..image_io.image_data import ImageData, image_of_pixels
 from ..line_drawing.tangent_mesh import TangentMesh, build_tangent_mesh
 from ..projection.gbuffer import MeshInstance
-from ..projection.pixel_blocks import pixel_blocks
 from ..projection.surface_sampling import values_in_triangles
 from .charts import UvCharts, uv_charts
 from .hatching import lit_ink, thresholds
@@ -198,7 +198,7 @@ def draw_texture(
     _check_texture_memory(frame, charts, mesh, look)
     with progress(0.1, 0.15):
         texels = rasterize_charts(charts, frame, name)
-    on = TexelSurface(instance, mesh, charts, texels, step_length(mesh, charts, texels))
+    on = TexelSurface(instance, mesh, charts, texels, step_length(mesh, charts, texels), cache)
     with progress(0.15, 0.3):
         field = texel_field(on, crease_angle)
     is_direction = content != "look"
@@ -207,7 +207,7 @@ def draw_texture(
         if is_direction:
             pixels = direction_map(on, content, look.guiding_angle)
         else:
-            pixels = _look_pixels(on, field, look, drift, cache)
+            pixels = _look_pixels(on, field, look, drift)
     is_lit = is_ink and lights is not None
     if is_lit:
         with progress(0.9, 0.95):
@@ -264,19 +264,14 @@ def step_length(mesh: TangentMesh, charts: UvCharts, texels: Texels) -> float:
     return max(1 / finest if finest else 0.0, MIN_STEP * mean_size)
 
 
-def _look_pixels(
-    on: TexelSurface, field: PixelField, look: Look, drift: Drift, cache: Cache | None
-) -> np.ndarray:
+def _look_pixels(on: TexelSurface, field: PixelField, look: Look, drift: Drift) -> np.ndarray:
     """Return (P, 4) values at texels: thresholds for a look with ink, linear colors for any other look."""
     is_ink = is_hatched(look)
-    step_look = surface_pixel_look(
-        sharp_look(look) if is_ink else look,
-        on.step,
-        float(np.sqrt(on.mesh.area.sum())) / SURFACE_PIXELS,
-        drift,
-    ).for_symmetry(field.symmetry)
+    pixel = float(np.sqrt(on.mesh.area.sum())) / SURFACE_PIXELS
+    step_look = surface_pixel_look(sharp_look(look) if is_ink else look, on.step, pixel, drift)
+    step_look = step_look.for_symmetry(field.symmetry)
     if is_ink:
-        return thresholds(on, field, step_look, look.guiding_angle, cache)
+        return thresholds(on, field, step_look, look.guiding_angle)
     return _colors(on, field, step_look)
 
 
@@ -296,10 +291,8 @@ def _colors(on: TexelSurface, field: PixelField, look: PixelLook) -> np.ndarray:
         low, scale = value_scale(look.look, [value_range(on.instance.color_values)])
         field = replace(field, map_position=scaled_positions(values, low, scale))
     color = np.ones((len(field.pixel), 4), dtype=np.float32)
-    for block in pixel_blocks(len(color)):
-        report(0.97 + 0.03 * block.start / len(color), "drawing the colors")
-        part = field.part(block), images.part(block), tone[block]
-        color[block, :3] = colorize(*part, look)
+    for block in reported_blocks(len(color), "drawing the colors", 0.97, 1.0):
+        color[block, :3] = colorize(field.part(block), images.part(block), tone[block], look)
     return color
 
 

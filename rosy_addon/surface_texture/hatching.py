@@ -30,7 +30,6 @@ from ..compositor.streak_statistics import look_streak_statistics
 from ..compositor.target_tone import apply_tone_curve
 from ..compositor.undirected import undirected_texture
 from ..compositor.wobble import WOBBLE_STD, has_wobble, rotate_pixel_field, solid_wobble_angle
-from ..core.cache import Cache
 from ..core.color import LUMINANCE_WEIGHTS
 from ..core.progress import progress
 from ..projection.rest_coordinates import matrix_scale, rest_positions
@@ -54,7 +53,7 @@ LABEL = "drawing hatching"
 
 
 def thresholds(
-    on: TexelSurface, field: PixelField, look: PixelLook, guiding_angle: float, cache: Cache | None
+    on: TexelSurface, field: PixelField, look: PixelLook, guiding_angle: float
 ) -> np.ndarray:
     """Compute the thresholds of hatching at P texels.
 
@@ -68,8 +67,6 @@ def thresholds(
         Look with ink, from `sharp_look`. Its lengths are in steps of streamlines.
     guiding_angle : float
         Angle that the first line direction is near to; see `line_order`.
-    cache : Cache or None
-        Cache for evenly spaced lines.
 
     Returns
     -------
@@ -85,7 +82,7 @@ def thresholds(
         with progress(0.13, 0.15):
             field = rotate_pixel_field(field, np.float32(look.wobble) * wobble_angle)
     with progress(0.15, 0.85):
-        lines = _lines(on, field, look, wobble_angle, cache)
+        lines = _lines(on, field, look, wobble_angle)
     members = all_members(field, look.guiding_angle)[: field.line_count]
     pixels = np.empty((len(field.pixel), 4), dtype=np.float32)
     for block in reported_blocks(len(pixels), LABEL, 0.85, 1.0):
@@ -146,11 +143,7 @@ def lit_ink(
 
 
 def _lines(
-    on: TexelSurface,
-    field: PixelField,
-    look: PixelLook,
-    wobble_angle: np.ndarray | None,
-    cache: Cache | None,
+    on: TexelSurface, field: PixelField, look: PixelLook, wobble_angle: np.ndarray | None
 ) -> HatchedLines:
     """Return the streaks or the evenly spaced lines of a field at the texels, with what makes them uneven:
     breaks, paper grain, and spots where the field is undefined.
@@ -162,7 +155,7 @@ def _lines(
             noise = texel_noise(on, **noise_args(look))
     if is_spaced:
         with progress(0.3, 0.6):
-            even_lines = _even_lines(on, field, look, wobble_angle, cache)
+            even_lines = _even_lines(on, field, look, wobble_angle)
     with progress(0.6 if is_spaced else 0.3, 0.8):
         images, break_images = line_images(look, lambda looks: lic_lengths(field, looks, noise))
     with progress(0.8, 0.9):
@@ -195,11 +188,7 @@ def _wobble_angle(on: TexelSurface, look: PixelLook) -> np.ndarray:
 
 
 def _even_lines(
-    on: TexelSurface,
-    field: PixelField,
-    look: PixelLook,
-    wobble_angle: np.ndarray | None,
-    cache: Cache | None,
+    on: TexelSurface, field: PixelField, look: PixelLook, wobble_angle: np.ndarray | None
 ) -> EvenLines:
     """Return evenly spaced lines along the field, evaluated at the texels."""
     instance, texels = on.instance, on.texels
@@ -207,7 +196,7 @@ def _even_lines(
     max_triangles = min(MAX_TRIANGLES, TRIANGLES_PER_TEXEL * len(texels))
     with progress(0.0, 0.8):
         geometry = instance.surface, instance.matrix, instance.field, look.display
-        lines = cached_surface_lines(*geometry, spacing, cache, max_triangles)
+        lines = cached_surface_lines(*geometry, spacing, on.cache, max_triangles)
     triangles, corners = np.arange(len(on.mesh.points)), on.mesh.points
     sides = [on.mesh.to_frame(triangles, corners[:, k] - corners[:, 0]) for k in (1, 2)]
     members = all_members(field, look.guiding_angle)

@@ -32,6 +32,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..compositor.reported_blocks import reported_blocks
 from ..core.progress import progress, report
 from ..field.bisection import BisectionTree, bisect
 from ..field.connection import build_connection
@@ -47,7 +48,6 @@ from ..line_drawing.tangent_mesh import (
     shared_edges,
 )
 from ..projection.gbuffer import MeshInstance
-from ..projection.pixel_blocks import pixel_blocks
 from .charts import uv_tangents
 from .texels import TexelSurface
 
@@ -330,8 +330,7 @@ def _welded(mesh: TangentMesh) -> tuple[np.ndarray, np.ndarray]:
         Indices of the corners of triangles into `points`.
     """
     pairs = np.concatenate(shared_edges(mesh).ends())
-    with progress(0.0, 1.0):
-        group = connected_components(3 * len(mesh.neighbor), pairs)
+    group = connected_components(3 * len(mesh.neighbor), pairs)
     points = np.empty((int(group.max()) + 1, 3))
     points[group] = mesh.points.reshape(-1, 3)
     return points, group.reshape(-1, 3).astype(np.int32)
@@ -366,8 +365,7 @@ def direction_map(on: TexelSurface, content: str, guiding_angle: float) -> np.nd
             tangents = uv_tangents(on.instance.surface, mesh, charts)
     is_mirrored = charts.density < 0
     values = np.ones((len(texels), 4), dtype=np.float32)
-    for block in pixel_blocks(len(texels)):
-        report(0.8 + 0.2 * block.start / len(texels), MAP_LABEL)
+    for block in reported_blocks(len(texels), MAP_LABEL, 0.8, 1.0):
         triangle, weights = texels.triangle[block], texels.barycentric[block]
         direction, is_defined = _directions_at(mesh, combed, triangle, weights)
         if is_flow:

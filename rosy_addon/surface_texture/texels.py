@@ -18,6 +18,7 @@ import numpy as np
 
 from ..compositor.covering import ALL_NEIGHBORS
 from ..compositor.pixel_field import NEIGHBOR_OFFSETS, PixelField
+from ..core.cache import Cache
 from ..core.errors import RosyError
 from ..core.progress import progress, report
 from ..line_drawing.tangent_mesh import TangentMesh
@@ -127,6 +128,8 @@ class TexelSurface(NamedTuple):
     texels : Texels
     step : float
         Length of a step of streamlines, in Blender units.
+    cache : Cache or None
+        Stores evenly spaced lines, which do not depend on the texels.
     """
 
     instance: MeshInstance
@@ -134,6 +137,7 @@ class TexelSurface(NamedTuple):
     charts: UvCharts
     texels: Texels
     step: float
+    cache: Cache | None = None
 
     def interpolated(self, vertex_values: np.ndarray, block: slice) -> np.ndarray:
         """Interpolate (V, K) values at vertices to the n texels of a block. The result is (n, K) float32."""

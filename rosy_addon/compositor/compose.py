@@ -82,8 +82,8 @@ def compose(
         Stores results that do not depend on the camera. By default `cache` stores them, too.
     strips : sequence of Strip, optional
         Rows to draw, from `divide_into_strips`; by default all rows. The G-buffer must contain these rows
-        and the rows around them that streamlines reach. Samples that are shaded one by one are a single
-        strip.
+        and the rows around them that streamlines reach. Without effect if the G-buffer is supersampled
+        and has no `coverage`: such a picture is drawn as a single strip.
     draws_thresholds : bool
         Whether to draw the thresholds of the ink (`ink_thresholds`), which do not depend on the tone,
         instead of the ink. Without effect if the look has no ink.
@@ -168,7 +168,8 @@ class _Canvas:
     look : PixelLook
     degrees : list of int
         Degrees of the visible fields.
-    tone_rgb : (P, 3) or (P, 1) float32 ndarray
+    tone_rgb : (P, 3) float32 ndarray
+        Target tone of each pixel, linear factors; see `target_tone`.
     map_position : (P,) float32 ndarray or None
         Position in the color map of the color value of each pixel; None if the look does not show color
         values.
@@ -176,7 +177,9 @@ class _Canvas:
         Linear, not premultiplied.
     alpha : (P,) float32 ndarray
     spread : (P, 1) float32 ndarray
-        Fourth channel of thresholds of ink (`ink_thresholds`). It has 0 pixels if no thresholds are drawn.
+        If thresholds of ink are drawn in place of colors: the alpha channel that
+        `ink_thresholds.threshold_pixels` returns, which tells how far the thresholds in a pixel spread.
+        Otherwise it has no pixels.
     """
 
     def __init__(
@@ -339,9 +342,10 @@ def _draw_layer(stages: ComposeStages, canvas: _Canvas, layer: _Layer, strip: St
 
 
 def _tone_along_lines(layer: _Layer, strip: Strip) -> np.ndarray:
-    """Return the (M, n) mean tone along the streamline of each of the M directions of the field.
+    """Return the (M, n) mean tone along the streamlines of each of the M directions of the field.
 
-    The mean is over the overshoot distance in each direction, at the n pixels of the strip.
+    The n pixels are those of the strip. A mean covers the `overshoot` of the look in both directions: the
+    distance by which lines of ink continue past the border of a tone.
     """
     # `normalize_variance` scales the means of streamlines that end early. A channel of ones is
     # scaled by the same factor, which is divided out below. There are two such channels, because LIC

@@ -1,7 +1,7 @@
 """Averages of noise along streamlines, by kernels that move; see `flow`.
 
 Let E be the prefix sum of the prefix sum of the noise along a streamline. The weights of every kernel here
-are piecewise linear, so their second difference is not 0 in only a few places. The weighted sum of the noise
+are piecewise linear: their second difference is 0 except at a few places. The weighted sum of the noise
 around the sample q is therefore a weighted sum of only a few values of E. Between two samples, sums
 are interpolated.
 """
@@ -82,9 +82,9 @@ class MovingKernel:
         Parameters
         ----------
         share : (n,) float32 ndarray
-            Length of the kernels, relative to `length`.
+            Length of each kernel as a fraction of `length`, 0 to 1.
         forward : (n,) float32 ndarray
-            Share of the kernel that drifts forward.
+            Fraction of the kernel that drifts forward, 0 to 1.
         behind, ahead : (n,) intp ndarray
             Steps to the ends of the streamlines. Negative numbers count as 0.
 
@@ -92,7 +92,8 @@ class MovingKernel:
         -------
         effective_samples : (n,) float64 ndarray
         factor : (n,) float64 ndarray
-            Weighted sums times this factor are averages times the effective samples.
+            Factor for the weighted sum of the noise of each streamline. The product is the average of the
+            noise times its effective samples.
         """
         table = self.energies.reshape(3, -1)
         width, levels = self.energies.shape[2], len(self.full_samples)
@@ -125,7 +126,7 @@ class DriftingAverages:
     kernel : MovingKernel
     second_sums : (3, 2 R + 3, n) complex64 ndarray
         E for n streamlines: row i + R + 2 of a channel is the sum up to step i of the prefix sums of its
-        noise, for i from -R - 2 to R. The imaginary part is the same for the derivative of the noise to the
+        noise, for i from -R - 2 to R. The imaginary part has the sums of the derivative of the noise to the
         left.
     """
 
@@ -156,15 +157,15 @@ class DriftingAverages:
         length : (n,) ndarray of int or None
             Steps of the kernels in each direction; None for the full length.
         forward : (n,) float32 ndarray
-            Share of the kernel that drifts forward, 0 to 1; the rest drifts backward.
+            Fraction of the kernel that drifts forward, 0 to 1; the rest drifts backward.
         behind, ahead : (n,) intp ndarray
             Steps to the ends of the streamlines.
 
         Returns
         -------
         sums : (n,) complex64 ndarray
-            The average of the noise times the effective samples. The imaginary part is the same for the
-            derivative of the noise to the left.
+            The real part is the average of the noise times the effective samples. The imaginary part is the
+            same average of the derivative of the noise to the left.
         effective_samples : (n,) float32 ndarray
         """
         kernel = self._kernel
@@ -200,9 +201,10 @@ class DriftingAverages:
         return total * factor.astype(np.float32), samples
 
     def _full(self, is_mirrored: bool) -> np.ndarray:
-        """Return the (3, 2 Q + 1, n) complex64 weighted sums around each step from -Q to Q.
+        """Return the (3, 2 Q + 1, n) complex64 weighted sums of each channel around each step from -Q to Q.
 
-        The kernels have the full length.
+        The kernels have the full length r. Q is R - r, so that no kernel reaches beyond step R of its
+        streamline.
         """
         if is_mirrored not in self._full_sums:
             kernel = self._kernel
@@ -220,9 +222,10 @@ class DriftingAverages:
     def _sums(
         self, channel: int, step: np.ndarray, columns: np.ndarray, terms: list[tuple]
     ) -> np.ndarray:
-        """Return the (n,) complex64 weighted sums around steps of the streamlines `columns`.
+        """Return (n,) complex64 weighted sums of the noise of one channel.
 
-        `terms` are the `_kernel_terms` of the kernels, whose lengths may differ.
+        Sum j is around the step `step[j]` of the streamline `columns[j]`. `terms` are the `_kernel_terms` of
+        the kernels, whose lengths may differ.
         """
         flat, stride = self._second_sums[channel].reshape(-1), self._second_sums.shape[2]
         total = np.zeros(len(step), dtype=np.complex64)

@@ -6,8 +6,8 @@ So lines whose width is a fraction of the distance between lines cover the same 
 and the tone is exact. Lines get wider in dark tones and thinner in light tones.
 
 Edges are smoothed by a box filter of at least a pixel. Where lines are too close for the pixels,
-they fade into their mean. Where foreshortening crowds the lines of one direction, lines in other
-directions are drawn before them, and lines at a larger distance on the surface replace them. Where
+they fade into their mean. Where foreshortening crowds the lines of one direction, they join only in darker
+tones than lines in other directions, and lines at a larger distance on the surface replace them. Where
 lines are too far apart, as in near parts of a perspective picture, further lines grow between them.
 """
 
@@ -164,7 +164,10 @@ def resolved_share(period: np.ndarray, supersampling: int = 1) -> np.ndarray:
 
 
 def crowded_pixels(look: PixelLook) -> tuple[float, float]:
-    """Return `CROWDED_SHARES` as distances in pixels of the frame."""
+    """Return two distances between lines on screen, in pixels of the frame; see `CROWDED_SHARES`.
+
+    Lines closer than the first are fully crowded, lines farther apart than the second are not crowded.
+    """
     low, high = CROWDED_SHARES
     return low * look.line_distance, high * look.line_distance
 
@@ -232,11 +235,19 @@ def look_width_table(look: PixelLook) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def _width_table(breaks: float, wobble: float, paper_grain_amplitude: float) -> np.ndarray:
-    """Return the (COVERAGE_STEPS,) widths m that give mean widths from 0 to 1 once they vary.
+    """Return (COVERAGE_STEPS,) widths m of lines before breaks and paper grain change them.
 
-    The variations are normally distributed, and varied widths are clipped to 0 to 1.
-    The mean of clip(m + s X, 0, 1) for a normal X is g(m) - g(m - 1), with g(x) = x F(x / s) +
-    s f(x / s), where F is the distribution function and f the density of X. It is solved for m.
+    Breaks and grain add a normally distributed variation s X to the width, and the sum is clipped to 0 to 1.
+    The result has the m for which the mean of the clipped widths is 0 to 1, in even steps. The mean of
+    clip(m + s X, 0, 1) is g(m) - g(m - 1), with g(x) = x F(x / s) + s f(x / s), where F is the distribution
+    function and f the density of X. It is solved for m by bisection.
+
+    Parameters
+    ----------
+    breaks, wobble : float
+        Settings of the look. With the grain, they determine the standard deviation s.
+    paper_grain_amplitude : float
+        Standard deviation of the paper grain, in standard deviations of the streaks.
     """
     coverage = np.linspace(0, 1, COVERAGE_STEPS)
     amount = np.minimum(break_amount(coverage, breaks, wobble), MAX_BREAK_AMOUNT)
@@ -306,7 +317,7 @@ def even_lines(
 
 
 class _InstanceLines:
-    """The evenly spaced lines of one mesh instance. The other parameters are those of `even_lines`."""
+    """The evenly spaced lines of one mesh instance. All parameters but `instance` are as in `even_lines`."""
 
     def __init__(
         self,
@@ -340,7 +351,8 @@ class _InstanceLines:
         Returns
         -------
         streaks, period : (M, n) float32 ndarray
-            See `EvenLines`. `period` is the distance between lines with the ratio 1.
+            See `EvenLines`. `period` does not depend on `ratio`: it is the distance between lines at the
+            ratio 1.
         growth : (n,) float32 ndarray
             See `EvenLines`; 0 where no further lines grow.
         """

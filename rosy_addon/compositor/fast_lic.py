@@ -297,7 +297,10 @@ class _LineAverages:
 
     @staticmethod
     def _or_own(values: np.ndarray, own: np.ndarray) -> np.ndarray:
-        """Replace (n, K + 1) values that hold no average by those of `own`, in place, and return `values`."""
+        """Copy rows of `own` to the (n, K + 1) `values` where these have no average, and return `values`.
+
+        A row has no average if its effective samples, in the last column, are not above 0.
+        """
         unknown = np.flatnonzero(values[:, -1] <= 0)
         values[unknown] = own[unknown]
         return values
@@ -362,9 +365,16 @@ def _write_streamlines(
     averages: Sequence[_LineAverages],
     steps: Iterable[tuple[np.ndarray, list[np.ndarray], np.ndarray]],
 ) -> None:
-    """Store the averages that `StreamlineBatch.trace` yields in `averages`, one of which is for each look.
+    """Store the averages of a batch of streamlines.
 
     If several streamlines pass a line, one that passes near the center of the cell wins.
+
+    Parameters
+    ----------
+    averages : sequence of _LineAverages
+        The averages for each look, which are changed.
+    steps : iterable
+        What `StreamlineBatch.trace` yields for each step of the streamlines.
     """
     centered_lines: list[np.ndarray] = []
     centered_values: list[list[np.ndarray]] = [[] for _ in averages]

@@ -287,9 +287,21 @@ def _above_threshold(
     look: PixelLook,
     slope: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Return 1 where streaks exceed the threshold of the target coverage, with soft edges.
+    """Return (P,) coverages: 1 where streaks exceed the threshold of the target coverage, with soft edges.
 
-    If `slope` is given, edges are at least as soft as those of a mean over a pixel.
+    Parameters
+    ----------
+    streak : (P,) ndarray
+        Streaks with mean 0 and standard deviation 1.
+    target_coverage : (P,) ndarray
+        0 to 1.
+    thresholds : (COVERAGE_STEPS,) ndarray
+        Threshold for each coverage from 0 to 1: `StreakStatistics.threshold` or `disc_threshold`.
+    look : PixelLook
+        Its `crispness` is used.
+    slope : (P,) ndarray, optional
+        Change of the streak across the line, per pixel. Edges are then at least as soft as in a mean over a
+        pixel.
     """
     threshold = np.interp(target_coverage, np.linspace(0, 1, COVERAGE_STEPS), thresholds)
     half_width = np.float32(softness(look.crispness))
@@ -452,9 +464,19 @@ def line_shares(
 
 
 def onset_weights(darkness: np.ndarray, delays: Sequence[np.ndarray | float]) -> list[np.ndarray]:
-    """Compute how much each line has joined the hatching at a darkness, 0 to 1.
+    """Compute the weight with which each line takes part in the hatching of a tone.
 
-    `delays` are the darkness at which each line joins. The result has an array for each line.
+    Parameters
+    ----------
+    darkness : ndarray
+        1 - transmittance of the tone, 0 to 1.
+    delays : sequence of ndarray or float
+        For each line, the darkness at which it joins.
+
+    Returns
+    -------
+    list of ndarray
+        Weight of each line, from 0 (does not take part) to 1.
     """
     extent = ONSET_RANGE + ONSET_LEAD
     return [smoothstep((darkness - delay + ONSET_LEAD) / extent) for delay in delays]

@@ -15,11 +15,12 @@ sum is doubled instead:
 A^D is given by the point D steps upstream on the streamline of each state (see `streamline_origins`).
 A few doublings replace more than a hundred blends. Each doubling interpolates values only once.
 
-Noise that varies in time makes the streaks drift. It is interpolated between the three channels of the
-flow, by a constant and a cosine and sine of the phase: n_c at the phase -c / 3. The squares of the weights
-(1 + 2 cos) / 3 have the sum 1, so the contrast is constant. There is one frequency, and A does not depend on
-the time. So the picture of any frame is a blend of the same three images: averages of the constant, the
-cosine and the sine part of the noise. No frame depends on earlier frames, and animations can loop.
+Noise that varies in time makes the streaks drift. It is the sum of the three channels n_c of the flow, with
+the weights (1 + 2 cos(2 pi (phase + c / 3))) / 3, so it is n_c at the phase -c / 3. The squares of the
+weights have the sum 1, so the contrast is constant. The noise is thus a constant part, plus a cosine part and
+a sine part that are multiplied by the cosine and the sine of 2 pi phase. A does not depend on the time. So
+the picture of any frame is a blend of the same three images: the averages of the three parts. No frame
+depends on earlier frames, and animations can loop.
 
 Streaks of a field of odd degree are averages upstream along its directions. In a field of even degree, a
 line is a pair of opposite sheets, and its streaks are the mean of both.
@@ -175,7 +176,10 @@ def _noise_sources(noise: np.ndarray, look: PixelLook) -> list[np.ndarray]:
 
 
 def _step_turn(look: PixelLook) -> float:
-    """Return the angle by which the phase of the noise changes with each step of the streamline."""
+    """Return the change of the phase of the noise from one step of a streamline to the next, in radians.
+
+    Streaks drift by `flow_distance` steps while the phase makes a full turn.
+    """
     if not has_flow(look):
         return 0.0
     angle = 2 * np.pi / look.flow_distance
@@ -241,9 +245,10 @@ def decay_of_samples(effective_samples: np.ndarray, two_sided: bool) -> np.ndarr
 
 
 def _square_sum(rest: np.ndarray | float, decay: np.ndarray) -> np.ndarray:
-    """Return the sum of the squared weights along one direction, up to the step with the weight `rest`.
+    """Return the sum of the squared weights of the steps along one direction.
 
-    `decay` is the ratio q of the weights of successive steps.
+    The weights are `OWN_WEIGHT`, q, q^2 and so on, where q is `decay`. The last one is `rest`, which is 0 if
+    the streamline does not end.
     """
     return OWN_WEIGHT**2 + decay**2 * (1 - np.square(rest)) / (1 - decay**2)
 
@@ -281,6 +286,14 @@ class _Sums:
         q, the ratio of the weights of successive steps.
     turn : float
         Angle in radians by which the second source is rotated at each step.
+
+    Attributes
+    ----------
+    values : list of (S C,) complex64 ndarray
+        Sum of each source over the first D steps upstream of each state, in which the noise at the pixel
+        itself has the weight 1.
+    weight : (P,) or () float32 ndarray
+        q^D, the weight of the next D steps.
     """
 
     def __init__(
@@ -288,7 +301,6 @@ class _Sums:
     ) -> None:
         self._sheets, self._turn = sheets, turn
         self.sources, self.decay = sources, decay
-        # q^D, the weight of the D steps by which the next doubling extends the sums.
         self.weight = decay
         size = sheets.count * sheets.cell_count
         self.values = [np.zeros(size, dtype=np.complex64) for _ in sources]
@@ -311,7 +323,7 @@ class _Sums:
         values : (n,) complex64 ndarray
             Sums that arrive at the pixels of a block.
         steps : int
-            D; the attribute `weight` must be the weight of as many steps.
+            D, for which the attribute `weight` is q^D.
         block : slice
             The pixels.
         """

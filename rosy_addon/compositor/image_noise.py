@@ -229,7 +229,7 @@ def _noise_tiles(
 
 
 def high_pass_margin(high_pass: float) -> int:
-    """Return the radius in pixels around a pixel on which its noise depends because of the high pass."""
+    """Return the radius of the high-pass filter: up to which distance in pixels it reads other pixels."""
     return int(np.ceil(3 * BLUR_FACTOR * high_pass))
 
 
@@ -318,11 +318,13 @@ def streak_moments(
 
     Notes
     -----
-    Let S(k) be the power spectrum of the noise. The covariance of the means along two lines of
-    length l through a point, in the directions u and v, is the integral of
-    S(k) sinc(l k.u) sinc(l k.v). For a lattice of bits with cells of side g, averaged over pixels,
-    minus a Gaussian blur with the standard deviation s, S is
-    g^2 / 4 [sinc(g kx) sinc(g ky) sinc(kx') sinc(ky') (1 - exp(-2 pi^2 s^2 k^2))]^2.
+    Let S(k) be the power spectrum of the noise at the frequency k, in cycles per pixel. The covariance of
+    the means along two lines of length l through a point, in the directions of the unit vectors u and v, is
+    the integral of S(k) sinc(l k.u) sinc(l k.v). For a lattice of bits with cells of side g, averaged over
+    pixels, minus a Gaussian blur with the standard deviation s, S is
+    g^2 / 4 [sinc(g cx) sinc(g cy) sinc(kx) sinc(ky) (1 - exp(-2 pi^2 s^2 k^2))]^2,
+    where (kx, ky) are the components of k along the rows and columns of pixels, and (cx, cy) are its
+    components along the axes of the lattice.
     Here it is averaged over all directions, and the integral is taken in polar coordinates. Tapered
     weights are a box filter of half the length applied twice: sinc(l k.u) becomes
     sinc(l k.u / 2)^2. The response of a ramp is complex, with the derivative of the sinc.

@@ -106,9 +106,11 @@ class FilteredEdges(NamedTuple):
     Attributes
     ----------
     edge
-        Half the width of an even distribution with the spread of the averaged thresholds.
+        Half the width of a soft edge, in thresholds (0 to 1): half the width of the uniform distribution
+        that has the same variance as the averaged thresholds.
     correction
-        Factor of the correction of coverages; see `FILTER_CORRECTION`.
+        Strength of the correction that keeps the mean coverage; see `FILTER_CORRECTION`. 0 where no
+        thresholds have been averaged.
     """
 
     edge: Any
@@ -145,14 +147,15 @@ def layer_coverage(
     Parameters
     ----------
     left
-        The transmittance that the lines of all layers together should have.
+        The fraction of the paper that the lines of all layers together should leave bare.
     share
-        Exponent of `left` for the lines of this layer; see `layer_shares`.
+        Share of this layer in the ink: it should leave ``left ** share`` bare; see `layer_shares`.
     threshold
         Threshold of the layer.
     filtered : FilteredEdges
     edge_factor
-        `DENSITY_FACTOR` times the softness of edges.
+        `DENSITY_FACTOR` times the `softness` of the edges of ink. It is multiplied by c (1 - c), for the
+        coverage c, to get half the width of edges in thresholds.
     """
     coverage = 1 - left.at_least(MIN_TRANSMITTANCE) ** share
     # Edges as wide as this leave the mean coverage of all thresholds unchanged.

@@ -387,7 +387,10 @@ def picture_thresholds(
 
 
 def _streak_sample(images: LicImages | None, node: float) -> LicImages | None:
-    """Return LIC images sampled beside the centers of pixels, at a position `node` of `PIXEL_NODES`."""
+    """Return LIC images at points beside the centers of pixels, or None for None.
+
+    The points are `node`, from `PIXEL_NODES`, times `STREAK_REACH` pixels to the left of the lines.
+    """
     if images is None or images.slopes is None or not node:
         return images
     shift = np.float32(STREAK_REACH * node) * images.slopes

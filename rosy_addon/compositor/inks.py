@@ -193,7 +193,8 @@ def is_light(look: Look) -> bool:
 def _ink_series(code: str, count: int) -> np.ndarray:
     """Return (count, 3) float32 linear colors: an ink, and variants with other hues.
 
-    The variants have the lightness and chroma of the ink, within the limits of this module.
+    `code` is the color of the ink as ``#rrggbb``. The variants have its lightness and chroma in Oklab, but
+    the lightness is clipped to `LIGHTNESS_RANGE`, and the chroma is at least `MIN_CHROMA`.
     """
     base_ink = to_linear(from_hex(code))
     lightness, a, b = _LMS_TO_LAB @ np.cbrt(_RGB_TO_LMS @ base_ink)

@@ -30,7 +30,9 @@ def lic_lengths(
     ----------
     field : PixelField
     looks : sequence of PixelLook
-        They differ in the length of streamlines. The first has the greatest length.
+        They differ in the length of streamlines. The first has the greatest length. Their `method` says
+        which module computes the images: "sheets" is `fast_lic`, "ibfv" is `ibfv`, and "members" and
+        "brute" are in `per_pixel_lic`.
     noise : (P, K) float32 ndarray
     strip : Strip, optional
         Rows to draw. With the method "sheets", the images have the pixels of its `averaged_rows`; other

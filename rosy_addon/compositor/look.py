@@ -89,7 +89,10 @@ def has_tone_inks(look: Any) -> bool:
 
 
 def _shading(panel: str, applies: Callable[[Any], bool] = always) -> dict[str, Any]:
-    """Return the arguments of a setting that LIC images do not depend on, shown in the given panel."""
+    """Return arguments for `number`, `choice` and so on: the setting has no effect on LIC images.
+
+    `panel` and `applies` are attributes of `Setting`: where the setting is shown, and when it has an effect.
+    """
     return {"panel": panel, "stage": Stage.SHADING, "applies": applies}
 
 

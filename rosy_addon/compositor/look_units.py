@@ -42,13 +42,14 @@ class PixelLook:
     look : Look
         The settings of the user.
     scale : float
-        Size in pixels of the picture of the unit in which the lengths of `look` are given.
+        Factor from the lengths of `look` to pixels of the picture (or to steps, for lines on a surface).
     length : int
         Steps of streamlines in each direction.
     supersampling : int
         Pixels of the frame along a side of a pixel of the picture.
     pixel_size : float
-        Blender units in place of a pixel, if `look` has lengths in Blender units (`unit_size`); otherwise 0.
+        If `look` has lengths in Blender units (`unit_size`): the Blender units that one pixel of the frame
+        stands for. Otherwise 0.
     color_range : (float, float)
         The setting `Look.color_range`, or the `magnitude_ends` of a field (see `with_magnitude_range`).
     kernel : {"box", "taper", "ramp"}
@@ -206,7 +207,7 @@ def surface_pixel_look(look: Look, step: float, pixel: float, drift: Drift = NO_
 def _scaled_pixel_look(look: Look, scale: float, unit_size: float, drift: Drift) -> PixelLook:
     """Return the `PixelLook` whose lengths are `scale` times the lengths of `look`.
 
-    `unit_size` is the number of Blender units in the unit of the lengths of `look`; 0 if that is a pixel.
+    The lengths of `look` are in multiples of `unit_size` Blender units, or in pixels if `unit_size` is 0.
     """
     scale = _possible_scale(look, scale)
     if not has_flow(look):

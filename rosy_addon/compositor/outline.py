@@ -3,7 +3,8 @@
 Silhouettes and borders lie between two adjacent pixels if the surface does not continue from one to
 the other (`pixel_neighbors.neighbor_masks`). Where one surface occludes the other, the line is drawn
 only on the nearer one. Creases are chains of edges of the mesh (`field.creases`), drawn where they
-are visible. Marks that are too short are not drawn, unless they are the border of something.
+are visible. A group of connected pixels at edges (a *mark*) is not drawn if it is too short, unless the
+background is next to it, or it surrounds a part of a mesh.
 """
 
 from __future__ import annotations
@@ -134,8 +135,10 @@ def _sample_outline(
 
     Returns
     -------
-    home, shown : (Q,) int32 ndarray
-        Indices of pixels of the G-buffer for each sample; see `project_samples`.
+    home : (Q,) int32 ndarray
+        For each sample, the index of the pixel of the G-buffer in which the sample lies.
+    shown : (Q,) int32 ndarray
+        For each sample, the index of the pixel whose surface it shows; see `project_samples`.
     coverage : (Q,) float32 ndarray
     """
     with progress(0.0, 0.4):
@@ -306,8 +309,9 @@ class _Edges:
         """Set the width of lines at the nearer pixel of steps in the depth of a surface.
 
         On a surface that is seen nearly edge-on, any difference in depth between neighbors is plausible, so
-        the neighbor masks link pixels across a silhouette. At a step, the depth changes much more than
-        between either pixel and the next one beyond it.
+        the neighbor masks link pixels across a silhouette. At a step between two pixels of a row or a column,
+        the depth changes much more than it does from each of them to its other neighbor in that row or
+        column.
         """
         depth, tolerance, defined = self._depth, self._tolerance, self._defined
         for block in reported_blocks(self._count, STEP_LABEL):
@@ -336,8 +340,8 @@ def _mark_strength(
 
     Marks are connected pixels of the finished picture; diagonal neighbors are connected. The length
     of a mark is the longer side of its bounding box. A short mark still has its full width if it is next to
-    the background, or if it surrounds a part: then the number of its pixels at borders of parts is at least
-    half the perimeter of its bounding box.
+    the background, or if it surrounds a part of a mesh. It counts as surrounding one if its pixels at borders
+    of parts are at least half as many as the perimeter of its bounding box is long, in pixels.
 
     Parameters
     ----------

@@ -241,8 +241,9 @@ def convolve_members(
     noise : (P, K) float32 ndarray
     neighbors : (9, P + 1) int32 ndarray
         From `neighbor_table`.
-    tracers : sequence of M functions
-        One function per member image.
+    tracers : sequence of M LineTracer
+        For each member image, a function that takes a block of pixels, and returns the function for
+        directions of `integrate_noise`.
 
     Returns
     -------

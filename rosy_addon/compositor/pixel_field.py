@@ -80,9 +80,9 @@ class PixelField:
         Neighbors that streamlines may step to. Bit i stands for `NEIGHBOR_OFFSETS[i]`. No bit is
         set where the field is undefined.
     channels : dict of FieldChannel to (P,) complex64 ndarray
-        Further channels of the field, in the view plane: the harmonics by which its directions deviate
-        from a RoSy; and the representation of the line of the stored member, from which families of
-        lines are counted.
+        Further complex values of the field, in the frames of the view plane. If its directions are not at
+        equal angles: the harmonics C_j (see `field.directional_field`). If the field distinguishes m
+        families of lines: the representation, of degree N / m, of the line of family 0.
     gbuffer_index : slice or (P,) intp ndarray
         Indices of the pixels in the arrays of the G-buffer. A slice if the pixels are all or adjacent
         pixels of the G-buffer.
@@ -240,10 +240,11 @@ def surface_pixel_field(gbuffer: GBuffer, degree: int, crease_angle: float | Non
 
 
 def _channels_of_degree(channels: dict[FieldChannel, np.ndarray]) -> dict[FieldChannel, np.ndarray]:
-    """Return the channels that the fields of one degree have, given their values at the pixels.
+    """Return the channels that the fields of one degree have.
 
-    A channel that only fields of other degrees have is 1 (C_0) or 0 (all others) at all these pixels, as
-    for a RoSy. It is left out.
+    `channels` holds the values of all channels of the G-buffer at the pixels of these fields. Where a field
+    does not have a channel, the harmonic C_0 is 1, and all other channels are 0. A channel that has these
+    values at all pixels is left out.
     """
     constant = ("deviation", 0)
     present = {

@@ -74,8 +74,8 @@ KEY_LIGHT = Light("sun", np.array([-0.50, 0.60, 0.62]) / 0.9975, np.ones(3), 1.0
 def lights_of(look: Any, lights: Sequence[Light]) -> Sequence[Light]:
     """Return the lights that a look or a style of strokes uses.
 
-    It is `KEY_LIGHT` for "lamp", the given lights of the scene for "scene", and none for "headlight", which
-    needs no `Light`.
+    They depend on the setting `light`: `KEY_LIGHT` for "lamp", the given lights of the scene for "scene", and
+    none for "headlight", which needs no `Light`.
     """
     return {"lamp": (KEY_LIGHT,), "scene": lights}.get(look.light, ())
 

@@ -176,11 +176,10 @@ def softness(crispness: float) -> float:
 
 
 def _threshold_tables(samples: list[np.ndarray], half_width: float) -> np.ndarray:
-    """Return the (S, COVERAGE_STEPS) thresholds above which a fraction 0 to 1 of S streak images is ink.
+    """Return (S, COVERAGE_STEPS) thresholds: for each of S images of streaks, a threshold for each coverage.
 
-    `samples` are the values of these images.
-
-    `half_width` is half the width of the step from paper to ink, in the unit of the samples.
+    Coverages are from 0 to 1, in even steps. Ink above the threshold covers that fraction of the image.
+    `half_width` is half the width of the step from paper to ink, in the unit of the images, `samples`.
     """
     lowest, highest = min(map(np.min, samples)), max(map(np.max, samples))
     edges = np.linspace(lowest, highest, HISTOGRAM_BINS + 1)
@@ -198,9 +197,10 @@ def _threshold_tables(samples: list[np.ndarray], half_width: float) -> np.ndarra
 def _noise_sample(
     shape: tuple[int, int], cell: float, density: float, high_pass: float, anchored: bool
 ) -> np.ndarray:
-    """Make an image of the noise in image space or, if `anchored`, of the noise on a flat surface.
+    """Make a (H, W) image of `image_noise` or, if `anchored`, of `surface_noise` on a flat surface.
 
-    On the surface, the cells of the middle octave have the size `cell` on screen.
+    `cell` is the side of a cell in pixels. Noise on the surface is the blend of the octave with these cells,
+    and of the octaves with cells of half and of twice the size.
     """
     pixel = np.arange(shape[0] * shape[1], dtype=np.int32)
     octave_offsets = np.arange(OCTAVES) - OCTAVES // 2 if anchored else np.zeros(1)

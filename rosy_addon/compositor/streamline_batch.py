@@ -154,9 +154,9 @@ class StreamlineBatch:
             yield line, values, np.flatnonzero(np.abs(lateral) < self._max_lateral)
 
     def _along_members(self, seeds: np.ndarray) -> np.ndarray:
-        """Return the state of each line that is a member of the field, not an opposite.
+        """Return for each line the one of its two opposite states that is a direction of the field.
 
-        In a field with opposites, return `seeds` unchanged.
+        In a field with opposites, both are, and the result is `seeds`, the (n,) indices of lines.
         """
         covering = self._covering
         if not covering.has_directions:
@@ -219,10 +219,11 @@ class StreamlineBatch:
         """Trace the streamlines and fill the buffers. Row i of a buffer is step i.
 
         A row holds n forward halves of streamlines, then n backward halves. The buffers are `_states`;
-        `_lateral_offset`, the distances to the left of the centers of pixels; and `_sums`, prefix sums of
-        the noise that include the seed. The imaginary part of `_sums` is the same for the derivative of the
+        `_lateral_offset`, the distances to the left of the centers of pixels; for moving kernels,
+        `_axial_offset`, the distances along the streamline; and `_sums`. The real part of `_sums` has prefix
+        sums of the noise, which include the seed. The imaginary part has prefix sums of the derivative of the
         noise to the left. For kernels other than the box, `_sums` are the prefix sums of these prefix sums,
-        and all rows are filled.
+        and all rows are filled. Lanes that have ended are in `SINK_CELL`.
 
         Returns
         -------
@@ -296,11 +297,11 @@ class StreamlineBatch:
     ) -> np.ndarray:
         """Return (2 n, K) complex64 sums of the noise around step i, with weights that fall along the field.
 
-        The sum along a lane with weights that fall from 2 r + 1 to 1, r = `half_width`, is
-        E(i + r) - E(i - r - 1) - (2 r + 1) P(i - r - 1). E are the sums of prefix sums, and
-        P(i) = E(i) - E(i - 1) are the prefix sums. If a lane runs against the field (`is_along` is False),
-        the weights rise along the lane. The sum is then that of a box of the weight 2 r + 2 minus the sum
-        above. All sums are divided by r + 1.
+        Let r be `half_width`, P(i) the prefix sums of the noise along a lane, and E(i) the sums of these
+        prefix sums. In a lane that runs along the field, the weights fall from 2 r + 1 to 1, and the sum is
+        E(i + r) - E(i - r - 1) - (2 r + 1) P(i - r - 1). In a lane that runs against the field (`is_along` is
+        False), the weights rise from 1 to 2 r + 1. Both weights of a sample add up to 2 r + 2, so the sum is
+        2 r + 2 times the unweighted sum, minus the sum with falling weights. All sums are divided by r + 1.
         """
         last, before = step + half_width, step - half_width - 1
         sums_through, sums_before = (self._second_prefix_sums(i, lanes) for i in (last, before))

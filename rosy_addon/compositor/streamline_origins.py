@@ -235,12 +235,17 @@ class Sheets:
         return steps
 
     def _sheet_shifts(self, spacing: int) -> np.ndarray:
-        """Tabulate by how much the number of the sheet increases in a step to each neighbor, from 0 on.
+        """Tabulate by how much the number of the sheet increases in a step to each neighbor.
+
+        Parameters
+        ----------
+        spacing : int
+            Difference between the numbers in `covering` of successive sheets that are needed.
 
         Returns
         -------
         (9 C,) int8 ndarray
-            -1 where streamlines cannot step.
+            Increase modulo `count`, from 0 to `count` - 1; -1 where streamlines cannot step.
         """
         phase = self._covering.packed_phase
         table = np.full((9, self.cell_count), -1, dtype=np.int8)

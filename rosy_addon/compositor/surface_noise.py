@@ -171,18 +171,19 @@ def solid_noise(
 
 
 def instance_units(gbuffer: GBuffer, unit: float) -> np.ndarray | None:
-    """Convert a length from Blender units of world space to the object space of each mesh instance.
+    """Convert a length from world space to the object space of each of B mesh instances.
 
     Parameters
     ----------
     gbuffer : GBuffer
         Its `instances` must be set.
     unit : float
-        Unit of lengths on the surface, in Blender units; 0 if lengths are in pixels.
+        A length in Blender units of world space; 0 if lengths are in pixels.
 
     Returns
     -------
-    (B,) float32 ndarray, or None if `unit` is 0
+    (B,) float32 ndarray or None
+        The same length in the object space of each instance. None if `unit` is 0.
     """
     if not unit:
         return None
@@ -287,7 +288,10 @@ def _to_lattice_space(position: np.ndarray) -> np.ndarray:
 
 
 def _high_pass(gbuffer: GBuffer, channels: np.ndarray, sigma: float) -> None:
-    """Subtract from (K, P) `channels` their Gaussian blur, in place. Pixels without a surface are ignored."""
+    """Subtract a Gaussian blur of each of (K, P) `channels` from the channel, in place.
+
+    `sigma` is its standard deviation in pixels. Pixels without a surface are ignored.
+    """
     count = len(gbuffer.pixel)
     # The empty margin is as wide as the support of the blur.
     cell, shape = pixel_window(gbuffer.pixel, gbuffer.camera.width, 3 * box_radius(sigma))

@@ -1,10 +1,10 @@
 """Declarative settings: dataclass fields with a range, a label and a help text.
 
 A settings class is a frozen dataclass whose fields are made by `number`, `fraction`, `numbers`,
-`choice`, `switch` and `color`. Each field is described by a `Setting`: default, range, label, help text, position in
-the panels, the stage of rendering that it affects, and when it has an effect. Properties, panels, validation,
-command line options, tables of the documentation and cache keys are derived from these descriptions. Other
-fields of the class, such as arrays, have no description.
+`choice`, `switch` and `color`. Each field is described by a `Setting`: default, range, label, help text,
+position in the panels, the stage of rendering that it affects, and when it has an effect. Properties, panels,
+validation, command line options, tables of the documentation and cache keys are derived from these
+descriptions. Other fields of the class, such as arrays, have no description.
 """
 
 from __future__ import annotations

@@ -6,7 +6,8 @@ tangents to displacements in the UV map is linear: w becomes a w + b conj(w).
 
 The angles of the field are compared from texel to texel, relative to frames. For this, frames must rotate as
 little from texel to texel as the surface allows. The frame used is the direction that the UV map rotates to
-its u axis. It is averaged at the corners over each smooth fan and interpolated like the field.
+its u axis. It is averaged at the corners and interpolated like the field. Each average is over the triangles
+around a vertex that are in the same chart and not separated by sharp edges (a smooth fan).
 """
 
 from __future__ import annotations

@@ -95,7 +95,7 @@ class Texture:
     rgba : (H, W, 4) float32 ndarray
         Pixels. The bottom row is first. The tiles of a UDIM texture are stacked.
     overlap : float
-        Fraction of the area of the UV map that is covered by another chart, so that both share texels.
+        Fraction of the area of all charts that is not shown because other charts overlap it.
     is_data : bool
         Whether the pixels are thresholds of ink (`compositor.ink_thresholds`) or directions. Otherwise
         they are linear colors.
@@ -151,7 +151,8 @@ def draw_texture(
     uv : (C, 2) ndarray
         u and v at the corners of the surface.
     look : Look
-        Settings of light and camera have no effect. Lengths in pixels are converted with `SURFACE_PIXELS`.
+        Settings of light and camera have no effect. A length in pixels becomes a length on the surface:
+        `SURFACE_PIXELS` (1024) pixels are the side of a square with the area of the surface.
     size : int
         Texels on each side of the texture, or of a tile of it.
     margin : int
@@ -161,8 +162,9 @@ def draw_texture(
     lights : sequence of Light, optional
         Lights in world space. If they are given, hatching is drawn as ink under this light. Otherwise a
         texture of hatching contains thresholds, and the material draws the ink.
-    content : str
-        One of `CONTENTS`.
+    content : {"look", "anisotropy", "flow"}
+        What the texture shows: the picture of the look, or the direction of the field as an anisotropy map
+        or as a flow map; see `direction_map`.
     drift : Drift
         How far streaks have drifted, if the look has flow.
     cache : Cache, optional

@@ -240,7 +240,10 @@ def rasterize_charts(charts: UvCharts, frame: TextureFrame, name: str) -> Texels
 
 
 def _reaches_tile(corners: np.ndarray) -> np.ndarray:
-    """Return the indices of triangles that may overlap the square from -1 to 1, given (T, 3, 2) corners."""
+    """Return the indices of triangles that may overlap a tile.
+
+    `corners`, (T, 3, 2), are relative to the center of the tile, in halves of its side.
+    """
     low, high = corners.min(axis=1), corners.max(axis=1)
     return np.flatnonzero(((low < 1) & (high > -1)).all(axis=1))
 

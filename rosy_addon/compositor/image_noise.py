@@ -270,12 +270,14 @@ def gaussian_blur(
 
 def _box_filter(image: np.ndarray, radius: int, outside: str) -> np.ndarray:
     """Return the mean over 2 * radius + 1 pixels along the columns; `outside` as in `gaussian_blur`."""
-    fill = {"mode": "edge"} if outside == "edge" else {"constant_values": NOISE_MEAN}
-    prefix_sum = np.pad(image, ((radius + 1, radius), (0, 0)), **fill).astype(np.float64)
+    low, high = (image[0], image[-1]) if outside == "edge" else (NOISE_MEAN, NOISE_MEAN)
+    window = 2 * radius + 1
+    prefix_sum = np.empty((len(image) + window, image.shape[1]))
+    prefix_sum[: radius + 1], prefix_sum[-radius:] = low, high
+    prefix_sum[radius + 1 : -radius] = image
     prefix_sum *= 1 / BLUR_QUANTUM
     np.rint(prefix_sum, out=prefix_sum)
     np.cumsum(prefix_sum, axis=0, out=prefix_sum)
-    window = 2 * radius + 1
     mean = prefix_sum[window:] - prefix_sum[:-window]
     mean *= BLUR_QUANTUM / window
     return mean

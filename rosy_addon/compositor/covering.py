@@ -435,5 +435,6 @@ def _to_screen(
         norm = np.sqrt(screen_x * screen_x + screen_y * screen_y)
         norm[norm == 0] = 1
         scale = 1 / norm
-        screen_x, screen_y = screen_x * scale, screen_y * scale
+        screen_x *= scale
+        screen_y *= scale
     return screen_x, screen_y

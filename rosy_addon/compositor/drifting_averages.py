@@ -186,9 +186,9 @@ class DriftingAverages:
                 whole = np.floor(place)
                 step, fraction = whole.astype(np.intp), place - whole
                 if length is None:
-                    sums = self._full(direction < 0)[channel]
-                    index = (step + len(sums) // 2) * sums.shape[1] + columns
-                    low, high = (sums.reshape(-1).take(index + i) for i in (0, sums.shape[1]))
+                    sums, stride = self._full(direction < 0)[channel], len(forward)
+                    index = (step + len(sums) // 2) * stride + columns
+                    low, high = sums.take(index), sums.take(index + stride)
                 else:
                     terms = _kernel_terms(kernel.kind, length[part], direction < 0)
                     low, high = (

@@ -53,7 +53,12 @@ STEP_LABEL = "drawing the paper grain"
 
 
 def picture_paper_grain(
-    pixel: np.ndarray, width: int, line_width: float, seed: int, subpixels: int = 1, lines: int = 1
+    pixel: np.ndarray,
+    width: int,
+    line_width: float,
+    seed: int,
+    subpixels: int = 1,
+    line_count: int = 1,
 ) -> np.ndarray:
     """Make paper grain that is anchored to the picture.
 
@@ -72,22 +77,22 @@ def picture_paper_grain(
     seed : int
     subpixels : int
         Subpixels along each side of a pixel. All subpixels of a pixel have the same height.
-    lines : int
+    line_count : int
         Number of lines (pairs of opposite directions of the field) at a pixel.
 
     Returns
     -------
-    (lines, P) float32 ndarray
+    (line_count, P) float32 ndarray
         Heights with mean 0 and standard deviation 1. Ink adheres better where they are larger.
     """
     offset = line_offset(line_width)
-    rectangle = tile_rectangle(pixel, width, subpixels, extra_columns=(lines - 1) * offset)
+    rectangle = tile_rectangle(pixel, width, subpixels, extra_columns=(line_count - 1) * offset)
     tiles = cached_tiles(_grain_tiles, rectangle, line_width, seed)
-    heights = np.empty((lines, len(pixel)), dtype=np.float32)
+    heights = np.empty((line_count, len(pixel)), dtype=np.float32)
     for block in reported_blocks(len(pixel), STEP_LABEL):
         row, column = np.divmod(pixel[block], np.int32(width))
         index = rectangle.index(row // subpixels, column // subpixels)
-        for line in range(lines):
+        for line in range(line_count):
             heights[line, block] = tiles.take(index + line * offset)
     return heights
 

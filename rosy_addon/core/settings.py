@@ -231,11 +231,6 @@ def number(default: float, low: float, high: float, text: str, **description: An
     return _field(Number(default=default, low=low, high=high, text=text, **description))
 
 
-def fraction(default: float, text: str, **description: Any) -> Any:
-    """Return a dataclass field for a setting that is a number from 0 to 1; see `Number` and `Setting`."""
-    return number(default, 0.0, 1.0, text, **description)
-
-
 def numbers(
     default: tuple[float, ...],
     text: str,
@@ -259,6 +254,11 @@ def switch(default: bool, text: str, **description: Any) -> Any:
 def color(default: str, text: str, **description: Any) -> Any:
     """Return a dataclass field for a setting that is a color; see `Color` and `Setting`."""
     return _field(Color(default=default, text=text, **description))
+
+
+def fraction(default: float, text: str, **description: Any) -> Any:
+    """Return a dataclass field for a setting that is a number from 0 to 1; see `Number` and `Setting`."""
+    return number(default, 0.0, 1.0, text, **description)
 
 
 def _field(setting: Setting) -> Any:

@@ -73,9 +73,9 @@ def test_statistics_of_paper_grain(line_width):
     """Mean 0, standard deviation 1, no low frequencies, independent of other lines and streaks."""
     side = 512
     pixel = np.arange(side * side, dtype=np.int32)
-    first_grain, second_grain = picture_paper_grain(pixel, side, line_width, 0, lines=2).reshape(
-        2, side, side
-    )
+    first_grain, second_grain = picture_paper_grain(
+        pixel, side, line_width, 0, line_count=2
+    ).reshape(2, side, side)
     assert abs(np.corrcoef(first_grain.ravel(), second_grain.ravel())[0, 1]) < 0.03
     assert abs(first_grain.mean()) < 0.02 and first_grain.std() == pytest.approx(1, abs=0.03)
     assert gaussian_filter(first_grain, 16).std() < 0.12

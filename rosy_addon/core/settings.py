@@ -1,10 +1,10 @@
 """Declarative settings: dataclass fields with a range, a label and a help text.
 
-A settings class is a frozen dataclass whose fields are made by `number`, `numbers`, `choice`,
-`switch` and `color`. Each field is described by a `Setting`: default, range, label, help text, position in
-the panels, the stage of rendering that it affects, and when it has an effect. Properties, panels, validation,
-command line options, tables of the documentation and cache keys are derived from these descriptions. Other
-fields of the class, such as arrays, have no description.
+A settings class is a frozen dataclass whose fields are made by `number`, `fraction`, `numbers`,
+`choice`, `switch` and `color`. Each field is described by a `Setting`: default, range, label, help text,
+position in the panels, the stage of rendering that it affects, and when it has an effect. Properties, panels,
+validation, command line options, tables of the documentation and cache keys are derived from these
+descriptions. Other fields of the class, such as arrays, have no description.
 """
 
 from __future__ import annotations
@@ -252,6 +252,11 @@ def switch(default: bool, text: str, **description: Any) -> Any:
 def color(default: str, text: str, **description: Any) -> Any:
     """Return a dataclass field for a setting that is a color; see `Color` and `Setting`."""
     return _field(Color(default=default, text=text, **description))
+
+
+def fraction(default: float, text: str, **description: Any) -> Any:
+    """Return a dataclass field for a setting that is a number from 0 to 1; see `Number` and `Setting`."""
+    return number(default, 0.0, 1.0, text, **description)
 
 
 def _field(setting: Setting) -> Any:

@@ -65,7 +65,8 @@ class SingularityMatching(NamedTuple):
     Attributes
     ----------
     first, second : (M,) intp ndarray
-        The singularities of each pair, as indices into the list of the first and of the second field.
+        The singularities of each pair: positions in the list of singularities of the first field, and in
+        the list of the second field.
     distance : (M,) float64 ndarray
         Distance between the two singularities of each pair, in object space.
     """

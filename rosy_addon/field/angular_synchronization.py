@@ -114,8 +114,8 @@ def synchronize(graph: PhaseGraph, depth: int = 0) -> np.ndarray:
 def _smoothed(graph: PhaseGraph, z: np.ndarray, inertia: np.ndarray) -> np.ndarray:
     """Return the values after a smoothing step: weighted means, normalized to modulus 1.
 
-    Each mean is over the values that the neighbors of a node demand, and over its old value with the weight
-    `inertia`.
+    `z` holds the (n,) old values. Each mean is over the values that the entries of a node demand, and over
+    its old value. `inertia` holds the (n,) weights of the old values.
     """
     neighbor = z.take(graph.column)
     terms = graph.a * neighbor
@@ -147,9 +147,10 @@ class _Clustering(NamedTuple):
 
 
 def _clustering(graph: PhaseGraph) -> _Clustering:
-    """Group the nodes of a graph into pairs along their strongest edges, and into larger clusters.
+    """Group the nodes of a graph into clusters: pairs along strong entries, and nodes that join a pair.
 
-    A node that found no partner joins the pair of a neighbor.
+    A node without a partner joins the pair of a neighbor that is the first node of its pair. If there is no
+    such neighbor, the node is a cluster of its own.
     """
     count = graph.node_count
     # A random factor makes the strengths distinct, so that many nodes find a partner in each round.

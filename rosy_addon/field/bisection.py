@@ -228,8 +228,9 @@ def _replaced(
 ) -> np.ndarray:
     """Return an array of the leaves after a split, with one element for each new leaf.
 
-    `first` and `second` hold the values of the first and the second child of each leaf in `parent`. The first
-    child takes the place of its parent. The second children are appended.
+    `leaves` holds one element for each leaf before the split, and is changed. `parent` holds the indices of
+    the leaves that are split. `first` and `second` hold the elements of their first and second children. The
+    first child takes the place of its parent. The second children are appended.
     """
     leaves[parent] = first
     return np.concatenate([leaves, second])

@@ -105,7 +105,9 @@ def _spread(graph: FaceGraph, given: np.ndarray) -> np.ndarray:
 def _settled(graph: FaceGraph, degree: int, given: np.ndarray, added: np.ndarray) -> np.ndarray:
     """Return the (n,) int64 indices of added singularities after moving them to where they add least energy.
 
-    They are also moved away from the given singularities. The index is 0 at nodes without a singularity.
+    `given` and `added` hold the (n,) indices of the given singularities, which stay, and of the added ones
+    before they are moved. No added singularity stays at a given one, if possible. The index is 0 at nodes
+    without a singularity.
     """
     if not added.any():
         return added
@@ -159,10 +161,11 @@ class _Neighbors:
         unit : float
             Angle in radians that an index of 1 stands for: 2 pi / N.
         potential : (n,) float64 ndarray
-            Solution of the Poisson equation whose right-hand side is the angle of each singularity, see
-            `turning_angles.potential_solver`. Its difference between two nodes says how the energy changes.
+            Result of `turning_angles.potential_solver` for the right-hand side ``unit * (given + added)``
+            minus the angle defects. Its difference between two nodes says how the energy changes.
         share : float
-            Fraction of these singularities that are moved, from 0 to 1; at least one is.
+            Fraction of the possible moves that are made in this round, from 0 to 1; at least one is made. The
+            moves that reduce the energy most are made first.
         """
         moves = []
         for node in np.flatnonzero(added).tolist():

@@ -128,7 +128,7 @@ class _ClosestSearch:
     def distance_to_cell_border(self, selection: np.ndarray) -> np.ndarray:
         """Return (k,) distances, in object space, of selected points from the nearest side of their cell.
 
-        They are 0 for points outside of the grid.
+        `selection` holds the (k,) indices of the points. Distances are 0 for points outside of the grid.
         """
         points = self.points[selection]
         fraction = self._in_cells(points) - self._cells_of(points)
@@ -137,7 +137,8 @@ class _ClosestSearch:
     def search_ring(self, selection: np.ndarray, ring: int) -> None:
         """Test the selected points against the triangles in one ring of cells around the cell of each point.
 
-        `ring` is the distance of the ring in cells; 0 is the cell of the point.
+        `selection` holds the (k,) indices of the points. `ring` is the distance of the ring in cells; 0 is
+        the cell of the point.
         """
         side = np.arange(-ring, ring + 1)
         offset = np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -162,7 +163,8 @@ class _ClosestSearch:
     ) -> np.ndarray:
         """Return the distances of the k selected points from c cells each, as a (k c,) array.
 
-        The cells are given by (c, 3) offsets from the cell of each point.
+        `selection` holds the (k,) indices of the points, and `own_cell` their (k, 3) cells. The c cells are
+        given by (c, 3) offsets from the cell of each point.
         """
         size = self.cell_size
         position = (self.points[selection] - self.origin - own_cell * size)[:, None]

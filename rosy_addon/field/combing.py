@@ -429,9 +429,11 @@ class BrushStroke:
             self._comb(face, distance, direction[is_reached])
 
     def _begin_passes(self, face: np.ndarray, arc_length: float) -> None:
-        """Begin a new pass over faces that the stroke has never reached, or left `PASS_GAP` radii ago.
+        """Begin a new pass over faces that the stroke reaches for the first time, or again after a gap.
 
-        The effect of a pass is applied to the guides that the face had when the pass began.
+        `arc_length` is the arc length of the stroke up to the end of the segment that is drawn, in object
+        space. A gap is an arc length of more than `PASS_GAP` brush radii in which the stroke does not reach
+        the face. The effect of a pass is applied to the guides that the face had when the pass began.
         """
         is_new = face[arc_length - self._last_arc_length[face] > PASS_GAP * self._brush.radius]
         self._last_arc_length[face] = arc_length

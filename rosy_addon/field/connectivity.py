@@ -146,10 +146,10 @@ def connected_components(count: int, pairs: np.ndarray) -> np.ndarray:
 
 
 def _lower(values: np.ndarray, index: np.ndarray, limits: np.ndarray) -> None:
-    """Do the same as ``np.minimum.at(values, index, limits)``, but faster, for limits below the values.
+    """Lower values in place, like ``np.minimum.at(values, index, limits)``, but faster.
 
-    Two plain assignments are enough for indices that occur once or twice, and most indices do. The others are
-    left to ``np.minimum.at``.
+    No limit may be above the value at its index. Two plain assignments are enough for indices that occur once
+    or twice, and most indices do. The others are left to ``np.minimum.at``.
     """
     for _ in range(2):
         values[index] = limits

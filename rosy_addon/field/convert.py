@@ -121,7 +121,8 @@ def comb_members(surface: Surface, field: RosyField, period: int) -> np.ndarray:
     surface : Surface
     field : RosyField
     period : int
-        A divisor of N. Members k and l of a face are equivalent if k - l is a multiple of it.
+        A divisor of N. Members k and l of a face are equivalent if k - l is a multiple of it. The chosen
+        members of neighboring faces match up to equivalence, except across seams (see `change_degree`).
 
     Returns
     -------

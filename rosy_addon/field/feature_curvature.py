@@ -142,7 +142,11 @@ def noise_sample(surface: Surface, noise_angle: float) -> np.ndarray:
 
 
 def _roughness(points: np.ndarray, normal: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Return the (V,) components along the normals of the bi-Laplacian of points, with equal edge weights."""
+    """Return (V,) float64: the Laplacian of the normal component of the Laplacian of (V, 3) points.
+
+    The Laplacian of a value is its difference from the mean of its neighbors. `normal` holds the (V, 3) unit
+    normals of the points, and `ends` the (E, 2) pairs of neighboring points: the ends of the edges.
+    """
     tail, head = ends.T
     degree = np.maximum(np.bincount(ends.ravel(), minlength=len(points)), 1)
 

@@ -263,8 +263,9 @@ def firmness_weights(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Convert the firmness of guides (how strictly a field follows them, from 0 to 1) to penalty weights.
 
-    The influence of a guide of firmness 1/2 falls off over the mean length of an edge. A guide of firmness 1
-    is followed exactly if `reach` is 0.
+    The weight w of a guide of firmness f satisfies ``1 / w = reach**2 + edge_length**2 * (1 / f - 1)``. The
+    influence of the guide falls off over the distance 1 / sqrt(w). If `reach` is 0, this is the mean length
+    of an edge for the firmness 1/2, and a guide of firmness 1 is followed exactly.
 
     Parameters
     ----------
@@ -273,7 +274,8 @@ def firmness_weights(
     edge_length : float
         Mean length of the edges, in object space.
     reach : float
-        Distance over which guides are smoothed, in object space. It adds to the effect of the firmness.
+        Distance over which the influence of a guide of firmness 1 falls off, in object space. A greater
+        distance makes all weights smaller, so guides are smoothed more.
 
     Returns
     -------

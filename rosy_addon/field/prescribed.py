@@ -172,8 +172,10 @@ def _turning(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the turning angles and directions of a field with given singularity indices.
 
-    See `turning_angles` for the result. `defect` holds the (n,) angle defects of the vertex nodes. If an
-    existing field is changed, `present` holds its turning angles.
+    For a new field, `index` holds the singularity indices of the vertices, and `defect` the (n,) angle
+    defects of the vertex nodes. If an existing field is changed, `index` holds the changes of its indices,
+    `defect` is 0, and `present` holds its (I,) turning angles in radians. For the result, see
+    `turning_angles`.
     """
     node_index = index_at_nodes(graph, vertex, index)
     _check_sums(graph, defect * (degree / (2 * np.pi)), node_index, degree)
@@ -193,7 +195,11 @@ def _bent(
     target: np.ndarray,
     reach: float,
 ) -> np.ndarray:
-    """Return (F,) representations z after rotating them toward a target, with the same singularities."""
+    """Return (F,) representations z after rotating them toward a target, with the same singularities.
+
+    `target` holds the (F,) representations to reach, and `turning` the (I,) turning angles of the field z
+    (see `guided_rotation`). The influence of the target falls off over the distance `reach`, in object space.
+    """
     penalty = graph.surface.face_area / reach / reach
     angle = guided_rotation(graph, degree, turning, z, target, penalty)
     _check_angles(graph, degree, turning + angle[graph.target] - angle[graph.source])

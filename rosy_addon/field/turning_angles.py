@@ -112,10 +112,13 @@ def turning_angles(
 def _least_angles_near(
     graph: FaceGraph, required: np.ndarray, loops: Loops, angle: np.ndarray, changed: np.ndarray
 ) -> np.ndarray | None:
-    """Return (I,) least-squares angles that differ from `angle` only near the edges `changed`.
+    """Return (M,) turning angles: least-squares angles near some edges, and the old angles elsewhere.
 
-    The result is None if the sum of the angles around a loop would change. That can happen if the changed
-    neighborhood surrounds a part of the surface.
+    `graph` is the graph of triangles with M edges, and `loops` is the result of `_loops` for it. `angle`
+    holds the (M,) old turning angles. `changed` holds the indices of edges whose conductances have changed;
+    angles within `REACH` edges of them are computed again. For `required`, see `turning_angles`. The result
+    is None if the sum of the angles around a loop would change. That can happen if the changed neighborhood
+    surrounds a part of the surface.
     """
     is_near = mask(graph.node_count, np.stack([graph.tail[changed], graph.head[changed]]))
     for step in range(REACH):
@@ -147,8 +150,9 @@ def _least_angles_near(
 def added_resistance(angle: np.ndarray, present: np.ndarray | float, limit: float) -> np.ndarray:
     """Return (I,) factors for the resistances of edges, which make angles smaller where they are too large.
 
-    The resistance of an edge is its weight in the sum of squares. `angle` is added to the `present` angles.
-    Factors are 1 where the sum of both is clearly below `limit`, and greater elsewhere.
+    The resistance of an edge is its weight in the sum of squares. `angle` and `present` hold the (I,) added
+    and present turning angles, in radians. A factor is 1 unless the added angle brings the modulus of the sum
+    near to `limit` or above it.
     """
     room = np.maximum(limit - np.sign(angle) * present, MIN_ROOM * limit)
     return np.maximum(np.abs(angle) / (ANGLE_MARGIN * room), 1) ** 2
@@ -159,9 +163,10 @@ def least_angles(
 ) -> np.ndarray:
     """Return (M,) float64, each turning angle divided by the conductance of its edge.
 
-    The angles have the least sum of squares, each divided by the conductance. `graph` is the graph of
-    triangles with M edges (see `TriangleGraph`), and `loops` is the result of `_loops`. For the other
-    parameters, see `turning_angles`.
+    The angles have the least sum of squares, each divided by the conductance. `graph` has M edges: it is the
+    graph of triangles (`TriangleGraph.graph`) or, for a simpler solution, the graph of faces. `loops` is the
+    result of `_loops` for this graph, or empty to ignore loops. `present` holds (M,) turning angles of an
+    existing field at its edges, or is 0. For `degree` and `required`, see `turning_angles`.
     """
     with progress(0.0, 0.5):
         solver = potential_solver(graph)
@@ -221,9 +226,9 @@ def potential_solver(
 def _potential_matrix(graph: FaceGraph) -> CSRMatrix:
     """Return the Laplacian matrix of potentials at interior nodes. At all other nodes the potential is 0.
 
-    A closed component has no such nodes, so a constant could be added to its potential. To make the matrix
-    regular, the diagonal element of its first node is increased. This does not change the gradient of the
-    solution if the sums on the component add up to 0.
+    All nodes of a closed component are interior, so a constant could be added to its potential. To make the
+    matrix regular, the diagonal element of the first node of the component is increased. This does not change
+    the gradient of the solution if the sums on the component add up to 0.
     """
     unknown = np.cumsum(graph.is_interior) - 1
     tail, head, conductance = graph.tail, graph.head, graph.conductance
@@ -269,7 +274,9 @@ def _nearest_lattice_coefficients(matrix: np.ndarray, sums: np.ndarray, turn: fl
 def _loops(graph: FaceGraph, tree: SpanningForest) -> Loops:
     """Find the loops of faces that cannot be contracted to a vertex, by a tree-cotree decomposition.
 
-    The result has, for each loop, the edges that it crosses, and the direction of each crossing as 1 or -1.
+    For each loop, the result has two arrays: the edges that the loop crosses, and the sign of each crossing.
+    The sign is 1 from the source of the edge to its target, and -1 in the opposite direction.
+
     There is one loop for each edge that is neither in the spanning forest `tree` of the faces nor in a
     spanning forest of the vertices. In the latter, all border nodes of a component count as one node.
     """

@@ -166,7 +166,10 @@ def _header(path: Path, data: bytes) -> tuple[str, list[_Element], int]:
 
 
 def _declare(place: str, kind: str, earlier: list[Any], new: _Element | _Property) -> None:
-    """Append an element or a property. Raise a `RosyError` if an earlier one has the same name."""
+    """Append an element or a property. Raise a `RosyError` if an earlier one has the same name.
+
+    For the message, `place` is the file and line of the declaration, and `kind` is "element" or "property".
+    """
     if any(item.name == new.name for item in earlier):
         raise RosyError(f"{place}: {kind} '{new.name}' is declared twice")
     earlier.append(new)

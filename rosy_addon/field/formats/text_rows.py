@@ -51,7 +51,11 @@ class TextRows:
         return TextRows(self.path, words, self.line_numbers)
 
     def check_lengths(self, least: int, subject: str, noun: str, expected: str) -> None:
-        """Raise a `RosyError` if a row has fewer than `least` words; `noun` is the name of a word."""
+        """Raise a `RosyError` if a row has fewer than `least` words.
+
+        The message is "`subject` has COUNT `noun`, expected `expected`", such as "a face has 2 corners,
+        expected 3 or more".
+        """
         for row, words in enumerate(self.words):
             if len(words) < least:
                 found = counted(len(words), noun)
@@ -97,7 +101,10 @@ class TextRows:
         return int(np.searchsorted(ends, word, side="right"))
 
     def _parse(self, convert: Callable, dtype: type, expected: str) -> np.ndarray:
-        """Convert all words of all rows, or raise an error about the first word that cannot be converted."""
+        """Convert all words of all rows, or raise an error about the first word that cannot be converted.
+
+        `convert` is float or int. `expected` says in the message what a word should be, such as "a number".
+        """
         count = sum(map(len, self.words))
         values = np.empty(count, dtype=dtype)
         words = chain.from_iterable(self.words)
@@ -110,7 +117,10 @@ class TextRows:
         return values
 
     def _parse_error(self, convert: Callable, expected: str, first_row: int) -> RosyError:
-        """Return the error to raise for the first word that cannot be converted, from row `first_row` on."""
+        """Return the error to raise for the first word that cannot be converted, from row `first_row` on.
+
+        For `convert` and `expected`, see `_parse`.
+        """
         for row, words in enumerate(self.words[first_row:], first_row):
             for word in words:
                 try:

@@ -76,7 +76,10 @@ class Device:
         return self._gpu.types.GPUTexture(size, layers=layers, format=texel_format, **options)
 
     def batch(self, vertices: np.ndarray) -> Any:
-        """Return a vertex buffer of triangles from (3 T, 4) float32 corners."""
+        """Return a vertex buffer of triangles from (3 T, 4) float32 corners.
+
+        The last component of a corner is a number that vertex shaders read, such as the id of the triangle.
+        """
         layout = self._gpu.types.GPUVertFormat()
         layout.attr_add(id="vertex_data", comp_type="F32", len=4, fetch_mode="FLOAT")
         buffer = self._gpu.types.GPUVertBuf(layout, len(vertices))

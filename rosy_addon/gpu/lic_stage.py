@@ -111,9 +111,10 @@ def render_fields(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> None
 def _streaks(
     frame: Frame, kind: FieldKind, box: Box, textures: dict[str, Any], uniforms: dict[str, Any]
 ) -> Any:
-    """Return the filtered noise along the lines, for a look with ink.
+    """Return means along each line through a pixel, for a look with ink: one layer per line direction.
 
-    If the look uses no noise or tone along its lines, return an arbitrary texture, which is not read.
+    The channels are the means of the noise, of the noise that breaks lines, and of the tone. If the look
+    needs none of them, return an arbitrary texture, which is not read.
     """
     layers = kind.line_count
     has_streaks = not uniforms["even_lines"] or uniforms["break_steps"] > 0
@@ -171,9 +172,12 @@ def _trace(
 def _unfold(frame: Frame, kind: FieldKind, box: Box) -> dict[str, Any]:
     """Render the covering of the fields of one kind, and return its images by name.
 
-    ``cells`` holds the phase and the noise of each pixel. ``directions`` has a layer for each line
-    direction, with its vector on screen. ``angle_gradients`` has the same layers: x and y of the vector,
-    and the derivatives of its angle along x and y, in radians per pixel.
+    ``cells`` holds the phase and the noise of each pixel. The phase is 2 plus the angle of a member, in turns
+    from the guiding angle and with wobble, times the number of sheets. Its lowest bits are a mask of the
+    neighbors to which the field continues. It is 0 at pixels without a field of this kind.
+
+    ``directions`` has a layer for each line direction, with its vector on screen. ``angle_gradients`` has the
+    same layers: x and y of the vector, and the derivatives of its angle along x and y, in radians per pixel.
     """
     lines = kind.line_count
     cell_format = "RG32F" if noise_args(frame.look)["channels"] == 1 else "RGBA32F"

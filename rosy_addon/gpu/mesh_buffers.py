@@ -259,9 +259,11 @@ def _write_records(
     `CornerField.representation`, and each channel has two further texels: six components are the real and
     imaginary parts at the three corners, the seventh is the result of `field_channel.rotation_order`, and
     the eighth is the layer of the channel (0 for the representation). `numbers`, the (T, 3) values for the
-    color map, have one texel. Its last component is 1 if all three values are finite. A tone with
-    (T, 3, 1 or 2) values has two texels. Of the `rest_positions`, x is in the fourth
-    components of the positions, y in the fourth components of the normals, and z in the last texel.
+    color map, have one texel. Its last component is 1 if all three values are finite. `tone`, the
+    `SurfaceTone.values` at the corners, (T, 3, 1) or (T, 3, 2), has two texels: each corner has two
+    components. Of the `rest_positions`, x is in the fourth components of the positions, y in the fourth
+    components of the normals, and z in the last texel. `corners` has the (T, 3, 4) rows of
+    `MeshBuffers.corners`.
     """
     rest = rest_positions(surface)
     channel_values = [corner_field.channels.get(channel) for channel in channels]

@@ -70,7 +70,10 @@ def _render_wobble(frame: Frame) -> None:
 
 
 def _surface_noise(frame: Frame, settings: dict[str, Any], name: str) -> Any:
-    """Return an image of noise that moves with the surfaces, as `surface_noise.surface_noise` with numpy."""
+    """Return an image of noise that moves with the surfaces, as `surface_noise.surface_noise` with numpy.
+
+    `settings` are the arguments of that function, and `name` is the name of the image.
+    """
     raw_noise = frame.image("raw_noise")
     frame.clear(raw_noise)
     shared_uniforms = surface_noise_uniforms(settings)
@@ -91,7 +94,10 @@ def _surface_noise(frame: Frame, settings: dict[str, Any], name: str) -> Any:
 
 
 def _high_passed(frame: Frame, raw_noise: Any, high_pass: float, name: str) -> Any:
-    """Return an image of the noise minus its mean; if `high_pass` is not 0, also without low frequencies."""
+    """Return an image of the noise minus its mean; if `high_pass` is not 0, also without low frequencies.
+
+    Variations wider than about `high_pass` pixels are removed. `name` is the name of the image.
+    """
     blurred = raw_noise
     if high_pass:
         radius = box_radius(BLUR_FACTOR * high_pass)

@@ -194,6 +194,8 @@ class GpuResources:
     ) -> OutlineTextures | Preparation:
         """Look up the creases and connected components of the mesh of an item, or return a `Preparation`.
 
+        `crease_angle` is in radians; see `outline_records`.
+
         Raises
         ------
         RosyError
@@ -332,7 +334,10 @@ class GpuResources:
     def _rows_texture(
         self, rows: np.ndarray, surface: Surface, what: str, remedy: str = "choose the processor"
     ) -> Any:
-        """Return (rows, `ROW_TEXELS`, 4) values as a texture; raise a `RosyError` if they do not fit."""
+        """Return (rows, `ROW_TEXELS`, 4) values as a texture; raise a `RosyError` if they do not fit.
+
+        The message names the surface, says that there are too many of `what`, and gives the advice `remedy`.
+        """
         if len(rows) > self.device.max_texture_size:
             raise RosyError(f"{surface.name}: {what} are too many for this graphics card: {remedy}")
         return self._texture(rows)

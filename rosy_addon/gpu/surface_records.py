@@ -24,6 +24,16 @@ def line_records(
 ) -> tuple[np.ndarray, int, int]:
     """Compute the evenly spaced lines of a mesh instance with `surface_lines.cached_surface_lines`.
 
+    Parameters
+    ----------
+    surface : Surface
+    matrix : (4, 4) ndarray
+        Object to world space.
+    field : RosyField
+    display : {"smooth", "flat"}
+    spacing : float
+        Distance between lines in world space, in Blender units.
+
     Returns
     -------
     rows : (rows, ROW_TEXELS, 4) float32 ndarray

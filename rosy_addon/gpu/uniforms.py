@@ -206,7 +206,8 @@ def light_view_uniforms(light_view: Camera, camera: Camera) -> dict[str, Any]:
     """Return the uniforms that look up a shadow map: two matrices, as rows, and the normal bias.
 
     The first matrix maps camera space to the camera space of the light, the second maps the latter to x and y
-    of the light's clip space. The bias is in Blender units, for a perspective light at depth 1.
+    of the light's clip space. The bias is in Blender units. If the light's camera is perspective, it is the
+    bias at depth 1, which the shader multiplies by the depth.
     """
     rotation, translation = camera.view[:3, :3], camera.view[:3, 3]
     camera_to_world = np.eye(4)

@@ -72,7 +72,10 @@ def with_marks(picture: Picture, view: ViewInput, cache: Cache | None = BAKE_CAC
 
 
 def view_arrows(view: ViewInput, cache: Cache | None, *, is_exact: bool = True) -> ArrowMarks:
-    """Return the arrowheads of a view. Its look must draw them (`Look.arrows` above 0); see `arrow_marks`."""
+    """Return the arrowheads of a view. Its look must draw them (`Look.arrows` above 0); see `arrow_marks`.
+
+    `is_exact` says whether all hidden arrowheads are removed, or only most of them, which is faster.
+    """
     look = pixel_look(view.look, view.camera, view.instances)
     return arrow_marks(
         view.instances,

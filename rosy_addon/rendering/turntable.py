@@ -103,7 +103,10 @@ def draw_next(view: ViewInput, cache: Cache, **options: Any) -> Picture:
 
 
 def check_still(look: Look, still: bool, name: str) -> None:
-    """Raise a `RosyError` if neither the camera nor the streaks of a turntable move."""
+    """Raise a `RosyError` if neither the camera nor the streaks of a turntable move.
+
+    `name` is the name of the object or mesh in the message.
+    """
     if still and not has_flow(look):
         raise RosyError(
             f"{name}: nothing moves: a still camera needs a look whose flow is above 0, with the method "

@@ -409,7 +409,10 @@ def remove_bakes(scene: bpy.types.Scene) -> RemovalCounts:
 
 
 def _clean_unused_meshes() -> None:
-    """Remove pictures from meshes without objects: meshes to which RoSy's modifier was applied keep its material."""
+    """Remove the materials and attributes of pictures from meshes that no object uses.
+
+    Such a mesh has them if the user applied RoSy's modifier to an object that no longer uses the mesh.
+    """
     used_data = {obj.data for obj in bpy.data.objects}
     for mesh in bpy.data.meshes:
         if mesh not in used_data:
@@ -434,7 +437,10 @@ def _remove_records(scene: bpy.types.Scene) -> int:
 
 @contextmanager
 def _object_mode(objects: Sequence[bpy.types.Object]) -> Iterator[None]:
-    """Context manager: leave edit mode during a block if an edited object has an applied picture."""
+    """Context manager: leave edit mode during a block if an edited object has an applied picture.
+
+    A picture is applied if the user has applied RoSy's modifier; see `remove_applied_picture`.
+    """
     is_editing = bpy.context.mode == "EDIT_MESH" and any(
         obj.mode == "EDIT" and has_applied_picture(obj.data) for obj in objects
     )

@@ -164,7 +164,10 @@ def write_frame(path: Path, image_data: ImageData) -> None:
 
 
 def load_sequence(path: Path, as_float: bool) -> bpy.types.Image:
-    """Load an image sequence as one Blender image, from the path of its first frame."""
+    """Load an image sequence as one Blender image, from the path of its first frame.
+
+    `as_float` says whether the files have linear values (.exr) instead of 8-bit sRGB (.png).
+    """
     image = bpy.data.images.load(str(path), check_existing=False)
     image.source = "SEQUENCE"
     image.alpha_mode = "CHANNEL_PACKED"

@@ -53,8 +53,8 @@ class BrushSurface:
         """Return the point of the original mesh under a ray, (3,) float32 in object space; None for a miss.
 
         The ray is in world space, and is intersected with the evaluated mesh. The hit is mapped to the
-        original mesh by its barycentric coordinates in a triangle. If modifiers change the faces, that is the
-        triangle of the original mesh, with the vertices moved by the modifiers, that is closest to the hit.
+        original mesh by its barycentric coordinates in a triangle of the face that was hit. If modifiers
+        change the faces, the triangle closest to the hit in `_shown_tree` is taken instead.
         """
         to_object = self._obj.matrix_world.inverted_safe()
         is_hit, location, _, face = self._evaluated.ray_cast(
@@ -128,7 +128,10 @@ class BrushSurface:
 
     @cached_property
     def _shown_tree(self) -> BVHTree:
-        """The triangles of the original mesh, with the vertices moved by the modifiers."""
+        """Search tree of the original mesh's triangles, with the vertices where modifiers have moved them.
+
+        The moved vertices are the first V vertices of the evaluated mesh; see `mesh_of_own_vertices`.
+        """
         triangles = self._surface.triangle_vertex.tolist()
         return BVHTree.FromPolygons(self._shown.tolist(), triangles, all_triangles=True)
 
@@ -150,7 +153,8 @@ def _deformed(
 ) -> np.ndarray:
     """Map (n, 3) directions in the planes of triangles by the linear maps from `rest` to `shown` positions.
 
-    `vertex` has the (n, 3) vertex indices of the triangles. The result is (n, 3).
+    `vertex` has the (n, 3) vertex indices of the triangles. `rest` and `shown` are (V, 3) vertex positions.
+    The result is (n, 3).
     """
     (a, b), (shown_a, shown_b) = (
         (points[vertex[:, 1]] - points[vertex[:, 0]], points[vertex[:, 2]] - points[vertex[:, 0]])

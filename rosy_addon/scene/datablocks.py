@@ -89,7 +89,7 @@ def delete_unused() -> int:
 
 
 def check_object_type(obj: bpy.types.Object, kind: Literal["MESH", "CAMERA"]) -> None:
-    """Check that an object has a type, and that it is not a placeholder for a missing one.
+    """Check that an object has a type, and that it is not a placeholder for a missing object.
 
     Raises
     ------

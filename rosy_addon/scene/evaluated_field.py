@@ -142,7 +142,21 @@ def _transport(
     source: str,
     nonfinite: str,
 ) -> np.ndarray:
-    """Return the vectors, (F, 3) float64, transported from the original to the evaluated faces."""
+    """Return vectors, (F, 3) float64, transported from the original to the evaluated faces.
+
+    Parameters
+    ----------
+    values : (F, 3) ndarray
+        The vectors that modifiers copied to the evaluated faces.
+    source_normals : (F, 3) ndarray or None
+        The normal of the original face of each evaluated face. None: vectors are only projected.
+    surface : Surface
+        Surface of the evaluated mesh.
+    source : str
+        Name of the attribute in messages.
+    nonfinite : {"error", "zero"}
+        See `read_evaluated_field`.
+    """
     label = "reading the field"
     vectors = as_float64(values)
     apply_nonfinite_policy(vectors, source, "face", nonfinite)
@@ -226,7 +240,10 @@ def temp_attributes(
 def _prepare_field(
     obj: bpy.types.Object, nonfinite: str, temp_meshes: list[bpy.types.Mesh], cache: Cache
 ) -> FieldLayout:
-    """Return the layout of the field of an object as vectors on faces; add temporary attributes if needed."""
+    """Return the layout of the field of an object as vectors on faces; add temporary attributes if needed.
+
+    If attributes are added to the mesh of the object, the mesh is appended to `temp_meshes`.
+    """
     mesh, label = obj.data, f"object '{obj.name}'"
     if mesh.is_editmode and is_face_vector_field(mesh):  # only the evaluated mesh can be read
         return FieldLayout(attribute_name(mesh), field_degree(mesh))

@@ -78,6 +78,8 @@ def _has_attribute(mesh: bpy.types.Mesh, name: str, domain: str, data_type: str)
 def field_values(attribute: bpy.types.Attribute, source: str, mesh: bpy.types.Mesh) -> np.ndarray:
     """Return the values of a field attribute: (n, 3) vectors or (n,) angles, float32.
 
+    `source` is the name of the attribute in messages.
+
     Raises
     ------
     RosyError

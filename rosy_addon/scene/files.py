@@ -70,9 +70,10 @@ def picture_stem(name: str, kind: str = "camera") -> str:
     texture. For a texture, `kind` says what it shows, such as "texture" or "flow", and ends the stem.
 
     Characters that file systems do not allow become underscores, and long names are cut. Two names may then
-    have the same stem, perhaps except for case, which some file systems ignore. In that case the first of
-    them has the plain stem, and the stems of the others end in a hash. The order depends only on the names in
-    the .blend file, so all processes agree.
+    have stems that some file systems treat as equal, for example because they ignore case. The first of the
+    names then has the plain stem, and the stems of the others end in a hash. Names that were not changed come
+    first, then the order is alphabetical. It depends only on the names in the .blend file, so all processes
+    agree.
     """
     siblings = {("camera", obj.name) for obj in bpy.data.objects if obj.type == "CAMERA"}
     siblings |= {("scene", scene.name) for scene in bpy.data.scenes}

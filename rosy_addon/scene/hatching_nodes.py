@@ -135,7 +135,10 @@ def _new_hatching_group() -> bpy.types.NodeTree:
 
 
 def _build_hatching(build: NodeBuilder, source: Any) -> None:
-    """Add the nodes between the inputs and the outputs of the group."""
+    """Add the nodes between the inputs and the outputs of the group.
+
+    `source` has the output sockets of the Group Input node.
+    """
 
     def number(name: str) -> Number:
         return Number(build, source[name])
@@ -196,7 +199,10 @@ def _build_hatching(build: NodeBuilder, source: Any) -> None:
 
 
 def _tone(number: Any) -> Number:
-    """Return the input Tone, changed by the strength of the shading and by the tone curve."""
+    """Return the input Tone, changed by the strength of the shading and by the tone curve.
+
+    `number` is a function that returns the input with a name as a `Number`.
+    """
     shading = number("Shading")
     tone = 1 - shading + shading * number("Tone")
     black, white = number("Black"), number("White")

@@ -123,7 +123,10 @@ def _lines(text: str) -> str:
 
 
 def _scale_bar(scene: bpy.types.Scene, view: Camera, width: int) -> tuple[float, str] | None:
-    """Return the length of the scale bar in pixels and its label; None for perspective cameras."""
+    """Return the length of the scale bar in pixels and its label; None for perspective cameras.
+
+    `width` is the width of the picture of the key in pixels. The picture fills the frame of the camera.
+    """
     if view.projection[3, 2] != 0:
         return None
     frame = 2 / abs(view.projection[0, 0])  # width in Blender units

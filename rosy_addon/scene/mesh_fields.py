@@ -158,7 +158,10 @@ def _field_from_directions(
 def _field_from_angles(
     surface: Surface, angles: np.ndarray, degree: int, source: str, nonfinite: str
 ) -> RosyField:
-    """Return a field from (F,) angles between its members and the first edges of faces, in radians."""
+    """Return a field from (F,) angles between its members and the first edges of faces, in radians.
+
+    `source` is the name of the attribute in messages.
+    """
     x, y = surface.face_frames
     report(0.5, "reading the field")
     angles = as_float64(angles)
@@ -171,7 +174,11 @@ def _field_from_angles(
 def _field_from_corners(
     surface: Surface, vectors: np.ndarray, degree: int, source: str, nonfinite: str
 ) -> RosyField:
-    """Return a field from vectors on face corners: project them to the face, and average them as RoSys."""
+    """Return a field from (C, 3) vectors on face corners, averaged over each face.
+
+    The vectors are projected to the face. Their representations z are averaged, so that different members at
+    the corners of a face do not cancel out. `source` is the name of the attribute in messages.
+    """
     vectors = as_float64(vectors)
     apply_nonfinite_policy(vectors, source, "corner", nonfinite)
     normal = surface.face_normal

@@ -32,7 +32,10 @@ REST_ATTRIBUTE = "rest_position"
 
 
 def mesh_label(mesh: bpy.types.Mesh) -> str:
-    """Return the name of a mesh for messages: that of an object that uses it, preferably a selected one."""
+    """Return the name of a mesh for messages: the name of an object that uses it, if there is one.
+
+    Selected objects are preferred.
+    """
     users = [obj for obj in bpy.data.objects if obj.data == mesh]
     if not users:
         return f"mesh '{mesh.name}'"

@@ -305,7 +305,7 @@ def _applied_attributes(data: bpy.types.ID | None) -> list[str]:
 
 
 def _restore_material_indices(mesh: bpy.types.Mesh) -> None:
-    """Give the faces that show a picture the material index that they had before."""
+    """Give the faces that show a picture the material index that they had without RoSy's modifier."""
     shows_picture = np.array([_is_picture(material) for material in mesh.materials], dtype=bool)
     index = read_attribute(mesh, "material_index", np.int32, 1)
     earlier_index = read_attribute(mesh, MATERIAL_ATTRIBUTE, np.int32, 1)

@@ -220,8 +220,9 @@ class SceneState:
     ) -> dict[str, _Instances]:
         """Return the objects without a field that may change the picture, by name.
 
-        If shadows are drawn, all of them may. Otherwise, only objects with a bounding box that may hide a
-        part of the bounding box of an object with a field are returned.
+        If shadows are drawn, or no picture can be drawn from the camera (None), all of them are returned.
+        Otherwise, only objects with a bounding box that may hide a part of the bounding box of an object with
+        a field are returned.
         """
         if casts_shadows or camera is None:
             return self._occluders

@@ -165,9 +165,10 @@ def _object_difference(
     recorded, present : dict of str to list of str
         The same attribute of two `PictureState`: digests by the names of objects.
     kind : str
-        Text before the names. If it is empty, the result tells moved objects from changed ones.
+        Text before the names, such as "light ". If it is empty, an object of which only the transform has
+        changed is called moved instead of changed.
     of_mesh : str
-        Text before the name of an object with a changed mesh.
+        Text before the name of an object with a changed mesh, such as "the mesh or field of ".
     """
     if sorted(recorded.values()) == sorted(present.values()):
         return ""

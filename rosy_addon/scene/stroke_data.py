@@ -144,7 +144,19 @@ def new_grease_pencil(
 def _add_to_drawing(
     frame: Any, counts: np.ndarray, points: np.ndarray, radius: np.ndarray, material_index: int
 ) -> None:
-    """Add strokes to a frame of a Grease Pencil layer, in Blender 4.3 and later."""
+    """Add strokes to a frame of a Grease Pencil layer, in Blender 4.3 and later.
+
+    Parameters
+    ----------
+    frame : GreasePencilFrame or GPencilFrame
+    counts : (S,) ndarray
+        Number of points of each stroke.
+    points : (n, 3) float32 ndarray
+        The points of all strokes, stroke by stroke; see `StrokeGeometry`.
+    radius : (n,) float32 ndarray
+        Radius at each point, in Blender units.
+    material_index : int
+    """
     drawing = frame.drawing
     drawing.add_strokes(counts.tolist())
     set_attribute(drawing, "position", "FLOAT_VECTOR", "POINT", points)
@@ -158,7 +170,7 @@ def _add_to_drawing(
 def _add_to_frame(
     frame: Any, counts: np.ndarray, points: np.ndarray, radius: np.ndarray, material_index: int
 ) -> None:
-    """Add strokes to a frame of a Grease Pencil layer, before Blender 4.3.
+    """Add strokes to a frame of a Grease Pencil layer, before Blender 4.3; see `_add_to_drawing`.
 
     In these versions, the width at a point is the integer width of the stroke times the pressure at the
     point.
@@ -269,7 +281,8 @@ def _weighted_mean(
 ) -> bpy.types.NodeSocket:
     """Add nodes that interpolate a vector of a mesh in the triangle of each point, and return their output.
 
-    `kind` is the type of the input node of the vector.
+    `kind` is the type of the node that reads the vector on the mesh, such as "GeometryNodeInputNormal". The
+    outputs of the node `weights` are the barycentric coordinates of the point.
     """
     value, terms = build(kind).outputs[0], []
     types = {"data_type": "FLOAT_VECTOR", "domain": "POINT"}

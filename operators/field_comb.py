@@ -23,7 +23,7 @@ MODES = ("OBJECT", "SCULPT")
 
 
 class RosyStrokePoint(bpy.types.PropertyGroup):
-    """A point of a stroke."""
+    """A point of a stroke: its location on the mesh in object space, and the pressure of the pen."""
 
     location: bpy.props.FloatVectorProperty(
         name="Location",

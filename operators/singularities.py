@@ -74,7 +74,7 @@ def _hide(context: bpy.types.Context, objects: list[bpy.types.Object]) -> None:
 
 
 def _reach() -> Any:
-    """Return the property for the distance over which directions change, relative to the size of the mesh.
+    """Return the property for the distance over which directions change, relative to `Surface.extent`.
 
     ``rosy.drag_singularity`` passes its value on to ``rosy.field_singularities``.
     """

@@ -74,11 +74,11 @@ class Comparison:
     def rows(self) -> list[dict[str, Any]]:
         """Measurements of each field, with angles in degrees.
 
-        Keys are title, degree, energy, and numbers of singularities: singularities (all), positive and
-        negative. Fields with a difference from the first one have more keys. These are mean, rms, p95,
-        max, worst_face, worst_position (the center of that face) and compared; see `Difference`. Then
-        matched is the number of singularities that match, and matched_distance is their mean distance in
-        units of the mesh (None if no singularities match).
+        Keys are title, degree, energy (see `Field.energy`), and numbers of singularities: singularities
+        (all), positive and negative. Fields with a difference from the first one have more keys. These are
+        mean, rms, p95, max, worst_face, worst_position (the center of that face) and compared; see
+        `Difference`. Then matched is the number of singularities that match, and matched_distance is their
+        mean distance in units of the mesh (None if no singularities match).
         """
         return [self._row(title, field) for title, field in self.fields.items()]
 
@@ -165,7 +165,8 @@ def compare(
         "field 2" and so on.
     reach : float
         Singularities of two fields match if they have the same index and are at most this far apart, as a
-        fraction of the longest side of the mesh. Each matches at most one other; near pairs come first.
+        fraction of the longest side of the mesh. The nearest pairs are matched first. Each singularity is in
+        at most one pair.
 
     Raises
     ------

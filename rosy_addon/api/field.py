@@ -173,7 +173,9 @@ def from_directions(surface: Surface, directions: ArrayLike, *, nonfinite: str =
 def from_tensors(surface: Surface, tensors: ArrayLike, *, nonfinite: str = "error") -> Field:
     """Make a field of degree 4 from the eigenvectors of a symmetric tensor on each face.
 
-    The tensors are projected to the faces. The major and the minor directions stay distinct.
+    The tensors are projected to the faces. The major and the minor directions are two families of lines.
+    Their lengths are the absolute values of the two eigenvalues in the plane of the face. Where these
+    eigenvalues are equal, the field is undefined.
 
     Parameters
     ----------

@@ -299,7 +299,8 @@ def _instances(
     Raises
     ------
     RosyError
-        If there is not one array of values for each field, or for the same reasons as `render`.
+        If there is not one array of values for each field (the message begins with `name`), or for the same
+        reasons as `render`.
     """
     if color_values is None or isinstance(color_values, str):
         values: Sequence[str | ArrayLike | None] = [color_values] * len(fields)
@@ -331,7 +332,10 @@ def _figure_look(
 def _panel_camera(
     points: NDArray[np.float64], view: tuple[float, float], width: int, *, perspective: bool
 ) -> Camera:
-    """Return the camera of all panels. The height of its picture fits the points that it shows."""
+    """Return the camera of all panels, which shows (n, 3) points in world space.
+
+    Its picture has a given width in pixels. The height fits the points.
+    """
     right, up, _ = orbit_basis(*view) @ points.T
     aspect = np.clip(np.ptp(up) / max(float(np.ptp(right)), 1e-30), MIN_ASPECT, MAX_ASPECT)
     height = max(round(width * float(aspect)), 1)

@@ -169,7 +169,7 @@ class Film:
     keeps_anchor : bool
         Whether the setting `anchor` of the look is used even if the mesh moves.
     name : str
-        For messages.
+        Name of the film, with which error messages begin.
 
     Raises
     ------
@@ -290,6 +290,8 @@ class Film:
 
     def _check(self, number: int, field: Field, previous: Field) -> bool:
         """Return whether a field has the polygons of the previous field.
+
+        `number` is the position of the field in the series, from 0, for messages.
 
         Raises
         ------

@@ -332,7 +332,7 @@ def upright_instance(
 ) -> MeshInstance:
     """Return a surface with a field as a mesh instance, with its upward axis along z of world space.
 
-    The parameters are those of `render`.
+    The parameters are as in `render`.
     """
     tone = _surface_tone(surface, tone_values, tone_image)
     numbers = corner_numbers(surface, color_values)
@@ -408,7 +408,7 @@ def _at_corners(
 def _named_array(
     surface: Surface, name: str, data: Mapping[str, NDArray[Any]], kind: str, kinds: str
 ) -> NDArray[Any]:
-    """Return an array of a surface by name. Errors call such arrays `kind` and `kinds` (plural)."""
+    """Return an array by name. `kind` and `kinds` are the words for one or several arrays in messages."""
     if name in data:
         return data[name]
     if not data:

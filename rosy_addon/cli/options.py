@@ -119,7 +119,8 @@ class CommandParser(argparse.ArgumentParser):
     def only_for(self, kind: str) -> Iterator[None]:
         """Context manager: note that the options added in its block are only for one kind of file.
 
-        With other files, `Options.check_only_for` raises an error if one of these options is given.
+        `kind` is the name of these files in messages, such as ".svg files". With other files,
+        `Options.check_only_for` raises an error if one of these options is given.
         """
         first = len(self._actions)
         yield

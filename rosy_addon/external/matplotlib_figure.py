@@ -205,7 +205,7 @@ class Page:
         return self._figure.add_axes(place)
 
     def _text(self, left: float, top: float, text: str, size: float, **options: object) -> None:
-        """Write a line of text. Its upper left corner is at (`left`, `top`), in inches."""
+        """Write a line of text with its upper left corner at (`left`, `top`), inches. `size` is in points."""
         baseline = top + 0.8 * _text_height(size)
         place = left / self.width, 1 - baseline / self._height
         self._figure.text(*place, text, fontsize=size, color=INK, va="baseline", **options)

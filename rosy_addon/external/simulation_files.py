@@ -255,7 +255,7 @@ def _times(reader: Any) -> Sequence[float]:
 
 
 def _read_dataset(path: Path, index: int | None) -> Any:
-    """Return the contents of a file as one of pyvista's datasets."""
+    """Return the contents of a file as one of pyvista's datasets; `index` as in `Step`."""
     suffix = path.suffix.lower()
     check_readable(path)
     with _reporting(path):

@@ -228,7 +228,7 @@ def _sequence_result(
     cameras: Sequence[CameraSource] | None,
     warnings: tuple[str, ...],
 ) -> SequenceResult:
-    """Return the result of an image sequence, given its frames."""
+    """Return the result of an image sequence, given its frames and the arguments of `bake_animation`."""
     first, last = drawn[0], drawn[-1]
     path = _path_of_frame(settings, first.name, cameras, first.frame)
     size = last.camera.width, last.camera.height
@@ -253,7 +253,8 @@ def _frame_steps(
 ) -> Steps[tuple[SceneData, list[_Frame]]]:
     """Draw one frame from all cameras as part of a job.
 
-    Return what was read, and the frame of each camera.
+    Return what was read, and the frame of each camera. `cache` has the meshes and fields of earlier frames.
+    The other parameters are as in `bake_animation`.
     """
     look = read_look(scene.rosy) if look is None else look
     # The look may be animated, and not every device can draw every method, so the device is chosen per frame.
@@ -341,7 +342,10 @@ def _input_hash(view: ViewInput, device: str, settings: pictures.OutputSettings)
 
 
 def _time_left(start_time: float, rendered_count: int, remaining_count: int) -> str:
-    """Return the estimated remaining time as text; empty if no frame has been drawn yet."""
+    """Return the estimated remaining time as text; empty if no frame has been drawn yet.
+
+    `start_time` is the value of `time.monotonic` when the first frame began to be drawn.
+    """
     if not rendered_count:
         return ""
     seconds = (time.monotonic() - start_time) / rendered_count * remaining_count

@@ -111,7 +111,7 @@ def _trefoil_mesh(
 
 
 def _trefoil_curve(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (n, 3) points of a trefoil knot at (n,) curve parameters, and (n, 3) unit tangents there."""
+    """Return (n, 3) points and unit tangents of a trefoil knot at (n,) curve parameters, 0 to 2 pi."""
     radius, height = 2 + np.cos(3 * t), 1.1
     slope = -3 * np.sin(3 * t)  # of the radius
     cos, sin = np.cos(2 * t), np.sin(2 * t)

@@ -86,7 +86,10 @@ def _draw_convert_settings(layout: bpy.types.UILayout, context: bpy.types.Contex
 def _draw_compare_settings(
     layout: bpy.types.UILayout, context: bpy.types.Context, other_fields: list[str]
 ) -> None:
-    """Draw the settings and the button that compare the field with another field."""
+    """Draw the settings and the button that compare the field with another field.
+
+    `other_fields` are the names of the attributes of the mesh that may hold another field.
+    """
     settings = context.window_manager.operator_properties_last("rosy.field_compare")
     only_other = other_fields[0] if len(other_fields) == 1 else ""
     draw_settings(layout.column(), settings, "other", "use_as_color", other=only_other)
@@ -150,7 +153,7 @@ def _draw_bakes(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
 
 
 def bake_label(bake_infos: list[BakeInfo]) -> str:
-    """Return the label of the button that bakes a single picture."""
+    """Return the label of the button that bakes a single picture, given the existing bakes of the scene."""
     pictures = [bake for bake in bake_infos if not bake.is_texture]
     if any(bake.frame_range and bake.is_shown for bake in pictures):
         return "Bake Still"

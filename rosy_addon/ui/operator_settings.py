@@ -53,7 +53,7 @@ def draw_convert_settings(layout: bpy.types.UILayout, settings: Any) -> None:
 
 
 def draw_generator_settings(layout: bpy.types.UILayout, settings: Any) -> None:
-    """Draw the settings of ``rosy.field_generate`` that apply to the chosen kind, guides and edges."""
+    """Draw the settings of ``rosy.field_generate`` that apply to the chosen generator, guides and edges."""
     inputs = _INPUTS_BY_KIND.get(settings.kind, ())
     if settings.kind == "guided":
         inputs = tuple(

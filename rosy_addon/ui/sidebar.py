@@ -52,7 +52,10 @@ def wrap_to_sidebar(text: str, context: bpy.types.Context) -> list[str]:
 
 
 def closed_panel(layout: bpy.types.UILayout, key: str, title: str) -> bpy.types.UILayout | None:
-    """Add a subpanel that is closed by default. Return its layout; None while the user has it closed."""
+    """Add a subpanel that is closed by default. Return its layout; None while it is closed.
+
+    Blender stores under the name `key` whether the user has opened the subpanel.
+    """
     header, body = layout.panel(f"rosy_{key}", default_closed=True)
     header.label(text=title)
     return body

@@ -40,7 +40,7 @@ class Drag:
     Attributes
     ----------
     source : int
-        Vertex of the singularity where the drag has started.
+        Vertex where the drag has started.
     target : int or None
         Vertex nearest to the surface point under the mouse. None if the mouse is not over the object.
     """
@@ -55,7 +55,7 @@ class Drag:
         self._handler: Any = add(self._draw, (), "WINDOW", "POST_PIXEL")
 
     def move(self, context: bpy.types.Context, mouse: tuple[float, float]) -> None:
-        """Find the target vertex for a new position of the mouse, in pixels, and redraw the view."""
+        """Find the target vertex for a new position of the mouse, in region pixels. Redraw the view."""
         points = _own_points(context, self._obj)
         self.target = _vertex_under(context, self._obj, points, mouse)
         vertices = [self.source] if self.target is None else [self.source, self.target]
@@ -88,9 +88,9 @@ def start_drag(
     mouse: tuple[float, float],
     from_any_vertex: bool,
 ) -> Drag | None:
-    """Start to drag the handle under the mouse (or with `from_any_vertex` the vertex under it).
+    """Start to drag the handle under the mouse (or with `from_any_vertex` the vertex under the mouse).
 
-    Return None if there is no handle or vertex under the mouse.
+    `mouse` is in pixels of the region. Return None if there is no handle or vertex under it.
 
     Raises
     ------
@@ -106,7 +106,9 @@ def start_drag(
 
 
 def show_handles(context: bpy.types.Context, obj: bpy.types.Object) -> None:
-    """Show the singularities that can be edited, unless the overlay already shows them.
+    """Show the singularities of the original mesh (without modifiers), unless the overlay shows them already.
+
+    Only these can be edited. The evaluated mesh may have others.
 
     Raises
     ------

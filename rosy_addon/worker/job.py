@@ -74,7 +74,8 @@ def advance(steps: Steps[Any], outcome: Callable[[], Any] | None = None) -> Call
     ----------
     steps : Steps
     outcome : callable, optional
-        Returns the result of the last call, or raises its error in the job. None for a job that begins.
+        Function that returns the result of the last call, or raises its error, which is then raised in the
+        job. None when the job begins, or after a `Step`.
 
     Raises
     ------
@@ -144,7 +145,7 @@ def part(
 class Job(Generic[Arguments, Result]):
     """A function that runs a job to its end and returns its result.
 
-    Its attribute `begin` starts the generator.
+    Its attribute `begin` is the generator function: it returns the steps of the job, and runs none of them.
     """
 
     def __init__(self, begin: Callable[Arguments, Steps[Result]]) -> None:

@@ -40,7 +40,7 @@ def start_module(
         Arguments of the program after the first one. The first one is added: the handle of the program's end
         of the connection, for `own_end`.
     environment : mapping of str to str, optional
-        Variables that are added to the environment of this process.
+        Variables for the new process, in addition to the environment of this process.
 
     Returns
     -------

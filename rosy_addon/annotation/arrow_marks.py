@@ -214,9 +214,9 @@ def _places_in_order(
 def _needed_distances(
     instance: MeshInstance, camera: Camera, points: SurfacePoints, spacing: float
 ) -> np.ndarray:
-    """Return (P,) float64: the smallest distance between arrowheads near each point, in Blender units.
+    """Return (P,) float64: the smallest distance between arrowheads near each point, in world space.
 
-    It is infinite behind the eye.
+    `spacing` is in pixels. The distance is infinite behind the eye.
     """
     world = instance.points_in_triangles(points.triangle, points.barycentric)
     result = np.full(len(world), NEAREST_PLACES * spacing / camera.pixels_per_unit)
@@ -227,7 +227,7 @@ def _needed_distances(
 
 
 def _smallest_pixel(instance: MeshInstance, camera: Camera) -> float:
-    """Return the size of a pixel at the nearest point of an instance, in Blender units.
+    """Return the size of a pixel at the nearest point of an instance, in world space.
 
     It is 0 if the instance reaches behind the eye.
     """
@@ -283,8 +283,10 @@ def _faces_camera(gbuffer: GBuffer) -> np.ndarray:
 def _seems_hidden(projected: ProjectedPoints, gbuffer: GBuffer, spacing: float) -> np.ndarray:
     """Return (P,) bool: whether points are probably hidden, judged only from the depths of the points around.
 
-    A point counts as hidden if a point next to it in the picture is nearer to the camera by more than
-    `HIDDEN_SPACINGS`. A point on a back side also counts as hidden if it is behind a point on a front side.
+    The picture is divided into cells of `spacing` pixels. A point is compared with the points in its cell and
+    the 8 cells around it. It counts as hidden if one of them is nearer to the camera by more than
+    `HIDDEN_SPACINGS` times the spacing. A point on a back side also counts as hidden if it is behind one on a
+    front side.
     """
     column, row = (projected.position / spacing).astype(np.intp).T + 1
     shape = int(row.max(initial=0)) + 2, int(column.max(initial=0)) + 2

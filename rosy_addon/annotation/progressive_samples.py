@@ -107,8 +107,8 @@ def progressive_samples(
     barycentric : (P, 3) float64 ndarray
         Barycentric coordinates of each point in its triangle.
     rank : (P,) float64 ndarray
-        Rank of each point, in points per square Blender unit. All points up to a rank are an even sample of
-        the surface.
+        Rank of each point, in points per square Blender unit. Areas are measured on the rest shape and
+        scaled by the square of `matrix_scale`. All points up to a rank are an even sample of the surface.
     """
     clip, triangles = all_triangles([instance], camera)
     shuffle = _random_bits(len(triangles))
@@ -213,7 +213,10 @@ def _screen_areas(
 
 
 def matrix_scale(instance: MeshInstance) -> float:
-    """Return the factor by which the matrix of an instance scales lengths, averaged over all directions."""
+    """Return the mean scale of the matrix of an instance.
+
+    It is the cube root of the factor by which the matrix scales volumes.
+    """
     a, b, c = np.asarray(instance.matrix, dtype=np.float64)[:3, :3]
     return float(np.abs((np.cross(a, b) * c).sum()) ** (1 / 3))
 

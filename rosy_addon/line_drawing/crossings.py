@@ -150,8 +150,9 @@ def _strip_keys(strokes: Strokes, segment_end: np.ndarray) -> tuple[np.ndarray, 
     key : (m,) float64 ndarray
         Number of the strip times `STRIP_STRIDE`, plus the position along the strip, 0 to 1.
     window : (m,) float64 ndarray
-        For each segment, the largest difference between its key and the key of a segment in the same strip
-        that crosses it. If the other segment is in the next strip, `STRIP_STRIDE` is added.
+        For each segment, the largest difference between its position along the strip and the position of a
+        segment that crosses it. The keys of the two segments differ by at most this in the same strip, and by
+        `STRIP_STRIDE` plus or minus at most this in successive strips.
     """
     start, end = strokes.points[segment_end - 1], strokes.points[segment_end]
     middle = (start + end) / 2

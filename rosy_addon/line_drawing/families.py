@@ -38,8 +38,9 @@ def label_families(strokes: Strokes, mesh: TangentMesh, right: np.ndarray | None
     Returns
     -------
     Strokes
-        The same strokes with `mesh.family_count` families. Family 1 is nearest to the guide direction; the
-        other families follow counter-clockwise.
+        The same strokes with `mesh.family_count` families, named "family 1" and so on. The first family is
+        nearest to the guide direction, and the others follow counter-clockwise. If the families are
+        consistent over the surface, `global_labels` chooses the first one.
     """
     report(0.0, "matching families")
     family_count = mesh.family_count
@@ -94,8 +95,10 @@ def member_offset(member: np.ndarray, reference: np.ndarray, degree: int) -> np.
 def global_labels(mesh: TangentMesh) -> np.ndarray | None:
     """Return (T, M) int: the family of each line direction in each triangle, or None.
 
-    Line directions are counted counter-clockwise from `reference_members`. None is returned if a path over
-    the surface connects different line directions of a triangle, so that no consistent labels exist.
+    Line directions are counted counter-clockwise from `reference_members`. If the field marks the direction
+    of the first family (`TangentMesh.family_z`), this is family 0. Otherwise `_order_labels` numbers the
+    families. None is returned if a path over the surface connects different line directions of a triangle, so
+    that no consistent labels exist.
     """
     family_count, count = mesh.family_count, len(mesh.z)
     if mesh.family_z is not None:

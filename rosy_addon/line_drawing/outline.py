@@ -222,7 +222,8 @@ def _strokes(
 ) -> Strokes:
     """Join segments to polylines, and return them as strokes of the given family.
 
-    If `salience`, (k,), is given, a polyline is left out if the sum of the saliences of its segments is below
+    `surface` is the surface on which the segments lie; the faces of its triangles become `Strokes.face`. If
+    `salience`, (k,), is given, a polyline is left out if the sum of the saliences of its segments is below
     `MIN_CREASE_PX`.
     """
     keys = _point_keys(segments.ends)
@@ -431,8 +432,9 @@ class _OutlineTest:
     ) -> np.ndarray:
         """Return (n,) bool: whether each point is hidden by the triangles at all four pixels around it.
 
-        A triangle that shares a vertex with the triangle of the point does not hide the point if the point is
-        behind it by less than `ring_depth`, (n,), along the view ray, in world space.
+        `points` are in world space, `pixels` are their (n, 2) pixel coordinates, and `triangle` is the
+        triangle on which each point lies. A triangle that shares a vertex with it does not hide the point if
+        the point is behind it by less than `ring_depth`, (n,), along the view ray, in world space.
         """
         hidden = np.ones(len(points), dtype=bool)
         for plane in planes_around(points, pixels, self.depth_buffer):

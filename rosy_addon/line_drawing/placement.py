@@ -373,8 +373,8 @@ class StreamlinePlacer:
     def rescan(self, rules: SeparationRules) -> None:
         """Change the rules, and allow seeds again where strokes were removed or earlier seeds did not fit.
 
-        The sides of samples that removed strokes covered, or that were closed after a seed did not fit, are
-        open again if no stroke is beside them.
+        Sides of samples are tested again if they were covered by a stroke that has been removed, or were
+        closed by `suspend` or after a seed did not fit. They become open if no stroke is beside them.
         """
         self.rules = rules
         samples = self.samples

@@ -111,7 +111,8 @@ def check_drawing_suffix(path: str | os.PathLike[str]) -> str:
 def _csv(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.ndarray) -> bytes:
     """Return a .csv file: a header, then a row for each point.
 
-    A closed stroke repeats its first point at its end.
+    A closed stroke repeats its first point at its end. `points` and `normals`, (n, 3), are in the space of
+    the file, and `width`, (n,), is the width of the stroke at each point, in world space.
     """
     blocks = [b"stroke,family,x,y,z,nx,ny,nz,width\n"]
     form = "%d,%s" + 3 * ",%.9g" + 4 * ",%.6g" + "\n"
@@ -132,7 +133,7 @@ def _obj(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.nd
     """Return an .obj file: vertices, then a line for each stroke, in a group for each family.
 
     In this format, lines cannot refer to normals, so normal n belongs to vertex n. Widths are stored as
-    texture coordinates with one component.
+    texture coordinates with one component. The parameters are as in `_csv`.
     """
     first_of_closed, kept = _without_repeated_points(strokes)
     rows = np.flatnonzero(kept)
@@ -159,7 +160,10 @@ def _obj(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.nd
 
 
 def _ply(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.ndarray) -> bytes:
-    """Return a binary .ply file with the points as vertices and the segments as edges."""
+    """Return a binary .ply file with the points as vertices and the segments as edges.
+
+    The parameters are as in `_csv`.
+    """
     first_of_closed, kept = _without_repeated_points(strokes)
     stroke = strokes.stroke
     vertex = np.zeros(int(kept.sum()), dtype=_PLY_VERTEX)

@@ -206,9 +206,8 @@ def thinned_seeds(
     cell_size : float
         Distance of the points where `spacing_ratio` is 1.
     spacing_ratio : (n,) ndarray
-        Spacing of strokes at the seeds, relative to their usual spacing. Where it is much larger than 1, the
-        chosen points are farther apart, and where it is much smaller, they are closer: by the powers of
-        `LEVEL_RATIO` that `point_grid.grid_levels` returns.
+        Spacing of strokes at the seeds, relative to their usual spacing. The distance of the chosen points is
+        `cell_size` times this ratio, rounded to a power of `LEVEL_RATIO` by `point_grid.grid_levels`.
     """
     position = mesh.points_at(seeds.triangle, seeds.weights)
     level = grid_levels(spacing_ratio, 1.0)

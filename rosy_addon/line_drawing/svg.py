@@ -424,7 +424,8 @@ def _nearest_end(
     """Return the index of the end that is nearest to the position `current`.
 
     `grid` holds the indices of the remaining ends in each cell, and `positions` the positions of all ends.
-    Rings of cells around `current_cell` are searched until no nearer end is possible.
+    The grid has at most `cell_count` cells along each axis, and `cell_size` is the side of a cell in the unit
+    of the positions. Rings of cells around `current_cell` are searched until no nearer end is possible.
     """
     best, best_distance = -1, np.inf
     for ring in range(cell_count + 1):

@@ -84,8 +84,8 @@ def fibonacci_sphere(count: int) -> np.ndarray:
 def _sample_points(instance: MeshInstance, inset: float) -> tuple[np.ndarray, np.ndarray]:
     """Return a (K, 3) sample point and a (K, 3) unit normal for each of K fans of corners.
 
-    Both are in world space. The points are moved from the vertices into the faces by `inset`, a distance in
-    world units that `MAX_INSET_FRACTION` limits.
+    Both are in world space. The points are moved from the vertices toward the mean of the centers of the
+    adjacent faces by `inset`, a distance in world space, but at most by `MAX_INSET_FRACTION` of the way.
     """
     surface, linear = instance.surface, np.asarray(instance.matrix, dtype=np.float64)[:3, :3]
     vertex = np.empty((len(surface.fan_normal), 3))

@@ -220,12 +220,13 @@ def transport_phase(
     -------
     (n,) complex64 ndarray
         Unit numbers: the x axis of the tangent frame of `source`, transported to `target`, in the
-        frame x, y. Zero if it cannot be transported.
+        frame x, y. They may be 0 if a normal is zero or if the two normals are almost opposite.
 
     Notes
     -----
-    As in `field.frames.transport`, v at s becomes v - (v.t) / (1 + s.t) (s + t) at t. The term
-    along t is left out, because t is perpendicular to the frame.
+    As in `field.frames.transport`, a vector v at the source normal s becomes
+    v - (v.t) / (1 + s.t) (s + t) at the target normal t. The term along t is left out, because t is
+    perpendicular to the frame.
     """
     tangents, _ = tangent_frame_components(source)
     fraction = dot_components(tangents, target)
@@ -250,7 +251,9 @@ def _fill_triangles(
 ) -> None:
     """Write the field and the normals of one block of triangles into `corner_field`.
 
-    If `fans` is None (flat display), the corners get the values and normals of their faces.
+    `deformed` holds the (3, V) vertices in world space without the translation. `faces` and `fans` are the
+    field on the faces and on the smooth fans of the surface. If `fans` is None (flat display), the corners
+    get the values and normals of their faces. `custom_normals` are as in `_corner_normals`.
     """
     corners = surface.triangles[block].T.astype(np.intp)
     face = surface.triangle_face[block]

@@ -99,14 +99,17 @@ def _crossings(
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
     """Yield the crossings of segments with the center lines of pixel rows (axis 0) or columns (axis 1).
 
-    Each crossing is yielded for the pixels on both sides of it.
+    `lines` holds the (m, 2, 3) ends of the segments, from `_on_screen`. Each crossing is yielded for the
+    pixels on both sides of it.
 
     Yields
     ------
     row, column : (k,) int64 ndarray
         A pixel next to the crossing. It may be outside of the frame, by one pixel.
-    offset, depth : (k,) float64 ndarray
-        Distance of the crossing from the center of the pixel, along the axis, and its depth.
+    offset : (k,) float64 ndarray
+        Signed distance in pixels from the pixel center to the crossing, along x (axis 0) or y (axis 1).
+    depth : (k,) float64 ndarray
+        Depth of the crossing, as in `_on_screen`.
     """
     along, across = axis, 1 - axis
     size = (camera.width, camera.height)

@@ -160,7 +160,11 @@ def _other_samples(
 
 
 def _centers(index: np.ndarray, width: int, samples: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return x and y of the centers of samples in pixels, (n,) float32 each, from their flat indices."""
+    """Return x and y of the centers of samples in pixels, (n,) float32 each, from their flat indices.
+
+    `index` counts samples row by row in the frame of all samples, which is `width` samples wide. A pixel has
+    `samples` of them along each side.
+    """
     row, column = np.divmod(index, np.int32(width))
     scale = np.float32(1 / samples)
     half = np.float32(0.5)

@@ -70,8 +70,9 @@ def fill_pixels(
 def _interpolated_normal(corners: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the (3, P) unit vectors along m = sum b_i n_i, and the (P,) lengths of m.
 
-    b_i are the barycentric `weights`, and n_i are the corner normals. Where a length is below 1e-6, the
-    vector and the length are set to 0.
+    b_i are the barycentric `weights`, (3, P). n_i are the normals at the three corners: `corners`, (3, 3, P),
+    has the corner as its first axis and the component as its second. Where a length is below 1e-6, the vector
+    and the length are set to 0.
     """
     normal = np.empty_like(weights)
     for component, out in enumerate(normal):
@@ -165,6 +166,12 @@ def view_plane_rotation(
     tangent: Sequence[np.ndarray], normal: np.ndarray, view_direction: np.ndarray
 ) -> np.ndarray:
     """Return the directions of tangents after transport to the view plane.
+
+    Parameters
+    ----------
+    tangent, normal, view_direction : 3 (P,) ndarrays
+        Components in camera space: tangents of any length, the unit normals to which they are perpendicular,
+        and the unit directions to the eye.
 
     Returns
     -------

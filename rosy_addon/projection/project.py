@@ -56,8 +56,8 @@ def project(
     samples : int
         Samples along each side of a pixel. If there are several, the G-buffer contains each pixel where
         at least one sample shows a field, and its `coverage` and `samples` are set.
-    rows : Rows
-        The rows of the frame to project.
+    rows : (int, int) or None
+        First row of the frame to project, and the row after the last one. None for all rows.
 
     Returns
     -------

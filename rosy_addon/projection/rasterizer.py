@@ -125,8 +125,8 @@ def rasterize(
         are the same, or have equal coordinates.
     width, height : int
         Size of the frame in pixels.
-    rows : Rows
-        The rows to draw.
+    rows : (int, int) or None
+        First row to draw, and the row after the last one. None for all rows.
 
     Returns
     -------

@@ -105,8 +105,8 @@ def rest_positions(surface: Surface) -> np.ndarray:
     -------
     (V, 3) float64 ndarray
         Positions in object space. If the mesh is farther from the origin than `FAR_RATIO` times its size,
-        they are relative to the center of its bounding box, rounded to multiples of a length that is its
-        size, rounded up to a power of 2.
+        they are relative to a point near the center of its bounding box. The coordinates of this point are
+        multiples of s, the size of the mesh rounded up to a power of 2.
     """
     rest = surface.in_rest_shape().vertices
     corners = box_corners(rest[surface.used_vertices])

@@ -209,7 +209,7 @@ def _pcf_visibility(
     ----------
     depth_map : (H, W) ndarray
     pixel : (n, 2) ndarray
-        Center of the window, column and row in pixels.
+        Center of the window: x and y in pixels from the lower left corner, as in `Camera`.
     axial_depth : (n,) ndarray
         Depth along the camera axis to compare with the depth map.
     """

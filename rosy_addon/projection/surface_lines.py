@@ -51,10 +51,10 @@ class SurfaceLines:
     pattern : StripePattern
         Phases on the L leaves.
     heading : (2, L) float32 ndarray
-        The direction in each leaf from which the lines of `pattern` are counted, counter-clockwise: one
-        member of the field, as a unit vector. Its two components are multiples of two sides of the
-        surface's triangle, from corner 0 to corner 1 and from corner 0 to corner 2. 0 where the field is
-        undefined.
+        The member of the field in each leaf that belongs to family 0 of `pattern`, a unit vector after
+        `stretch` of `surface_lines`. The other families follow counter-clockwise. The two components are
+        multiples of two sides of the surface's triangle, from corner 0 to corner 1 and from corner 0 to
+        corner 2. 0 where the field is undefined.
     """
 
     tree: BisectionTree
@@ -169,7 +169,8 @@ def _leaf_directions(
 ) -> tuple[CornerDirections, np.ndarray]:
     """Interpolate a field to the corners of the leaves of a tree.
 
-    `corners` are the (T, 3, 3) positions of the corners of the surface's triangles.
+    `corners` are the (T, 3, 3) positions of the corners of the surface's triangles in the rest shape, after
+    `stretch` of `surface_lines`.
 
     Returns
     -------
@@ -245,7 +246,9 @@ def _deviations(
 ) -> np.ndarray:
     """Return the (L, 3, N) rotations, as unit complex numbers, from members of a RoSy to the directions.
 
-    The RoSy has evenly spaced members; `angle` holds their (L, 3) angles at the corners of the leaves.
+    `harmonics` holds pairs of an order j and the (L, 3) harmonics C_j (see `evaluate_harmonics`). `angle`,
+    (L, 3), is the angle of one member of the RoSy at the corners of the leaves; the N members are evenly
+    spaced.
     """
     members = np.exp(1j * (angle[..., None] + 2 * np.pi * np.arange(degree) / degree))
     result = np.ones_like(members)

@@ -124,7 +124,11 @@ def feature_curvatures(gbuffer: GBuffer, cache: Cache) -> np.ndarray:
 def _texel_footprint(
     gbuffer: GBuffer, instance: MeshInstance, pixels: slice | np.ndarray, corners: np.ndarray
 ) -> np.ndarray:
-    """Return the (n,) areas, in texels of the image of a tone, that pixels of the picture cover."""
+    """Return the (n,) areas, in texels of the image of a tone, that pixels of the picture cover.
+
+    `pixels` are indices into the G-buffer, all on one instance. `corners`, (n, 3), are the face corners of
+    the visible triangles at these pixels.
+    """
     surface, tone = instance.surface, instance.tone
     linear = np.asarray(instance.matrix, dtype=np.float64)[:3, :3]
     positions = surface.vertices[surface.corner_vertex[corners]] @ linear.T

@@ -199,7 +199,7 @@ class _Scene:
     clip_planes : (6, 4) float64 ndarray or None
         World space. The negative side of each plane is cut away.
     tolerance : float
-        Distance in front of a point at which surfaces begin to hide it.
+        A surface hides a point only if it is nearer to the camera by more than this depth, in Blender units.
     """
 
     clip: np.ndarray

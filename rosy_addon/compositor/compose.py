@@ -206,7 +206,7 @@ class _Canvas:
         return rgba, self._resolved(self.spread, strip.drawn_rows)
 
     def _resolved(self, color: np.ndarray, rows: tuple[int, int]) -> np.ndarray:
-        """Assemble an image from the colors of subpixels.
+        """Assemble rows of the finished picture: average the colors of the subpixels of each pixel.
 
         Parameters
         ----------
@@ -218,7 +218,7 @@ class _Canvas:
         Returns
         -------
         (h, w, 4) float32 ndarray
-            Linear RGBA, not premultiplied.
+            Linear RGBA, not premultiplied, with an element for each pixel of the finished picture.
         """
         gbuffer, s = self._gbuffer, self.look.supersampling
         pixel, width, coverage = gbuffer.pixel, gbuffer.camera.width, gbuffer.coverage

@@ -1,4 +1,7 @@
-"""Contrast correction of LIC images, with factors from theory instead of image analysis."""
+"""Contrast correction of LIC images, with factors from theory instead of image analysis.
+
+The paper is Palacios and Zhang, IEEE TVCG 2011 (see `compositor`).
+"""
 
 from __future__ import annotations
 

@@ -149,13 +149,14 @@ class Covering:
         Parameters
         ----------
         max_winding : int
-            Maximum number of full turns of a streamline, in both directions of rotation.
+            Maximum number of full turns that a streamline makes, clockwise or counter-clockwise.
 
         Returns
         -------
         offsets : (n,) intp ndarray
-            The elements at k plus any multiple of `sheets_per_turn` are the index of the first state of
-            sheet k.
+            A table of 2 `max_winding` turns. Element k, plus any multiple of `sheets_per_turn`, is the index
+            of the first state of sheet k. A streamline starts in the middle of the table. If opposite
+            directions are a separate covering, a second table for that covering follows.
         backward : int
             The opposite of the sheet at element i is at element i + backward.
         """
@@ -317,13 +318,13 @@ def build_covering(field: PixelField, look: PixelLook, noise: np.ndarray) -> Cov
 
 
 def _surface_steps(x: np.ndarray, y: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Shorten steps to at most one pixel along x and y, and weight the noise gradient.
+    """Shorten steps to at most one pixel along x and y; also return factors for the noise gradient.
 
     `x` and `y` are the components of (n,) steps in the picture, in pixels. The result is two (x, y) pairs.
-    The first pair is the shortened steps. The second pair is used in place of a unit vector, for the
-    derivative of the noise to the left of the step. `streamline_batch` multiplies this derivative by
-    `streamline_tracing.lateral_offset`, which is proportional to the length of the step. So the second
-    pair is the step divided by the square of its length.
+    The first pair is the shortened steps. The second pair replaces the unit vector along the step when the
+    derivative of the noise to the left is computed from its gradient. `streamline_batch` multiplies this
+    derivative by `streamline_tracing.lateral_offset`, which is proportional to the length of the step. So the
+    second pair is the step divided by the square of its length.
     """
     scale = 1 / np.maximum(np.maximum(np.abs(x), np.abs(y)), np.float32(1))
     x, y = x * scale, y * scale

@@ -6,9 +6,9 @@ So lines whose width is a fraction of the distance between lines cover the same 
 and the tone is exact. Lines get wider in dark tones and thinner in light tones.
 
 Edges are smoothed by a box filter of at least a pixel. Where lines are too close for the pixels,
-they fade into their mean. Where foreshortening crowds the lines of one direction, they join only in darker
-tones than lines in other directions, and lines at a larger distance on the surface replace them. Where
-lines are too far apart, as in near parts of a perspective picture, further lines grow between them.
+they fade into their mean. Where foreshortening crowds the lines of one direction, lines at a larger
+distance on the surface replace them. These are drawn only in darker tones than lines in other directions.
+Where lines are too far apart, as in near parts of a perspective picture, further lines grow between them.
 """
 
 from __future__ import annotations
@@ -425,7 +425,8 @@ class _InstanceLines:
     def _heading_in_view(self, entries: np.ndarray, heading: np.ndarray) -> np.ndarray:
         """Return the (n,) complex64 directions in the view plane of headings on the surface.
 
-        `heading`, (2, n), is from `SurfaceLines.heading`; `entries` are indices of pixels of the G-buffer.
+        `heading`, (2, n), is from `SurfaceLines.heading`: a unit vector along the surface, as multiples of
+        two sides of the triangle. `entries` are the indices of the n pixels in the G-buffer.
         """
         gbuffer = self._gbuffer
         triangle = gbuffer.triangle[entries]

@@ -322,7 +322,10 @@ def _cover_all_lines(
     looks: Sequence[PixelLook],
     step_limits: Sequence[np.ndarray | None],
 ) -> None:
-    """Trace streamlines until every line that needs an average has one, for each look."""
+    """Trace streamlines until every line that needs an average has one, for each look.
+
+    `averages` are filled, one for each look. `looks` and `step_limits` are as in `StreamlineBatch`.
+    """
     look = looks[0]
     half_window = max(HALF_WINDOW_STEPS, look.length // 2)
     # A line that has the average for one look has the averages for all looks.

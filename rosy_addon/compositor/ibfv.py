@@ -247,8 +247,8 @@ def decay_of_samples(effective_samples: np.ndarray, two_sided: bool) -> np.ndarr
 def _square_sum(rest: np.ndarray | float, decay: np.ndarray) -> np.ndarray:
     """Return the sum of the squared weights of the steps along one direction.
 
-    The weights are `OWN_WEIGHT`, q, q^2 and so on, where q is `decay`. The last one is `rest`, which is 0 if
-    the streamline does not end.
+    The weights are `OWN_WEIGHT`, q, q^2, ..., q^n, where q is `decay` and n is the number of steps before the
+    streamline ends. `rest` is q^n: 0 if the streamline does not end.
     """
     return OWN_WEIGHT**2 + decay**2 * (1 - np.square(rest)) / (1 - decay**2)
 

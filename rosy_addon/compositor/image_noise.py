@@ -69,7 +69,8 @@ def hash_bits(
     Parameters
     ----------
     cell_index : sequence of int ndarray
-        Up to five indices of cells.
+        Up to five arrays of one shape: the indices of the cells along each axis of the lattice, and further
+        integers that tell lattices apart.
     seed, channel : int
     density : float
         Fraction of cells whose bit is set, to the nearest 2 ** -24.

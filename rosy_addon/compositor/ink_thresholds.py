@@ -113,8 +113,8 @@ def _streak_thresholds(
 ) -> np.ndarray:
     """Compute `line_thresholds` for a LIC image with mean 0 and standard deviation 1.
 
-    `table` is `StreakStatistics.threshold`. `break_streak` is the same for short streamlines; None if lines
-    are not broken.
+    `streak` is the LIC image. `break_streak` is a LIC image of short streamlines, with the same mean and
+    deviation; None if lines are not broken. `table` is `StreakStatistics.threshold`.
     """
     if break_streak is None:
         return _coverage_from(streak, table)
@@ -214,7 +214,8 @@ def ordered_thresholds(
 def _layer_densities(layers: int, layering: float) -> np.ndarray:
     """Tabulate the (layers, DENSITY_STEPS) float32 density of each layer, by the total density `DENSITIES`.
 
-    Density is -log(transmittance). Each row increases strictly. Beyond the table it continues linearly.
+    Density is -log(transmittance). Each row increases strictly. Beyond the table it continues linearly. The
+    parameters are those of `layer_shares`.
     """
     shares = np.stack(layer_shares(-np.expm1(-DENSITIES), layers, layering))
     return (DENSITIES * np.maximum(shares, LEAST_SHARE)).astype(np.float32)
@@ -231,9 +232,10 @@ def _layer_density(table: np.ndarray, total: np.ndarray) -> np.ndarray:
 
 
 def _merged_densities(density: np.ndarray, places: np.ndarray, table: np.ndarray) -> np.ndarray:
-    """Return the density of each layer above which it has ink, where lines swap their places in the order.
+    """Return the thresholds of layers, as densities, where lines swap their places in the order.
 
-    Lines that swap are merged into the first of the two layers. Density is -log(transmittance).
+    Lines that swap are merged into the first of the two layers. Density is -log(transmittance). A layer has
+    ink where its own density, its share of the density of the tone, exceeds its threshold.
 
     Parameters
     ----------
@@ -289,7 +291,7 @@ def layer_shares(darkness: np.ndarray, layers: int, layering: float) -> list[np.
     layers : int
         Number of layers.
     layering : float
-        The setting of the look.
+        The setting of the look: difference in darkness between the tones at which successive layers join.
     """
     weights = onset_weights(darkness, [layer * layering for layer in range(layers)])
     total = np.add.reduce(weights)

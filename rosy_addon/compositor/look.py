@@ -89,9 +89,10 @@ def has_tone_inks(look: Any) -> bool:
 
 
 def _shading(panel: str, applies: Callable[[Any], bool] = always) -> dict[str, Any]:
-    """Return arguments for `number`, `choice` and so on: the setting has no effect on LIC images.
+    """Return keyword arguments that declare a setting of a look that has no effect on LIC images.
 
-    `panel` and `applies` are attributes of `Setting`: where the setting is shown, and when it has an effect.
+    They are for `number`, `choice` and similar functions of `core.settings`. `panel` and `applies` are
+    attributes of `Setting`: where the setting is shown, and when it has an effect.
     """
     return {"panel": panel, "stage": Stage.SHADING, "applies": applies}
 

@@ -35,7 +35,8 @@ class PixelLook:
     """A look for one frame: its lengths are in pixels of the frame, and its streaks have drifted to a phase.
 
     The settings of the look are attributes as well: ``pixel_look.crispness``. Lengths among them, such as
-    ``pixel_look.line_width``, are in pixels of the frame, and may be out of range.
+    ``pixel_look.line_width``, are in pixels of the frame, and may be outside of the range that the setting
+    allows.
 
     Attributes
     ----------

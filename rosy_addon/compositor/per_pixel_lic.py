@@ -1,8 +1,8 @@
 """LIC with one streamline per pixel, for a block of pixels at once: the method of the paper and brute force.
 
-The method of the paper decomposes the field into vector fields and blends two sets of their LIC images. The
-paper compares it with brute force, in which a streamline follows at each step the best match among the N
-members.
+The method of the paper (Palacios and Zhang, IEEE TVCG 2011) decomposes the field into vector fields and
+blends two sets of their LIC images. The paper compares it with brute force, in which a streamline follows at
+each step the best match among the N members.
 """
 
 from __future__ import annotations

@@ -72,10 +72,13 @@ class PixelField:
     pixel : (P,) int32 ndarray
         Flat indices into the frame, ascending, from the lower left.
     representation : (P,) complex64 ndarray
-        z = rho exp(i N t), where t is the angle of a member in the view plane. It is 0 where the field
-        is undefined.
+        z = rho exp(i N t), where rho is the magnitude and t is the angle of a member in the view plane:
+        the plane perpendicular to the ray from the eye. See `GBuffer.representation`. It is 0 where the
+        field is undefined.
     screen_jacobian : (P, 2) complex64 ndarray
-        The two axes of the view plane, projected to the screen along the surface, as x + i y in pixels.
+        For each axis of the view plane: the displacement on screen, x + i y in pixels, of a step on the
+        surface along that axis. A step that is parallel to the picture is one pixel long. For textures, see
+        `surface_texture.texel_field`.
     neighbor_mask : (P,) uint16 ndarray
         Neighbors that streamlines may step to. Bit i stands for `NEIGHBOR_OFFSETS[i]`. No bit is
         set where the field is undefined.
@@ -179,7 +182,7 @@ class PixelField:
         Returns
         -------
         (P,) complex64 ndarray
-            x + i y in pixels.
+            x + i y: unit vectors or, with `foreshorten`, displacements as in `screen_jacobian`.
         """
         # Double precision makes the float32 result the same with all versions of numpy.
         x, y = self.screen_jacobian.astype(np.complex128).T
@@ -324,8 +327,8 @@ def mask_undefined(
 def nearest_member(field: PixelField, guiding_angle: float) -> np.ndarray:
     """Return the (P,) complex64 member nearest to a guiding angle, in the view plane (equations 3 and 4).
 
-    If two members are equally near, the one on the counter-clockwise side is returned, as in the
-    paper.
+    If two members are equally near, the one on the counter-clockwise side is returned. Equations and this
+    choice are from Palacios and Zhang, IEEE TVCG 2011.
     """
     relative = field.representation.astype(np.complex128)
     relative *= np.exp(-1j * field.degree * guiding_angle)

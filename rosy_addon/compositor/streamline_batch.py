@@ -34,7 +34,7 @@ class StreamlineBatch:
     """A batch of streamlines, traced together, with preallocated buffers.
 
     A *lane* of the buffers is one half of a streamline: n seeds have n forward lanes, followed by n
-    backward lanes.
+    backward lanes. An integer parameter `lanes` is their number, 2 n.
 
     Lanes end at the border and where the field ends. Long lanes also end where they return to a state that
     they have passed: further turns around the loop would cost time and add no other noise.
@@ -167,7 +167,10 @@ class StreamlineBatch:
     def _drifting_averages(
         self, count: int, step_counts: np.ndarray, last_step: int
     ) -> Iterator[tuple[np.ndarray, list[np.ndarray], np.ndarray]]:
-        """Yield the same as `trace`, for looks with flow, whose kernels move. Averages have one channel."""
+        """Yield the same as `trace`, for looks with flow, whose kernels move. Averages have one channel.
+
+        `count` is n, the number of streamlines. The other parameters are the results of `_trace_steps`.
+        """
         lanes, covering = 2 * count, self._covering
         second_sums = self._whole_second_sums(count)
         averages = [DriftingAverages(kernel, second_sums) for kernel in self._moving_kernels]
@@ -197,7 +200,7 @@ class StreamlineBatch:
     def _whole_second_sums(self, count: int) -> np.ndarray:
         """Return the prefix sums of prefix sums of whole streamlines, joined from both halves.
 
-        They run in the direction of the forward half.
+        They run in the direction of the forward half. `count` is n, the number of streamlines.
 
         Returns
         -------
@@ -280,7 +283,7 @@ class StreamlineBatch:
                 np.add(row, self._totals[:lanes], out=next_row)
 
     def _tapered_sums(self, step: int, half_width: int | np.ndarray, lanes: int) -> np.ndarray:
-        """Return (2 n, K) complex64 sums of the noise around step i, with tapered weights.
+        """Return (2 n, K) complex64 sums of the noise around the step i = `step`, with tapered weights.
 
         The kernel reaches r = `half_width` steps in each direction. With the sums of prefix sums E, the sum
         is (E(i + r) - 2 E(i - 1) + E(i - r - 2)) / (r + 1), because a triangular kernel is the mean of r + 1
@@ -295,13 +298,14 @@ class StreamlineBatch:
     def _ramp_sums(
         self, step: int, half_width: int | np.ndarray, lanes: int, is_along: np.ndarray
     ) -> np.ndarray:
-        """Return (2 n, K) complex64 sums of the noise around step i, with weights that fall along the field.
+        """Return (2 n, K) complex64 sums of the noise around a step, with weights that fall along the field.
 
-        Let r be `half_width`, P(i) the prefix sums of the noise along a lane, and E(i) the sums of these
-        prefix sums. In a lane that runs along the field, the weights fall from 2 r + 1 to 1, and the sum is
-        E(i + r) - E(i - r - 1) - (2 r + 1) P(i - r - 1). In a lane that runs against the field (`is_along` is
-        False), the weights rise from 1 to 2 r + 1. Both weights of a sample add up to 2 r + 2, so the sum is
-        2 r + 2 times the unweighted sum, minus the sum with falling weights. All sums are divided by r + 1.
+        Let i be the step, r the `half_width`, P(i) the prefix sums of the noise along a lane, and E(i) the
+        sums of these prefix sums. In a lane that runs along the field, the weights fall from 2 r + 1 to 1,
+        and the sum is E(i + r) - E(i - r - 1) - (2 r + 1) P(i - r - 1). In a lane that runs against the field
+        (`is_along` is False), the weights rise from 1 to 2 r + 1. Both weights of a sample add up to 2 r + 2,
+        so the sum is 2 r + 2 times the unweighted sum, minus the sum with falling weights. All sums are
+        divided by r + 1.
         """
         last, before = step + half_width, step - half_width - 1
         sums_through, sums_before = (self._second_prefix_sums(i, lanes) for i in (last, before))

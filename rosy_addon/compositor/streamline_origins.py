@@ -245,7 +245,8 @@ class Sheets:
         Returns
         -------
         (9 C,) int8 ndarray
-            Increase modulo `count`, from 0 to `count` - 1; -1 where streamlines cannot step.
+            Increase modulo `count`, from 0 to `count` - 1; -1 where streamlines cannot step. Element b C + c
+            is for the step from cell c to its neighbor at `NEIGHBOR_OFFSETS[b]`.
         """
         phase = self._covering.packed_phase
         table = np.full((9, self.cell_count), -1, dtype=np.int8)

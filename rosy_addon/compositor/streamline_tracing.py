@@ -117,7 +117,8 @@ class TracedLanes:
         state, direction : (m,) ndarray
             Results of `look_up`. `direction` is overwritten.
         step_scale : float32
-            Factor from the unit of `direction` (integers of `Covering.state_table`) to 3/2 pixels.
+            Factor from the unit of `direction` (integers of `Covering.state_table`) to pixels, times 3/2: the
+            first coefficient of the Adams-Bashforth method.
         """
         displacement = self._move(direction, step_scale)
         column, row = displacement.view(np.float32).reshape(-1, 2).T
@@ -262,7 +263,11 @@ def lateral_offset(position: np.ndarray, direction: np.ndarray) -> np.ndarray:
 
 
 def axial_steps(position: np.ndarray, direction: np.ndarray, step_scale: np.float32) -> np.ndarray:
-    """Return the (n,) float32 steps from positions to the centers of cells, measured along streamlines."""
+    """Return the (n,) float32 steps from positions to the centers of cells, measured along streamlines.
+
+    `position` is relative to the center of the cell, in pixels. `direction` is in the unit of
+    `TracedLanes.look_up`, and `step_scale` is the factor from that unit to pixels.
+    """
     square = direction.real * direction.real + direction.imag * direction.imag
     along = position.real * direction.real + position.imag * direction.imag
     return along / np.minimum(-step_scale * square, np.float32(-1))

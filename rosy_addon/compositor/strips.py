@@ -45,7 +45,10 @@ class Strip(NamedTuple):
 
     @property
     def averaged_rows(self) -> tuple[int, int]:
-        """The rows whose pixels get averages of streamlines: the first row, and the row after the last."""
+        """The rows whose pixels get averages of streamlines: the first row, and the row after the last.
+
+        They begin with the strip and end `OVERLAP_ROWS` above it: `drawn_rows`, and `BORDER_ROWS` more.
+        """
         return self.start, min(self.stop + OVERLAP_ROWS, self.height)
 
     @property

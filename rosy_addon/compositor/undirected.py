@@ -27,7 +27,10 @@ STEP_LABEL = "drawing undirected texture"
 
 
 def disc_offsets(line_width: float) -> np.ndarray:
-    """Return the (SAMPLE_COUNT, 2) int32 pixel offsets (dx, dy) of the samples of a disc."""
+    """Return the (SAMPLE_COUNT, 2) int32 pixel offsets (dx, dy) of the samples of a disc.
+
+    The radius is `DISC_WIDTHS` times `line_width`, which is in pixels.
+    """
     # A sunflower spiral is spread evenly over the unit disc.
     index = np.arange(SAMPLE_COUNT)
     radius, angle = np.sqrt((index + 0.5) / SAMPLE_COUNT), index * GOLDEN_ANGLE

@@ -5,9 +5,10 @@ are complex numbers in the frame of their triangle (see `line_drawing.tangent_me
 tangents to displacements in the UV map is linear: w becomes a w + b conj(w).
 
 The angles of the field are compared from texel to texel, relative to frames. For this, frames must rotate as
-little from texel to texel as the surface allows. The frame used is the direction that the UV map rotates to
-its u axis. It is averaged at the corners and interpolated like the field. Each average is over the triangles
-around a vertex that are in the same chart and not separated by sharp edges (a smooth fan).
+little from texel to texel as the surface allows. The frame of a triangle is the tangent that points along u
+after the rotation of the UV map, without its stretch (polar decomposition). It is averaged at the corners and
+interpolated like the field. Each average is over the triangles around a vertex that are in the same chart and
+not separated by sharp edges (a smooth fan).
 """
 
 from __future__ import annotations
@@ -48,7 +49,8 @@ class UvCharts:
     chart : (T,) int32 ndarray
         Number of the chart to which each triangle belongs.
     frame : (T, 3) complex128 ndarray
-        Unit tangents at the corners, in the frame of the triangle. Angles at texels are measured from them.
+        Unit tangents at the corners, as complex numbers in the frame of the triangle. Angles at texels are
+        measured from them.
     """
 
     uv: np.ndarray

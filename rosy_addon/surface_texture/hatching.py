@@ -145,8 +145,9 @@ def lit_ink(
 def _lines(
     on: TexelSurface, field: PixelField, look: PixelLook, wobble_angle: np.ndarray | None
 ) -> HatchedLines:
-    """Return the streaks or the evenly spaced lines of a field at the texels, with what makes them uneven:
-    breaks, paper grain, and spots where the field is undefined.
+    """Return the streaks or the evenly spaced lines of a field at the texels.
+
+    Breaks and paper grain, which make them uneven, and the undirected texture are included.
     """
     is_spaced, undefined = is_even(look), not field.representation.all()
     even_lines = noise = undirected = paper_grain = None

@@ -215,9 +215,16 @@ def combed_directions(mesh: TangentMesh, guiding_angle: float) -> CombedDirectio
 
 
 class _RefinedMesh(NamedTuple):
-    """A mesh of small triangles, on which representations of directions are averaged.
+    """A mesh of L small triangles, on which representations of directions are averaged.
 
-    Lengths are in units of `side`: the side, in world space, of a square that has the area of the surface.
+    Attributes
+    ----------
+    tree : BisectionTree
+        The triangles of the tangent mesh, refined into the L triangles. Coordinates are in units of `side`.
+    averages : SurfaceAverages
+        The operators that average on the refined mesh, with lengths in units of `side`.
+    side : float
+        Side, in Blender units of world space, of a square that has the area of the surface.
     """
 
     tree: BisectionTree
@@ -276,8 +283,8 @@ def _aligned(
 ) -> LineOrder:
     """Align a guiding direction with a field: replace it by the nearest member, average, and repeat.
 
-    This is threshold dynamics (diffusion-generated motion): the averages remove short boundaries between parts
-    in which another member is the nearest one.
+    This is threshold dynamics (diffusion-generated motion): the averages remove short boundaries between
+    parts in which another member is the nearest one.
 
     Parameters
     ----------

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from ..core.errors import RosyError, RosyWarning
 from ..field.array_field import SurfaceArrays, array_field
-from ..field.directional_field import tensor_field
+from ..field.directional_field import tensor_field, with_opposites
 from ..field.field import Field
-from ..field.field_io import load_field
+from ..field.field_io import HALF_CROSS_NOTE, load_field
 from ..field.mesh_arrays import SIMULATION_READERS
 from ..field.rosy_field import RosyField, check_degree
 from ..field.surface import Surface
@@ -136,7 +136,13 @@ def from_representation(surface: Surface, representation: ArrayLike, degree: int
     return from_angles(surface, np.angle(z) / check_degree(degree), degree, magnitude=np.abs(z))
 
 
-def from_directions(surface: Surface, directions: ArrayLike, *, nonfinite: str = "error") -> Field:
+def from_directions(
+    surface: Surface,
+    directions: ArrayLike,
+    degree: int | None = None,
+    *,
+    nonfinite: str = "error",
+) -> Field:
     """Make a field from N directions for each face or vertex. They need not be at equal angles.
 
     Parameters
@@ -144,7 +150,10 @@ def from_directions(surface: Surface, directions: ArrayLike, *, nonfinite: str =
     surface : Surface
     directions : (F, N, 3) or (V, N, 3) array_like
         The N directions of a face or vertex may be in any order. If one of them is zero, the field is
-        undefined there.
+        undefined there. Two directions may also be one for each line of a cross.
+    degree : int, optional
+        N. By default the number of directions; two directions that are nowhere opposite are a cross, of
+        degree 4, and a `RosyWarning` says so.
     nonfinite : {"error", "zero"}
         Raise an error if a vector is not finite, or treat it as undefined.
 
@@ -167,6 +176,11 @@ def from_directions(surface: Surface, directions: ArrayLike, *, nonfinite: str =
     source = f"{surface.name}: directions"
     if array.ndim != 3 or array.shape[2] != 3:
         raise RosyError(f"{source} must have the shape (F, N, 3), not {array.shape}")
+    given, array = array.shape[1], with_opposites(array, degree)
+    if degree is None and array.shape[1] > given:
+        warnings.warn(f"{source}: {HALF_CROSS_NOTE}", RosyWarning, stacklevel=2)
+    elif degree not in (None, array.shape[1]):
+        raise RosyError(f"{source} are {given} for each row, not {degree}")
     return Field.of(surface, validated_directions(surface, array, source, nonfinite))
 
 

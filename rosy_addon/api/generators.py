@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from numbers import Integral
 from pathlib import Path
 
 import numpy as np
@@ -226,7 +227,7 @@ def _guide_vectors(
 
 def prescribed(
     surface: Surface,
-    singularities: Mapping[int, int] | str | os.PathLike[str],
+    singularities: Mapping[int, float] | str | os.PathLike[str],
     degree: int | None = None,
     *,
     vectors: ArrayLike | Field | None = None,
@@ -242,9 +243,10 @@ def prescribed(
     Parameters
     ----------
     surface : Surface
-    singularities : mapping of int to int, or path-like
-        The indices of singularities by their vertices, in units of 1/N, or the path of a file of
-        singularities (``.sings``).
+    singularities : mapping of int to int or float, or path-like
+        The indices of singularities by their vertices: whole numbers (int) are in units of 1/N, others
+        (float or `Fraction`) are the index itself, such as 0.25. Or the path of a file of singularities
+        (``.sings``).
     degree : int, optional
         N, from 1 to 12. By default the degree of the file, or 4.
     vectors : (F, 3) array_like or Field, optional
@@ -261,21 +263,21 @@ def prescribed(
     Raises
     ------
     RosyError
-        If the surface cannot have these singularities, the file cannot be read or is of another degree,
-        or there is not enough memory.
+        If an index is no multiple of 1/N, the surface cannot have these singularities, the file cannot be
+        read or is of another degree, or there is not enough memory.
 
     Examples
     --------
     >>> import rosyfields as rf
     >>> torus = rf.Surface("torus.obj")
-    >>> field = rf.prescribed(torus, {10: 1, 200: -1})
+    >>> field = rf.prescribed(torus, {10: 0.25, 200: -0.25})
     >>> field.singularities.vertex.tolist(), field.singularities.index.tolist()
     ([10, 200], [1, -1])
     """
     if isinstance(singularities, Mapping):
         vertex = np.array(list(singularities), dtype=np.int64)
-        index = np.array(list(singularities.values()), dtype=np.int64)
         degree = 4 if degree is None else degree
+        index = _whole_indices(surface, singularities, degree)
     else:
         file_degree, vertex, index = read_sings(Path(singularities))
         if degree not in (None, file_degree):
@@ -291,6 +293,19 @@ def prescribed(
         add_missing=add_missing,
     )
     return generated(surface, settings, degree)
+
+
+def _whole_indices(surface: Surface, singularities: Mapping[int, float], degree: int) -> np.ndarray:
+    """Return the indices of singularities in units of 1 / `degree`; see `prescribed`."""
+    indices = []
+    for vertex, index in singularities.items():
+        units = index if isinstance(index, Integral) else float(index) * degree
+        if abs(units - round(units)) > 1e-6 * degree:
+            raise RosyError(
+                f"{surface.name}: the index {index} at vertex {vertex} is not a multiple of 1/{degree}"
+            )
+        indices.append(round(units))
+    return np.array(indices, dtype=np.int64)
 
 
 def along_axis(surface: Surface, axis: Sequence[float] = (0.0, 0.0, 1.0), degree: int = 4) -> Field:

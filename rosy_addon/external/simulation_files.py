@@ -264,7 +264,10 @@ def _read_dataset(path: Path, index: int | None) -> Any:
         if suffix in MESHIO_SUFFIXES:
             import meshio
 
-            return pyvista.from_meshio(meshio.read(path))
+            dataset = pyvista.from_meshio(meshio.read(path))
+            if suffix == ".med":
+                _name_components(dataset, path)
+            return dataset
         if suffix in VTK_SUFFIXES:
             return pyvista.read(str(path))
         reader = _time_reader(path)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.errors import RosyError
+from ..core.errors import RosyError, RosyWarning
 from ..core.progress import progress, report
 from .blocks import as_float64
 from .field_io import field_from_raw
@@ -180,7 +181,7 @@ def array_field(
     =======  ====================================================================================
     2        on a mesh with constant z: a member vector, z is 0
     3        a member vector
-    6        a symmetric tensor, in VTK's order XX, YY, ZZ, XY, YZ, XZ
+    6        a symmetric tensor, in VTK's order XX, YY, ZZ, XY, YZ, XZ; a `RosyWarning` says so
     9        a symmetric tensor, 3 x 3
     12 ...   3 N numbers: all N directions
     =======  ====================================================================================
@@ -228,6 +229,12 @@ def array_field(
     if raw.degree not in (None, degree):
         raise RosyError(
             f"{source} gives a field of degree {raw.degree}, but degree {degree} was requested"
+        )
+    if found.columns == 6:
+        warnings.warn(
+            f"{source}: its components have no names; they are read in VTK's order XX, YY, ZZ, XY, YZ, XZ",
+            RosyWarning,
+            stacklevel=3,
         )
     report(0.0, _LABEL)
     if raw.tensors and raw.domain == "vertex":

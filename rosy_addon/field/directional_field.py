@@ -26,7 +26,7 @@ from dataclasses import replace
 import numpy as np
 
 from .blocks import by_rows, row_blocks
-from .frames import coordinates
+from .frames import coordinates, dot
 from .representation import matching_angles, signed_power, to_representation
 from .rosy_field import RosyField, check_degree
 from .surface import Surface
@@ -36,6 +36,14 @@ from .symmetry import FieldSymmetry
 #: directions, in degrees, and the relative difference of lengths. Rounding to six digits, as in
 #: text files, gives errors about 100 times smaller.
 ANGLE_TOLERANCE_DEG, LENGTH_TOLERANCE = 1.0, 0.01
+
+#: Two directions count as opposite up to this angle, in radians. In fields of others, the lines of a cross have
+#: angles of 30 degrees or more.
+OPPOSITE_TOLERANCE = np.radians(10)
+
+#: Largest fraction of the rows with opposite directions at which pairs are one direction for each line of a
+#: cross. In a field of degree 2 nearly all rows have opposite directions; here are exceptions at needle faces.
+MAX_OPPOSITE_SHARE = 0.01
 
 #: Smallest modulus of a harmonic C_j that is kept (C_0 is about 1). Smaller ones are rounding
 #: errors of text files.
@@ -77,6 +85,35 @@ def field_from_directions(surface: Surface, directions: np.ndarray) -> RosyField
     else:
         vectors = rho[:, None] * (np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y)
     return detect_families(surface, RosyField(directions.shape[1], vectors, direction_ratios))
+
+
+def with_opposites(directions: np.ndarray, degree: int | None = None) -> np.ndarray:
+    """Return N directions on each face, given N directions or one of each opposite pair of a cross.
+
+    Programs for quad meshes store a cross by two directions, one for each of its lines. In a field of degree 2,
+    by contrast, the two directions are mostly opposite.
+
+    Parameters
+    ----------
+    directions : (n, k, 3) ndarray
+    degree : int, optional
+        The degree N, if it is known: two directions are then a cross exactly if it is 4. Otherwise they are
+        one if fewer than `MAX_OPPOSITE_SHARE` of the rows have opposite directions.
+
+    Returns
+    -------
+    (n, N, 3) ndarray
+        The array `directions` itself if nothing is missing.
+    """
+    if directions.shape[1] != 2 or degree not in (None, 4):
+        return directions
+    first, second = directions.swapaxes(0, 1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        norms = np.sqrt(dot(first, first) * dot(second, second))
+        is_opposite = dot(first, second) < -np.cos(OPPOSITE_TOLERANCE) * norms
+    if degree is None and is_opposite.sum() > MAX_OPPOSITE_SHARE * np.count_nonzero(norms):
+        return directions
+    return np.concatenate([directions, -directions], axis=1)
 
 
 def closest_rosy(w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,7 +15,7 @@ from ..core.file_io import check_parsing_memory, write_bytes
 from ..core.progress import progress, report
 from .blocks import row_blocks
 from .closest_point import closest_triangles
-from .directional_field import field_directions, tensor_field
+from .directional_field import field_directions, tensor_field, with_opposites
 from .formats.fieldgen import fieldgen_text, read_fieldgen
 from .formats.plain import npy_bytes, read_npy, read_text
 from .formats.polygons import RawField
@@ -42,6 +43,7 @@ _READERS: dict[str, Callable[[Path], RawField]] = {
     ".rawfield": read_rawfield,
     ".obj": read_fieldgen,
     ".txt": read_text,
+    ".vec": read_text,
     ".npy": read_npy,
 }
 READ_SUFFIXES = tuple(_READERS)
@@ -49,6 +51,12 @@ WRITE_SUFFIXES = (".rosy", ".rawfield", ".obj", ".txt", ".npy", *SINGULARITY_SUF
 
 #: Degree of fields from files that do not state a degree, if the caller gives none.
 DEFAULT_DEGREE = 4
+
+#: Note about rows of two directions that are read as a cross.
+HALF_CROSS_NOTE = (
+    "rows have two directions that are nowhere opposite; they are read as the lines of a cross (degree 4). "
+    "Give the degree 2 for two directions as they are"
+)
 
 #: Peak memory in bytes per byte of an .npy file, until its field is made.
 NPY_MEMORY = 4
@@ -71,11 +79,12 @@ def load_field(
     """Read a field from a file and fit it to a mesh.
 
     ============  ==================================================================
-    `.rosy`       row count, degree N, then rows x y z with one member vector each
+    `.rosy`       row count, degree N (or none), then rows x y z with one member vector each
     `.rawfield`   N, row count, then rows of all N directions, which need not be a RoSy
     `.obj`        a mesh with the field in comments, as written by the program fieldgen
-    `.txt`        rows of 3 numbers (one member vector), 3 N numbers (all N
-                  directions), or 9 numbers (a symmetric 3 x 3 tensor)
+    `.txt .vec`   rows of 3 numbers (one member vector), 3 N numbers (all N
+                  directions), 6 numbers (two directions that are nowhere opposite: the
+                  lines of a cross), or 9 numbers (a symmetric 3 x 3 tensor)
     `.npy`        the same data as an array: (n, 3), (n, 3 N), (n, N, 3) or (n, 3, 3)
     ============  ==================================================================
 
@@ -119,25 +128,45 @@ def load_field(
     check_parsing_memory(path, NPY_MEMORY)
     with progress(0.0, 0.5):
         raw = reader(path)
-    if degree is not None and raw.degree is not None and raw.degree != degree:
-        raise RosyError(
-            f"{path}: the field has degree {raw.degree}, but degree {degree} was requested"
-        )
+    raw, note = _with_degree(raw, path, degree)
     with progress(0.5, 0.6):
         source_surface = _source_surface(path, raw, surface, mesh)
     if source_surface is None:
         with progress(0.6, 1.0):
-            return LoadedField(field_from_raw(raw, surface, degree, str(path), nonfinite), "")
+            return LoadedField(field_from_raw(raw, surface, degree, str(path), nonfinite), note)
     with progress(0.6, 0.7):
         field = field_from_raw(raw, source_surface, degree, str(path), nonfinite)
     with progress(0.7, 1.0):
         field = transfer_field(source_surface, field, surface, str(path))
-    return LoadedField(
-        field,
+    transferred = (
         f"{path.name}: the field has {counted(source_surface.face_count, 'face')}, but the mesh has "
         f"{surface.face_count:,}; the field was transferred by position from "
-        f"{Path(source_surface.name).name}",
+        f"{Path(source_surface.name).name}"
     )
+    return LoadedField(field, "; ".join(filter(None, [note, transferred])))
+
+
+def _with_degree(raw: RawField, path: Path, degree: int | None) -> tuple[RawField, str]:
+    """Return the rows of a file with the opposites of directions that are not stored, and a note on that.
+
+    Raises
+    ------
+    RosyError
+        If the rows are of another degree than the requested one.
+    """
+    note, count = "", raw.values.shape[1]
+    if raw.degree is None and count > 1:
+        values = with_opposites(raw.values, degree)
+        if degree is None and len(values[0]) > count:
+            note = f"{path.name}: {HALF_CROSS_NOTE}"
+        raw = replace(raw, values=values, degree=len(values[0]))
+    elif raw.degree is None and degree is None:
+        note = f"{path.name}: no degree is stated; it is read as a field of degree {DEFAULT_DEGREE}"
+    if degree is not None and raw.degree not in (None, degree):
+        raise RosyError(
+            f"{path}: the field has degree {raw.degree}, but degree {degree} was requested"
+        )
+    return raw, note
 
 
 def field_from_raw(

@@ -1,13 +1,14 @@
 """Read and write fields as plain tables of numbers: text and `.npy` files.
 
-A row holds one of the N member vectors (3 numbers), all N directions (3 N numbers) or a symmetric tensor (9
-numbers).
+A row holds one of the N member vectors (3 numbers), all N directions (3 N numbers), one direction of each line
+of a cross (6 numbers; see `directional_field.with_opposites`) or a symmetric tensor (9 numbers).
 """
 
 from __future__ import annotations
 
 import io
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from ...core.file_io import read_bytes
 from ..blocks import as_float64
 from ..rosy_field import MAX_DEGREE
 from .polygons import RawField
-from .text_rows import read_rows
+from .text_rows import is_number, read_rows
 
 #: Largest difference between a symmetric matrix and its transpose, relative to its largest entry.
 SYMMETRY_TOLERANCE = 1e-5
@@ -32,7 +33,9 @@ _NPY_HEADERS = {
 def read_text(path: Path) -> RawField:
     """Read a text file with rows of 3, 3 N or 9 numbers.
 
-    Numbers are separated by commas or white space. ``#`` starts a comment.
+    Numbers are separated by commas or white space. ``#`` starts a comment. The first line may have words or
+    the number of rows, and each row may begin with its number, from 0 or 1. Rows of a center, two
+    directions and their opposites, as in files of seamless parametrizations, are read without the center.
 
     Raises
     ------
@@ -40,16 +43,29 @@ def read_text(path: Path) -> RawField:
         If the file cannot be read or holds no numbers, or if its rows differ in length.
     """
     rows = read_rows(path, data=read_bytes(path, reject_binary=True).replace(b",", b" "))
+    if len(rows) and not any(map(is_number, rows.words[0])):
+        rows = rows[1:]
+    header_count = None
+    if len(rows) > 1 and len(rows.words[0]) == 1 and rows.words[0][0].isdigit():
+        header_count, rows = int(rows.words[0][0]), rows[1:]
     if not len(rows):
         raise RosyError(f"{path}: contains no numbers")
     columns = len(rows.words[0])
-    _check_columns(str(path), columns)
+    _check_columns(str(path), columns - (columns % 3 == 1))
     for row, words in enumerate(rows.words):
         if len(words) != columns:
             raise rows.error(
                 row, f"the row has {counted(len(words), 'number')}, the rows above have {columns}"
             )
-    return _raw_field(rows.floats("part of a vector").reshape(-1, columns))
+    values = rows.floats("part of a vector").reshape(-1, columns)
+    if columns % 3 == 1:
+        number = values[:, 0] - values[0, 0]
+        if values[0, 0] not in (0, 1) or (number != np.arange(len(values))).any():
+            _check_columns(str(path), columns)
+        values = values[:, 1:]
+    elif columns == 15 and not (values[:, 3:9] + values[:, 9:]).any():
+        values = values[:, 3:]
+    return replace(_raw_field(values), header_count=header_count)
 
 
 def _check_npy_size(data: bytes) -> None:
@@ -141,7 +157,7 @@ def _raw_field(values: np.ndarray) -> RawField:
     matrices = values.reshape(len(values), -1, 3)
     if values.shape[1] == 9 and _are_symmetric(matrices):
         return RawField(matrices, 4, tensors=True)
-    return RawField(matrices, None if values.shape[1] == 3 else values.shape[1] // 3)
+    return RawField(matrices)
 
 
 def _are_symmetric(matrices: np.ndarray) -> bool:

@@ -43,7 +43,7 @@ class RawField:
         k vectors for each row of the file: one of the N member vectors (k = 1), all N directions (k = N), or
         the rows of a tensor (k = 3).
     degree : int or None
-        N; None if the file does not state it.
+        N; None if the file does not state it. It is then k, unless k is 1.
     header_count : int or None
         Number of rows that the header declares; None if the header does not declare it.
     domain : {"face", "vertex"} or None

@@ -18,7 +18,7 @@ from .text_rows import TextRows, abbreviate, format_lines, read_rows
 def read_rosy(path: Path) -> RawField:
     """Read a `.rosy` file: the number of rows, the degree N, and rows x y z.
 
-    The first two numbers may be on one line or on two lines.
+    The first two numbers may be on one line or on two lines. Some programs write no degree.
 
     Raises
     ------
@@ -26,6 +26,9 @@ def read_rosy(path: Path) -> RawField:
         If the file cannot be read, or is malformed.
     """
     rows = read_rows(path, comment=None)
+    if len(rows) > 1 and len(rows.words[0]) == 1 and len(rows.words[1]) == 3:
+        (count,) = _read_header(rows, "count")
+        return RawField(_vector_table(rows, 3, count, 1).reshape(-1, 1, 3), None, count)
     count, degree = _read_header(rows, "count", "degree")
     table = _vector_table(rows, 3, count)
     return RawField(table.reshape(-1, 1, 3), _validated_degree(rows, 1, degree), count)
@@ -56,12 +59,12 @@ def rawfield_text(directions: np.ndarray) -> str:
     return f"{degree} {count}\n{format_lines(directions.reshape(count, -1))}"
 
 
-def _read_header(rows: TextRows, *names: str) -> tuple[int, int]:
-    """Return the first two integers of a file, which are on one line or on two.
+def _read_header(rows: TextRows, *names: str) -> list[int]:
+    """Return the first one or two integers of a file; two are on one line or on two.
 
     `names` are their names in messages.
     """
-    words = [word for line in rows.words[:2] for word in line][:2]
+    words = [word for line in rows.words[:2] for word in line]
     values = []
     for index, name in enumerate(names):
         try:
@@ -72,7 +75,7 @@ def _read_header(rows: TextRows, *names: str) -> tuple[int, int]:
             row = rows.row_of_word(index)
             found = abbreviate(words[index])
             raise rows.error(row, f"expected the {name}, a whole number, found {found}") from None
-    return values[0], values[1]
+    return values
 
 
 def _validated_degree(rows: TextRows, word: int, degree: int) -> int:
@@ -83,15 +86,16 @@ def _validated_degree(rows: TextRows, word: int, degree: int) -> int:
         raise rows.error(rows.row_of_word(word), str(reason)) from None
 
 
-def _vector_table(rows: TextRows, columns: int, count: int) -> np.ndarray:
+def _vector_table(rows: TextRows, columns: int, count: int, header: int = 2) -> np.ndarray:
     """Return the numbers after the header as (n, columns) float64. Line breaks in the file are ignored.
 
-    `count` is the number of rows that the header declares; it is used in the error message.
+    `count` is the number of rows that the header declares, for the error message. The header has `header`
+    numbers.
     """
-    row_count, remainder = divmod(sum(map(len, rows.words)) - 2, columns)
+    row_count, remainder = divmod(sum(map(len, rows.words)) - header, columns)
     if remainder:
         raise RosyError(
             f"{rows.path}: declares {counted(count, 'row')} of {columns} numbers, but contains {row_count} and "
             "part of another"
         )
-    return rows.floats("part of a vector")[2:].reshape(row_count, columns)
+    return rows.floats("part of a vector")[header:].reshape(row_count, columns)

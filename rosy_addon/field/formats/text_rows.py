@@ -164,6 +164,15 @@ def read_rows(path: Path, *, comment: bytes | None = b"#", data: bytes | None = 
     return TextRows(path, words, line_numbers)
 
 
+def is_number(word: bytes) -> bool:
+    """Return whether a word is a number, or nan or inf."""
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
 def abbreviate(word: bytes) -> str:
     """Return a word in quotes for a message: at most 24 of its bytes, and printable characters only."""
     text = word[:24].decode("ascii", "backslashreplace")

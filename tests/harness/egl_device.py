@@ -68,11 +68,7 @@ class EglDevice(Device):
         self.context.memory_barrier()
 
     def draw(
-        self,
-        shader: RasterPass,
-        batches: Sequence[tuple[Any, NamedValues]],
-        color: Any,
-        depth: Any,
+        self, shader: RasterPass, batches: Sequence[tuple[Any, NamedValues]], color: Any, depth: Any
     ) -> None:
         framebuffer = self.context.framebuffer([color], depth)
         framebuffer.use()

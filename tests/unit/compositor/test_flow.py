@@ -9,13 +9,7 @@ from scipy import ndimage
 
 from rosy_addon.compositor.drifting_averages import DriftingAverages, MovingKernel
 from rosy_addon.compositor.filter_kernel import sample_weights
-from rosy_addon.compositor.flow import (
-    NO_DRIFT,
-    Drift,
-    channel_shifts,
-    channel_weights,
-    drift_at,
-)
+from rosy_addon.compositor.flow import NO_DRIFT, Drift, channel_shifts, channel_weights, drift_at
 from rosy_addon.compositor.look import Look, has_flow
 from rosy_addon.compositor.look_units import pixel_look
 

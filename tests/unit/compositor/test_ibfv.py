@@ -25,10 +25,7 @@ LOOK = Look(method="ibfv")
 
 
 def draw(
-    field: PixelField,
-    look: Look = LOOK,
-    noise: np.ndarray | None = None,
-    drift: Drift = NO_DRIFT,
+    field: PixelField, look: Look = LOOK, noise: np.ndarray | None = None, drift: Drift = NO_DRIFT
 ) -> LicImages:
     return lic(field, look, noise, drift)
 

@@ -79,12 +79,7 @@ def test_strips_depend_on_their_context_alone(name, samples, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "look",
-    [
-        load_preset("engraving").look,
-        Look(hue="magnitude"),
-        Look(high_pass=1024.0),
-    ],
+    "look", [load_preset("engraving").look, Look(hue="magnitude"), Look(high_pass=1024.0)]
 )
 def test_pictures_that_depend_on_all_pixels_are_one_group(look):
     strips = divide_into_strips(look, CAMERA, instances())

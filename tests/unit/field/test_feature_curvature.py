@@ -37,10 +37,7 @@ def test_sharp_edges_have_none(make):
 def test_a_deformation_changes_nothing():
     ball = icosphere(3)
     bent = build_surface(
-        ball.vertices * (1, 1, 3),
-        ball.corner_vertex,
-        ball.face_start,
-        rest_vertices=ball.vertices,
+        ball.vertices * (1, 1, 3), ball.corner_vertex, ball.face_start, rest_vertices=ball.vertices
     )
     np.testing.assert_array_equal(feature_curvature(bent), feature_curvature(ball))
 

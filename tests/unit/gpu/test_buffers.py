@@ -141,10 +141,7 @@ def test_only_meshes_with_a_field_have_records_and_a_limit(error_of, monkeypatch
     assert "sphere" in message and "80" in message
 
 
-FIELDS = {
-    **{f"RoSy {n}": lambda surface, n=n: axis_field(surface, n) for n in range(1, 7)},
-    **FREE,
-}
+FIELDS = {**{f"RoSy {n}": lambda surface, n=n: axis_field(surface, n) for n in range(1, 7)}, **FREE}
 
 
 @pytest.mark.parametrize("name", FIELDS)

@@ -13,11 +13,7 @@ from rosy_addon.core.cache import Cache
 from rosy_addon.field.directional_field import field_from_directions
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.surface import Surface, build_surface
-from rosy_addon.projection.surface_lines import (
-    cached_surface_lines,
-    rest_matrix,
-    surface_lines,
-)
+from rosy_addon.projection.surface_lines import cached_surface_lines, rest_matrix, surface_lines
 
 #: Part of the surface on which distances between lines differ by at most `TOLERANCE`, where no line
 #: ends within `AWAY` distances.

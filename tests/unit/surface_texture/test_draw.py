@@ -69,11 +69,7 @@ UNEVEN = {"wobble": 0.5, "breaks": 0.5, "paper_grain": 0.3}
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("settings", "lights"),
-    [
-        ({"ink": "even"}, None),
-        (UNEVEN, [LAMP]),
-        *long(({"ink": "even"}, [LAMP]), (UNEVEN, None)),
-    ],
+    [({"ink": "even"}, None), (UNEVEN, [LAMP]), *long(({"ink": "even"}, [LAMP]), (UNEVEN, None))],
     ids=str,
 )
 def test_hatching_does_not_depend_on_the_charts(settings, lights):

@@ -11,14 +11,13 @@ from harness.gpu_scenes import (
     ROSY,
     SHEAR,
     perturbed_field,
-    placed,
     rotation,
     shown,
     smooth_field,
 )
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from shapes import from_triangles, icosphere
+from shapes import from_triangles, icosphere, placed
 
 from rosy_addon.compositor.pixel_field import surface_pixel_field
 from rosy_addon.field.generate import axis_field

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
-from shapes import from_quads, icosphere, plane, torus
+from shapes import from_quads, icosphere, joined, plane, torus
 
 from rosy_addon.core.errors import RosyError
 from rosy_addon.field.combing import BrushStroke, Combing, GuideBrush, start_combing
@@ -148,10 +148,8 @@ def test_mirrored_strokes_are_symmetric():
 
 def test_other_side_of_a_sheet_is_left_out():
     front = plane(20, 20)
-    vertices = np.concatenate([front.vertices, front.vertices - [0, 0, 0.01]])
     corners = front.corner_vertex.reshape(-1, 4)
-    back = corners[:, ::-1] + len(front.vertices)
-    surface = from_quads(vertices, np.concatenate([corners, back]))
+    surface = joined(front, from_quads(front.vertices - [0, 0, 0.01], corners[:, ::-1]))
     line = np.stack([np.linspace(-0.5, 0.5, 50), np.zeros(50), np.zeros(50)], axis=1)
     for front_faces, expected in ((True, 0), (False, 1)):
         combing = start(surface, 4)

@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from shapes import icosphere, instance_of, moved, plane, sharp_cube
+from shapes import icosphere, instance_of, moved, placed, plane, sharp_cube
 
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, axis_field, generate
@@ -66,10 +66,8 @@ def test_extensions_at_borders_are_straight_and_of_different_lengths():
     growth = np.abs(ends_of(extended)[:, :, 0]) - np.abs(ends_of(plain)[:, :, 0])
     assert np.allclose(np.abs(ends_of(plain)[:, :, 0]), 1)
     pixels = 100 * growth
-    assert (
-        pixels.min() >= MIN_EXTENSION_RATIO * MAX_PIXELS - 1e-6
-        and pixels.max() <= MAX_PIXELS + 1e-6
-    )
+    assert pixels.min() >= MIN_EXTENSION_RATIO * MAX_PIXELS - 1e-6
+    assert pixels.max() <= MAX_PIXELS + 1e-6
     assert pixels.mean() == pytest.approx((1 + MIN_EXTENSION_RATIO) / 2 * MAX_PIXELS, rel=0.1)
     assert pixels.std() > 0.15 * MAX_PIXELS
     # Extensions are as straight as the field, and in its plane.
@@ -182,9 +180,8 @@ def test_ends_at_creases_are_extended():
 def test_extensions_are_clipped_to_the_frame():
     camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 206, 206, scale=2.06)
     for options in ({}, {"hidden": True}):
-        strokes = draw_instances(
-            [SQUARE], camera, StrokeStyle(spacing=6, overshoot=MAX_PIXELS, **options)
-        ).strokes
+        style = StrokeStyle(spacing=6, overshoot=MAX_PIXELS, **options)
+        strokes = draw_instances([SQUARE], camera, style).strokes
         pixels, _ = project_to_pixels(strokes.points, camera)
         assert (pixels >= 0).all() and (pixels <= 206).all()
         assert np.abs(ends_of(strokes)[:, :, 0]).min() > 1.015
@@ -204,18 +201,12 @@ def test_extensions_are_tapered(taper):
 @pytest.mark.slow
 def test_with_hidden_strokes_extensions_are_straight_in_space():
     """On a slanted plane, extensions are in the plane. Their length is along the plane."""
-    slope = np.eye(4)
-    slope[:3, :3] = [[0.6, 0, -0.8], [0, 1, 0], [0.8, 0, 0.6]]
-    instance = MeshInstance(SQUARE.surface, slope, SQUARE.field)
-    strokes = draw_instances(
-        [instance],
-        TOP_CAMERA,
-        StrokeStyle(spacing=6, hidden=True, overshoot=MAX_PIXELS),
-        clip_to_frame=False,
-    ).strokes
-    local = strokes.points @ slope[:3, :3]
-    assert np.abs(local[:, 2]).max() < 1e-9
-    growth = np.abs(ends_of(strokes) @ slope[:3, :3])[:, :, 0] - 1
+    slope = np.array([[0.6, 0, -0.8], [0, 1, 0], [0.8, 0, 0.6]])
+    instance = MeshInstance(SQUARE.surface, placed(slope), SQUARE.field)
+    style = StrokeStyle(spacing=6, hidden=True, overshoot=MAX_PIXELS)
+    strokes = draw_instances([instance], TOP_CAMERA, style, clip_to_frame=False).strokes
+    assert np.abs((strokes.points @ slope)[:, 2]).max() < 1e-9
+    growth = np.abs(ends_of(strokes) @ slope)[:, :, 0] - 1
     assert growth.min() > 0.01 * MIN_EXTENSION_RATIO * MAX_PIXELS - 1e-6
     assert growth.max() <= 0.01 * MAX_PIXELS + 1e-6
 

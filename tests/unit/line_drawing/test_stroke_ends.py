@@ -23,21 +23,12 @@ def test_taper_and_closed_strokes():
 def test_ends_that_meet_head_on_are_not_tapered():
     """Stroke 1 continues stroke 0 at half a spacing, 2 is beside 0, and 3 is perpendicular to it."""
     along = np.linspace(0, 1, 11)[:, None] * np.array([1.0, 0, 0])
-    points = [
-        along,
-        along + (1.05, 0.05, 0),
-        along + (0, 0.1, 0),
-        along[:, [1, 0, 2]] + (1.02, 0, 0),
-    ]
+    points = [along, along + (1.05, 0.05, 0), along + (0, 0.1, 0)]
+    points.append(along[:, [1, 0, 2]] + (1.02, 0, 0))
     directions = np.repeat([[1.0, 0, 0], [1.0, 0, 0], [1.0, 0, 0], [0, 1.0, 0]], 11, axis=0)
     strokes = planar_strokes(np.array(points), directions, 0.1)
     # The last end of stroke 2 is beside that of stroke 0, and also meets stroke 1.
-    assert head_on_ends(strokes).tolist() == [
-        [False, True],
-        [True, False],
-        [False, True],
-        [False, False],
-    ]
+    assert head_on_ends(strokes).tolist() == [[0, 1], [1, 0], [0, 1], [0, 0]]
     tapered = strokes.tapered(2.0, 0.2, ~head_on_ends(strokes))
     first, last = tapered.start[:-1], tapered.start[1:] - 1
     end_width = np.stack([tapered.width[first], tapered.width[last]], axis=1)
@@ -67,10 +58,7 @@ def test_gaps_at_crossings(columns):
     assert not len(find_crossings(gapped).stroke)
     removed_length = strokes.length.sum() - gapped.length.sum()
     assert np.isclose(removed_length, len(crossings.stroke) * 0.3 * 0.2, rtol=0.1)
-    for family in (
-        0,
-        1,
-    ):  # strokes pass over and under in turn, so each family has half of the gaps
+    for family in (0, 1):  # strokes pass over and under in turn: each family has half of the gaps
         cut = strokes.length[strokes.family == family].sum()
         cut -= gapped.length[gapped.family == family].sum()
         assert np.isclose(cut, removed_length / 2, rtol=0.1)

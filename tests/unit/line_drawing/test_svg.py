@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from field_helpers import write_off
 from harness.stroke_tracing import trace_strokes, turned, visible_strokes
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -130,23 +131,12 @@ def test_simplified_lines_stay_within_the_tolerance(sizes, seed):
 
 @pytest.mark.slow
 def test_command_line(tmp_path, capsys, monkeypatch):
-    mesh, out = tmp_path / "ball.obj", tmp_path / "ball.svg"
-    ball = icosphere(3)
-    rows = [f"v {x} {y} {z}" for x, y, z in ball.vertices]
-    mesh.write_text("\n".join(rows + [f"f {a} {b} {c}" for a, b, c in ball.triangle_vertex + 1]))
-    command = [
-        "strokes",
-        str(mesh),
-        "--generate",
-        "smoothest",
-        "--set",
-        "spacing=12",
-        "-o",
-        str(out),
-    ]
+    mesh, out = write_off(tmp_path / "ball.off", icosphere(3)), tmp_path / "ball.svg"
+    words = "--generate smoothest --set spacing=12 -o"
+    command = ["strokes", str(mesh), *words.split(), str(out)]
+    options = "--size 150x100 --set outline=on --set gaps=0.3 --set light=lamp"
     contents = []
     for _ in range(2):
-        options = "--size 300x200 --set outline=on --set gaps=0.3 --set light=lamp"
         assert main([*command, *options.split()]) == 0
         contents.append(out.read_bytes())
     assert contents[0] == contents[1]
@@ -154,9 +144,9 @@ def test_command_line(tmp_path, capsys, monkeypatch):
     assert len(root.findall("{http://www.w3.org/2000/svg}g")) == 4
     for arguments, message in (
         (["-o", str(tmp_path / "ball.png")], "ball.png"),
-        (["--camera", "Close"], "ball.obj: --camera applies only to .blend files"),
-        (["--frames", "1-3"], "ball.obj: --frames applies only to .blend files"),
-        (["--set", "light=scene"], "ball.obj: has no lights"),
+        (["--camera", "Close"], "ball.off: --camera applies only to .blend files"),
+        (["--frames", "1-3"], "ball.off: --frames applies only to .blend files"),
+        (["--set", "light=scene"], "ball.off: has no lights"),
         (["--set", "taper=-1"], "setting 'taper' is -1.0, expected a number from 0"),
         (["--set", "wobble=1"], "--set wobble=1: unknown setting 'wobble'"),
         (["--set", "light"], "--set light: expected NAME=VALUE"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from harness.planar import compose_planar
+from planar_fields import KERNELS
 from scipy import ndimage
 
 from rosy_addon.compositor.drifting_averages import DriftingAverages, MovingKernel
@@ -17,8 +18,6 @@ SIZE = 320
 
 #: Pixels at the border that are not compared: streamlines end there.
 MARGIN = 64
-
-KERNELS = {"box": {}, "taper": {"fade": "ends"}, "ramp": {"fade": "tail"}}
 
 
 def member(angle, degree, look, drift=NO_DRIFT):

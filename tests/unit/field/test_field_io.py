@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import tracemalloc
 
@@ -28,6 +29,15 @@ WEST = np.tile((-2.0, 0.0, 0.0), (6, 1))
 def rosy_text(rows, count=None, degree=4, form="{count}\n{degree}\n"):
     head = form.format(count=len(rows) if count is None else count, degree=degree)
     return head + "".join(" ".join(map(str, row)) + "\n" for row in rows)
+
+
+def npy_that_claims(count):
+    """An array of 6 rows whose header claims more."""
+    file = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        file, {"descr": "<f8", "fortran_order": False, "shape": (count, 3)}
+    )
+    return file.getvalue() + WEST.tobytes()
 
 
 # --- reading and writing ---------------------------------------------------------------------
@@ -143,6 +153,7 @@ DAMAGED = {
     "nan.rosy": (rosy_text(np.where(np.arange(6)[:, None] == 4, np.nan, WEST)).encode(),
                  "1 of 6 vectors are not finite, the first on face 4"),
     "upright.rosy": (rosy_text(np.tile((0, 0, 1), (6, 1))).encode(), "face 0 by 90.0 degrees"),
+    "claims.npy": (npy_that_claims(10**11), "which is more than it contains"),
     "a.vtk": (b"", "is not a field file"),
 }  # fmt: skip
 

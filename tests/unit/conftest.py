@@ -8,6 +8,7 @@ import pytest
 from hypothesis import settings
 
 from rosy_addon.core.errors import RosyError
+from rosy_addon.worker.helper import Helper
 
 #: Machines may be busy, so hypothesis has no deadline for an example.
 settings.register_profile("patient", deadline=None)
@@ -47,6 +48,14 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip("no ../shared/data")
     return folder
+
+
+@pytest.fixture
+def helper():
+    """A helper process that has not been started."""
+    helper = Helper()
+    yield helper
+    helper.close()
 
 
 @pytest.fixture

@@ -39,15 +39,15 @@ def instances() -> tuple[MeshInstance, ...]:
     )
 
 
+PAPER_GRAIN = {"anchor": "surface", "high_pass": 0.0, "ink": "hatch", "paper_grain": 0.8}
+
 #: Looks that need each kind of rows around a strip.
 LOOKS = {
-    "default": Look(length=14, supersampling=1),
-    "color noise, by families": Look(length=14, hue="noise"),
+    "default": Look(length=14),
+    "color noise, by families": Look(length=14, hue="noise", supersampling=2),
     "cross-hatch": replace(load_preset("cross-hatch").look, length=14, overshoot=4.0),
-    "wide paper grain": Look(
-        length=6, line_width=10.0, anchor="surface", high_pass=0.0, ink="hatch", paper_grain=0.8
-    ),
-    "flow": Look(length=10, flow=1.0),
+    "wide paper grain": Look(length=6, line_width=10.0, supersampling=2, **PAPER_GRAIN),
+    "flow": Look(length=10, flow=1.0, supersampling=2),
 }
 
 

@@ -261,8 +261,9 @@ def test_tones(card, name, tone, scale):
     assert_parity(card, [instance], look=look, reference=reference)
 
 
-@pytest.mark.parametrize("name", TONED)
-@pytest.mark.parametrize("perspective", [True, False])
+@pytest.mark.parametrize(
+    ("name", "perspective"), [*((name, True) for name in TONED), ("unchanged", False)]
+)
 def test_tones_of_attributes(card, name, perspective):
     look = replace(LOOK, tone="attribute", **TONED[name])
     assert_parity(card, [toned(waves())], view(perspective=perspective), look)

@@ -169,15 +169,14 @@ LINEAR_PARTS = {
 
 
 @pytest.mark.parametrize("name", LINEAR_PARTS)
-@pytest.mark.parametrize("degree", [3, 4])
-def test_matrices(card, name, degree):
+def test_matrices(card, name):
     linear = LINEAR_PARTS[name]
     scale = np.cbrt(abs(np.linalg.det(linear)))
     eye = 4.5 * scale * np.array([0.4, -0.9, 0.5])
-    assert_parity(card, [ball(degree, linear)], camera_from(eye, fov=0.75, scale=scale))
+    assert_parity(card, [ball(3, linear)], camera_from(eye, fov=0.75, scale=scale))
 
 
-@pytest.mark.parametrize("degree", [1, 3, 4])
+@pytest.mark.parametrize("degree", [3, 4])
 @pytest.mark.parametrize("distortion", [np.eye(3), MIRROR])
 def test_the_back_of_an_open_surface(card, degree, distortion):
     sheet = with_axis_field(plane(8, 8), degree, (1.0, 0.4, 0.0), distortion)
@@ -187,11 +186,10 @@ def test_the_back_of_an_open_surface(card, degree, distortion):
     assert_parity(card, [tube], camera_from((0.5, -2.0, 3.0), fov=0.8))
 
 
-@pytest.mark.parametrize("degree", [1, 3, 4])
 @pytest.mark.parametrize("turn", range(4))
-def test_normals_with_zeros_of_either_sign(card, degree, turn):
+def test_normals_with_zeros_of_either_sign(card, turn):
     """The frame of a normal depends on the sign of its z, also if z is 0."""
-    axis = (0.4, 0.5, 0.6)
+    degree, axis = 3, (0.4, 0.5, 0.6)
     tube = with_axis_field(cylinder(24, 8), degree, axis, rotation(0, 0, turn * np.pi / 2))
     assert_parity(card, [tube], view(distance=6.0, perspective=False))
     corners = np.array([(-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1)]) * (1.0, -0.0, 1.0)
@@ -203,9 +201,10 @@ def test_normals_with_zeros_of_either_sign(card, degree, turn):
 # --- creases and outlines ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("crossing", "degree"), [(True, 4), (False, 3), (False, 4)])
+@pytest.mark.parametrize(
+    ("crossing", "degree", "perspective"), [(True, 4, True), (False, 3, True), (False, 4, False)]
+)
 @pytest.mark.parametrize("display", ["smooth", "flat"])
-@pytest.mark.parametrize("perspective", [True, False])
 def test_creases_of_a_cube(card, crossing, degree, display, perspective):
     """Axis-aligned walls. Low degrees are not tested across creases: the directions on one wall lie
     between the directions on the next.

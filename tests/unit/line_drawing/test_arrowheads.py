@@ -54,7 +54,7 @@ def test_arrowheads_point_along_a_member(shape, degree, settings):
 @pytest.mark.slow
 def test_lines_without_a_direction_have_no_arrowheads():
     ball = icosphere(2)
-    assert len(drawn(ball, generate(ball, "smoothest", 4))[1]) == 0
+    assert len(drawn(ball, generate(ball, "smoothest", 4), spacing=40.0)[1]) == 0
 
 
 def test_arrowheads_are_evenly_spaced():

@@ -6,6 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from harness.stroke_tracing import latitudes
 from shapes import icosphere, instance_of, moved, placed, plane, sharp_cube
 
 from rosy_addon.field.frames import dot, normalize
@@ -151,7 +152,7 @@ def test_ends_at_gaps_and_at_neighbors_are_not_extended():
 
 @pytest.mark.slow
 def test_closed_strokes_and_outlines_are_not_extended():
-    circles = MeshInstance(icosphere(3), IDENTITY, axis_field(icosphere(3), 4, (0, 0, 1)))
+    circles = latitudes(icosphere(3))
     plain, extended = draw_both([circles], TOP_CAMERA, spacing=18.0, outline=True)
     closed = plain.closed & extended.closed
     assert closed.sum() >= 4

@@ -19,7 +19,7 @@ def spread_points(count, octaves):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("octaves", [0, 4, 16])
+@pytest.mark.parametrize("octaves", [0, 16])
 def test_all_pairs_are_found(octaves):
     points, radius = spread_points(3000, octaves)
     grid = PointGrid(float(np.median(radius)), len(points))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import pytest
 from harness.stroke_tracing import planar_strokes, trace_strokes, turned
@@ -64,11 +66,15 @@ def test_gaps_at_crossings(columns):
         assert np.isclose(cut, removed_length / 2, rtol=0.1)
 
 
-@pytest.mark.slow
-@settings(max_examples=30, deadline=None)
+@lru_cache(maxsize=1)
+def lines():
+    return trace_strokes(instance_of(plane(3, 3), 2), 0.2)
+
+
+@settings(max_examples=30)
 @given(st.floats(0.01, 1.9), st.floats(0.01, 0.5))
 def test_cut_intervals_remove_their_length(low, size):
-    strokes = trace_strokes(instance_of(plane(3, 3), 2), 0.2)
+    strokes = lines()
     remaining = cut_intervals(strokes, np.array([0]), np.array([low]), np.array([low + size]))
     total = strokes.length[0]
     assume(low + size < total - 1e-6 or low + size > total + 1e-6)

@@ -24,7 +24,7 @@ def values_at_vertices(surface, values):
     return actual
 
 
-def trough(cells=24, size=4.0, sharp=True, angle=np.pi / 2):
+def trough(cells=8, size=4.0, sharp=True, angle=np.pi / 2):
     """A floor (z = 0, y > 0) and a wall at an angle, long in x; (V,) distances from the edge."""
     x = np.linspace(-3 * size, 3 * size, 3 * cells + 1)
     edge_distance = np.linspace(0, size, cells + 1)
@@ -46,7 +46,7 @@ def test_directions_are_evenly_spread():
     np.testing.assert_allclose(actual.T @ actual / 256, np.eye(3) / 3, atol=5e-3)
 
 
-@pytest.mark.parametrize("scale", [0.01, 1.0, 300.0])
+@pytest.mark.parametrize("scale", [0.01, 300.0])
 def test_a_sphere_is_fully_open(scale):
     instance = MeshInstance(icosphere(3), np.diag([scale, scale, scale, 1.0]))
     np.testing.assert_allclose(ambient_occlusion([instance], 0, 64), 1, atol=0.005)
@@ -84,7 +84,7 @@ def test_the_smooth_edge_of_two_planes():
 
 def test_a_plane_below_a_sphere():
     """A ball of radius r hides cos(a) (r / l)^2, at distance l and angle a (Nusselt)."""
-    ground, ball = plane(20, 20, 6.0), icosphere(4)
+    ground, ball = plane(10, 10, 6.0), icosphere(4)
     instances = [instance_at(ground), instance_at(ball, 0, 0, 1.6)]
     actual = values_at_vertices(ground, ambient_occlusion(instances, 0, 300))
     distance = np.sqrt(ground.vertices[:, 0] ** 2 + ground.vertices[:, 1] ** 2 + 1.6**2)

@@ -256,5 +256,5 @@ def test_lines_grow_between_lines_that_are_too_far_apart():
     assert lines.period[0, near].min() > 3.6 and lines.period[0, near].max() < 8.4
     coverage = lines.coverage(0, np.full(len(depth), 0.4, np.float32), look)
     assert coverage[near].mean() == pytest.approx(0.4, abs=0.05)
-    world = replace(look, unit_size=0.02)
+    world = replace(look, unit_size=0.2)
     assert lines_at_pixels(instance, camera, world)[0].growth is None

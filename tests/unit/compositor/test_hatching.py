@@ -87,7 +87,7 @@ def test_detail_shows_the_tone_of_small_features():
     """A ball of 20 pixels is drawn better, and a large one stays the same."""
     fine = replace(INK, detail=0.6)
     assert ramp_error(fine, zoom=0.12, sigma=2) < ramp_error(INK, zoom=0.12, sigma=2)
-    instance, camera = make_instance(BALL), make_camera(zoom=12)
+    instance, camera = make_instance(BALL), make_camera(zoom=12).resized(160, 160)
     np.testing.assert_array_equal(render(instance, camera, fine), render(instance, camera, INK))
 
 
@@ -206,11 +206,11 @@ def test_families_keep_their_inks_at_any_guiding_angle():
 
 
 def test_clear_paper_shows_only_ink():
-    instance = make_instance(BALL)
+    instance, camera = make_instance(BALL), make_camera().resized(160, 160)
 
     def on_paper(alpha):
         look = replace(INK, paper_color="#ffffff" + alpha, ink_color="#204060")
-        return render(instance, make_camera(), look)
+        return render(instance, camera, look)
 
     clear, full = on_paper("00"), on_paper("")
     inked = clear[clear[..., 3] > 0][:, :3]

@@ -99,7 +99,7 @@ def line_width(picture):
 )
 def test_widths_of_lines_through_a_zoom(unit_size, zooms):
     """They are constant in pixels, or proportional to the zoom; in between, lines of two widths mix."""
-    look = replace(INK, light="scene", shading=0.4, unit_size=unit_size)
+    look = replace(INK, light="scene", shading=0.4, unit_size=unit_size, supersampling=1)
     widths = []
     for zoom in zooms:
         rgba = render(make_wall(), camera_before_wall(8 / zoom, 0.3, 0.2), look)

@@ -19,7 +19,7 @@ from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
-WIDTH, HEIGHT = 96, 320
+WIDTH, HEIGHT = 64, 320
 CAMERA = perspective_camera(look_at((0.4, -6.0, 3.0), (0, 0, 0.5)), WIDTH, HEIGHT, fov=0.5)
 
 

@@ -76,7 +76,7 @@ def test_the_edge_of_two_planes():
 
 def test_the_smooth_edge_of_two_planes():
     """The normal bisects the open wedge of 90 degrees, whose visibility is sin 45."""
-    surface, edge_distance = trough(sharp=False)
+    surface, edge_distance = trough(24, sharp=False)
     actual = values_at_vertices(surface, ambient_occlusion([instance_at(surface)], 0))
     selected = (np.abs(surface.vertices[:, 0]) < 1) & (edge_distance == 0)
     assert actual[selected].mean() == pytest.approx(np.sqrt(0.5), abs=0.02)

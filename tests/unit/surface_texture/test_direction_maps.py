@@ -51,7 +51,7 @@ def test_maps_decode_to_the_field(uv, degree):
     vectors = field.vectors.copy()
     vectors[:48] = 0
     instance = MeshInstance(surface, np.eye(4), RosyField(degree, vectors))
-    texture = draw_texture(instance, uv, Look(display="flat"), 1024, content="anisotropy")
+    texture = draw_texture(instance, uv, Look(display="flat"), 512, content="anisotropy")
     assert texture.is_data
     direction, strength = decoded(texture.rgba, surface, uv)
     np.testing.assert_array_equal(strength[:48], 0)
@@ -70,7 +70,7 @@ def test_maps_decode_to_the_field(uv, degree):
 @pytest.mark.slow
 def test_a_line_goes_on_where_its_directions_turn_over():
     """On an ellipsoid they do between two umbilics; away from these, one family is followed everywhere."""
-    surface = rebuilt(globe(48, 96), globe(48, 96).vertices * (1, 0.7, 0.5))
+    surface = rebuilt(globe(32, 64), globe(32, 64).vertices * (1, 0.7, 0.5))
     field, line = (generate(surface, "curvature", n) for n in (4, 2))
     first = surface.triangles[:, 0]
     tangent = corner_tangents(surface, field, 0.0)[first]

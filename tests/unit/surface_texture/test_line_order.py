@@ -80,7 +80,7 @@ def test_lines_swap_only_between_singularities():
 @pytest.mark.slow
 def test_the_order_does_not_depend_on_the_size_of_triangles_or_of_the_mesh():
     """A cube of twelve triangles has one first line on each face, at any scale."""
-    for scale in (1e-6, 1.0, 1e6):
+    for scale in (1e-6, 1e6):
         mesh = mesh_of(cube(), "axis", 4, placed(scale))
         line, share = first_lines(mesh, blend=0.02 * scale)
         is_side = np.abs(mesh.normal[:, 2]) < 0.1

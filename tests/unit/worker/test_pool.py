@@ -28,7 +28,7 @@ sys.path.append(str(Path(__file__).parent))
 from test_helper import has_ended
 
 #: Fields with many lines need many strips.
-DEGREE, WIDTH, HEIGHT = 11, 320, 1216
+DEGREE, WIDTH, HEIGHT = 11, 160, 1216
 
 
 def view_from(eye, **look) -> ViewInput:

@@ -17,20 +17,11 @@ settings.load_profile("patient")
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def long(*cases):
-    """Parameters of a test that only `make test LONG=1` runs. A tuple holds several arguments."""
-    return [
-        pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=pytest.mark.long)
-        for case in cases
-    ]
-
-
 def mainly(common, cases):
     """Parameters of all cases; `make test` runs the common ones, `make test LONG=1` all."""
-    common, cases = set(common), list(cases)
     return [
-        *(case for case in cases if case in common),
-        *long(*(c for c in cases if c not in common)),
+        case if case in set(common) else pytest.param(case, marks=pytest.mark.long)
+        for case in cases
     ]
 
 

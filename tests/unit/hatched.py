@@ -19,7 +19,7 @@ from rosy_addon.projection.camera import look_at, orthographic_camera, perspecti
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 
-SIZE = 384
+SIZE = 256
 
 INK = Look(
     fade="ends",

@@ -94,14 +94,15 @@ def line_width(picture):
 
 
 @pytest.mark.parametrize(
-    ("unit_size", "zooms"), [(0, [1, 1.23, 1.62, 6.7]), (8 / SIZE, [1.62, 2.8, 6.7])]
+    ("unit_size", "zooms"), [(0, [1, 1.23, 1.62, 6.7]), (8 / 384, [1.62, 2.8, 6.7])]
 )
 def test_widths_of_lines_through_a_zoom(unit_size, zooms):
     """They are constant in pixels, or proportional to the zoom; in between, lines of two widths mix."""
     look = replace(INK, light="scene", shading=0.4, unit_size=unit_size, supersampling=1)
     widths = []
     for zoom in zooms:
-        rgba = render(make_wall(), camera_before_wall(8 / zoom, 0.3, 0.2), look)
+        camera = camera_before_wall(8 / zoom, 0.3, 0.2).resized(384, 384)
+        rgba = render(make_wall(), camera, look)
         widths.append(line_width(rgba[..., 0]) / (zoom if unit_size else 1))
     assert max(widths) / min(widths) < 1.15
 

@@ -169,8 +169,7 @@ def test_lines_are_spaced_on_no_more_triangles_than_texels_can_show(monkeypatch)
         return lines
 
     monkeypatch.setattr(hatching, "cached_surface_lines", counted)
-    monkeypatch.setattr(hatching, "TRIANGLES_PER_TEXEL", 4)
-    grid = plane(1, 100)
+    grid = plane(1, 200)
     surface = rebuilt(grid, grid.vertices * (1, 0.1, 1))
     uv = np.tile([(0.0, 0.0), (1, 0), (1, 1), (0, 1)], (surface.face_count, 1))
     look = Look(line_distance=2.0).with_settings({"ink": "even"})

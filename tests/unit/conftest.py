@@ -11,7 +11,7 @@ from rosy_addon.core.errors import RosyError
 from rosy_addon.worker.helper import Helper
 
 #: Machines may be busy, so hypothesis has no deadline for an example.
-settings.register_profile("patient", deadline=None)
+settings.register_profile("patient", deadline=None, max_examples=50)
 settings.load_profile("patient")
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -21,7 +21,7 @@ from rosy_addon.projection.gbuffer import MeshInstance
 def drawn(surface, field, **settings):
     """The strokes of a surface, and its arrowheads: their (n, 3, 3) points, and their faces."""
     camera = orbit_camera(surface.vertices, -25, 30, 400, 400)
-    style = StrokeStyle(**{"spacing": 14.0, "arrows": 5.0} | settings)
+    style = StrokeStyle(**{"spacing": 20.0, "arrows": 4.0} | settings)
     instance = MeshInstance(surface, np.eye(4), field)
     with_arrows = draw_instances([instance], camera, style).strokes
     without = draw_instances([instance], camera, replace(style, arrows=0.0)).strokes

@@ -42,7 +42,7 @@ ORTHOGRAPHIC = orthographic_camera(look_at((0.5, -4, 1), (0, 0, 0)), 240, 200, s
 def test_families_of_several_instances_are_merged_by_name():
     degree_6 = MeshInstance(icosphere(3), moved(x=0.9), generate(icosphere(3), "smoothest", 6))
     occluder = MeshInstance(plane(), moved(z=-1.0))
-    style = StrokeStyle(spacing=12, outline=True)
+    style = StrokeStyle(spacing=16, outline=True)
     drawing = draw_instances([occluder, SPHERE, degree_6], CAMERA, style)
     strokes = drawing.strokes
     assert strokes.names == ("family 1", "family 2", "family 3", *OUTLINE_KINDS)
@@ -101,7 +101,7 @@ def test_light_is_that_of_lambert():
 @pytest.mark.slow
 @pytest.mark.parametrize("camera", [CAMERA, ORTHOGRAPHIC], ids=["perspective", "orthographic"])
 def test_offset_toward_the_camera_keeps_the_picture_and_clears_the_surface(camera):
-    strokes = draw_instances([SPHERE], camera, StrokeStyle(spacing=12)).strokes
+    strokes = draw_instances([SPHERE], camera, StrokeStyle(spacing=16)).strokes
     points = offset_toward_camera(strokes, camera, 2.0)
     pixels, depth = project_to_pixels(strokes.points, camera)
     offset_pixels, offset_depth = project_to_pixels(points, camera)
@@ -118,11 +118,11 @@ def test_offset_toward_the_camera_keeps_the_picture_and_clears_the_surface(camer
 
 @pytest.mark.slow
 def test_stroke_geometry_has_the_width_and_colors_of_the_pen():
-    drawing = draw_instances([SPHERE], CAMERA, StrokeStyle(spacing=12, taper=0.0))
+    drawing = draw_instances([SPHERE], CAMERA, StrokeStyle(spacing=20, taper=0.0))
     geometry = stroke_geometry(drawing, CAMERA, Pen(width=3.0, colors=["#112233", "#445566"]))
     np.testing.assert_allclose(2 * geometry.radius / pixel_size(geometry.points, CAMERA), 3.0)
     assert geometry.colors == ["#112233", "#445566"]
-    hidden = draw_instances([SPHERE], CAMERA, StrokeStyle(spacing=12, hidden=True))
+    hidden = draw_instances([SPHERE], CAMERA, StrokeStyle(spacing=20, hidden=True))
     offset_points = stroke_geometry(hidden, CAMERA, Pen(width=3.0)).points
     assert np.linalg.norm(offset_points, axis=1).min() > 1
     assert len(hidden.strokes) > len(drawing.strokes)
@@ -142,7 +142,7 @@ def test_seeding_ends_where_shading_normals_are_steep(tilt):
 
 @pytest.mark.slow
 def test_blocks_do_not_change_strokes(monkeypatch):
-    style = StrokeStyle(spacing=10, outline=True)
+    style = StrokeStyle(spacing=16, outline=True)
     expected = draw_instances([SPHERE], CAMERA, style).strokes
     for module, name in (
         (separation, "BLOCK_POINTS"),

@@ -31,11 +31,11 @@ def _many_strips(monkeypatch):
 
 
 def instances() -> tuple[MeshInstance, ...]:
-    """A torus with a field of degree 4, and in front a ball with one of degree 7."""
+    """A torus with a field of degree 4, and in front a ball with one of degree 3."""
     ring, ball = torus(30, 15), icosphere(3)
     return (
         MeshInstance(ring, np.eye(4), axis_field(ring, 4, (0, 0, 1))),
-        MeshInstance(ball, moved(0.2, -0.5, 1.0), generate(ball, "smoothest", 7)),
+        MeshInstance(ball, moved(0.2, -0.5, 1.0), generate(ball, "smoothest", 3)),
     )
 
 

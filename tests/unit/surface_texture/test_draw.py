@@ -81,7 +81,7 @@ def test_hatching_does_not_depend_on_the_charts(settings, lights):
     look = WIDER.with_settings({"ink": "hatch", **settings})
     colors = []
     for uv in (SINGLE, PATCHES):
-        texture = draw_texture(instance, uv, look, 512, lights=lights)
+        texture = draw_texture(instance, uv, look, 384, lights=lights)
         assert texture.is_data == (lights is None)
         colors.append(colors_at(texture.rgba, TORUS, uv, POINTS))
     assert correlation(*colors) > 0.85

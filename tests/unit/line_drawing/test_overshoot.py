@@ -152,14 +152,12 @@ def test_ends_at_gaps_and_at_neighbors_are_not_extended():
 
 @pytest.mark.slow
 def test_closed_strokes_and_outlines_are_not_extended():
-    circles = latitudes(icosphere(3))
-    plain, extended = draw_both([circles], TOP_CAMERA, spacing=18.0, outline=True)
+    circles, occluder = latitudes(icosphere(3)), MeshInstance(plane(), moved(x=1.8, z=1.7))
+    plain, extended = draw_both([circles, occluder], TOP_CAMERA, spacing=15.0, outline=True)
     closed = plain.closed & extended.closed
     assert closed.sum() >= 4
     for number in np.flatnonzero(closed):
         assert np.array_equal(plain.select([number]).points, extended.select([number]).points)
-    occluder = MeshInstance(plane(), moved(x=1.2, z=1.7))
-    plain, extended = draw_both([circles, occluder], TOP_CAMERA, spacing=18.0, outline=True)
     for kind in OUTLINE_KINDS:
         a, b = (s.select(s.family == s.names.index(kind)) for s in (plain, extended))
         assert np.array_equal(a.points, b.points) and np.allclose(a.width, b.width)

@@ -196,7 +196,7 @@ def test_errors(error_of):
 @pytest.mark.slow
 def test_swelling_strokes_are_evenly_spaced():
     """They are where strokes without a tone are, and their width is the darkness."""
-    style = StrokeStyle(spacing=12, taper=0.0, hidden=True)
+    style = StrokeStyle(spacing=16, taper=0.0, hidden=True)
     even = draw_instances([SPHERE], CAMERA, style).strokes
     swelling_style = replace(style, light="headlight", swell=1.0)
     swelling = draw_instances([SPHERE], CAMERA, swelling_style).strokes

@@ -59,7 +59,7 @@ def segments_of(strokes):
 
 
 @pytest.mark.slow
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=8)
 @given(st.floats(0, np.pi), st.integers(1, 6), st.integers(1, 7))
 def test_in_the_plane_strokes_are_straight_and_evenly_spaced(angle, degree, cells):
     instance = turned(plane(cells, cells), degree, angle)

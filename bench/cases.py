@@ -105,7 +105,7 @@ def first_frame(triangles: int, degree: int, look: Look = LOOK, size: int = SIZE
     """Draw the ball as if for the first time, including the work that does not depend on the camera."""
     cached = instance(triangles, degree)
     # A copy of the surface has no cached results.
-    gbuffer = project([replace(cached, surface=replace(cached.surface))], camera(size))
+    gbuffer = project([replace(cached, surface=cached.surface.with_parts())], camera(size))
     return compose(gbuffer, look).rgba
 
 

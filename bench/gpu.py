@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 
-from rosy_addon.compositor.flow import NO_DRIFT, Drift, drift_at
 from rosy_addon.compositor.look import Look
 from rosy_addon.gpu.renderer import GpuRenderer
 from rosy_addon.gpu.resources import DrawItem
@@ -64,15 +63,9 @@ def open_device() -> Any:
         )
 
 
-def draw_texture(
-    renderer: GpuRenderer,
-    items: Sequence[DrawItem],
-    camera: Any,
-    look: Any,
-    drift: Drift = NO_DRIFT,
-) -> Any:
+def draw_texture(renderer: GpuRenderer, items: Sequence[DrawItem], camera: Any, look: Any) -> Any:
     """Draw a picture without reading it back, and return its texture."""
-    return run(renderer.texture_steps(items, ViewInput((), camera, look, drift=drift)))
+    return run(renderer.texture_steps(items, ViewInput((), camera, look)))
 
 
 def frame_times(
@@ -92,7 +85,7 @@ def frame_times(
         timer = device.context.query(time=True)
         start = time.perf_counter()
         with timer:
-            draw_texture(renderer, items, camera, look, drift_at(look, number))
+            draw_texture(renderer, items, camera, look)
         device.finish()
         number += 1
         return time.perf_counter() - start, timer.elapsed * 1e-9
@@ -115,9 +108,6 @@ def looks(options: argparse.Namespace) -> Iterator[tuple[str, int, Look]]:
             for samples in (1, 2):
                 look = replace(load_preset(preset).look, supersampling=samples)
                 yield f"{preset}, {samples} x {samples} samples", DEGREE, look
-    elif options.flow:
-        yield "still", DEGREE, cases.LOOK
-        yield "drifting", DEGREE, replace(cases.LOOK, flow=2.0)
     else:
         for degree, paper in PAPER_MILLISECONDS.items():
             yield f"N = {degree} (the paper: {paper} at 512 x 512)", degree, cases.LOOK
@@ -130,7 +120,6 @@ def main() -> None:
     parser.add_argument("--sizes", nargs="+", default=SIZES, help="WIDTHxHEIGHT ...")
     parser.add_argument("--frames", type=int, default=FRAMES, help="frames a row (%(default)s)")
     parser.add_argument("--presets", action="store_true", help="time the presets instead")
-    parser.add_argument("--flow", action="store_true", help="time still and drifting streaks")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers to a file")
     options = parser.parse_args()
     device = open_device()

@@ -29,7 +29,7 @@ def measure(bench: Bench) -> None:
         renderer = GpuRenderer(device)
         items = renderer.upload([cases.instance(triangles, DEGREE)], LOOK.display)
         picture = draw_texture(renderer, items, cases.camera(), LOOK)
-        rgba = renderer.read(picture, cases.SIZE, cases.SIZE)
+        rgba = device.read(picture)
         draw_next()
         print_coverage(vtk_name, read_pixels(), rgba)
         azimuths = iter(np.arange(1, 10_000) * AZIMUTH_STEP)

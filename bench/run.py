@@ -17,16 +17,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 #: The scripts, in the order in which they run.
 SCRIPTS = (
-    *(
-        "table1",
-        "ibfv",
-        "scaling",
-        "stages",
-        "planar_rlic",
-        "surface_vtk",
-        "two_cores_vtk",
-        "large",
-    ),
+    *("table1", "ibfv", "scaling", "planar_rlic", "surface_vtk", "two_cores_vtk", "large"),
     *("gpu_vtk", "again", "animation", "memory", "fields", "strokes"),
 )
 

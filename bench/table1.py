@@ -12,10 +12,7 @@ from .timing import Bench, main
 
 #: Target ratios by degree: for the LIC stage, and for frames of a small and a large mesh (by triangles).
 LIC = {2: 4.0, 3: 8.0, 4: 12.0, 6: 16.0}
-FRAMES = {
-    12_000: {2: 2.5, 3: 5.0, 4: 7.0, 6: 10.0},
-    200_000: {2: 2.0, 3: 4.0, 4: 6.0, 6: 8.0},
-}
+FRAMES = {12_000: {2: 2.5, 3: 5.0, 4: 7.0, 6: 10.0}, 200_000: {2: 2.0, 3: 4.0, 4: 6.0, 6: 8.0}}
 BRUTE, MEMBERS = (replace(cases.LOOK, method=method) for method in ("brute", "members"))
 
 

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import bpy
 
 from ..rosy_addon.core.errors import RosyError, counted
 from ..rosy_addon.jobs.animation import SequenceResult, bake_animation
-from ..rosy_addon.jobs.bake import BakeResult, bake
+from ..rosy_addon.jobs.bake import bake
 from ..rosy_addon.projection.ambient_occlusion import DIRECTION_COUNT
 from ..rosy_addon.projection.camera import Camera
 from ..rosy_addon.scene.bake_records import has_pictures, remove_bakes
 from ..rosy_addon.scene.cameras import CameraSource, camera_of_view, render_camera, scene_cameras
 from ..rosy_addon.scene.computed_attributes import OCCLUSION_ATTRIBUTE, store_occlusion
 from ..rosy_addon.scene.files import output_folder
-from ..rosy_addon.scene.pictures import read_output_settings, show_bake
+from ..rosy_addon.scene.pictures import BakeResult, read_output_settings, show_bake
 from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.ui.main_panel import SHADING_WITHOUT_MATERIALS
 from ..rosy_addon.ui.preferences import worker_count
@@ -102,8 +100,7 @@ class ROSY_OT_bake_animation(DialogJobMixin, bpy.types.Operator):
         try:
             output_folder(context.scene)
         except RosyError:
-            for name, value in self._frame_settings(context.scene).items():
-                setattr(self, name, value)
+            self.first, self.last, self.step = self._frame_settings(context.scene)
             context.window_manager.fileselect_add(self)
             return {"RUNNING_MODAL"}
         return None
@@ -113,32 +110,23 @@ class ROSY_OT_bake_animation(DialogJobMixin, bpy.types.Operator):
 
     def begin(self, context: bpy.types.Context) -> Steps[list[SequenceResult]]:
         scene = context.scene
-        frame_settings = self._frame_settings(scene)
-        frames = range(frame_settings["first"], frame_settings["last"] + 1, frame_settings["step"])
+        first, last, step = self._frame_settings(scene)
+        frames = range(first, last + 1, step)
         if not len(frames):
-            raise RosyError(
-                f"the last frame, {frame_settings['last']}, is before the first, "
-                f"{frame_settings['first']}"
-            )
+            raise RosyError(f"the last frame, {last}, is before the first, {first}")
         cameras = scene_cameras(scene) if self.all_cameras else None
         # Frames are saved to the folder of the scene, even if single pictures are packed into the .blend
         # file.
-        settings = replace(read_output_settings(scene), folder=output_folder(scene))
+        settings = read_output_settings(scene, output_folder(scene))
         return bake_animation.begin(
-            scene,
-            frames,
-            cameras=cameras,
-            settings=settings,
-            workers=worker_count(context),
+            scene, frames, cameras=cameras, settings=settings, workers=worker_count(context)
         )
 
-    def _frame_settings(self, scene: bpy.types.Scene) -> dict[str, int]:
+    def _frame_settings(self, scene: bpy.types.Scene) -> tuple[int, int, int]:
         """Return the first and last frame and the step, as set for the operator, or else in the scene."""
-        return {
-            "first": self.chosen("first", scene.frame_start),
-            "last": self.chosen("last", scene.frame_end),
-            "step": self.chosen("step", scene.frame_step),
-        }
+        first = self.chosen("first", scene.frame_start)
+        last = self.chosen("last", scene.frame_end)
+        return first, last, self.chosen("step", scene.frame_step)
 
     def finish(self, context: bpy.types.Context, result: list[SequenceResult]) -> None:
         for sequence in result:
@@ -153,7 +141,6 @@ class ROSY_OT_occlusion(ModalJobMixin, bpy.types.Operator):
 
     bl_idname = "rosy.occlusion"
     bl_label = "Tone by Occlusion"
-    bl_options = {"REGISTER", "UNDO"}
     conditions = (IDLE, VISIBLE_FIELD)
 
     directions: integer(
@@ -183,7 +170,6 @@ class ROSY_OT_show(RosyOperator, bpy.types.Operator):
 
     bl_idname = "rosy.show"
     bl_label = "Show Picture"
-    bl_options = {"REGISTER", "UNDO"}
     conditions = (IDLE,)
 
     camera: text("Camera", "Name of the camera")
@@ -212,7 +198,6 @@ class ROSY_OT_remove(RosyOperator, bpy.types.Operator):
 
     bl_idname = "rosy.remove"
     bl_label = "Remove Pictures"
-    bl_options = {"REGISTER", "UNDO"}
     conditions = (
         IDLE,
         Condition(lambda context: has_pictures(context.scene), "This scene has no baked pictures"),
@@ -221,6 +206,5 @@ class ROSY_OT_remove(RosyOperator, bpy.types.Operator):
     def act(self, context: bpy.types.Context) -> None:
         removed = remove_bakes(context.scene)
         self.report_done(
-            f"Removed {counted(removed.images, 'picture')} from "
-            f"{counted(removed.objects, 'object')}"
+            f"Removed {counted(removed.images, 'picture')} from {counted(removed.objects, 'object')}"
         )

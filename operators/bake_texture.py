@@ -30,7 +30,7 @@ UV_MAP_NAME = "UVMap"
 
 
 class ROSY_OT_bake_texture(DialogJobMixin, bpy.types.Operator):
-    """Draw the field of the selected meshes as a texture for their UV map, which stays on the surface from all sides"""
+    """Draw the field of the selected meshes as textures for their UV maps. Unlike a baked picture, a texture covers all sides of a mesh"""
 
     bl_idname = "rosy.bake_texture"
     bl_label = "Bake Texture"

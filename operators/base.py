@@ -61,6 +61,9 @@ EDITABLE_FIELD = (*EDITABLE, ACTIVE_FIELD)
 class RosyOperator:
     """Mixin of all operators: checks their conditions, and reports errors as sentences."""
 
+    #: Blender's options: the operator is listed in the info editor, and can be undone.
+    bl_options = {"REGISTER", "UNDO"}
+
     #: The conditions, which are checked in this order.
     conditions: tuple[Condition, ...] = ()
 
@@ -130,8 +133,9 @@ class RosyOperator:
     ) -> None:
         """Store fields on meshes with `assign_fields`, and apply the preferences to the scene.
 
-        Shown singularities are updated. With the first field of a scene, the 3D view is made live, if the
-        preferences ask for it. If a request of the preferences fails, this is reported to the user.
+        Shown singularities are updated. With the first field of a scene, the 3D view is made live if the
+        preferences say so. If the preferences cannot be applied, or the view cannot be made live, the user
+        gets a warning, and the field is stored all the same.
 
         Parameters
         ----------

@@ -41,7 +41,6 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
 
     bl_idname = "rosy.field_comb"
     bl_label = "Comb Field"
-    bl_options = {"REGISTER", "UNDO"}
     conditions = (
         IDLE,
         Condition(
@@ -185,13 +184,9 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         return self._line.extend(np.array([point.location]), np.array([point.pressure]))
 
     def _start_line(self, context: bpy.types.Context) -> CombStroke:
+        effect = self.effect.lower()
         brush = GuideBrush(
-            self.radius,
-            self.strength,
-            self.effect.lower(),
-            self.exact,
-            self.front_faces,
-            self.mirror,
+            self.radius, self.strength, effect, self.exact, self.front_faces, self.mirror
         )
         return CombStroke(selected_mesh_objects(context)[0].data, brush, self.reach)
 

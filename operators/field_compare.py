@@ -22,9 +22,7 @@ from .modal_job import ActiveMeshMixin, ModalJobMixin
 
 
 def _search_fields(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
-    return [
-        name for obj in selected_mesh_objects(context)[:1] for name in other_field_names(obj.data)
-    ]
+    return other_field_names(selected_mesh_objects(context)[0].data)
 
 
 class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
@@ -32,7 +30,6 @@ class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
 
     bl_idname = "rosy.field_compare"
     bl_label = "Compare"
-    bl_options = {"REGISTER", "UNDO"}
 
     other: text(
         "With",
@@ -57,14 +54,14 @@ class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
             # The range is reversed. So lines are light, and can be seen, where the fields are the same.
             settings.look.hue, settings.look.color_map = "values", "magma"
             settings.look.color_range = 180.0 / degree, 0.0
-        statistics = comparison.statistics
+        difference = comparison.difference
         mean, p95, largest = (
             format_degrees(np.degrees(angle))
-            for angle in (statistics.mean, statistics.p95, statistics.max)
+            for angle in (difference.mean, difference.p95, difference.max)
         )
         self.report_done(
             f"Off by {mean} degrees on average, {p95} on 95 % of the area, at most {largest} on "
-            f"face {statistics.worst_face}; {comparison.matched_count} of "
+            f"face {difference.worst_face}; {comparison.matched_count} of "
             f"{counted(comparison.singularity_count, 'singularity', 'singularities')} match the "
             f"{comparison.other_count} of '{other}'"
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from math import pi
-from typing import Any, TypeVar
+from typing import Any
 
 import bpy
 
@@ -23,8 +23,6 @@ from ..rosy_addon.ui.property_makers import choice, fraction, integer, real, tex
 from ..rosy_addon.worker.job import Call, Step, Steps, part
 from .base import EDITABLE_FIELD, selected_mesh_objects
 from .modal_job import ModalJobMixin
-
-_Result = TypeVar("_Result")
 
 #: Items of the property for the new degree. The number of each item is the degree. They are not in the
 #: annotation of the property, because up to Python 3.11 a comprehension there cannot see names of the module.
@@ -70,8 +68,8 @@ class _FieldsJobMixin(ModalJobMixin):
         return dict.fromkeys(obj.data for obj in selected_mesh_objects(context) if has_field(obj))
 
     def each_mesh(
-        self, context: bpy.types.Context, begin: Callable[[bpy.types.Mesh], Steps[_Result]]
-    ) -> Steps[dict[bpy.types.Mesh, _Result]]:
+        self, context: bpy.types.Context, begin: Callable[[bpy.types.Mesh], Steps[Any]]
+    ) -> Steps[dict[bpy.types.Mesh, Any]]:
         """Run a job for each selected mesh. Return the results by mesh.
 
         `begin` returns the steps of the job for a mesh.
@@ -89,7 +87,6 @@ class ROSY_OT_field_convert(_FieldsJobMixin, bpy.types.Operator):
 
     bl_idname = "rosy.field_convert"
     bl_label = "Convert Field"
-    bl_options = {"REGISTER", "UNDO"}
 
     degree: integer(
         "Degree",
@@ -113,9 +110,7 @@ class ROSY_OT_field_convert(_FieldsJobMixin, bpy.types.Operator):
         max=2 * pi,
     )
     smooth: fraction(
-        "Smooth",
-        "Smooth the field over this fraction of the size of the mesh",
-        soft_max=0.2,
+        "Smooth", "Smooth the field over this fraction of the size of the mesh", soft_max=0.2
     )
     pair_distance: fraction(
         "Cancel Pairs",
@@ -172,7 +167,6 @@ class ROSY_OT_field_store(_FieldsJobMixin, bpy.types.Operator):
 
     bl_idname = "rosy.field_store"
     bl_label = "Store Field"
-    bl_options = {"REGISTER", "UNDO"}
 
     form: choice(
         "Store As",

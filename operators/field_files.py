@@ -29,7 +29,6 @@ class ROSY_OT_field_import(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Im
 
     bl_idname = "rosy.field_import"
     bl_label = "Import Field"
-    bl_options = {"REGISTER", "UNDO"}
     conditions = EDITABLE
 
     filename_ext = ".rosy"
@@ -145,32 +144,32 @@ class ROSY_OT_field_export(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Ex
     )
 
     def check(self, context: bpy.types.Context) -> bool:
-        """Set the suffix of the file name to that of the chosen format. The file browser calls this."""
+        """Give the file name the suffix of the chosen format. Return whether the name has changed.
+
+        The file browser calls this.
+        """
         return sync_suffix(self, self.file_format)
 
     def begin(self, context: bpy.types.Context) -> Steps[Path]:
-        path = Path(bpy.path.abspath(self.filepath))
-        is_guides = self.content == "GUIDES"
-        if is_guides and path.suffix.lower() not in GUIDE_FORMATS:
-            raise RosyError(
-                f"{path}: cannot keep the firmness of guides: write a {', '.join(GUIDE_FORMATS[:-1])} or "
-                f"{GUIDE_FORMATS[-1]} file"
-            )
-        return _export(selected_mesh_objects(context)[0].data, path, is_guides)
+        """Read the field or the combed guides of the active mesh, and write them to the file."""
+        mesh = selected_mesh_objects(context)[0].data
+        surface, path = mesh_surface(mesh), Path(bpy.path.abspath(self.filepath))
+        if self.content == "GUIDES":
+            if path.suffix.lower() not in GUIDE_FORMATS:
+                formats = f"{', '.join(GUIDE_FORMATS[:-1])} or {GUIDE_FORMATS[-1]}"
+                raise RosyError(
+                    f"{path}: cannot keep the firmness of guides: write a {formats} file"
+                )
+            field = RosyField(field_degree(mesh), read_combed_guides(mesh, surface))
+            if not field.vectors.any():
+                raise RosyError(
+                    f"{mesh_label(mesh)}: its field has no combed guides: comb it first"
+                )
+        else:
+            field = read_mesh_field(mesh, surface=surface)
+        check_writable(path)
+        write_bytes(path, (yield Call(field_file, (path, field, surface))))
+        return path
 
     def finish(self, context: bpy.types.Context, result: Path) -> None:
         self.report_done(f"Wrote {result}")
-
-
-def _export(mesh: bpy.types.Mesh, path: Path, is_guides: bool) -> Steps[Path]:
-    """Read the field or the combed guides of a mesh, and write them to a file."""
-    surface = mesh_surface(mesh)
-    if is_guides:
-        field = RosyField(field_degree(mesh), read_combed_guides(mesh, surface))
-        if not field.vectors.any():
-            raise RosyError(f"{mesh_label(mesh)}: its field has no combed guides: comb it first")
-    else:
-        field = read_mesh_field(mesh, surface=surface)
-    check_writable(path)
-    write_bytes(path, (yield Call(field_file, (path, field, surface))))
-    return path

@@ -15,14 +15,7 @@ from ..rosy_addon.field.guides import feature_edges
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
 from ..rosy_addon.field.singularities import description
 from ..rosy_addon.field.surface import Surface, orientation_warning
-from ..rosy_addon.scene.guides import (
-    GUIDE_ATTRIBUTE,
-    STROKE_FIRMNESS,
-    annotation_strokes,
-    guide_objects,
-    guide_strokes_and_empties,
-    guide_vectors,
-)
+from ..rosy_addon.scene import guides
 from ..rosy_addon.scene.look_properties import read_settings
 from ..rosy_addon.scene.meshes import EDGE_MARKS, marked_edges, mesh_surface, read_uvs
 from ..rosy_addon.scene.singularity_points import (
@@ -55,7 +48,7 @@ EDGE_ITEMS = [
 
 
 def _search_guides(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
-    return [obj.name for obj in guide_objects(context.scene.objects)]
+    return [obj.name for obj in guides.guide_objects(context.scene.objects)]
 
 
 def _search_points(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
@@ -67,14 +60,11 @@ def _search_points(_operator: Any, context: bpy.types.Context, _typed: str) -> l
 
 
 def _search_uv_maps(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
-    return [
-        layer.name for obj in selected_mesh_objects(context)[:1] for layer in obj.data.uv_layers
-    ]
+    return selected_mesh_objects(context)[0].data.uv_layers.keys()
 
 
 def _search_attributes(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
-    objects = selected_mesh_objects(context)[:1]
-    return [attribute.name for obj in objects for attribute in obj.data.attributes]
+    return selected_mesh_objects(context)[0].data.attributes.keys()
 
 
 class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
@@ -82,7 +72,6 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
 
     bl_idname = "rosy.field_generate"
     bl_label = "Make Field"
-    bl_options = {"REGISTER", "UNDO"}
     conditions = EDITABLE
 
     __annotations__ = setting_properties(GeneratorSettings) | {
@@ -153,7 +142,9 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
                 errors.append(error)
                 continue
             if surface.face_count and not field.vectors.any():
-                errors.append(self._no_direction_error(surface))
+                kind = self.properties.bl_rna.properties["kind"].enum_items[self.kind].name
+                reason = "gives no direction on any face: choose another kind, such as Form"
+                errors.append(RosyError(f"{surface.name}: {kind} {reason}"))
                 continue
             fields[mesh] = field
             label = "checking orientations"
@@ -174,52 +165,44 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
         target = f"'{names[0]}'" if len(fields) == 1 else counted(len(fields), "mesh", "meshes")
         return f"a field of degree {self.degree} on {target}{notes and ': '}{notes}"
 
-    def _no_direction_error(self, surface: Surface) -> RosyError:
-        """Return the error for a mesh on which this kind of field is undefined everywhere."""
-        kind = self.properties.bl_rna.properties["kind"].enum_items[self.kind].name
-        return RosyError(
-            f"{surface.name}: {kind} gives no direction on any face: choose another kind, such as "
-            "Form"
-        )
-
     def _generator_settings(
         self, context: bpy.types.Context, mesh: bpy.types.Mesh, surface: Surface
     ) -> GeneratorSettings:
         """Return the settings of the generator for a mesh. They contain the guides, read from the scene."""
         owner = next(obj for obj in selected_mesh_objects(context) if obj.data == mesh)
         kind_guides = {"features": {"EDGES"}, "uv": {"UV"}, "guided": self.guides}
-        guides = kind_guides.get(self.kind, ())
+        guide_kinds = kind_guides.get(self.kind, ())
         values = read_settings(self, GeneratorSettings)
-        if "EDGES" in guides and self.edges != "FEATURES":
+        if "EDGES" in guide_kinds and self.edges != "FEATURES":
             values["edges"] = marked_edges(mesh, self.edges)
-        elif "EDGES" in guides and self.kind == "guided":
+        elif "EDGES" in guide_kinds and self.kind == "guided":
             values["edges"] = feature_edges(surface, self.sharp_angle)
-        if "OBJECTS" in guides:
-            strokes, empties = guide_strokes_and_empties(self._guide_objects(context), owner)
+        if "OBJECTS" in guide_kinds:
+            strokes, empties = guides.guide_strokes_and_empties(self._guide_objects(context), owner)
             values |= {"strokes": strokes, "axis_guides": empties}
-        if "ANNOTATIONS" in guides:
-            annotations = annotation_strokes(context.scene, owner)
+        if "ANNOTATIONS" in guide_kinds:
+            annotations = guides.annotation_strokes(context.scene, owner)
             values["strokes"] = [*values.get("strokes", ()), *annotations]
-        if "UV" in guides:
+        if "UV" in guide_kinds:
             values["uv"] = read_uvs(mesh, self.uv_map)
-        if "ATTRIBUTE" in guides:
-            name = self.vectors or GUIDE_ATTRIBUTE
-            values["vectors"] = guide_vectors(mesh, name, surface)
-            values["vectors_have_firmness"] = name == GUIDE_ATTRIBUTE
+        if "ATTRIBUTE" in guide_kinds:
+            name = self.vectors or guides.GUIDE_ATTRIBUTE
+            values["vectors"] = guides.guide_vectors(mesh, name, surface)
+            values["vectors_have_firmness"] = name == guides.GUIDE_ATTRIBUTE
         if self.kind == "prescribed":
             values["singularities"] = read_singularity_points(
                 context.scene, owner, self.degree, self.singularities
             )
-            vectors = guide_vectors(mesh, self.vectors, surface) if self.vectors else None
-            if self.vectors == GUIDE_ATTRIBUTE:
-                vectors[np.linalg.norm(vectors, axis=1) < STROKE_FIRMNESS] = 0
+            vectors = guides.guide_vectors(mesh, self.vectors, surface) if self.vectors else None
+            if self.vectors == guides.GUIDE_ATTRIBUTE:
+                vectors[np.linalg.norm(vectors, axis=1) < guides.STROKE_FIRMNESS] = 0
             values["vectors"] = vectors
         return GeneratorSettings(**values)
 
     def _guide_objects(self, context: bpy.types.Context) -> list[bpy.types.Object]:
         """Return the guide objects: the one that the settings name, or else the selected ones."""
         if not self.guide:
-            objects = guide_objects(context.selected_objects)
+            objects = guides.guide_objects(context.selected_objects)
             if not objects:
                 raise RosyError(
                     "there are no guides: choose an object, or select Grease Pencil, curves or "
@@ -227,7 +210,7 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
                 )
             return objects
         obj = context.scene.objects.get(self.guide)
-        if obj is None or not guide_objects([obj]):
+        if obj is None or not guides.guide_objects([obj]):
             raise RosyError(
                 f"object '{self.guide}' is not a Grease Pencil, curve or empty of this scene"
             )

@@ -19,6 +19,7 @@ from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.ui import job_status
 from ..rosy_addon.ui.preferences import uses_helper
 from ..rosy_addon.ui.property_makers import toggle
+from ..rosy_addon.viewport.app_handlers import add_handlers, remove_handlers
 from ..rosy_addon.viewport.view3d import redraw_sidebars
 from ..rosy_addon.worker.helper import HELPER, HelperLostError
 from ..rosy_addon.worker.job import Step, Steps, run
@@ -94,12 +95,11 @@ class Job:
         self.window_manager = context.window_manager
         self.timer = self.window_manager.event_timer_add(TIMER_SECONDS, window=context.window)
         self.window_manager.progress_begin(0, 100)
-        self.handlers = [
-            (getattr(bpy.app.handlers, name), lambda *_, reason=reason: self.stop(reason))
+        self.handlers = {
+            name: lambda *_, reason=reason: self.stop(reason)
             for name, reason in INTERRUPT_REASONS.items()
-        ]
-        for handlers, handler in self.handlers:
-            handlers.append(handler)
+        }
+        add_handlers(self.handlers)
         _current_job = self
         self._show_progress(context, Step(0.0, "starting"))
 
@@ -155,13 +155,11 @@ class Job:
         global _has_said_no_helper
         if uses_helper(context) and not _has_said_no_helper:
             self.note, _has_said_no_helper = NO_HELPER, True
-        if context.window is not None:
-            context.window.cursor_modal_set("WAIT")
+        context.window.cursor_modal_set("WAIT")
         try:
             yield
         finally:
-            if context.window is not None:
-                context.window.cursor_modal_restore()
+            context.window.cursor_modal_restore()
 
     def _abort_reason(self, context: bpy.types.Context) -> str | None:
         """Return why the job cannot continue; None if it can."""
@@ -182,13 +180,11 @@ class Job:
         if step is None or step == job_status.current:
             return
         job_status.current = step
-        percent = int(100 * step.fraction)
+        percent, label = int(100 * step.fraction), as_sentence(step.label)
         self.window_manager.progress_update(percent)
-        if context.workspace is not None:
-            if context.workspace not in self.workspaces:
-                self.workspaces.append(context.workspace)
-            label = as_sentence(step.label)
-            context.workspace.status_text_set(f"RoSy: {label}, {percent} %     ESC: Cancel")
+        if context.workspace not in self.workspaces:
+            self.workspaces.append(context.workspace)
+        context.workspace.status_text_set(f"RoSy: {label}, {percent} %     ESC: Cancel")
         redraw_sidebars()
 
     def stop(self, reason: str) -> None:
@@ -213,8 +209,7 @@ class Job:
 
     def _cleanup(self) -> None:
         """Remove the handlers, the timer and the progress display."""
-        for handlers, handler in self.handlers:
-            handlers.remove(handler)
+        remove_handlers(self.handlers)
         self.window_manager.event_timer_remove(self.timer)
         self.window_manager.progress_end()
         for workspace in self.workspaces:
@@ -321,7 +316,7 @@ class DialogJobMixin(ModalJobMixin):
         raise NotImplementedError
 
     def take_answer(self, context: bpy.types.Context) -> None:
-        """Set the properties with which the operator is called again to do the work, without asking."""
+        """Set the properties for the second call of the operator, so that it does not ask again."""
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if bpy.app.background or context.window is None:

@@ -9,18 +9,7 @@ import bpy
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ..rosy_addon.core.errors import RosyError
-from ..rosy_addon.preset_files.store import (
-    MAX_DESCRIPTION_LENGTH,
-    MAX_NAME_LENGTH,
-    Preset,
-    load_preset,
-    preset_key,
-    read_preset,
-    remove_preset,
-    rename_preset,
-    save_preset,
-    write_preset,
-)
+from ..rosy_addon.preset_files import store
 from ..rosy_addon.scene.files import user_presets_folder
 from ..rosy_addon.scene.look_properties import read_look
 from ..rosy_addon.ui import preset_library
@@ -38,9 +27,8 @@ def _preset_property(search: Any) -> Any:
 
     `search` returns the keys to choose from.
     """
-    return text(
-        "Preset", "Name of the preset. Empty: the active preset of the scene", search=search
-    )
+    description = "Name of the preset. Empty: the active preset of the scene"
+    return text("Preset", description, search=search, options={"SKIP_SAVE"})
 
 
 def _replace_property() -> Any:
@@ -58,7 +46,6 @@ class ROSY_OT_preset_apply(RosyOperator, bpy.types.Operator):
 
     bl_idname = "rosy.preset_apply"
     bl_label = "Apply Preset"
-    bl_options = {"REGISTER", "UNDO"}
 
     preset: text(
         "Preset",
@@ -77,11 +64,11 @@ class _DescribedPreset(RosyOperator):
     #: Label of the button that confirms the dialog.
     confirm_text = ""
 
-    name: text("Name", "Name of the preset", maxlen=MAX_NAME_LENGTH)
+    name: text("Name", "Name of the preset", maxlen=store.MAX_NAME_LENGTH)
     sentence: text(
         "Description",
         "What the look is like, or what it is for",
-        maxlen=MAX_DESCRIPTION_LENGTH,
+        maxlen=store.MAX_DESCRIPTION_LENGTH,
     )
 
     def ask(self, context: bpy.types.Context, entry: preset_library.PresetEntry | None) -> set[str]:
@@ -123,8 +110,9 @@ class ROSY_OT_preset_save(_DescribedPreset, bpy.types.Operator):
 
     def act(self, context: bpy.types.Context) -> None:
         settings = context.scene.rosy
-        preset = Preset(self.name.strip(), self.sentence.strip(), read_look(settings))
-        settings.preset_name = save_preset(preset, user_presets_folder(), replace=self.replace)
+        preset = store.Preset(self.name.strip(), self.sentence.strip(), read_look(settings))
+        folder = user_presets_folder()
+        settings.preset_name = store.save_preset(preset, folder, replace=self.replace)
         self.report_done(f"Saved preset '{preset.name}'")
         redraw()
 
@@ -132,7 +120,7 @@ class ROSY_OT_preset_save(_DescribedPreset, bpy.types.Operator):
 def _is_user_preset(name: str) -> bool:
     """Return whether the user has a preset with this name."""
     try:
-        return preset_key(name) in preset_library.user_preset_keys()
+        return store.preset_key(name) in preset_library.user_preset_keys()
     except RosyError:
         return False
 
@@ -154,7 +142,7 @@ class ROSY_OT_preset_rename(_DescribedPreset, bpy.types.Operator):
     def act(self, context: bpy.types.Context) -> None:
         old, name = _target_preset(self, context), self.name.strip()
         old_name = preset_library.preset_name(old)
-        new = rename_preset(old, name, self.sentence.strip(), user_presets_folder())
+        new = store.rename_preset(old, name, self.sentence.strip(), user_presets_folder())
         preset_library.rename_references(old, new)
         self.report_done(f"Renamed preset '{old_name}' to '{name}'")
         redraw()
@@ -184,7 +172,7 @@ class ROSY_OT_preset_remove(RosyOperator, bpy.types.Operator):
     def act(self, context: bpy.types.Context) -> None:
         key = _target_preset(self, context)
         name = preset_library.preset_name(key)
-        remove_preset(key, user_presets_folder())
+        store.remove_preset(key, user_presets_folder())
         self.report_done(f"Deleted preset '{name}'")
         redraw()
 
@@ -201,8 +189,8 @@ class ROSY_OT_preset_import(RosyOperator, bpy.types.Operator, ImportHelper):
     replace: _replace_property()
 
     def act(self, context: bpy.types.Context) -> None:
-        preset = read_preset(bpy.path.abspath(self.filepath))
-        save_preset(preset, user_presets_folder(), replace=self.replace)
+        preset = store.read_preset(bpy.path.abspath(self.filepath))
+        store.save_preset(preset, user_presets_folder(), replace=self.replace)
         self.report_done(f"Added preset '{preset.name}' to your presets")
         redraw()
 
@@ -224,5 +212,6 @@ class ROSY_OT_preset_export(RosyOperator, bpy.types.Operator, ExportHelper):
 
     def act(self, context: bpy.types.Context) -> None:
         path = Path(bpy.path.abspath(self.filepath))
-        write_preset(path, load_preset(_target_preset(self, context), user_presets_folder()))
+        preset = store.load_preset(_target_preset(self, context), user_presets_folder())
+        store.write_preset(path, preset)
         self.report_done(f"Wrote {path}")

@@ -54,10 +54,12 @@ CLASSES = tuple(
 )
 
 
+_register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
+
+
 def register() -> None:
     """Register the operators and the tools that call them."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
+    _register_classes()
     bpy.utils.register_tool(VIEW3D_TOOL_rosy_comb, separator=True)
     bpy.utils.register_tool(VIEW3D_TOOL_rosy_singularities, after={VIEW3D_TOOL_rosy_comb.bl_idname})
     bpy.utils.register_tool(VIEW3D_TOOL_rosy_comb_sculpt, separator=True)
@@ -71,5 +73,4 @@ def unregister() -> None:
     bpy.utils.unregister_tool(VIEW3D_TOOL_rosy_singularities)
     bpy.utils.unregister_tool(VIEW3D_TOOL_rosy_comb)
     brush_mouse.unregister()
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+    _unregister_classes()

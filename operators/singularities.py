@@ -22,14 +22,7 @@ from ..rosy_addon.ui import overlay, singularity_handles
 from ..rosy_addon.ui.operator_settings import draw_settings
 from ..rosy_addon.ui.property_makers import choice, fraction, integer, toggle
 from ..rosy_addon.worker.job import Call, Steps
-from .base import (
-    ACTIVE_FIELD,
-    EDITABLE_FIELD,
-    IDLE,
-    IN_3D_VIEW,
-    RosyOperator,
-    selected_mesh_objects,
-)
+from .base import ACTIVE_FIELD, IDLE, IN_3D_VIEW, RosyOperator, selected_mesh_objects
 from .modal_job import ActiveMeshMixin, ModalJobMixin
 
 
@@ -38,7 +31,6 @@ class ROSY_OT_singularities(RosyOperator, bpy.types.Operator):
 
     bl_idname = "rosy.singularities"
     bl_label = "Singularities"
-    bl_options = {"REGISTER", "UNDO"}
     conditions = (IDLE, ACTIVE_FIELD)
 
     show: choice(
@@ -82,9 +74,9 @@ def _hide(context: bpy.types.Context, objects: list[bpy.types.Object]) -> None:
 
 
 def _reach() -> Any:
-    """Return the property for the distance over which directions change.
+    """Return the property for the distance over which directions change, relative to the size of the mesh.
 
-    Two operators have it: the one of the tool passes its value on to the one that moves singularities.
+    ``rosy.drag_singularity`` passes its value on to ``rosy.field_singularities``.
     """
     return fraction(
         "Reach",
@@ -100,7 +92,6 @@ class ROSY_OT_field_singularities(ActiveMeshMixin, ModalJobMixin, bpy.types.Oper
 
     bl_idname = "rosy.field_singularities"
     bl_label = "Move Singularity"
-    bl_options = {"REGISTER", "UNDO"}
 
     source: integer(
         "From",
@@ -116,10 +107,7 @@ class ROSY_OT_field_singularities(ActiveMeshMixin, ModalJobMixin, bpy.types.Oper
         default=OUTSIDE,
     )
     index: integer(
-        "Index",
-        "What is moved, in units of 1/N. 0: the whole index",
-        soft_min=-4,
-        soft_max=4,
+        "Index", "What is moved, in units of 1/N. 0: the whole index", soft_min=-4, soft_max=4
     )
     reach: _reach()
 
@@ -143,7 +131,7 @@ class ROSY_OT_drag_singularity(RosyOperator, bpy.types.Operator):
     bl_idname = "rosy.drag_singularity"
     bl_label = "Drag Singularity"
     bl_options = {"INTERNAL"}
-    conditions = (IN_3D_VIEW, *EDITABLE_FIELD)
+    conditions = (IN_3D_VIEW, *ActiveMeshMixin.conditions)
 
     make_pair: toggle(
         "Make Pair",

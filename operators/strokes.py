@@ -7,13 +7,8 @@ import bpy
 from ..rosy_addon.core.errors import counted
 from ..rosy_addon.jobs.draw_strokes import StrokeResult, draw_strokes
 from ..rosy_addon.line_drawing.polyline_files import DRAWING_SUFFIXES
+from ..rosy_addon.scene import stroke_objects
 from ..rosy_addon.scene.cameras import CameraSource, render_camera
-from ..rosy_addon.scene.stroke_objects import (
-    edited_strokes,
-    remove_strokes,
-    stroke_objects,
-    target_objects,
-)
 from ..rosy_addon.ui.properties import STROKE_CAMERA_ITEMS, STROKE_KIND_ITEMS
 from ..rosy_addon.ui.property_makers import choice, file_filter, text, toggle
 from ..rosy_addon.worker.job import Steps
@@ -62,7 +57,7 @@ class ROSY_OT_strokes(DialogJobMixin, bpy.types.Operator):
             context.window_manager.fileselect_add(self)
             return {"RUNNING_MODAL"}
         camera = self._camera(context) or render_camera(context.scene)
-        obj = edited_strokes(context.scene, self._kind(context), camera.name)
+        obj = stroke_objects.edited_strokes(context.scene, self._kind(context), camera.name)
         if obj is None or self.replace:
             return None
         return context.window_manager.invoke_confirm(
@@ -81,7 +76,10 @@ class ROSY_OT_strokes(DialogJobMixin, bpy.types.Operator):
             self.replace = True
 
     def check(self, context: bpy.types.Context) -> bool:
-        """Set the suffix .svg in the file browser, unless the file already has a suffix of stroke files."""
+        """Give the file name the suffix .svg, unless it ends with .svg, .ply, .obj or .csv.
+
+        Return whether the name has changed. The file browser calls this.
+        """
         return not self.filepath.lower().endswith(DRAWING_SUFFIXES) and sync_suffix(self, ".svg")
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -93,7 +91,7 @@ class ROSY_OT_strokes(DialogJobMixin, bpy.types.Operator):
             kind=self._kind(context),
             collection=context.collection,
             path=self.chosen("filepath", None),
-            objects=target_objects(context.scene, context.view_layer),
+            objects=stroke_objects.target_objects(context.scene, context.view_layer),
             camera=self._camera(context),
         )
 
@@ -122,12 +120,14 @@ class ROSY_OT_strokes_remove(RosyOperator, bpy.types.Operator):
 
     bl_idname = "rosy.strokes_remove"
     bl_label = "Remove Strokes"
-    bl_options = {"REGISTER", "UNDO"}
     conditions = (
         IDLE,
-        Condition(lambda context: stroke_objects(context.scene), "This scene has no strokes"),
+        Condition(
+            lambda context: stroke_objects.stroke_objects(context.scene),
+            "This scene has no strokes",
+        ),
     )
 
     def act(self, context: bpy.types.Context) -> None:
-        count = remove_strokes(context.scene)
+        count = stroke_objects.remove_strokes(context.scene)
         self.report_done(f"Removed {counted(count, 'object')} with strokes")

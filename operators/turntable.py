@@ -59,7 +59,10 @@ class ROSY_OT_turntable(FileJobMixin, bpy.types.Operator, ExportHelper):
     )
 
     def check(self, context: bpy.types.Context) -> bool:
-        """Set the suffix of the file name to that of the video format. The file browser calls this."""
+        """Give the file name the suffix of the video format. Return whether the name has changed.
+
+        The file browser calls this.
+        """
         return sync_suffix(self, self.film)
 
     def begin(self, context: bpy.types.Context) -> Steps[Path]:

@@ -13,14 +13,11 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 
 
-def main() -> int:
-    """Check the tag in the command line. The exit status is 0 only if the tag can be released."""
+def main() -> str:
+    """Return what is wrong with the tag in the command line; empty if it can be released."""
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
     changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
-    fault = fault_of(sys.argv[1], manifest["version"], changes)
-    if fault:
-        print(fault)
-    return 1 if fault else 0
+    return fault_of(sys.argv[1], manifest["version"], changes)
 
 
 def fault_of(tag: str, version: str, changes: str) -> str:
@@ -44,4 +41,4 @@ def fault_of(tag: str, version: str, changes: str) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main() or 0)

@@ -8,9 +8,7 @@ temporary folder. Every case (a short program) of `tools/outputs/cases.toml` run
 that imports only this copy. The exit status is 0 only if all cases ran and gave the same files. One revision
 takes 3 to 4 minutes on two processor cores.
 
-Cases use only interfaces that users have: the command line, the Python package, operators and properties. In
-an older commit some of them had other names, which `cases.toml` lists. The cases then run with these names,
-and files of settings may differ in them.
+Cases use only interfaces that users have: the command line, the Python package, operators and properties.
 
 Each case runs in one of three environments, called lanes: `numpy` (plain Python), `bpy` (Blender's Python
 module, if this Python has it) and `card` (a full Blender that draws on the graphics card, only with
@@ -45,19 +43,9 @@ from pathlib import Path
 
 import numpy as np
 from outputs.inputs import write_inputs
-from outputs.run_cases import (
-    FOLDER,
-    INPUT,
-    INPUTS,
-    LANES,
-    LOG,
-    STATUS,
-    Case,
-    older_words,
-    read_cases,
-)
+from outputs.run_cases import FOLDER, INPUT, INPUTS, LANES, LOG, STATUS, Case, read_cases
+from working_tree import ROOT, copy_working_tree
 
-ROOT = Path(__file__).resolve().parents[1]
 CACHE = ROOT / "build" / "compare"
 
 #: Number of cases that one child process runs, and seconds after which the process is stopped.
@@ -104,16 +92,11 @@ class Revision:
 
         Of the working tree, files that git ignores are left out.
         """
-        self.tree.mkdir()
         if self.sha:
             with tarfile.open(fileobj=io.BytesIO(git("archive", self.sha))) as files:
                 files.extractall(self.tree, filter="data")
-            return
-        listed = git("ls-files", "-z", "--cached", "--others", "--exclude-standard")
-        for name in filter(None, os.fsdecode(listed).split("\0")):
-            if (ROOT / name).is_file():
-                (self.tree / name).parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy(ROOT / name, self.tree / name)
+        else:
+            copy_working_tree(self.tree)
 
 
 def git(*arguments: str) -> bytes:
@@ -225,9 +208,7 @@ def compare(old: Path, new: Path) -> list[str]:
     for name in sorted({*first, *second}):
         if name not in first or name not in second:
             differences.append(f"{name} is only in {'old' if name in first else 'new'}")
-        elif first[name].read_bytes() != second[name].read_bytes() and not (
-            name.endswith(".json") and are_renamed(first[name], second[name])
-        ):
+        elif first[name].read_bytes() != second[name].read_bytes():
             differences.append(f"{name}: {describe_difference(first[name], second[name])}")
     return differences
 
@@ -237,17 +218,6 @@ def compared_files(folder: Path) -> dict[str, Path]:
     paths = [path for path in folder.rglob("*") if path.is_file()]
     files = {str(path.relative_to(folder)): path for path in paths}
     return {name: path for name, path in files.items() if not name.endswith(NOT_COMPARED)}
-
-
-def are_renamed(old: Path, new: Path) -> bool:
-    """Return whether two JSON files, with one value per line, differ only in renamed settings."""
-
-    def settings(path: Path) -> str:
-        text = re.sub(r'"(\w+)": "?(.*?)"?,?\n', r"\1=\2\n", path.read_text(encoding="utf-8"))
-        return text.replace("=true\n", "=on\n").replace("=false\n", "=off\n")
-
-    before = sorted(settings(old).splitlines())
-    return any(sorted(text.splitlines()) == before for text in older_words(settings(new)))
 
 
 def describe_difference(old: Path, new: Path) -> str:

@@ -1,6 +1,6 @@
 """Break the code on purpose, one fault at a time, and check that the tests notice.
 
-    python tools/run_faults.py [NAME...] [--jobs N] [--baseline | --check]
+    python tools/run_faults.py [NAME...] [--jobs N]
 
 tests/faults.toml lists the faults. Each fault is applied to a temporary copy of the working tree, where its
 tests have to fail. The exit status is 0 only if every fault is caught.
@@ -21,7 +21,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+from working_tree import ROOT, copy_working_tree
 
 #: The environment whose Python runs the tests of each lane. Those of lane "blender" build a zip and run it in
 #: a full Blender.
@@ -66,13 +66,8 @@ def copy_tree(folder: Path) -> Path:
 
     Return the copy.
     """
-    listed = ("git", "ls-files", "-z", "--cached", "--others", "--exclude-standard")
-    names = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout
     copy = folder / "main"
-    for name in filter(None, names.split("\0")):
-        if (ROOT / name).is_file():
-            (copy / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(ROOT / name, copy / name)
+    copy_working_tree(copy)
     for environment in ROOT.glob(".venv*"):
         (copy / environment.name).symlink_to(environment)
     if (ROOT.parent / "shared").is_dir():
@@ -102,25 +97,20 @@ def run_tests(fault: Fault, copy: Path) -> tuple[int, str]:
     return completed.returncode, message.splitlines()[-1].strip("= ")
 
 
-def try_fault(fault: Fault, copies: queue.Queue[Path], baseline: bool) -> bool:
-    """Run the tests of a fault, print a line, and return whether the outcome is as expected."""
+def try_fault(fault: Fault, copies: queue.Queue[Path]) -> bool:
+    """Run the tests of a fault, print a line, and return whether they have caught it."""
     copy, start, succeeded = copies.get(), time.monotonic(), False
     path, broken = copy / fault.file, broken_text(fault, copy)
     verdict, message = "does not apply", f"`find` is not in {fault.file} exactly once"
     if broken is not None:
         original = path.read_bytes()
         try:
-            if not baseline:
-                path.write_text(broken, encoding="utf-8")
+            path.write_text(broken, encoding="utf-8")
             status, message = run_tests(fault, copy)
         finally:
             path.write_bytes(original)
-        if baseline:
-            succeeded = status == 0 and "passed" in message and "skipped" not in message
-            verdict = "passes" if succeeded else "DOES NOT PASS"
-        else:
-            succeeded = status == TESTS_FAILED and "failed" in message
-            verdict = "caught" if succeeded else "MISSED"
+        succeeded = status == TESTS_FAILED and "failed" in message
+        verdict = "caught" if succeeded else "MISSED"
     copies.put(copy)
     print(f"{verdict:14} {fault.name:36} {time.monotonic() - start:6.1f} s  {message}", flush=True)
     return succeeded
@@ -131,29 +121,19 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help="all faults if not given")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="copies used side by side")
-    mode = parser.add_mutually_exclusive_group()
-    mode.add_argument("--baseline", action="store_true", help="the tests pass without the faults")
-    mode.add_argument("--check", action="store_true", help="only check that each fault applies")
     options = parser.parse_args()
     faults = {fault.name: fault for fault in read_faults()}
     if unknown := set(options.names) - set(faults):
         parser.error(f"no fault is named {', '.join(sorted(unknown))}")
     chosen = [faults[name] for name in options.names or faults]
-    if options.check:
-        unmatched = [fault.name for fault in chosen if broken_text(fault, ROOT) is None]
-        print(
-            *(f"does not apply  {name}" for name in unmatched), f"{len(chosen)} checked", sep="\n"
-        )
-        return 1 if unmatched else 0
     with tempfile.TemporaryDirectory(prefix="rosy-faults-") as name:
         copies: queue.Queue[Path] = queue.Queue()
         for number in range(options.jobs):
             copies.put(copy_tree(Path(name) / str(number)))
         with ThreadPoolExecutor(options.jobs) as pool:
-            tried = pool.map(lambda fault: try_fault(fault, copies, options.baseline), chosen)
-            succeeded = list(tried)
-    print(f"{sum(succeeded)} of {len(succeeded)} {'pass' if options.baseline else 'caught'}")
-    return 0 if all(succeeded) else 1
+            caught = list(pool.map(lambda fault: try_fault(fault, copies), chosen))
+    print(f"{sum(caught)} of {len(caught)} caught")
+    return 0 if all(caught) else 1
 
 
 if __name__ == "__main__":

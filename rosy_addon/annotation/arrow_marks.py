@@ -28,12 +28,7 @@ from ..projection.pixel_neighbors import screen_jacobians
 from ..projection.project import surface_points
 from ..projection.surface_points import SurfacePoints
 from ..projection.visible_vertices import ProjectedPoints, project_points
-from .progressive_samples import (
-    matrix_scale,
-    progressive_samples,
-    rest_areas,
-    surface_samples,
-)
+from .progressive_samples import matrix_scale, progressive_samples, rest_areas, surface_samples
 
 #: Colors of arrowheads and of their outlines.
 FILL_COLOR, OUTLINE_COLOR = "#141414", "#ffffff"
@@ -213,8 +208,7 @@ def _places_in_order(
             parts.append(points.part(kept))
             keys.append(np.stack([rank[kept], np.ones(len(kept))]))
     # Sort places by their distance, and the points between them, which are last, by their rank.
-    order = np.lexsort(np.concatenate(keys, axis=1))
-    return SurfacePoints.concatenate(parts).part(order)
+    return SurfacePoints.concatenate(parts).part(np.lexsort(np.concatenate(keys, axis=1)))
 
 
 def _needed_distances(
@@ -264,9 +258,8 @@ def _screen_directions(gbuffer: GBuffer) -> np.ndarray:
     for number in np.unique(degree).tolist():
         of_degree = np.flatnonzero((degree == number) & (gbuffer.representation != 0))
         z = gbuffer.representation[of_degree].astype(np.complex128)
-        member = np.exp(
-            1j * np.angle(z)[:, None] / number + 2j * np.pi * np.arange(number) / number
-        )
+        turns = 2j * np.pi * np.arange(number) / number
+        member = np.exp(1j * np.angle(z)[:, None] / number + turns)
         harmonics = [
             (order, values[of_degree, None].astype(np.complex128))
             for (kind, order), values in gbuffer.channels.items()
@@ -412,9 +405,8 @@ def _with_level(
     barycentric = np.concatenate([places.barycentric, barycentric])
     corners = surface.in_rest_shape().vertices[surface.triangle_vertex[triangle]]
     chosen = spaced_points(np.einsum("nk,nki->ni", barycentric, corners), finest)
-    return SurfacePlaces(
-        triangle[chosen], barycentric[chosen], distance[chosen], level, places.extent
-    )
+    columns = (column[chosen] for column in (triangle, barycentric, distance))
+    return SurfacePlaces(*columns, level, places.extent)
 
 
 def spaced_points(position: np.ndarray, spacing: float) -> np.ndarray:
@@ -462,8 +454,7 @@ def spaced_points(position: np.ndarray, spacing: float) -> np.ndarray:
             if not len(near):
                 continue
             step = position[left[near]] - position[other[near]]
-            is_near = (step * step).sum(axis=1) < spacing**2
-            left = np.delete(left, near[is_near])
+            left = np.delete(left, near[(step * step).sum(axis=1) < spacing**2])
     return np.sort(np.concatenate(chosen))
 
 

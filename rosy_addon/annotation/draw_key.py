@@ -91,10 +91,8 @@ def _draw_plate(
     low, high = np.array(box[:2]), np.array(box[2:])
     part, x, y = window(rgba, low, high)
     center, half = (low + high) / 2, (high - low) / 2 - radius
-    beyond_x, beyond_y = (
-        np.maximum(np.abs(values - center[axis]) - half[axis], 0)
-        for axis, values in enumerate((x, y))
-    )
+    beyond_x = np.maximum(np.abs(x - center[0]) - half[0], 0)
+    beyond_y = np.maximum(np.abs(y - center[1]) - half[1], 0)
     draw_over(part, color, opacity * np.clip(radius + 0.5 - np.hypot(beyond_x, beyond_y), 0, 1))
 
 
@@ -161,8 +159,7 @@ def triangle_coverage(triangles: np.ndarray, width: int, height: int) -> np.ndar
     owner = np.repeat(np.arange(len(corners)), count)
     line = concatenated_ranges(first, count)
     x, y, level = x[owner], y[owner], line + 0.5
-    is_lower = level < y[:, 1]
-    start = np.where(is_lower, 0, 1)
+    start = np.where(level < y[:, 1], 0, 1)
     sides = _crossing(x, y, start, start + 1, level), _crossing(x, y, 0 * start, 2, level)
     left, right = np.minimum(*sides), np.maximum(*sides)
     total = np.zeros(height * (width + 1))

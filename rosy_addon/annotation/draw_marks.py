@@ -9,16 +9,10 @@ import numpy as np
 from ..core.color import from_hex, to_linear
 from ..core.progress import report
 from ..field.blocks import blocks_by_count, concatenated_ranges
-from . import arrow_marks
+from . import arrow_marks, singularity_marks
 from .arrow_marks import NOTCH, WIDTH, ArrowMarks
 from .index_labels import HALO, HALO_COLOR, LABEL_COLOR, Label, placed_labels, stroke_width
-from .singularity_marks import (
-    COLOR_BY_SIGN,
-    HIDDEN_OPACITY,
-    OUTLINE,
-    OUTLINE_COLOR,
-    SingularityMarks,
-)
+from .singularity_marks import SingularityMarks
 
 #: Number of dots that are drawn between two reports of the progress, and number of pixels of arrowheads that
 #: are drawn at once.
@@ -43,8 +37,7 @@ def window(
 def draw_over(part: np.ndarray, color: np.ndarray, opacity: np.ndarray) -> None:
     """Composite a linear color, with an opacity for each pixel, over a part of a picture, in place."""
     opacity = opacity.astype(np.float32)
-    below = part[..., 3] * (1 - opacity)
-    alpha = opacity + below
+    alpha = opacity + part[..., 3] * (1 - opacity)
     share = np.divide(opacity, alpha, out=np.zeros_like(alpha), where=alpha > 0)[..., None]
     part[..., :3] += share * (color - part[..., :3])
     part[..., 3] = alpha
@@ -66,13 +59,13 @@ def draw_marks(rgba: np.ndarray, marks: SingularityMarks) -> np.ndarray:
     """
     rgba = rgba.copy()
     marks = marks.in_drawing_order()
-    for number, (center, radius, index, is_visible) in enumerate(
-        zip(marks.position, marks.radius.tolist(), marks.index, marks.is_visible, strict=True)
-    ):
+    outline = singularity_marks.OUTLINE * marks.size
+    rows = zip(marks.position, marks.radius.tolist(), marks.index, marks.is_visible, strict=True)
+    for number, (center, radius, index, is_visible) in enumerate(rows):
         if number % DOTS_PER_BLOCK == 0:
             report(number / len(marks), "drawing singularities")
-        opacity = 1.0 if is_visible else HIDDEN_OPACITY
-        draw_dot(rgba, center, radius, OUTLINE * marks.size, int(index), opacity)
+        opacity = 1.0 if is_visible else singularity_marks.HIDDEN_OPACITY
+        draw_dot(rgba, center, radius, outline, int(index), opacity)
     for label in placed_labels(marks):
         _draw_label(rgba, label, marks.size)
     return rgba
@@ -104,9 +97,9 @@ def draw_dot(
     part, x, y = window(rgba, center - outer - 1, center + outer + 1)
     distance = np.hypot(x - center[0], y - center[1])
     inner = np.clip(radius + 0.5 - distance, 0, 1)[..., None].astype(np.float32)
-    fill, line = _linear_color(COLOR_BY_SIGN[int(np.sign(index))]), _linear_color(OUTLINE_COLOR)
-    coverage = opacity * np.clip(outer + 0.5 - distance, 0, 1)
-    draw_over(part, line + inner * (fill - line), coverage)
+    fill = _linear_color(singularity_marks.COLOR_BY_SIGN[int(np.sign(index))])
+    line = _linear_color(singularity_marks.OUTLINE_COLOR)
+    draw_over(part, line + inner * (fill - line), opacity * np.clip(outer + 0.5 - distance, 0, 1))
 
 
 @lru_cache(maxsize=8)
@@ -217,7 +210,7 @@ def head_distance(x: np.ndarray, y: np.ndarray, direction: np.ndarray, size: flo
 
 
 def head_outline(size: float) -> np.ndarray:
-    """Return (3, 2) float64: the tip, the left barb and the notch of an arrowhead of a length.
+    """Return (3, 2) float64: the tip, the left barb and the notch of an arrowhead that is `size` long.
 
     The first coordinate is forward and the second to the left, from the middle of the arrowhead.
     """

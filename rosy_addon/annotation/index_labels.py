@@ -69,19 +69,15 @@ def placed_labels(marks: SingularityMarks) -> list[Label]:
     visible = np.flatnonzero(marks.is_visible)
     if not marks.has_labels or len(visible) > MAX_LABELS:
         return []
-    nearest = marks.part(visible[np.argsort(marks.depth[visible], kind="stable")])
+    marks = marks.part(visible[np.argsort(marks.depth[visible], kind="stable")])
     size = marks.size
     height, padding = LABEL_HEIGHT * size, stroke_width(size) / 2 + HALO * size
 
     def label_size(text: str) -> tuple[float, float]:
         return text_width(text) * height + 2 * padding, height + 2 * padding
 
-    return [
-        Label(text, left + padding, bottom + padding, height)
-        for text, left, bottom in place_indices(
-            nearest.position, nearest.index, nearest.degree, size, label_size, marks.frame
-        )
-    ]
+    places = place_indices(marks.position, marks.index, marks.degree, size, label_size, marks.frame)
+    return [Label(text, left + padding, bottom + padding, height) for text, left, bottom in places]
 
 
 def place_indices(
@@ -114,17 +110,12 @@ def place_indices(
     list of (str, float, float)
         The text and the lower left corner, in pixels, of each label that was placed.
     """
-    if not len(index):
-        return []
     texts = [format_index(*pair) for pair in zip(index.tolist(), degree.tolist(), strict=True)]
     sizes = np.array([label_size(text) for text in texts])
     radii = dot_diameters(index, size) / 2 + OUTLINE * size
-    corners = place_labels(position, sizes, radii, frame)
-    return [
-        (text, left, bottom)
-        for text, (left, bottom) in zip(texts, corners.tolist(), strict=True)
-        if np.isfinite(left)
-    ]
+    corners = place_labels(position, sizes, radii, frame).tolist()
+    labels = zip(texts, corners, strict=True)
+    return [(text, *corner) for text, corner in labels if np.isfinite(corner[0])]
 
 
 def stroke_width(size: float) -> float:
@@ -219,10 +210,7 @@ LETTERS: dict[str, list[list[tuple[float, float]]]] = {
     "5": [[(0.52, 1.0), (0.08, 1.0), (0.05, 0.58), *_arc((0.25, 0.32), (0.31, 0.32), 115, -150)]],
     "6": [[(0.45, 1.0), (0.04, 0.45)], _arc((0.28, 0.3), (0.28, 0.3), 0, 360)],
     "7": [[(0.0, 1.0), (0.55, 1.0), (0.18, 0.0)]],
-    "8": [
-        _arc((0.28, 0.75), (0.25, 0.25), 0, 360),
-        _arc((0.28, 0.26), (0.28, 0.26), 0, 360),
-    ],
+    "8": [_arc((0.28, 0.75), (0.25, 0.25), 0, 360), _arc((0.28, 0.26), (0.28, 0.26), 0, 360)],
     "9": [[(0.11, 0.0), (0.52, 0.55)], _arc((0.28, 0.7), (0.28, 0.3), 0, 360)],
     "+": [[(0.0, 0.5), (0.5, 0.5)], [(0.25, 0.25), (0.25, 0.75)]],
     "-": [[(0.0, 0.5), (0.5, 0.5)]],

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..field.singularities import format_index
-from .key_contents import ColorScale, IndexCount
+from .key_contents import ColorScale, IndexCount, PictureKey
 from .round_numbers import MINUS, tick_labels
 from .singularity_marks import OUTLINE, dot_diameters
 
@@ -64,7 +64,7 @@ Box = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
-class KeyParts:
+class KeyParts(PictureKey):
     """Contents of a key: color bar, legend of singularities, scale bar and caption.
 
     Attributes
@@ -83,9 +83,6 @@ class KeyParts:
         Text of one or several lines; empty: no caption.
     """
 
-    color_scale: ColorScale | None = None
-    indices: Sequence[IndexCount] = ()
-    dot_size: float = 0.0
     has_counts: bool = False
     scale: tuple[float, str] | None = None
     caption: str = ""
@@ -160,7 +157,8 @@ def lay_out_key(
     text_width : callable
         Function that returns the width of a line of text, as a multiple of the text size.
     text_size : float
-        Text size in pixels. It is reduced until the parts fit. 0: the fraction `TEXT_SIZE` of the frame.
+        Text size in pixels. It is reduced until the parts fit. 0: the fraction `TEXT_SIZE` of the smaller
+        side of the frame.
 
     Returns
     -------
@@ -232,10 +230,10 @@ class _Arrangement:
         return self.size * max((self.text_width(text) for text in texts), default=0.0)
 
     def _bottom(self, left: float, width: float) -> float:
-        """Return the lowest y coordinate, in pixels, for the bottom of a background rectangle.
+        """Return the smallest y coordinate, in pixels, at which the bottom of a background rectangle may be.
 
-        `left` and `width` are those of the rectangle. The bottom is above the caption if the rectangle is not
-        beside it, and at the margin of the frame otherwise.
+        The rectangle is given by its left edge and its width, in pixels. If it would overlap the caption
+        horizontally, its bottom is above the caption, otherwise at the margin of the frame.
         """
         gap = PLATE_GAP * self.size
         if self.parts.caption.strip():
@@ -253,10 +251,9 @@ class _Arrangement:
         contents.
         """
         left, bottom = round(left), round(bottom)
+        right, top = left + self._plate_size(width), bottom + self._plate_size(height)
+        self.result.plates.append((left, bottom, right, top))
         padding = round(PADDING * self.size)
-        self.result.plates.append(
-            (left, bottom, left + round(width) + 2 * padding, bottom + round(height) + 2 * padding)
-        )
         return left + padding, bottom + padding
 
     def _add_text(self, text: str, left: float, baseline: float) -> None:
@@ -272,13 +269,11 @@ class _Arrangement:
         lines = wrapped(self.parts.caption, CAPTION_WIDTH * width / size, self.text_width)
         text_width = self._width(lines)
         height = (CAP_HEIGHT + DESCENT + LINE * (len(lines) - 1)) * size
-        left, bottom = self._add_plate(
-            (width - self._plate_size(text_width)) / 2, self.margin, text_width, height
-        )
+        left = (width - self._plate_size(text_width)) / 2
+        left, bottom = self._add_plate(left, self.margin, text_width, height)
         for number, line in enumerate(lines):
-            indent = (text_width - self._width([line])) / 2
             baseline = bottom + (DESCENT + LINE * (len(lines) - 1 - number)) * size
-            self._add_text(line, left + indent, baseline)
+            self._add_text(line, left + (text_width - self._width([line])) / 2, baseline)
 
     def _scale_bar(self, length: float, label: str) -> None:
         """Place the scale bar, `length` pixels long, and its label."""
@@ -287,9 +282,8 @@ class _Arrangement:
         width = max(length, label_width)
         end = round(SCALE_END * size)
         bottom = self._bottom(self.margin, self._plate_size(width))
-        left, bottom = self._add_plate(
-            self.margin, bottom, width, end + (SCALE_GAP + CAP_HEIGHT) * size
-        )
+        height = end + (SCALE_GAP + CAP_HEIGHT) * size
+        left, bottom = self._add_plate(self.margin, bottom, width, height)
         start = left + (width - length) / 2
         middle = bottom + (end - stroke) // 2
         self.result.strokes += [
@@ -314,9 +308,8 @@ class _Arrangement:
         left = self.frame[0] - self.margin - plate_width
         left, bottom = self._add_plate(left, self._bottom(left, plate_width), width, height)
         top = bottom + height
-        for entry, label, diameter, row in zip(
-            parts.indices, labels, diameters.tolist(), heights.tolist(), strict=True
-        ):
+        rows = zip(parts.indices, labels, diameters.tolist(), heights.tolist(), strict=True)
+        for entry, label, diameter, row in rows:
             y = top - row / 2
             radius = diameter / 2 - outline
             self.result.dots.append(PlacedDot(left + column / 2, y, radius, outline, entry.index))
@@ -344,13 +337,9 @@ class _Arrangement:
         ticks = _ticks(scale, max_steps, CAP_HEIGHT * 1.7 * size / length)
         beside = (TICK_LENGTH + LABEL_GAP) * size + self._width([label for _, label in ticks])
         content = max(BAR_WIDTH * size + beside, self._width(title))
-        plate_height = self._plate_size(around + length)
-        left, bottom = self._add_plate(
-            width - self.margin - self._plate_size(content),
-            max((height - plate_height) / 2, lowest),
-            content,
-            around + length,
-        )
+        left = width - self.margin - self._plate_size(content)
+        bottom = max((height - self._plate_size(around + length)) / 2, lowest)
+        left, bottom = self._add_plate(left, bottom, content, around + length)
         bar_bottom = bottom + round(CAP_HEIGHT / 2 * size)
         right = left + round(BAR_WIDTH * size)
         self.result.color_bar = bar = (left, bar_bottom, right, bar_bottom + length)
@@ -377,8 +366,7 @@ def _ticks(scale: ColorScale, max_steps: int, gap: float) -> list[tuple[float, s
         return [(0.0, low), (1.0, "max")]
     low, high = sorted((scale.low, scale.high))
     labels = tick_labels(low, high, max(max_steps, 1), gap)
-    extent = high - low or 1.0
-    return [((value - low) / extent, label) for value, label in labels]
+    return [((value - low) / (high - low or 1.0), label) for value, label in labels]
 
 
 def _frame_strokes(box: Box, width: float) -> list[Box]:

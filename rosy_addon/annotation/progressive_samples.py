@@ -22,6 +22,7 @@ from ..field.blocks import concatenated_ranges
 from ..field.surface import Surface
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
+from ..projection.pixel_blocks import part_of
 from ..projection.project import all_triangles
 
 #: Number of points per square on screen whose side is the given spacing.
@@ -74,10 +75,6 @@ class _Pieces:
     first: np.ndarray
     depth: int
 
-    def part(self, chosen: np.ndarray) -> _Pieces:
-        """Return the sub-triangles that a mask selects."""
-        return _Pieces(self.triangle[chosen], self.corners[chosen], self.first[chosen], self.depth)
-
     def divided(self, shuffle: np.ndarray) -> _Pieces:
         """Divide each sub-triangle into four, and return them.
 
@@ -121,21 +118,17 @@ def progressive_samples(
     area = np.zeros(len(triangles))
     area[start] = rest_areas(instance.surface, start) * matrix_scale(instance) ** 2
     start = start[area[start] > 0]
-    todo = _Pieces(
-        start,
-        np.broadcast_to(np.eye(3), (len(start), 3, 3)),
-        np.zeros(len(start), dtype=np.int64),
-        0,
-    )
+    corners = np.broadcast_to(np.eye(3), (len(start), 3, 3))
+    todo = _Pieces(start, corners, np.zeros(len(start), dtype=np.int64), 0)
     while len(todo.triangle):
         corners = clip[triangles[todo.triangle]]
         if todo.depth:
             corners = np.einsum("nij,njk->nik", todo.corners, corners)
         in_frame = _touches_frame(corners)
-        todo, corners = todo.part(in_frame), corners[in_frame]
+        todo, corners = part_of(todo, in_frame), corners[in_frame]
         screen_area, is_divided = _screen_areas(corners, camera, spacing)
         is_divided &= todo.depth < MAX_DIVISIONS
-        whole = todo.part(~is_divided)
+        whole = part_of(todo, ~is_divided)
         # The number of points of the triangle, if all of it had the scale of this sub-triangle on screen.
         total = POINTS_PER_SPACING * screen_area[~is_divided] * 4.0**whole.depth / spacing**2
         step = 4**whole.depth
@@ -145,16 +138,12 @@ def progressive_samples(
         rank_in_piece = concatenated_ranges(np.zeros(len(count), dtype=np.intp), count)
         numbers.append(whole.first[chosen] + rank_in_piece * step)
         of_pieces.append(whole.triangle[chosen])
-        todo = todo.part(is_divided).divided(shuffle)
+        todo = part_of(todo, is_divided).divided(shuffle)
     return _points(np.concatenate(numbers), np.concatenate(of_pieces), shuffle, area)
 
 
 def _with_points(
-    clip: np.ndarray,
-    triangles: np.ndarray,
-    camera: Camera,
-    spacing: float,
-    offset: np.ndarray,
+    clip: np.ndarray, triangles: np.ndarray, camera: Camera, spacing: float, offset: np.ndarray
 ) -> np.ndarray:
     """Return the (n,) intp indices of the triangles in which there may be points for this view.
 
@@ -218,12 +207,9 @@ def _screen_areas(
     (ax, ay), (bx, by) = (np.moveaxis(ndc[:, k] - ndc[:, 0], 1, 0) for k in (1, 2))
     area = np.abs(ax * by - ay * bx) * (camera.width * camera.height / 8)
     area[~is_in_front] = 0.0
-    is_cut = (np.abs(ndc) > 1).any(axis=(1, 2))
-    is_large = area > spacing**2 / POINTS_PER_SPACING
-    return area, ~is_in_front | (
-        is_large
-        & ((farthest > MAX_DEPTH_RATIO * nearest) | (is_cut & (area > MAX_CUT_AREA * spacing**2)))
-    )
+    is_cut = (np.abs(ndc) > 1).any(axis=(1, 2)) & (area > MAX_CUT_AREA * spacing**2)
+    is_divided = is_cut | (farthest > MAX_DEPTH_RATIO * nearest)
+    return area, ~is_in_front | (is_divided & (area > spacing**2 / POINTS_PER_SPACING))
 
 
 def matrix_scale(instance: MeshInstance) -> float:
@@ -263,9 +249,8 @@ def surface_samples(surface: Surface, density: float) -> tuple[np.ndarray, np.nd
     area = rest_areas(surface)
     shuffle = _random_bits(len(area))
     count = np.maximum(np.ceil(area * density - _random_offsets(shuffle)), 0).astype(np.int64)
-    triangle = np.repeat(np.arange(len(area)), count)
     number = concatenated_ranges(np.zeros(len(area), dtype=np.intp), count)
-    return _points(number, triangle, shuffle, area)
+    return _points(number, np.repeat(np.arange(len(area)), count), shuffle, area)
 
 
 def _points(

@@ -28,7 +28,10 @@ def round_above(least: float) -> float:
 
 
 def _round_near(number: float) -> list[float]:
-    """Return the round numbers (1, 2 or 5 times a power of ten) around a positive number."""
+    """Return nine round numbers (1, 2 or 5 times a power of ten), ascending.
+
+    They are in three decades: the decade of `number`, which is positive, the one before it and the one after.
+    """
     exponent = math.floor(math.log10(number))
     powers = (exponent - 1, exponent, exponent + 1)
     return [float(f"{mantissa}e{power}") for power in powers for mantissa in MANTISSAS]
@@ -74,21 +77,17 @@ def tick_labels(low: float, high: float, max_steps: int, gap: float) -> list[tup
     if not low < high:
         return [(low, format_number(low))]
     values = tick_values(low, high, max_steps)
-    between = values[(values > low + gap * (high - low)) & (values < high - gap * (high - low))]
+    margin = gap * (high - low)
+    between = values[(values > low + margin) & (values < high - margin)].tolist()
     step = values[1] - values[0] if len(values) > 1 else high - low
     decimals = max(-math.floor(math.log10(step) + 1e-9), 0)
     largest = math.floor(math.log10(max(abs(low), abs(high))))
-    labels = [
-        f"{value:.{decimals}f}".replace("-", MINUS)
-        if largest in PLAIN_EXPONENTS
-        else format_number(value)
-        for value in between.tolist()
-    ]
-    return [
-        (low, format_number(low)),
-        *zip(between.tolist(), labels, strict=True),
-        (high, format_number(high)),
-    ]
+    if largest in PLAIN_EXPONENTS:
+        labels = [f"{value:.{decimals}f}".replace("-", MINUS) for value in between]
+    else:
+        labels = [format_number(value) for value in between]
+    labels = [format_number(low), *labels, format_number(high)]
+    return list(zip([low, *between, high], labels, strict=True))
 
 
 def format_number(value: float, digits: int = 3) -> str:

@@ -111,8 +111,8 @@ def singularity_marks(
         Instances without a field can only hide singularities.
     camera : Camera
     settings : Look or StrokeStyle
-        Settings that select the singularities and the style of their dots. Only those of
-        `singularity_settings` are read.
+        Only the settings `singularity_dots` and `singularity_size` are read. They select the singularities
+        and the style of their dots.
     clip_planes : (6, 4) float64 ndarray, optional
         Planes in world space. The negative side of each plane is cut away.
     cache : Cache, optional
@@ -136,7 +136,7 @@ def singularity_marks(
     with progress(0.5, 1.0):
         projected = project_vertices(instances, camera, vertices, clip_planes)
     kept = projected.is_in_view if shows_hidden_singularities(settings) else projected.is_visible
-    marks = SingularityMarks(
+    return SingularityMarks(
         projected.position,
         np.concatenate(indices),
         np.concatenate(degrees),
@@ -145,15 +145,14 @@ def singularity_marks(
         (camera.width, camera.height),
         settings.singularity_size,
         shows_indices(settings),
-    )
-    return marks.part(kept)
+    ).part(kept)
 
 
 def cached_singularities(instance: MeshInstance, cache: Cache) -> tuple[np.ndarray, np.ndarray]:
     """Return the vertices and the indices of the singularities of an instance, from the cache if possible.
 
-    The instance must have a field. All deformations of a mesh have the same singularities. The values are
-    those of `field.singularities.find_singularities`.
+    The instance must have a field. All deformations of a mesh have the same singularities. The result is a
+    pair of (K,) int32 arrays; indices are in units of 1 / N.
     """
     surface, field = instance.surface, instance.field
     return cache.get_or_create(

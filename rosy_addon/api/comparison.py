@@ -11,12 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import RosyError
-from ..field.analysis import (
-    DEFAULT_REACH,
-    SingularityMatching,
-    format_degrees,
-    match_on_surface,
-)
+from ..field.analysis import DEFAULT_REACH, SingularityMatching, format_degrees, match_on_surface
 from ..field.field import Difference, Field
 
 #: Replacements for characters that LaTeX interprets.
@@ -33,9 +28,7 @@ _LATEX = {
 _COLUMNS: dict[str, tuple[str, Callable[[Any], str]]] = {
     "degree": ("degree", str),
     "energy": ("energy", "{:.4g}".format),
-    "singularities": ("singularities", str),
-    "positive": ("positive", str),
-    "negative": ("negative", str),
+    **{key: (key, str) for key in ("singularities", "positive", "negative")},
 }
 #: Columns that are added if there are differences from the first field, by title.
 _DIFFERENCE_COLUMNS: dict[str, tuple[str, Callable[[Any], str]]] = {
@@ -77,9 +70,6 @@ class Comparison:
     def __repr__(self) -> str:
         return f"<Comparison: {', '.join(self.fields)}>"
 
-    def __str__(self) -> str:
-        return self.to_text()
-
     @property
     def rows(self) -> list[dict[str, Any]]:
         """Measurements of each field, with angles in degrees.
@@ -105,14 +95,10 @@ class Comparison:
         if title not in self.differences:
             return row
         difference, matching = self.differences[title], self.matchings[title]
-        has_worst = difference.worst_face >= 0
-        center = field.surface.face_center
-        row |= {
-            name: float(np.degrees(getattr(difference, name)))
-            for name in ("mean", "rms", "p95", "max")
-        }
-        row["worst_face"] = difference.worst_face
-        row["worst_position"] = center[difference.worst_face].tolist() if has_worst else None
+        for name in ("mean", "rms", "p95", "max"):
+            row[name] = float(np.degrees(getattr(difference, name)))
+        worst = row["worst_face"] = difference.worst_face
+        row["worst_position"] = field.surface.face_center[worst].tolist() if worst >= 0 else None
         row["compared"] = difference.compared
         row["matched"] = len(matching.distance)
         row["matched_distance"] = float(matching.distance.mean()) if row["matched"] else None
@@ -130,19 +116,16 @@ class Comparison:
     def to_text(self) -> str:
         """Return the table with aligned columns, for a terminal."""
         cells = self.cells()
+        # Titles are aligned to the left, and numbers to the right.
         widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-        lines = [
-            "  ".join(
-                [row[0].ljust(widths[0])]
-                + [text.rjust(width) for text, width in zip(row[1:], widths[1:], strict=True)]
-            ).rstrip()
-            for row in cells
-        ]
+        formats = [f"{{:<{widths[0]}}}", *(f"{{:>{width}}}" for width in widths[1:])]
+        lines = ["  ".join(formats).format(*row).rstrip() for row in cells]
         if self.differences:
-            lines.append(
-                f"Angles and matched singularities are those to '{next(iter(self.fields))}'."
-            )
+            first = next(iter(self.fields))
+            lines.append(f"Angles and matched singularities are those to '{first}'.")
         return "\n".join(lines)
+
+    __str__ = to_text
 
     def to_json(self) -> str:
         """Return the `rows` as a JSON array."""
@@ -199,15 +182,14 @@ def compare(
     """
     titled = titled_fields(fields)
     reference = next(iter(titled.values()))
-    differences: dict[str, Difference] = {}
-    matchings: dict[str, SingularityMatching] = {}
+    comparison = Comparison(titled, {}, {})
     for title, field in list(titled.items())[1:]:
         if field.degree != reference.degree or field.surface is not reference.surface:
             continue
-        differences[title] = reference.difference(field)
+        comparison.differences[title] = reference.difference(field)
         pair = reference.singularities, field.singularities
-        matchings[title] = match_on_surface(field.surface, *pair, reach)
-    return Comparison(titled, differences, matchings)
+        comparison.matchings[title] = match_on_surface(field.surface, *pair, reach)
+    return comparison
 
 
 def titled_fields(fields: Iterable[Field] | Mapping[str, Field]) -> dict[str, Field]:

@@ -118,7 +118,8 @@ def strokes(
     Parameters
     ----------
     surface, field, view, size, orthographic
-        See `render`. Lengths in pixels are relative to this size.
+        See `render`. All lengths in pixels, such as the setting `spacing`, are pixels of a picture of this
+        `size`.
     width : float
         Full width of a stroke in pixels.
     colors : sequence of str
@@ -154,22 +155,9 @@ def strokes(
     stroke_style = StrokeStyle().with_settings(style)
     check_light(stroke_style.light, surface.name)
     pen = Pen(width, tuple(colors), None if plotter else paper, millimeters, plotter)
-    return draw_strokes(surface, field, stroke_style, pen, view, size, orthographic)
-
-
-def draw_strokes(
-    surface: Surface,
-    field: Field | None,
-    style: StrokeStyle,
-    pen: Pen,
-    view: tuple[float, float],
-    size: tuple[int, int],
-    orthographic: bool,
-) -> Drawing:
-    """Draw strokes with a style and a pen; see `strokes`."""
-    instance = upright_instance(surface, field, None)
-    camera = orbit_camera(
-        instance.face_points(), *view, *check_size(*size), perspective=not orthographic
-    )
-    drawing = draw_instances([instance], camera, style, lights=lights_of(style, ()))
+    instance = upright_instance(surface, field)
+    points, frame = instance.face_points(), (*view, *check_size(*size))
+    camera = orbit_camera(points, *frame, perspective=not orthographic)
+    lights = lights_of(stroke_style, ())
+    drawing = draw_instances([instance], camera, stroke_style, lights=lights)
     return Drawing(drawing, camera, pen, surface.up)

@@ -164,11 +164,9 @@ def from_directions(surface: Surface, directions: ArrayLike, *, nonfinite: str =
     (4, False)
     """
     array = np.asarray(directions, dtype=np.float64)
-    if array.ndim != 3 or array.shape[2] != 3:
-        raise RosyError(
-            f"{surface.name}: directions must have the shape (F, N, 3), not {array.shape}"
-        )
     source = f"{surface.name}: directions"
+    if array.ndim != 3 or array.shape[2] != 3:
+        raise RosyError(f"{source} must have the shape (F, N, 3), not {array.shape}")
     return Field.of(surface, validated_directions(surface, array, source, nonfinite))
 
 
@@ -198,13 +196,11 @@ def from_tensors(surface: Surface, tensors: ArrayLike, *, nonfinite: str = "erro
     >>> rf.from_tensors(torus, stress).degree
     4
     """
-    array = np.array(tensors, dtype=np.float64)
+    array, source = np.array(tensors, dtype=np.float64), f"{surface.name}: tensors"
     if array.shape != (surface.face_count, 3, 3):
-        raise RosyError(
-            f"{surface.name}: tensors must have the shape ({surface.face_count}, 3, 3), not "
-            f"{array.shape}"
-        )
-    apply_nonfinite_policy(array, f"{surface.name}: tensors", "face", nonfinite)
+        count = surface.face_count
+        raise RosyError(f"{source} must have the shape ({count}, 3, 3), not {array.shape}")
+    apply_nonfinite_policy(array, source, "face", nonfinite)
     return Field.of(surface, tensor_field(surface, array))
 
 
@@ -236,8 +232,8 @@ def from_array(
     surface : Surface
         From a file of a simulation, from the mesh of another library, or from a ``.ply`` file.
     name : str, optional
-        Name of the array. If the vertices and the faces both have an array of this name, "point:NAME" is
-        that of the vertices, and "cell:NAME" that of the faces. By default, the only array that can be a
+        Name of the array. If the vertices and the faces both have an array NAME, "point:NAME" is the array
+        of the vertices, and "cell:NAME" the array of the faces. By default, the only array that can be a
         field is used: floating-point numbers that are not normals.
     degree : int, optional
         N, from 1 to 12; by default 1 for an array of vectors. Tensors have degree 4.
@@ -247,8 +243,8 @@ def from_array(
     Raises
     ------
     RosyError
-        If there is no such array, several could be meant, it holds scalars or tensors that are not
-        symmetric, its degree is another one, or a number is not finite.
+        If there is no such array, no name is given and several arrays can be a field, the array holds scalars
+        or tensors that are not symmetric, its degree is not `degree`, or a number is not finite.
 
     Examples
     --------

@@ -91,17 +91,21 @@ class Studio:
     def difference_row(self, lines: str, largest_angle: float) -> Row:
         """Return the row of the figure that shows the differences from the first field.
 
-        Panels have the order of the fields. A field without a difference has None as its panel. See
-        `_difference_panel` and `figure` for the parameters.
+        Panels have the order of the fields. A field without a difference has None as its panel.
+
+        Parameters
+        ----------
+        lines : {"other", "first", "both"}
+            Fields whose lines are drawn over a difference; see `figure`.
+        largest_angle : float
+            Angle at the top of the color map, in degrees. 0 means 180/N.
         """
         reference, first = next(iter(self.comparison.fields.items()))
         top = largest_angle or 180.0 / first.degree
-        panels = [
-            self._difference_panel(title, lines, top)
-            if title in self.comparison.differences
-            else None
-            for title in self.instances
-        ]
+        differences, panels = self.comparison.differences, []
+        for title in self.instances:
+            has_one = title in differences
+            panels.append(self._difference_panel(title, lines, top) if has_one else None)
         legend = f"Angle to \u201c{reference}\u201d\n\u00d7  largest angle"
         if shows_singularities(self.look):
             legend += (

@@ -27,7 +27,7 @@ from ..projection.camera import Camera, orbit_basis, orbit_camera
 from ..projection.gbuffer import MeshInstance
 from .comparison import Comparison, compare, titled_fields
 from .figure_panels import Studio
-from .pictures import DEFAULT_VIEW, corner_numbers, picture_look, upright_instance
+from .pictures import DEFAULT_VIEW, picture_look, upright_instance
 
 if TYPE_CHECKING:
     from ..external.matplotlib_figure import Figure
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 #: The parts that a figure may have, from top to bottom.
 PARTS = ("fields", "differences", "table")
 
-#: Which lines are drawn over a difference: those of the other field, of the first field, or of both.
+#: Field whose lines are drawn over a difference: the other field, the first field, or both.
 LINES = ("other", "first", "both")
 
 #: The resolution at which lengths of the look are in pixels of the figure. At other resolutions they are
@@ -109,7 +109,7 @@ def figure(
     largest_angle : float
         Angle at the top of the color map of differences, in degrees. 0 means 180/N.
     lines : {"other", "first", "both"}
-        Which lines are drawn over a difference: those of the other field, of the first field, or of both.
+        Field whose lines are drawn over a difference: the other field, the first field, or both.
     reach : float
         Largest distance of singularities that match; see `compare`.
     scale_bar : str, optional
@@ -124,8 +124,8 @@ def figure(
     Returns
     -------
     matplotlib.figure.Figure
-        ``savefig`` writes it as ``.pdf``, ``.svg`` or ``.png``. Journals want fonts of the type
-        ``matplotlib.rcParams["pdf.fonttype"] = 42``.
+        ``savefig`` writes it as ``.pdf``, ``.svg`` or ``.png``. Journals want TrueType fonts in a ``.pdf``:
+        set ``matplotlib.rcParams["pdf.fonttype"] = 42``.
 
     Raises
     ------
@@ -150,21 +150,20 @@ def figure(
     if not (orthographic or scale_bar is None):
         raise RosyError(f"{name}: a scale bar needs the orthographic projection")
     shown = {"singularity_dots": "visible", **settings}
-    look = picture_look(name, preset, shown, {}, color_values is not None)
+    look = picture_look(name, preset, shown, color_values=color_values)
     instances = _instances(name, comparison.fields, color_values)
     look = _figure_look(look, comparison.fields, instances.values(), dpi / LENGTH_DPI)
     if color_label is None:
         color_label = color_values if isinstance(color_values, str) else ""
         color_label = "magnitude" if colors_magnitude(look) else color_label
-    color_bar = _color_bar(look, color_label)
+    color_bar = None
+    if colors_magnitude(look) or colors_values(look):
+        color_bar = ColorBar(color_label, *look.color_range, color_stops(look.color_map))
     columns = min(len(instances), MAX_COLUMNS) if columns is None else max(columns, 1)
     has_key = shows_singularities(look) or color_bar is not None or "differences" in parts
-    camera = _panel_camera(
-        np.concatenate([instance.face_points() for instance in instances.values()]),
-        view,
-        drawing.panel_width(width, columns, has_key, dpi),
-        perspective=not orthographic,
-    )
+    points = np.concatenate([instance.face_points() for instance in instances.values()])
+    pixels = drawing.panel_width(width, columns, has_key, dpi)
+    camera = _panel_camera(points, view, pixels, perspective=not orthographic)
     studio = Studio(comparison, instances, camera, look, workers)
     rows = []
     if "fields" in parts:
@@ -270,8 +269,9 @@ def _check_parts(comparison: Comparison, parts: Sequence[str], lines: str) -> No
     if lines not in LINES:
         raise RosyError(f"lines is {lines!r}: choose {', '.join(LINES)}")
     if "differences" in parts and not comparison.differences:
+        first = next(iter(comparison.fields))
         raise RosyError(
-            f"'{next(iter(comparison.fields))}': there is no other field of its degree on its surface to compare"
+            f"'{first}': there is no other field of its degree on its surface to compare"
         )
 
 
@@ -292,27 +292,24 @@ def _check_numbers(name: str, **numbers: float) -> None:
 
 
 def _instances(
-    name: str,
-    fields: Mapping[str, Field],
-    color_values: str | Sequence[str | ArrayLike] | None,
+    name: str, fields: Mapping[str, Field], color_values: str | Sequence[str | ArrayLike] | None
 ) -> dict[str, MeshInstance]:
     """Return the fields in world space, with their `color_values`; see `figure`.
 
     Raises
     ------
     RosyError
-        If there is not one array of values for each field, or for the same reasons as `corner_numbers`.
+        If there is not one array of values for each field, or for the same reasons as `render`.
     """
     if color_values is None or isinstance(color_values, str):
         values: Sequence[str | ArrayLike | None] = [color_values] * len(fields)
     else:
         values = list(color_values)
     if len(values) != len(fields):
-        raise RosyError(
-            f"{name}: color_values has {counted(len(values), 'array')} for {counted(len(fields), 'field')}"
-        )
+        arrays, count = counted(len(values), "array"), counted(len(fields), "field")
+        raise RosyError(f"{name}: color_values has {arrays} for {count}")
     return {
-        title: upright_instance(field.surface, field, None, corner_numbers(field.surface, array))
+        title: upright_instance(field.surface, field, array)
         for (title, field), array in zip(fields.items(), values, strict=True)
     }
 
@@ -339,13 +336,6 @@ def _panel_camera(
     aspect = np.clip(np.ptp(up) / max(float(np.ptp(right)), 1e-30), MIN_ASPECT, MAX_ASPECT)
     height = max(round(width * float(aspect)), 1)
     return orbit_camera(points, *view, width, height, perspective=perspective, margin=MARGIN)
-
-
-def _color_bar(look: Look, label: str) -> ColorBar | None:
-    """Return the color bar of the fields; None if colors show neither magnitudes nor values."""
-    if not (colors_magnitude(look) or colors_values(look)):
-        return None
-    return ColorBar(label, *look.color_range, color_stops(look.color_map))
 
 
 def _scale_bar(camera: Camera, unit: str, share: float) -> tuple[float, str]:

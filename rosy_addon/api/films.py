@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import KW_ONLY, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -112,17 +112,10 @@ def film(
     encode = default_encoder(path, encode)
     if not rate > 0:
         raise RosyError(f"{path}: a film needs a rate above 0")
-    look = picture_look(str(path), preset, settings, {})
+    look = picture_look(str(path), preset, settings)
+    framing = (*view, *check_size(*size))
     series = Film(
-        fields,
-        look,
-        view,
-        check_size(*size),
-        between=between,
-        loop=loop,
-        perspective=not orthographic,
-        keeps_anchor="anchor" in settings,
-        name=str(path),
+        fields, look, framing, not orthographic, between, loop, "anchor" in settings, str(path)
     )
     draw = partial(draw_picture, cache=Cache(), keep_gbuffers=False, workers=workers)
     result = turntable(draw, series.views(), series.picture_count, path, rate, encode, on_picture)
@@ -164,16 +157,15 @@ class Film:
     look : Look
         Look of the first picture. If it shows magnitudes and sets no range of colors, the range covers all
         fields.
-    view_angles : (float, float)
-        Azimuth and elevation in degrees, see `orbit_camera`.
-    size : (int, int)
-        Pixels.
+    framing : (float, float, int, int)
+        Azimuth and elevation in degrees, width and height in pixels; see `orbit_camera`.
+    perspective : bool
+        Whether the projection is perspective. If not, it is orthographic.
     between : int or None
         Number of pictures between two fields. None chooses a number that keeps streaks steady, or 0 if the
         polygons change.
     loop : bool
         Whether pictures lead from the last field back to the first one.
-    perspective : bool
     keeps_anchor : bool
         Whether the setting `anchor` of the look is used even if the mesh moves.
     name : str
@@ -187,16 +179,12 @@ class Film:
 
     fields: Sequence[Field]
     look: Look
-    view_angles: tuple[float, float]
-    size: tuple[int, int]
-    _: KW_ONLY
+    framing: tuple[float, float, int, int]
+    perspective: bool = True
     between: int | None = 0
     loop: bool = False
-    perspective: bool = True
     keeps_anchor: bool = False
     name: str = "film"
-    #: A warning about streaks that flicker, set before the first view; empty if there is none.
-    advice: str = ""
 
     def __post_init__(self) -> None:
         if len(self.fields) < 2:
@@ -205,10 +193,6 @@ class Film:
             raise RosyError(
                 f"{self.name}: between must be from 0 to {MAX_BETWEEN}, not {self.between}"
             )
-
-    @property
-    def _framing(self) -> tuple[float, float, int, int]:
-        return (*self.view_angles, *self.size)
 
     @property
     def picture_count(self) -> int:
@@ -223,6 +207,19 @@ class Film:
             return self.between
         survey = self._survey
         return _steady_between(survey.turn, self.look) if survey.keeps_polygons else 0
+
+    @property
+    def advice(self) -> str:
+        """A warning that streaks flicker, as too few pictures are between two fields; empty if not."""
+        turn, between = self._survey.turn, self._between
+        needed = _steady_between(turn, self.look)
+        if needed <= between:
+            return ""
+        return (
+            f"the field turns by up to {np.degrees(turn / (between + 1)):.1f} degrees from picture to "
+            f"picture, by which streaks flicker: {needed} pictures between two fields keep them steady, "
+            "and so do shorter streaks"
+        )
 
     def views(self) -> Iterator[ViewInput]:
         """Yield the views.
@@ -239,8 +236,7 @@ class Film:
         if rest is not None and not self.keeps_anchor:
             look = replace(look, anchor="surface")
         rest = rest if look.anchor == "surface" else None
-        self.advice = _advice(survey.turn, self._between, look)
-        camera = orbit_camera(survey.points, *self._framing, perspective=self.perspective)
+        camera = orbit_camera(survey.points, *self.framing, perspective=self.perspective)
         loop_frames = self.picture_count if self.loop else 0
         for number, (surface, field) in enumerate(self._moments()):
             if rest is not None:
@@ -285,7 +281,7 @@ class Film:
             if number == 0 or mesh is not previous.surface:
                 instance = mesh_instance(mesh, field)
                 points = np.concatenate([points, instance.face_points()])
-                points = framing_points(points, *self._framing, perspective=self.perspective)
+                points = framing_points(points, *self.framing, perspective=self.perspective)
             previous = field
         if self.loop and self._check(0, first, previous):
             turn = max(turn, _mean_turn(previous, first))
@@ -308,9 +304,10 @@ class Film:
         mesh, other = field.surface, previous.surface
         has_same = mesh is other or have_same_polygons(mesh, other)
         if self.between and not has_same:
+            counts = f"{counted(mesh.face_count, 'face')} after {other.face_count:,}"
             raise RosyError(
-                f"{name} has other polygons than the one before it ({counted(mesh.face_count, 'face')} after "
-                f"{other.face_count:,}): there can be no pictures between them"
+                f"{name} has other polygons than the one before it ({counts}): there can be no pictures "
+                "between them"
             )
         return has_same
 
@@ -343,15 +340,3 @@ def _steady_between(turn: float, look: Look) -> int:
         return 0
     steady = STEADY_TURN * look.line_width / look.length
     return min(max(int(np.ceil(turn / steady - 1e-9)) - 1, 0), MAX_BETWEEN)
-
-
-def _advice(turn: float, between: int, look: Look) -> str:
-    """Return a warning that there are too few pictures between two fields; empty if there are enough."""
-    needed = _steady_between(turn, look)
-    if needed <= between:
-        return ""
-    return (
-        f"the field turns by up to {np.degrees(turn / (between + 1)):.1f} degrees from picture to picture, "
-        f"by which streaks flicker: {needed} pictures between two fields keep them steady, and so do shorter "
-        "streaks"
-    )

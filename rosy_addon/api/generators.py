@@ -127,7 +127,8 @@ def features(
     Raises
     ------
     RosyError
-        If there is no such edge.
+        If the mesh has neither borders nor sharp edges, or no pair in `edges` is an edge of the mesh. Pairs
+        that are not an edge are ignored as long as there are others.
 
     Examples
     --------
@@ -136,11 +137,8 @@ def features(
     >>> rf.features(torus, edges=[[0, 1], [1, 2], [2, 3]]).degree
     4
     """
-    settings = GeneratorSettings(
-        "features",
-        sharp_angle=float(sharp_angle),
-        edges=None if edges is None else np.asarray(edges),
-    )
+    followed = None if edges is None else np.asarray(edges)
+    settings = GeneratorSettings("features", sharp_angle=float(sharp_angle), edges=followed)
     return generated(surface, settings, degree)
 
 
@@ -251,14 +249,14 @@ def prescribed(
         N, from 1 to 12. By default the degree of the file, or 4.
     vectors : (F, 3) array_like or Field, optional
         Guides: one vector for each face, zero where there is no guide. On each connected part of the mesh,
-        the field is rotated as a whole to be near to the guides. By default, it is near to the edges of the
-        mesh.
+        the whole field is rotated by one angle, which aligns it with the guides as well as possible. Without
+        guides, it is aligned with the edges of the faces.
     reach : float
         If it is above 0, the field also bends toward the guides. Their influence falls off over this
         distance, which is a fraction of the longest side of the mesh.
     add_missing : bool
-        Whether to add the singularities that are missing for the sum of the indices, at vertices where the
-        field stays smoothest.
+        Whether to add singularities until the sum of the indices is N times the Euler characteristic, at
+        vertices where the field stays smoothest.
 
     Raises
     ------

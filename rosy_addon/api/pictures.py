@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..compositor.look import Look
 from ..compositor.picture import Picture
+from ..compositor.target_tone import ReferenceRender
 from ..core.cache import Cache
 from ..core.color import LUMINANCE_WEIGHTS, luminance, to_linear
 from ..core.errors import RosyError
@@ -24,13 +25,14 @@ from ..image_io.png import read_png
 from ..preset_files.store import default_user_folder, load_preset, preset_files, read_preset
 from ..projection.ambient_occlusion import DIRECTION_COUNT
 from ..projection.ambient_occlusion import ambient_occlusion as corner_occlusion
-from ..projection.camera import check_size
+from ..projection.camera import check_size, orbit_camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 from ..rendering import turntable as turntable_video
 from ..rendering.draw import draw_picture
-from ..rendering.mesh_view import check_light, mesh_instance, mesh_view
+from ..rendering.mesh_view import check_light, mesh_instance
 from ..rendering.turntable import Encoder
+from ..rendering.view_input import ViewInput
 from .generators import form, uv_map
 
 #: Azimuth and elevation of the default view in degrees: from the front left, looking slightly down.
@@ -42,6 +44,9 @@ DEFAULT_SIZE, DEFAULT_VIDEO_SIZE = (1024, 1024), (512, 512)
 #: Number of samples per pixel along each axis, unless the preset sets it. Pictures of scenes need fewer, as
 #: the renderer smooths their edges.
 SUPERSAMPLING = 2
+
+#: Value of `Look.tone` for each argument of `render` that gives a tone.
+TONE_SOURCES = {"tone_values": "attribute", "tone_image": "image", "tone_picture": "picture"}
 
 #: Name of the vertex attribute whose tone is the luminance of the vertex colors: Blender's name of colors.
 VERTEX_COLOR = "Color"
@@ -162,22 +167,18 @@ def render(
     >>> rf.render(square, field, view=(0, 90), size=(64, 64), preset="engraving")
     <Picture: 64 x 64 pixels>
     """
-    sources = {"attribute": tone_values, "image": tone_image, "picture": tone_picture}
-    look = picture_look(surface.name, preset, settings, sources, color_values is not None)
-    tone = _surface_tone(surface, tone_values, tone_image)
-    numbers = corner_numbers(surface, color_values)
-    reference = None if tone_picture is None else _image_luminance(tone_picture)
-    name = str(tone_picture) if isinstance(tone_picture, (str, os.PathLike)) else "tone_picture"
-    picture_view = mesh_view(
-        upright_instance(surface, field, tone, numbers),
-        look,
-        view,
-        check_size(*size),
-        perspective=not orthographic,
-        reference_luminance=reference,
-        reference_name=name,
-    )
-    return draw_picture(picture_view, workers=workers)
+    sources: dict[str, Any] = {"tone_values": tone_values, "tone_image": tone_image}
+    sources["color_values"] = color_values
+    look = picture_look(surface.name, preset, settings, tone_picture=tone_picture, **sources)
+    pixels = None if tone_picture is None else _image_luminance(tone_picture)
+    instance = upright_instance(surface, field, **sources)
+    points, frame = instance.face_points(), (*view, *check_size(*size))
+    camera = orbit_camera(points, *frame, perspective=not orthographic)
+    reference = None
+    if pixels is not None:
+        name = tone_picture if isinstance(tone_picture, (str, os.PathLike)) else "tone_picture"
+        reference = ReferenceRender(pixels, camera, str(name))
+    return draw_picture(ViewInput((instance,), camera, look, reference=reference), workers=workers)
 
 
 def turntable(
@@ -250,11 +251,11 @@ def turntable(
     encode = default_encoder(path, encode)
     if pictures < 2 or not rate > 0:
         raise RosyError(f"{path}: a turntable needs 2 or more pictures, and a rate above 0")
-    sources = {"attribute": tone_values, "image": tone_image}
-    look = picture_look(surface.name, preset, settings, sources, color_values is not None)
+    sources: dict[str, Any] = {"tone_values": tone_values, "tone_image": tone_image}
+    sources["color_values"] = color_values
+    look = picture_look(surface.name, preset, settings, **sources)
     turntable_video.check_still(look, still, surface.name)
-    tone = _surface_tone(surface, tone_values, tone_image)
-    instance = upright_instance(surface, field, tone, corner_numbers(surface, color_values))
+    instance = upright_instance(surface, field, **sources)
     views = turntable_video.turntable_views(
         instance, look, pictures, check_size(*size), view, perspective=not orthographic, still=still
     )
@@ -263,11 +264,7 @@ def turntable(
 
 
 def picture_look(
-    name: str,
-    preset: str | os.PathLike[str] | None,
-    settings: Mapping[str, Any],
-    tone_sources: Mapping[str, Any],
-    has_color_values: bool = False,
+    name: str, preset: str | os.PathLike[str] | None, settings: Mapping[str, Any], **sources: Any
 ) -> Look:
     """Return the look of a picture of a surface that is not in a scene of Blender.
 
@@ -277,12 +274,11 @@ def picture_look(
         Name of the surface, for messages.
     preset : str or path-like or None
         Name of a preset, or a file.
-    settings : mapping
-        Settings of `Look` by name. They replace those of the preset.
-    tone_sources : mapping
-        The source of each kind of tone, by the values of `Look.tone`. None where a source is not given.
-    has_color_values : bool
-        Whether there are values for the color map.
+    settings : mapping of str to object
+        Settings of `Look`, by name. They take precedence over the settings of the preset.
+    **sources
+        The arguments `color_values`, `tone_values`, `tone_image` and `tone_picture` of `render`. Here it
+        matters only which of them are not None.
 
     Raises
     ------
@@ -294,11 +290,11 @@ def picture_look(
         look = replace(look, supersampling=SUPERSAMPLING)
     look = look.with_settings(dict(settings))
     check_light(look.light, name)
-    given = [source for source, value in tone_sources.items() if value is not None]
-    if len(given) > 1:
-        raise RosyError(f"{name}: choose one source of the tone, {' or '.join(given)}")
-    look = replace(look, hue="values") if has_color_values else look
-    return replace(look, tone=given[0]) if given else look
+    tones = [tone for key, tone in TONE_SOURCES.items() if sources.get(key) is not None]
+    if len(tones) > 1:
+        raise RosyError(f"{name}: choose one source of the tone, {' or '.join(tones)}")
+    look = replace(look, hue="values") if sources.get("color_values") is not None else look
+    return replace(look, tone=tones[0]) if tones else look
 
 
 def preset_look(preset: str | os.PathLike[str] | None) -> Look:
@@ -330,16 +326,19 @@ def find_ffmpeg() -> Encoder | None:
 def upright_instance(
     surface: Surface,
     field: Field | None,
-    tone: SurfaceTone | None,
-    color_values: NDArray[np.float32] | None = None,
+    color_values: str | ArrayLike | None = None,
+    tone_values: str | ArrayLike | None = None,
+    tone_image: str | os.PathLike[str] | ArrayLike | Picture | None = None,
 ) -> MeshInstance:
     """Return a surface with a field as a mesh instance, with its upward axis along z of world space.
 
-    If `field` is None, the field is the result of `form`.
+    The parameters are those of `render`.
     """
+    tone = _surface_tone(surface, tone_values, tone_image)
+    numbers = corner_numbers(surface, color_values)
     field = form(surface) if field is None else field
     check_same_surface(surface, field)
-    return mesh_instance(surface, field, tone, color_values)
+    return mesh_instance(surface, field, tone, numbers)
 
 
 def corner_numbers(
@@ -368,9 +367,8 @@ def corner_numbers(
     if isinstance(color_values, str):
         # An array of faces takes precedence over an array of vertices with the same name.
         data = {**surface.face_data, **surface.vertex_data, **surface.face_data}
-        color_values = _named_array(
-            surface, color_values, data, "attribute", "attributes of faces or vertices"
-        )
+        kinds = "attribute", "attributes of faces or vertices"
+        color_values = _named_array(surface, color_values, data, *kinds)
     numbers = _at_corners(surface, color_values, "color_values", may_be_of_faces=True)
     numbers[~np.isfinite(numbers)] = np.nan
     return numbers
@@ -384,8 +382,8 @@ def _at_corners(
     Raises
     ------
     RosyError
-        If the values are not numbers, or there are as many as neither of these. The message begins with
-        `name`, the name of the argument.
+        If the values are not numbers, or their number does not fit. The message begins with `name`, the name
+        of the argument.
     """
     try:
         array = np.asarray(values, dtype=np.float64)
@@ -454,9 +452,7 @@ def _named_tone(surface: Surface, name: str) -> NDArray[Any]:
     return values
 
 
-def _image_luminance(
-    image: str | os.PathLike[str] | ArrayLike | Picture,
-) -> NDArray[np.float32]:
+def _image_luminance(image: str | os.PathLike[str] | ArrayLike | Picture) -> NDArray[np.float32]:
     """Return the linear luminance of an image, (H, W), with the bottom row first.
 
     The image is a picture, a file, or an array of display values (sRGB).

@@ -20,16 +20,10 @@ from ..field.field import Field
 from ..field.frames import unit_direction
 from ..field.surface import Surface
 from ..projection.gbuffer import MeshInstance
-from ..surface_texture.draw import (
-    CONTENTS,
-    DEFAULT_MARGIN,
-    DEFAULT_SIZE,
-    check_texture_size,
-    draw_texture,
-)
+from ..surface_texture.draw import CONTENTS, DEFAULT_MARGIN, DEFAULT_SIZE, draw_texture
 from .field import warn
 from .generators import uv_map
-from .pictures import corner_numbers, preset_look, upright_instance
+from .pictures import preset_look, upright_instance
 
 #: Placeholder in a file name for the number of the UDIM tile, as in Blender.
 UDIM_TOKEN = "<UDIM>"
@@ -40,8 +34,9 @@ class Texture:
 
     A texture of hatching does not hold ink, but thresholds, from which a shader can draw the hatching for
     any light. Hatching has up to three layers of lines, whose lines get wider in darker tones. Red, green
-    and blue belong to the first, second and third layer. Each is the fraction of the paper that the layer
-    covers when its lines are just wide enough to reach the texel. Thresholds are data without a color space.
+    and blue are the thresholds of the first, second and third layer. From the tone, a shader computes which
+    fraction of the paper a layer must cover. It draws ink where the threshold is below this fraction.
+    Thresholds are data without a color space.
 
     Attributes
     ----------
@@ -150,9 +145,9 @@ def texture(
     color_values : str or (F,), (V,) or (C,) array_like, optional
         Values for the color map, by which streaks are colored; see `render`. Hatching cannot show them.
     **settings
-        Settings of the look, after the preset: ``line_width=3, seed=3``. Lengths in pixels refer to a
-        square with the area of the surface and 1024 pixels on each side, independent of the size of the
-        texture. With ``unit_size=0.002``, a pixel is that many units of length.
+        Settings of the look, after the preset: ``line_width=3, seed=3``. In these, a pixel is 1/1024 of the
+        square root of the area of the surface, for any size of the texture. With ``unit_size=0.002``, a
+        pixel is 0.002 units of length of the mesh.
 
     Returns
     -------
@@ -181,32 +176,23 @@ def texture(
     <Texture: 64 x 64 texels>
     """
     look = texture_look(preset, settings, color_values is not None)
-    check_texture_size(size, margin)
     if content not in CONTENTS:
         raise RosyError(f"content must be one of {', '.join(CONTENTS)}, not '{content}'")
     if not 0 <= flow_phase <= 1:
         raise RosyError(f"flow_phase must be a number from 0 to 1, not {flow_phase}")
     uv = uv_map(surface)
-    instance = upright_instance(surface, field, None, corner_numbers(surface, color_values))
-    drawn = draw_texture(
-        instance,
-        uv,
-        look,
-        size,
-        margin=margin,
-        is_udim=udim,
-        content=content,
-        drift=Drift(flow_phase),
-        lights=None if light_direction is None else [_lamp(light_direction, instance)],
-    )
+    instance = upright_instance(surface, field, color_values)
+    lights = None if light_direction is None else [_lamp(light_direction, instance)]
+    layout: dict[str, Any] = {"margin": margin, "is_udim": udim, "content": content}
+    drift = Drift(flow_phase)
+    drawn = draw_texture(instance, uv, look, size, drift=drift, lights=lights, **layout)
     warn(drawn.overlap_note(surface.name))
-    tiles = drawn.tiles()
-    if drawn.is_data:  # display values, as pictures are saved
-        tiles = {
-            number: np.concatenate([to_linear(rgba[..., :3]), rgba[..., 3:]], axis=-1)
-            for number, rgba in tiles.items()
-        }
-    return Texture({number: Picture(rgba) for number, rgba in tiles.items()}, drawn.overlap)
+    tiles = {}
+    for number, rgba in drawn.tiles().items():
+        if drawn.is_data:  # display values, as pictures are saved
+            rgba = np.concatenate([to_linear(rgba[..., :3]), rgba[..., 3:]], axis=-1)
+        tiles[number] = Picture(rgba)
+    return Texture(tiles, drawn.overlap)
 
 
 def _lamp(light_direction: ArrayLike, instance: MeshInstance) -> Light:
@@ -227,9 +213,7 @@ def _lamp(light_direction: ArrayLike, instance: MeshInstance) -> Light:
 
 
 def texture_look(
-    preset: str | os.PathLike[str] | None,
-    settings: dict[str, Any],
-    has_color_values: bool = False,
+    preset: str | os.PathLike[str] | None, settings: dict[str, Any], has_color_values: bool = False
 ) -> Look:
     """Return the look of a texture: a preset with settings; see `texture`.
 

@@ -12,9 +12,9 @@ from ..core.errors import RosyError, counted
 from ..core.file_io import check_folder, check_readable
 from ..core.progress import listening
 from ..gpu.select import RENDER_DEVICES
-from ..preset_files.store import SHIPPED_FOLDER, find_preset_file
+from ..preset_files.store import SHIPPED_FOLDER
 from ..worker.frame_workers import parse_frames, run_local
-from .options import Options, add_subcommand, int_between, parse_size, user_presets_folder
+from .options import Options, add_subcommand, int_between, parse_size
 from .scene import open_scene, print_warnings, requested_cameras, requested_objects
 from .streams import print_line
 
@@ -22,51 +22,35 @@ from .streams import print_line
 def add_bake_command(subparsers: Any, has_cluster: bool) -> None:
     """Add the command `bake`, with --scheduler if it can run on a cluster."""
     parser = add_subcommand(subparsers, "bake", run_bake)
-    parser.add_argument(
-        "scene",
-        nargs="?",
-        type=Path,
-        metavar="SCENE.blend",
-        help="Blender file; by default the open one",
-    )
+    text = "Blender file; by default the open one"
+    parser.add_argument("scene", nargs="?", type=Path, metavar="SCENE.blend", help=text)
     parser.add_object_option("objects to draw; by default all with a field")
     cameras = parser.add_mutually_exclusive_group()
-    cameras.add_argument(
-        "--camera", metavar="NAME", help="camera to draw from; by default the scene's active one"
-    )
+    text = "camera to draw from; by default the scene's active one"
+    cameras.add_argument("--camera", metavar="NAME", help=text)
     cameras.add_argument("--all-cameras", action="store_true", help="draw from all cameras")
     parser.add_look_options()
     parser.add_value("--size", "WxH", "size in pixels; by default the scene's", parse_size)
     parser.add_value("--out", "DIR", "write the pictures to this folder as .png files", Path)
-    parser.add_argument(
-        "--device",
-        choices=list(RENDER_DEVICES),
-        help="draw with the processor (cpu), the graphics card (gpu), or the graphics card if there is "
-        "one (auto); by default as set in the scene",
+    text = (
+        "draw with the processor (cpu), the graphics card (gpu), or the graphics card if there is one "
+        "(auto); by default as set in the scene"
     )
+    parser.add_argument("--device", choices=list(RENDER_DEVICES), help=text)
     parser.add_workers_option()
     parser.add_switch("--save", "save the Blender file")
-    parser.add_value(
-        "--frames",
-        "A-B[:STEP]",
+    text = (
         "draw a picture of each frame from the camera that renders it; pictures that exist and "
-        "are up to date are kept",
+        "are up to date are kept"
     )
+    parser.add_value("--frames", "A-B[:STEP]", text)
     workers = parser.add_mutually_exclusive_group()
-    workers.add_argument(
-        "--jobs",
-        type=int_between(1, 1024),
-        default=1,
-        metavar="J",
-        help="number of processes for the frames",
-    )
+    text, parse = "number of processes for the frames", int_between(1, 1024)
+    workers.add_argument("--jobs", type=parse, default=1, metavar="J", help=text)
     parser.set_defaults(scheduler=None)
     if has_cluster:
-        workers.add_argument(
-            "--scheduler",
-            metavar="ADDRESS",
-            help="address of a Dask cluster whose workers draw the frames",
-        )
+        text = "address of a Dask cluster whose workers draw the frames"
+        workers.add_argument("--scheduler", metavar="ADDRESS", help=text)
 
 
 def run_bake(options: Options) -> None:
@@ -88,9 +72,8 @@ def run_bake(options: Options) -> None:
     settings = read_output_settings(scene, out)
     if out is None and settings.folder is not None and not is_beside_blend(settings.folder):
         # The file may come from another person, and must not choose a folder to write to.
-        raise RosyError(
-            f"the file stores its pictures in another place, {os.path.realpath(settings.folder)}: give --out DIR"
-        )
+        place = os.path.realpath(settings.folder)
+        raise RosyError(f"the file stores its pictures in another place, {place}: give --out DIR")
     if options.device is not None:
         settings = replace(settings, device=options.device)
     results = _bake(options, scene, settings)
@@ -193,7 +176,7 @@ def _forwarded_args(options: Options) -> list[str]:
 
     An option and its value are one argument (``--object=-x``), because names may begin with a dash.
     """
-    size, preset = options.size, options.preset
+    size, preset = options.size, options.requested_preset()
     blender = getattr(options, "blender", None)
     values = {
         "out": [os.path.realpath(options.out)],
@@ -208,20 +191,16 @@ def _forwarded_args(options: Options) -> list[str]:
         "workers": [options.workers or 1],
     }
     arguments = [
-        f"--{name}={value}"
-        for name, given in values.items()
-        for value in given
-        if value is not None
+        f"--{name}={value}" for name in values for value in values[name] if value is not None
     ]
     return [*arguments, "--all-cameras"] if options.all_cameras else arguments
 
 
-def _forwarded_preset(preset: str) -> str:
+def _forwarded_preset(path: Path) -> str:
     """Return how other processes find a preset: by its name if RoSy provides it, otherwise by its path.
 
     RoSy may be installed in another folder on the machine of a worker.
     """
-    path = find_preset_file(preset, user_presets_folder())
     return path.stem if path.parent == SHIPPED_FOLDER else os.path.realpath(path)
 
 

@@ -11,7 +11,6 @@ import numpy as np
 from .. import api
 from ..api.figures import LINES, check_figure_path, load_drawing
 from ..api.generators import GENERATOR_FUNCTIONS
-from ..api.pictures import picture_look
 from ..core.errors import RosyError, counted
 from ..field.convert import Conversion, convert
 from ..field.curvature import MAGNITUDES
@@ -19,7 +18,6 @@ from ..field.field_io import DEFAULT_DEGREE, READ_SUFFIXES, WRITE_SUFFIXES
 from ..field.formats.sings import SINGULARITY_SUFFIXES, read_sings
 from ..field.mesh_arrays import SIMULATION_READERS
 from ..field.mesh_io import READERS
-from ..field.rosy_field import check_degree
 from .mesh_field import add_field_file_options, add_mesh_options, load_mesh_and_field, read_field
 from .options import CommandParser, Options, add_subcommand, float_between, int_between
 from .streams import print_line
@@ -33,34 +31,20 @@ def add_field_command(subparsers: Any) -> None:
     parser = add_subcommand(subparsers, "field", run_field)
     add_mesh_options(parser)
     parser.add_output_option("OUT", ", ".join(WRITE_SUFFIXES))
-    parser.add_value(
-        "--to-degree", "N", "convert to this degree, a multiple or a divisor of the field's", int
+    text = "convert to this degree, a multiple or a divisor of the field's"
+    parser.add_value("--to-degree", "N", text, int)
+    text, angle = "rotate all directions by this angle", float_between(-360.0, 360.0)
+    parser.add_value("--turn", "DEGREES", text, angle, default=0.0)
+    share = float_between(0.0, 10.0)
+    text = "diffuse the field over this fraction of the size of the mesh"
+    parser.add_value("--smooth", "SHARE", text, share, default=0.0)
+    text = (
+        "remove pairs of singularities with opposite indices that are nearer than this fraction of "
+        "the size of the mesh"
     )
-    parser.add_value(
-        "--turn",
-        "DEGREES",
-        "rotate all directions by this angle",
-        float_between(-360.0, 360.0),
-        default=0.0,
-    )
-    parser.add_value(
-        "--smooth",
-        "SHARE",
-        "diffuse the field over this fraction of the size of the mesh",
-        float_between(0.0, 10.0),
-        default=0.0,
-    )
-    parser.add_value(
-        "--cancel-pairs",
-        "SHARE",
-        "remove pairs of singularities with opposite indices that are nearer than this fraction of the size "
-        "of the mesh",
-        float_between(0.0, 10.0),
-        default=0.0,
-    )
-    parser.add_argument(
-        "--magnitude", choices=list(MAGNITUDES), help="replace the lengths of the vectors"
-    )
+    parser.add_value("--cancel-pairs", "SHARE", text, share, default=0.0)
+    text = "replace the lengths of the vectors"
+    parser.add_argument("--magnitude", choices=list(MAGNITUDES), help=text)
 
 
 def run_field(options: Options) -> None:
@@ -82,12 +66,8 @@ def add_info_command(subparsers: Any) -> None:
     parser = add_subcommand(subparsers, "info", run_info)
     add_mesh_options(parser)
     parser.add_switch("--json", "print one JSON object")
-    parser.add_value(
-        "--against",
-        "FILE",
-        "compare with another field file, or with a file of singularities (.sings)",
-        Path,
-    )
+    text = "compare with another field file, or with a file of singularities (.sings)"
+    parser.add_value("--against", "FILE", text, Path)
 
 
 def run_info(options: Options) -> None:
@@ -124,7 +104,8 @@ def _compare(options: Options, field: api.Field) -> dict[str, Any]:
     degree, other_element, other_index = read_sings(options.against)
     if degree != field.degree:
         raise RosyError(
-            f"{options.against}: is for a field of degree {degree}, but this field has degree {field.degree}"
+            f"{options.against}: is for a field of degree {degree}, but this field has degree "
+            f"{field.degree}"
         )
     own_pairs = set(map(tuple, np.stack(field.singularities, axis=1).tolist()))
     other_pairs = set(zip(other_element.tolist(), other_index.tolist(), strict=True))
@@ -137,41 +118,36 @@ def _compare(options: Options, field: api.Field) -> dict[str, Any]:
 
 def _format_info(facts: dict[str, Any]) -> str:
     """Return the results of the command `info` as text."""
-    singularity_lines = [
-        f"  vertex {vertex}: {index:+d}/{facts['degree']}"
-        for vertex, index in facts["singularities"]
-    ]
+    degree, singularities = facts["degree"], facts["singularities"]
+    faces = counted(facts["faces"], "face")
+    vertices = counted(facts["vertices"], "vertex", "vertices")
     low, high = facts["magnitude"]
-    return "\n".join(
-        [
-            f"degree {facts['degree']}",
-            f"{counted(facts['faces'], 'face')}, {counted(facts['vertices'], 'vertex', 'vertices')}, "
-            f"Euler characteristic {facts['euler_characteristic']}",
-            f"magnitude {low:.4g} to {high:.4g}, undefined on "
-            f"{counted(facts['undefined_faces'], 'face')}",
-            f"energy {facts['energy']:.6g}",
-            *([] if facts["is_rosy"] else ["directions at free angles, not a RoSy"]),
-            *_format_comparison(facts.get("against")),
-            counted(len(singularity_lines), "singularity", "singularities"),
-            *singularity_lines,
-        ]
-    )
+    undefined = counted(facts["undefined_faces"], "face")
+    lines = [
+        f"degree {degree}",
+        f"{faces}, {vertices}, Euler characteristic {facts['euler_characteristic']}",
+        f"magnitude {low:.4g} to {high:.4g}, undefined on {undefined}",
+        f"energy {facts['energy']:.6g}",
+    ]
+    if not facts["is_rosy"]:
+        lines.append("directions at free angles, not a RoSy")
+    if "against" in facts:
+        lines.append(_format_comparison(facts["against"]))
+    lines.append(counted(len(singularities), "singularity", "singularities"))
+    lines += [f"  vertex {vertex}: {index:+d}/{degree}" for vertex, index in singularities]
+    return "\n".join(lines)
 
 
-def _format_comparison(against: dict[str, Any] | None) -> list[str]:
-    """Return lines of text for the result of `_compare`; no lines if it is None."""
-    if against is None:
-        return []
+def _format_comparison(against: dict[str, Any]) -> str:
+    """Return the result of `_compare` as a line of text."""
     if "same" in against:
-        counts = len(against["only_here"]), len(against["only_there"])
-        return [
-            f"singularities: {against['same']} are the same, {counts[0]} only here, "
-            f"{counts[1]} only there"
-        ]
-    return [
+        here, there = len(against["only_here"]), len(against["only_there"])
+        same = against["same"]
+        return f"singularities: {same} are the same, {here} only here, {there} only there"
+    return (
         f"off by {against['mean']:.4g} degrees on average, rms {against['rms']:.4g}, at most "
         f"{against['max']:.4g}, on {100 * against['compared']:.4g} % of the faces"
-    ]
+    )
 
 
 def add_compare_command(subparsers: Any) -> None:
@@ -179,35 +155,23 @@ def add_compare_command(subparsers: Any) -> None:
     parser = add_subcommand(subparsers, "compare", run_compare, api.figure)
     suffixes = [*READERS, *SIMULATION_READERS]
     parser.add_argument("mesh", type=Path, metavar="MESH", help=", ".join(suffixes))
-    parser.add_argument(
-        "fields",
-        nargs="+",
-        metavar="[TITLE=]FIELD",
-        help=f"a field file ({', '.join(READ_SUFFIXES)}), or what to generate: "
-        f"{', '.join(GENERATORS)}. The first one is what the others are compared with",
+    text = (
+        f"a field file ({', '.join(READ_SUFFIXES)}), or what to generate: {', '.join(GENERATORS)}. "
+        "The first one is what the others are compared with"
     )
-    parser.add_output_option(
-        "OUT.pdf|OUT.svg|OUT.png",
-        "draw the fields, their differences and the table; a .pdf has two pages",
-        required=False,
-    )
-    parser.add_argument(
-        "--format",
-        choices=("text", "json", "latex"),
-        default="text",
-        help="of the table that is printed (%(default)s)",
-    )
-    parser.add_degree_option(
-        "degree of generated fields, 1 to 12; by default that of the first field file, or 4"
-    )
+    parser.add_argument("fields", nargs="+", metavar="[TITLE=]FIELD", help=text)
+    text = "draw the fields, their differences and the table; a .pdf has two pages"
+    parser.add_output_option("OUT.pdf|OUT.svg|OUT.png", text, required=False)
+    text, formats = "of the table that is printed (%(default)s)", ("text", "json", "latex")
+    parser.add_argument("--format", choices=formats, default="text", help=text)
+    text = "degree of generated fields, 1 to 12; by default that of the first field file, or 4"
+    parser.add_degree_option(text)
     add_field_file_options(parser)
-    parser.add_value(
-        "--match-reach",
-        "SHARE",
-        "largest distance of singularities that match, as a fraction of the size of the mesh (%(default)g)",
-        float_between(0.0, 10.0),
-        dest="reach",
+    text = (
+        "largest distance of singularities that match, as a fraction of the size of the mesh "
+        "(%(default)g)"
     )
+    parser.add_value("--match-reach", "SHARE", text, float_between(0.0, 10.0), dest="reach")
     _add_layout_options(parser)
     parser.add_direction_options()
     parser.add_workers_option()
@@ -216,9 +180,8 @@ def add_compare_command(subparsers: Any) -> None:
 
 def _add_layout_options(parser: CommandParser) -> None:
     """Add the options for the layout and the texts of the figure of a comparison."""
-    parser.add_argument(
-        "--lines", choices=LINES, help="lines that are drawn over differences (%(default)s)"
-    )
+    text = "lines that are drawn over differences (%(default)s)"
+    parser.add_argument("--lines", choices=LINES, help=text)
     add, count, inches = parser.add_value, int_between(1, 100), float_between(0.5, 100.0)
     add("--columns", "N", "panels side by side; by default at most 3", count)
     add("--width", "INCHES", "width of the figure (%(default)g)", inches)
@@ -230,36 +193,29 @@ def _add_layout_options(parser: CommandParser) -> None:
 
 def run_compare(options: Options) -> None:
     """Compare fields on a mesh: angles, energies and singularities."""
-    preset, settings = options.requested_preset(), options.requested_settings()
     if options.output is not None:
         check_figure_path(options.output)
         options.check_output()
-        picture_look(str(options.mesh), preset, settings, {})
         load_drawing()
+    arguments = options.picture_arguments(api.figure, options.mesh)
     comparison = api.compare(_load_fields(options), reach=options.reach)
     if options.output is not None:
-        _draw(options, comparison)
+        _draw(options.output, comparison, arguments)
     write = {"text": comparison.to_text, "json": comparison.to_json, "latex": comparison.to_latex}
     print_line(write[options.format]())
 
 
-def _draw(options: Options, comparison: api.Comparison) -> None:
-    """Draw the figures of a comparison, and write them to a file."""
+def _draw(path: Path, comparison: api.Comparison, arguments: dict[str, Any]) -> None:
+    """Draw the figures of a comparison with these arguments of `api.figure`, and write them to a file."""
     rest = ("differences", "table") if comparison.differences else ("table",)
-    if options.output.suffix.lower() == ".pdf":
-        pages: list[dict[str, Any]] = [{}, {"parts": rest, "caption": ""}]
-    else:
-        pages = [{"parts": ("fields", *rest)}]
-    figures = [
-        api.figure(comparison, **options.api_arguments(api.figure, **page)) for page in pages
-    ]
-    api.save_figures(options.output, figures)
+    pages: list[dict[str, Any]] = [{"parts": ("fields", *rest)}]
+    if path.suffix.lower() == ".pdf":
+        pages = [{}, {"parts": rest, "caption": ""}]
+    api.save_figures(path, [api.figure(comparison, **(arguments | page)) for page in pages])
 
 
 def _load_fields(options: Options) -> dict[str, api.Field]:
     """Read or generate the fields that the options name. Return them by title."""
-    if options.degree is not None:
-        check_degree(options.degree)
     sources = dict(_titled_source(text) for text in options.fields)
     if len(sources) < len(options.fields):
         raise RosyError(f"{options.mesh}: two fields have the same title: give TITLE=FIELD")

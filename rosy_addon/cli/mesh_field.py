@@ -13,7 +13,6 @@ from ..field.formats.plain import read_guide_strokes
 from ..field.generate import GENERATORS, GeneratorSettings, options_of
 from ..field.mesh_arrays import SIMULATION_READERS
 from ..field.mesh_io import READERS
-from ..field.rosy_field import check_degree
 from .options import CommandParser, Options, int_between
 
 
@@ -40,51 +39,39 @@ def add_field_options(parser: CommandParser) -> None:
 
 def add_field_file_options(parser: CommandParser) -> None:
     """Add the options for reading field files."""
-    parser.add_value(
-        "--field-mesh",
-        "MESH",
-        "mesh file that the field belongs to, if it is not MESH; the field is transferred by position",
-        Path,
-    )
+    text = "mesh file that the field belongs to, if it is not MESH; the field is transferred by position"
+    parser.add_value("--field-mesh", "MESH", text, Path)
     parser.add_undefined_option()
 
 
 def _add_generator_options(parser: CommandParser) -> None:
     """Add the options that generate a field."""
-    parser.add_argument(
-        "--generate",
-        choices=list(GENERATORS),
-        help="generate a field instead of reading one; by default guided if there are guides, "
-        "prescribed if there are singularities, otherwise form",
+    text = (
+        "generate a field instead of reading one; by default guided if there are guides, "
+        "prescribed if there are singularities, otherwise form"
     )
+    parser.add_argument("--generate", choices=list(GENERATORS), help=text)
     for name, setting in settings_of(GeneratorSettings).items():
         kinds = [kind for kind in GENERATORS if name in options_of(kind)]
         if kinds:
             parser.add_setting_option(setting, f"; for --generate {', '.join(kinds)}")
-    parser.add_value(
-        "--strokes",
-        "FILE",
-        "strokes on the mesh that a guided field follows: rows x y z, with an empty line between two strokes",
-        Path,
+    text = (
+        "strokes on the mesh that a guided field follows: rows x y z, with an empty line between two "
+        "strokes"
     )
-    parser.add_value(
-        "--guides",
-        "FIELD",
+    parser.add_value("--strokes", "FILE", text, Path)
+    text = (
         "a field file that a guided field follows where its vectors are not zero; a prescribed field "
-        "is turned to it as a whole",
-        Path,
+        "is turned to it as a whole"
     )
-    parser.add_switch(
-        "--firmness",
+    parser.add_value("--guides", "FIELD", text, Path)
+    text = (
         "let the lengths of --guides, from 0 to 1, say how firmly a guided field follows them, as for "
-        "guides that are combed in Blender",
+        "guides that are combed in Blender"
     )
-    parser.add_value(
-        "--singularities",
-        "FILE.sings",
-        "singular vertices and their indices, for --generate prescribed",
-        Path,
-    )
+    parser.add_switch("--firmness", text)
+    text = "singular vertices and their indices, for --generate prescribed"
+    parser.add_value("--singularities", "FILE.sings", text, Path)
     parser.add_switch("--uv", "make a guided field follow the UV map of an .obj file")
 
 
@@ -95,17 +82,13 @@ def _add_simulation_options(parser: CommandParser) -> None:
         return
     suffixes = ", ".join(SIMULATION_READERS)
     parser.epilog = f"MESH may also be the file of a simulation: {suffixes}."
-    parser.add_value(
-        "--array",
-        "NAME",
-        "array of the file of a simulation that is the field; by default the only one of vectors or tensors",
+    text = (
+        "array of the file of a simulation that is the field; by default the only one of vectors or "
+        "tensors"
     )
-    parser.add_value(
-        "--step",
-        "N",
-        "step of the file of a simulation, from 1; by default the last one",
-        int_between(1, 10**9),
-    )
+    parser.add_value("--array", "NAME", text)
+    text = "step of the file of a simulation, from 1; by default the last one"
+    parser.add_value("--step", "N", text, int_between(1, 10**9))
 
 
 def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
@@ -114,8 +97,6 @@ def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
     If the mesh is in a file of a simulation, the field is one of the arrays of this file, unless the options
     name a field file or a generator.
     """
-    if options.degree is not None:
-        check_degree(options.degree)
     if options.field is not None and options.generate is not None:
         raise RosyError(f"{options.field}: give either a field file or --generate, not both")
     is_simulation = options.mesh.suffix.lower() in SIMULATION_READERS
@@ -132,8 +113,7 @@ def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
     if options.field is not None:
         field = read_field(options, options.field, surface, options.degree)
     elif is_simulation and not has_source:
-        nonfinite = "zero" if options.undefined else "error"
-        field = api.from_array(surface, options.array, options.degree, nonfinite=nonfinite)
+        field = api.from_array(surface, options.array, options.degree, nonfinite=options.nonfinite)
     else:
         field = _generate_field(options, surface)
     return surface, field
@@ -141,38 +121,29 @@ def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
 
 def read_field(options: Options, path: Path, surface: api.Surface, degree: int | None) -> api.Field:
     """Read a field file, with the options that `add_field_file_options` adds."""
-    nonfinite = "zero" if options.undefined else "error"
-    return api.read_field(path, surface, degree, nonfinite=nonfinite, mesh=options.field_mesh)
+    keywords = {"nonfinite": options.nonfinite, "mesh": options.field_mesh}
+    return api.read_field(path, surface, degree, **keywords)
 
 
 def _generate_field(options: Options, surface: api.Surface) -> api.Field:
     """Generate a field of the kind that the options name."""
-    degree = DEFAULT_DEGREE if options.degree is None else options.degree
     has_guides = options.strokes is not None or options.guides is not None
     kind = options.generate or ("guided" if has_guides else "form")
     if options.singularities is not None and options.generate is None:
         kind = "prescribed"
-    given = {name: value for name, value in vars(options).items() if name in options_of(kind)}
+    names = {"degree", *options_of(kind)}
+    arguments = {name: value for name, value in vars(options).items() if name in names}
+    if options.degree is None and kind != "prescribed":
+        arguments["degree"] = DEFAULT_DEGREE
     if kind == "prescribed":
         if options.singularities is None:
             raise RosyError(f"{options.mesh}: give the singularities: --singularities FILE.sings")
-        guides, file = _guides(options, surface, options.degree), options.singularities
-        return api.prescribed(surface, file, options.degree, vectors=guides, **given)
+        arguments["singularities"] = options.singularities
     if kind == "guided":
-        return api.guided(
-            surface,
-            degree,
-            strokes=[] if options.strokes is None else read_guide_strokes(options.strokes),
-            vectors=_guides(options, surface, degree),
-            uv=options.uv,
-            vectors_have_firmness=options.firmness,
-            **given,
-        )
-    return GENERATOR_FUNCTIONS[kind](surface, degree=degree, **given)
-
-
-def _guides(options: Options, surface: api.Surface, degree: int | None) -> api.Field | None:
-    """Read the field file of the option --guides. None if the option is not given."""
-    if options.guides is None:
-        return None
-    return read_field(options, options.guides, surface, degree)
+        arguments |= {"uv": options.uv, "vectors_have_firmness": options.firmness}
+        if options.strokes is not None:
+            arguments["strokes"] = read_guide_strokes(options.strokes)
+    if kind in ("guided", "prescribed") and options.guides is not None:
+        guides = read_field(options, options.guides, surface, arguments["degree"])
+        arguments["vectors"] = guides
+    return GENERATOR_FUNCTIONS[kind](surface, **arguments)

@@ -8,22 +8,26 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
 
-from ..api.pictures import DEFAULT_VIEW, VERTEX_COLOR, picture_look
+from ..api.pictures import DEFAULT_VIEW, TONE_SOURCES, VERTEX_COLOR, picture_look
 from ..compositor.look import Look
 from ..core.errors import RosyError
 from ..core.file_io import check_writable
 from ..core.settings import Number, Numbers, Setting, Switch, settings_of
+from ..field.rosy_field import check_degree
 from ..field.up_axis import UP_AXIS_MATRIX
 from ..preset_files.store import default_user_folder, find_preset_file, preset_keys, read_preset
 from ..projection.camera import check_size
 from .streams import print_line
+
+#: A function that converts the text of an argument to a value.
+Parse = Callable[[str], Any]
 
 
 class CommandParser(argparse.ArgumentParser):
@@ -36,12 +40,7 @@ class CommandParser(argparse.ArgumentParser):
         print_line(message.removesuffix("\n"), sys.stderr if file is None else file)
 
     def add_value(
-        self,
-        option: str,
-        metavar: str,
-        text: str,
-        parse: Callable[[str], Any] | None = None,
-        **keywords: Any,
+        self, option: str, metavar: str, text: str, parse: Parse | None = None, **keywords: Any
     ) -> None:
         """Add an option with a value.
 
@@ -52,8 +51,8 @@ class CommandParser(argparse.ArgumentParser):
             Placeholder for the value in the help.
         text : str
             Help text, in which %(default)s stands for the default.
-        parse : function, optional
-            Function that converts the text of the argument to a value. By default, the value is the text.
+        parse : Parse, optional
+            By default, the value is the text.
         **keywords
             More keyword arguments of `argparse.ArgumentParser.add_argument`.
         """
@@ -63,11 +62,14 @@ class CommandParser(argparse.ArgumentParser):
         """Add an option without a value, which is False by default."""
         self.add_argument(option, action="store_true", help=text)
 
-    def add_output_option(self, metavar: str, text: str = "", *, required: bool = True) -> None:
-        """Add the option -o, the path of the output."""
-        self.add_argument(
-            "-o", "--output", required=required, type=Path, metavar=metavar, help=text or None
-        )
+    def add_toggle(self, option: str, text: str, **keywords: Any) -> None:
+        """Add an option with the value True, and its negation (``--no-...``) with the value False."""
+        self.add_argument(option, help=text, action=argparse.BooleanOptionalAction, **keywords)
+
+    def add_output_option(self, metavar: str, text: str | None = None, **keywords: Any) -> None:
+        """Add the option -o, the path of the output, which is required unless `keywords` say otherwise."""
+        keywords = {"required": True, "metavar": metavar, "help": text} | keywords
+        self.add_argument("-o", "--output", type=Path, **keywords)
 
     def add_object_option(self, text: str) -> None:
         """Add the option --object with one or more names, which may be repeated.
@@ -82,13 +84,12 @@ class CommandParser(argparse.ArgumentParser):
         If the option is not given, `Options` has no attribute for it. Angles are in degrees on the command
         line, and are converted to radians. `note` is added to the help text.
         """
+        option = f"--{setting.name.replace('_', '-')}"
         text = setting.text[0].lower() + setting.text[1:] + note
-        add = partial(
-            self.add_argument, f"--{setting.name.replace('_', '-')}", default=argparse.SUPPRESS
-        )
+        add = partial(self.add_argument, option, default=argparse.SUPPRESS)
         match setting:
             case Switch():
-                add(action=argparse.BooleanOptionalAction, help=text)
+                self.add_toggle(option, text, default=argparse.SUPPRESS)
             case Numbers(parts=parts, default=default):
                 names, values = ",".join(parts), ",".join(f"{value:g}" for value in default)
                 add(type=float_tuple(len(parts), names), metavar=names, help=f"{text} ({values})")
@@ -102,6 +103,7 @@ class CommandParser(argparse.ArgumentParser):
 
     def add_set_option(self, settings_class: type, text: str) -> None:
         """Add the option --set, which may be repeated. `Options.requested_settings` returns the settings."""
+        self.set_defaults(settings_class=settings_class)
         names = ", ".join(settings_of(settings_class))
         self.add_value("--set", "NAME=VALUE", f"{text}: {names}", action="append", default=[])
 
@@ -124,35 +126,21 @@ class CommandParser(argparse.ArgumentParser):
         kinds = self.get_default("kinds") or {}
         self.set_defaults(kinds={**kinds, kind: self._actions[first:]})
 
-    def add_view_options(self) -> None:
-        """Add the options of the view and the size of the picture."""
-        self.add_direction_options()
-        self.add_size_option()
-
     def add_size_option(self) -> None:
         """Add the option --size, the size of a picture."""
         self.add_value("--size", "WxH", "size in pixels", parse_size)
 
     def add_direction_options(self) -> None:
         """Add the options --view, --up and --ortho, which set the camera."""
-        self.add_value(
-            "--view",
-            "AZ,EL",
-            "azimuth and elevation in degrees: 0,0 is from the front, 90,0 from the right, 0,90 from above",
-            float_tuple(2, "AZ,EL"),
-            default=DEFAULT_VIEW,
+        text = (
+            "azimuth and elevation in degrees: 0,0 is from the front, 90,0 from the right, "
+            "0,90 from above"
         )
-        self.add_argument(
-            "--up",
-            choices=list(UP_AXIS_MATRIX),
-            help="upward axis of the file; by default y for .obj and .off, otherwise z",
-        )
-        self.add_argument(
-            "--ortho",
-            dest="orthographic",
-            action=argparse.BooleanOptionalAction,
-            help="orthographic projection, or with --no-ortho perspective",
-        )
+        self.add_value("--view", "AZ,EL", text, float_tuple(2, "AZ,EL"), default=DEFAULT_VIEW)
+        text = "upward axis of the file; by default y for .obj and .off, otherwise z"
+        self.add_argument("--up", choices=list(UP_AXIS_MATRIX), help=text)
+        text = "orthographic projection, or with --no-ortho perspective"
+        self.add_toggle("--ortho", text, dest="orthographic")
 
     def add_look_options(self) -> None:
         """Add the options --preset and --set."""
@@ -165,36 +153,39 @@ class CommandParser(argparse.ArgumentParser):
 
     def add_degree_option(self, text: str) -> None:
         """Add the option --degree, the degree of a field, with a help text."""
-        self.add_value("--degree", "N", text, int)
+        self.add_value("--degree", "N", text, int, action=_CheckedDegree)
 
     def add_undefined_option(self) -> None:
-        """Add the option --undefined, which treats vectors that are not finite as undefined."""
-        self.add_switch("--undefined", "treat NaN and infinite vectors as undefined")
+        """Add the option --undefined, which sets the argument `nonfinite` of `api.read_field` to "zero"."""
+        text = "treat NaN and infinite vectors as undefined"
+        keywords = {"action": "store_const", "const": "zero", "default": "error"}
+        self.add_argument("--undefined", dest="nonfinite", help=text, **keywords)
 
     def add_picture_options(self) -> None:
         """Add the options of a picture of a mesh: view, look, values for colors, source of the tone."""
-        self.add_view_options()
+        self.add_direction_options()
+        self.add_size_option()
         self.add_workers_option()
         self.add_look_options()
-        self.add_value(
-            "--color-values",
-            "NAME",
+        text = (
             "color the lines by the numbers of a property of the faces or vertices, such as a vertex "
-            "property of a .ply file",
+            "property of a .ply file"
         )
-        self.add_value(
-            "--tone-attribute",
-            "NAME",
+        self.add_value("--color-values", "NAME", text)
+        text = (
             "take the tone from a vertex property of a .ply file, or from the vertex colors: "
-            f"'{VERTEX_COLOR}'",
-            dest="tone_values",
+            f"'{VERTEX_COLOR}'"
         )
-        self.add_value(
-            "--tone-image",
-            "IMAGE.png",
-            "take the tone from an image on the UV map of an .obj file",
-            Path,
-        )
+        self.add_value("--tone-attribute", "NAME", text, dest="tone_values")
+        text = "take the tone from an image on the UV map of an .obj file"
+        self.add_value("--tone-image", "IMAGE.png", text, Path)
+
+
+class _CheckedDegree(argparse.Action):
+    """Store the degree of a field, or raise a `RosyError` if there can be no field of this degree."""
+
+    def __call__(self, _parser: Any, options: Any, degree: Any, _option: Any = None) -> None:
+        setattr(options, self.dest, check_degree(degree))
 
 
 class Options(argparse.Namespace):
@@ -244,9 +235,9 @@ class Options(argparse.Namespace):
         """Return the file of the preset of the option --preset. None if the option is not given."""
         return find_preset_file(self.preset, user_presets_folder()) if self.preset else None
 
-    def requested_settings(self, settings_class: type = Look) -> dict[str, Any]:
+    def requested_settings(self) -> dict[str, Any]:
         """Return the settings of the options --set, by name."""
-        return dict(_parse_setting(text, settings_of(settings_class)) for text in self.set)
+        return dict(_parse_setting(text, settings_of(self.settings_class)) for text in self.set)
 
     def requested_look(self, default: Look) -> Look:
         """Return the look of the option --preset (by default `default`), changed by the options --set."""
@@ -255,36 +246,43 @@ class Options(argparse.Namespace):
         return look.with_settings(self.requested_settings())
 
     def api_arguments(self, function: Callable[..., Any], **others: Any) -> dict[str, Any]:
-        """Return keyword arguments for a function: the options with the names of its parameters, and --set.
+        """Return keyword arguments for a function of `api`, from the options of the command.
+
+        These are the values of all options whose names are keyword parameters of the function, and the
+        settings of the options --set.
 
         Parameters
         ----------
         function : function
-            A function of `api`.
         **others
-            Arguments that replace those of the options.
+            Further arguments. They take precedence over options of the same name.
         """
         names = inspect.getfullargspec(function).kwonlyargs
         arguments = {name: value for name, value in vars(self).items() if name in names}
         return arguments | {"preset": self.requested_preset()} | others | self.requested_settings()
 
-    def picture_arguments(self, function: Callable[..., Any]) -> dict[str, Any]:
-        """Return keyword arguments for a function of `api` that draws a mesh, after a check.
+    def picture_arguments(self, function: Callable[..., Any], path: Path) -> dict[str, Any]:
+        """Return keyword arguments (see `api_arguments`) for a function of `api` that draws pictures.
 
-        See `api_arguments`.
+        The options are checked here, so that their errors are reported before the files are read.
+
+        Parameters
+        ----------
+        function : function
+        path : Path
+            The file that is drawn, for messages.
 
         Raises
         ------
         RosyError
             If the options of the look, the tone or the size are invalid.
         """
-        sources = {"attribute": self.tone_values, "image": self.tone_image}
-        sources["picture"] = getattr(self, "tone_picture", None)
-        preset, settings = self.requested_preset(), self.requested_settings()
-        # Errors in the options are reported before the mesh is read.
-        picture_look(str(self.mesh), preset, settings, sources, self.color_values is not None)
-        check_size(*self.size)
-        return self.api_arguments(function)
+        values = {name: getattr(self, name, None) for name in ("color_values", *TONE_SOURCES)}
+        picture_look(str(path), self.requested_preset(), self.requested_settings(), **values)
+        arguments = self.api_arguments(function)
+        if "size" in arguments:
+            check_size(*self.size)
+        return arguments
 
 
 def add_subcommand(
@@ -325,10 +323,9 @@ def float_tuple(count: int, metavar: str) -> Callable[[str], tuple[float, ...]]:
     """Return a function that parses `count` numbers, separated by commas."""
 
     def parse(text: str) -> tuple[float, ...]:
-        try:
+        values: tuple[float, ...] = ()
+        with suppress(ValueError):
             values = tuple(map(float, text.split(",")))
-        except ValueError:
-            values = ()
         if len(values) != count:
             raise argparse.ArgumentTypeError(f"{text!r} is not {metavar}")
         return values
@@ -340,10 +337,9 @@ def float_between(low: float, high: float) -> Callable[[str], float]:
     """Return a function that parses a number in the closed interval from `low` to `high`."""
 
     def parse(text: str) -> float:
-        try:
+        value = np.nan
+        with suppress(ValueError):
             value = float(text)
-        except ValueError:
-            value = np.nan
         if not low <= value <= high:
             raise argparse.ArgumentTypeError(f"{text!r} is not a number from {low:g} to {high:g}")
         return value

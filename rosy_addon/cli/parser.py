@@ -47,8 +47,8 @@ class Extras:
         Function that runs the command in a Blender process and exits with its status. It takes the options,
         the name of the command and the .blend file. It returns if the command can run in this process.
     is_in_blender : bool
-        Whether this is the Blender process of `run_in_blender`. If the
-        options ask for several processes, these have already drawn the frames.
+        Whether this process is the Blender that `run_in_blender` starts. It then draws no frames that the
+        options leave to other processes (--jobs), because they were drawn before Blender was started.
     """
 
     program: tuple[str, ...] = ()
@@ -105,37 +105,31 @@ def main(
         discard_output()
         return EXIT_OUTPUT_ERROR
     except SystemExit as exit_request:  # argparse: 0 after the help, 2 for a usage error
-        return EXIT_OK if exit_request.code is None else int(exit_request.code)
+        return int(exit_request.code)
     return EXIT_OK
 
 
 def _build_parser(prog: str, extras: Extras = NO_EXTRAS) -> CommandParser:
     """Return the parser of all commands."""
-    parser = CommandParser(
-        prog=prog, description="Draw N-way rotational symmetry fields on meshes."
-    )
+    text = "Draw N-way rotational symmetry fields on meshes."
+    parser = CommandParser(prog=prog, description=text)
     parser.set_defaults(extras=extras)
     subparsers = parser.add_subparsers(metavar="VERB", required=True)
     add_bake_command(subparsers, extras.run_on_cluster is not None)
-    for add_command in (
-        add_render_command,
-        add_strokes_command,
-        add_turntable_command,
-        add_texture_command,
-        add_field_command,
-        add_info_command,
-        add_compare_command,
-        *extras.add_commands,
-        add_presets_command,
-    ):
+    add_render_command(subparsers)
+    add_strokes_command(subparsers)
+    add_turntable_command(subparsers)
+    add_texture_command(subparsers)
+    add_field_command(subparsers)
+    add_info_command(subparsers)
+    add_compare_command(subparsers)
+    for add_command in extras.add_commands:
         add_command(subparsers)
+    add_presets_command(subparsers)
     if extras.run_in_blender is not None:
+        text = "Blender to run; by default Python's module bpy, or a Blender that is installed"
         for verb in BLENDER_VERBS & subparsers.choices.keys():
-            subparsers.choices[verb].add_argument(
-                "--blender",
-                metavar="PATH",
-                help="Blender to run; by default Python's module bpy, or a Blender that is installed",
-            )
+            subparsers.choices[verb].add_value("--blender", "PATH", text)
     return parser
 
 

@@ -13,14 +13,7 @@ from ..core.errors import RosyError
 from ..rendering.turntable import NO_ENCODER, Encoder, check_video_path
 from ..surface_texture.draw import CONTENTS, MAX_MARGIN, MAX_SIZE, MIN_SIZE
 from .mesh_field import add_mesh_options, load_mesh_and_field
-from .options import (
-    CommandParser,
-    Options,
-    add_subcommand,
-    float_between,
-    float_tuple,
-    int_between,
-)
+from .options import CommandParser, Options, add_subcommand, float_between, float_tuple, int_between
 from .streams import print_line
 
 
@@ -30,18 +23,14 @@ def add_render_command(subparsers: Any) -> None:
     add_mesh_options(parser)
     parser.add_output_option("OUT.png")
     parser.add_picture_options()
-    parser.add_value(
-        "--tone-picture",
-        "PICTURE.png",
-        "take the tone from a picture of the same mesh in the same view",
-        Path,
-    )
+    text = "take the tone from a picture of the same mesh in the same view"
+    parser.add_value("--tone-picture", "PICTURE.png", text, Path)
 
 
 def run_render(options: Options) -> None:
     """Draw the field of a mesh file as a picture."""
     options.check_output(".png")
-    arguments = options.picture_arguments(api.render)
+    arguments = options.picture_arguments(api.render, options.mesh)
     surface, field = load_mesh_and_field(options)
     api.render(surface, field, **arguments).save(options.output)
 
@@ -51,13 +40,11 @@ def add_turntable_command(subparsers: Any) -> None:
     parser = add_subcommand(subparsers, "turntable", run_turntable, api.turntable)
     add_mesh_options(parser)
     parser.add_output_option("OUT.mp4|OUT.gif")
-    parser.add_value(
-        "--pictures", "N", "pictures in a full turn (%(default)d)", int_between(2, 10_000)
-    )
+    text = "pictures in a full turn (%(default)d)"
+    parser.add_value("--pictures", "N", text, int_between(2, 10_000))
     add_rate_option(parser)
-    parser.add_switch(
-        "--still", "leave the camera where it is: only streaks drift, as the setting flow says"
-    )
+    text = "leave the camera where it is: only streaks drift, as the setting flow says"
+    parser.add_switch("--still", text)
     parser.add_picture_options()
 
 
@@ -70,7 +57,7 @@ def run_turntable(options: Options) -> None:
     """Draw the field of a mesh file from all sides, as a video."""
     options.check_output()
     check_video_path(options.output)
-    arguments = options.picture_arguments(api.turntable)
+    arguments = options.picture_arguments(api.turntable, options.mesh)
     encode = video_encoder(options)
 
     def announce(number: int) -> None:
@@ -109,31 +96,19 @@ def add_texture_command(subparsers: Any) -> None:
     """Add the command `texture`."""
     parser = add_subcommand(subparsers, "texture", run_texture, api.texture)
     add_mesh_options(parser)
-    parser.add_output_option(
-        "OUT.png",
-        f"{UDIM_TOKEN} in the name stands for the number of a tile: each has a file of its own",
-    )
-    parser.add_value(
-        "--size", "N", "width and height in texels (%(default)d)", int_between(MIN_SIZE, MAX_SIZE)
-    )
-    parser.add_value(
-        "--margin",
-        "N",
-        "width of the margin around charts, in texels (%(default)d)",
-        int_between(0, MAX_MARGIN),
-    )
-    parser.add_value(
-        "--light-direction",
-        "X,Y,Z",
+    text = f"{UDIM_TOKEN} in the name stands for the number of a tile: each has a file of its own"
+    parser.add_output_option("OUT.png", text)
+    text = "width and height in texels (%(default)d)"
+    parser.add_value("--size", "N", text, int_between(MIN_SIZE, MAX_SIZE))
+    text = "width of the margin around charts, in texels (%(default)d)"
+    parser.add_value("--margin", "N", text, int_between(0, MAX_MARGIN))
+    text = (
         "direction to a lamp, in the axes of the mesh: draw its hatching as ink, and not thresholds "
-        "for a shader",
-        float_tuple(3, "X,Y,Z"),
+        "for a shader"
     )
-    parser.add_argument(
-        "--content",
-        choices=list(CONTENTS),
-        help="; ".join(f"{name}: {text[0].lower()}{text[1:]}" for name, text in CONTENTS.items()),
-    )
+    parser.add_value("--light-direction", "X,Y,Z", text, float_tuple(3, "X,Y,Z"))
+    texts = [f"{name}: {text[0].lower()}{text[1:]}" for name, text in CONTENTS.items()]
+    parser.add_argument("--content", choices=list(CONTENTS), help="; ".join(texts))
     parser.add_look_options()
 
 

@@ -6,11 +6,7 @@ import json
 from typing import Any
 
 from ..core.errors import RosyError
-from ..preset_files.store import (
-    merge_preset_files,
-    read_preset,
-    user_preset_files,
-)
+from ..preset_files.store import merge_preset_files, read_preset, user_preset_files
 from .options import Options, add_subcommand, user_presets_folder
 from .streams import print_error, print_line
 
@@ -37,7 +33,6 @@ def run_presets(options: Options) -> None:
         return
     width = max(len(record["preset"]) for record in records)
     for record in records:
-        print_line(
-            f"{record['preset']:{width}}  {record['description']}{'  (own)' * record['own']}"
-        )
+        note = "  (own)" * record["own"]
+        print_line(f"{record['preset']:{width}}  {record['description']}{note}")
     print_line(f"Your presets are in {folder}")

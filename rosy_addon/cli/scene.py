@@ -64,7 +64,13 @@ def print_warnings(warnings: Iterable[str]) -> None:
 
 
 def find_camera(scene: Any, name: str) -> Any:
-    """Return the object of a scene with the name of a camera; raise an error if there is none."""
+    """Return the object with this name, which should be a camera. Its type is checked when it is used.
+
+    Raises
+    ------
+    RosyError
+        If the scene has no object of this name. The message lists the cameras of the scene.
+    """
     if name not in scene.objects:
         names = ", ".join(f"'{obj.name}'" for obj in scene.objects if obj.type == "CAMERA")
         raise RosyError(

@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..api.drawings import draw_strokes
+from .. import api
 from ..api.pictures import DEFAULT_SIZE
 from ..core.errors import RosyError
 from ..field.mesh_io import READERS
@@ -22,9 +22,12 @@ from ..projection.camera import check_size
 from ..rendering.mesh_view import check_light
 from ..worker.frame_workers import parse_frames
 from .mesh_field import add_field_options, load_mesh_and_field
-from .options import CommandParser, Options, add_subcommand, float_between
+from .options import Options, add_subcommand, float_between
 from .scene import find_camera, open_scene, print_warnings, requested_objects
 from .streams import print_line
+
+#: Attributes of `Pen` that are arguments of `api.strokes`.
+PEN_ARGUMENTS = ("width", "colors", "paper", "millimeters", "plotter")
 
 #: Names of kinds of files. Some options apply only to one of these; see `CommandParser.only_for`.
 MESH_FILES, SCENES, PICTURES = "mesh files", ".blend files", ".svg files"
@@ -39,25 +42,26 @@ def add_strokes_command(subparsers: Any) -> None:
     with parser.only_for(MESH_FILES):
         add_field_options(parser)
         parser.add_direction_options()
-    parser.add_output_option(
-        "OUT", "file of strokes: a picture as .svg, or polylines in space as .ply, .obj or .csv"
-    )
+    text = "file of strokes: a picture as .svg, or polylines in space as .ply, .obj or .csv"
+    parser.add_output_option("OUT", text)
     parser.add_size_option()
     with parser.only_for(SCENES):
         parser.add_object_option("objects of a .blend file; by default all with a field")
         parser.add_value("--camera", "NAME", "camera of a .blend file; by default the scene's")
-        parser.add_value(
-            "--frames",
-            "A-B[:STEP]",
-            "frames of a .blend file, each in its own file; # in OUT stands for the frame number",
-        )
+        text = "frames of a .blend file, each in its own file; # in OUT stands for the frame number"
+        parser.add_value("--frames", "A-B[:STEP]", text)
     parser.add_set_option(StrokeStyle, "one setting of the strokes")
-    width = float_between(0.01, 1e3)
-    parser.add_value(
-        "--width", "PX", f"width of the strokes ({Pen.width:g})", width, default=argparse.SUPPRESS
-    )
+    # Options of the pen that are not given are no attributes of `Options`.
+    add = partial(parser.add_value, default=argparse.SUPPRESS)
+    add("--width", "PX", f"width of the strokes ({Pen.width:g})", float_between(0.01, 1e3))
     with parser.only_for(PICTURES):
-        add_page_options(parser)
+        toggle = partial(parser.add_toggle, default=argparse.SUPPRESS)
+        text = "lines of constant width, without paper, in an order that keeps the pen travel short"
+        toggle("--plotter", text)
+        text, parse = "width of the page in millimeters", float_between(1.0, 1e5)
+        add("--mm", "WIDTH", text, parse, dest="millimeters")
+        add("--colors", "C,C,...", "SVG colors of the layers (#000000)")
+        toggle("--paper", "white paper behind the strokes")
 
 
 def run_strokes(options: Options) -> None:
@@ -66,7 +70,7 @@ def run_strokes(options: Options) -> None:
     if check_drawing_suffix(options.output) != ".svg":
         options.check_only_for(PICTURES, options.output)
     # Errors in the options are reported before files are read.
-    style = StrokeStyle().with_settings(options.requested_settings(StrokeStyle))
+    style = StrokeStyle().with_settings(options.requested_settings())
     if options.mesh is None and "bpy" not in sys.modules:
         raise RosyError("no input: give a mesh file, or SCENE.blend")
     if options.mesh is None or options.mesh.suffix.lower() == ".blend":
@@ -76,9 +80,11 @@ def run_strokes(options: Options) -> None:
     options.check_only_for(SCENES, options.mesh)
     pen = pen_of(options, Pen())
     check_light(style.light, str(options.mesh))
-    size, is_ortho = check_size(*(options.size or DEFAULT_SIZE)), bool(options.orthographic)
+    size = check_size(*(options.size or DEFAULT_SIZE))
+    arguments = {"view": options.view, "size": size, "orthographic": bool(options.orthographic)}
+    arguments |= {name: getattr(pen, name) for name in PEN_ARGUMENTS}
     surface, field = load_mesh_and_field(options)
-    drawing = draw_strokes(surface, field, style, pen, options.view, size, is_ortho)
+    drawing = api.strokes(surface, field, **arguments, **options.requested_settings())
     drawing.save(options.output)
 
 
@@ -126,45 +132,18 @@ def _draw_frame_strokes(options: Options, scene: Any, path: Path) -> None:
         camera = None if options.frames is None else frame_camera(scene, scene.frame_current)
     settings, layer = scene.rosy.strokes, bpy.context.view_layer
     objects = requested_objects(options) or target_objects(scene, layer)
-    result = draw_strokes(
-        scene,
-        kind="FILE",
-        path=Path(os.path.realpath(path)),
-        objects=objects,
-        camera=camera,
-        style=read_stroke_style(settings).with_settings(options.requested_settings(StrokeStyle)),
-        pen=pen_of(options, read_pen(settings)),
-        size=options.size,
-    )
+    style = read_stroke_style(settings).with_settings(options.requested_settings())
+    pen = pen_of(options, read_pen(settings))
+    output = {"kind": "FILE", "path": Path(os.path.realpath(path)), "size": options.size}
+    result = draw_strokes(scene, objects=objects, camera=camera, style=style, pen=pen, **output)
     print_warnings(result.notes)
     print_line(f"{result.camera}: {result.path}")
 
 
-def add_page_options(parser: CommandParser) -> None:
-    """Add options for those fields of `Pen` that apply only to pictures (not to polylines in space).
-
-    If an option is not given, `Options` has no attribute for it.
-    """
-    add = partial(parser.add_value, default=argparse.SUPPRESS)
-    switch = partial(
-        parser.add_argument, action=argparse.BooleanOptionalAction, default=argparse.SUPPRESS
-    )
-    switch(
-        "--plotter",
-        help="lines of constant width, without paper, in an order that keeps the pen travel short",
-    )
-    page_width = float_between(1.0, 1e5)
-    add("--mm", "WIDTH", "width of the page in millimeters", page_width, dest="millimeters")
-    add("--colors", "C,C,...", "SVG colors of the layers (#000000)")
-    switch("--paper", help="white paper behind the strokes")
-
-
 def pen_of(options: Options, base: Pen) -> Pen:
-    """Return the pen `base`, with those fields replaced for which options are given."""
-    values = vars(options)
-    overrides = {
-        name: values[name] for name in ("width", "millimeters", "plotter") if name in values
-    }
+    """Return a copy of the pen `base` with the changes of --width, --mm, --plotter, --colors and --paper."""
+    values, names = vars(options), ("width", "millimeters", "plotter")
+    overrides = {name: values[name] for name in names if name in values}
     if "colors" in values:
         overrides |= {"colors": values["colors"].split(","), "outline": None}
     if values.get("plotter"):

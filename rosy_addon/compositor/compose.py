@@ -16,7 +16,6 @@ from ..projection.pixel_blocks import BLOCK_PIXELS
 from .color_values import map_positions, value_ends, value_ranges
 from .contrast import blend_gain, scale_contrast, supersampling_gain
 from .covering import scatter_rows
-from .even_lines import EvenLines
 from .family_hues import family_hues
 from .flow import NO_DRIFT, Drift
 from .hatching import (
@@ -25,28 +24,22 @@ from .hatching import (
     has_outline,
     has_overshoot,
     has_paper_grain,
+    line_images,
     overshoot_steps,
     render_hatching,
 )
 from .image_noise import NOISE_MEAN
 from .ink_thresholds import picture_thresholds, sharp_look
 from .lic import lic_lengths
-from .lic_images import (
-    LicImages,
-    lic_images,
-    magnitude_ends,
-    relative_magnitude,
-    with_magnitude_range,
-)
+from .lic_images import LicImages, magnitude_ends, relative_magnitude, with_magnitude_range
 from .look import Look, colors_magnitude, colors_values, is_even, is_hatched
 from .look_units import PixelLook, pixel_look
-from .paper_grain import PAPER_GRAIN_CHANNELS, picture_paper_grain
 from .picture import Picture, common_color_range
 from .pixel_field import PixelField, entries_of_rows
 from .reported_blocks import reported_blocks
 from .shading import Light
 from .stages import ComposeStages
-from .streak_statistics import break_steps, look_streak_statistics
+from .streak_statistics import look_streak_statistics
 from .strip_division import divide_into_strips
 from .strips import Strip, join_strips
 from .target_tone import ReferenceRender, target_tone
@@ -89,8 +82,8 @@ def compose(
         Stores results that do not depend on the camera. By default `cache` stores them, too.
     strips : sequence of Strip, optional
         Rows to draw, from `divide_into_strips`; by default all rows. The G-buffer must contain these rows
-        and the rows around them that streamlines reach. Samples that are shaded one by one are a single
-        strip.
+        and the rows around them that streamlines reach. Without effect if the G-buffer is supersampled
+        and has no `coverage`: such a picture is drawn as a single strip.
     draws_thresholds : bool
         Whether to draw the thresholds of the ink (`ink_thresholds`), which do not depend on the tone,
         instead of the ink. Without effect if the look has no ink.
@@ -124,19 +117,18 @@ def compose(
     stages = ComposeStages(gbuffer, cache, cache if mesh_cache is None else mesh_cache)
     with progress(0.0, SHARED_SHARE):
         with progress(0.0, 0.2):
-            canvas = _Canvas(gbuffer, frame_look, lights, reference, cache, draws_thresholds)
+            tone_rgb = target_tone(gbuffer, look, lights, reference, cache)
+            canvas = _Canvas(gbuffer, frame_look, tone_rgb, draws_thresholds)
         layers = []
         for number, degree in enumerate(canvas.degrees):
             with progress(0.2 + 0.8 * number / len(canvas.degrees), 1.0):
                 layers.append(_prepare_layer(stages, canvas, degree, frame_look))
     with progress(SHARED_SHARE, 1.0):
         rgba, spread = _draw_strips(stages, canvas, layers, strips)
-    return Picture(
-        rgba,
-        spread[..., 0] if draws_thresholds else None,
-        _color_range(gbuffer, look, layers, canvas),
-        line_count=max((layer.field.line_count for layer in layers), default=0),
-    )
+    color_range = _color_range(gbuffer, look, layers, canvas)
+    line_count = max((layer.field.line_count for layer in layers), default=0)
+    shown_spread = spread[..., 0] if draws_thresholds else None
+    return Picture(rgba, shown_spread, color_range, line_count=line_count)
 
 
 def _draw_strips(
@@ -176,7 +168,8 @@ class _Canvas:
     look : PixelLook
     degrees : list of int
         Degrees of the visible fields.
-    tone_rgb : (P, 3) or (P, 1) float32 ndarray
+    tone_rgb : (P, 3) float32 ndarray
+        Target tone of each pixel, linear factors; see `target_tone`.
     map_position : (P,) float32 ndarray or None
         Position in the color map of the color value of each pixel; None if the look does not show color
         values.
@@ -184,24 +177,20 @@ class _Canvas:
         Linear, not premultiplied.
     alpha : (P,) float32 ndarray
     spread : (P, 1) float32 ndarray
-        Fourth channel of thresholds of ink (`ink_thresholds`). It has 0 pixels if no thresholds are drawn.
+        If thresholds of ink are drawn in place of colors: the alpha channel that
+        `ink_thresholds.threshold_pixels` returns, which tells how far the thresholds in a pixel spread.
+        Otherwise it has no pixels.
     """
 
     def __init__(
-        self,
-        gbuffer: GBuffer,
-        look: PixelLook,
-        lights: Sequence[Light],
-        reference: ReferenceRender | None,
-        cache: Cache,
-        draws_thresholds: bool,
+        self, gbuffer: GBuffer, look: PixelLook, tone_rgb: np.ndarray, draws_thresholds: bool
     ) -> None:
         count = len(gbuffer.pixel)
-        self._gbuffer = gbuffer
-        self.look, self.draws_thresholds = look, draws_thresholds
+        self._gbuffer, self.look, self.tone_rgb = gbuffer, look, tone_rgb
+        self.draws_thresholds = draws_thresholds
         visible = np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist()
         self.degrees = sorted({gbuffer.instance_degrees[index] for index in visible})
-        self.tone_rgb = target_tone(gbuffer, look.look, lights, reference, cache)
+
         self.map_position = None
         if colors_values(look) and not draws_thresholds:
             self.map_position = map_positions(gbuffer, look.look)
@@ -233,7 +222,7 @@ class _Canvas:
         """
         gbuffer, s = self._gbuffer, self.look.supersampling
         pixel, width, coverage = gbuffer.pixel, gbuffer.camera.width, gbuffer.coverage
-        height = (rows[1] - rows[0]) // s
+        height, is_averaged = (rows[1] - rows[0]) // s, s > 1 or coverage is not None
         rgba = np.zeros((height, width // s, 4), dtype=np.float32)
         band_rows = max(BLOCK_PIXELS // (width * s), 1)
         for start in range(0, height, band_rows):
@@ -242,36 +231,33 @@ class _Canvas:
             band_of_frame = rows[0] + start * s, rows[0] + (start + len(band)) * s
             first_pixel = band_of_frame[0] * width
             block = entries_of_rows(pixel, width, band_of_frame)
-            if (
-                block.start == block.stop
-            ):  # rows without pixels: memory that is not written to is not used
-                continue
+            if block.start == block.stop:
+                continue  # memory that is not written to is not used
             # Colors are premultiplied for averaging. Subpixels without a field are black, with alpha 0.
             band_rgba = np.zeros((band.size // 4 * s * s, 4), dtype=np.float32)
-            block_rgba = np.empty((block.stop - block.start, 4), dtype=np.float32)
-            block_rgba[:, 3] = self.alpha[block]
-            if s == 1 and coverage is None:
-                block_rgba[:, :3] = color[block]
-                scatter_rows(band_rgba, pixel[block] - first_pixel, block_rgba)
-                band[...] = band_rgba.reshape(band.shape)
-                continue
-            if coverage is not None:
-                block_rgba[:, 3] *= coverage.own[block]
-            block_rgba[:, :3] = color[block] * block_rgba[:, 3:]
+            alpha = self.alpha[block] * (1 if coverage is None else coverage.own[block])
+            block_rgba = _rgba(color[block], alpha, is_averaged)
             scatter_rows(band_rgba, pixel[block] - first_pixel, block_rgba)
-            if coverage is None:
-                band[...] = band_rgba.reshape(len(band), s, width // s, s, 4).mean(axis=(1, 3))
-            else:
+            if coverage is not None:
                 shares = entries_of_rows(coverage.pixel, width, band_of_frame)
                 entry = coverage.entry[shares]
-                shared = np.empty((len(entry), 4), dtype=np.float32)
-                shared[:, 3] = self.alpha[entry] * np.float32(coverage.share)
-                shared[:, :3] = color[entry] * shared[:, 3:]
+                shared = _rgba(color[entry], self.alpha[entry] * np.float32(coverage.share), True)
                 np.add.at(band_rgba, coverage.pixel[shares] - first_pixel, shared)
-                band[...] = band_rgba.reshape(band.shape)
-            band_alpha = band[..., 3:]
-            np.divide(band[..., :3], band_alpha, out=band[..., :3], where=band_alpha > 0)
+            if s > 1:
+                band_rgba = band_rgba.reshape(len(band), s, width // s, s, 4).mean(axis=(1, 3))
+            band[...] = band_rgba.reshape(band.shape)
+            if is_averaged:
+                band_alpha = band[..., 3:]
+                np.divide(band[..., :3], band_alpha, out=band[..., :3], where=band_alpha > 0)
         return rgba
+
+
+def _rgba(color: np.ndarray, alpha: np.ndarray, is_premultiplied: bool) -> np.ndarray:
+    """Return (n, 4) float32 RGBA of (n, 3) or (n, 1) colors, premultiplied if that is asked for."""
+    rgba = np.empty((len(color), 4), dtype=np.float32)
+    rgba[:, 3] = alpha
+    rgba[:, :3] = color * rgba[:, 3:] if is_premultiplied else color
+    return rgba
 
 
 class _Layer(NamedTuple):
@@ -307,23 +293,17 @@ def _prepare_layer(stages: ComposeStages, canvas: _Canvas, degree: int, look: Pi
         return _Layer(field, HatchedLines(look))
     if has_paper_grain(look):
         with progress(0.6, 0.7):
-            paper_grain = _paper_grain(stages, field, look)
+            paper_grain = stages.paper_grain(field, look)
     if has_outline(look):
         with progress(0.7, 0.9):
             outline = stages.outline(field, look)
     with progress(0.9, 1.0):
         undirected = stages.undirected_texture(field, look)
     lines = HatchedLines(
-        look,
-        paper_grain=paper_grain,
-        outline=outline,
-        undirected=undirected,
-        even_lines=even_lines,
+        look, paper_grain=paper_grain, outline=outline, undirected=undirected, even_lines=even_lines
     )
     if even_lines is None or undirected is not None or has_breaks(look) or has_paper_grain(look):
-        look_streak_statistics(
-            look
-        )  # computed here, so that `HatchedLines.coverage` finds them cached
+        look_streak_statistics(look)  # stores them for `HatchedLines.coverage`
     tone = canvas.tone_rgb[field.gbuffer_index].mean(axis=1)
     return _Layer(field, lines, np.clip(tone, 0, 1, out=tone))
 
@@ -334,15 +314,15 @@ def _draw_layer(stages: ComposeStages, canvas: _Canvas, layer: _Layer, strip: St
     rows = entries_of_rows(field.pixel, field.width, strip.averaged_rows)
     lines = layer.lines.part(rows)
     with progress(0.0, 0.7):
-        images, break_images = _line_images(stages, layer, strip, lines.even_lines)
-        lines = lines._replace(images=images)
+        images, break_images = line_images(look, lambda looks: stages.lic(field, looks, strip))
+        lines = lines._replace(images=images, break_images=break_images)
     with progress(0.7, 0.9):
         if layer.tone is None:
             streaks = streak_tone(field, look, images)
         else:
             tone = layer.tone[rows]
-            line_tones = _tone_along_lines(layer, strip) if has_overshoot(look) else None
-            lines = lines._replace(break_images=break_images, line_tones=line_tones)
+            if has_overshoot(look):
+                lines = lines._replace(line_tones=_tone_along_lines(layer, strip))
     field = field.part(rows)
     if canvas.map_position is not None:
         field = replace(field, map_position=canvas.map_position[field.gbuffer_index])
@@ -357,35 +337,15 @@ def _draw_layer(stages: ComposeStages, canvas: _Canvas, layer: _Layer, strip: St
             pixels = picture_thresholds(part, part_lines, samples)
             canvas.color[entries], canvas.spread[entries] = pixels[:, :3], pixels[:, 3:]
         else:
-            canvas.color[entries], canvas.alpha[entries] = render_hatching(
-                part, part_lines, tone[block]
-            )
-
-
-def _line_images(
-    stages: ComposeStages, layer: _Layer, strip: Strip, even_lines: EvenLines | None
-) -> tuple[LicImages, LicImages | None]:
-    """Return two LIC images of a strip: the streaks, and the short streaks that break lines into pieces.
-
-    The second one is None if lines are not broken.
-    """
-    look, is_broken = layer.lines.look, has_breaks(layer.lines.look)
-    looks = [look] if even_lines is None else []
-    if is_broken:
-        looks.append(look.with_length(break_steps(look)))
-    images = stages.lic(layer.field, looks, strip) if looks else []
-    break_images = images[-1] if is_broken else None
-    if even_lines is None:
-        return images[0], break_images
-    # Evenly spaced lines are used in place of the streaks of LIC.
-    members = even_lines.streaks[..., None]
-    return lic_images(members, np.ones(members.shape[1], dtype=np.float32)), break_images
+            color, alpha = render_hatching(part, part_lines, tone[block])
+            canvas.color[entries], canvas.alpha[entries] = color, alpha
 
 
 def _tone_along_lines(layer: _Layer, strip: Strip) -> np.ndarray:
-    """Return the (M, n) mean tone along the streamline of each of the M directions of the field.
+    """Return the (M, n) mean tone along the streamlines of each of the M directions of the field.
 
-    The mean is over the overshoot distance in each direction, at the n pixels of the strip.
+    The n pixels are those of the strip. A mean covers the `overshoot` of the look in both directions: the
+    distance by which lines of ink continue past the border of a tone.
     """
     # `normalize_variance` scales the means of streamlines that end early. A channel of ones is
     # scaled by the same factor, which is divided out below. There are two such channels, because LIC
@@ -393,36 +353,13 @@ def _tone_along_lines(layer: _Layer, strip: Strip) -> np.ndarray:
     channels = np.ones((len(layer.tone), 3), dtype=np.float32)
     channels[:, 0] = layer.tone
     look = layer.lines.look.for_means(overshoot_steps(layer.lines.look))
-    # The weights of the method "ibfv" fall exponentially: they would reach too far.
-    method = "sheets" if look.method == "ibfv" else look.method
-    (images,) = lic_lengths(layer.field, [look], channels, strip, method)
+    (images,) = lic_lengths(layer.field, [look], channels, strip)
     means = np.empty(images.members.shape[:2], dtype=np.float32)
     for block in reported_blocks(means.shape[1], "finding tones", 1.0, 1.0):
         centered = images.members[:, block] - np.float32(NOISE_MEAN)
-        means[:, block] = (
-            NOISE_MEAN + np.float32(1 - NOISE_MEAN) * centered[..., 0] / centered[..., 1]
-        )
+        scaled = np.float32(1 - NOISE_MEAN) * centered[..., 0]
+        means[:, block] = NOISE_MEAN + scaled / centered[..., 1]
     return np.clip(means, 0, 1, out=means)
-
-
-def _paper_grain(stages: ComposeStages, field: PixelField, look: PixelLook) -> np.ndarray:
-    """Return the (M, P) heights of the paper grain for each of the M directions of the field.
-
-    The mean is 0, the standard deviation 1.
-    """
-    if look.anchor == "picture":
-        subpixels = look.supersampling
-        line_width = look.line_width / subpixels
-        return picture_paper_grain(
-            field.pixel, field.width, line_width, look.seed, subpixels, field.line_count
-        )
-    noise = stages.surface_paper_grain(field, look)
-    std = np.float32(look_streak_statistics(look).paper_grain_std)
-    channel = np.arange(field.line_count) % PAPER_GRAIN_CHANNELS
-    heights = np.empty((field.line_count, len(noise)), dtype=np.float32)
-    for block in reported_blocks(len(noise), "drawing the paper grain", 1.0, 1.0):
-        heights[:, block] = ((noise[block] - np.float32(NOISE_MEAN)) / std).T[channel]
-    return heights
 
 
 def streak_tone(field: PixelField, look: PixelLook, images: LicImages) -> np.ndarray:

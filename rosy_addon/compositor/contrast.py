@@ -62,11 +62,8 @@ def blend_gain(image_count: int, effective_samples: np.ndarray, look: PixelLook)
         sqrt(M / (1 + r)), from 1 to sqrt(M).
     """
     _, correlation_sum = streak_moments(*streak_args(look), image_count, kernel=look.kernel)
-    pixel_correlation = np.clip(
-        correlation_sum * full_sample_count(look.length, look.kernel) / effective_samples,
-        0,
-        image_count - 1,
-    )
+    correlation = correlation_sum * full_sample_count(look.length, look.kernel) / effective_samples
+    pixel_correlation = np.clip(correlation, 0, image_count - 1)
     return np.sqrt(image_count / (1 + pixel_correlation)).astype(np.float32)
 
 
@@ -81,9 +78,8 @@ def supersampling_gain(look: PixelLook) -> float:
     subpixels = look.supersampling
     supersampled_args = streak_args(look)
     supersampled_std, _ = streak_moments(*supersampled_args, average=subpixels, kernel=look.kernel)
-    direct_std, _ = streak_moments(
-        *(length / subpixels for length in supersampled_args), kernel=look.kernel
-    )
+    direct_args = (length / subpixels for length in supersampled_args)
+    direct_std, _ = streak_moments(*direct_args, kernel=look.kernel)
     return direct_std / supersampled_std
 
 

@@ -1,9 +1,9 @@
 """The covering surface of a field, and a compact table of its states for tracing streamlines.
 
 A *state* is a pixel and a *sheet* k. Sheet k is the direction at the angle t + 2 pi k / S, where t
-is the angle of the representation, and S is N for even N and 2 N for odd N. The states form an
-S-fold covering of the surface. On it the field is a single vector field without breaking points. A
-step from (p, k) to the pixel q leads to the sheet
+is the angle of the member nearest to the guiding angle, and S is N for even N and 2 N for odd N. The
+states form an S-fold covering of the surface. On it the field is a single vector field without
+breaking points. A step from (p, k) to the pixel q leads to the sheet
 
     k' = k + round((t(p) - t(q)) S / 2 pi)  mod S,
 
@@ -107,9 +107,10 @@ class Covering:
     cell_of_pixel : (P,) int32 ndarray
         The cell of each pixel.
     packed_phase : (C,) float32 ndarray
-        Angle t of the representation plus 2, in units of a full turn divided by `sheets_per_turn`. The
-        last nine bits of the mantissa hold the neighbor mask (see `unpack_neighbor_mask`). Every step
-        reads both, so they are stored together.
+        t S / (2 pi) + 2, where S is `sheets_per_turn`, and t is the angle in radians of the member nearest
+        to the guiding angle, measured from that angle. The result is from 1 to 3, so the last nine bits of
+        the mantissa are below 2e-4. They hold the neighbor mask instead (see `unpack_neighbor_mask`): every
+        step reads both, so they are stored together.
     state_table : (S C, 2 + 2 K) int16 ndarray
         The step on screen, x and y; then for each of the K channels, the noise and its derivative to the
         left of the step.
@@ -180,20 +181,20 @@ class Covering:
         return sheet < self.line_count
 
     def forward_share(self, state: np.ndarray) -> np.ndarray:
-        """Return how much of the moving kernel drifts in the direction of each of (n,) states.
+        """Return the fraction of the filter kernel that moves along the direction of each of (n,) states.
 
-        The result is (n,) float32, 0 to 1; see `flow.forward_share`. Streaks of a field without opposites
-        drift along its directions. If there are seams, the angles of different charts cannot be compared,
-        and streaks of other fields drift half one way and half the other.
+        The result is (n,) float32, 0 to 1; the rest of the kernel moves the opposite way (see `flow`). In a
+        field without opposites, the kernel moves along the directions of the field. In other fields, the
+        fraction depends on the angle to the guiding angle; on a texture with seams, where angles in
+        different charts cannot be compared, it is 0.5.
         """
         if self.has_directions:
             return self.is_along_member(state).astype(np.float32)
         if self.seams is not None:
             return np.full(len(state), 0.5, dtype=np.float32)
         sheet, cell = np.divmod(state, np.int32(self.cell_count))
-        angle = (self.packed_phase.take(cell) - np.float32(2) + sheet) * np.float32(
-            2 * np.pi / self.sheets_per_turn
-        )
+        spacing = np.float32(2 * np.pi / self.sheets_per_turn)
+        angle = (self.packed_phase.take(cell) - np.float32(2) + sheet) * spacing
         return forward_share(np.cos(angle))
 
     def neighbor_lines(
@@ -241,11 +242,8 @@ def member_lines(field: PixelField) -> np.ndarray:
     Lines are pairs of opposite sheets of the covering surface, numbered from 0 to M - 1. For an odd degree N,
     sheet 2 i is member i of the field, and sheet 2 i - N is the opposite direction.
     """
-    return (
-        np.arange(field.line_count)
-        * (field.symmetry.sheets_per_turn // field.degree)
-        % field.line_count
-    )
+    spacing = field.symmetry.sheets_per_turn // field.degree
+    return np.arange(field.line_count) * spacing % field.line_count
 
 
 def build_covering(field: PixelField, look: PixelLook, noise: np.ndarray) -> Covering:
@@ -319,12 +317,13 @@ def build_covering(field: PixelField, look: PixelLook, noise: np.ndarray) -> Cov
 
 
 def _surface_steps(x: np.ndarray, y: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Shorten steps to at most one pixel in x and y, and weight the noise gradient.
+    """Shorten steps to at most one pixel along x and y, and weight the noise gradient.
 
-    The result is two (x, y) pairs: the steps, and the factors by which the x and y components of the noise
-    gradient are multiplied for its derivative to the left. That derivative is multiplied by a distance
-    to the left (see `streamline_batch`). Both are proportional to the length of the step, so the factors
-    are divided by the square of the length.
+    `x` and `y` are the components of (n,) steps in the picture, in pixels. The result is two (x, y) pairs.
+    The first pair is the shortened steps. The second pair is used in place of a unit vector, for the
+    derivative of the noise to the left of the step. `streamline_batch` multiplies this derivative by
+    `streamline_tracing.lateral_offset`, which is proportional to the length of the step. So the second
+    pair is the step divided by the square of its length.
     """
     scale = 1 / np.maximum(np.maximum(np.abs(x), np.abs(y)), np.float32(1))
     x, y = x * scale, y * scale
@@ -374,9 +373,9 @@ def _noise_gradient(
 def _nearest_member(
     z: np.ndarray, degree: int, guiding_angle: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the angle of the member nearest to the guiding angle, and its cosine and sine.
+    """Return the angle from the guiding angle to the nearest member, and the cosine and sine of that angle.
 
-    The angle is relative to the guiding angle. All three are 0 where the representation `z` is 0.
+    Angles are in radians. All three results are 0 where the representation `z` is 0.
     """
     x, y = _rotate(z.real, z.imag, -degree * guiding_angle)
     angle = vector_angle(x, y)
@@ -417,10 +416,8 @@ def _apply_harmonics(
     """
     if not field.harmonics:
         return x, y
-    member = x + 1j * y
-    direction = normalized(
-        member * evaluate_harmonics([(j, c[block]) for j, c in field.harmonics], member)
-    )
+    member, harmonics = x + 1j * y, [(j, c[block]) for j, c in field.harmonics]
+    direction = normalized(member * evaluate_harmonics(harmonics, member))
     return direction.real, direction.imag
 
 
@@ -435,11 +432,9 @@ def _to_screen(
     screen_x = x_axis.real * x + y_axis.real * y
     screen_y = x_axis.imag * x + y_axis.imag * y
     if not foreshorten:
-        norm = screen_x * screen_x
-        norm += screen_y * screen_y
-        np.sqrt(norm, out=norm)
+        norm = np.sqrt(screen_x * screen_x + screen_y * screen_y)
         norm[norm == 0] = 1
-        np.divide(1, norm, out=norm)
-        screen_x *= norm
-        screen_y *= norm
+        scale = 1 / norm
+        screen_x *= scale
+        screen_y *= scale
     return screen_x, screen_y

@@ -1,7 +1,7 @@
 """Averages of noise along streamlines, by kernels that move; see `flow`.
 
 Let E be the prefix sum of the prefix sum of the noise along a streamline. The weights of every kernel here
-are piecewise linear, so their second difference is not 0 in only a few places. The weighted sum of the noise
+are piecewise linear: their second difference is 0 except at a few places. The weighted sum of the noise
 around the sample q is therefore a weighted sum of only a few values of E. Between two samples, sums
 are interpolated.
 """
@@ -31,8 +31,6 @@ class MovingKernel:
     ----------
     look : PixelLook
         A look that has flow.
-    levels : int
-        Number of different lengths of streamlines, if the length depends on the magnitude.
 
     Attributes
     ----------
@@ -46,13 +44,15 @@ class MovingKernel:
     energies : (3, L, 2 R + 2) float64 ndarray
         Prefix sums over the samples from -R - 1 to R of three products: the squares of the weights of the
         kernel that drifts forward, the squares for the kernel that drifts backward, and the products of both
-        weights. Level l is for kernels of the full length times l / (L - 1).
+        weights. Level l is for kernels of the full length times l / (L - 1). There is one level if the length
+        of streamlines does not depend on the magnitude.
     full_samples : (L,) float64 ndarray
         `filter_kernel.KernelWeights.effective_samples` of the kernels at rest.
     """
 
-    def __init__(self, look: PixelLook, levels: int = 1) -> None:
+    def __init__(self, look: PixelLook) -> None:
         self.length, self.kind = look.length, look.kernel
+        levels = min(look.length + 1, MAX_LEVELS) if look.magnitude_length else 1
         self.shifts = channel_shifts(look.flow_phase, look.flow_distance)
         self.weights = channel_weights(look.flow_phase)
         self.reach = look.streamline_reach()
@@ -63,17 +63,14 @@ class MovingKernel:
             share = level / (levels - 1) if levels > 1 else 1.0
             length = float(round(share * self.length))
             self.full_samples[level] = kernel_weights(*[length] * 3, self.kind).effective_samples
-            rows = np.stack(
-                [
-                    weight * _shifted_weights(position, share * shift, length, self.kind)
-                    for shift, weight in zip(self.shifts, self.weights, strict=True)
-                ]
-            )
+            shifted = [
+                _shifted_weights(position, share * shift, length, self.kind)
+                for shift in self.shifts
+            ]
+            rows = self.weights[:, None] * np.stack(shifted)
             mirrored = rows[:, ::-1]
-            for total, products in zip(
-                self.energies[:, level], (rows**2, mirrored**2, rows * mirrored), strict=True
-            ):
-                np.cumsum(products.sum(axis=0), out=total[1:])
+            products = np.stack([rows**2, mirrored**2, rows * mirrored]).sum(axis=1)
+            np.cumsum(products, axis=1, out=self.energies[:, level, 1:])
 
     def effective_samples(
         self, share: np.ndarray, forward: np.ndarray, behind: np.ndarray, ahead: np.ndarray
@@ -85,24 +82,25 @@ class MovingKernel:
         Parameters
         ----------
         share : (n,) float32 ndarray
-            Length of the kernels, relative to `length`.
+            Length of each kernel as a fraction of `length`, 0 to 1.
         forward : (n,) float32 ndarray
-            Share of the kernel that drifts forward.
+            Fraction of the kernel that drifts forward, 0 to 1.
         behind, ahead : (n,) intp ndarray
-            Steps to the ends of the streamlines.
+            Steps to the ends of the streamlines. Negative numbers count as 0.
 
         Returns
         -------
         effective_samples : (n,) float64 ndarray
         factor : (n,) float64 ndarray
-            Weighted sums times this factor are averages times the effective samples.
+            Factor for the weighted sum of the noise of each streamline. The product is the average of the
+            noise times its effective samples.
         """
         table = self.energies.reshape(3, -1)
         width, levels = self.energies.shape[2], len(self.full_samples)
         level = np.rint(share * (levels - 1)).astype(np.intp)
         center = level * width + (self.reach + 1)
-        available = table.take(center + np.minimum(ahead, self.reach), axis=1)
-        available -= table.take(center - np.minimum(behind, self.reach) - 1, axis=1)
+        available = table.take(center + np.clip(ahead, 0, self.reach), axis=1)
+        available -= table.take(center - np.clip(behind, 0, self.reach) - 1, axis=1)
         shares = np.stack([forward**2, (1 - forward) ** 2, 2 * forward * (1 - forward)])
         full = (shares * self.energies[:, level, -1]).sum(axis=0)
         samples = self.full_samples[level]
@@ -116,9 +114,8 @@ def _shifted_weights(position: np.ndarray, shift: float, length: float, kind: Ke
     """
     whole = math.floor(shift)
     fraction = shift - whole
-    return (1 - fraction) * sample_weights(position + whole, length, kind) + fraction * (
-        sample_weights(position + whole + 1, length, kind)
-    )
+    low, high = (sample_weights(position + whole + step, length, kind) for step in (0, 1))
+    return (1 - fraction) * low + fraction * high
 
 
 class DriftingAverages:
@@ -129,13 +126,12 @@ class DriftingAverages:
     kernel : MovingKernel
     second_sums : (3, 2 R + 3, n) complex64 ndarray
         E for n streamlines: row i + R + 2 of a channel is the sum up to step i of the prefix sums of its
-        noise, for i from -R - 2 to R. The imaginary part is the same for the derivative of the noise to the
+        noise, for i from -R - 2 to R. The imaginary part has the sums of the derivative of the noise to the
         left.
     """
 
     def __init__(self, kernel: MovingKernel, second_sums: np.ndarray) -> None:
-        self._kernel = kernel
-        self._second_sums = second_sums
+        self._kernel, self._second_sums = kernel, second_sums
         #: Row of `second_sums` for step 0.
         self._middle = second_sums.shape[1] // 2 + 1
         #: Weighted sums around all steps with kernels of full length. Key: whether the kernel is mirrored.
@@ -161,15 +157,15 @@ class DriftingAverages:
         length : (n,) ndarray of int or None
             Steps of the kernels in each direction; None for the full length.
         forward : (n,) float32 ndarray
-            Share of the kernel that drifts forward, 0 to 1; the rest drifts backward.
+            Fraction of the kernel that drifts forward, 0 to 1; the rest drifts backward.
         behind, ahead : (n,) intp ndarray
             Steps to the ends of the streamlines.
 
         Returns
         -------
         sums : (n,) complex64 ndarray
-            The average of the noise times the effective samples. The imaginary part is the same for the
-            derivative of the noise to the left.
+            The real part is the average of the noise times the effective samples. The imaginary part is the
+            same average of the derivative of the noise to the left.
         effective_samples : (n,) float32 ndarray
         """
         kernel = self._kernel
@@ -184,52 +180,31 @@ class DriftingAverages:
                 continue
             part = slice(None) if len(columns) == len(weight) else columns
             drifted = np.zeros(len(columns), dtype=np.complex64)
-            for channel, (shift, amount) in enumerate(
-                zip(kernel.shifts, kernel.weights, strict=True)
-            ):
-                if amount:
-                    place = center[part] - np.float32(direction * shift) * share[part]
-                    lengths = None if length is None else length[part]
-                    drifted += np.float32(amount) * self._sums_at(
-                        channel, place, columns, lengths, direction < 0
+            for channel in np.flatnonzero(kernel.weights).tolist():
+                shift = np.float32(direction * kernel.shifts[channel])
+                place = center[part] - shift * share[part]
+                whole = np.floor(place)
+                step, fraction = whole.astype(np.intp), place - whole
+                if length is None:
+                    sums, stride = self._full(direction < 0)[channel], len(forward)
+                    index = (step + len(sums) // 2) * stride + columns
+                    low, high = sums.take(index), sums.take(index + stride)
+                else:
+                    terms = _kernel_terms(kernel.kind, length[part], direction < 0)
+                    low, high = (
+                        self._sums(channel, each, columns, terms) for each in (step, step + 1)
                     )
+                drifted += np.float32(kernel.weights[channel]) * (low + fraction * (high - low))
             total[part] += weight[part] * drifted
         samples, factor = kernel.effective_samples(share, forward, behind, ahead)
-        return (
-            total * factor.astype(np.float32),
-            np.maximum(samples, MIN_EFFECTIVE_SAMPLES).astype(np.float32),
-        )
-
-    def _sums_at(
-        self,
-        channel: int,
-        place: np.ndarray,
-        columns: np.ndarray,
-        length: np.ndarray | None,
-        is_mirrored: bool,
-    ) -> np.ndarray:
-        """Return the (n,) complex64 weighted sums around positions between steps.
-
-        `place` is the position in steps, `columns` the streamline, one of each for each sum.
-        """
-        whole = np.floor(place)
-        fraction = place - whole
-        step = whole.astype(np.intp)
-        if length is None:
-            sums = self._full(is_mirrored)[channel]
-            index = (step + len(sums) // 2) * sums.shape[1] + columns
-            low, high = sums.reshape(-1).take(index), sums.reshape(-1).take(index + sums.shape[1])
-        else:
-            low, high = (
-                self._sums_of_length(channel, each, columns, length, is_mirrored)
-                for each in (step, step + 1)
-            )
-        return low + fraction * (high - low)
+        samples = np.maximum(samples, MIN_EFFECTIVE_SAMPLES).astype(np.float32)
+        return total * factor.astype(np.float32), samples
 
     def _full(self, is_mirrored: bool) -> np.ndarray:
-        """Return the (3, 2 Q + 1, n) complex64 weighted sums around each step from -Q to Q.
+        """Return the (3, 2 Q + 1, n) complex64 weighted sums of each channel around each step from -Q to Q.
 
-        The kernels have the full length.
+        The kernels have the full length r. Q is R - r, so that no kernel reaches beyond step R of its
+        streamline.
         """
         if is_mirrored not in self._full_sums:
             kernel = self._kernel
@@ -244,18 +219,17 @@ class DriftingAverages:
                 self._full_sums[not is_mirrored] = sums
         return self._full_sums[is_mirrored]
 
-    def _sums_of_length(
-        self,
-        channel: int,
-        step: np.ndarray,
-        columns: np.ndarray,
-        length: np.ndarray,
-        is_mirrored: bool,
+    def _sums(
+        self, channel: int, step: np.ndarray, columns: np.ndarray, terms: list[tuple]
     ) -> np.ndarray:
-        """Return the (n,) complex64 weighted sums around steps, with a different kernel length for each."""
+        """Return (n,) complex64 weighted sums of the noise of one channel.
+
+        Sum j is around the step `step[j]` of the streamline `columns[j]`. `terms` are the `_kernel_terms` of
+        the kernels, whose lengths may differ.
+        """
         flat, stride = self._second_sums[channel].reshape(-1), self._second_sums.shape[2]
         total = np.zeros(len(step), dtype=np.complex64)
-        for offset, weight in _kernel_terms(self._kernel.kind, length, is_mirrored):
+        for offset, weight in terms:
             index = (self._middle + step + offset) * stride + columns
             total += np.asarray(weight, dtype=np.float32) * flat.take(index)
         return total

@@ -6,8 +6,8 @@ So lines whose width is a fraction of the distance between lines cover the same 
 and the tone is exact. Lines get wider in dark tones and thinner in light tones.
 
 Edges are smoothed by a box filter of at least a pixel. Where lines are too close for the pixels,
-they fade into their mean. Where foreshortening crowds the lines of one direction, lines in other
-directions are drawn before them, and lines at a larger distance on the surface replace them. Where
+they fade into their mean. Where foreshortening crowds the lines of one direction, they join only in darker
+tones than lines in other directions, and lines at a larger distance on the surface replace them. Where
 lines are too far apart, as in near parts of a perspective picture, further lines grow between them.
 """
 
@@ -105,35 +105,27 @@ class EvenLines:
         (P,) float32 ndarray
         """
         width = np.asarray(target_coverage, dtype=np.float32)
+        relief = self._relief(line, width, look)
         if self.coarse_streaks is None:
-            return width + self._relief(self.streaks[line], self.period[line], width, look)
+            return width + relief
         crowding = self.crowding(line, look)
-        covered = width + (1 - crowding) * self._relief(
-            self.streaks[line], self.period[line], width, look
-        )
+        covered = width + (1 - crowding) * relief
         crowded = np.flatnonzero(crowding)
-        coarse_period = np.float32(COARSE_RATIO) * self.period[line, crowded]
-        streak, width = self.coarse_streaks[line, crowded], width[crowded]
-        relief = self._relief(streak, coarse_period, width, look, crowded)
-        covered[crowded] += crowding[crowded] * relief
+        streak, period = self.coarse_streaks[line, crowded], self.period[line, crowded]
+        growth = None if self.growth is None else self.growth[crowded]
+        coarse = EvenLines(streak[None], np.float32(COARSE_RATIO) * period[None], growth)
+        covered[crowded] += crowding[crowded] * coarse._relief(0, width[crowded], look)
         return covered
 
-    def _relief(
-        self,
-        streak: np.ndarray,
-        period: np.ndarray,
-        width: np.ndarray,
-        look: PixelLook,
-        pixels: np.ndarray | slice = slice(None),
-    ) -> np.ndarray:
-        """Return the (n,) coverage of each of `pixels` by lines, minus their mean coverage `width`."""
-        position = np.float32(0.5) - np.float32(0.5) * streak
+    def _relief(self, line: int, width: np.ndarray, look: PixelLook) -> np.ndarray:
+        """Return the (P,) coverage of each pixel by lines, minus their mean coverage `width`."""
+        position, period = np.float32(0.5) - np.float32(0.5) * self.streaks[line], self.period[line]
         min_edge = np.float32(MAX_EDGE_WIDTH * (1 - look.crispness) ** 2)
         edge = np.clip(1 / np.maximum(period, np.float32(1e-6)), min_edge, 1)
         if self.growth is None:
             covered = _box_filtered(position, width, edge)
         else:
-            between = np.float32(0.5) * self.growth[pixels] * width
+            between = np.float32(0.5) * self.growth * width
             covered = _box_filtered(position, width - between, edge)
             covered += _box_filtered(np.float32(0.5) - position, between, edge)
         return resolved_share(period, look.supersampling) * (covered - width)
@@ -172,7 +164,10 @@ def resolved_share(period: np.ndarray, supersampling: int = 1) -> np.ndarray:
 
 
 def crowded_pixels(look: PixelLook) -> tuple[float, float]:
-    """Return `CROWDED_SHARES` as distances in pixels of the frame."""
+    """Return two distances between lines on screen, in pixels of the frame; see `CROWDED_SHARES`.
+
+    Lines closer than the first are fully crowded, lines farther apart than the second are not crowded.
+    """
     low, high = CROWDED_SHARES
     return low * look.line_distance, high * look.line_distance
 
@@ -240,11 +235,19 @@ def look_width_table(look: PixelLook) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def _width_table(breaks: float, wobble: float, paper_grain_amplitude: float) -> np.ndarray:
-    """Return the (COVERAGE_STEPS,) widths m that give mean widths from 0 to 1 once they vary.
+    """Return (COVERAGE_STEPS,) widths m of lines before breaks and paper grain change them.
 
-    The variations are normally distributed, and varied widths are clipped to 0 to 1.
-    The mean of clip(m + s X, 0, 1) for a normal X is g(m) - g(m - 1), with g(x) = x F(x / s) +
-    s f(x / s), where F is the distribution function and f the density of X. It is solved for m.
+    Breaks and grain add a normally distributed variation s X to the width, and the sum is clipped to 0 to 1.
+    The result has the m for which the mean of the clipped widths is 0 to 1, in even steps. The mean of
+    clip(m + s X, 0, 1) is g(m) - g(m - 1), with g(x) = x F(x / s) + s f(x / s), where F is the distribution
+    function and f the density of X. It is solved for m by bisection.
+
+    Parameters
+    ----------
+    breaks, wobble : float
+        Settings of the look. With the grain, they determine the standard deviation s.
+    paper_grain_amplitude : float
+        Standard deviation of the paper grain, in standard deviations of the streaks.
     """
     coverage = np.linspace(0, 1, COVERAGE_STEPS)
     amount = np.minimum(break_amount(coverage, breaks, wobble), MAX_BREAK_AMOUNT)
@@ -314,7 +317,7 @@ def even_lines(
 
 
 class _InstanceLines:
-    """The evenly spaced lines of one mesh instance. The other parameters are those of `even_lines`."""
+    """The evenly spaced lines of one mesh instance. All parameters but `instance` are as in `even_lines`."""
 
     def __init__(
         self,
@@ -348,19 +351,14 @@ class _InstanceLines:
         Returns
         -------
         streaks, period : (M, n) float32 ndarray
-            See `EvenLines`. `period` is the distance between lines with the ratio 1.
+            See `EvenLines`. `period` does not depend on `ratio`: it is the distance between lines at the
+            ratio 1.
         growth : (n,) float32 ndarray
             See `EvenLines`; 0 where no further lines grow.
         """
         instance, look = self._instance, self._look
-        lines = cached_surface_lines(
-            instance.surface,
-            instance.matrix,
-            instance.field,
-            look.display,
-            ratio * self._spacing,
-            self._cache,
-        )
+        geometry = instance.surface, instance.matrix, instance.field, look.display
+        lines = cached_surface_lines(*geometry, ratio * self._spacing, self._cache)
         streaks, period = np.empty((2, self._field.line_count, len(pixels)), dtype=np.float32)
         growth = np.zeros(len(pixels), dtype=np.float32)
         for block in reported_blocks(len(pixels), STEP_LABEL, 1.0, 1.0):
@@ -431,10 +429,7 @@ class _InstanceLines:
         """
         gbuffer = self._gbuffer
         triangle = gbuffer.triangle[entries]
-        tangent = [
-            heading[0] * first.take(triangle) + heading[1] * second.take(triangle)
-            for first, second in zip(*self._sides, strict=True)
-        ]
-        return view_plane_rotation(
-            tangent, gbuffer.geometric_normal[entries].T, gbuffer.view_direction[entries].T
-        )
+        first, second = self._sides.take(triangle, axis=2)
+        tangent = heading[0] * first + heading[1] * second
+        normal, view = gbuffer.geometric_normal[entries].T, gbuffer.view_direction[entries].T
+        return view_plane_rotation(tangent, normal, view)

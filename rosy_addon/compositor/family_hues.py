@@ -92,9 +92,8 @@ def line_families(field: PixelField, look: PixelLook) -> list[np.ndarray] | None
     for member in all_members(field, look.guiding_angle)[: field.line_count]:
         # The angle from the stored line, in steps of one family. It is 0 where no line is stored:
         # adding 0 turns -0, whose angle can be pi, into +0.
-        relative = (
-            member.astype(np.complex128) ** (field.degree // family_count) * stored_line.conj() + 0
-        )
+        line = member.astype(np.complex128) ** (field.degree // family_count)
+        relative = line * stored_line.conj() + 0
         line_offset = np.rint(np.angle(relative) * (family_count / (2 * np.pi)))
         labels.append(line_offset.astype(np.intp) % family_count)
     return labels

@@ -106,9 +106,8 @@ def fast_lic(
         rows = start - margin, min(stop + margin, strip.height)
         extent = entries_of_rows(field.pixel, field.width, rows)
     images = []
-    for look, (sums, slopes) in zip(
-        looks, _line_averages(field, extent, drawn, looks, noise), strict=True
-    ):
+    averages = _line_averages(field, extent, drawn, looks, noise)
+    for look, (sums, slopes) in zip(looks, averages, strict=True):
         members = np.empty((*sums.shape[:2], sums.shape[2] - 1), dtype=np.float32)
         for line_sums, member in zip(sums, members, strict=True):
             _write_averages(line_sums, look, member)
@@ -150,9 +149,9 @@ def _line_averages(
         own_noise = blend_channels(own_noise, looks[0].flow_phase)
     for table in tables:
         table.init_undefined(covering.cell_of_pixel[undefined], own_noise)
-    cell_limits = [_pixels_to_cells(limit, extent, covering) for limit in step_limits]
+    line_limits = [_line_limits(limit, extent, covering) for limit in step_limits]
     with progress(0.1, 0.9):
-        _cover_all_lines(covering, tables, looks, cell_limits)
+        _cover_all_lines(covering, tables, looks, line_limits)
     averages = []
     for look, table in zip(looks, tables, strict=True):
         if is_fine(look):
@@ -162,10 +161,10 @@ def _line_averages(
     return averages
 
 
-def _pixels_to_cells(
+def _line_limits(
     step_limit: np.ndarray | None, extent: slice, covering: Covering
 ) -> np.ndarray | None:
-    """Return the (C,) intp step limits of the cells of a covering, given the (P,) limits of pixels.
+    """Return the (M C,) intp step limits of the lines of a covering, given the (P,) limits of pixels.
 
     None if `step_limit` is None.
     """
@@ -173,7 +172,7 @@ def _pixels_to_cells(
         return None
     cell_limit = np.zeros(covering.cell_count, dtype=np.intp)
     cell_limit[covering.cell_of_pixel] = step_limit[extent]
-    return cell_limit
+    return np.tile(cell_limit, covering.line_count)
 
 
 def _write_averages(line_sums: np.ndarray, look: PixelLook, member: np.ndarray) -> None:
@@ -298,7 +297,10 @@ class _LineAverages:
 
     @staticmethod
     def _or_own(values: np.ndarray, own: np.ndarray) -> np.ndarray:
-        """Replace (n, K + 1) values that hold no average by those of `own`, in place, and return `values`."""
+        """Copy rows of `own` to the (n, K + 1) `values` where these have no average, and return `values`.
+
+        A row has no average if its effective samples, in the last column, are not above 0.
+        """
         unknown = np.flatnonzero(values[:, -1] <= 0)
         values[unknown] = own[unknown]
         return values
@@ -350,8 +352,7 @@ def _cover_all_lines(
         seeds = missing[(priority >= last) & (priority < threshold)]
     for forward, left in FILL_OFFSETS:
         (source,) = covering.neighbor_lines(missing, [(forward, left)])
-        remaining = [table.copy_from(missing, source) for table in averages]
-        missing = remaining[0]
+        missing, *_ = [table.copy_from(missing, source) for table in averages]
     # Each line whose neighbors have no average either gets a streamline for itself alone (no half window).
     batch_size = min(_batch_size(look.streamline_reach()), len(missing))
     batch = StreamlineBatch(covering, looks, step_limits, 0, batch_size, fine)
@@ -364,9 +365,16 @@ def _write_streamlines(
     averages: Sequence[_LineAverages],
     steps: Iterable[tuple[np.ndarray, list[np.ndarray], np.ndarray]],
 ) -> None:
-    """Store the averages that `StreamlineBatch.trace` yields in `averages`, one of which is for each look.
+    """Store the averages of a batch of streamlines.
 
     If several streamlines pass a line, one that passes near the center of the cell wins.
+
+    Parameters
+    ----------
+    averages : sequence of _LineAverages
+        The averages for each look, which are changed.
+    steps : iterable
+        What `StreamlineBatch.trace` yields for each step of the streamlines.
     """
     centered_lines: list[np.ndarray] = []
     centered_values: list[list[np.ndarray]] = [[] for _ in averages]

@@ -17,11 +17,7 @@ Kernel = Literal["box", "taper", "ramp"]
 
 
 #: How much the weights of samples fall from the center to the end of a streamline: forward, backward.
-WEIGHT_SLOPES: dict[Kernel, tuple[float, float]] = {
-    "box": (0.0, 0.0),
-    "taper": (1.0, 1.0),
-    "ramp": (1.0, -1.0),
-}
+WEIGHT_SLOPES: dict[Kernel, tuple[int, int]] = {"box": (0, 0), "taper": (1, 1), "ramp": (1, -1)}
 
 
 #: The kernel of each value of `Look.fade`.
@@ -75,10 +71,9 @@ def kernel_weights(forward: Any, backward: Any, full_length: Any, kernel: Kernel
     if kernel == "box":
         return KernelWeights(*[1 + forward + backward] * 2)
     slope = 1 / (1 + np.asarray(full_length, dtype=np.result_type(forward)))
-    (forward_sum, forward_squares), (backward_sum, backward_squares) = (
-        _weight_sums(count, direction * slope)
-        for count, direction in zip((forward, backward), WEIGHT_SLOPES[kernel], strict=True)
-    )
+    forward_slope, backward_slope = WEIGHT_SLOPES[kernel]
+    forward_sum, forward_squares = _weight_sums(forward, forward_slope * slope)
+    backward_sum, backward_squares = _weight_sums(backward, backward_slope * slope)
     total = 1 + forward_sum + backward_sum
     return KernelWeights(total, total**2 / (1 + forward_squares + backward_squares))
 

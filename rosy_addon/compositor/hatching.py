@@ -16,7 +16,7 @@ they do not change the tone.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,13 +27,14 @@ from .family_hues import line_families
 from .image_noise import NOISE_MEAN
 from .inks import MAX_INKS, has_ink_per_line, ink_count, inks_of
 from .lic_images import LicImages, magnitude_ends, relative_magnitude
-from .look import colors_magnitude, is_hatched
+from .look import colors_magnitude, is_even, is_hatched
 from .look_units import PixelLook
 from .paper_grain import PAPER_GRAIN_STRENGTH
 from .pixel_field import PixelField, all_members
 from .streak_statistics import (
     COVERAGE_STEPS,
     break_amount,
+    break_steps,
     look_streak_statistics,
     smoothstep,
     softness,
@@ -165,9 +166,8 @@ class HatchedLines(NamedTuple):
             spots = self.spots(line)
             undefined = np.flatnonzero(~np.isnan(spots))
             thresholds = look_streak_statistics(look).disc_threshold
-            coverage[undefined] = _above_threshold(
-                spots[undefined], target_coverage[undefined], thresholds, look
-            )
+            spots, target = spots[undefined], target_coverage[undefined]
+            coverage[undefined] = _above_threshold(spots, target, thresholds, look)
         return coverage
 
 
@@ -252,9 +252,8 @@ def _render_many_inks(
     shares = line_shares(field, look, transmittance, lines.even_lines)
     for line, share in enumerate(shares):
         ink = inks.ink_at_tone(ink_indices[line], tone)
-        target_coverage = inks.required_coverage(
-            target_transmittance[line % len(target_transmittance)] ** share, ink
-        )
+        line_transmittance = target_transmittance[line % len(target_transmittance)] ** share
+        target_coverage = inks.required_coverage(line_transmittance, ink)
         coverage = lines.coverage(line, target_coverage)
         transmitted *= 1 - coverage[:, None] * (1 - inks.transmittance(ink))
         bare_paper *= 1 - coverage
@@ -288,9 +287,21 @@ def _above_threshold(
     look: PixelLook,
     slope: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Return 1 where streaks exceed the threshold of the target coverage, with soft edges.
+    """Return (P,) coverages: 1 where streaks exceed the threshold of the target coverage, with soft edges.
 
-    If `slope` is given, edges are at least as soft as those of a mean over a pixel.
+    Parameters
+    ----------
+    streak : (P,) ndarray
+        Streaks with mean 0 and standard deviation 1.
+    target_coverage : (P,) ndarray
+        0 to 1.
+    thresholds : (COVERAGE_STEPS,) ndarray
+        Threshold for each coverage from 0 to 1: `StreakStatistics.threshold` or `disc_threshold`.
+    look : PixelLook
+        Its `crispness` is used.
+    slope : (P,) ndarray, optional
+        Change of the streak across the line, per pixel. Edges are then at least as soft as in a mean over a
+        pixel.
     """
     threshold = np.interp(target_coverage, np.linspace(0, 1, COVERAGE_STEPS), thresholds)
     half_width = np.float32(softness(look.crispness))
@@ -307,6 +318,30 @@ def _above_threshold(
 def has_breaks(look: Any) -> bool:
     """Return whether lines are broken into pieces, or vary in width as drawn by hand."""
     return is_hatched(look) and (look.breaks > 0 or look.wobble > 0)
+
+
+def line_images(
+    look: PixelLook, convolve: Callable[[list[PixelLook]], list[LicImages]]
+) -> tuple[LicImages | None, LicImages | None]:
+    """Compute the LIC images that the lines of a look are drawn with.
+
+    Parameters
+    ----------
+    look : PixelLook
+    convolve : callable
+        Function that computes LIC images for looks that differ in the length of streamlines, the longest
+        first.
+
+    Returns
+    -------
+    images, break_images : LicImages or None
+        See `HatchedLines`.
+    """
+    looks = [] if is_even(look) else [look]
+    if has_breaks(look):
+        looks.append(look.with_length(break_steps(look)))
+    images = convolve(looks) if looks else []
+    return None if is_even(look) else images[0], images[-1] if has_breaks(look) else None
 
 
 def has_overshoot(look: Any) -> bool:
@@ -429,13 +464,22 @@ def line_shares(
 
 
 def onset_weights(darkness: np.ndarray, delays: Sequence[np.ndarray | float]) -> list[np.ndarray]:
-    """Compute how much each line has joined the hatching at a darkness, 0 to 1.
+    """Compute the weight with which each line takes part in the hatching of a tone.
 
-    `delays` are the darkness at which each line joins. The result has an array for each line.
+    Parameters
+    ----------
+    darkness : ndarray
+        1 - transmittance of the tone, 0 to 1.
+    delays : sequence of ndarray or float
+        For each line, the darkness at which it joins.
+
+    Returns
+    -------
+    list of ndarray
+        Weight of each line, from 0 (does not take part) to 1.
     """
-    return [
-        smoothstep((darkness - delay + ONSET_LEAD) / (ONSET_RANGE + ONSET_LEAD)) for delay in delays
-    ]
+    extent = ONSET_RANGE + ONSET_LEAD
+    return [smoothstep((darkness - delay + ONSET_LEAD) / extent) for delay in delays]
 
 
 def _onset_darkness(

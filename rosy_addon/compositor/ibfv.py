@@ -15,11 +15,12 @@ sum is doubled instead:
 A^D is given by the point D steps upstream on the streamline of each state (see `streamline_origins`).
 A few doublings replace more than a hundred blends. Each doubling interpolates values only once.
 
-Noise that varies in time makes the streaks drift. It is interpolated between the three channels of the
-flow, by a constant and a cosine and sine of the phase: n_c at the phase -c / 3. The squares of the weights
-(1 + 2 cos) / 3 have the sum 1, so the contrast is constant. There is one frequency, and A does not depend on
-the time. So the picture of any frame is a blend of the same three images: averages of the constant, the
-cosine and the sine part of the noise. No frame depends on earlier frames, and animations can loop.
+Noise that varies in time makes the streaks drift. It is the sum of the three channels n_c of the flow, with
+the weights (1 + 2 cos(2 pi (phase + c / 3))) / 3, so it is n_c at the phase -c / 3. The squares of the
+weights have the sum 1, so the contrast is constant. The noise is thus a constant part, plus a cosine part and
+a sine part that are multiplied by the cosine and the sine of 2 pi phase. A does not depend on the time. So
+the picture of any frame is a blend of the same three images: the averages of the three parts. No frame
+depends on earlier frames, and animations can loop.
 
 Streaks of a field of odd degree are averages upstream along its directions. In a field of even degree, a
 line is a pair of opposite sheets, and its streaks are the mean of both.
@@ -141,10 +142,8 @@ def streak_waves(
         with progress(start, stop):
             origins = _doubled(sheets, sums, 1 << doubling, origins, doubling == doublings - 1)
     with progress(0.9, 1.0):
-        return [
-            _line_waves(field, covering, each, total)
-            for each, total in zip(looks, sums, strict=True)
-        ]
+        pairs = zip(looks, sums, strict=True)
+        return [_line_waves(field, covering, each, total) for each, total in pairs]
 
 
 def _noise_sources(noise: np.ndarray, look: PixelLook) -> list[np.ndarray]:
@@ -177,7 +176,10 @@ def _noise_sources(noise: np.ndarray, look: PixelLook) -> list[np.ndarray]:
 
 
 def _step_turn(look: PixelLook) -> float:
-    """Return the angle by which the phase of the noise changes with each step of the streamline."""
+    """Return the change of the phase of the noise from one step of a streamline to the next, in radians.
+
+    Streaks drift by `flow_distance` steps while the phase makes a full turn.
+    """
     if not has_flow(look):
         return 0.0
     angle = 2 * np.pi / look.flow_distance
@@ -243,9 +245,10 @@ def decay_of_samples(effective_samples: np.ndarray, two_sided: bool) -> np.ndarr
 
 
 def _square_sum(rest: np.ndarray | float, decay: np.ndarray) -> np.ndarray:
-    """Return the sum of the squared weights along one direction, up to the step with the weight `rest`.
+    """Return the sum of the squared weights of the steps along one direction.
 
-    `decay` is the ratio q of the weights of successive steps.
+    The weights are `OWN_WEIGHT`, q, q^2 and so on, where q is `decay`. The last one is `rest`, which is 0 if
+    the streamline does not end.
     """
     return OWN_WEIGHT**2 + decay**2 * (1 - np.square(rest)) / (1 - decay**2)
 
@@ -283,17 +286,22 @@ class _Sums:
         q, the ratio of the weights of successive steps.
     turn : float
         Angle in radians by which the second source is rotated at each step.
+
+    Attributes
+    ----------
+    values : list of (S C,) complex64 ndarray
+        Sum of each source over the first D steps upstream of each state, in which the noise at the pixel
+        itself has the weight 1.
+    weight : (P,) or () float32 ndarray
+        q^D, the weight of the next D steps.
     """
 
     def __init__(
         self, sheets: Sheets, sources: list[np.ndarray], decay: np.ndarray, turn: float
     ) -> None:
-        self._sheets = sheets
-        self.sources = sources
-        self.decay = decay
-        # q^D, the weight of the D steps by which the next doubling extends the sums.
+        self._sheets, self._turn = sheets, turn
+        self.sources, self.decay = sources, decay
         self.weight = decay
-        self._turn = turn
         size = sheets.count * sheets.cell_count
         self.values = [np.zeros(size, dtype=np.complex64) for _ in sources]
         for _, block, state in sheets.blocks():
@@ -315,7 +323,7 @@ class _Sums:
         values : (n,) complex64 ndarray
             Sums that arrive at the pixels of a block.
         steps : int
-            D; the attribute `weight` must be the weight of as many steps.
+            D, for which the attribute `weight` is q^D.
         block : slice
             The pixels.
         """
@@ -346,9 +354,8 @@ class _Sums:
         ]
         weight = values[0].imag
         decay = self.decay[block] if np.ndim(self.decay) else self.decay
-        rest = 1 - (weight - np.float32(OWN_WEIGHT)) * (1 - decay) / np.maximum(
-            decay, np.float32(1e-6)
-        )
+        other_weight = weight - np.float32(OWN_WEIGHT)
+        rest = 1 - other_weight * (1 - decay) / np.maximum(decay, np.float32(1e-6))
         return values, weight, _square_sum(np.clip(rest, 0, 1), decay).astype(np.float32)
 
 
@@ -389,9 +396,8 @@ def _line_waves(field: PixelField, covering: Covering, look: PixelLook, sums: _S
     effective_samples = np.zeros(count, dtype=np.float32)
     for line, first_sheet in enumerate(member_lines(field).tolist()):
         for block in reported_blocks(count, "blending lines", line / lines, (line + 1) / lines):
-            state = first_sheet * covering.cell_count + covering.cell_of_pixel[block].astype(
-                np.intp
-            )
+            cell = covering.cell_of_pixel[block].astype(np.intp)
+            state = first_sheet * covering.cell_count + cell
             if covering.has_directions:
                 is_along = bool(covering.is_along_member(state[:1])[0])
                 opposite = first_sheet + (lines if is_along == (look.kernel != "ramp") else 0)

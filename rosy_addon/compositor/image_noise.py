@@ -128,9 +128,8 @@ def tile_rectangle(
     column = pixel % np.int32(width)
     left, right = int(column.min()) // subpixels, int(column.max()) // subpixels + 1
     bottom, top = (int(end) // width // subpixels for end in pixel[[0, -1]])
-    return TileRectangle(
-        *_round_outward(left, right + extra_columns), *_round_outward(bottom, top + 1)
-    )
+    columns, rows = _round_outward(left, right + extra_columns), _round_outward(bottom, top + 1)
+    return TileRectangle(*columns, *rows)
 
 
 def _round_outward(start: int, stop: int) -> tuple[int, int]:
@@ -139,9 +138,7 @@ def _round_outward(start: int, stop: int) -> tuple[int, int]:
 
 
 def cached_tiles(
-    create: Callable[..., np.ndarray],
-    rectangle: TileRectangle,
-    *settings: Hashable,
+    create: Callable[..., np.ndarray], rectangle: TileRectangle, *settings: Hashable
 ) -> np.ndarray:
     """Return the result of ``create(rectangle, *settings)``, from the cache if it is there.
 
@@ -203,12 +200,7 @@ def image_noise(
 
 
 def _noise_tiles(
-    rectangle: TileRectangle,
-    cell: float,
-    seed: int,
-    channel: int,
-    density: float,
-    high_pass: float,
+    rectangle: TileRectangle, cell: float, seed: int, channel: int, density: float, high_pass: float
 ) -> np.ndarray:
     """Return the flat float32 noise of one channel in a rectangle, row by row, averaged over each pixel."""
     full_margin = high_pass_margin(high_pass)
@@ -237,7 +229,7 @@ def _noise_tiles(
 
 
 def high_pass_margin(high_pass: float) -> int:
-    """Return the radius in pixels around a pixel on which its noise depends because of the high pass."""
+    """Return the radius of the high-pass filter: up to which distance in pixels it reads other pixels."""
     return int(np.ceil(3 * BLUR_FACTOR * high_pass))
 
 
@@ -265,32 +257,28 @@ def gaussian_blur(
     (H, W) float32 ndarray
     """
     radius = box_radius(sigma)
-    for index, axis in enumerate((0, 1, 0, 1, 0, 1)):
-        blurred = np.empty(image.shape, dtype=np.float32)
-        for start in range(0, image.shape[1 - axis], BLUR_LINES):
-            report((index + start / image.shape[1 - axis]) / 6, STEP_LABEL)
-            lines = [slice(None), slice(None)]
-            lines[1 - axis] = slice(start, start + BLUR_LINES)
-            blurred[tuple(lines)] = _box_filter(image[tuple(lines)], radius, axis, outside)
+    for index in range(6):
+        # Blur along the columns, and transpose.
+        blurred = np.empty(image.shape[::-1], dtype=np.float32)
+        for start in range(0, image.shape[1], BLUR_LINES):
+            report((index + start / image.shape[1]) / 6, STEP_LABEL)
+            lines = slice(start, start + BLUR_LINES)
+            blurred[lines] = _box_filter(image[:, lines], radius, outside).T
         image = blurred
     return image
 
 
-def _box_filter(image: np.ndarray, radius: int, axis: int, outside: str) -> np.ndarray:
-    """Return the mean over 2 * radius + 1 pixels along an axis; `outside` as in `gaussian_blur`."""
-    pads = [(0, 0), (0, 0)]
-    pads[axis] = (radius + 1, radius)
-    fill = {"mode": "edge"} if outside == "edge" else {"constant_values": NOISE_MEAN}
-    prefix_sum = np.pad(image, pads, **fill).astype(np.float64)
+def _box_filter(image: np.ndarray, radius: int, outside: str) -> np.ndarray:
+    """Return the mean over 2 * radius + 1 pixels along the columns; `outside` as in `gaussian_blur`."""
+    low, high = (image[0], image[-1]) if outside == "edge" else (NOISE_MEAN, NOISE_MEAN)
+    window = 2 * radius + 1
+    prefix_sum = np.empty((len(image) + window, image.shape[1]))
+    prefix_sum[: radius + 1], prefix_sum[-radius:] = low, high
+    prefix_sum[radius + 1 : -radius] = image
     prefix_sum *= 1 / BLUR_QUANTUM
     np.rint(prefix_sum, out=prefix_sum)
-    np.cumsum(prefix_sum, axis=axis, out=prefix_sum)
-    size, window = image.shape[axis], 2 * radius + 1
-    after, before = (
-        prefix_sum[:, start : start + size] if axis else prefix_sum[start : start + size]
-        for start in (window, 0)
-    )
-    mean = after - before
+    np.cumsum(prefix_sum, axis=0, out=prefix_sum)
+    mean = prefix_sum[window:] - prefix_sum[:-window]
     mean *= BLUR_QUANTUM / window
     return mean
 
@@ -332,11 +320,13 @@ def streak_moments(
 
     Notes
     -----
-    Let S(k) be the power spectrum of the noise. The covariance of the means along two lines of
-    length l through a point, in the directions u and v, is the integral of
-    S(k) sinc(l k.u) sinc(l k.v). For a lattice of bits with cells of side g, averaged over pixels,
-    minus a Gaussian blur with the standard deviation s, S is
-    g^2 / 4 [sinc(g kx) sinc(g ky) sinc(kx') sinc(ky') (1 - exp(-2 pi^2 s^2 k^2))]^2.
+    Let S(k) be the power spectrum of the noise at the frequency k, in cycles per pixel. The covariance of
+    the means along two lines of length l through a point, in the directions of the unit vectors u and v, is
+    the integral of S(k) sinc(l k.u) sinc(l k.v). For a lattice of bits with cells of side g, averaged over
+    pixels, minus a Gaussian blur with the standard deviation s, S is
+    g^2 / 4 [sinc(g cx) sinc(g cy) sinc(kx) sinc(ky) (1 - exp(-2 pi^2 s^2 k^2))]^2,
+    where (kx, ky) are the components of k along the rows and columns of pixels, and (cx, cy) are its
+    components along the axes of the lattice.
     Here it is averaged over all directions, and the integral is taken in polar coordinates. Tapered
     weights are a box filter of half the length applied twice: sinc(l k.u) becomes
     sinc(l k.u / 2)^2. The response of a ramp is complex, with the derivative of the sinc.
@@ -344,18 +334,14 @@ def streak_moments(
     k, dk = np.linspace(0, 4 / (1 + cell), 700, retstep=True)
     angle = np.arange(1440) * np.pi / 1440
     kx, ky = np.outer(k, np.cos(angle)), np.outer(k, np.sin(angle))
-    cx, cy = (
-        np.cos(LATTICE_ANGLE) * kx - np.sin(LATTICE_ANGLE) * ky,
-        np.sin(LATTICE_ANGLE) * kx + np.cos(LATTICE_ANGLE) * ky,
-    )
+    cosine, sine = np.cos(LATTICE_ANGLE), np.sin(LATTICE_ANGLE)
+    cx, cy = cosine * kx - sine * ky, sine * kx + cosine * ky
     amplitude = np.sinc(cell * cx) * np.sinc(cell * cy) * np.sinc(kx) * np.sinc(ky)
     if average > 1:
         amplitude *= np.sinc(average * kx) * np.sinc(average * ky)
     power = (cell * NOISE_STD * amplitude) ** 2
-    high_pass_gain = (
-        1 - np.exp(-2 * (np.pi * BLUR_FACTOR * high_pass * k) ** 2) if high_pass else 1.0
-    )
-    weight = power.mean(axis=1) * high_pass_gain**2 * k * dk * (2 * np.pi / len(angle))
+    blur = np.exp(-2 * (np.pi * BLUR_FACTOR * high_pass * k) ** 2) if high_pass else 0.0
+    weight = power.mean(axis=1) * (1 - blur) ** 2 * k * dk * (2 * np.pi / len(angle))
     response = _line_response(length * kx, kernel)
     variance = weight @ np.sum(np.abs(response) ** 2, axis=1)
     correlation_sum = 0.0

@@ -80,10 +80,8 @@ def ink_of_thresholds(
     """
     layers, inks = layer_inks(look, line_count)
     required = inks.target_transmittance(inks.complement_if_light(tone))
-    colors = [
-        inks.ink_at_tone(np.full(len(tone), min(layer, len(inks.dark) - 1)), tone)
-        for layer in range(layers)
-    ]
+    indices = [min(layer, len(inks.dark) - 1) for layer in range(layers)]
+    colors = [inks.ink_at_tone(np.full(len(tone), index), tone) for index in indices]
     left = [1 - inks.required_coverage(required, ink) for ink in colors]
     shares = layer_shares(1 - left[0], layers, look.layering)
     thresholds = [pixels[:, layer].view(_Values) for layer in range(MAX_LAYERS)]
@@ -94,10 +92,8 @@ def ink_of_thresholds(
     bare = np.ones(len(tone), dtype=np.float32)
     # The first layer is drawn last, on top of the others.
     for layer in reversed(range(layers)):
-        left_by_layer = left[layer].view(_Values)
-        covered = np.asarray(
-            layer_coverage(left_by_layer, shares[layer], thresholds[layer], filtered, edge_factor)
-        )
+        parameters = left[layer].view(_Values), shares[layer], thresholds[layer]
+        covered = np.asarray(layer_coverage(*parameters, filtered, edge_factor))
         bare *= 1 - covered
         part = covered / np.maximum(1 - bare, np.float32(1e-6)) if not is_opaque else covered
         color = color + part[:, None] * (colors[layer] - color)
@@ -110,9 +106,11 @@ class FilteredEdges(NamedTuple):
     Attributes
     ----------
     edge
-        Half the width of an even distribution with the spread of the averaged thresholds.
+        Half the width of a soft edge, in thresholds (0 to 1): half the width of the uniform distribution
+        that has the same variance as the averaged thresholds.
     correction
-        Factor of the correction of coverages; see `FILTER_CORRECTION`.
+        Strength of the correction that keeps the mean coverage; see `FILTER_CORRECTION`. 0 where no
+        thresholds have been averaged.
     """
 
     edge: Any
@@ -149,14 +147,15 @@ def layer_coverage(
     Parameters
     ----------
     left
-        The transmittance that the lines of all layers together should have.
+        The fraction of the paper that the lines of all layers together should leave bare.
     share
-        Exponent of `left` for the lines of this layer; see `layer_shares`.
+        Share of this layer in the ink: it should leave ``left ** share`` bare; see `layer_shares`.
     threshold
         Threshold of the layer.
     filtered : FilteredEdges
     edge_factor
-        `DENSITY_FACTOR` times the softness of edges.
+        `DENSITY_FACTOR` times the `softness` of the edges of ink. It is multiplied by c (1 - c), for the
+        coverage c, to get half the width of edges in thresholds.
     """
     coverage = 1 - left.at_least(MIN_TRANSMITTANCE) ** share
     # Edges as wide as this leave the mean coverage of all thresholds unchanged.

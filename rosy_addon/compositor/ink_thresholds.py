@@ -22,22 +22,12 @@ from dataclasses import replace
 import numpy as np
 
 from .even_lines import COARSE_RATIO, EvenLines, resolved_share, uneven_width
-from .hatching import (
-    HatchedLines,
-    line_ranks,
-    onset_weights,
-    soft_rank_of,
-    standard_streak,
-)
+from .hatching import HatchedLines, line_ranks, onset_weights, soft_rank_of, standard_streak
 from .lic_images import LicImages
 from .look import Look
 from .look_units import PixelLook
 from .pixel_field import PixelField
-from .streak_statistics import (
-    COVERAGE_STEPS,
-    break_amount,
-    look_streak_statistics,
-)
+from .streak_statistics import COVERAGE_STEPS, break_amount, look_streak_statistics
 
 #: Number of lines whose thresholds are stored.
 MAX_LAYERS = 3
@@ -381,10 +371,8 @@ def picture_thresholds(
             sample, period = _even_sample(even_lines, crowding > level, node)
             part = part._replace(even_lines=sample)
             resolved = np.einsum("klp,lp->kp", places, resolved_share(period, samples_per_side))
-        part = part._replace(
-            images=_streak_sample(images, node),
-            break_images=_streak_sample(part.break_images, node),
-        )
+        sampled, broken = (_streak_sample(each, node) for each in (images, lines.break_images))
+        part = part._replace(images=sampled, break_images=broken)
         thresholds = np.stack([line_thresholds(line, part) for line in range(len(rank))])
         ordered = ordered_thresholds(thresholds, places, field.representation == 0, look)
         if lines.outline is not None:
@@ -399,7 +387,10 @@ def picture_thresholds(
 
 
 def _streak_sample(images: LicImages | None, node: float) -> LicImages | None:
-    """Return LIC images sampled beside the centers of pixels, at a position `node` of `PIXEL_NODES`."""
+    """Return LIC images at points beside the centers of pixels, or None for None.
+
+    The points are `node`, from `PIXEL_NODES`, times `STREAK_REACH` pixels to the left of the lines.
+    """
     if images is None or images.slopes is None or not node:
         return images
     shift = np.float32(STREAK_REACH * node) * images.slopes

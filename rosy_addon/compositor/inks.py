@@ -94,8 +94,7 @@ class Inks:
         upper = np.minimum(lower + 1, len(self.dark) - 1)
         fraction = (index - lower).astype(np.float32)[:, None]
         dark, light = (
-            colors[lower] + fraction * (colors[upper] - colors[lower])
-            for colors in (self.dark, self.light)
+            ink[lower] + fraction * (ink[upper] - ink[lower]) for ink in (self.dark, self.light)
         )
         return dark + tone[:, None] * (light - dark)
 
@@ -104,9 +103,8 @@ class Inks:
 
         If the ink is lighter than the paper, it is the ratio of the complements, (1 - ink) / (1 - paper).
         """
-        return self.complement_if_light(ink) / np.maximum(
-            self.complement_if_light(self.paper), 1e-3
-        )
+        paper = np.maximum(self.complement_if_light(self.paper), 1e-3)
+        return self.complement_if_light(ink) / paper
 
     def luminance_transmittance(self, ink: np.ndarray) -> np.ndarray:
         """Return the (...,) ratio of the luminances of ink and paper.
@@ -122,11 +120,8 @@ class Inks:
 
     def required_coverage(self, target_transmittance: np.ndarray, ink: np.ndarray) -> np.ndarray:
         """Return the (P,) coverage at which (P, 3) ink has the luminance transmittance that is asked for."""
-        return np.clip(
-            (1 - target_transmittance) / np.maximum(1 - self.luminance_transmittance(ink), 1e-3),
-            0,
-            1,
-        )
+        opacity = np.maximum(1 - self.luminance_transmittance(ink), 1e-3)
+        return np.clip((1 - target_transmittance) / opacity, 0, 1)
 
     def on_paper(self, ink: np.ndarray, coverage: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the (P, 3) color, not premultiplied, and (P,) opacity of ink that covers the paper.
@@ -198,7 +193,8 @@ def is_light(look: Look) -> bool:
 def _ink_series(code: str, count: int) -> np.ndarray:
     """Return (count, 3) float32 linear colors: an ink, and variants with other hues.
 
-    The variants have the lightness and chroma of the ink, within the limits of this module.
+    `code` is the color of the ink as ``#rrggbb``. The variants have its lightness and chroma in Oklab, but
+    the lightness is clipped to `LIGHTNESS_RANGE`, and the chroma is at least `MIN_CHROMA`.
     """
     base_ink = to_linear(from_hex(code))
     lightness, a, b = _LMS_TO_LAB @ np.cbrt(_RGB_TO_LMS @ base_ink)
@@ -206,13 +202,8 @@ def _ink_series(code: str, count: int) -> np.ndarray:
     hue = np.arctan2(b, a) if chroma > ACHROMATIC_CHROMA else np.radians(FIRST_HUE)
     hues = hue + np.radians(HUE_STEP) * np.arange(1, min(count, MAX_INKS))
     chroma = max(chroma, MIN_CHROMA)
-    lab = np.stack(
-        [
-            np.full(len(hues), np.clip(lightness, *LIGHTNESS_RANGE)),
-            chroma * np.cos(hues),
-            chroma * np.sin(hues),
-        ]
-    )
+    lightness = np.full(len(hues), np.clip(lightness, *LIGHTNESS_RANGE))
+    lab = np.stack([lightness, chroma * np.cos(hues), chroma * np.sin(hues)])
     lms = np.linalg.solve(_LMS_TO_LAB, lab) ** 3
     other_inks = np.clip(np.linalg.solve(_RGB_TO_LMS, lms), 0, 1).T
     return np.concatenate([base_ink[None], other_inks]).astype(np.float32)

@@ -22,11 +22,7 @@ from .strips import Strip
 
 
 def lic_lengths(
-    field: PixelField,
-    looks: Sequence[PixelLook],
-    noise: np.ndarray,
-    strip: Strip | None = None,
-    method: str = "",
+    field: PixelField, looks: Sequence[PixelLook], noise: np.ndarray, strip: Strip | None = None
 ) -> list[LicImages]:
     """Compute LIC images: average noise along the streamlines of each member of the field.
 
@@ -34,13 +30,13 @@ def lic_lengths(
     ----------
     field : PixelField
     looks : sequence of PixelLook
-        They differ in the length of streamlines. The first has the greatest length.
+        They differ in the length of streamlines. The first has the greatest length. Their `method` says
+        which module computes the images: "sheets" is `fast_lic`, "ibfv" is `ibfv`, and "members" and
+        "brute" are in `per_pixel_lic`.
     noise : (P, K) float32 ndarray
     strip : Strip, optional
         Rows to draw. With the method "sheets", the images have the pixels of its `averaged_rows`; other
         methods draw all pixels.
-    method : str
-        LIC method; by default the `method` of the looks.
 
     Returns
     -------
@@ -48,7 +44,7 @@ def lic_lengths(
         One for each look.
     """
     raise_mmap_threshold()
-    method = method or looks[0].method
+    method = looks[0].method
     if method == "sheets":
         return fast_lic(field, looks, noise, strip)
     if method == "ibfv":

@@ -42,12 +42,9 @@ class LicImages:
 
     def part(self, extent: slice) -> LicImages:
         """Return the LIC images at the pixels `extent`."""
-        return LicImages(
-            self.members[:, extent],
-            self.blend[extent],
-            self.effective_samples[extent],
-            None if self.slopes is None else self.slopes[:, extent],
-        )
+        members, blend = self.members[:, extent], self.blend[extent]
+        slopes = None if self.slopes is None else self.slopes[:, extent]
+        return LicImages(members, blend, self.effective_samples[extent], slopes)
 
 
 def lic_images(

@@ -16,6 +16,7 @@ from ..core.settings import (
     check_settings,
     choice,
     color,
+    fraction,
     number,
     numbers,
     settings_of,
@@ -88,8 +89,18 @@ def has_tone_inks(look: Any) -> bool:
 
 
 def _shading(panel: str, applies: Callable[[Any], bool] = always) -> dict[str, Any]:
-    """Return the arguments of a setting that LIC images do not depend on, shown in the given panel."""
+    """Return arguments for `number`, `choice` and so on: the setting has no effect on LIC images.
+
+    `panel` and `applies` are attributes of `Setting`: where the setting is shown, and when it has an effect.
+    """
     return {"panel": panel, "stage": Stage.SHADING, "applies": applies}
+
+
+def _pixel_length(
+    default: float, high: float, text: str, low: float = 0.0, **description: Any
+) -> Any:
+    """Return a dataclass field for a setting that is a length in pixels; see `Number.is_pixel_length`."""
+    return number(default, low, high, text, is_pixel_length=True, **description)
 
 
 def _ink(applies: Callable[[Any], bool] = is_hatched) -> dict[str, Any]:
@@ -166,12 +177,11 @@ class Look:
         panel="streaks",
         panel_label="Pixel Size",
     )
-    length: int = number(
+    length: int = _pixel_length(
         40,
-        1,
         8000,
         "Length of the streaks in pixels, in each direction",
-        is_pixel_length=True,
+        low=1,
         panel="streaks",
         applies=_has_streaks,
     )
@@ -188,42 +198,36 @@ class Look:
         panel="streaks",
         applies=_has_streaks,
     )
-    arrows: float = number(
-        0.0,
+    arrows: float = _pixel_length(
         0.0,
         65536.0,
         "Least distance in pixels between arrowheads over the lines, which show which way they point. They "
         "are a quarter as long. For fields of odd degree. 0: none",
         label="Arrowheads",
-        is_pixel_length=True,
         **_shading("streaks"),
     )
-    flow: float = number(
-        0.0,
+    flow: float = _pixel_length(
         0.0,
         256.0,
         "Pixels that streaks drift along the field per frame, in animations and live views. Lines of fields "
         "of even degree drift toward the guiding angle, or both ways if they are perpendicular to it. 0: no "
         "drift",
-        is_pixel_length=True,
         panel="streaks",
         applies=_can_flow,
     )
-    line_width: float = number(
+    line_width: float = _pixel_length(
         1.5,
-        0.5,
         256.0,
         "Width of the streaks in pixels, which is the size of a cell of the noise",
-        is_pixel_length=True,
+        low=0.5,
         preview_low=0.75,
         panel="streaks",
     )
-    line_distance: float = number(
+    line_distance: float = _pixel_length(
         3.0,
-        1.0,
         512.0,
         "Distance between even lines in pixels. At half coverage, lines are half as wide",
-        is_pixel_length=True,
+        low=1.0,
         preview_low=1.5,
         panel="streaks",
         applies=is_even,
@@ -236,13 +240,11 @@ class Look:
         "several directions easier to tell apart",
         panel="streaks",
     )
-    high_pass: float = number(
+    high_pass: float = _pixel_length(
         16.0,
-        0.0,
         1024.0,
         "Remove noise variations wider than this many pixels, so that crossing streaks do not form "
         "clouds. 0: keep them, as in the paper",
-        is_pixel_length=True,
         panel="streaks",
     )
     detail: float = number(
@@ -334,12 +336,8 @@ class Look:
         },
         **_shading("color", lambda look: colors_magnitude(look) or colors_values(look)),
     )
-    shading: float = number(
-        0.7,
-        0.0,
-        1.0,
-        "Strength of the diffuse shading in the picture",
-        **_shading("light"),
+    shading: float = fraction(
+        0.7, "Strength of the diffuse shading in the picture", **_shading("light")
     )
     light: str = choice(
         "headlight",
@@ -405,10 +403,7 @@ class Look:
         **_ink(lambda look: is_hatched(look) and not colors_magnitude(look)),
     )
     ink_color_light: str = color(
-        "#b06a3c",
-        "Color of the ink in the lights",
-        label="Highlight Color",
-        **_ink(has_tone_inks),
+        "#b06a3c", "Color of the ink in the lights", label="Highlight Color", **_ink(has_tone_inks)
     )
     paper_color: str = color(
         "#ffffff",
@@ -416,55 +411,39 @@ class Look:
         has_alpha=True,
         **_ink(),
     )
-    crispness: float = number(
-        0.7, 0.0, 1.0, "Edges of lines, from soft gray streaks to sharp lines", **_ink()
+    crispness: float = fraction(
+        0.7, "Edges of lines, from soft gray streaks to sharp lines", **_ink()
     )
     layers: int = number(
         3, 1, 12, "Maximum number of line families that cross in the darkest tones", **_ink()
     )
-    layering: float = number(
-        0.3,
-        0.0,
-        1.0,
-        "Difference in darkness between the tones at which successive families begin",
-        **_ink(),
+    layering: float = fraction(
+        0.3, "Difference in darkness between the tones at which successive families begin", **_ink()
     )
-    breaks: float = number(
-        0.0,
-        0.0,
-        1.0,
-        "Amount by which lines are broken into pieces, in light tones first",
-        **_ink(),
+    breaks: float = fraction(
+        0.0, "Amount by which lines are broken into pieces, in light tones first", **_ink()
     )
-    overshoot: float = number(
-        0.0,
+    overshoot: float = _pixel_length(
         0.0,
         256.0,
         "Maximum distance in pixels by which lines continue past the borders of tones, getting thinner",
-        is_pixel_length=True,
         **_ink(),
     )
-    wobble: float = number(
+    wobble: float = fraction(
         0.0,
-        0.0,
-        1.0,
         "Amount by which lines vary in direction and width, as if drawn by hand",
         panel="ink",
         applies=is_hatched,
     )
-    paper_grain: float = number(
+    paper_grain: float = fraction(
         0.0,
-        0.0,
-        1.0,
         "Amount by which the grain of the paper breaks up the ink, as with pencil and charcoal",
         **_ink(),
     )
-    outline: float = number(
-        0.0,
+    outline: float = _pixel_length(
         0.0,
         64.0,
         "Width in pixels of ink lines along silhouettes, borders and sharp creases. 0: none",
-        is_pixel_length=True,
         **_ink(),
     )
     singularity_dots: str = singularity_dots_choice(panel="singularities", stage=Stage.SHADING)

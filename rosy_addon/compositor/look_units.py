@@ -42,13 +42,14 @@ class PixelLook:
     look : Look
         The settings of the user.
     scale : float
-        Size in pixels of the picture of the unit in which the lengths of `look` are given.
+        Factor from the lengths of `look` to pixels of the picture (or to steps, for lines on a surface).
     length : int
         Steps of streamlines in each direction.
     supersampling : int
         Pixels of the frame along a side of a pixel of the picture.
     pixel_size : float
-        Blender units in place of a pixel, if `look` has lengths in Blender units (`unit_size`); otherwise 0.
+        If `look` has lengths in Blender units (`unit_size`): the Blender units that one pixel of the frame
+        stands for. Otherwise 0.
     color_range : (float, float)
         The setting `Look.color_range`, or the `magnitude_ends` of a field (see `with_magnitude_range`).
     kernel : {"box", "taper", "ramp"}
@@ -128,8 +129,12 @@ class PixelLook:
         return replace(self, length=length)
 
     def for_means(self, length: int) -> PixelLook:
-        """Return the look for unweighted means over `length` steps in each direction: no fading, no drift."""
-        still = replace(self.look, flow=0.0)
+        """Return the look for unweighted means over `length` steps in each direction: no fading, no drift.
+
+        The weights of the method "ibfv" fall exponentially and would reach too far, so "sheets" replaces it.
+        """
+        method = "sheets" if self.method == "ibfv" else self.method
+        still = replace(self.look, flow=0.0, method=method)
         return replace(self, look=still, length=length, kernel="box", is_antialiased=False)
 
     def in_samples(self, side: int) -> PixelLook:
@@ -171,9 +176,8 @@ def pixel_look(
     bounds = [instance.world_bounds() for instance in instances if instance.field is not None]
     scale = 1.0
     if look.unit_size and bounds:
-        exact_scale = look.unit_size / (
-            pixel_world_size(np.concatenate(bounds), camera) * supersampling
-        )
+        pixel = pixel_world_size(np.concatenate(bounds), camera)
+        exact_scale = look.unit_size / (pixel * supersampling)
         scale = 2 ** (np.rint(np.log2(exact_scale) * STEPS_PER_OCTAVE) / STEPS_PER_OCTAVE)
     in_picture = _scaled_pixel_look(look, scale, look.unit_size, drift)
     return replace(in_picture.in_samples(supersampling), is_antialiased=is_antialiased)
@@ -203,7 +207,7 @@ def surface_pixel_look(look: Look, step: float, pixel: float, drift: Drift = NO_
 def _scaled_pixel_look(look: Look, scale: float, unit_size: float, drift: Drift) -> PixelLook:
     """Return the `PixelLook` whose lengths are `scale` times the lengths of `look`.
 
-    `unit_size` is the number of Blender units in the unit of the lengths of `look`; 0 if that is a pixel.
+    The lengths of `look` are in multiples of `unit_size` Blender units, or in pixels if `unit_size` is 0.
     """
     scale = _possible_scale(look, scale)
     if not has_flow(look):
@@ -233,9 +237,8 @@ def _possible_scale(look: Look, scale: float) -> float:
 
     Noise cells stay at least as large as a pixel, as smaller ones are not visible.
     """
-    max_scale = min(
-        setting.high / max(getattr(look, setting.name), 1e-9) for setting in pixel_lengths(Look)
-    )
+    lengths = pixel_lengths(Look)
+    max_scale = min(item.high / max(getattr(look, item.name), 1e-9) for item in lengths)
     min_scale = 1.0 / look.line_width
     return float(np.clip(scale, min(min_scale, 1.0), max(max_scale, 1.0)))
 

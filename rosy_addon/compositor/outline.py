@@ -3,7 +3,8 @@
 Silhouettes and borders lie between two adjacent pixels if the surface does not continue from one to
 the other (`pixel_neighbors.neighbor_masks`). Where one surface occludes the other, the line is drawn
 only on the nearer one. Creases are chains of edges of the mesh (`field.creases`), drawn where they
-are visible. Marks that are too short are not drawn, unless they are the border of something.
+are visible. A group of connected pixels at edges (a *mark*) is not drawn if it is too short, unless the
+background is next to it, or it surrounds a part of a mesh.
 """
 
 from __future__ import annotations
@@ -85,8 +86,7 @@ def outline_coverage(gbuffer: GBuffer, look: PixelLook, cache: Cache | None = No
     entries = np.flatnonzero(_dilated(gbuffer, is_near, 1))
     sums, counts = np.zeros((2, len(gbuffer.pixel)))
     for band, core in _bands(gbuffer, entries, reach + FULL_MARK_LENGTH):
-        start = 0.3 + 0.7 * core.start / len(entries)
-        stop = 0.3 + 0.7 * core.stop / len(entries)
+        start, stop = (0.3 + 0.7 * end / len(entries) for end in (core.start, core.stop))
         with progress(start, stop, STEP_LABEL):
             home, shown, coverage = _sample_outline(gbuffer, look, entries[band], is_near, cache)
         first, last = entries[core.start], entries[core.stop - 1]
@@ -135,8 +135,10 @@ def _sample_outline(
 
     Returns
     -------
-    home, shown : (Q,) int32 ndarray
-        Indices of pixels of the G-buffer for each sample; see `project_samples`.
+    home : (Q,) int32 ndarray
+        For each sample, the index of the pixel of the G-buffer in which the sample lies.
+    shown : (Q,) int32 ndarray
+        For each sample, the index of the pixel whose surface it shows; see `project_samples`.
     coverage : (Q,) float32 ndarray
     """
     with progress(0.0, 0.4):
@@ -213,9 +215,8 @@ class _Edges:
         gbuffer, look, depth = self._gbuffer, self._look, self._depth
         edge = np.flatnonzero(self.line_width)
         with progress(0.0, 0.5, STEP_LABEL):
-            strength = _mark_strength(
-                gbuffer.pixel[edge], self._border[edge], gbuffer.camera.width, look.supersampling
-            )
+            marks = gbuffer.pixel[edge], self._border[edge]
+            strength = _mark_strength(*marks, gbuffer.camera.width, look.supersampling)
         edge, strength = edge[strength > 0], strength[strength > 0]
         line_width = np.minimum(self.line_width[edge], np.float32(look.outline) * strength)
         depth_slack = np.float32(DEPTH_JUMP) * self._tolerance[edge]
@@ -255,9 +256,8 @@ class _Edges:
             points = mesh.crease_points(instance.surface, instance.matrix)
             points += np.asarray(instance.matrix, dtype=np.float64)[:3, 3]
             with progress(0.5, 0.8):
-                marks = crease_pixels(
-                    gbuffer, instance_id, points, self._entry_of_cell, origin, self._stride
-                )
+                frame = self._entry_of_cell, origin, self._stride
+                marks = crease_pixels(gbuffer, instance_id, points, *frame)
             self.line_width[marks & defined] = look.outline / 2
         if mesh.triangle_part is None:
             return
@@ -309,8 +309,9 @@ class _Edges:
         """Set the width of lines at the nearer pixel of steps in the depth of a surface.
 
         On a surface that is seen nearly edge-on, any difference in depth between neighbors is plausible, so
-        the neighbor masks link pixels across a silhouette. At a step, the depth changes much more than
-        between either pixel and the next one beyond it.
+        the neighbor masks link pixels across a silhouette. At a step between two pixels of a row or a column,
+        the depth changes much more than it does from each of them to its other neighbor in that row or
+        column.
         """
         depth, tolerance, defined = self._depth, self._tolerance, self._defined
         for block in reported_blocks(self._count, STEP_LABEL):
@@ -318,9 +319,8 @@ class _Edges:
                 first = np.flatnonzero(self._is_linked(block, bit)) + block.start
                 second = self._neighbor(first, dx, dy)
                 jump = np.abs(depth[second] - depth[first])
-                steep = jump > np.float32(MIN_STEP) * np.minimum(
-                    tolerance[first], tolerance[second]
-                )
+                least = np.minimum(tolerance[first], tolerance[second])
+                steep = jump > np.float32(MIN_STEP) * least
                 first, second, jump = first[steep], second[steep], jump[steep]
                 is_step = np.ones(len(first), dtype=bool)
                 for near, side in ((first, -1), (second, 1)):
@@ -340,8 +340,8 @@ def _mark_strength(
 
     Marks are connected pixels of the finished picture; diagonal neighbors are connected. The length
     of a mark is the longer side of its bounding box. A short mark still has its full width if it is next to
-    the background, or if it surrounds a part: then the number of its pixels at borders of parts is at least
-    half the perimeter of its bounding box.
+    the background, or if it surrounds a part of a mesh. It counts as surrounding one if its pixels at borders
+    of parts are at least half as many as the perimeter of its bounding box is long, in pixels.
 
     Parameters
     ----------
@@ -363,9 +363,8 @@ def _mark_strength(
         return np.zeros(0, dtype=np.float32)
     row, column = np.divmod(pixel.astype(np.int64), width)
     stride = width // block_side + 2
-    block, block_of_pixel = np.unique(
-        row // block_side * stride + column // block_side, return_inverse=True
-    )
+    block = row // block_side * stride + column // block_side
+    block, block_of_pixel = np.unique(block, return_inverse=True)
     pairs = []
     for offset in (1, stride - 1, stride, stride + 1):
         target = np.searchsorted(block, block + offset)

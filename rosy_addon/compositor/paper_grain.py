@@ -16,6 +16,7 @@ import numpy as np
 from ..core.progress import progress
 from .image_noise import (
     BLOCK_ROWS,
+    NOISE_MEAN,
     TileRectangle,
     box_radius,
     cached_tiles,
@@ -114,6 +115,30 @@ def surface_paper_grain_args(look: PixelLook) -> dict[str, Any]:
         "density": 0.5,
         "high_pass": HIGH_PASS_CELLS * cell,
     }
+
+
+def surface_paper_grain(noise: np.ndarray, std: float, line_count: int) -> np.ndarray:
+    """Make paper grain from noise on surfaces.
+
+    Parameters
+    ----------
+    noise : (P, K) float32 ndarray
+        Noise with the mean `NOISE_MEAN`, made with `surface_paper_grain_args`.
+    std : float
+        Standard deviation of the noise: `StreakStatistics.paper_grain_std`.
+    line_count : int
+        Number of lines (pairs of opposite directions of the field) at a pixel.
+
+    Returns
+    -------
+    (line_count, P) float32 ndarray
+        Heights with mean 0 and standard deviation 1.
+    """
+    channel = np.arange(line_count) % PAPER_GRAIN_CHANNELS
+    heights = np.empty((line_count, len(noise)), dtype=np.float32)
+    for block in reported_blocks(len(noise), STEP_LABEL, 1.0, 1.0):
+        heights[:, block] = ((noise[block] - np.float32(NOISE_MEAN)) / np.float32(std)).T[channel]
+    return heights
 
 
 def line_offset(line_width: float) -> int:

@@ -19,14 +19,7 @@ from .contrast import normalize_variance
 from .filter_kernel import WEIGHT_SLOPES, kernel_weights
 from .lic_images import LicImages, lic_images, magnitude_step_limits
 from .look_units import PixelLook
-from .pixel_field import (
-    NEIGHBOR_OFFSETS,
-    PixelField,
-    all_members,
-    blend_weights,
-    neighbor_table,
-    normalized,
-)
+from .pixel_field import NEIGHBOR_OFFSETS, PixelField, all_members, normalized, rotated
 
 #: Function (indices of pixels, offsets) -> directions; see `direction_at` of `integrate_noise`.
 DirectionSampler = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -61,9 +54,8 @@ def brute_force(field: PixelField, look: PixelLook, noise: np.ndarray) -> LicIma
         tables[:, index] = direction_table(direction, member, degree, neighbors)
     candidates = np.zeros((count + 1, degree), dtype=np.complex64)
     candidates[:-1] = members.T
-    tracers = [
-        partial(_best_match_sampler, candidates, tables, line) for line in range(field.line_count)
-    ]
+    lines = range(field.line_count)
+    tracers = [partial(_best_match_sampler, candidates, tables, line) for line in lines]
     return convolve_members(field, look, noise, neighbors, tracers)
 
 
@@ -140,9 +132,8 @@ def member_decomposition(field: PixelField, look: PixelLook, noise: np.ndarray) 
     for block in pixel_blocks(len(field.pixel)):
         weight = _first_set_weight(field.part(block), look)
         second.blend[block] += weight[:, None] * (first.blend[block] - second.blend[block])
-        second.effective_samples[block] += weight * (
-            first.effective_samples[block] - second.effective_samples[block]
-        )
+        samples = second.effective_samples[block]
+        samples += weight * (first.effective_samples[block] - samples)
     return replace(first, blend=second.blend, effective_samples=second.effective_samples)
 
 
@@ -154,10 +145,9 @@ def _one_set(
         members, directions = _members_on_screen(field, angle, field.line_count)
     else:
         members = directions = _screen_space_members(field, angle)
-    tracers = [
-        partial(_member_sampler, direction_table(direction, member, field.degree, neighbors))
-        for member, direction in zip(members, directions, strict=True)
-    ]
+    pairs = zip(directions, members, strict=True)
+    tables = [direction_table(*pair, field.degree, neighbors) for pair in pairs]
+    tracers = [partial(_member_sampler, table) for table in tables]
     return convolve_members(field, look, noise, neighbors, tracers)
 
 
@@ -175,6 +165,16 @@ def _first_set_weight(field: PixelField, look: PixelLook) -> np.ndarray:
         angle_offset = np.angle(member * np.exp(-1j * look.guiding_angle))
         weight = (0.5 + 0.5 * np.cos(field.degree * angle_offset)).astype(np.float32)
     return (weight > 0.5).astype(np.float32) if look.weights == "binary" else weight
+
+
+def blend_weights(field: PixelField, guiding_angle: float) -> np.ndarray:
+    """Return the (P,) float32 weight of the first set of member images, cos^2(N (t - phi) / 2).
+
+    phi is the guiding angle, and t is the angle of a member. The weight is 0 at the breaking points
+    of the first set and 1 at the breaking points of the second.
+    """
+    relative = rotated(normalized(field.representation), -field.degree * guiding_angle)
+    return (0.5 + 0.5 * relative.real).astype(np.float32)
 
 
 def _screen_space_members(field: PixelField, angle: float) -> np.ndarray:
@@ -240,9 +240,10 @@ def convolve_members(
         In pixels of the frame. Its `length`, kernel and `magnitude_length` are used.
     noise : (P, K) float32 ndarray
     neighbors : (9, P + 1) int32 ndarray
-        From `pixel_field.neighbor_table`.
-    tracers : sequence of M functions
-        One function per member image.
+        From `neighbor_table`.
+    tracers : sequence of M LineTracer
+        For each member image, a function that takes a block of pixels, and returns the function for
+        directions of `integrate_noise`.
 
     Returns
     -------
@@ -257,12 +258,9 @@ def convolve_members(
     for member, tracer in enumerate(tracers):
         for block in pixel_blocks(count):
             block_limit = None if step_limit is None else step_limit[block]
-            (forward_sum, forward), (backward_sum, backward) = (
-                integrate_noise(
-                    block, neighbors, tracer(block), padded_noise, look, side, block_limit
-                )
-                for side in (1, -1)
-            )
+            args = block, neighbors, padded_noise, look, block_limit
+            forward_sum, forward = integrate_noise(tracer(block), 1, *args)
+            backward_sum, backward = integrate_noise(tracer(block), -1, *args)
             full_length = look.length if block_limit is None else block_limit
             weights = kernel_weights(forward, backward, full_length, kernel)
             mean = (noise[block] + forward_sum + backward_sum) / weights.total[:, None]
@@ -272,6 +270,28 @@ def convolve_members(
             report(fraction, "tracing streamlines")
     effective_samples /= len(tracers)
     return lic_images(members, effective_samples)
+
+
+def neighbor_table(field: PixelField) -> np.ndarray:
+    """Tabulate the neighbors of the pixels of a field.
+
+    Returns
+    -------
+    (9, P + 1) int32 ndarray
+        Index of the neighbor of each pixel at each of `NEIGHBOR_OFFSETS`. The index is P where streamlines
+        cannot step to the neighbor, and in column P. There is one row per offset, because a streamline
+        mostly steps in one direction and then reads adjacent elements of a row.
+    """
+    count = len(field.pixel)
+    entry = np.full(field.height * field.width, count, dtype=np.int32)
+    entry[field.pixel] = np.arange(count, dtype=np.int32)
+    table = np.full((9, count + 1), count, dtype=np.int32)
+    for block in pixel_blocks(count):
+        pixel, mask = field.pixel[block], field.neighbor_mask[block]
+        for bit, (dx, dy) in enumerate(NEIGHBOR_OFFSETS):
+            linked = np.flatnonzero(mask >> bit & 1)
+            table[bit, block.start + linked] = entry[pixel[linked] + (dy * field.width + dx)]
+    return table
 
 
 def direction_table(
@@ -291,7 +311,7 @@ def direction_table(
     degree : int
         Degree of the field.
     neighbors : (9, P + 1) int32 ndarray
-        From `pixel_field.neighbor_table`.
+        From `neighbor_table`.
 
     Returns
     -------
@@ -346,12 +366,12 @@ def interpolate_direction(rows: np.ndarray, offset: np.ndarray) -> np.ndarray:
 
 
 def integrate_noise(
+    direction_at: DirectionSampler,
+    side: int,
     block: slice,
     neighbors: np.ndarray,
-    direction_at: DirectionSampler,
     noise: np.ndarray,
     look: PixelLook,
-    side: int,
     step_limit: np.ndarray | None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Sum the noise along one half of each streamline that starts in a block.
@@ -362,20 +382,20 @@ def integrate_noise(
 
     Parameters
     ----------
-    block : slice
-        Pixels of the field.
-    neighbors : (9, P + 1) int32 ndarray
-        From `pixel_field.neighbor_table`.
     direction_at : function
         Takes the (B,) int32 indices of the pixels of the streamlines (P if a streamline has ended) and the
         (B, 2) float32 offsets from the centers of these pixels. Returns the (B, 2) float32 directions on
         screen (0 for P). It is called once per step, in order, and may keep data between calls.
+    side : {1, -1}
+        1 for the forward half of the streamline, -1 for the backward half.
+    block : slice
+        Pixels of the field.
+    neighbors : (9, P + 1) int32 ndarray
+        From `neighbor_table`.
     noise : (P + 1, K) float32 ndarray
         Noise at the P pixels; row P is 0.
     look : PixelLook
         In pixels of the frame. Its `length` and kernel are used.
-    side : {1, -1}
-        1 for the forward half of the streamline, -1 for the backward half.
     step_limit : (B,) ndarray or None
         Number of steps after which each streamline ends. If None, it is the `length` of the look.
 
@@ -394,17 +414,14 @@ def integrate_noise(
     total = np.zeros((len(entry), noise.shape[1]), dtype=np.float32)
     samples = np.zeros(len(entry), dtype=np.float32)
     previous_direction = None
-    weight_step = weight_slope / (
-        1 + np.asarray(look.length if step_limit is None else step_limit, dtype=np.float32)
-    )
+    length = look.length if step_limit is None else step_limit
+    weight_step = weight_slope / (1 + np.asarray(length, dtype=np.float32))
     for step_index in range(1, look.length + 1):
         direction = direction_at(entry, offset)
-        if previous_direction is None:
-            offset += np.float32(side) * direction
-        else:
-            offset += (
-                np.float32(1.5 * side) * direction - np.float32(0.5 * side) * previous_direction
-            )
+        step = np.float32(side if previous_direction is None else 1.5 * side) * direction
+        if previous_direction is not None:
+            step -= np.float32(0.5 * side) * previous_direction
+        offset += step
         previous_direction = direction
         # At most to a neighbor, even where the direction turns sharply.
         pixel_step = np.clip(np.rint(offset), -1, 1)

@@ -60,8 +60,6 @@ def picture_key(look: Look, picture: Picture) -> PictureKey:
     """
     if picture.spread is not None:
         return PictureKey()
-    return PictureKey(
-        color_scale_of(look, picture.color_range),
-        () if picture.marks is None else count_indices(picture.marks),
-        look.singularity_size if shows_singularities(look) else 0.0,
-    )
+    counts = () if picture.marks is None else count_indices(picture.marks)
+    size = look.singularity_size if shows_singularities(look) else 0.0
+    return PictureKey(color_scale_of(look, picture.color_range), counts, size)

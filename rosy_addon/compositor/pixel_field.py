@@ -13,7 +13,7 @@ from ..field.directional_field import evaluate_harmonics
 from ..field.symmetry import FieldSymmetry
 from ..projection.field_channel import FieldChannel
 from ..projection.gbuffer import GBuffer
-from ..projection.pixel_blocks import BLOCK_PIXELS, pixel_blocks
+from ..projection.pixel_blocks import BLOCK_PIXELS, part_of
 from ..projection.pixel_neighbors import neighbor_masks, screen_jacobians
 from .reported_blocks import reported_blocks
 
@@ -80,9 +80,9 @@ class PixelField:
         Neighbors that streamlines may step to. Bit i stands for `NEIGHBOR_OFFSETS[i]`. No bit is
         set where the field is undefined.
     channels : dict of FieldChannel to (P,) complex64 ndarray
-        Further channels of the field, in the view plane: the harmonics by which its directions deviate
-        from a RoSy; and the representation of the line of the stored member, from which families of
-        lines are counted.
+        Further complex values of the field, in the frames of the view plane. If its directions are not at
+        equal angles: the harmonics C_j (see `field.directional_field`). If the field distinguishes m
+        families of lines: the representation, of degree N / m, of the line of family 0.
     gbuffer_index : slice or (P,) intp ndarray
         Indices of the pixels in the arrays of the G-buffer. A slice if the pixels are all or adjacent
         pixels of the G-buffer.
@@ -111,11 +111,8 @@ class PixelField:
 
         See `field.directional_field`.
         """
-        return [
-            (number, values)
-            for (kind, number), values in self.channels.items()
-            if kind == "deviation"
-        ]
+        channels = self.channels.items()
+        return [(number, values) for (kind, number), values in channels if kind == "deviation"]
 
     @property
     def symmetry(self) -> FieldSymmetry:
@@ -140,24 +137,16 @@ class PixelField:
 
         The `neighbor_mask` of the result may refer to pixels that are left out.
         """
-        index = self.gbuffer_index
-        if not isinstance(index, slice):
-            index = index[extent]
-        elif isinstance(extent, slice):
-            index = slice((index.start or 0) + extent.start, (index.start or 0) + extent.stop)
-        else:
-            index = (index.start or 0) + extent
-        return replace(
-            self,
-            pixel=self.pixel[extent],
-            representation=self.representation[extent],
-            screen_jacobian=self.screen_jacobian[extent],
-            neighbor_mask=self.neighbor_mask[extent],
-            channels={channel: values[extent] for channel, values in self.channels.items()},
-            gbuffer_index=index,
-            seam_steps=None,
-            map_position=None if self.map_position is None else self.map_position[extent],
-        )
+        part = part_of(self, extent)
+        index = part.gbuffer_index
+        if isinstance(index, slice):
+            first = index.start or 0
+            if isinstance(extent, slice):
+                index = slice(first + extent.start, first + extent.stop)
+            else:
+                index = first + extent
+        channels = {channel: values[extent] for channel, values in self.channels.items()}
+        return replace(part, channels=channels, gbuffer_index=index, seam_steps=None)
 
     def member_direction(self, member: np.ndarray) -> np.ndarray:
         """Compute the directions of the field from the members of the RoSy that they deviate from.
@@ -193,10 +182,7 @@ class PixelField:
             x + i y in pixels.
         """
         # Double precision makes the float32 result the same with all versions of numpy.
-        x, y = (
-            self.screen_jacobian[:, 0].astype(np.complex128),
-            self.screen_jacobian[:, 1].astype(np.complex128),
-        )
+        x, y = self.screen_jacobian.astype(np.complex128).T
         direction = x * member.real + y * member.imag
         return direction.astype(np.complex64) if foreshorten else normalized(direction)
 
@@ -206,28 +192,6 @@ def normalized(values: np.ndarray) -> np.ndarray:
     values = values.astype(np.complex128)
     norm = np.sqrt(values.real**2 + values.imag**2)
     return np.divide(values, norm, out=values, where=norm > 0).astype(np.complex64)
-
-
-def neighbor_table(field: PixelField) -> np.ndarray:
-    """Tabulate the neighbors of the pixels of a field.
-
-    Returns
-    -------
-    (9, P + 1) int32 ndarray
-        Index of the neighbor of each pixel at each of `NEIGHBOR_OFFSETS`. The index is P where streamlines
-        cannot step to the neighbor, and in column P. There is one row per offset, because a streamline
-        mostly steps in one direction and then reads adjacent elements of a row.
-    """
-    count = len(field.pixel)
-    entry = np.full(field.height * field.width, count, dtype=np.int32)
-    entry[field.pixel] = np.arange(count, dtype=np.int32)
-    table = np.full((9, count + 1), count, dtype=np.int32)
-    for block in pixel_blocks(count):
-        pixel, mask = field.pixel[block], field.neighbor_mask[block]
-        for bit, (dx, dy) in enumerate(NEIGHBOR_OFFSETS):
-            linked = np.flatnonzero(mask >> bit & 1)
-            table[bit, block.start + linked] = entry[pixel[linked] + (dy * field.width + dx)]
-    return table
 
 
 def surface_pixel_field(gbuffer: GBuffer, degree: int, crease_angle: float | None) -> PixelField:
@@ -261,6 +225,7 @@ def surface_pixel_field(gbuffer: GBuffer, degree: int, crease_angle: float | Non
     if not z.all():
         with progress(0.9, 1.0):
             mask = mask_undefined(mask, pixel, camera.width, camera.height, z != 0)
+    channels = {channel: values[selected] for channel, values in gbuffer.channels.items()}
     return PixelField(
         degree=degree,
         width=camera.width,
@@ -269,18 +234,17 @@ def surface_pixel_field(gbuffer: GBuffer, degree: int, crease_angle: float | Non
         representation=z,
         screen_jacobian=jacobians[selected],
         neighbor_mask=mask,
-        channels=_channels_of_degree(
-            {channel: values[selected] for channel, values in gbuffer.channels.items()}
-        ),
+        channels=_channels_of_degree(channels),
         gbuffer_index=selected,
     )
 
 
 def _channels_of_degree(channels: dict[FieldChannel, np.ndarray]) -> dict[FieldChannel, np.ndarray]:
-    """Return the channels that the fields of one degree have, given their values at the pixels.
+    """Return the channels that the fields of one degree have.
 
-    A channel that only fields of other degrees have is 1 (C_0) or 0 (all others) at all these pixels, as
-    for a RoSy. It is left out.
+    `channels` holds the values of all channels of the G-buffer at the pixels of these fields. Where a field
+    does not have a channel, the harmonic C_0 is 1, and all other channels are 0. A channel that has these
+    values at all pixels is left out.
     """
     constant = ("deviation", 0)
     present = {
@@ -355,16 +319,6 @@ def mask_undefined(
         band = entries_of_rows(pixel, width, (start, start + band_rows))
         result[band] = mask[band] & open_bits[row[band] - start, column[band]]
     return result
-
-
-def blend_weights(field: PixelField, guiding_angle: float) -> np.ndarray:
-    """Return the (P,) float32 weight of the first set of member images, cos^2(N (t - phi) / 2).
-
-    phi is the guiding angle, and t is the angle of a member. The weight is 0 at the breaking points
-    of the first set and 1 at the breaking points of the second.
-    """
-    relative = rotated(normalized(field.representation), -field.degree * guiding_angle)
-    return (0.5 + 0.5 * relative.real).astype(np.float32)
 
 
 def nearest_member(field: PixelField, guiding_angle: float) -> np.ndarray:

@@ -74,8 +74,8 @@ KEY_LIGHT = Light("sun", np.array([-0.50, 0.60, 0.62]) / 0.9975, np.ones(3), 1.0
 def lights_of(look: Any, lights: Sequence[Light]) -> Sequence[Light]:
     """Return the lights that a look or a style of strokes uses.
 
-    It is `KEY_LIGHT` for "lamp", the given lights of the scene for "scene", and none for "headlight", which
-    needs no `Light`.
+    They depend on the setting `light`: `KEY_LIGHT` for "lamp", the given lights of the scene for "scene", and
+    none for "headlight", which needs no `Light`.
     """
     return {"lamp": (KEY_LIGHT,), "scene": lights}.get(look.light, ())
 
@@ -144,10 +144,7 @@ def light_visibility(
     for light in lights_of(look, lights):
         vector = np.asarray(light.vector, dtype=np.float64)
         cameras = light_cameras(gbuffer.instances, gbuffer.camera, light.kind, vector)
-        visibility.append(
-            cache.get_or_create(
-                ("shadow", gbuffer, light.kind, vector.tobytes()),
-                functools.partial(shadow_visibility, gbuffer, cameras),
-            )
-        )
+        compute = functools.partial(shadow_visibility, gbuffer, cameras)
+        key = "shadow", gbuffer, light.kind, vector.tobytes()
+        visibility.append(cache.get_or_create(key, compute))
     return visibility

@@ -20,8 +20,9 @@ from .lic_images import LicImages
 from .look import crease_angle_of, has_flow
 from .look_units import PixelLook, cell_size_args
 from .outline import OUTLINE_SETTINGS, outline_coverage
-from .paper_grain import surface_paper_grain_args
+from .paper_grain import picture_paper_grain, surface_paper_grain, surface_paper_grain_args
 from .pixel_field import PixelField, surface_pixel_field
+from .streak_statistics import look_streak_statistics
 from .strips import Strip
 from .surface_noise import surface_noise
 from .undirected import undirected_texture
@@ -47,17 +48,14 @@ class ComposeStages:
     """
 
     def __init__(self, gbuffer: GBuffer, cache: Cache, mesh_cache: Cache) -> None:
-        self._gbuffer = gbuffer
-        self._cache = cache
-        self._mesh_cache = mesh_cache
+        self._gbuffer, self._cache, self._mesh_cache = gbuffer, cache, mesh_cache
 
     def pixel_field(self, degree: int, look: PixelLook) -> PixelField:
         """Return the `PixelField` of one degree, with its directions rotated by the wobble of the look."""
         crease_angle = crease_angle_of(look)
-        field = self._cache.get_or_create(
-            ("pixel field", self._gbuffer, degree, crease_angle),
-            partial(surface_pixel_field, self._gbuffer, degree, crease_angle),
-        )
+        args = self._gbuffer, degree, crease_angle
+        create = partial(surface_pixel_field, *args)
+        field = self._cache.get_or_create(("pixel field", *args), create)
         if not has_wobble(look):
             return field
         angle = self._wobble_angle(look)[field.gbuffer_index]
@@ -128,19 +126,22 @@ class ComposeStages:
 
     def outline(self, field: PixelField, look: PixelLook) -> np.ndarray:
         """Return the (P,) float32 coverage by outlines at the pixels of a field; see `outline_coverage`."""
-        coverage = self._cache.get_or_create(
-            ("outline", self._gbuffer, *(getattr(look, name) for name in OUTLINE_SETTINGS)),
-            partial(outline_coverage, self._gbuffer, look, self._mesh_cache),
-        )
-        return coverage[field.gbuffer_index]
+        key = "outline", self._gbuffer, *(getattr(look, name) for name in OUTLINE_SETTINGS)
+        compute = partial(outline_coverage, self._gbuffer, look, self._mesh_cache)
+        return self._cache.get_or_create(key, compute)[field.gbuffer_index]
 
-    def surface_paper_grain(self, field: PixelField, look: PixelLook) -> np.ndarray:
-        """Return the (P, K) float32 heights of the paper grain, for a look that is anchored to the surface.
+    def paper_grain(self, field: PixelField, look: PixelLook) -> np.ndarray:
+        """Return the (M, P) heights of the paper grain for each of the M directions of the field.
 
-        They are not normalized; their mean is `NOISE_MEAN`.
+        The mean is 0, the standard deviation 1.
         """
+        lines, subpixels = field.line_count, look.supersampling
+        if look.anchor == "picture":
+            width = look.line_width / subpixels
+            return picture_paper_grain(field.pixel, field.width, width, look.seed, subpixels, lines)
         args = surface_paper_grain_args(look) | cell_size_args(look)
-        return self._surface_noise(field, args)
+        std = look_streak_statistics(look).paper_grain_std
+        return surface_paper_grain(self._surface_noise(field, args), std, lines)
 
     def _surface_noise(self, field: PixelField, args: dict[str, Any]) -> np.ndarray:
         """Return the (P, K) float32 noise at the pixels of a field; see `surface_noise`."""
@@ -152,8 +153,7 @@ class ComposeStages:
             return surface_noise(self._gbuffer, **args, curvature=curvature)
 
         key = "surface noise", self._gbuffer, *sorted(args.items())
-        noise = self._cache.get_or_create(key, compute)
-        return noise[field.gbuffer_index]
+        return self._cache.get_or_create(key, compute)[field.gbuffer_index]
 
     def _wobble_angle(self, look: PixelLook) -> np.ndarray:
         """Return the (Q,) float32 `wobble.wobble_angle` at all Q pixels of the G-buffer."""

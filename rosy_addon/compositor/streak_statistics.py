@@ -129,26 +129,17 @@ def _measured(look: PixelLook) -> StreakStatistics:
         paper_relief = amplitude * heights[0].reshape(streaks.shape)
     coverages = np.linspace(0, 1, COVERAGE_STEPS)
     break_amounts = break_amount(coverages, look.breaks, look.wobble)
-    break_levels = np.linspace(
-        break_amounts.min(), break_amounts.max(), BREAK_LEVELS if look.breaks else 1
-    )
-    samples = [
-        streaks + amount * (break_streaks - streaks) + paper_relief for amount in break_levels
-    ]
+    levels = BREAK_LEVELS if look.breaks else 1
+    break_levels = np.linspace(break_amounts.min(), break_amounts.max(), levels)
+    change = break_streaks - streaks
+    samples = [streaks + amount * change + paper_relief for amount in break_levels]
     half_width = softness(look.crispness)
     threshold_tables = _threshold_tables(samples, half_width)
     (disc_threshold,) = _threshold_tables([spots + paper_relief], half_width)
+    columns = zip(break_amounts, threshold_tables.T, strict=True)
+    thresholds = [np.interp(amount, break_levels, column) for amount, column in columns]
     stds = streak_std, break_std, disc_threshold, disc_std, paper_grain_std
-    if len(break_levels) == 1:
-        return StreakStatistics(threshold_tables[0], *stds)
-    level = (
-        (break_amounts - break_levels[0])
-        / (break_levels[-1] - break_levels[0])
-        * (BREAK_LEVELS - 1)
-    )
-    lower = np.minimum(level.astype(int), BREAK_LEVELS - 2)
-    low, high = (threshold_tables[row, np.arange(COVERAGE_STEPS)] for row in (lower, lower + 1))
-    return StreakStatistics(low + (level - lower) * (high - low), *stds)
+    return StreakStatistics(np.array(thresholds), *stds)
 
 
 def break_amount(target_coverage: np.ndarray, breaks: float, wobble: float) -> np.ndarray:
@@ -185,18 +176,16 @@ def softness(crispness: float) -> float:
 
 
 def _threshold_tables(samples: list[np.ndarray], half_width: float) -> np.ndarray:
-    """Return the (S, COVERAGE_STEPS) thresholds above which a fraction 0 to 1 of S streak images is ink.
+    """Return (S, COVERAGE_STEPS) thresholds: for each of S images of streaks, a threshold for each coverage.
 
-    `samples` are the values of these images.
-
-    `half_width` is half the width of the step from paper to ink, in the unit of the samples.
+    Coverages are from 0 to 1, in even steps. Ink above the threshold covers that fraction of the image.
+    `half_width` is half the width of the step from paper to ink, in the unit of the images, `samples`.
     """
     lowest, highest = min(map(np.min, samples)), max(map(np.max, samples))
     edges = np.linspace(lowest, highest, HISTOGRAM_BINS + 1)
     thresholds = np.linspace(highest + half_width, lowest - half_width, 4 * COVERAGE_STEPS)
-    ink_fraction = smoothstep(
-        ((edges[:-1] + edges[1:]) / 2 - thresholds[:, None]) / (2 * half_width) + 0.5
-    )
+    middles = (edges[:-1] + edges[1:]) / 2
+    ink_fraction = smoothstep((middles - thresholds[:, None]) / (2 * half_width) + 0.5)
     coverages = np.linspace(0, 1, COVERAGE_STEPS)
     tables = []
     for sample in samples:
@@ -208,16 +197,16 @@ def _threshold_tables(samples: list[np.ndarray], half_width: float) -> np.ndarra
 def _noise_sample(
     shape: tuple[int, int], cell: float, density: float, high_pass: float, anchored: bool
 ) -> np.ndarray:
-    """Make an image of the noise in image space or, if `anchored`, of the noise on a flat surface.
+    """Make a (H, W) image of `image_noise` or, if `anchored`, of `surface_noise` on a flat surface.
 
-    On the surface, the cells of the middle octave have the size `cell` on screen.
+    `cell` is the side of a cell in pixels. Noise on the surface is the blend of the octave with these cells,
+    and of the octaves with cells of half and of twice the size.
     """
     pixel = np.arange(shape[0] * shape[1], dtype=np.int32)
     octave_offsets = np.arange(OCTAVES) - OCTAVES // 2 if anchored else np.zeros(1)
+    weights = octave_weights(octave_offsets) if anchored else (1.0,)
     noise = np.zeros(shape, dtype=np.float32)
-    for octave_offset, weight in zip(
-        octave_offsets, octave_weights(octave_offsets) if anchored else (1.0,), strict=True
-    ):
+    for octave_offset, weight in zip(octave_offsets, weights, strict=True):
         cell_size = cell * 2.0**octave_offset
         cells = image_noise(pixel, shape[1], cell_size, 1, 1, density=density, high_pass=high_pass)
         noise += np.float32(weight) * cells.reshape(shape)

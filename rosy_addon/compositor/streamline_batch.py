@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from .covering import SINK_CELL, Covering
-from .drifting_averages import MAX_LEVELS, DriftingAverages, MovingKernel
+from .drifting_averages import DriftingAverages, MovingKernel
 from .filter_kernel import kernel_weights
 from .look import has_flow
 from .look_units import PixelLook
@@ -44,8 +44,8 @@ class StreamlineBatch:
     covering : Covering
     looks : sequence of PixelLook
         Looks that differ in `length` alone. There is an average over the length of each.
-    step_limits : sequence of (C,) intp ndarray or None
-        For each look: steps in each direction that the average of each cell covers. If None, they are
+    step_limits : sequence of (M C,) intp ndarray or None
+        For each look: steps in each direction that the average of each line covers. If None, they are
         the `length` of the look.
     half_window : int
         States within so many steps of the seed, in each direction, take their average from the streamline.
@@ -66,17 +66,10 @@ class StreamlineBatch:
         max_streamlines: int,
         interpolates: bool = False,
     ) -> None:
-        self._covering = covering
-        look = looks[0]
+        self._covering, self._half_window, look = covering, half_window, looks[0]
         self._lengths, self._kernel = [look.length for look in looks], look.kernel
-        self._half_window = half_window
         self._max_steps = half_window + max(look.streamline_reach() for look in looks)
-        self._moving_kernels = []
-        if has_flow(look):
-            self._moving_kernels = [
-                MovingKernel(each, 1 if limit is None else min(each.length + 1, MAX_LEVELS))
-                for each, limit in zip(looks, step_limits, strict=True)
-            ]
+        self._moving_kernels = [MovingKernel(each) for each in looks] if has_flow(look) else []
         step_scale, noise_scale, slope_scale = covering.state_scales
         self._step_scale, self._noise_scale = np.float32(1.5 * step_scale), np.float32(noise_scale)
         lateral_gain = (INTERPOLATED_GAIN if interpolates else LATERAL_GAIN) * slope_scale
@@ -84,9 +77,7 @@ class StreamlineBatch:
         # `_lateral_gain` in the unit of the noise of states.
         self._noise_gain = self._lateral_gain / self._noise_scale if interpolates else None
         self._max_lateral = np.float32(MAX_LATERAL_OFFSET / step_scale)
-        self._step_limits = [
-            None if limit is None else np.tile(limit, covering.line_count) for limit in step_limits
-        ]
+        self._step_limits = step_limits
         lanes, channels = 2 * max_streamlines, covering.noise_channels
         self._has_second_sums = self._kernel != "box" or bool(self._moving_kernels)
         self._sums = np.empty((self._max_steps + 1, lanes, channels), dtype=np.complex64)
@@ -163,9 +154,9 @@ class StreamlineBatch:
             yield line, values, np.flatnonzero(np.abs(lateral) < self._max_lateral)
 
     def _along_members(self, seeds: np.ndarray) -> np.ndarray:
-        """Return the state of each line that is a member of the field, not an opposite.
+        """Return for each line the one of its two opposite states that is a direction of the field.
 
-        In a field with opposites, return `seeds` unchanged.
+        In a field with opposites, both are, and the result is `seeds`, the (n,) indices of lines.
         """
         covering = self._covering
         if not covering.has_directions:
@@ -192,17 +183,11 @@ class StreamlineBatch:
             # The quantities of the backward half are turned to the direction of the forward half.
             for sign, lane in ((1, slice(0, count)), (-1, slice(count, lanes))):
                 forward = share[lane] if sign > 0 else 1 - share[lane]
-                ahead, behind = (np.maximum(ends[0] - sign * step, 0), ends[1] + sign * step)
+                ahead, behind = ends[0] - sign * step, ends[1] + sign * step
+                place = sign * step, sign * axial[lane]
                 for average, limit, out in zip(averages, self._step_limits, values, strict=True):
                     length = None if limit is None else limit.take(line[lane])
-                    sums, samples = average.at(
-                        sign * step,
-                        sign * axial[lane],
-                        length,
-                        forward,
-                        np.maximum(behind, 0),
-                        ahead,
-                    )
+                    sums, samples = average.at(*place, length, forward, behind, ahead)
                     lane_out = out[lane]
                     np.multiply(sums.real, self._noise_scale, out=lane_out[:, 0])
                     lane_out[:, 0] -= correction[lane] * (np.float32(sign) * sums.imag)
@@ -234,10 +219,11 @@ class StreamlineBatch:
         """Trace the streamlines and fill the buffers. Row i of a buffer is step i.
 
         A row holds n forward halves of streamlines, then n backward halves. The buffers are `_states`;
-        `_lateral_offset`, the distances to the left of the centers of pixels; and `_sums`, prefix sums of
-        the noise that include the seed. The imaginary part of `_sums` is the same for the derivative of the
+        `_lateral_offset`, the distances to the left of the centers of pixels; for moving kernels,
+        `_axial_offset`, the distances along the streamline; and `_sums`. The real part of `_sums` has prefix
+        sums of the noise, which include the seed. The imaginary part has prefix sums of the derivative of the
         noise to the left. For kernels other than the box, `_sums` are the prefix sums of these prefix sums,
-        and all rows are filled.
+        and all rows are filled. Lanes that have ended are in `SINK_CELL`.
 
         Returns
         -------
@@ -257,7 +243,15 @@ class StreamlineBatch:
             lanes.total += noise
             self._store_sums(step, lanes)
             if step <= self._half_window:
-                self._store_passage(step, lanes, state, direction, lateral)
+                passages = [(self._states, state), (self._lateral_offset, lateral)]
+                if self._axial_offset is not None:
+                    axial = axial_steps(
+                        lanes.position, direction, self._step_scale / np.float32(1.5)
+                    )
+                    passages.append((self._axial_offset, axial))
+                for buffer, values in passages:
+                    buffer[step, : lanes.count] = SINK_CELL  # it is 0, which also means no offset
+                    buffer[step, lanes.index] = values
             if step == self._max_steps:
                 break
             lanes.advance(step, state, direction, self._step_scale)
@@ -275,23 +269,6 @@ class StreamlineBatch:
         if self._has_second_sums and step:
             self._sums[step, : lanes.count] += self._sums[step - 1, : lanes.count]
 
-    def _store_passage(
-        self,
-        step: int,
-        lanes: TracedLanes,
-        state: np.ndarray,
-        direction: np.ndarray,
-        lateral: np.ndarray,
-    ) -> None:
-        """Fill a row of `_states` and `_lateral_offset`. Lanes that have ended are in `SINK_CELL`."""
-        records = [(self._states, state), (self._lateral_offset, lateral)]
-        if self._axial_offset is not None:
-            axial = axial_steps(lanes.position, direction, self._step_scale / np.float32(1.5))
-            records.append((self._axial_offset, axial))
-        for buffer, values in records:
-            buffer[step, : lanes.count] = SINK_CELL  # it is 0, which also means no offset
-            buffer[step, lanes.index] = values
-
     def _extend_sums(self, last_step: int, lanes: int) -> None:
         """Fill the rows of `_sums` after the last streamline has ended.
 
@@ -299,9 +276,8 @@ class StreamlineBatch:
         """
         if self._has_second_sums:
             for step in range(last_step, self._max_steps):
-                np.add(
-                    self._sums[step, :lanes], self._totals[:lanes], out=self._sums[step + 1, :lanes]
-                )
+                row, next_row = self._sums[step : step + 2, :lanes]
+                np.add(row, self._totals[:lanes], out=next_row)
 
     def _tapered_sums(self, step: int, half_width: int | np.ndarray, lanes: int) -> np.ndarray:
         """Return (2 n, K) complex64 sums of the noise around step i, with tapered weights.
@@ -321,11 +297,11 @@ class StreamlineBatch:
     ) -> np.ndarray:
         """Return (2 n, K) complex64 sums of the noise around step i, with weights that fall along the field.
 
-        The sum along a lane with weights that fall from 2 r + 1 to 1, r = `half_width`, is
-        E(i + r) - E(i - r - 1) - (2 r + 1) P(i - r - 1). E are the sums of prefix sums, and
-        P(i) = E(i) - E(i - 1) are the prefix sums. If a lane runs against the field (`is_along` is False),
-        the weights rise along the lane. The sum is then that of a box of the weight 2 r + 2 minus the sum
-        above. All sums are divided by r + 1.
+        Let r be `half_width`, P(i) the prefix sums of the noise along a lane, and E(i) the sums of these
+        prefix sums. In a lane that runs along the field, the weights fall from 2 r + 1 to 1, and the sum is
+        E(i + r) - E(i - r - 1) - (2 r + 1) P(i - r - 1). In a lane that runs against the field (`is_along` is
+        False), the weights rise from 1 to 2 r + 1. Both weights of a sample add up to 2 r + 2, so the sum is
+        2 r + 2 times the unweighted sum, minus the sum with falling weights. All sums are divided by r + 1.
         """
         last, before = step + half_width, step - half_width - 1
         sums_through, sums_before = (self._second_prefix_sums(i, lanes) for i in (last, before))

@@ -40,11 +40,8 @@ class Origins(NamedTuple):
     @classmethod
     def ended(cls, count: int) -> Origins:
         """Return `count` origins of states whose streamlines have ended."""
-        return cls(
-            np.full(count, SINK_CELL, dtype=np.int32),
-            np.zeros(count, dtype=np.int8),
-            np.zeros(count, dtype=np.complex64),
-        )
+        cell = np.full(count, SINK_CELL, dtype=np.int32)
+        return cls(cell, np.zeros(count, dtype=np.int8), np.zeros(count, dtype=np.complex64))
 
     def at(self, state: np.ndarray) -> Origins:
         """Return the origins of the states (pixels with a direction) that have the given indices."""
@@ -152,12 +149,10 @@ class Sheets:
     def one_step(self) -> Origins:
         """Find the origin of each state one step upstream, by the midpoint method."""
         scale = np.float32(self._covering.state_scales[0])
-        table = self._covering.state_table.reshape(
-            -1, self.cell_count, self._covering.state_table.shape[1]
-        )
+        x, y = self._covering.state_table[:, :2].reshape(-1, self.cell_count, 2).transpose(2, 0, 1)
         step = np.zeros((self.count, self.cell_count), dtype=np.complex64)
         for rows, sheet in zip(step, self.covering_sheet, strict=True):
-            rows.real, rows.imag = table[sheet, :, 0], table[sheet, :, 1]
+            rows.real, rows.imag = x[sheet], y[sheet]
             rows *= scale
         step = step.reshape(-1)
         result = Origins.ended(len(step))
@@ -240,12 +235,17 @@ class Sheets:
         return steps
 
     def _sheet_shifts(self, spacing: int) -> np.ndarray:
-        """Tabulate by how much the number of the sheet increases in a step to each neighbor, from 0 on.
+        """Tabulate by how much the number of the sheet increases in a step to each neighbor.
+
+        Parameters
+        ----------
+        spacing : int
+            Difference between the numbers in `covering` of successive sheets that are needed.
 
         Returns
         -------
         (9 C,) int8 ndarray
-            -1 where streamlines cannot step.
+            Increase modulo `count`, from 0 to `count` - 1; -1 where streamlines cannot step.
         """
         phase = self._covering.packed_phase
         table = np.full((9, self.cell_count), -1, dtype=np.int8)

@@ -32,8 +32,8 @@ MAX_SEAM_OFFSET = np.float32(1.5)
 class TracedLanes:
     """Halves of streamlines that are traced together, a step at a time.
 
-    There are n forward halves (lanes), then n backward halves. The arrays hold the m lanes that had not ended
-    at the last compaction. Lanes that have ended are in the cell `SINK_CELL` and stay there.
+    There are n forward halves (lanes), then n backward halves. A lane that ends moves to the cell `SINK_CELL`
+    and stays there, until `compact` removes it from the arrays. The arrays hold the remaining m lanes.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ class TracedLanes:
         state, direction : (m,) ndarray
             Results of `look_up`. `direction` is overwritten.
         step_scale : float32
-            3/2 pixel, in the unit of the directions.
+            Factor from the unit of `direction` (integers of `Covering.state_table`) to 3/2 pixels.
         """
         displacement = self._move(direction, step_scale)
         column, row = displacement.view(np.float32).reshape(-1, 2).T

@@ -10,13 +10,7 @@ import numpy as np
 from ..field.symmetry import FieldSymmetry
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
-from .hatching import (
-    has_breaks,
-    has_outline,
-    has_overshoot,
-    has_paper_grain,
-    overshoot_steps,
-)
+from .hatching import has_breaks, has_outline, has_overshoot, has_paper_grain, overshoot_steps
 from .image_noise import MAX_MARGIN, high_pass_margin
 from .look import Look, is_even, magnitude_range, uses_magnitude
 from .look_units import PixelLook, pixel_look
@@ -66,9 +60,8 @@ def divide_into_strips(
         degrees = {field.degree for instance in instances if (field := instance.field) is not None}
         lines = max((FieldSymmetry(degree, ()).line_count for degree in degrees), default=1)
         margin = _longest_margin(pixel_look(look, camera, instances))
-        rows = max(
-            STRIP_STATES / (2 * lines * camera.width), MIN_STRIP_MARGINS * margin, 2 * OVERLAP_ROWS
-        )
+        rows = STRIP_STATES / (2 * lines * camera.width)
+        rows = max(rows, MIN_STRIP_MARGINS * margin, 2 * OVERLAP_ROWS)
         count = 1 << max(int(np.log2(height / rows)), 0)
     borders = [height * number // count for number in range(count + 1)]
     return [Strip(start, stop, height) for start, stop in pairwise(borders)]

@@ -19,15 +19,7 @@ import numpy as np
 from ..core.progress import progress
 from ..projection.gbuffer import GBuffer
 from ..projection.rest_coordinates import RestCoordinates, matrix_scale, rest_coordinates
-from .image_noise import (
-    BLUR_FACTOR,
-    NOISE_MEAN,
-    NOISE_STD,
-    STEP_LABEL,
-    box_radius,
-    gaussian_blur,
-    hash_bits,
-)
+from .image_noise import BLUR_FACTOR, NOISE_MEAN, NOISE_STD, box_radius, gaussian_blur, hash_bits
 from .pixel_field import pixel_window
 from .reported_blocks import reported_blocks
 
@@ -56,6 +48,9 @@ FEATURE_CELLS = 32.0
 
 #: Maximum number of bits of the index of a cell.
 MAX_CELL_BITS = 28
+
+#: Label of all steps.
+STEP_LABEL = "making noise"
 
 #: Added to octave indices, so that positive integers are hashed.
 OCTAVE_OFFSET = 64
@@ -176,24 +171,24 @@ def solid_noise(
 
 
 def instance_units(gbuffer: GBuffer, unit: float) -> np.ndarray | None:
-    """Convert a length from Blender units of world space to the object space of each mesh instance.
+    """Convert a length from world space to the object space of each of B mesh instances.
 
     Parameters
     ----------
     gbuffer : GBuffer
         Its `instances` must be set.
     unit : float
-        Unit of lengths on the surface, in Blender units; 0 if lengths are in pixels.
+        A length in Blender units of world space; 0 if lengths are in pixels.
 
     Returns
     -------
-    (B,) float32 ndarray, or None if `unit` is 0
+    (B,) float32 ndarray or None
+        The same length in the object space of each instance. None if `unit` is 0.
     """
     if not unit:
         return None
-    return np.array(
-        [unit / matrix_scale(instance.matrix) for instance in gbuffer.instances], dtype=np.float32
-    )
+    units = [unit / matrix_scale(instance.matrix) for instance in gbuffer.instances]
+    return np.array(units, dtype=np.float32)
 
 
 def cell_scale(
@@ -293,7 +288,10 @@ def _to_lattice_space(position: np.ndarray) -> np.ndarray:
 
 
 def _high_pass(gbuffer: GBuffer, channels: np.ndarray, sigma: float) -> None:
-    """Subtract from (K, P) `channels` their Gaussian blur, in place. Pixels without a surface are ignored."""
+    """Subtract a Gaussian blur of each of (K, P) `channels` from the channel, in place.
+
+    `sigma` is its standard deviation in pixels. Pixels without a surface are ignored.
+    """
     count = len(gbuffer.pixel)
     # The empty margin is as wide as the support of the blur.
     cell, shape = pixel_window(gbuffer.pixel, gbuffer.camera.width, 3 * box_radius(sigma))

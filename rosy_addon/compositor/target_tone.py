@@ -63,7 +63,10 @@ class ReferenceRender:
         return MipMap(self.luminance)
 
     def mip_level(self, camera: Camera) -> float:
-        """Return the (fractional) level of the mip map whose pixels are as large as those of `camera`."""
+        """Return the (fractional) level of the mip map at which a pixel is as large as a pixel of `camera`.
+
+        Pixels are compared at the same distance from the camera.
+        """
         height, width = self.luminance.shape
         pixels_per_unit = self.camera.resized(width, height).pixels_per_unit
         return max(float(np.log2(pixels_per_unit / camera.pixels_per_unit)), 0.0)

@@ -46,7 +46,8 @@ def has_wobble(look: Any) -> bool:
 def wave_table() -> np.ndarray:
     """Return the (WAVE_COUNT, 4) float32 frequency vector and phase of each wave.
 
-    Frequencies are in cycles per unit of length along x, y and z, phases in cycles. The directions
+    Frequencies are in cycles per octave length along x, y and z, phases in cycles. The octave length is a
+    power of two near the mean wavelength, in units of rest space (see `solid_wobble_angle`). The directions
     form a spiral that covers a hemisphere evenly. The wavelengths are spread over one octave.
     """
     golden = (5**0.5 - 1) / 2

@@ -13,21 +13,12 @@ import numpy as np
 # Coefficients of three polynomials, highest power first. They interpolate, at Chebyshev nodes, atan(a) / a as
 # a function of a^2 from 0 to 1, and sin(x) / x and cos(x) as functions of x^2 from 0 to (pi / 2)^2. Their
 # errors are below 1e-8, 1e-10 and 1e-9.
-_ATAN_COEFFICIENTS = (
+_ATAN_TERMS = (
     0.00276628, -0.01573125, 0.04213762, -0.07456855, 0.10618371, -0.14197798, 0.19991872,
     -0.33333037, 0.99999998,
 )  # fmt: skip
-_SIN_COEFFICIENTS = (
-    -2.38892170e-08,
-    2.75252698e-06,
-    -1.98408612e-04,
-    8.33333097e-03,
-    -1.66666666e-01,
-    1.0,
-)
-_COS_COEFFICIENTS = (
-    -2.60506573e-07, 2.47601097e-05, -1.38883603e-03, 4.16666362e-02, -4.99999994e-01, 1.0,
-)  # fmt: skip
+_SIN_TERMS = (-2.3889217e-8, 2.75252698e-6, -1.98408612e-4, 8.33333097e-3, -0.166666666, 1.0)
+_COS_TERMS = (-2.60506573e-7, 2.47601097e-5, -1.38883603e-3, 4.16666362e-2, -0.499999994, 1.0)
 
 
 def vector_angle(x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -48,7 +39,7 @@ def vector_angle(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     np.maximum(larger, np.float32(1e-30), out=larger)
     ratio = np.minimum(abs_x, abs_y)
     ratio /= larger
-    angle = _horner(_ATAN_COEFFICIENTS, ratio * ratio)
+    angle = _horner(_ATAN_TERMS, ratio * ratio)
     angle *= ratio
     angle = np.where(abs_y > abs_x, np.float32(np.pi / 2) - angle, angle)
     angle = np.where(x < 0, np.float32(np.pi) - angle, angle)
@@ -69,9 +60,9 @@ def cos_sin(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         Their errors are below 3e-7.
     """
     square = angle * angle
-    sine = _horner(_SIN_COEFFICIENTS, square)
+    sine = _horner(_SIN_TERMS, square)
     sine *= angle
-    return _horner(_COS_COEFFICIENTS, square), sine
+    return _horner(_COS_TERMS, square), sine
 
 
 def unit_phasor(angle: np.ndarray) -> np.ndarray:

@@ -43,7 +43,7 @@ def read_bytes(
     reject_binary : bool
         Raise an error if the first `HEAD_BYTES` bytes contain a zero byte. The rest is then not read.
     max_bytes : int, optional
-        Largest permitted size of the file. Of a larger file, only one byte more is read.
+        Largest permitted size of the file. A larger file is refused before it is read.
 
     Raises
     ------
@@ -55,12 +55,11 @@ def read_bytes(
         head = file.read(HEAD_BYTES)
         if reject_binary and b"\0" in head:
             raise RosyError(f"{path}: expected text, found binary data")
-        if max_bytes is None:
-            check_memory(os.fstat(file.fileno()).st_size, f"{path}", "choose a smaller file")
-        data = head + file.read(-1 if max_bytes is None else max(max_bytes + 1 - len(head), 0))
-    if max_bytes is not None and len(data) > max_bytes:
-        raise RosyError(f"{path}: is larger than the limit of {max_bytes:,} bytes")
-    return data
+        size = os.fstat(file.fileno()).st_size
+        if max_bytes is not None and size > max_bytes:
+            raise RosyError(f"{path}: is larger than the limit of {max_bytes:,} bytes")
+        check_memory(size, f"{path}", "choose a smaller file")
+        return head + file.read()
 
 
 @contextmanager
@@ -119,22 +118,16 @@ def check_parsing_memory(path: str | os.PathLike[str], binary_memory: float) -> 
     Raises
     ------
     RosyError
-        If more memory is needed than `available_memory`.
+        If the file cannot be read, or more memory is needed than `available_memory`.
     """
-    head = b""
-    with suppress(OSError):  # the error is raised where the file is read
-        if os.path.isfile(path):
-            with open(path, "rb") as file:
-                head, size = file.read(COUNTED_BYTES), os.path.getsize(path)
-    if not head:
-        return
+    with open_file(path) as file:
+        head, size = file.read(COUNTED_BYTES), os.fstat(file.fileno()).st_size
     memory_per_byte = binary_memory
     if b"\0" not in head[:HEAD_BYTES]:
         words, lines = len(head.split()), head.count(b"\n")
-        memory_per_byte = (WORD_MEMORY * words + LINE_MEMORY * lines) / len(head)
-    check_memory(
-        size * memory_per_byte, f"{path}: a file of {format_bytes(size)}", "choose a smaller file"
-    )
+        memory_per_byte = (WORD_MEMORY * words + LINE_MEMORY * lines) / max(len(head), 1)
+    subject = f"{path}: a file of {format_bytes(size)}"
+    check_memory(size * memory_per_byte, subject, "choose a smaller file")
 
 
 def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
@@ -212,10 +205,8 @@ def _is_running(pid: int) -> bool:
         return True  # on other systems, the signal 0 ends a process
     try:
         os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):
-        return True
+    except (OSError, OverflowError) as error:
+        return not isinstance(error, ProcessLookupError)
     return True
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextvars import ContextVar
-from types import TracebackType
 from typing import NamedTuple
 
 #: A function that is called with the progress, from 0 to 1, and a description of the current work. If it
@@ -60,12 +59,7 @@ class _Scope:
     def __enter__(self) -> None:
         self._token = _current.set(self._part)
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         _current.reset(self._token)
 
 
@@ -96,12 +90,8 @@ def progress(start: float, stop: float | None = None, label: str | None = None) 
     if outer is None:
         return _Scope(None)
     extent, stop = outer.stop - outer.start, start if stop is None else stop
-    inner_label = label if outer.label is None else outer.label
-    return _Scope(
-        _Part(
-            outer.listener, outer.start + extent * start, outer.start + extent * stop, inner_label
-        )
-    )
+    first, last = outer.start + extent * start, outer.start + extent * stop
+    return _Scope(_Part(outer.listener, first, last, label if outer.label is None else outer.label))
 
 
 def listening(listener: Listener | None) -> _Scope:

@@ -1,10 +1,10 @@
 """Declarative settings: dataclass fields with a range, a label and a help text.
 
-A settings class is a frozen dataclass whose fields are made by `number`, `numbers`, `choice`,
-`switch` and `color`. Each field is described by a `Setting`: default, range, label, help text, position in
-the panels, the stage of rendering that it affects, and when it has an effect. Properties, panels, validation,
-command line options, tables of the documentation and cache keys are derived from these descriptions. Other
-fields of the class, such as arrays, have no description.
+A settings class is a frozen dataclass whose fields are made by `number`, `fraction`, `numbers`,
+`choice`, `switch` and `color`. Each field is described by a `Setting`: default, range, label, help text,
+position in the panels, the stage of rendering that it affects, and when it has an effect. Properties, panels,
+validation, command line options, tables of the documentation and cache keys are derived from these
+descriptions. Other fields of the class, such as arrays, have no description.
 """
 
 from __future__ import annotations
@@ -22,6 +22,9 @@ from .errors import RosyError
 
 #: Texts that are accepted for switches on the command line, and their values.
 SWITCH_VALUES = {"true": True, "on": True, "1": True, "false": False, "off": False, "0": False}
+
+#: Smallest and largest allowed value of each number of a tuple, by the name of the number in the interface.
+Ranges = Mapping[str, tuple[float, float]]
 
 
 class Stage(IntEnum):
@@ -154,7 +157,7 @@ class Numbers(Setting):
         Smallest and largest allowed value of each number, by the name of the number in the interface.
     """
 
-    parts: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    parts: Ranges = field(default_factory=dict)
 
     def check(self, value: Any) -> None:
         """Raise a `RosyError` if a value is not a tuple of numbers within their ranges."""
@@ -231,12 +234,7 @@ def number(default: float, low: float, high: float, text: str, **description: An
     return _field(Number(default=default, low=low, high=high, text=text, **description))
 
 
-def numbers(
-    default: tuple[float, ...],
-    text: str,
-    parts: Mapping[str, tuple[float, float]],
-    **description: Any,
-) -> Any:
+def numbers(default: tuple[float, ...], text: str, parts: Ranges, **description: Any) -> Any:
     """Return a dataclass field for a setting that is a tuple of numbers; see `Numbers` and `Setting`."""
     return _field(Numbers(default=default, text=text, parts=parts, **description))
 
@@ -254,6 +252,11 @@ def switch(default: bool, text: str, **description: Any) -> Any:
 def color(default: str, text: str, **description: Any) -> Any:
     """Return a dataclass field for a setting that is a color; see `Color` and `Setting`."""
     return _field(Color(default=default, text=text, **description))
+
+
+def fraction(default: float, text: str, **description: Any) -> Any:
+    """Return a dataclass field for a setting that is a number from 0 to 1; see `Number` and `Setting`."""
+    return number(default, 0.0, 1.0, text, **description)
 
 
 def _field(setting: Setting) -> Any:

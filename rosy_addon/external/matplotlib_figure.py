@@ -170,11 +170,10 @@ class Page:
     @cached_property
     def _caption_lines(self) -> list[str]:
         letters = max(int(self.width * POINTS / (TITLE_SIZE * LETTER_WIDTH)), 8)
-        return [
-            line
-            for paragraph in self.caption.splitlines()
-            for line in textwrap.wrap(paragraph, letters) or [""]
-        ]
+        lines = []
+        for paragraph in self.caption.splitlines():
+            lines += textwrap.wrap(paragraph, letters) or [""]
+        return lines
 
     @cached_property
     def _height(self) -> float:
@@ -255,25 +254,22 @@ class Page:
     def _draw_keys(self, row: Row, top: float) -> None:
         """Draw the keys of a row in their column: the color bar and the legend of singularities."""
         left = self.columns * (self._panel_size[0] + GAP) + GAP
-        top += self._title_height(row)
+        top, text_height = top + self._title_height(row), _text_height(TEXT_SIZE)
         marks = [marks for panel in row.drawn for marks in (panel.dots, panel.rings)]
         entries = _legend_entries([each for each in marks if each is not None])
-        legend_height = len(entries) * _text_height(TEXT_SIZE) * 1.2
+        legend_height = len(entries) * text_height * 1.2
         if row.color_bar is not None:
             height = self._panel_size[1] - (legend_height + ROW_GAP if entries else 0.0)
             self._draw_color_bar(row.color_bar, left, top, max(height, 0.5 * self._panel_size[1]))
         bottom = top + self._panel_size[1] - legend_height
         for number, (text, color, diameter) in enumerate(entries):
-            line_top = bottom + number * _text_height(TEXT_SIZE) * 1.2
-            middle = (
-                line_top + 0.8 * _text_height(TEXT_SIZE) - 0.5 * CAPITAL_HEIGHT * TEXT_SIZE / POINTS
-            )
+            line_top = bottom + number * text_height * 1.2
+            middle = line_top + 0.8 * text_height - 0.5 * CAPITAL_HEIGHT * TEXT_SIZE / POINTS
             axes = self._axes(left, middle - 0.1, 0.2, 0.2)
             axes.axis("off")
             size, line_width = _marker_size(np.array([diameter / self.dpi * POINTS]), False)
-            axes.scatter(
-                0.5, 0.5, s=size**2, c=color, edgecolors=OUTLINE_COLOR, linewidths=line_width
-            )
+            style = {"edgecolors": OUTLINE_COLOR, "linewidths": line_width}
+            axes.scatter(0.5, 0.5, s=size**2, c=color, **style)
             axes.set(xlim=(0, 1), ylim=(0, 1))
             self._text(left + 0.25, line_top, text, TEXT_SIZE)
 
@@ -351,23 +347,16 @@ def _draw_marks(axes: Axes, marks: SingularityMarks, dpi: int, is_open: bool) ->
     colors[:, 3] = 0.0 if is_open else np.where(marks.is_visible, 1.0, HIDDEN_OPACITY)
     outlines[:, 3] = np.where(marks.is_visible, 1.0, HIDDEN_OPACITY)
     size, line_width = _marker_size(2 * marks.radius * POINTS / dpi, is_open)
-    axes.scatter(
-        *marks.position.T,
-        s=size**2,
-        facecolors=colors,
-        edgecolors=outlines,
-        linewidths=line_width,
-        zorder=MARK_ORDER,
-    )
+    style = {"facecolors": colors, "edgecolors": outlines, "linewidths": line_width}
+    axes.scatter(*marks.position.T, s=size**2, zorder=MARK_ORDER, **style)
     if is_open:
         return
     plate = {"facecolor": "white", "alpha": 0.75, "linewidth": 0, "pad": 0.4}
     for label in placed_labels(marks):
         size = label.height / CAPITAL_HEIGHT * POINTS / dpi
         text = label.text.replace("-", MINUS)
-        axes.text(
-            label.left, label.bottom, text, fontsize=size, color=INK, bbox=plate, zorder=MARK_ORDER
-        )
+        style = {"fontsize": size, "color": INK, "zorder": MARK_ORDER}
+        axes.text(label.left, label.bottom, text, bbox=plate, **style)
 
 
 def _marker_size(diameter: np.ndarray, is_open: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -388,26 +377,23 @@ def _marker_size(diameter: np.ndarray, is_open: bool) -> tuple[np.ndarray, np.nd
 
 def _legend_entries(marks: Sequence[SingularityMarks]) -> list[tuple[str, str, float]]:
     """Return text, color and diameter (pixels) for each index of singularities, the largest index first."""
-    entries = {}
+    diameters: dict[tuple[float, int, int], float] = {}
     for part in marks:
-        for index, degree, radius in zip(
-            part.index.tolist(), part.degree.tolist(), part.radius.tolist(), strict=True
-        ):
-            key = index / degree, index
-            if key in entries and entries[key][2] >= 2 * radius:
-                continue
-            entries[key] = (
-                f"index {format_index(index, degree)}".replace("-", MINUS),
-                COLOR_BY_SIGN[int(np.sign(index))],
-                2 * radius,
-            )
-    return [entries[key] for key in sorted(entries, reverse=True)]
+        columns = part.index.tolist(), part.degree.tolist(), part.radius.tolist()
+        for index, degree, radius in zip(*columns, strict=True):
+            key = index / degree, index, degree
+            diameters[key] = max(2 * radius, diameters.get(key, 0.0))
+    entries = []
+    for key in sorted(diameters, reverse=True):
+        _, index, degree = key
+        text = f"index {format_index(index, degree)}".replace("-", MINUS)
+        entries.append((text, COLOR_BY_SIGN[int(np.sign(index))], diameters[key]))
+    return entries
 
 
 def _draw_scale_bar(axes: Axes, length: float, text: str, dpi: int) -> None:
     """Draw a scale bar of a given length in pixels at the lower left of a panel, with its text."""
     margin, gap = 0.06 * dpi, 0.03 * dpi
-    axes.plot(
-        [margin, margin + length], [margin, margin], color=INK, linewidth=1.2, solid_capstyle="butt"
-    )
+    ends = [margin, margin + length]
+    axes.plot(ends, [margin, margin], color=INK, linewidth=1.2, solid_capstyle="butt")
     axes.text(margin, margin + gap, text, fontsize=TEXT_SIZE, color=INK, va="bottom")

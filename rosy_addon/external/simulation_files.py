@@ -73,14 +73,10 @@ class Step:
     def read(self) -> MeshArrays:
         """Read the surface of the step, with the arrays at its points and cells."""
         datasets = [_read_dataset(path, self.index) for path in self.paths]
+        suffix = self.paths[0].suffix.lower()
+        has_parts, repeats_blocks = suffix in PARTED_SUFFIXES, suffix in XDMF_SUFFIXES
         with _reporting(self.paths[0]):
-            suffix = self.paths[0].suffix.lower()
-            return surface_arrays(
-                datasets,
-                self.name,
-                has_parts=suffix in PARTED_SUFFIXES,
-                repeats_blocks=suffix in XDMF_SUFFIXES,
-            )
+            return surface_arrays(datasets, self.name, has_parts, repeats_blocks)
 
 
 def read_simulation(path: str | os.PathLike[str], step: int | None = None) -> MeshArrays:
@@ -280,11 +276,6 @@ def _read_dataset(path: Path, index: int | None) -> Any:
         return pyvista.wrap(reader.GetOutputDataObject(0))
 
 
-def _missing(path: Path, error: ModuleNotFoundError) -> RosyError:
-    """Return the error that says which library must be installed to read a file."""
-    return RosyError(f"{path}: needs {error.name}: pip install rosyfields[io]")
-
-
 @contextlib.contextmanager
 def _reporting(path: Path) -> Iterator[None]:
     """Context manager: raise errors of the libraries as a `RosyError` of one line. Discard all other output.
@@ -292,21 +283,19 @@ def _reporting(path: Path) -> Iterator[None]:
     It catches exceptions, errors that VTK prints before it continues, and the exit of meshio, which prints
     its errors first. Warnings are discarded.
     """
-    try:
-        import pyvista
-    except ModuleNotFoundError as error:
-        raise _missing(path, error) from None
-    catcher = pyvista.VtkErrorCatcher(send_to_logging=False)
     reason = None
     with _discarded_output() as printed:
         try:
+            import pyvista
+
+            catcher = pyvista.VtkErrorCatcher(send_to_logging=False)
             with warnings.catch_warnings(), np.errstate(all="ignore"), catcher:
                 warnings.simplefilter("ignore")
                 yield
         except (RosyError, MemoryError):
             raise
         except ModuleNotFoundError as error:
-            raise _missing(path, error) from None
+            raise RosyError(f"{path}: needs {error.name}: pip install rosyfields[io]") from None
         except (Exception, SystemExit) as error:
             text = "" if isinstance(error, SystemExit) else str(error)
             reason = text or printed() or type(error).__name__

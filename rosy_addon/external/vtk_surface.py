@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.cache import content_hash
 from ..core.errors import RosyError, counted
 from ..field.formats.polygons import Polygons, offsets_from_sizes
 from ..field.frames import dot
@@ -41,7 +42,7 @@ _INTERNAL_ARRAYS = (
 
 
 def surface_arrays(
-    datasets: list[Any], name: str, *, has_parts: bool, repeats_blocks: bool
+    datasets: list[Any], name: str, has_parts: bool, repeats_blocks: bool
 ) -> MeshArrays:
     """Return the surface of the datasets of a time step, with the arrays at its points and cells.
 
@@ -104,27 +105,17 @@ def _without_copies(blocks: list[Any]) -> list[Any]:
 
     If the steps of an .xdmf file refer to a common grid, VTK returns this grid as an additional block.
     """
-    kept: list[Any] = []
+    kept: dict[bytes, Any] = {}
     for block in blocks:
-        if not any(
-            block.n_cells == other.n_cells
-            and np.array_equal(block.points, other.points)
-            and np.array_equal(
-                block.cast_to_unstructured_grid().cells, other.cast_to_unstructured_grid().cells
-            )
-            for other in kept
-        ):
-            kept.append(block)
-    return kept
+        cells = np.asarray(block.cast_to_unstructured_grid().cells)
+        kept.setdefault(content_hash(np.asarray(block.points), cells), block)
+    return list(kept.values())
 
 
 def _arrays(attributes: Any, index: np.ndarray) -> dict[str, np.ndarray]:
     """Return the numeric arrays of points or cells, by name, with the rows that `index` selects."""
-    skipped = {
-        *_INTERNAL_ARRAYS,
-        attributes.active_normals_name,
-        attributes.active_texture_coordinates_name,
-    }
+    normals, uv = attributes.active_normals_name, attributes.active_texture_coordinates_name
+    skipped = {*_INTERNAL_ARRAYS, normals, uv}
     return {
         name: np.asarray(values)[index]
         for name, values in attributes.items()
@@ -154,10 +145,8 @@ def _surface_polygons(grid: Any, name: str) -> tuple[Polygons, np.ndarray, np.nd
         raise RosyError(
             f"{name}: has no surface: none of its {counted(len(cell_types), 'cell')} is a face or a volume"
         )
-    points = np.unique(corner_point)
-    polygons = Polygons(
-        np.asarray(grid.points)[points], np.searchsorted(points, corner_point), face_start
-    )
+    points, corner_vertex = np.unique(corner_point, return_inverse=True)
+    polygons = Polygons(np.asarray(grid.points)[points], corner_vertex, face_start)
     return polygons, points, cells
 
 

@@ -21,7 +21,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, BinaryIO, TextIO
 
@@ -96,12 +96,11 @@ def find_blender(requested: str | None = None) -> str:
     RosyError
         If there is no Blender, or it is too old.
     """
-    for named, source in (
-        (requested, "--blender "),
-        (os.environ.get(BLENDER_VARIABLE), f"{BLENDER_VARIABLE}="),
-    ):
-        if named:
-            return _checked_blender(named, source)
+    named = os.environ.get(BLENDER_VARIABLE)
+    if requested:
+        return _checked_blender(requested, "--blender ")
+    if named:
+        return _checked_blender(named, f"{BLENDER_VARIABLE}=")
     outdated = []
     for program in installed_blenders():
         version = blender_version(program)
@@ -128,10 +127,8 @@ def _checked_blender(named: str, source: str) -> str:
     if version is None:
         raise RosyError(f"{source}{named}: is not Blender, or does not start")
     if version < OLDEST_VERSION:
-        raise RosyError(
-            f"{source}{named}: is Blender {_version_text(version)}, but RoSy needs "
-            f"{_version_text(OLDEST_VERSION)} or later"
-        )
+        found, oldest = _version_text(version), _version_text(OLDEST_VERSION)
+        raise RosyError(f"{source}{named}: is Blender {found}, but RoSy needs {oldest} or later")
     return program
 
 
@@ -159,7 +156,10 @@ def _usual_places() -> list[str]:
 
 
 def _numbers(path: str) -> list[int]:
-    """Return the numbers in those parts of a path that contain the name Blender, as a version to compare."""
+    """Return the numbers in the folder and file names of a path that contain "blender".
+
+    For ``/opt/blender-4.10/blender`` they are [4, 10]. Such lists are compared to find the newest version.
+    """
     names = " ".join(part for part in Path(path).parts if "blender" in part.lower())
     return [int(number) for number in re.findall(r"\d+", names)]
 
@@ -174,28 +174,13 @@ def _program(path: Path) -> str | None:
 
 def blender_version(program: str) -> tuple[int, ...] | None:
     """Return the version of a Blender program, such as (4, 2, 1). None if the program is not Blender."""
+    streams = {"stdin": subprocess.DEVNULL, "capture_output": True}
     try:
-        done = subprocess.run(
-            [program, "-b", "--version"],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            timeout=VERSION_SECONDS,
-            check=False,
-        )
+        done = subprocess.run([program, "-b", "--version"], timeout=VERSION_SECONDS, **streams)
     except (OSError, subprocess.TimeoutExpired):
         return None
     match = re.search(rb"^Blender (\d+)\.(\d+)(?:\.(\d+))?", done.stdout, re.MULTILINE)
     return tuple(int(part) for part in match.groups(b"0")) if match else None
-
-
-def has_bpy() -> bool:
-    """Return whether Python has Blender's module ``bpy``."""
-    try:
-        importlib.import_module("bpy")
-    except ImportError:
-        return False
-    return True
 
 
 def run_in_blender(
@@ -224,8 +209,10 @@ def run_in_blender(
     RosyError
         If there is no file, no Blender, or Blender failed.
     """
-    if options.blender is None and has_bpy():
-        return
+    if options.blender is None:
+        with suppress(ImportError):
+            importlib.import_module("bpy")
+            return
     if path is None:
         raise RosyError(f"{command}: no input: give SCENE.blend")
     try:
@@ -281,14 +268,14 @@ def run_job(program: str, arguments: Sequence[str]) -> int:
             process.wait()
         except KeyboardInterrupt:
             _stop(process, report)
-            if _reported_status(report) is None:
+            if len(_report_words(report)) < 2:
                 raise
         finally:
             _stop(process, report)
-        status = _reported_status(report)
-        if status is None:
+        words = _report_words(report)
+        if len(words) < 2:
             raise RosyError(f"{program}: {_failure(process.returncode, log)}")
-        return status
+        return int(words[1])
 
 
 def _copy(stream: TextIO | None, default: int, stack: ExitStack) -> int:
@@ -339,28 +326,20 @@ def _stop(process: subprocess.Popen[bytes], report: BinaryIO) -> None:
     """
     if process.poll() is not None:
         return
-    if _report_lines(report):
+    if _report_words(report):
         if sys.platform != "win32":  # on Windows, Ctrl-C has reached Blender already
             process.send_signal(signal.SIGINT)
-        try:
+        with suppress(subprocess.TimeoutExpired, KeyboardInterrupt):
             process.wait(STOP_SECONDS)
-        except (subprocess.TimeoutExpired, KeyboardInterrupt):
-            pass
-        else:
             return
     process.kill()
     process.wait()
 
 
-def _report_lines(report: BinaryIO) -> list[bytes]:
+def _report_words(report: BinaryIO) -> list[bytes]:
     """Return the words that the script has reported: "begun", then the exit status of the command."""
     report.seek(0)
     return report.read().split()
-
-
-def _reported_status(report: BinaryIO) -> int | None:
-    lines = _report_lines(report)
-    return int(lines[1]) if len(lines) > 1 else None
 
 
 def _failure(status: int, log: BinaryIO) -> str:

@@ -40,9 +40,8 @@ def run(job: dict[str, Any]) -> None:
     )
     blender_errors, sys.stderr = sys.stderr, errors
     signal.signal(signal.SIGINT, interrupt)
-    if hasattr(
-        signal, "SIGPIPE"
-    ):  # as in Python outside of Blender, a closed pipe raises an OSError
+    if hasattr(signal, "SIGPIPE"):
+        # As in Python outside of Blender, a closed pipe raises an OSError.
         signal.signal(signal.SIGPIPE, signal.SIG_IGN)
     os.write(report, b"begun\n")
     try:
@@ -77,10 +76,9 @@ def interrupt(_number: int, _frame: object) -> None:
 
 def run_command(job: dict[str, Any], output: TextIO) -> int:
     """Import the package and run the command, which prints to `output`."""
-    name, folder = job["package"], Path(job["folder"])
-    spec = importlib.util.spec_from_file_location(
-        name, folder / "__init__.py", submodule_search_locations=[str(folder)]
-    )
+    name, file = job["package"], Path(job["folder"], "__init__.py")
+    # As the file is an __init__.py, its folder is searched for submodules.
+    spec = importlib.util.spec_from_file_location(name, file)
     package = importlib.util.module_from_spec(spec)
     sys.modules[name] = package
     spec.loader.exec_module(package)

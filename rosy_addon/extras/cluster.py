@@ -94,7 +94,8 @@ def _run_tasks(
 def _python_runner() -> Callable[[list[str]], tuple[int, str, str]]:
     """Return a function that runs Python with some arguments on a worker.
 
-    It is a local function. Dask sends these by value, so RoSy need not be installed on the scheduler.
+    The function is local to this one. Dask pickles local functions by value, so that the scheduler can
+    unpickle it without RoSy.
     """
 
     def run_python(words: list[str]) -> tuple[int, str, str]:

@@ -39,9 +39,6 @@ def main_in_blender(argv: Sequence[str], output: TextIO) -> int:
         Standard output of the command. `sys.stdout` is not used, as Blender also prints to it.
     """
     use_output(output)
-    extras = Extras(
-        run_on_cluster=run_on_cluster,
-        run_in_blender=lambda *_: None,
-        is_in_blender=True,
-    )
+    hooks = {"run_on_cluster": run_on_cluster, "run_in_blender": lambda *_: None}
+    extras = Extras(is_in_blender=True, **hooks)
     return cli_main(argv, f"python -m {PACKAGE}", extras)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,6 @@ import numpy as np
 
 from .. import api
 from ..api.films import MAX_BETWEEN
-from ..api.pictures import picture_look
 from ..cli.options import Options, add_subcommand, int_between
 from ..cli.pictures import add_rate_option, video_encoder
 from ..cli.streams import print_line
@@ -23,7 +23,6 @@ from ..field.field_io import READ_SUFFIXES
 from ..field.formats.polygons import Polygons
 from ..field.mesh_arrays import MeshArrays
 from ..field.mesh_io import READERS
-from ..field.rosy_field import check_degree
 from ..rendering.turntable import check_video_path
 
 
@@ -33,34 +32,27 @@ def add_film_command(subparsers: Any) -> None:
     parser.description += (
         " Files whose names differ only in numbers are shown in the order of the numbers."
     )
-    parser.add_argument(
-        "series",
-        nargs="+",
-        type=Path,
-        metavar="SERIES",
-        help=f"a file with several steps, or a file for each step: {', '.join(SUFFIXES)}; or a mesh file and a "
-        f"field file for each step: {', '.join(READ_SUFFIXES)}",
+    text = (
+        f"a file with several steps, or a file for each step: {', '.join(SUFFIXES)}; or a mesh file "
+        f"and a field file for each step: {', '.join(READ_SUFFIXES)}"
     )
+    parser.add_argument("series", nargs="+", type=Path, metavar="SERIES", help=text)
     parser.add_output_option("OUT.mp4|OUT.gif")
-    parser.add_value(
-        "--array", "NAME", "array that is the field; by default the only one of vectors or tensors"
-    )
-    parser.add_degree_option(
-        "degree of the fields, 1 to 12; by default that of the files, 1 for an array of vectors, or 4"
-    )
+    text = "array that is the field; by default the only one of vectors or tensors"
+    parser.add_value("--array", "NAME", text)
+    text = "degree of the fields, 1 to 12; by default that of the files, 1 for an array of vectors, or 4"
+    parser.add_degree_option(text)
     parser.add_undefined_option()
-    parser.add_value(
-        "--between",
-        "N|auto",
-        "pictures between two steps, for which fields and vertices are interpolated (%(default)d); auto: as "
-        "many as keep streaks steady",
-        _count_or_auto,
+    text = (
+        "pictures between two steps, for which fields and vertices are interpolated (%(default)d); "
+        "auto: as many as keep streaks steady"
     )
-    parser.add_switch(
-        "--loop", "let the first step follow the last one, for films that are shown in a loop"
-    )
+    parser.add_value("--between", "N|auto", text, _count_or_auto)
+    text = "let the first step follow the last one, for films that are shown in a loop"
+    parser.add_switch("--loop", text)
     add_rate_option(parser)
-    parser.add_view_options()
+    parser.add_direction_options()
+    parser.add_size_option()
     parser.add_workers_option()
     parser.add_look_options()
 
@@ -74,11 +66,7 @@ def run_film(options: Options) -> None:
     """Draw the steps of a simulation, or a series of fields, under one camera, as a video."""
     options.check_output()
     check_video_path(options.output)
-    if options.degree is not None:
-        check_degree(options.degree)
-    preset, settings = options.requested_preset(), options.requested_settings()
-    # Mistakes are reported before the files are read.
-    picture_look(str(options.series[0]), preset, settings, {})
+    arguments = options.picture_arguments(api.film, options.series[0])
     encode = video_encoder(options)
     fields = requested_fields(options)
     count, between = len(fields), options.between
@@ -88,15 +76,25 @@ def run_film(options: Options) -> None:
 
     def announce(number: int) -> None:
         if between == 0:
-            print_line(f"step {number} of {count}{fields.time_text(number - 1)}")
+            print_line(f"step {number} of {count}{_item_note(fields.items[number - 1])}")
         else:
             print_line(f"picture {number}{total}")
 
-    arguments = options.api_arguments(api.film, encode=encode, on_picture=announce)
+    arguments |= {"encode": encode, "on_picture": announce}
     api.film(fields, options.output, **arguments)
 
 
-def requested_fields(options: Options) -> SimulationFields | FieldFiles:
+def _item_note(item: Path | Step) -> str:
+    """Return what is printed about a field before it is drawn: the name of its file, or the time of its step.
+
+    Empty if the files state no time.
+    """
+    if isinstance(item, Path):
+        return f", {item.name}"
+    return "" if item.time is None else f", time {item.time:g}"
+
+
+def requested_fields(options: Options) -> FieldSeries:
     """Return the fields of the series that the command line names.
 
     These are the fields of field files on one mesh if there are field files or the first file is a mesh file.
@@ -108,7 +106,7 @@ def requested_fields(options: Options) -> SimulationFields | FieldFiles:
         If there is only one step or field, or a file is missing or of another format.
     """
     name, *others = options.series
-    nonfinite = "zero" if options.undefined else "error"
+    degree, nonfinite = options.degree, options.nonfinite
     has_mesh = name.suffix.lower() in READERS
     if has_mesh or any(path.suffix.lower() in READ_SUFFIXES for path in others):
         if not has_mesh and name.suffix.lower() not in SUFFIXES:
@@ -124,80 +122,61 @@ def requested_fields(options: Options) -> SimulationFields | FieldFiles:
         surface = api.Surface(name, up=options.up)
         for path in others:
             check_readable(path)
-        return FieldFiles(in_order(others), surface, options.degree, nonfinite)
+        keywords = {"surface": surface, "degree": degree, "nonfinite": nonfinite}
+        return FieldSeries(in_order(others), partial(api.read_field, **keywords))
     steps = list_steps(options.series)
     if len(steps) < 2:
         raise RosyError(f"{name}: has one step only: draw it with the command render")
-    return SimulationFields(steps, options.array, options.degree, nonfinite, options.up or "z")
+    read = StepReader(options.array, degree, nonfinite, options.up or "z")
+    return FieldSeries(steps, read)
 
 
 @dataclass(eq=False)
-class FieldFiles(Sequence[api.Field]):
-    """A sequence of fields from field files, all on one surface. Each access to an item reads its file.
+class FieldSeries(Sequence[api.Field]):
+    """A sequence of fields. Each access to one reads its files.
 
     Parameters
     ----------
-    paths : sequence of Path
-    surface : Surface
-    degree, nonfinite
-        See `api.read_field`.
+    items : sequence of Path or Step
+        Field files, or steps of a simulation.
+    read : function
+        Function that returns the field of an item.
     """
 
-    paths: Sequence[Path]
-    surface: api.Surface
-    degree: int | None = None
-    nonfinite: str = "error"
+    items: Sequence[Any]
+    read: Callable[[Any], api.Field]
 
     def __len__(self) -> int:
-        return len(self.paths)
+        return len(self.items)
 
     def __getitem__(self, index: Any) -> Any:
-        path = self.paths[index]
-        return api.read_field(path, self.surface, self.degree, nonfinite=self.nonfinite)
-
-    def time_text(self, index: int) -> str:
-        """Return the name of a file, for the line that is printed before its field is drawn."""
-        return f", {self.paths[index].name}"
+        return self.read(self.items[index])
 
 
 @dataclass(eq=False)
-class SimulationFields(Sequence[api.Field]):
-    """A sequence of fields from the steps of a simulation. Each access to an item reads its files.
+class StepReader:
+    """A function that returns the field of a step of a simulation.
 
     Parameters
     ----------
-    steps : sequence of Step
     array, degree, nonfinite
         See `field.array_field.array_field`.
     up : {"y", "z"}
         The upward axis of the meshes.
     """
 
-    steps: Sequence[Step]
     array: str | None = None
     degree: int | None = None
     nonfinite: str = "error"
     up: str = "z"
     _last: tuple[Polygons, api.Surface] | None = None
 
-    def __len__(self) -> int:
-        return len(self.steps)
-
-    def __getitem__(self, index: Any) -> Any:
-        name, mesh = self.steps[index].name, self.steps[index].read()
+    def __call__(self, step: Step) -> api.Field:
+        mesh = step.read()
         # If the mesh has not changed since the last step that was read, its surface is reused.
         if self._last is None or not all(map(np.array_equal, mesh.polygons, self._last[0])):
-            surface = api.Surface(MeshArrays(*mesh.polygons), name=name, up=self.up)
+            surface = api.Surface(MeshArrays(*mesh.polygons), name=step.name, up=self.up)
             self._last = mesh.polygons, surface
         surface = self._last[1]
-        arrays = SurfaceArrays(name, surface, mesh.vertex_data or {}, mesh.face_data or {})
-        field = array_field(arrays, self.array, self.degree, self.nonfinite)
-        return api.Field.of(surface, field)
-
-    def time_text(self, index: int) -> str:
-        """Return the time of a step, for the line that is printed before it is drawn.
-
-        Empty if the files state no time.
-        """
-        time = self.steps[index].time
-        return "" if time is None else f", time {time:g}"
+        arrays = SurfaceArrays(step.name, surface, mesh.vertex_data or {}, mesh.face_data or {})
+        return api.Field.of(surface, array_field(arrays, self.array, self.degree, self.nonfinite))

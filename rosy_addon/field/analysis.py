@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.errors import RosyError
 from ..core.progress import progress, report
 from .blocks import row_blocks
-from .connectivity import build_edges
 from .directional_field import field_directions
 from .frames import coordinates, dot, normalize
-from .representation import (
-    face_frames,
-    face_representation,
-    matching_angles,
-    to_representation,
-    unit_complex,
-)
+from .representation import face_representation, matching_angles, unit_complex
 from .rosy_field import RosyField
 from .singularities import find_singularities, first_pairs
 from .surface import Surface
@@ -29,29 +24,33 @@ DEFAULT_REACH = 0.05
 #: Number of distances that are computed at once, to bound memory.
 DISTANCES_PER_BLOCK = 2_000_000
 
-#: Fraction of the area on which the error is at most `ErrorStatistics.p95`.
+#: Fraction of the area on which the error is at most `Difference.p95`.
 PERCENTILE = 0.95
 
 
-class ErrorStatistics(NamedTuple):
-    """Statistics of the angular errors on the faces of a surface, in radians.
-
-    Faces on which the error is NaN are ignored. If it is NaN on all faces, all statistics are 0.
+@dataclass(frozen=True, eq=False)
+class Difference:
+    """The angle between two fields of the same degree on each face, and statistics of it.
 
     Attributes
     ----------
+    angle : (F,) float64 ndarray
+        Angle between a vector of one field and the nearest vector of the other, in radians from 0 to
+        pi/N. It is the same for all N vectors of a face. NaN where either field is undefined. For
+        directions that are not rotationally symmetric, see `Field.difference`.
     mean, rms : float
-        Mean and root mean square of the error, weighted by area.
+        Mean and root mean square of the angle in radians, weighted by area.
     p95 : float
-        95th percentile of the error, weighted by area.
+        95th percentile of the angle in radians, weighted by area.
     max : float
-        Largest error.
+        Largest angle, in radians.
     worst_face : int
-        The face with the largest error; -1 if the error is NaN on all faces.
+        The face with the largest angle; -1 if there is no face on which both fields are defined.
     compared : float
-        Fraction of the faces on which the error is not NaN.
+        Fraction of the faces on which both fields are defined, from 0 to 1.
     """
 
+    angle: NDArray[np.float64]
     mean: float
     rms: float
     p95: float
@@ -81,18 +80,15 @@ class FieldComparison(NamedTuple):
 
     Attributes
     ----------
-    angles : (F,) float64 ndarray
-        Angle between the fields on each face, in radians; see `angle_errors`.
-    statistics : ErrorStatistics
-        Statistics of the angles.
+    difference : Difference
+        Angle between the fields on each face, and its statistics.
     singularity_count, other_count : int
         Number of singularities of each field.
     matched_count : int
         Number of singularities that occur in both fields with the same index and nearly the same position.
     """
 
-    angles: np.ndarray
-    statistics: ErrorStatistics
+    difference: Difference
     singularity_count: int
     other_count: int
     matched_count: int
@@ -110,33 +106,32 @@ def dirichlet_energy(surface: Surface, field: RosyField) -> float:
     has an energy of about 4 pi N. The contribution of each singularity grows slowly with the resolution of
     the mesh. Faces where the field is undefined are ignored.
     """
-    x, y = face_frames(surface)
-    z = unit_complex(to_representation(field.vectors, x, y, field.degree))
-    edges = build_edges(surface.corner_vertex, surface.face_start)
-    a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
-    face_a, face_b = surface.corner_face[a], surface.corner_face[b]
-    angle = field.degree * matching_angles(surface, x, y, z, field.degree, a, b)
-    length, center_distance = edge_lengths(surface, a, b)
-    defined = (z[face_a] != 0) & (z[face_b] != 0) & (center_distance > 0)
+    z = unit_complex(face_representation(surface, field))
+    halfedges = surface.edges.halfedges
+    angle = field.degree * matching_angles(surface, z, field.degree)
+    length, center_distance = edge_lengths(surface, *halfedges.T)
+    defined = (z[surface.corner_face[halfedges]] != 0).all(axis=1) & (center_distance > 0)
     weight = np.divide(length, center_distance, out=np.zeros_like(length), where=defined)
     return float((weight * 2 * (1 - np.cos(angle)))[defined].sum())
 
 
 def edge_lengths(surface: Surface, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lengths of interior edges, and the distances between the face centers on their two sides.
+    """Return the lengths of I interior edges, and how far the centers of their two faces are from them.
 
     Parameters
     ----------
     surface : Surface
     a, b : (I,) int ndarray
-        The columns of `Edges.halfedges`: for both faces of each edge, the corner at which the edge starts.
+        For the first and the second face of each edge, the corner at which the edge starts (the columns of
+        `Edges.halfedges`).
 
     Returns
     -------
     length : (I,) float64 ndarray
-        Length of each edge.
+        Length of each edge, in object space.
     center_distance : (I,) float64 ndarray
-        Distance of the center of one face from the edge, plus that of the center of the other face.
+        Distance of the center of the first face from the line of the edge, plus the distance of the center
+        of the second face from this line, in object space.
     """
     start = surface.vertices[surface.corner_vertex[a]]
     edge = surface.vertices[surface.corner_vertex[b]] - start
@@ -160,10 +155,10 @@ def angle_errors(surface: Surface, field: RosyField, other: RosyField) -> np.nda
     Returns
     -------
     (F,) float64 ndarray
-        Angle in radians between a member of `field` and the nearest member of `other`, from 0 to pi / N. If
-        one of the fields is not a RoSy, its directions are matched with those of the other field, in their
-        order around the normal. There are N such matchings. The angle is then the least mean angle between
-        matched directions. NaN on faces where either field is undefined.
+        Angle in radians between a member of `field` and the nearest member of `other`, from 0 to pi / N. NaN
+        on faces where either field is undefined. If `field` or `other` has `direction_ratios`, the N
+        directions of one field are matched with the N directions of the other, in their order around the
+        normal. There are N such matchings. The angle is then the least mean angle between matched directions.
 
     Raises
     ------
@@ -176,7 +171,7 @@ def angle_errors(surface: Surface, field: RosyField, other: RosyField) -> np.nda
             f"{other.degree}"
         )
     if field.direction_ratios is None and other.direction_ratios is None:
-        z, other_z = face_representation(surface, field), face_representation(surface, other)
+        z, other_z = (face_representation(surface, f) for f in (field, other))
         error = np.abs(np.angle(z * other_z.conj())) / field.degree
         error[(z == 0) | (other_z == 0)] = np.nan
         return error
@@ -190,7 +185,7 @@ def _matched_direction_angles(surface: Surface, field: RosyField, other: RosyFie
 
     On each face, the best of the N matchings that keep the order around the normal is used.
     """
-    frames = face_frames(surface)
+    frames = surface.face_frames
     z, other_z = (coordinates(field_directions(surface, f), *frames) for f in (field, other))
     best = np.full(surface.face_count, np.inf)
     for shift in range(field.degree):
@@ -199,8 +194,10 @@ def _matched_direction_angles(surface: Surface, field: RosyField, other: RosyFie
     return best
 
 
-def error_statistics(surface: Surface, error: np.ndarray) -> ErrorStatistics:
-    """Return statistics of angular errors over the surface, weighted by the areas of the faces.
+def error_statistics(surface: Surface, error: np.ndarray) -> Difference:
+    """Return angular errors with their statistics over the surface, weighted by the areas of the faces.
+
+    If the error is NaN on all faces, all statistics are 0, and `worst_face` is -1.
 
     Parameters
     ----------
@@ -210,12 +207,13 @@ def error_statistics(surface: Surface, error: np.ndarray) -> ErrorStatistics:
     """
     defined = np.flatnonzero(np.isfinite(error))
     if not len(defined):
-        return ErrorStatistics(0.0, 0.0, 0.0, 0.0, -1, 0.0)
+        return Difference(error, 0.0, 0.0, 0.0, 0.0, -1, 0.0)
     area = np.bincount(surface.triangle_face, _triangle_areas(surface), surface.face_count)
     values, weight = error[defined], area[defined] / max(float(area[defined].sum()), 1e-300)
     order = np.argsort(values, kind="stable")
     rank = np.searchsorted(np.cumsum(weight[order]), PERCENTILE)
-    return ErrorStatistics(
+    return Difference(
+        error,
         float(weight @ values),
         float(np.sqrt(weight @ values**2)),
         float(values[order[min(rank, len(order) - 1)]]),
@@ -285,12 +283,11 @@ def match_on_surface(
 def compare_fields(surface: Surface, field: RosyField, other: RosyField) -> FieldComparison:
     """Compare two fields of the same degree on a surface: their angles and their singularities."""
     report(0.0, "comparing the fields")
-    angles = angle_errors(surface, field, other)
+    difference = error_statistics(surface, angle_errors(surface, field, other))
     with progress(0.2, 0.5):
         own = find_singularities(surface, field)
     with progress(0.5, 0.8):
         others = find_singularities(surface, other)
     with progress(0.8, 1.0):
         matching = match_on_surface(surface, own, others)
-    statistics = error_statistics(surface, angles)
-    return FieldComparison(angles, statistics, len(own[0]), len(others[0]), len(matching.distance))
+    return FieldComparison(difference, len(own[0]), len(others[0]), len(matching.distance))

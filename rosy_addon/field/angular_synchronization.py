@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.progress import report
+from .blocks import run_starts
 from .connectivity import sorted_with_order
 from .representation import unit_complex
 
@@ -58,7 +59,7 @@ class PhaseGraph:
     @cached_property
     def row_start(self) -> np.ndarray:
         """Index of the first entry of each row, for the rows (nodes) that have entries."""
-        return _run_starts(self.row)
+        return run_starts(self.row)
 
     @cached_property
     def strength(self) -> np.ndarray:
@@ -71,13 +72,6 @@ class PhaseGraph:
         return np.flatnonzero(self.b)
 
 
-def _run_starts(values: np.ndarray) -> np.ndarray:
-    """Return the first index of each run of equal values."""
-    is_first = np.ones(len(values), dtype=bool)
-    np.not_equal(values[1:], values[:-1], out=is_first[1:])
-    return np.flatnonzero(is_first)
-
-
 def phase_graph(
     node_count: int, row: np.ndarray, column: np.ndarray, a: np.ndarray, b: np.ndarray
 ) -> PhaseGraph:
@@ -86,7 +80,7 @@ def phase_graph(
     key = row[entry].astype(np.int64) * node_count + column[entry]
     key, order = sorted_with_order(key, max(node_count, 1) ** 2)
     entry = entry[order]
-    first = _run_starts(key)
+    first = run_starts(key)
     if len(first):
         a, b = (np.add.reduceat(values.take(entry), first) for values in (a, b))
     row, column = np.divmod(key[first], max(node_count, 1))
@@ -94,10 +88,11 @@ def phase_graph(
 
 
 def synchronize(graph: PhaseGraph, depth: int = 0) -> np.ndarray:
-    """Return (n,) complex128 values of modulus 1 at the nodes that nearly satisfy the entries of a graph.
+    """Return (n,) complex128 values of modulus 1, one for each node, that nearly satisfy all relations.
 
     First, the nodes are grouped into clusters, and this function is called for the graph of the clusters. Its
-    result is the initial value of the nodes, which are then smoothed. `depth` is the depth of this recursion.
+    result gives the initial values of the nodes, which are then smoothed. `depth` counts these recursive
+    calls; other callers leave it 0.
     """
     clustering = _clustering(graph) if graph.node_count > MIN_LEVEL_NODES else None
     if clustering is None or clustering.count * MIN_COARSENING > graph.node_count:
@@ -165,14 +160,12 @@ def _clustering(graph: PhaseGraph) -> _Clustering:
     nodes = np.arange(count)
     entry = np.arange(len(graph.row))
     for _ in range(MATCHING_ROUNDS):
-        free = (partner[graph.row[entry]] < 0) & (partner[graph.column[entry]] < 0)
-        entry = entry[free]
+        entry = entry[(partner[graph.row[entry]] < 0) & (partner[graph.column[entry]] < 0)]
         if not len(entry):
             break
         chosen = _strongest_of_row(graph.row, strength, entry)
-        choice = np.full(count, -1, dtype=np.int64)
-        choice[graph.row[chosen]] = graph.column[chosen]
-        chooser = graph.row[chosen]
+        chooser, choice = graph.row[chosen], np.full(count, -1, dtype=np.int64)
+        choice[chooser] = graph.column[chosen]
         mutual = choice[choice[chooser]] == chooser
         partner[chooser[mutual]] = choice[chooser[mutual]]
         link[chooser[mutual]] = chosen[mutual]
@@ -192,17 +185,20 @@ def _clustering(graph: PhaseGraph) -> _Clustering:
     keeps = np.abs(a) >= np.abs(b)
     value = unit_complex(np.where(keeps, a, b), otherwise=1)
     p[follower], q[follower] = np.where(keeps, value, 0), np.where(keeps, 0, value)
-    number = np.cumsum(is_root) - 1
-    return _Clustering(number[root], p, q, int(np.count_nonzero(is_root)))
+    return _Clustering((np.cumsum(is_root) - 1)[root], p, q, int(np.count_nonzero(is_root)))
 
 
 def _strongest_of_row(row: np.ndarray, strength: np.ndarray, entry: np.ndarray) -> np.ndarray:
-    """Return, for each row, the strongest of the given entries. `entry` is in ascending order."""
-    first = _run_starts(row[entry])
+    """Return the index of the strongest given entry of each row that has one of them.
+
+    `row` and `strength` hold the row and the strength of all entries of a graph. `entry` holds the indices of
+    the given entries, in ascending order.
+    """
+    first = run_starts(row[entry])
     largest = np.maximum.reduceat(strength[entry], first)
     is_largest = strength[entry] == np.repeat(largest, np.diff(first, append=len(entry)))
     candidate = entry[is_largest]
-    return candidate[_run_starts(row[candidate])]
+    return candidate[run_starts(row[candidate])]
 
 
 def _coarse_graph(graph: PhaseGraph, clustering: _Clustering) -> PhaseGraph:

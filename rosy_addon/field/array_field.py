@@ -15,15 +15,10 @@ from .field_io import field_from_raw
 from .formats.polygons import RawField
 from .frames import dot
 from .polygon_arrays import mean_per_face
-from .representation import face_frames, from_representation, to_representation
+from .representation import from_representation, to_representation
 from .rosy_field import MAX_DEGREE, RosyField, check_degree
 from .surface import Surface
-from .validate import (
-    MAX_OUTLIER_FRACTION,
-    TOLERANCE_DEG,
-    apply_nonfinite_policy,
-    tangent_normals,
-)
+from .validate import MAX_OUTLIER_FRACTION, TOLERANCE_DEG, apply_nonfinite_policy, tangent_normals
 
 #: Degree of the field made from an array of vectors, if the caller gives none.
 VECTOR_DEGREE = 1
@@ -237,8 +232,7 @@ def array_field(
     report(0.0, _LABEL)
     if raw.tensors and raw.domain == "vertex":
         apply_nonfinite_policy(raw.values, source, "vertex", nonfinite)
-        corner_values = raw.values.reshape(-1, 9)[surface.corner_vertex]
-        means = mean_per_face(corner_values, surface.face_start)
+        means = mean_per_face(raw.values.reshape(-1, 9)[surface.corner_vertex], surface.face_start)
         raw = replace(raw, values=means.reshape(-1, 3, 3), domain="face")
     elif not raw.tensors and raw.values.shape[1] == 1:
         vectors = raw.values[:, 0]
@@ -251,7 +245,10 @@ def array_field(
 
 
 def _raw_field(array: FieldArray, source: str) -> RawField:
-    """Return the rows of an array as a `RawField` of vectors, directions or tensors."""
+    """Return the rows of an array as a `RawField` of vectors, directions or tensors.
+
+    `source` is the name of the array in error messages.
+    """
     count, columns = len(array.values), array.columns
     values = as_float64(array.values.reshape(count, columns))
     if columns == 2:
@@ -287,7 +284,7 @@ def _tangential_on_faces(
         return _tangential(vectors, surface.face_normal)
     vectors = vectors[surface.corner_vertex]
     tangential = _tangential(vectors, surface.face_normal[surface.corner_face])
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     frames = x[surface.corner_face], y[surface.corner_face]
     mean = mean_per_face(to_representation(tangential, *frames, degree), surface.face_start)
     return from_representation(mean, x, y, degree)

@@ -173,8 +173,9 @@ class _Leaves:
     def split_longest(self, midpoint: np.ndarray) -> np.ndarray:
         """Split each leaf that has midpoints on its edges in two halves, at the longest of these edges.
 
-        `midpoint` is the result of `add_midpoints` or of the last call. The result is (L, 3) int32 for the
-        new leaves: the midpoint of each edge that is still to be split; -1 for all other edges.
+        `midpoint` is the result of `add_midpoints` or, from the second call on, the result of the previous
+        call of this method. The result is (L, 3) int32 for the new leaves: the midpoint of each edge that is
+        still to be split; -1 for all other edges.
         """
         parent = np.flatnonzero((midpoint >= 0).any(axis=1))
         lengths = _edge_lengths(self.vertices, self.vertex[parent])
@@ -195,10 +196,8 @@ class _Leaves:
         self.vertex = _replaced(self.vertex, parent, *halves)
         self.weights = _replaced(self.weights, parent, *weight_halves)
         none = np.full_like(middle, -1)
-        first, second = (
-            np.stack(rows, axis=1) for rows in ((none, none, on_ca), (none, on_bc, none))
-        )
-        return _replaced(midpoint, parent, first, second)
+        halves = np.stack([none, none, on_ca], axis=1), np.stack([none, on_bc, none], axis=1)
+        return _replaced(midpoint, parent, *halves)
 
     def tree(self) -> BisectionTree:
         """Return the `BisectionTree` with these leaves."""
@@ -229,8 +228,8 @@ def _replaced(
 ) -> np.ndarray:
     """Return an array of the leaves after a split, with one element for each new leaf.
 
-    In place of each parent leaf is the value of its first child. The values of the second children are
-    appended.
+    `first` and `second` hold the values of the first and the second child of each leaf in `parent`. The first
+    child takes the place of its parent. The second children are appended.
     """
     leaves[parent] = first
     return np.concatenate([leaves, second])

@@ -9,9 +9,15 @@ import numpy as np
 #: Number of rows of an array (faces, corners, edges) in a block. A block takes hundredths of a second.
 ROWS_PER_BLOCK = 1 << 16
 
+#: One or several arrays, as the result of a function.
+Arrays = np.ndarray | tuple[np.ndarray, ...]
+
 
 def row_blocks(count: int, size: int | None = None) -> list[slice]:
-    """Return slices that split `count` rows into consecutive blocks of `size`; an empty slice for no rows."""
+    """Return slices that split `count` rows into consecutive blocks of `size`; an empty slice for no rows.
+
+    By default, blocks have `ROWS_PER_BLOCK` rows.
+    """
     size = ROWS_PER_BLOCK if size is None else size
     return [slice(start, min(start + size, count)) for start in range(0, max(count, 1), size)]
 
@@ -30,10 +36,7 @@ def blocks_by_count(count: np.ndarray, limit: int) -> list[slice]:
     return blocks
 
 
-def by_rows(
-    function: Callable[..., np.ndarray | tuple[np.ndarray, ...]],
-    *arrays: np.ndarray,
-) -> np.ndarray | tuple[np.ndarray, ...]:
+def by_rows(function: Callable[..., Arrays], *arrays: np.ndarray) -> Arrays:
     """Apply a function to blocks of the rows of arrays, and concatenate the results.
 
     Parameters
@@ -44,8 +47,7 @@ def by_rows(
     arrays : (n, ...) ndarray
         Arrays with the same number of rows.
     """
-    blocks = row_blocks(len(arrays[0]))
-    parts = [function(*(array[block] for array in arrays)) for block in blocks]
+    parts = [function(*(array[block] for array in arrays)) for block in row_blocks(len(arrays[0]))]
     if isinstance(parts[0], tuple):
         return tuple(np.concatenate(columns) for columns in zip(*parts, strict=True))
     return np.concatenate(parts)
@@ -56,6 +58,21 @@ def mask(count: int, index: np.ndarray) -> np.ndarray:
     result = np.zeros(count, dtype=bool)
     result[index] = True
     return result
+
+
+def bincount_rows(index: np.ndarray, rows: np.ndarray, count: int = 0) -> np.ndarray:
+    """Return (count, k) sums of the (m, k) rows of each index: `numpy.bincount` for rows of real weights.
+
+    `count` is raised to the largest index plus 1.
+    """
+    return np.stack([np.bincount(index, column, count) for column in rows.T], axis=1)
+
+
+def run_starts(values: np.ndarray) -> np.ndarray:
+    """Return the first index of each run of equal values."""
+    is_first = np.ones(len(values), dtype=bool)
+    np.not_equal(values[1:], values[:-1], out=is_first[1:])
+    return np.flatnonzero(is_first)
 
 
 def neighbors_of_nodes(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .frames import dot, normalize, tangent_frame
+from .frames import coordinates, dot, normalize, tangent_frame
 from .polygon_arrays import mean_per_face
 from .representation import complex_bincount, unit_complex
 from .surface import Surface
@@ -45,24 +45,21 @@ def carried_vectors(surface: Surface, rest_vertices: np.ndarray, vectors: np.nda
     rest = surface.with_vertices(rest_vertices)
     old_frame, old_offset = _planar_corners(rest)
     new_frame, new_offset = _planar_corners(surface)
-    covariance = complex_bincount(
-        surface.corner_face, new_offset * old_offset.conj(), surface.face_count
-    )
+    corner_face, count = surface.corner_face, surface.face_count
+    covariance = complex_bincount(corner_face, new_offset * old_offset.conj(), count)
     has_area = rest.face_normal.any(axis=1) & surface.face_normal.any(axis=1)
     face = np.flatnonzero(moved & has_area & (covariance != 0))
     rotation = covariance[face] / np.abs(covariance[face])
-    before = result.reshape(surface.face_count, -1, 3)[face]
-    (old_x, old_y), (new_x, new_y) = (
-        [axis[face, None] for axis in frame] for frame in (old_frame, new_frame)
-    )
+    before = result.reshape(count, -1, 3)[face]
+    new_x, new_y = (axis[face, None] for axis in new_frame)
     with np.errstate(invalid="ignore", over="ignore"):  # vectors that are not finite stay
-        z = (dot(before, old_x) + 1j * dot(before, old_y)) * rotation[:, None]
+        z = coordinates(before, *(axis[face] for axis in old_frame)) * rotation[:, None]
         length = np.sqrt(dot(before, before))
         after = normalize(z.real[..., None] * new_x + z.imag[..., None] * new_y) * length[..., None]
         change = np.sqrt(dot(after - before, after - before))
         tangent = np.abs(z) >= np.sqrt(1 - MAX_SINE**2) * length
         carried = np.isfinite(length) & tangent & (change > ROUNDING * length)
-    result.reshape(surface.face_count, -1, 3)[face] = np.where(carried[..., None], after, before)
+    result.reshape(count, -1, 3)[face] = np.where(carried[..., None], after, before)
     return result
 
 
@@ -93,8 +90,7 @@ def vectors_on_rest_shape(
     --------
     rosy_addon.projection.face_values : Transport to the deformed mesh.
     """
-    rest = surface.with_vertices(rest_vertices)
-    (rest_x, rest_y), w = _planar_corners(rest)
+    (rest_x, rest_y), w = _planar_corners(surface.with_vertices(rest_vertices))
     (x, y), u = _planar_corners(surface)
     face, count = surface.corner_face, surface.face_count
     # Rotations are relative to the first corner of the face, as in `projection.face_values`.

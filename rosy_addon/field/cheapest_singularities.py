@@ -15,9 +15,8 @@ from ..core.errors import RosyError
 from ..core.progress import progress, report
 from .blocks import neighbors_of_nodes
 from .face_graph import LABEL, FaceGraph, face_graph
-from .polygon_arrays import face_area_vectors
 from .prescribed import index_at_nodes
-from .representation import face_frames, from_representation, unit_complex
+from .representation import from_representation, unit_complex
 from .rosy_field import RosyField, check_degree
 from .singularities import find_singularities
 from .smoothest import eigenproblem, spectral_shift
@@ -64,39 +63,36 @@ def cheapest_singularities(
         If a vertex cannot be singular (at a border, or not in the mesh), or if no face has an area.
     """
     degree = check_degree(degree)
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     if not x.any():
         raise RosyError(f"{surface.name}: no face has an area")
-    graph = face_graph(surface, x, y)
-    area = np.linalg.norm(
-        face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start), axis=1
-    )
-    given = index_at_nodes(surface, graph, vertex, index)
-    required = 2 * np.pi / degree * (given - _spread(surface, graph, area, given))
+    graph = face_graph(surface)
+    given = index_at_nodes(graph, vertex, index)
+    required = 2 * np.pi / degree * (given - _spread(graph, given))
     with progress(0.1, 0.3):
         angle = graph.conductance * least_angles(graph, degree, required, [], 0.0)
-    mass = np.maximum(area, 1e-12 * area.mean())
+    mass = np.maximum(surface.face_area, 1e-12 * surface.face_area.mean())
     matrix = _energy(graph, degree, angle, spectral_shift(mass) * mass)
     with progress(0.35, 0.6):
         z, _ = eigenproblem(matrix, mass, graph.component)
     field = RosyField(degree, from_representation(unit_complex(z), x, y, degree))
     with progress(0.6, 0.65):
         found, found_index = find_singularities(surface, field)
-    total = index_at_nodes(surface, graph, found, found_index)
+    total = index_at_nodes(graph, found, found_index)
     with progress(0.65, 1.0):
         added = _settled(graph, degree, given, total - given)
     node = np.flatnonzero(added)
-    vertex_of_node = np.empty(graph.node_count, dtype=np.int64)
-    vertex_of_node[graph.corner_node] = surface.corner_vertex
-    return np.concatenate([vertex, vertex_of_node[node]]), np.concatenate([index, added[node]])
+    return np.concatenate([vertex, graph.node_vertex[node]]), np.concatenate([index, added[node]])
 
 
-def _spread(surface: Surface, graph: FaceGraph, area: np.ndarray, given: np.ndarray) -> np.ndarray:
-    """Return (n,) values at the nodes: the sum of the given indices on a component, distributed by area.
+def _spread(graph: FaceGraph, given: np.ndarray) -> np.ndarray:
+    """Return (n,) float64 indices: on each connected component, the sum of the given ones, spread by area.
 
-    They are 0 on components with a border.
+    `given` holds the index at each vertex node of the graph. Each node gets a part of the sum in proportion
+    to the area around it. On components with a border, the result is 0.
     """
-    corner_area = (area / np.diff(surface.face_start))[surface.corner_face]
+    surface = graph.surface
+    corner_area = (surface.face_area / np.diff(surface.face_start))[surface.corner_face]
     node_area = np.bincount(graph.corner_node, corner_area, graph.node_count)
     component = graph.node_component
     count = int(component.max(initial=-1)) + 1
@@ -137,27 +133,36 @@ def _settled(graph: FaceGraph, degree: int, given: np.ndarray, added: np.ndarray
 
 
 class _Neighbors:
-    """The vertex nodes of a graph of faces, and the neighbors of each along edges."""
+    """The vertices to which the singularity at a vertex can move: its neighbors along mesh edges.
+
+    Vertices are represented by the *vertex nodes* of a `FaceGraph`.
+    """
 
     def __init__(self, graph: FaceGraph) -> None:
-        self._start, self._neighbor, edge = neighbors_of_nodes(
-            graph.node_count, graph.tail, graph.head
-        )
+        csr = neighbors_of_nodes(graph.node_count, graph.tail, graph.head)
+        self._start, self._neighbor, edge = csr
         self._resistance = EDGE_RESISTANCE / np.tile(graph.conductance, 2)[edge]
         self._is_interior = graph.is_interior
 
     def step(
-        self,
-        added: np.ndarray,
-        given: np.ndarray,
-        unit: float,
-        potential: np.ndarray,
-        share: float,
+        self, added: np.ndarray, given: np.ndarray, unit: float, potential: np.ndarray, share: float
     ) -> np.ndarray:
-        """Return (n,) indices of the added singularities after one round of moves.
+        """Return (n,) int64 indices of the added singularities after one round of moves.
 
-        A share of the singularities that would reduce the energy are moved to their best neighbor. Those at
-        a given singularity must leave it, and are moved first.
+        Singularities whose move to a neighbor reduces the energy are moved to the best neighbor. Added
+        singularities at a given one must leave it, and are moved first.
+
+        Parameters
+        ----------
+        added, given : (n,) int ndarray
+            Index of the added and of the given singularity at each vertex node; 0 if there is none.
+        unit : float
+            Angle in radians that an index of 1 stands for: 2 pi / N.
+        potential : (n,) float64 ndarray
+            Solution of the Poisson equation whose right-hand side is the angle of each singularity, see
+            `turning_angles.potential_solver`. Its difference between two nodes says how the energy changes.
+        share : float
+            Fraction of these singularities that are moved, from 0 to 1; at least one is.
         """
         moves = []
         for node in np.flatnonzero(added).tolist():
@@ -182,9 +187,11 @@ class _Neighbors:
 
 
 def _energy(graph: FaceGraph, degree: int, angle: np.ndarray, diagonal: np.ndarray) -> CSRMatrix:
-    """Return the matrix of the Dirichlet energy of (F,) representations, relative to given turning angles.
+    """Return a matrix A such that z* A z is the energy of a field with (F,) representations z.
 
-    The energy is 0 for a field that turns by `angle` across the edges.
+    It is the Dirichlet energy relative to given turning angles: it is 0 for a field that turns by `angle`,
+    (I,) in radians, across the edges. `diagonal` holds (F,) values that are added to the diagonal of the
+    matrix.
     """
     source, target, weight = graph.source, graph.target, 1 / graph.conductance
     transport = np.exp(1j * degree * (graph.unfolding + angle))

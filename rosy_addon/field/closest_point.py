@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.progress import report
-from .blocks import concatenated_ranges
+from .blocks import concatenated_ranges, row_blocks
 from .frames import dot
 from .surface import Surface
 
@@ -49,10 +49,8 @@ def closest_triangles(
     points, distance = search.points, search.distance
     is_near = (points >= search.origin - max_distance) & (points <= search.top + max_distance)
     unfinished = np.flatnonzero(is_near.all(axis=1))
-    large_count = len(search.large_triangles)
-    search.update(
-        np.repeat(unfinished, large_count), np.tile(search.large_triangles, len(unfinished))
-    )
+    large = search.large_triangles
+    search.update(np.repeat(unfinished, len(large)), np.tile(large, len(unfinished)))
     # Search rings of cells around the cell of each point. Stop when all triangles of the next ring are
     # farther away than the closest triangle so far, or farther than the maximum distance.
     ring = 0
@@ -103,14 +101,8 @@ class _ClosestSearch:
         count = span.prod(axis=1)
         spans = np.repeat(span, count, axis=0)
         cell_number = concatenated_ranges(np.zeros_like(count), count)
-        offset = np.stack(
-            [
-                cell_number // (spans[:, 1] * spans[:, 2]),
-                cell_number // spans[:, 2] % spans[:, 1],
-                cell_number % spans[:, 2],
-            ],
-            axis=1,
-        )
+        column, z = np.divmod(cell_number, spans[:, 2])
+        offset = np.stack([*np.divmod(column, spans[:, 1]), z], axis=1)
         owner = np.repeat(small, count)
         cell_key = self._keys_of(first[owner] + offset)
         order = np.argsort(cell_key, kind="stable")
@@ -134,7 +126,10 @@ class _ClosestSearch:
         return (cell[:, 0] * self.shape[1] + cell[:, 1]) * self.shape[2] + cell[:, 2]
 
     def distance_to_cell_border(self, selection: np.ndarray) -> np.ndarray:
-        """Return (k,) distances of selected points from the sides of their cells; 0 outside of the grid."""
+        """Return (k,) distances, in object space, of selected points from the nearest side of their cell.
+
+        They are 0 for points outside of the grid.
+        """
         points = self.points[selection]
         fraction = self._in_cells(points) - self._cells_of(points)
         return np.maximum(np.minimum(fraction, 1 - fraction).min(axis=1), 0) * self.cell_size
@@ -153,16 +148,14 @@ class _ClosestSearch:
             chunk = selection[start : start + block]
             own_cell = self._cells_of(self.points[chunk])
             cell = (own_cell[:, None] + offset).reshape(-1, 3)
+            limit = np.repeat(self.distance[chunk], len(offset))
             exists = ((cell >= 0) & (cell < self.shape)).all(axis=1)
-            exists &= self._cell_distances(chunk, own_cell, offset) < np.repeat(
-                self.distance[chunk], len(offset)
-            )
+            exists &= self._cell_distances(chunk, own_cell, offset) < limit
             key = self._keys_of(cell[exists])
             first = np.searchsorted(self.key, key, side="left")
             count = np.searchsorted(self.key, key, side="right") - first
-            point = np.repeat(chunk, len(offset))[exists]
-            entry = concatenated_ranges(first, count)
-            self.update(np.repeat(point, count), self.cell_triangle[entry])
+            point = np.repeat(np.repeat(chunk, len(offset))[exists], count)
+            self.update(point, self.cell_triangle[concatenated_ranges(first, count)])
 
     def _cell_distances(
         self, selection: np.ndarray, own_cell: np.ndarray, offset: np.ndarray
@@ -178,13 +171,11 @@ class _ClosestSearch:
 
     def update(self, owner: np.ndarray, candidate: np.ndarray) -> None:
         """Update the results, given pairs of a point (`owner`) and a candidate for its closest triangle."""
-        for start in range(0, len(owner), MAX_PAIRS):
-            block = slice(start, start + MAX_PAIRS)
+        for block in row_blocks(len(owner), MAX_PAIRS):
             point, triangle = owner[block], candidate[block]
             distance = point_triangle_distances(self.points[point], self.corners[triangle])
-            is_closer = (distance < self.distance[point]) | (
-                (distance == self.distance[point]) & (triangle < self.triangle[point])
-            )
+            is_tied = (distance == self.distance[point]) & (triangle < self.triangle[point])
+            is_closer = (distance < self.distance[point]) | is_tied
             point, triangle, distance = point[is_closer], triangle[is_closer], distance[is_closer]
             # Sort so that the best candidate of a point is stored last.
             order = np.lexsort((triangle, distance))[::-1]
@@ -197,8 +188,7 @@ def point_triangle_distances(points: np.ndarray, corners: np.ndarray) -> np.ndar
     a, b, c = (corners[:, k] for k in range(3))
     normal = np.cross(b - a, c - a)
     size = np.sqrt(dot(normal, normal))
-    safe_size = np.where(size > 0, size, 1)
-    plane_distance = np.abs(dot(points - a, normal)) / safe_size
+    plane_distance = np.abs(dot(points - a, normal)) / np.where(size > 0, size, 1)
     inside = size > 0
     edge_distance = np.full(len(points), np.inf)
     for start, stop in ((a, b), (b, c), (c, a)):

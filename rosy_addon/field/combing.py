@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -17,13 +18,7 @@ from ..core.errors import RosyError
 from ..core.progress import progress
 from .conjugate_gradient import RELATIVE_TOLERANCE
 from .frames import dot, normalize
-from .guided_system import (
-    EXACT_FIRMNESS,
-    GuidedSystem,
-    NodeGuides,
-    firmness_weights,
-    unit_representations,
-)
+from .guided_system import GuidedSystem, NodeGuides, firmness_weights, unit_representations
 from .representation import to_representation, unit_complex
 from .rosy_field import RosyField
 
@@ -137,23 +132,22 @@ class Combing:
         if self._node_guides is None:
             self._node_guides = self._guides_at_nodes()
             return
-        corner = self.system.corners_of_nodes(node)
-        new = self._guides_at_nodes(corner)
+        new = self._guides_at_nodes(self.system.corners_of_nodes(node))
         for name, values in vars(new).items():
             getattr(self._node_guides, name)[node] = values[node]
 
     def _guides_at_nodes(self, corner: np.ndarray | slice = slice(None)) -> NodeGuides:
-        firmness = np.abs(self.guides)
-        weight, is_exact = firmness_weights(firmness, self.system.surface.mean_edge_length)
-        return self.system.node_guides(unit_complex(self.guides), weight, is_exact, corner)
+        weights = firmness_weights(np.abs(self.guides), self.system.surface.mean_edge_length)
+        return self.system.node_guides(unit_complex(self.guides), *weights, corner)
 
     def _set_face_z(self, z: np.ndarray, face: np.ndarray) -> None:
-        """Set the field on (m,) faces to representations, normalized; exact guides take precedence."""
-        z = unit_representations(z)
+        """Normalize (m,) representations, and set the field on the given faces to them.
+
+        A face with a guide of firmness 1, which is followed exactly, gets the representation of its guide.
+        """
         guides = self.guides[face]
-        is_exact = np.abs(guides) >= EXACT_FIRMNESS
-        z[is_exact] = guides[is_exact] / np.abs(guides[is_exact])
-        self._face_z[face] = z
+        _, is_exact = firmness_weights(np.abs(guides), self.system.surface.mean_edge_length)
+        self._face_z[face] = np.where(is_exact, unit_complex(guides), unit_representations(z))
 
 
 def start_combing(
@@ -270,12 +264,8 @@ class BrushStroke:
         self._brush = brush
         self._locate = locate
         self._spacing = max(DAB_SPACING * brush.radius, MIN_SPACING * self._surface.extent)
-        signs = np.array([[1.0, 1.0, 1.0]])
-        for axis in np.flatnonzero(brush.mirror):
-            mirrored = signs.copy()
-            mirrored[:, axis] *= -1
-            signs = np.concatenate([signs, mirrored])
-        self._signs = signs
+        signs = [(1.0, -1.0) if is_mirrored else (1.0,) for is_mirrored in reversed(brush.mirror)]
+        self._signs = np.array(list(product(*signs)))[:, ::-1]
         self._start_arc_length = 0.0
         self._end: _Dab | None = None  # the last point, which need not be a dab
         self._dabs: list[_Dab] = []  # the last dabs that were drawn, and new ones
@@ -312,8 +302,7 @@ class BrushStroke:
         end = self._end
         if end is None:
             return np.empty(0, dtype=np.intp)
-        rest = end.arc_length - self._dabs[-1].arc_length
-        if rest > 1e-3 * self._spacing:
+        if end.arc_length - self._dabs[-1].arc_length > 1e-3 * self._spacing:
             self._dabs.append(end)
         self._dabs.append(self._dabs[-1])  # the end has no later dab
         changed = self._draw()
@@ -355,21 +344,14 @@ class BrushStroke:
         positions = np.array([dab.position for dab in dabs])
         tangents = normalize(positions[2:] - positions[:-2])
         inner = positions[1:-1]
-        faces = [self._locate(inner * sign) for sign in self._signs]
-        near = [
-            self._near_faces(inner * sign, located)
-            for sign, located in zip(self._signs, faces, strict=True)
-        ]
+        copies = [inner * sign for sign in self._signs]
+        faces = list(map(self._locate, copies))
+        near = list(map(self._near_faces, copies, faces))
         for first in range(max(len(inner) - 1, 1)):
             segment = slice(first, first + 2)
             for sign, candidates, located in zip(self._signs, near, faces, strict=True):
-                self._draw_segment(
-                    candidates,
-                    inner[segment] * sign,
-                    tangents[segment] * sign,
-                    dabs[1:-1][segment],
-                    located[segment],
-                )
+                path = inner[segment] * sign, tangents[segment] * sign, dabs[1:-1][segment]
+                self._draw_segment(candidates, *path, located[segment])
         self._dabs = dabs[-3:]
         return np.unique(np.concatenate(near))
 
@@ -394,7 +376,20 @@ class BrushStroke:
         dabs: Sequence[_Dab],
         located: np.ndarray,
     ) -> None:
-        """Apply the effect of the brush to faces near the segment between two dabs, or near a single dab."""
+        """Apply the effect of the brush to faces near the segment between two dabs, or near a single dab.
+
+        Parameters
+        ----------
+        near : (m,) intp ndarray
+            Faces that may be within the radius of the segment.
+        positions, tangents : (k, 3) float64 ndarray
+            Positions and unit directions of the stroke at its k dabs (1 or 2), in object space. For a
+            mirrored copy of the stroke, they are mirrored.
+        dabs : sequence of _Dab
+            The k dabs. Their pressures and arc lengths are used, and not their positions.
+        located : (k,) int ndarray
+            The face under each dab; -1 if there is none.
+        """
         brush, normal = self._brush, self._surface.face_normal
         on_face = located[located >= 0]
         if not len(on_face):
@@ -445,16 +440,18 @@ class BrushStroke:
         self._coverage[is_new] = 0
 
     def _comb(self, face: np.ndarray, distance: np.ndarray, direction: np.ndarray) -> None:
-        """Turn the guides of faces to the direction of the stroke, at its part nearest to the face so far."""
+        """Turn the guides of faces to the direction of the stroke where the stroke is nearest to the face.
+
+        `distance` and `direction` hold, for each of m faces, its distance from the segment that is drawn, and
+        the (m, 3) directions of the stroke there. In the same pass, a face that an earlier segment passed
+        more closely keeps its guide.
+        """
         is_closest = distance <= self._least_distance[face]
         face = face[is_closest]
         self._least_distance[face] = distance[is_closest]
-        target = to_representation(
-            normalize(direction[is_closest]),
-            self._system.averages.x[face],
-            self._system.averages.y[face],
-            self._system.degree,
-        )
+        frames = self._system.averages.x[face], self._system.averages.y[face]
+        direction = normalize(direction[is_closest])
+        target = to_representation(direction, *frames, self._system.degree)
         target *= (1.0 if self._brush.is_exact else SOFT_FIRMNESS) / np.abs(target)
         coverage = self._coverage[face]
         self._store(face, (1 - coverage) * self._base[face] + coverage * target)

@@ -60,7 +60,8 @@ def conjugate_gradient(
         precondition = partial(w_cycle, levels)
     # Scale all numbers so that their squares stay in the range of floating-point numbers. A power of two
     # changes no digits.
-    scale = 0.5 ** np.clip(np.frexp(_largest_part(rhs, start))[1], -1000, 1000)
+    largest = max(float(np.abs(each).max(initial=0)) for each in (rhs, start) if each is not None)
+    scale = 0.5 ** np.clip(np.frexp(largest)[1], -1000, 1000)
     rhs = scale * rhs
     if start is None:
         solution, residual = np.zeros_like(rhs), rhs.copy()
@@ -93,16 +94,6 @@ def conjugate_gradient(
         residual -= step * image
         previous = current
     return solution / scale
-
-
-def _largest_part(*vectors: np.ndarray | None) -> float:
-    """Return the largest absolute value of all real and imaginary parts of some vectors; None is skipped."""
-    return max(
-        float(np.abs(part).max(initial=0))
-        for vector in vectors
-        if vector is not None
-        for part in ((vector.real, vector.imag) if np.iscomplexobj(vector) else (vector,))
-    )
 
 
 def _norm(vector: np.ndarray) -> float:

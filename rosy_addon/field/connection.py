@@ -21,6 +21,7 @@ from functools import cached_property
 import numpy as np
 
 from ..core.progress import report
+from .blocks import row_blocks
 from .connectivity import build_edges, connected_components
 from .frames import dot
 from .polygon_arrays import next_corners
@@ -99,7 +100,7 @@ def build_connection(surface: Surface) -> Connection:
     next_corner = next_corners(start)
     previous_corner = next_corner[next_corner]
     twin = np.full(len(vertex), -1, dtype=np.int32)
-    a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
+    a, b = edges.halfedges.T
     twin[a], twin[b] = b, a
 
     corner_angle, cotangent, area = _corner_geometry(surface.vertices, surface.triangle_vertex)
@@ -122,16 +123,11 @@ def build_connection(surface: Surface) -> Connection:
     # The direction of the reversed edge at its head is the direction of the twin halfedge or, at a
     # boundary, of the second side of the corner at the head.
     twin_of_tail = twin[tail_corner]
-    reverse_direction = np.where(
-        twin_of_tail >= 0,
-        edge_direction[np.maximum(twin_of_tail, 0)],
-        edge_direction[head_corner]
-        + corner_angle[head_corner] * angle_scale[corner_node[head_corner]],
-    )
-    weight = 0.5 * (
-        cotangent[previous_corner[tail_corner]]
-        + np.where(twin_of_tail >= 0, cotangent[previous_corner[twin_of_tail]], 0)
-    )
+    scaled_angle = corner_angle[head_corner] * angle_scale[corner_node[head_corner]]
+    has_twin, border_direction = twin_of_tail >= 0, edge_direction[head_corner] + scaled_angle
+    reverse_direction = np.where(has_twin, edge_direction[twin_of_tail], border_direction)
+    opposite = np.where(has_twin, cotangent[previous_corner[twin_of_tail]], 0)
+    weight = 0.5 * (cotangent[previous_corner[tail_corner]] + opposite)
     return Connection(
         corner_node=corner_node,
         node_count=node_count,
@@ -182,8 +178,7 @@ def _corner_geometry(
     """Return (3 T,) angles (radians) and cotangents at the corners of triangles, and (T,) areas."""
     corner_angle, cotangent = np.empty(triangles.shape), np.empty(triangles.shape)
     area = np.empty(len(triangles))
-    for first in range(0, len(triangles), BLOCK_TRIANGLES):
-        block = slice(first, first + BLOCK_TRIANGLES)
+    for block in row_blocks(len(triangles), BLOCK_TRIANGLES):
         points = [vertices.take(column, axis=0) for column in triangles[block].T]
         edges = [points[(k + 1) % 3] - points[k] for k in range(3)]
         cross = np.cross(edges[0], edges[1])
@@ -194,9 +189,8 @@ def _corner_geometry(
             corner_angle[block, k] = np.arctan2(double_area, cosine_term)
             exceeds_limit = np.abs(cosine_term) >= MAX_COTANGENT * double_area
             limit = np.where(double_area > 0, np.sign(cosine_term) * MAX_COTANGENT, 0)
-            cotangent[block, k] = np.where(
-                exceeds_limit, limit, cosine_term / np.where(exceeds_limit, 1, double_area)
-            )
+            ratio = cosine_term / np.where(exceeds_limit, 1, double_area)
+            cotangent[block, k] = np.where(exceeds_limit, limit, ratio)
     return corner_angle.ravel(), cotangent.ravel(), area
 
 

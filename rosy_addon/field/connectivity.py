@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .blocks import run_starts
 from .frames import dot, normalize
 from .polygon_arrays import corner_faces, face_area_vectors, next_corners
 
@@ -42,15 +43,12 @@ def build_edges(corner_vertex: np.ndarray, face_start: np.ndarray) -> Edges:
     tail = corner_vertex.astype(np.int64)
     head = tail[next_corners(face_start)]
     stride = int(corner_vertex.max(initial=0)) + 1
-    key, corner_by_edge = sorted_with_order(
-        np.minimum(tail, head) * stride + np.maximum(tail, head), stride * stride
-    )
-    is_first = np.ones(len(key), dtype=bool)
-    np.not_equal(key[1:], key[:-1], out=is_first[1:])
-    first = np.flatnonzero(is_first)
+    key = np.minimum(tail, head) * stride + np.maximum(tail, head)
+    key, corner_by_edge = sorted_with_order(key, stride * stride)
+    first = run_starts(key)
     edge_key, face_count = key[first], np.diff(first, append=len(key))
     corner_edge = np.empty(len(key), dtype=np.int32)
-    corner_edge[corner_by_edge] = np.cumsum(is_first, dtype=np.int32) - 1
+    corner_edge[corner_by_edge] = np.repeat(np.arange(len(first), dtype=np.int32), face_count)
     interior = np.flatnonzero(face_count == 2)
     a, b = corner_by_edge[first[interior]], corner_by_edge[first[interior] + 1]
     opposite = tail[a] == head[b]
@@ -82,7 +80,7 @@ def smooth_fans(
     """
     edges = build_edges(corner_vertex, face_start)
     corner_face, next_corner = corner_faces(face_start), next_corners(face_start)
-    a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
+    a, b = edges.halfedges.T
     smooth = np.ones(len(a), dtype=bool)
     if flat_faces is not None:
         flat = np.asarray(flat_faces, dtype=bool)
@@ -95,8 +93,7 @@ def smooth_fans(
         sharp = np.sort(np.asarray(sharp_edges, dtype=np.int64).reshape(-1, 2), axis=1)
         ends = edges.ends[edges.interior].astype(np.int64)
         smooth &= ~np.isin(ends[:, 0] * stride + ends[:, 1], sharp[:, 0] * stride + sharp[:, 1])
-    a, b = a[smooth], b[smooth]
-    return connected_corners(a, b, next_corner)
+    return connected_corners(a[smooth], b[smooth], next_corner)
 
 
 def connected_corners(a: np.ndarray, b: np.ndarray, next_corner: np.ndarray) -> np.ndarray:
@@ -145,14 +142,14 @@ def connected_components(count: int, pairs: np.ndarray) -> np.ndarray:
             root = flattened
         unmerged = root[a] != root[b]
         a, b = a[unmerged], b[unmerged]
-    is_root = root == np.arange(count, dtype=np.int32)
-    return (np.cumsum(is_root, dtype=np.int32) - 1)[root]
+    return (np.cumsum(root == np.arange(count), dtype=np.int32) - 1)[root]
 
 
 def _lower(values: np.ndarray, index: np.ndarray, limits: np.ndarray) -> None:
     """Do the same as ``np.minimum.at(values, index, limits)``, but faster, for limits below the values.
 
-    Two plain assignments are enough for indices that occur once or twice, and most indices do.
+    Two plain assignments are enough for indices that occur once or twice, and most indices do. The others are
+    left to ``np.minimum.at``.
     """
     for _ in range(2):
         values[index] = limits

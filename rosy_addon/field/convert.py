@@ -15,10 +15,9 @@ from .directional_field import field_matching
 from .face_graph import spanning_forest
 from .frames import normalize
 from .generate import MIN_SMOOTHING_LENGTH
-from .representation import face_frames, from_representation, to_representation
+from .representation import from_representation, to_representation
 from .rosy_field import RosyField, check_degree
 from .singularity_changes import cancel_pairs
-from .sparse_multigrid import from_coo
 from .surface import Surface
 from .surface_averages import SurfaceAverages
 
@@ -150,11 +149,8 @@ def rotate_field(surface: Surface, field: RosyField, angle: np.ndarray | float) 
     """
     angle = np.broadcast_to(angle, (len(field.vectors),))[:, None]
     perpendicular = np.cross(surface.face_normal, field.vectors)
-    return replace(
-        field,
-        vectors=np.cos(angle) * field.vectors + np.sin(angle) * perpendicular,
-        source_directions=None,
-    )
+    vectors = np.cos(angle) * field.vectors + np.sin(angle) * perpendicular
+    return replace(field, vectors=vectors, source_directions=None)
 
 
 def diffuse_field(surface: Surface, field: RosyField, time: float) -> RosyField:
@@ -185,7 +181,7 @@ def diffuse_field(surface: Surface, field: RosyField, time: float) -> RosyField:
     field.check_rosy(surface.name)
     if not time > 0 or not np.isfinite(time):
         raise RosyError(f"{surface.name}: the diffusion time must be above 0, not {time}")
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     degree = field.degree
     z = to_representation(field.vectors, x, y, degree)
     connection = build_connection(surface)
@@ -193,15 +189,7 @@ def diffuse_field(surface: Surface, field: RosyField, time: float) -> RosyField:
     report(0.1, "smoothing the field")
     rhs = averages.node_sums(z, degree)
     matrix = laplacian(connection, degree)
-    mass = connection.positive_mass
-    nodes = np.arange(connection.node_count)
-    matrix = from_coo(
-        np.concatenate([matrix.row_indices, nodes]),
-        np.concatenate([matrix.indices, nodes]),
-        np.concatenate([matrix.data * time, mass.astype(np.complex128)]),
-        connection.node_count,
-        connection.node_count,
-    )
+    matrix = replace(matrix, data=time * matrix.data).plus_diagonal(connection.positive_mass)
     with progress(0.2, 0.95):
         solution = conjugate_gradient(matrix, rhs)
     report(0.95, "smoothing the field")

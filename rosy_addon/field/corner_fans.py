@@ -9,17 +9,12 @@ import numpy as np
 
 from .blocks import by_rows
 from .frames import angle_between, dot, tangent_frame, transport
-from .polygon_arrays import face_blocks, next_corners
+from .polygon_arrays import face_blocks, mean_per_face, next_corners
 from .representation import complex_bincount, power, unit_complex
 from .surface import Surface
 
 
-def corner_rotations(
-    face_normal: np.ndarray,
-    face_x: np.ndarray,
-    corner_face: np.ndarray,
-    corner_normal: np.ndarray,
-) -> np.ndarray:
+def corner_rotations(surface: Surface, corner_normal: np.ndarray) -> np.ndarray:
     """Return the rotation from the frame of each face to the frame of each of its corners.
 
     Transport is the minimal rotation from the face normal to the corner normal. A tangent vector
@@ -28,10 +23,8 @@ def corner_rotations(
 
     Parameters
     ----------
-    face_normal, face_x : (F, 3) ndarray
-        Unit normals of the faces, and the x axes of their frames.
-    corner_face : (C,) int ndarray
-        Face of each corner.
+    surface : Surface
+        Its `Surface.face_frames` are the frames of the faces.
     corner_normal : (C, 3) ndarray
         Unit normals of the corners.
 
@@ -40,14 +33,14 @@ def corner_rotations(
     (C,) complex ndarray
         Numbers of modulus 1; 0 at the corners of faces without a frame (faces without area).
     """
+    face_x, _ = surface.face_frames
 
     def rotations(face: np.ndarray, normal: np.ndarray) -> np.ndarray:
-        transported_x = transport(face_x[face], face_normal[face], normal)
+        transported_x = transport(face_x[face], surface.face_normal[face], normal)
         x, y = tangent_frame(normal)
-        rotation = dot(transported_x, x) + 1j * dot(transported_x, y)
-        return unit_complex(rotation)
+        return unit_complex(dot(transported_x, x) + 1j * dot(transported_x, y))
 
-    return by_rows(rotations, corner_face, corner_normal)
+    return by_rows(rotations, surface.corner_face, corner_normal)
 
 
 def average_over_fans(
@@ -71,10 +64,8 @@ def average_over_fans(
     """
     fan_count = int(corner_fan.max()) + 1
     weight_sum = np.bincount(corner_fan, weights, fan_count)
-    mean = complex_bincount(corner_fan, weights * values, fan_count) / np.where(
-        weight_sum > 0, weight_sum, 1
-    )
-    return mean[corner_fan]
+    total = complex_bincount(corner_fan, weights * values, fan_count)
+    return (total / np.where(weight_sum > 0, weight_sum, 1))[corner_fan]
 
 
 def corner_angles(surface: Surface) -> np.ndarray:
@@ -113,5 +104,4 @@ def smooth_face_values(
     """
     corner_phase = power(rotation, degree)
     averaged = average_over_fans(z[surface.corner_face] * corner_phase, weights, surface.corner_fan)
-    face_values = averaged * corner_phase.conj()
-    return np.add.reduceat(face_values, surface.face_start[:-1]) / np.diff(surface.face_start)
+    return mean_per_face(averaged * corner_phase.conj(), surface.face_start)

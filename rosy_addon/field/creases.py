@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.progress import report
-from .blocks import mask
-from .connectivity import Edges, build_edges, connected_components
+from .blocks import bincount_rows, mask
+from .connectivity import connected_components
 from .frames import angle_between, dot, normalize
 from .polygon_arrays import face_area_vectors
 from .surface import Surface
@@ -69,14 +69,13 @@ def weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
 
 
 def filtered_normals(
-    surface: Surface, edges: Edges, region: np.ndarray | None = None
+    surface: Surface, region: np.ndarray | None = None
 ) -> tuple[np.ndarray, float]:
     """Return face normals after bilateral filtering, which smooths noise and keeps sharp edges.
 
     Parameters
     ----------
     surface : Surface
-    edges : Edges
     region : (F,) bool ndarray, optional
         The faces to smooth. Other faces keep their normals and do not influence the result. By default all
         faces.
@@ -93,16 +92,12 @@ def filtered_normals(
     ----------
     Zheng, Fu, Au and Tai, "Bilateral Normal Filtering for Mesh Denoising", TVCG 2011.
     """
-    face_a, face_b = (surface.corner_face[side] for side in edges.halfedges.T)
-    corner_vertex, face_start = surface.corner_vertex, surface.face_start
-    unfiltered = normals = surface.face_normal
-    if region is not None:
-        inside = region[face_a] & region[face_b]
-        rank = np.cumsum(region) - 1
-        face_a, face_b = rank[face_a[inside]], rank[face_b[inside]]
-        unfiltered = normals = normals[region]
-        corner_vertex = corner_vertex[region[surface.corner_face]]
-        face_start = np.concatenate([[0], np.cumsum(np.diff(face_start)[region])])
+    region = np.ones(surface.face_count, dtype=bool) if region is None else region
+    sides = surface.corner_face[surface.edges.halfedges]
+    face_a, face_b = (np.cumsum(region) - 1)[sides[region[sides].all(axis=1)]].T
+    unfiltered = normals = surface.face_normal[region]
+    corner_vertex = surface.corner_vertex[region[surface.corner_face]]
+    face_start = np.concatenate([[0], np.cumsum(np.diff(surface.face_start)[region])])
     vectors = face_area_vectors(surface.vertices, corner_vertex, face_start)
     area = np.sqrt(dot(vectors, vectors))
     area /= max(float(area.max(initial=0.0)), 1e-300)
@@ -112,21 +107,16 @@ def filtered_normals(
         weight = np.exp(dot(difference, difference) * (-0.5 / FILTER_WIDTH**2))
         weight_a, weight_b = weight * area[face_b], weight * area[face_a]
         total = normals * area[:, None]
-        for axis in range(3):
-            total[:, axis] += np.bincount(face_a, weight_a * normal_b[:, axis], len(area))
-            total[:, axis] += np.bincount(face_b, weight_b * normal_a[:, axis], len(area))
+        total += bincount_rows(face_a, weight_a[:, None] * normal_b, len(area))
+        total += bincount_rows(face_b, weight_b[:, None] * normal_a, len(area))
         normals = normalize(total)
     noise_angle = weighted_median(angle_between(unfiltered, normals), area)
-    if region is not None:
-        filtered = normals
-        normals = surface.face_normal.copy()
-        normals[region] = filtered
-    return normals, noise_angle
+    result = surface.face_normal.copy()
+    result[region] = normals
+    return result, noise_angle
 
 
-def salient_edges(
-    surface: Surface, edges: Edges, normals: np.ndarray, noise_angle: float
-) -> np.ndarray:
+def salient_edges(surface: Surface, normals: np.ndarray, noise_angle: float) -> np.ndarray:
     """Find the salient edges: border edges, and edges that are clearly sharper than the edges around them.
 
     On a coarse mesh of a smooth surface, neighboring edges have similar angles, so only very sharp edges are
@@ -135,7 +125,6 @@ def salient_edges(
     Parameters
     ----------
     surface : Surface
-    edges : Edges
     normals, noise_angle
         Results of `filtered_normals`.
 
@@ -144,10 +133,11 @@ def salient_edges(
     (E, 2) int32 ndarray
         Pairs of vertices.
     """
-    face_a, face_b = (surface.corner_face[side] for side in edges.halfedges.T)
+    edges = surface.edges
+    face_a, face_b = surface.corner_face[edges.halfedges].T
     # Faces without area have no normal, so no angle is computed at their edges.
     interior = angle_between(normals[face_a], normals[face_b])
-    others = _largest_of_others(surface, edges, interior)
+    others = _largest_of_others(surface, interior)
     noise = NOISE_MULTIPLE * noise_angle
     is_sharp = interior >= max(SHARP_ANGLE, noise)
     is_sharp |= (interior >= max(MIN_ANGLE, noise)) & (interior >= MIN_RATIO * others)
@@ -156,18 +146,18 @@ def salient_edges(
     ends = edges.ends[is_salient]
     if not len(ends):
         return ends
-    line = connected_components(len(surface.vertices), ends)
-    line = line[ends[:, 0]]
+    line = connected_components(len(surface.vertices), ends)[ends[:, 0]]
     edge = surface.vertices[ends[:, 0]] - surface.vertices[ends[:, 1]]
     length = np.bincount(line, np.sqrt(dot(edge, edge)))[line]
     return ends[length >= MIN_LINE_LENGTH * surface.extent]
 
 
-def _largest_of_others(surface: Surface, edges: Edges, angle: np.ndarray) -> np.ndarray:
+def _largest_of_others(surface: Surface, angle: np.ndarray) -> np.ndarray:
     """Return, for each interior edge, the largest angle of all other edges of its two faces.
 
     `angle` holds the (I,) angles of the interior edges. The result is (I,).
     """
+    edges = surface.edges
     all_angles = np.zeros(len(edges.ends))
     all_angles[edges.interior] = angle
     corner_angle = all_angles[edges.corner_edge]
@@ -219,7 +209,7 @@ def find_creases(surface: Surface, crease_angle: float) -> Creases:
     """
     none = Creases(np.empty((0, 2), np.int32), np.empty(0, np.int32))
     report(0.0, "finding creases")
-    edges = build_edges(surface.corner_vertex, surface.face_start)
+    edges = surface.edges
     sides = surface.corner_face[edges.halfedges].T
     # Smaller crease angles have no effect.
     crease_angle = max(crease_angle, MIN_CREASE_ANGLE)
@@ -227,7 +217,7 @@ def find_creases(surface: Surface, crease_angle: float) -> Creases:
     if angle.max(initial=0.0) < crease_angle:
         return none
     region = _faces_near(surface, edges.ends[edges.interior[angle >= crease_angle]])
-    normals, noise_angle = filtered_normals(surface, edges, region)
+    normals, noise_angle = filtered_normals(surface, region)
     ends = edges.ends[edges.interior]
     vector = surface.vertices[ends[:, 0]] - surface.vertices[ends[:, 1]]
     length = np.sqrt(dot(vector, vector))
@@ -240,7 +230,7 @@ def find_creases(surface: Surface, crease_angle: float) -> Creases:
     is_candidate = angle[bent] >= SHARP_ANGLE
     is_candidate |= _is_between_fans(surface, edges.halfedges[bent])
     if not is_candidate.all():
-        is_candidate |= angle[bent] >= MIN_RATIO * _largest_of_others(surface, edges, angle)[bent]
+        is_candidate |= angle[bent] >= MIN_RATIO * _largest_of_others(surface, angle)[bent]
     bent = bent[is_candidate]
     if not len(bent):
         return none

@@ -6,12 +6,13 @@ import numpy as np
 
 from ..core.errors import RosyError
 from ..core.progress import report
+from .connectivity import smooth_fans
 from .corner_fans import corner_angles, corner_rotations, smooth_face_values
 from .frames import dot
-from .polygon_arrays import sum_per_face
-from .representation import face_frames, from_representation
+from .polygon_arrays import fan_normals, sum_per_face
+from .representation import from_representation
 from .rosy_field import RosyField, check_degree
-from .surface import Surface, build_surface
+from .surface import Surface
 
 #: The smallest normal floating-point number. Its inverse is finite.
 TINY = float(np.finfo(np.float64).tiny)
@@ -50,8 +51,7 @@ def face_magnitude(surface: Surface, kind: str) -> np.ndarray:
         raise RosyError(f"unknown magnitude '{kind}': choose {', '.join(MAGNITUDES)}")
     report(0.0, "computing curvature")
     smooth_surface = with_smooth_normals(surface)
-    x, y = face_frames(smooth_surface)
-    mean, deviator = face_curvature(smooth_surface, x, y)
+    mean, deviator = face_curvature(smooth_surface, *smooth_surface.face_frames)
     return (np.abs(mean) + np.abs(deviator)) * surface.extent
 
 
@@ -60,15 +60,10 @@ def with_smooth_normals(surface: Surface, corner_fan: np.ndarray | None = None) 
 
     If no fans are given, normals are smooth everywhere. `corner_fan` is as in `Surface`.
     """
-    return build_surface(
-        surface.vertices,
-        surface.corner_vertex,
-        surface.face_start,
-        name=surface.name,
-        corner_fan=corner_fan,
-        triangles=surface.triangles,
-        triangle_face=surface.triangle_face,
-    )
+    mesh = surface.vertices, surface.corner_vertex, surface.face_start
+    fan = smooth_fans(*mesh) if corner_fan is None else corner_fan
+    normal = fan_normals(*mesh, fan)
+    return surface.with_parts(corner_fan=fan, corner_normal=normal, rest_vertices=None)
 
 
 def curvature_field(surface: Surface, degree: int) -> RosyField:
@@ -105,23 +100,19 @@ def curvature_field(surface: Surface, degree: int) -> RosyField:
     label = "computing principal directions"
     report(0.0, label)
     smooth_surface = with_smooth_normals(surface)
-    x, y = face_frames(smooth_surface)
+    x, y = smooth_surface.face_frames
     mean, deviator = face_curvature(smooth_surface, x, y)
     report(0.6, label)
     deviator_norm = np.abs(deviator)
-    center = smooth_surface.face_center.mean(axis=0)
-    offset = smooth_surface.face_center - center
+    offset = smooth_surface.face_center - smooth_surface.face_center.mean(axis=0)
     radius = np.sqrt(np.mean(dot(offset, offset)))
     # |k1 - k2| = 2 |d|; |k1| + |k2| is the larger of 2 |H| and 2 |d|.
-    confidence = deviator_norm / (
-        np.maximum(np.abs(mean), deviator_norm) + 0.01 / max(radius, 1e-30)
-    )
+    larger = np.maximum(np.abs(mean), deviator_norm)
+    confidence = deviator_norm / (larger + 0.01 / max(radius, 1e-30))
     is_curved = deviator_norm > TINY
     phase = np.divide(deviator, deviator_norm, out=np.zeros_like(deviator), where=is_curved)
     z = confidence * phase ** (degree // 2)
-    rotation = corner_rotations(
-        smooth_surface.face_normal, x, smooth_surface.corner_face, smooth_surface.corner_normal
-    )
+    rotation = corner_rotations(smooth_surface, smooth_surface.corner_normal)
     weights = corner_angles(smooth_surface)
     for index in range(CURVATURE_SMOOTHING_ROUNDS):
         report(0.7 + 0.1 * index, label)

@@ -26,9 +26,8 @@ from dataclasses import replace
 import numpy as np
 
 from .blocks import by_rows, row_blocks
-from .connectivity import build_edges
 from .frames import coordinates
-from .representation import face_frames, matching_angles, signed_power, to_representation
+from .representation import matching_angles, signed_power, to_representation
 from .rosy_field import RosyField, check_degree
 from .surface import Surface
 from .symmetry import FieldSymmetry
@@ -69,18 +68,15 @@ def field_from_directions(surface: Surface, directions: np.ndarray) -> RosyField
     --------
     rosy_addon.field.validate.validated_directions : Check directions from outside first.
     """
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     w = by_rows(coordinates, directions, x, y)
     within_tolerance = all(is_rosy(w[rows]) for rows in row_blocks(len(w)))
-    first_angle, rho, direction_ratios = by_rows(closest_rosy, w)
+    angle, rho, direction_ratios = by_rows(closest_rosy, w)
     if within_tolerance:
         vectors, direction_ratios = directions[:, 0] * (rho > 0)[:, None], None
     else:
-        vectors = rho[:, None] * (
-            np.cos(first_angle)[:, None] * x + np.sin(first_angle)[:, None] * y
-        )
-    field = RosyField(directions.shape[1], vectors, direction_ratios)
-    return detect_families(surface, field)
+        vectors = rho[:, None] * (np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y)
+    return detect_families(surface, RosyField(directions.shape[1], vectors, direction_ratios))
 
 
 def closest_rosy(w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -106,10 +102,7 @@ def closest_rosy(w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     w = np.where(defined[:, None], w, np.exp(1j * member_angles))
     relative_angles = _relative_angles(w)
     order = np.argsort(relative_angles, axis=1, kind="stable")
-    relative_angles, w = (
-        np.take_along_axis(relative_angles, order, 1),
-        np.take_along_axis(w, order, 1),
-    )
+    relative_angles, w = (np.take_along_axis(each, order, 1) for each in (relative_angles, w))
     first_angle = np.angle(w[:, 0]) + (relative_angles - member_angles).mean(axis=1)
     rho = np.abs(w).mean(axis=1)
     direction_ratios = w / (rho[:, None] * np.exp(1j * (first_angle[:, None] + member_angles)))
@@ -125,21 +118,15 @@ def is_rosy(w: np.ndarray) -> bool:
     if not len(w):
         return True
     length = np.abs(w)
-    gap_error = (
-        np.diff(np.sort(_relative_angles(w), axis=1), axis=1, append=2 * np.pi)
-        - 2 * np.pi / w.shape[1]
-    )
-    length_error = 1 - length.min(axis=1) / length.max(axis=1)
-    angle_error = np.degrees(np.abs(gap_error).max(initial=0.0))
-    return bool(
-        angle_error <= ANGLE_TOLERANCE_DEG and length_error.max(initial=0.0) <= LENGTH_TOLERANCE
-    )
+    gap = np.diff(np.sort(_relative_angles(w), axis=1), axis=1, append=2 * np.pi)
+    angle_error = np.degrees(np.abs(gap - 2 * np.pi / w.shape[1]).max())
+    length_error = (1 - length.min(axis=1) / length.max(axis=1)).max()
+    return bool(angle_error <= ANGLE_TOLERANCE_DEG and length_error <= LENGTH_TOLERANCE)
 
 
 def _relative_angles(w: np.ndarray) -> np.ndarray:
     """Return (n, N) counter-clockwise angles from the first direction of a row, in radians from 0 to 2 pi."""
-    angle = np.angle(w)
-    relative = (angle - angle[:, :1]) % (2 * np.pi)
+    relative = (np.angle(w) - np.angle(w[:, :1])) % (2 * np.pi)
     relative[:, 0] = 0
     return relative
 
@@ -179,14 +166,15 @@ def field_directions(surface: Surface, field: RosyField) -> np.ndarray:
 
 
 def field_harmonics(field: RosyField) -> dict[int, np.ndarray]:
-    """Compute the harmonics C_j of a field, which describe how its directions deviate from a RoSy.
+    """Compute the harmonics of a field, which describe how its directions deviate from a RoSy.
 
     Returns
     -------
     dict of int to (F,) complex128 ndarray
-        For each order j, from -((N - 1) // 2) to N // 2, the value C_j exp(i j t) on each face, where t is
-        the angle of the stored member (see the module docstring). An order other than 0 is left out if its
-        modulus is at most `MIN_HARMONIC` on all faces. Empty for a RoSy.
+        For each order j, from -((N - 1) // 2) to N // 2, the product C_j exp(i j t) on each face: the
+        harmonic C_j, relative to the angle t of the stored member (see the module docstring). The order 0 is
+        always there. Another order is left out if the modulus is at most `MIN_HARMONIC` on all faces. For a
+        field without `direction_ratios`, the dict is empty.
     """
     return {} if field.direction_ratios is None else ratio_harmonics(field.direction_ratios)
 
@@ -233,8 +221,7 @@ def tensor_field(surface: Surface, tensors: np.ndarray) -> RosyField:
         The lengths of the directions are the absolute eigenvalues. `family_count` is 2. The field is
         undefined (zero) where the two eigenvalues are equal.
     """
-    frames = face_frames(surface)
-    vectors, ratios = by_rows(_tensor_directions, tensors, *frames)
+    vectors, ratios = by_rows(_tensor_directions, tensors, *surface.face_frames)
     return RosyField(4, vectors, ratios, 2)
 
 
@@ -255,10 +242,7 @@ def _tensor_directions(
     rho = np.where(deviator_norm > 1e-9 * max_eigenvalue, (major + minor) / 2, 0)
     vectors = rho[:, None] * (np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y)
     major_ratio = np.where(rho > 0, major / np.where(rho > 0, rho, 1), 1)
-    direction_ratios = np.stack(
-        [major_ratio, 2 - major_ratio, major_ratio, 2 - major_ratio], axis=1
-    ).astype(np.complex128)
-    return vectors, direction_ratios
+    return vectors, np.stack([major_ratio, 2 - major_ratio] * 2, axis=1).astype(np.complex128)
 
 
 def field_matching(surface: Surface, field: RosyField) -> tuple[np.ndarray, np.ndarray]:
@@ -273,18 +257,12 @@ def field_matching(surface: Surface, field: RosyField) -> tuple[np.ndarray, np.n
         one when the two faces are unfolded into a plane. Members are counted counter-clockwise from the
         stored member of each face. The directions of a field that is not a RoSy match in the same way.
     """
-    x, y = face_frames(surface)
-    edges = build_edges(surface.corner_vertex, surface.face_start)
-    a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
-    z_stored = to_representation(field.vectors, x, y, 1)
-    z = to_representation(field.vectors, x, y, field.degree)
-    closest_angle = matching_angles(surface, x, y, z, field.degree, a, b)
-    stored_angle = matching_angles(surface, x, y, z_stored, 1, a, b)
-    matching = (
-        np.rint((closest_angle - stored_angle) * field.degree / (2 * np.pi)).astype(np.int32)
-        % field.degree
-    )
-    return np.stack([surface.corner_face[a], surface.corner_face[b]], axis=1), matching
+    degree = field.degree
+    z, z_stored = (to_representation(field.vectors, *surface.face_frames, n) for n in (degree, 1))
+    closest_angle = matching_angles(surface, z, degree)
+    stored_angle = matching_angles(surface, z_stored, 1)
+    step = np.rint((closest_angle - stored_angle) * degree / (2 * np.pi)).astype(np.int32)
+    return surface.corner_face[surface.edges.halfedges], step % degree
 
 
 def evaluate_harmonics(

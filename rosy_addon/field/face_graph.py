@@ -20,9 +20,8 @@ import numpy as np
 from ..core.progress import report
 from .analysis import edge_lengths
 from .blocks import concatenated_ranges, mask, neighbors_of_nodes
-from .connectivity import build_edges, connected_components, connected_corners
+from .connectivity import connected_components, connected_corners
 from .frames import dot
-from .polygon_arrays import next_corners
 from .representation import edge_unfolding
 from .singularities import signed_corner_angles
 from .surface import Surface
@@ -48,6 +47,7 @@ class FaceGraph:
 
     Attributes
     ----------
+    surface : Surface
     halfedges : (I, 2) int32 ndarray
         For the source and the target face of each edge, the corner at which the edge starts in that face.
     source, target : (I,) int32 ndarray
@@ -72,6 +72,7 @@ class FaceGraph:
         Connected component of the faces at each vertex node.
     """
 
+    surface: Surface
     halfedges: np.ndarray
     source: np.ndarray
     target: np.ndarray
@@ -90,6 +91,13 @@ class FaceGraph:
         """n, the number of vertex nodes."""
         return len(self.is_interior)
 
+    @property
+    def node_vertex(self) -> np.ndarray:
+        """(n,) int32: the vertex of the surface at which each vertex node lies."""
+        vertex = np.empty(self.node_count, dtype=np.int32)
+        vertex[self.corner_node] = self.surface.corner_vertex
+        return vertex
+
     def turn_around_nodes(self, angle: np.ndarray) -> np.ndarray:
         """Return (n,) float64 sums of (I,) angles at the edges, counter-clockwise around each vertex node."""
         count = self.node_count
@@ -100,45 +108,37 @@ class FaceGraph:
         return potential[self.head] - potential[self.tail]
 
 
-def face_graph(
-    surface: Surface, x: np.ndarray, y: np.ndarray, is_defined: np.ndarray | None = None
-) -> FaceGraph:
+def face_graph(surface: Surface, is_defined: np.ndarray | None = None) -> FaceGraph:
     """Build the graph of the faces of a surface.
 
     Parameters
     ----------
     surface : Surface
-    x, y : (F, 3) ndarray
-        Tangent frames of the faces.
     is_defined : (F,) bool ndarray, optional
         Faces on which the field is defined. By default all faces with an area.
     """
     report(0.0, LABEL)
-    edges = build_edges(surface.corner_vertex, surface.face_start)
     if is_defined is None:
-        is_defined = x.any(axis=1)
-    halfedges = edges.halfedges
+        is_defined = surface.face_frames[0].any(axis=1)
+    halfedges = surface.edges.halfedges
     halfedges = halfedges[is_defined[surface.corner_face[halfedges]].all(axis=1)]
     a, b = halfedges.T
-    following = next_corners(surface.face_start)
+    following = surface.next_corner
     source, target = surface.corner_face[a], surface.corner_face[b]
-    unfolding = edge_unfolding(surface, x, y, a, b)
+    unfolding = edge_unfolding(surface, a, b)
     length, distance = edge_lengths(surface, a, b)
     conductance = distance / np.maximum(length, 1e-300)
     median = max(float(np.median(conductance)), 1e-300) if len(a) else 1.0
-    np.clip(
-        conductance, median / MAX_CONDUCTANCE_RATIO, median * MAX_CONDUCTANCE_RATIO, out=conductance
-    )
+    conductance = conductance.clip(median / MAX_CONDUCTANCE_RATIO, median * MAX_CONDUCTANCE_RATIO)
     corner_node = connected_corners(a, b, following)
-    continues = mask(len(following), halfedges)
-    is_interior = np.ones(int(corner_node.max(initial=-1)) + 1, dtype=bool)
-    is_interior[corner_node[~continues]] = False
-    is_interior[corner_node[following[~continues]]] = False
-    corner_angle = signed_corner_angles(surface, x, y)
+    ends = np.flatnonzero(~mask(len(following), halfedges))
+    count = int(corner_node.max(initial=-1)) + 1
+    is_interior = ~mask(count, corner_node[np.concatenate([ends, following[ends]])])
     component = connected_components(surface.face_count, np.stack([source, target], axis=1))
-    node_component = np.zeros(len(is_interior), dtype=component.dtype)
+    node_component = np.zeros(count, dtype=component.dtype)
     node_component[corner_node] = component[surface.corner_face]
     return FaceGraph(
+        surface=surface,
         halfedges=halfedges,
         source=source,
         target=target,
@@ -148,7 +148,7 @@ def face_graph(
         conductance=conductance,
         corner_node=corner_node,
         is_interior=is_interior,
-        defect=2 * np.pi - np.bincount(corner_node, corner_angle, len(is_interior)),
+        defect=2 * np.pi - np.bincount(corner_node, signed_corner_angles(surface), count),
         component=component,
         node_component=node_component,
     )
@@ -216,15 +216,13 @@ def spanning_forest(node_count: int, first: np.ndarray, second: np.ndarray) -> S
     parent, parent_edge = np.arange(node_count), np.full(node_count, -1)
     parent_sign = np.zeros(node_count)
     is_reached = mask(node_count, roots)
-    front, done = roots, 0
+    front = roots
     while len(front):
-        done += len(front)
-        counts = start[front + 1] - start[front]
-        entry = concatenated_ranges(start[front], counts)
+        entry = concatenated_ranges(start[front], start[front + 1] - start[front])
         entry = entry[~is_reached[neighbor[entry]]]
-        source = edge[entry]
         front, kept = np.unique(neighbor[entry], return_index=True)
-        entry, source = entry[kept], source[kept]
+        entry = entry[kept]
+        source = edge[entry]
         is_reached[front] = True
         parent_edge[front], parent_sign[front] = source, sign[entry]
         parent[front] = np.where(sign[entry] > 0, first[source], second[source])
@@ -303,11 +301,12 @@ class TriangleGraph:
         return turn - mean[face]
 
     def with_resistance(self, factor: np.ndarray) -> TriangleGraph:
-        """Return a graph in which squared turning angles at edges between faces have greater weights.
+        """Return a graph whose edges have smaller conductances, so that large turning angles cost more.
 
-        `factor` holds (I,) factors of at least 1 by which the weights grow. Edges within a face get the
-        largest factor of the edges around the face. Negative conductances are replaced by small positive
-        ones, because they could make the matrix indefinite.
+        The energy of a field is the sum of its squared turning angles, each divided by the conductance of the
+        edge. The conductances of the edges between faces are divided by `factor`, (I,) numbers of at least 1.
+        Edges within a face get the largest factor of the edges around the face. Negative conductances are
+        replaced by small positive ones, because they could make the matrix indefinite.
         """
         graph, face, outer = self.graph, self.triangle_face, slice(self.face_edge_count)
         face_factor = np.ones(len(np.bincount(face)))
@@ -320,9 +319,9 @@ class TriangleGraph:
         return replace(self, graph=replace(graph, conductance=conductance))
 
 
-def triangle_graph(surface: Surface, faces: FaceGraph) -> TriangleGraph:
+def triangle_graph(faces: FaceGraph) -> TriangleGraph:
     """Return the graph of the triangles of a surface, given the graph of its faces."""
-    size = np.diff(surface.face_start)
+    surface, size = faces.surface, np.diff(faces.surface.face_start)
     face = np.repeat(np.arange(len(size)), size - 2)
     first_triangle = np.cumsum(size - 2) - (size - 2)
     rank = np.arange(len(face)) - first_triangle[face]
@@ -345,15 +344,14 @@ def triangle_graph(surface: Surface, faces: FaceGraph) -> TriangleGraph:
     triangles = [np.concatenate(pair) for pair in zip(triangles, (inner - 1, inner), strict=True)]
     inner_weights = cotangent[inner - 1, 1] / 2, cotangent[inner, 2] / 2
     weights = [np.concatenate(pair) for pair in zip(weights, inner_weights, strict=True)]
-    tail, head = faces.corner_node[corner[inner, 1]], faces.corner_node[apex[inner]]
     weight = np.stack(weights, axis=1)
     graph = replace(
         faces,
         source=triangles[0],
         target=triangles[1],
         unfolding=np.concatenate([faces.unfolding, np.zeros(len(inner))]),
-        tail=np.concatenate([faces.tail, tail]),
-        head=np.concatenate([faces.head, head]),
+        tail=np.concatenate([faces.tail, faces.corner_node[corner[inner, 1]]]),
+        head=np.concatenate([faces.head, faces.corner_node[apex[inner]]]),
         conductance=weight.sum(axis=1),
         component=faces.component[face],
     )

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .blocks import bincount_rows
 from .connection import build_connection
-from .connectivity import Edges, build_edges, smooth_fans
+from .connectivity import smooth_fans
 from .creases import filtered_normals, salient_edges, weighted_median
 from .curvature import face_curvature, with_smooth_normals
 from .frames import angle_between, dot, normalize
 from .polygon_arrays import face_area_vectors
-from .representation import face_frames
 from .surface import Surface
 from .surface_averages import SurfaceAverages
 
@@ -43,12 +43,13 @@ class NoisyCurvature:
     averages : SurfaceAverages
         Averages between faces and vertices, in the frames of the faces.
     mean : (F,) float64 ndarray
-        Mean curvature of each face.
+        Mean curvature of each face, in units of 1 / length in object space.
     deviator : (F,) complex128 ndarray
         Deviator of each face: half the difference of the principal curvatures, and their directions.
-    mean_noise, deviator_noise : (F,) ndarray
-        By how much the mean curvature and the deviator change if random displacements as strong as the noise
-        of the mesh are added to the vertices.
+    mean_noise : (F,) float64 ndarray
+    deviator_noise : (F,) complex128 ndarray
+        Mean curvature and deviator after random displacements of the vertices that are as strong as the noise
+        of the mesh, minus `mean` and `deviator`.
     """
 
     salient_ends: np.ndarray
@@ -73,23 +74,19 @@ def of_unit_extent(surface: Surface) -> Surface:
 
 def noisy_curvature(surface: Surface) -> NoisyCurvature:
     """Measure the curvature of a surface, and its change by random noise; see `NoisyCurvature`."""
-    edges = build_edges(surface.corner_vertex, surface.face_start)
-    normals, noise_angle = filtered_normals(surface, edges)
-    ends = salient_edges(surface, edges, normals, noise_angle)
-    noise = noise_sample(surface, edges, noise_angle)
-    fans = smooth_fans(
-        surface.vertices, surface.corner_vertex, surface.face_start, sharp_edges=ends
-    )
-    x, y = face_frames(surface)
+    normals, noise_angle = filtered_normals(surface)
+    ends = salient_edges(surface, normals, noise_angle)
+    noise = noise_sample(surface, noise_angle)
+    fans = smooth_fans(surface.vertices, surface.corner_vertex, surface.face_start, ends)
+    x, y = surface.face_frames
     mean, deviator = _bounded_curvature(surface, fans, x, y)
     noisy = surface.with_parts(vertices=surface.vertices + noise)
     normal = noisy.face_normal
     x_noisy = normalize(x - dot(x, normal)[:, None] * normal)
     mean_noisy, deviator_noisy = _bounded_curvature(noisy, fans, x_noisy, np.cross(normal, x_noisy))
     averages = SurfaceAverages(surface, build_connection(surface), x, y)
-    return NoisyCurvature(
-        ends, averages, mean, deviator, mean_noisy - mean, deviator_noisy - deviator
-    )
+    noise = mean_noisy - mean, deviator_noisy - deviator
+    return NoisyCurvature(ends, averages, mean, deviator, *noise)
 
 
 def _bounded_curvature(
@@ -108,7 +105,7 @@ def _bounded_curvature(
     return np.clip(mean, -limit, limit), deviator
 
 
-def noise_sample(surface: Surface, edges: Edges, noise_angle: float) -> np.ndarray:
+def noise_sample(surface: Surface, noise_angle: float) -> np.ndarray:
     """Return random displacements of the vertices along their normals, as strong as the noise of the mesh.
 
     The noise is white. Its amplitude is estimated in two ways, by comparing the mesh with a mesh that has
@@ -119,7 +116,6 @@ def noise_sample(surface: Surface, edges: Edges, noise_angle: float) -> np.ndarr
     Parameters
     ----------
     surface : Surface
-    edges : Edges
     noise_angle : float
         Result of `creases.filtered_normals`.
 
@@ -129,20 +125,16 @@ def noise_sample(surface: Surface, edges: Edges, noise_angle: float) -> np.ndarr
         Displacements of the vertices, in object space.
     """
     count = len(surface.vertices)
-    normal = np.stack(
-        [np.bincount(surface.corner_vertex, n, count) for n in surface.corner_normal.T], axis=1
-    )
-    normal = normalize(normal)
+    normal = normalize(bincount_rows(surface.corner_vertex, surface.corner_normal, count))
     sample = np.random.default_rng(SEED).standard_normal(count)[:, None] * normal
-    vectors = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
+    faces = surface.corner_vertex, surface.face_start
+    vectors = face_area_vectors(surface.vertices, *faces)
     area = np.sqrt(dot(vectors, vectors))
     probe = PROBE * np.sqrt(area.mean())
-    displaced = face_area_vectors(
-        surface.vertices + probe * sample, surface.corner_vertex, surface.face_start
-    )
+    displaced = face_area_vectors(surface.vertices + probe * sample, *faces)
     turn = weighted_median(angle_between(vectors, displaced), area)
     by_angle = probe * noise_angle / turn if turn > 0 else 0.0
-    used = surface.used_vertices
+    edges, used = surface.edges, surface.used_vertices
     actual = np.median(np.abs(_roughness(surface.vertices, normal, edges.ends)[used]))
     unit = np.median(np.abs(_roughness(sample, normal, edges.ends)[used]))
     by_roughness = actual / unit if unit > 0 else 0.0
@@ -166,9 +158,9 @@ def _roughness(points: np.ndarray, normal: np.ndarray, ends: np.ndarray) -> np.n
 def feature_curvature(surface: Surface) -> np.ndarray:
     """Compute the curvature of the features of a surface at the corners of its triangles.
 
-    It is the larger absolute principal curvature, averaged over the distance `SCALE`. The curvature of
-    noise is subtracted, and the bend at sharp edges does not count. The rest shape is used if there is one,
-    so that a deformation does not change the result.
+    It is the larger absolute principal curvature, averaged over the distance `SCALE`, a fraction of
+    `Surface.extent`. The curvature of noise is subtracted, and the bend at sharp edges does not count. The
+    rest shape is used if there is one, so that a deformation does not change the result.
 
     Parameters
     ----------

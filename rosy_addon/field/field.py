@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, fields
 from functools import cached_property
 from typing import NamedTuple
 
@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.errors import RosyError
+from .analysis import Difference as Difference
 from .analysis import angle_errors, dirichlet_energy, error_statistics
 from .convert import Conversion, convert
 from .directional_field import field_directions
 from .field_io import write_field
+from .representation import face_representation, to_representation
 from .rosy_field import RosyField
 from .singularities import find_singularities
 from .singularity_changes import move_index
@@ -35,37 +37,6 @@ class Singularities(NamedTuple):
 
     vertex: NDArray[np.int32]
     index: NDArray[np.int32]  # type: ignore[assignment]  # hides tuple.index
-
-
-@dataclass(frozen=True, eq=False)
-class Difference:
-    """The angle between two fields of the same degree on each face, and statistics of it.
-
-    Attributes
-    ----------
-    angle : (F,) float64 ndarray
-        Angle between a vector of one field and the nearest vector of the other, in radians from 0 to
-        pi/N. It is the same for all N vectors of a face. NaN where either field is undefined. For
-        directions that are not rotationally symmetric, see `Field.difference`.
-    mean, rms : float
-        Mean and root mean square of the angle in radians, weighted by area.
-    p95 : float
-        95th percentile of the angle in radians, weighted by area.
-    max : float
-        Largest angle, in radians.
-    worst_face : int
-        The face with the largest angle; -1 if there is no face on which both fields are defined.
-    compared : float
-        Fraction of the faces on which both fields are defined, from 0 to 1.
-    """
-
-    angle: NDArray[np.float64]
-    mean: float
-    rms: float
-    p95: float
-    max: float
-    worst_face: int
-    compared: float
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -107,14 +78,8 @@ class Field(RosyField):
     @classmethod
     def of(cls, surface: Surface, field: RosyField) -> Field:
         """Return a `Field` with the values of a `RosyField` and this surface."""
-        return cls(
-            field.degree,
-            field.vectors,
-            field.direction_ratios,
-            field.family_count,
-            field.source_directions,
-            surface=surface,
-        )
+        values = {each.name: getattr(field, each.name) for each in fields(RosyField)}
+        return cls(**values, surface=surface)
 
     def __repr__(self) -> str:
         kind = f"{self.degree}-RoSy field" if self.is_rosy else f"field of {self.degree} directions"
@@ -133,12 +98,7 @@ class Field(RosyField):
     @cached_property
     def angles(self) -> NDArray[np.float64]:
         """(F,): counter-clockwise angle from x of `Surface.face_frames` to `vectors`, -pi to pi radians."""
-        x, y = self.surface.face_frames
-        vectors = self.vectors
-        angles: NDArray[np.float64] = np.arctan2(
-            (vectors * y).sum(axis=1), (vectors * x).sum(axis=1)
-        )
-        return angles
+        return np.angle(to_representation(self.vectors, *self.surface.face_frames, 1))
 
     @cached_property
     def representation(self) -> NDArray[np.complex128]:
@@ -146,8 +106,7 @@ class Field(RosyField):
 
         All N members of a face give the same value. `from_representation` makes a field from it.
         """
-        z: NDArray[np.complex128] = self.magnitude * np.exp(1j * self.degree * self.angles)
-        return z
+        return face_representation(self.surface, self)
 
     @cached_property
     def singularities(self) -> Singularities:
@@ -247,10 +206,8 @@ class Field(RosyField):
         >>> field.singularities.vertex.tolist()
         [12, 200]
         """
-        distance = reach * self.surface.extent
-        return Field.of(
-            self.surface, move_index(self.surface, self, source, target, index, distance)
-        )
+        surface, distance = self.surface, reach * self.surface.extent
+        return Field.of(surface, move_index(surface, self, source, target, index, distance))
 
     def with_magnitude(self, magnitude: str | ArrayLike) -> Field:
         """Return the field with the same directions and other magnitudes.
@@ -285,8 +242,7 @@ class Field(RosyField):
             If the degrees or the surfaces differ.
         """
         check_same_surface(self.surface, other)
-        angle = angle_errors(self.surface, self, other)
-        return Difference(angle, **error_statistics(self.surface, angle)._asdict())
+        return error_statistics(self.surface, angle_errors(self.surface, self, other))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the field to a file.

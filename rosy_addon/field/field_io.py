@@ -18,12 +18,7 @@ from .directional_field import field_directions, tensor_field
 from .formats.fieldgen import fieldgen_text, read_fieldgen
 from .formats.plain import npy_bytes, read_npy, read_text
 from .formats.polygons import RawField
-from .formats.rosy_rawfield import (
-    rawfield_text,
-    read_rawfield,
-    read_rosy,
-    rosy_text,
-)
+from .formats.rosy_rawfield import rawfield_text, read_rawfield, read_rosy, rosy_text
 from .formats.sings import SINGULARITY_SUFFIXES, sings_text
 from .formats.text_rows import format_lines
 from .frames import dot, normalize, transport
@@ -32,12 +27,7 @@ from .mesh_io import SHARP_ANGLE
 from .rosy_field import RosyField
 from .singularities import find_singularities
 from .surface import Surface, build_surface
-from .validate import (
-    apply_nonfinite_policy,
-    infer_domain,
-    validated_directions,
-    validated_field,
-)
+from .validate import apply_nonfinite_policy, checked_domain, validated_directions, validated_field
 
 #: A face of the target mesh gets the field of the closest source face only within these limits: the distance
 #: relative to `Surface.extent` of the source, and the angle between the normals in radians.
@@ -172,10 +162,10 @@ def field_from_raw(
     RosyError
         If the rows belong to another mesh, or a vector is not finite or not tangent to the surface.
     """
-    _check_count(raw, surface, source)
+    _check_header(raw, surface, source)
     values = raw.values
     if raw.tensors:
-        if len(values) != surface.face_count:
+        if checked_domain(surface, len(values), raw.domain, source) != "face":
             raise RosyError(
                 f"{source}: contains tensors on vertices; only tensors on faces are supported"
             )
@@ -187,24 +177,16 @@ def field_from_raw(
     return validated_directions(surface, values, source, nonfinite, raw.domain)
 
 
-def _check_count(raw: RawField, surface: Surface, source: str) -> None:
-    """Raise a `RosyError` if the number of rows is not that in the header, or does not fit the surface.
+def _check_header(raw: RawField, surface: Surface, source: str) -> None:
+    """Raise a `RosyError` if a file does not have the number of rows that its header declares.
 
     Some programs write the number of vertices in the header of a field on faces. This is accepted.
     """
-    row_count = len(raw.values)
-    vertices_over_faces = (
-        raw.header_count == len(surface.vertices) and row_count == surface.face_count
-    )
-    if raw.header_count not in (None, row_count) and not vertices_over_faces:
+    row_count, vertex_count = len(raw.values), len(surface.vertices)
+    is_mixed = (raw.header_count, row_count) == (vertex_count, surface.face_count)
+    if raw.header_count not in (None, row_count) and not is_mixed:
         raise RosyError(
             f"{source}: declares {counted(raw.header_count, 'row')} of {raw.columns} numbers, but contains {row_count}"
-        )
-    if raw.domain is None and infer_domain(surface, row_count) is None:
-        raise RosyError(
-            f"{source}: contains {counted(row_count, 'row')}, but {surface.name} has "
-            f"{counted(surface.face_count, 'face')} and "
-            f"{counted(len(surface.vertices), 'vertex', 'vertices')}"
         )
 
 
@@ -225,15 +207,13 @@ def _source_surface(
         return build_surface(*raw.polygons, name=str(path), sharp_angle=SHARP_ANGLE)
     if count == surface.face_count:
         return None
-    candidates = [
-        path.with_suffix(suffix) for suffix in MESH_READERS if suffix != path.suffix.lower()
-    ]
-    mesh_path = next((candidate for candidate in candidates if candidate.is_file()), None)
+    suffixes = (suffix for suffix in MESH_READERS if suffix != path.suffix.lower())
+    mesh_path = next(filter(Path.is_file, map(path.with_suffix, suffixes)), None)
     if mesh_path is None:
         return None
     source = Surface(mesh_path)
     # The number of rows may fit the vertices of `surface` although the rows belong to faces of the mesh file.
-    return source if count == source.face_count or infer_domain(surface, count) is None else None
+    return source if count == source.face_count or count != len(surface.vertices) else None
 
 
 def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface) -> None:
@@ -267,15 +247,7 @@ def field_file(path: str | os.PathLike[str], field: RosyField, surface: Surface)
     RosyError
         If the extension is not in `WRITE_SUFFIXES`, or the format cannot store such a field.
     """
-    path = Path(path)
-    _check_storable(path, field)
-    report(0.0, "writing the file")
-    return _contents(path.suffix.lower(), field, surface)
-
-
-def _check_storable(path: Path, field: RosyField) -> None:
-    """Raise a `RosyError` if the format of a file (given by its suffix) cannot store a field."""
-    suffix = path.suffix.lower()
+    suffix = Path(path).suffix.lower()
     if suffix not in WRITE_SUFFIXES:
         raise RosyError(
             f"{path}: cannot be written as a field: its name must end in {_join_names(WRITE_SUFFIXES)}"
@@ -285,10 +257,7 @@ def _check_storable(path: Path, field: RosyField) -> None:
             f"{path}: a {suffix} file stores one member per row, but the directions of this field "
             "do not form a RoSy: write a .rawfield, .txt or .npy file"
         )
-
-
-def _contents(suffix: str, field: RosyField, surface: Surface) -> bytes:
-    """Return the contents of a field file in the format with this suffix, as bytes."""
+    report(0.0, "writing the file")
     if suffix == ".rosy":
         return rosy_text(field).encode("ascii")
     if suffix == ".obj":
@@ -300,10 +269,9 @@ def _contents(suffix: str, field: RosyField, surface: Surface) -> bytes:
         rows = field_directions(surface, field)
     if suffix == ".npy":
         return npy_bytes(rows)
-    text = (
-        rawfield_text(rows) if suffix == ".rawfield" else format_lines(rows.reshape(len(rows), -1))
-    )
-    return text.encode("ascii")
+    if suffix == ".rawfield":
+        return rawfield_text(rows).encode("ascii")
+    return format_lines(rows.reshape(len(rows), -1)).encode("ascii")
 
 
 def _join_names(names: tuple[str, ...]) -> str:
@@ -329,24 +297,23 @@ def transfer_field(
     Returns
     -------
     RosyField
-        Field on the faces of `target`. It is zero on faces that exceed `MAX_DISTANCE` or `MAX_NORMAL_ANGLE`,
-        and on faces without area.
+        Field on the faces of `target`. It is zero on faces without area, and on faces that have no source
+        face near them: the closest one is farther away than `MAX_DISTANCE`, a fraction of the extent of
+        `source`, or the angle between the two normals is above `MAX_NORMAL_ANGLE`.
 
     Raises
     ------
     RosyError
-        If more than `MAX_UNMATCHED_FRACTION` of the faces exceed these limits.
+        If more than `MAX_UNMATCHED_FRACTION` of the faces have no source face near them.
     """
-    points = _face_points(target)
     with progress(0.1, 0.9):
-        triangle, distance = closest_triangles(source, points)
+        triangle, distance = closest_triangles(source, _face_points(target))
     report(0.9, "transferring the field")
     face = source.triangle_face[triangle]
-    extent = max(source.extent, 1e-300)
     normal = target.face_normal
     normal_cosine = dot(normal, source.face_normal[face])
-    undefined = (distance > MAX_DISTANCE * extent) | (normal_cosine < np.cos(MAX_NORMAL_ANGLE))
-    undefined |= ~normal.any(axis=1)
+    undefined = distance > MAX_DISTANCE * max(source.extent, 1e-300)
+    undefined |= (normal_cosine < np.cos(MAX_NORMAL_ANGLE)) | ~normal.any(axis=1)
     unmatched = undefined & normal.any(axis=1)
     if unmatched.sum() > MAX_UNMATCHED_FRACTION * len(undefined):
         raise RosyError(
@@ -366,8 +333,7 @@ def _face_points(surface: Surface) -> np.ndarray:
     """Return one (F, 3) point on each face: the centroid of its largest triangle."""
     points = np.empty((surface.face_count, 3))
     for faces in row_blocks(surface.face_count):
-        limits = np.searchsorted(surface.triangle_face, [faces.start, faces.stop])
-        triangles = slice(*limits)
+        triangles = slice(*np.searchsorted(surface.triangle_face, [faces.start, faces.stop]))
         face = surface.triangle_face[triangles]
         corners = surface.vertices[surface.triangle_vertex[triangles]]
         cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

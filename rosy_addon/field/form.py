@@ -43,14 +43,6 @@ REACH = 0.04
 FIELD_TOLERANCE = 1e-4
 
 
-def follows_curvature(degree: int) -> bool:
-    """Return whether a field of this degree can follow principal directions: degree 2 and multiples of 4.
-
-    Degree 2 follows one principal direction, and multiples of 4 follow both of them equally.
-    """
-    return degree == 2 or degree % 4 == 0
-
-
 def form(surface: Surface, degree: int) -> RosyField:
     """Generate a field that follows the form of a surface.
 
@@ -80,25 +72,25 @@ def form(surface: Surface, degree: int) -> RosyField:
     bootstrap (Efron and Tibshirani, "An Introduction to the Bootstrap", 1993).
     """
     degree = check_degree(degree)
-    if not follows_curvature(degree) or not surface.face_normal.any():
+    # Degree 2 follows one principal direction, and multiples of 4 follow both of them equally.
+    follows_curvature = degree == 2 or degree % 4 == 0
+    if not follows_curvature or not surface.face_normal.any():
         return smoothest_field(surface, degree)
     original, surface = surface, of_unit_extent(surface)
     with progress(0.0, 0.2):
         measured = noisy_curvature(surface)
     with progress(0.2, 0.5):
         guides, confidence = _curvature_guides(measured, degree)
-    weight = (confidence / REACH) ** 2
     report(0.5, "finding guides")
     edge_guides = guides_from_edges(surface, measured.salient_ends, degree)
     at_edge = edge_guides.any(axis=1)
     guides = np.where(at_edge[:, None], edge_guides, guides)
+    weight = np.where(at_edge, 0.0, (confidence / REACH) ** 2)
     if not guides.any():
         with progress(0.5, 1.0):
             return smoothest_field(original, degree)
     with progress(0.5, 1.0):
-        return guided_field(
-            surface, degree, guides, np.where(at_edge, 0.0, weight), at_edge, FIELD_TOLERANCE
-        )
+        return guided_field(surface, degree, guides, weight, at_edge, FIELD_TOLERANCE)
 
 
 def _curvature_guides(measured: NoisyCurvature, degree: int) -> tuple[np.ndarray, np.ndarray]:

@@ -209,8 +209,8 @@ def generate(surface: Surface, settings: GeneratorSettings | str, degree: int) -
 def _curvature(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyField:
     """Return a field along principal curvature directions.
 
-    Where they are not well defined, as on flat parts, the field extends smoothly from the parts where they
-    are.
+    Where the two principal curvatures are nearly equal, as on flat parts, these directions are arbitrary. If
+    `settings.reach` is above 0, the field there is a smooth continuation of the field around these parts.
     """
     split = 0.4 if settings.reach else 1.0
     with progress(0.0, split):
@@ -229,22 +229,19 @@ def _prescribed(surface: Surface, settings: GeneratorSettings, degree: int) -> R
         raise RosyError(
             f"{surface.name}: no singularities are given: give their vertices and indices"
         )
-    singularities, start = settings.singularities, 0.0
+    singularities, start, reach = settings.singularities, 0.0, settings.reach * surface.extent
     if settings.add_missing:
         with progress(0.0, 0.5):
             singularities, start = cheapest_singularities(surface, degree, *singularities), 0.5
     with progress(start, 1.0):
-        return prescribed_field(
-            surface, degree, *singularities, settings.vectors, settings.reach * surface.extent
-        )
+        return prescribed_field(surface, degree, *singularities, settings.vectors, reach)
 
 
 def _features(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyField:
     """Return a field along the edges in the settings or, if there are none, along border and sharp edges."""
     degree = check_degree(degree)
-    ends = settings.edges
-    if ends is None:
-        ends = feature_edges(surface, settings.sharp_angle)
+    angle, ends = settings.sharp_angle, settings.edges
+    ends = feature_edges(surface, angle) if ends is None else ends
     if not len(ends):
         raise NoFeaturesError(
             f"{surface.name}: has no border or sharp edge: reduce the sharp angle, or mark edges"
@@ -272,10 +269,9 @@ def _guided(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyF
     if settings.strokes:
         guide_sets.append(guides_from_strokes(surface, settings.strokes, degree))
     if settings.axis_guides:
-        position, axis, radius = (
-            np.array(column, dtype=np.float64) for column in zip(*settings.axis_guides, strict=True)
-        )
-        guide_sets.append(guides_from_axes(surface, position, axis, radius, degree))
+        columns = zip(*settings.axis_guides, strict=True)
+        given = (np.array(column, dtype=np.float64) for column in columns)
+        guide_sets.append(guides_from_axes(surface, *given, degree))
     if settings.uv is not None:
         guide_sets.append(guides_from_uv(surface, settings.uv, degree))
     if settings.vectors is not None:

@@ -22,12 +22,7 @@ from ..core.progress import progress, report
 from .blocks import mask
 from .conjugate_gradient import RELATIVE_TOLERANCE, conjugate_gradient
 from .connection import build_connection, laplacian
-from .representation import (
-    complex_bincount,
-    face_frames,
-    from_representation,
-    to_representation,
-)
+from .representation import complex_bincount, from_representation, to_representation, unit_complex
 from .rosy_field import RosyField, check_degree
 from .smoothest import smoothest_field
 from .sparse_multigrid import CSRMatrix, Level, add_diagonal, hierarchy, w_cycle
@@ -80,7 +75,7 @@ class GuidedSystem:
     degree : int
         N.
     averages : SurfaceAverages
-        Averages between faces and nodes, in the frames of `face_frames`.
+        Averages between faces and nodes, in the frames `Surface.face_frames`.
     laplacian : (n, n) CSRMatrix
         The connection Laplacian.
     levels : list of Level
@@ -119,18 +114,16 @@ class GuidedSystem:
         is_hard : (F,) bool ndarray
             Faces whose guides are followed exactly.
         corner : (m,) int ndarray or slice
-            Corners of triangles that are included; all by default. Values at nodes without one are 0.
+            Corners of triangles that are included; all by default. A node gets the value 0 if none of its
+            corners is included.
         """
         sums = self.averages.node_sums
         penalty = sums(weight, 0, corner)
         rhs = sums(weight * target, self.degree, corner)
         # Nodes of faces with hard guides are fixed at the mean guide, unless the guides cancel.
         fixed = sums(is_hard * target, self.degree, corner)
-        max_modulus = sums(is_hard * np.abs(target), 0, corner)
-        is_fixed = np.abs(fixed) > 1e-6 * max_modulus
-        fixed[~is_fixed] = 0
-        fixed[is_fixed] /= np.abs(fixed[is_fixed])
-        return NodeGuides(penalty, rhs, is_fixed, fixed)
+        is_fixed = np.abs(fixed) > 1e-6 * sums(is_hard * np.abs(target), 0, corner)
+        return NodeGuides(penalty, rhs, is_fixed, unit_complex(np.where(is_fixed, fixed, 0)))
 
     def solve(
         self,
@@ -138,7 +131,7 @@ class GuidedSystem:
         start: np.ndarray | None = None,
         tolerance: float = RELATIVE_TOLERANCE,
     ) -> np.ndarray:
-        """Return the representations at the nodes of the field that follows the guides: solve the system.
+        """Solve the linear system: return the field that follows the guides, as representations at the nodes.
 
         Parameters
         ----------
@@ -161,16 +154,9 @@ class GuidedSystem:
         report(0.5, label)
         levels = add_diagonal(self.levels, diagonal)
         start = guides.fixed if start is None else np.where(guides.is_fixed, guides.fixed, start)
+        matrix, cycle, is_fixed = levels[0].matrix, partial(w_cycle, levels), guides.is_fixed
         with progress(0.5, 1.0, label):
-            return conjugate_gradient(
-                levels[0].matrix,
-                guides.rhs,
-                tolerance,
-                partial(w_cycle, levels),
-                label,
-                start,
-                guides.is_fixed,
-            )
+            return conjugate_gradient(matrix, guides.rhs, tolerance, cycle, label, start, is_fixed)
 
     def solve_near(
         self, guides: NodeGuides, z: np.ndarray, nodes: np.ndarray, max_iterations: int
@@ -243,8 +229,7 @@ class GuidedSystem:
 
     def corners_of_nodes(self, node: np.ndarray) -> np.ndarray:
         """Return the (k,) intp corners of triangles that lie at the given nodes, in ascending order."""
-        corner_node = self.averages.connection.corner_node
-        return np.flatnonzero(mask(len(self.laplacian), node)[corner_node])
+        return np.flatnonzero(mask(len(self.laplacian), node)[self.averages.connection.corner_node])
 
     def nodes_near(self, node: np.ndarray, count: int) -> np.ndarray:
         """Add rings of neighbors to a set of nodes until it has at least `count` nodes.
@@ -286,9 +271,9 @@ def firmness_weights(
     firmness : (F,) ndarray
         Firmness of the guide of each face, from 0 to 1.
     edge_length : float
-        Mean length of the edges.
+        Mean length of the edges, in object space.
     reach : float
-        Distance over which guides are smoothed in addition.
+        Distance over which guides are smoothed, in object space. It adds to the effect of the firmness.
 
     Returns
     -------
@@ -299,16 +284,14 @@ def firmness_weights(
     """
     is_exact = (firmness >= EXACT_FIRMNESS) & (reach == 0)
     firmness = np.where(is_exact, 0.0, np.minimum(firmness, 1.0))
-    weight = firmness / np.maximum(
-        reach**2 * firmness + edge_length**2 * (1 - firmness), np.finfo(np.float64).tiny
-    )
-    return weight, is_exact
+    area = reach**2 * firmness + edge_length**2 * (1 - firmness)
+    return firmness / np.maximum(area, np.finfo(np.float64).tiny), is_exact
 
 
 def guided_system(surface: Surface, degree: int) -> GuidedSystem:
     """Build the linear system for guided fields of this degree on a surface."""
     connection = build_connection(surface)
-    averages = SurfaceAverages(surface, connection, *face_frames(surface))
+    averages = SurfaceAverages(surface, connection, *surface.face_frames)
     matrix = laplacian(connection, degree)
     matrix = matrix.plus_diagonal(REGULAR_SHIFT * matrix.diagonal)
     return GuidedSystem(surface, degree, averages, matrix)
@@ -367,7 +350,7 @@ def guided_field(
         z = system.solve(node_guides, tolerance=tolerance)
     report(0.75, "averaging the field on the faces")
     face_z = unit_representations(system.averages.face_sums(z, degree))
-    face_z[is_hard] = target[is_hard] / np.abs(target[is_hard])
+    face_z[is_hard] = unit_complex(target[is_hard])
     vectors = system.to_vectors(face_z)
     del system  # it is large
     unguided = (face_z == 0) & surface.face_normal.any(axis=1)
@@ -380,5 +363,4 @@ def guided_field(
 def unit_representations(z: np.ndarray) -> np.ndarray:
     """Return (F,) representations divided by their moduli; 0 where the modulus is only a rounding error."""
     modulus = np.abs(z)
-    is_defined = modulus > 1e-9 * max(float(modulus.max()), 1e-300)
-    return np.divide(z, modulus, out=np.zeros_like(z), where=is_defined)
+    return unit_complex(np.where(modulus > 1e-9 * max(float(modulus.max()), 1e-300), z, 0))

@@ -13,10 +13,9 @@ import numpy as np
 from ..core.errors import RosyError
 from .blocks import mask
 from .closest_point import closest_triangles
-from .connectivity import build_edges
 from .frames import dot, normalize
 from .polygon_arrays import mean_per_face, sum_per_face
-from .representation import complex_bincount, face_frames, from_representation, to_representation
+from .representation import complex_bincount, from_representation, to_representation, unit_complex
 from .surface import Surface
 
 #: Largest distance of a stroke point from the surface, relative to `Surface.extent`. Points farther
@@ -76,7 +75,7 @@ def feature_edges(surface: Surface, angle: float) -> np.ndarray:
     (E, 2) int32 ndarray
         Pairs of vertices. Nonmanifold edges count as border edges.
     """
-    edges = build_edges(surface.corner_vertex, surface.face_start)
+    edges = surface.edges
     is_feature = ~mask(len(edges.ends), edges.interior)
     normal = surface.face_normal
     normal_a, normal_b = (normal[surface.corner_face[side]] for side in edges.halfedges.T)
@@ -113,10 +112,7 @@ def guides_from_strokes(surface: Surface, strokes: Sequence[np.ndarray], degree:
         the strokes need more than `MAX_STROKE_SAMPLES` samples in total.
     """
     spacing = max(0.5 * surface.mean_edge_length, MIN_STROKE_SPACING * surface.extent)
-    polylines = [
-        _polyline(np.asarray(stroke, dtype=np.float64).reshape(-1, 3)) for stroke in strokes
-    ]
-    polylines = [(points, arc_length) for points, arc_length in polylines if len(points) > 1]
+    polylines = [polyline for polyline in map(_polyline, strokes) if len(polyline[0]) > 1]
     if not polylines:
         raise RosyError(f"{surface.name}: no stroke has two different points")
     length = sum(arc_length[-1] for _, arc_length in polylines)
@@ -176,26 +172,23 @@ def guides_from_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:
     uv : (C, 2) float ndarray
         Texture coordinates of each corner.
     degree : int
-        N of the field. If it is a multiple of 4, members follow the u axis and the v axis equally well: the
-        axes of the rotation nearest to the map. For other degrees, the guide is the direction of increasing
-        u.
+        N of the field. If it is a multiple of 4, members follow the u axis and the v axis. Where these two
+        axes are not perpendicular on the surface, members follow two perpendicular directions that deviate
+        equally from them. For other degrees, the guide is the direction of increasing u.
 
     Returns
     -------
     (F, 3) float64 ndarray
         Unit vectors; zero on faces without area in the map.
     """
-    x, y = face_frames(surface)
-    face = surface.corner_face
+    x, y = surface.face_frames
+    face, uv = surface.corner_face, np.asarray(uv, dtype=np.float64)
     offset = surface.vertices[surface.corner_vertex] - surface.face_center[face]
     position = dot(offset, x[face]) + 1j * dot(offset, y[face])
-    mean_uv = mean_per_face(np.asarray(uv, dtype=np.float64), surface.face_start)
-    u, v = (np.asarray(uv, dtype=np.float64) - mean_uv[face]).T
+    u, v = (uv - mean_per_face(uv, surface.face_start)[face]).T
     # Least squares fit of the linear map from (u, v) to the face plane.
-    uu, uv_sum, vv = (
-        sum_per_face(product, surface.face_start) for product in (u * u, u * v, v * v)
-    )
-    up, vp = (sum_per_face(axis * position, surface.face_start) for axis in (u, v))
+    products = u * u, u * v, v * v, u * position, v * position
+    uu, uv_sum, vv, up, vp = (sum_per_face(product, surface.face_start) for product in products)
     area = uu * vv - uv_sum**2
     degenerate = area <= 1e-12 * np.maximum(uu * vv, 1e-300)
     along_u, along_v = vv * up - uv_sum * vp, uu * vp - uv_sum * up
@@ -204,8 +197,7 @@ def guides_from_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:
         mirrored = (np.conj(along_u) * along_v).imag < 0
         size = np.maximum(np.abs(along_u), 1e-300), np.maximum(np.abs(along_v), 1e-300)
         along_u = along_u / size[0] - 1j * np.where(mirrored, -1, 1) * along_v / size[1]
-    size = np.abs(along_u)
-    along_u = np.where(degenerate | (size == 0), 0, along_u / np.where(size > 0, size, 1))
+    along_u = np.where(degenerate, 0, unit_complex(along_u))
     return along_u.real[:, None] * x + along_u.imag[:, None] * y
 
 
@@ -231,7 +223,7 @@ def average_guides(
     (F, 3) float64 ndarray
         Unit member vectors of the means; zero on faces without vectors, and where the vectors cancel.
     """
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     z = to_representation(vectors, x[face], y[face], degree)
     total = complex_bincount(face, z, surface.face_count)
     magnitude_sum = np.bincount(face, np.abs(z), surface.face_count)
@@ -242,10 +234,10 @@ def average_guides(
 
 def _polyline(stroke: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the (m, 3) points of a stroke without consecutive duplicates, and their (m,) arc lengths."""
+    stroke = np.asarray(stroke, dtype=np.float64).reshape(-1, 3)
     with np.errstate(over="ignore"):  # a length may be infinite
         length = np.sqrt((np.diff(stroke, axis=0) ** 2).sum(axis=1))
-    is_kept = np.ones(len(stroke), dtype=bool)
-    is_kept[1:] = length > 0
+    is_kept = np.concatenate([[True], length > 0])
     return stroke[is_kept], np.concatenate([[0], np.cumsum(length[length > 0])])
 
 
@@ -263,8 +255,7 @@ def _resampled(
     """
 
     def points_at(place: np.ndarray) -> np.ndarray:
-        columns = [np.interp(place, arc_length, column) for column in points.T]
-        return np.stack(columns, axis=1)
+        return np.stack([np.interp(place, arc_length, column) for column in points.T], axis=1)
 
     count = max(int(arc_length[-1] / spacing), 1)
     middle = (np.arange(count) + 0.5) * (arc_length[-1] / count)

@@ -7,7 +7,7 @@ import numpy as np
 from ..core.errors import RosyError
 from .directional_field import closest_rosy, field_directions
 from .frames import coordinates
-from .representation import face_frames, face_representation, from_representation
+from .representation import face_representation, from_representation
 from .rosy_field import RosyField
 from .surface import Surface
 
@@ -20,9 +20,10 @@ def interpolate_fields(
 ) -> RosyField:
     """Return the field at a given share of the way between two fields of the same degree.
 
-    The directions of a RoSy field are those of (1 - s) z + s z', a linear interpolation of the
-    representations z = rho exp(i N t) of both fields in `face_frames`. Members take the shorter turn.
-    Singularities move continuously if the magnitude of the fields vanishes at them.
+    RoSy fields are interpolated by their representations z = rho exp(i N t) in `Surface.face_frames`: the
+    result has the directions of (1 - s) z + s z'. So each member turns by at most pi / N, to the nearest
+    member of the second field. Singularities move continuously if the magnitude of the fields vanishes at
+    them.
 
     Where members turn by nearly pi / N, the shorter turn may be to the left on one face and to the right on
     the next one. If angles were interpolated, the directions of these two faces would differ by up to
@@ -30,8 +31,8 @@ def interpolate_fields(
     first direction, and then changes to the second one within a short range of s. For turns up to a quarter
     of 2 pi / N, the two interpolations differ by less than 4 / N degrees.
 
-    Magnitudes are interpolated linearly. They are reduced where the phase of z turns by more than pi / 2,
-    because the direction is uncertain there.
+    Magnitudes are interpolated linearly. Where the phase of z turns by more than pi / 2, the direction is
+    uncertain, so the magnitude is at most sqrt(2) times the modulus of (1 - s) z + s z'.
 
     In two cases, each direction is interpolated separately: if a field is not a RoSy, and if its directions
     form separate families, such as the major and minor directions of a tensor field. The directions of the
@@ -60,13 +61,13 @@ def interpolate_fields(
         raise RosyError(
             f"{second[0].name}: the field has degree {second[1].degree}, but the one before it {degree}"
         )
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     if all(is_plain(field) for _, field in (first, second)):
         z = _between(*(face_representation(*pair) for pair in (first, second)), share)
         return RosyField(degree, from_representation(z, x, y, degree))
     family_count = min(field.family_count for _, field in (first, second))
     start, stop = (
-        coordinates(field_directions(*pair), *face_frames(pair[0])) for pair in (first, second)
+        coordinates(field_directions(*pair), *pair[0].face_frames) for pair in (first, second)
     )
     angle, rho, ratios = closest_rosy(_between(start, _matched(start, stop, family_count), share))
     vectors = rho[:, None] * (np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y)
@@ -79,7 +80,11 @@ def is_plain(field: RosyField) -> bool:
 
 
 def _between(first: np.ndarray, second: np.ndarray, share: float) -> np.ndarray:
-    """Interpolate complex numbers linearly, with the modulus that `interpolate_fields` describes."""
+    """Interpolate complex numbers: the phase of the linear interpolation, and a larger modulus.
+
+    The modulus is the linear interpolation of the two moduli, but at most sqrt(2) times the modulus of the
+    linear interpolation.
+    """
     z = (1 - share) * first + share * second
     modulus = np.abs(z)
     linear = (1 - share) * np.abs(first) + share * np.abs(second)
@@ -89,10 +94,11 @@ def _between(first: np.ndarray, second: np.ndarray, share: float) -> np.ndarray:
 
 
 def _matched(first: np.ndarray, second: np.ndarray, family_count: int) -> np.ndarray:
-    """Return the (F, N) directions of the second field, reordered to be nearest to those of the first field.
+    """Return the (F, N) directions of the second field in the order in which they match the first field best.
 
-    Both are complex numbers. The directions of a face are shifted cyclically by a multiple of the number of
-    families, so that each direction keeps its family.
+    `first` and `second` hold the N directions of each face as complex numbers in `Surface.face_frames`. The
+    directions of a face are shifted cyclically by a multiple of the number of families, so that each
+    direction keeps its family.
     """
     best, best_order = second, np.full(len(second), -np.inf)
     for shift in range(0, first.shape[1], family_count if family_count > 1 else 1):

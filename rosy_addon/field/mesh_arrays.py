@@ -111,13 +111,9 @@ def mesh_arrays(
 def _corner_uv(
     uv: ArrayLike, vertex_count: int, corner_vertex: NDArray[Any], name: str
 ) -> NDArray[np.float64]:
-    """Return (C, 2) texture coordinates of corners, given those of vertices (V, 2) or of corners (C, 2)."""
+    """Return (C, 2) texture coordinates of corners; `uv` has a row for each vertex or for each corner."""
     array = np.asarray(uv, dtype=np.float64)
-    if (
-        array.ndim != 2
-        or array.shape[1] != 2
-        or len(array) not in (vertex_count, len(corner_vertex))
-    ):
+    if array.shape not in ((vertex_count, 2), (len(corner_vertex), 2)):
         raise RosyError(
             f"{name}: uv needs a row of 2 numbers for each of the {vertex_count:,} vertices or "
             f"{len(corner_vertex):,} corners, not an array of shape {array.shape}"
@@ -131,14 +127,9 @@ def _flat_faces(
     faces: ArrayLike | Sequence[Sequence[int]],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return `corner_vertex` and `face_start` (see `MeshArrays`) for faces as an array or as sequences."""
-    if isinstance(faces, np.ndarray):
-        rows: Sequence[Any] | NDArray[Any] = faces
-    else:
-        rows = [np.asarray(face) for face in faces]  # type: ignore[union-attr]
-        sizes = {row.shape for row in rows}
-        if len(sizes) == 1:
-            rows = np.array(rows)
-    if isinstance(rows, np.ndarray):
+    rows: Any = faces if isinstance(faces, np.ndarray) else [np.asarray(face) for face in faces]
+    if isinstance(rows, np.ndarray) or len({row.shape for row in rows}) == 1:
+        rows = np.asarray(rows)
         if rows.ndim != 2 or not np.issubdtype(rows.dtype, np.integer):
             raise RosyError(
                 f"faces must be whole numbers, one row for each face, not {rows.dtype} of shape "

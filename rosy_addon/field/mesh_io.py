@@ -10,9 +10,9 @@ import numpy as np
 
 from ..core.errors import RosyError
 from ..core.file_io import check_parsing_memory
-from .formats.obj import read_obj, read_uv
+from .formats.obj import read_obj
 from .formats.off import read_off
-from .formats.ply import read_ply, read_vertex_values
+from .formats.ply import read_ply
 from .formats.polygons import Polygons
 from .formats.stl import read_stl
 
@@ -64,16 +64,3 @@ def read_polygons(path: str | os.PathLike[str], other_suffixes: Sequence[str] = 
         )
     check_parsing_memory(path, BINARY_MEMORY.get(path.suffix.lower(), 1))
     return reader(path)
-
-
-def read_uv_map(path: Path) -> np.ndarray | None:
-    """Return the (C, 2) texture coordinates in a mesh file, or None if it has none.
-
-    They are read from .obj files only.
-    """
-    return read_uv(path) if path.suffix.lower() == ".obj" else None
-
-
-def read_vertex_data(path: Path) -> dict[str, np.ndarray]:
-    """Return the vertex attributes in a mesh file, as arrays by their names; {} for files other than .ply."""
-    return read_vertex_values(path) if path.suffix.lower() == ".ply" else {}

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .blocks import bincount_rows
 from .frames import dot, normalize
 
 #: Number of faces or corners that are processed at once, to bound memory and to fit in the CPU caches.
@@ -80,16 +81,6 @@ def face_blocks(face_start: np.ndarray) -> list[tuple[slice, slice, np.ndarray]]
     return blocks
 
 
-def sum_per_fan(values: np.ndarray, corner_fan: np.ndarray) -> np.ndarray:
-    """Return (K, k) sums of (C, k) real corner values over the corners of each of the K smooth fans.
-
-    `corner_fan` holds the index of the fan of each corner.
-    """
-    fan_count = int(corner_fan.max()) + 1
-    columns = [np.bincount(corner_fan, weights=column, minlength=fan_count) for column in values.T]
-    return np.stack(columns, axis=1)
-
-
 def fan_normals(
     vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray, corner_fan: np.ndarray
 ) -> np.ndarray:
@@ -107,9 +98,7 @@ def fan_normals(
         angle[corners] = np.arccos(np.clip(dot(to_next, to_previous), -1, 1))
     face_normal = normalize(face_area_vectors(vertices, corner_vertex, face_start))
     face = corner_faces(face_start)
-    fan_count = int(corner_fan.max()) + 1
-    total = [np.bincount(corner_fan, angle * column[face], fan_count) for column in face_normal.T]
-    normal = normalize(np.stack(total, axis=1))[corner_fan]
+    normal = normalize(bincount_rows(corner_fan, angle[:, None] * face_normal[face]))[corner_fan]
     undefined = ~normal.any(axis=1)
     normal[undefined] = face_normal[face[undefined]]
     normal[~normal.any(axis=1)] = (0.0, 0.0, 1.0)
@@ -119,5 +108,4 @@ def fan_normals(
 def box_corners(points: np.ndarray) -> np.ndarray:
     """Return the (8, 3) corners of the bounding box of (n, 3) points."""
     limits = np.stack([points.min(axis=0), points.max(axis=0)])
-    selector = np.indices((2, 2, 2)).reshape(3, 8)
-    return np.stack([limits[selector[axis], axis] for axis in range(3)], axis=1)
+    return limits[np.indices((2, 2, 2)).reshape(3, 8).T, np.arange(3)]

@@ -21,17 +21,11 @@ import numpy as np
 from ..core.errors import RosyError
 from ..core.memory import raise_mmap_threshold
 from ..core.progress import progress, report
+from .blocks import mask
 from .conjugate_gradient import conjugate_gradient
 from .face_graph import LABEL, FaceGraph, face_graph
 from .frames import normalize
-from .polygon_arrays import face_area_vectors
-from .representation import (
-    complex_bincount,
-    face_frames,
-    from_representation,
-    to_representation,
-    unit_complex,
-)
+from .representation import complex_bincount, from_representation, to_representation, unit_complex
 from .rosy_field import RosyField, check_degree
 from .sparse_multigrid import CSRMatrix, Level, from_edges, hierarchy, w_cycle
 from .surface import Surface
@@ -105,9 +99,9 @@ def prescribed_field(
     """
     degree = check_degree(degree)
     raise_mmap_threshold()
-    x, y = face_frames(surface)
-    graph = face_graph(surface, x, y)
-    angle, direction = _turning(surface, graph, degree, vertex, index, graph.defect)
+    x, y = surface.face_frames
+    graph = face_graph(surface)
+    angle, direction = _turning(graph, degree, vertex, index, graph.defect)
     z = np.exp(1j * degree * direction) * x.any(axis=1)
     points, face = surface.vertices[surface.corner_vertex], surface.corner_face
     edge_z = to_representation(points[surface.next_corner] - points, x[face], y[face], degree)
@@ -117,7 +111,7 @@ def prescribed_field(
         z *= _rotation_to(target, z, graph.component)
         if reach > 0:
             with progress(0.9, 1.0):
-                z = _bent(surface, graph, degree, angle, z, target, reach)
+                z = _bent(graph, degree, angle, z, target, reach)
     return RosyField(degree, from_representation(z, x, y, degree))
 
 
@@ -153,24 +147,22 @@ def change_singularities(
     """
     raise_mmap_threshold()
     degree, magnitude = field.degree, np.linalg.norm(field.vectors, axis=1, keepdims=True)
-    x, y = face_frames(surface)
-    z = to_representation(field.vectors, x, y, degree)
+    x, y = surface.face_frames
+    z = unit_complex(to_representation(field.vectors, x, y, degree))
     is_defined = z != 0
-    z[is_defined] /= np.abs(z[is_defined])
-    graph = face_graph(surface, x, y, is_defined)
+    graph = face_graph(surface, is_defined)
     transported = z[graph.source] * np.exp(1j * degree * graph.unfolding)
     present = np.angle(z[graph.target] * transported.conj()) / degree
     no_defect = np.zeros(graph.node_count)
-    added, direction = _turning(surface, graph, degree, vertex, change, no_defect, present)
+    added, direction = _turning(graph, degree, vertex, change, no_defect, present)
     turned = np.exp(1j * degree * direction) * is_defined
     turned *= _rotation_to(z, turned, graph.component)
     with progress(0.9, 1.0):
-        turned = _bent(surface, graph, degree, present + added, turned, z, reach)
+        turned = _bent(graph, degree, present + added, turned, z, reach)
     return RosyField(degree, magnitude * from_representation(turned, x, y, degree))
 
 
 def _turning(
-    surface: Surface,
     graph: FaceGraph,
     degree: int,
     vertex: np.ndarray,
@@ -183,18 +175,17 @@ def _turning(
     See `turning_angles` for the result. `defect` holds the (n,) angle defects of the vertex nodes. If an
     existing field is changed, `present` holds its turning angles.
     """
-    node_index = index_at_nodes(surface, graph, vertex, index)
-    _check_sums(surface, graph, defect * (degree / (2 * np.pi)), node_index, degree)
+    node_index = index_at_nodes(graph, vertex, index)
+    _check_sums(graph, defect * (degree / (2 * np.pi)), node_index, degree)
     required = 2 * np.pi / degree * node_index - defect
     with progress(0.2, 0.85):
-        angle, direction = turning_angles(surface, graph, degree, required, present)
-    _check_angles(surface, graph, degree, present + angle)
+        angle, direction = turning_angles(graph, degree, required, present)
+    _check_angles(graph, degree, present + angle)
     report(0.85, LABEL)
     return angle, direction
 
 
 def _bent(
-    surface: Surface,
     graph: FaceGraph,
     degree: int,
     turning: np.ndarray,
@@ -203,22 +194,20 @@ def _bent(
     reach: float,
 ) -> np.ndarray:
     """Return (F,) representations z after rotating them toward a target, with the same singularities."""
-    area = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
-    penalty = np.linalg.norm(area, axis=1) / reach / reach
+    penalty = graph.surface.face_area / reach / reach
     angle = guided_rotation(graph, degree, turning, z, target, penalty)
-    _check_angles(surface, graph, degree, turning + angle[graph.target] - angle[graph.source])
+    _check_angles(graph, degree, turning + angle[graph.target] - angle[graph.source])
     return z * np.exp(1j * degree * angle)
 
 
-def index_at_nodes(
-    surface: Surface, graph: FaceGraph, vertex: np.ndarray, index: np.ndarray
-) -> np.ndarray:
-    """Return the (n,) int64 singularity indices of the vertex nodes, given those of vertices.
+def index_at_nodes(graph: FaceGraph, vertex: np.ndarray, index: np.ndarray) -> np.ndarray:
+    """Return (n,) int64: the singularity index of each vertex node, from the indices of some vertices.
 
-    A vertex whose faces are not connected around it has several nodes. Its index is given to the first of
-    them.
+    A vertex whose faces are not connected around it has several nodes. The first of these nodes gets the
+    index of the vertex.
     """
-    vertex, vertex_count = np.asarray(vertex, dtype=np.int64), len(surface.vertices)
+    surface, vertex_count = graph.surface, len(graph.surface.vertices)
+    vertex = np.asarray(vertex, dtype=np.int64)
     out_of_range = (vertex < 0) | (vertex >= vertex_count)
     if out_of_range.any():
         raise RosyError(
@@ -239,9 +228,7 @@ def index_at_nodes(
     return result
 
 
-def _check_sums(
-    surface: Surface, graph: FaceGraph, needed: np.ndarray, given: np.ndarray, degree: int
-) -> None:
+def _check_sums(graph: FaceGraph, needed: np.ndarray, given: np.ndarray, degree: int) -> None:
     """Check that the singularity indices on each closed component have the sum that it needs.
 
     `needed` and `given` are values at the nodes; their sums over a component must be equal.
@@ -253,23 +240,22 @@ def _check_sums(
     """
     component = graph.node_component
     count = int(component.max(initial=-1)) + 1
-    is_closed = np.ones(count, dtype=bool)
-    is_closed[component[~graph.is_interior]] = False
+    is_closed = ~mask(count, component[~graph.is_interior])
     needed = np.rint(np.bincount(component, needed, count)).astype(int)
     given = np.rint(np.bincount(component, given, count)).astype(int)
     wrong = np.flatnonzero(is_closed & (needed != given))
     if not len(wrong):
         return
     first = wrong[0]
-    vertices = surface.corner_vertex[component[graph.corner_node] == first]
+    vertices = graph.node_vertex[component == first]
     part = "" if count == 1 else f"the part with vertex {vertices.min()}: "
     raise RosyError(
-        f"{surface.name}: {part}the singularity indices add up to {given[first]}/{degree}, but this "
+        f"{graph.surface.name}: {part}the singularity indices add up to {given[first]}/{degree}, but this "
         f"closed surface needs {needed[first]}/{degree}: change them, or add the missing ones"
     )
 
 
-def _check_angles(surface: Surface, graph: FaceGraph, degree: int, angle: np.ndarray) -> None:
+def _check_angles(graph: FaceGraph, degree: int, angle: np.ndarray) -> None:
     """Check that a field turns by less than pi / N (half the angle between two members) from face to face.
 
     Raises
@@ -280,14 +266,12 @@ def _check_angles(surface: Surface, graph: FaceGraph, degree: int, angle: np.nda
     """
     if not len(angle) or np.abs(angle).max() < np.pi / degree:
         return
-    vertex_of_node = np.empty(graph.node_count, dtype=np.intp)
-    vertex_of_node[graph.corner_node[::-1]] = surface.corner_vertex[::-1]
     is_fast = np.abs(angle) >= np.pi / degree
-    vertices = np.unique(vertex_of_node[np.concatenate([graph.tail[is_fast], graph.head[is_fast]])])
-    worst = vertex_of_node[graph.head[np.abs(angle).argmax()]]
+    ends = np.stack([graph.tail, graph.head])[:, is_fast]
+    worst = graph.node_vertex[graph.head[np.abs(angle).argmax()]]
     raise TurningError(
-        vertices,
-        f"{surface.name}: near vertex {worst}, a field of degree {degree} with these singularities would "
+        np.unique(graph.node_vertex[ends]),
+        f"{graph.surface.name}: near vertex {worst}, a field of degree {degree} with these singularities would "
         "turn too fast for the size of the faces: subdivide the mesh, move singularities apart, or choose "
         "smaller indices",
     )
@@ -364,7 +348,10 @@ def guided_rotation(
 
 
 def _system(graph: FaceGraph, stiffness: np.ndarray, penalty: np.ndarray) -> CSRMatrix:
-    """Return the matrix of the Laplacian of the graph of faces, with the penalty added to its diagonal."""
+    """Return the matrix of the Laplacian of the graph of faces, with the penalty added to its diagonal.
+
+    `stiffness` holds the (I,) weights of the edges, and `penalty` the (F,) weights of the guides.
+    """
     ends = np.concatenate([graph.source, graph.target])
     diagonal = np.bincount(ends, np.tile(stiffness, 2), len(penalty))
     diagonal += penalty + REGULARIZATION * np.where(diagonal > 0, diagonal, 1.0)
@@ -381,8 +368,24 @@ def _initial_angle(
 ) -> np.ndarray:
     """Return a first estimate of N times the (F,) angles that `guided_rotation` computes.
 
-    The phases by which z must be rotated to the guides are smoothed. The estimate is the least-squares phase
-    unwrapping of the result.
+    The phase by which z must be rotated to reach the guide is known on faces with a guide, up to multiples of
+    2 pi. First, unit complex numbers with these phases are smoothed over all faces. Then the phases of the
+    result are unwrapped: the estimate has the differences between neighboring faces that fit them best, in
+    the sense of least squares.
+
+    Parameters
+    ----------
+    graph : FaceGraph
+    stiffness : (I,) float64 ndarray
+        Weights of the edges.
+    matrix : CSRMatrix
+        Result of `_system`, with the penalty.
+    levels : list of Level
+        Multigrid levels of `matrix`.
+    offset : (F,) complex128 ndarray
+        Numbers whose phase takes z to the guide; 0 on faces without a guide.
+    penalty : (F,) float64 ndarray
+        Weights of the guides; 0 on faces without a guide.
     """
     unit = unit_complex(offset)
     with progress(0.0, 0.3):
@@ -402,6 +405,5 @@ def _initial_angle(
 def _solve(matrix: CSRMatrix, rhs: np.ndarray, levels: list[Level] | None) -> np.ndarray:
     """Solve a linear system by the conjugate gradient method, with multigrid as preconditioner if given."""
     precondition = None if levels is None else partial(w_cycle, levels)
-    return conjugate_gradient(
-        matrix, rhs, TOLERANCE, precondition, "turning the field to the guides"
-    )
+    label = "turning the field to the guides"
+    return conjugate_gradient(matrix, rhs, TOLERANCE, precondition, label)

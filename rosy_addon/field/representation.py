@@ -14,7 +14,6 @@ from .blocks import by_rows
 from .frames import dot
 from .rosy_field import RosyField
 from .surface import Surface
-from .surface import face_frames as face_frames
 
 
 def power(base: np.ndarray, degree: int) -> np.ndarray:
@@ -32,7 +31,8 @@ def power(base: np.ndarray, degree: int) -> np.ndarray:
 def signed_power(base: np.ndarray, exponent: int) -> np.ndarray | int:
     """Return `base` ** `exponent` for complex numbers of modulus 1 or 0 and any integer exponent.
 
-    Negative powers are computed as conjugates of positive powers, so negative powers of 0 are 0.
+    Negative powers are computed as conjugates of positive powers, so negative powers of 0 are 0. The result
+    for the exponent 0 is the number 1, not an array.
     """
     if exponent == 0:
         return 1
@@ -48,8 +48,7 @@ def unit_complex(z: np.ndarray, otherwise: int = 0) -> np.ndarray:
 
 def complex_bincount(index: np.ndarray, weights: np.ndarray, count: int) -> np.ndarray:
     """Return (count,) complex128 sums of the weights of each index: `numpy.bincount` for complex weights."""
-    real = np.bincount(index, weights.real, count)
-    return real + 1j * np.bincount(index, weights.imag, count)
+    return np.bincount(index, weights.real, count) + 1j * np.bincount(index, weights.imag, count)
 
 
 def to_representation(vectors: np.ndarray, x: np.ndarray, y: np.ndarray, degree: int) -> np.ndarray:
@@ -92,19 +91,17 @@ def from_representation(z: np.ndarray, x: np.ndarray, y: np.ndarray, degree: int
 
 def face_representation(surface: Surface, field: RosyField) -> np.ndarray:
     """Return (F,) complex128 representations z of a field in the tangent frames of `surface.face_frames`."""
-    x, y = face_frames(surface)
-    return to_representation(field.vectors, x, y, field.degree)
+    return to_representation(field.vectors, *surface.face_frames, field.degree)
 
 
-def edge_unfolding(
-    surface: Surface, x: np.ndarray, y: np.ndarray, a: np.ndarray, b: np.ndarray
-) -> np.ndarray:
-    """Return (I,) complex128 factors of modulus 1 that change frames across each interior edge.
+def edge_unfolding(surface: Surface, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return (I,) complex128 factors of modulus 1 that change frames across interior edges.
 
     If the two faces are unfolded into one plane, a direction (as a complex number in the frame of the first
-    face) times the factor is the same direction in the frame of the second face. For the parameters, see
-    `matching_angles`.
+    face, see `Surface.face_frames`) times the factor is the same direction in the frame of the second face.
+    `a` and `b` are the corners of both faces where the edges start, as in `Edges.halfedges`.
     """
+    x, y = surface.face_frames
     source_face, target_face = surface.corner_face[a], surface.corner_face[b]
     edge = surface.vertices[surface.corner_vertex[b]] - surface.vertices[surface.corner_vertex[a]]
     edge_in_source = dot(edge, x[source_face]) + 1j * dot(edge, y[source_face])
@@ -113,15 +110,7 @@ def edge_unfolding(
     return unit_complex(unfolding, otherwise=1)
 
 
-def matching_angles(
-    surface: Surface,
-    x: np.ndarray,
-    y: np.ndarray,
-    z: np.ndarray,
-    degree: int,
-    a: np.ndarray,
-    b: np.ndarray,
-) -> np.ndarray:
+def matching_angles(surface: Surface, z: np.ndarray, degree: int) -> np.ndarray:
     """Return the angle between matching members of the two faces at each interior edge.
 
     The faces are unfolded into one plane. A member of the first face matches the nearest member of
@@ -130,25 +119,21 @@ def matching_angles(
     Parameters
     ----------
     surface : Surface
-    x, y : (F, 3) ndarray
-        Orthonormal tangent frames of the faces.
     z : (F,) complex ndarray
-        Representations in these frames.
+        Representations in the frames `Surface.face_frames`.
     degree : int
         N of the representations.
-    a, b : (I,) int ndarray
-        The columns of `Edges.halfedges`: the corners of both faces where the edge starts.
 
     Returns
     -------
     (I,) float64 ndarray
-        Counter-clockwise angle in radians from a member of the first face to the nearest member of the
-        second face, from -pi / N to pi / N.
+        For each row of `Edges.halfedges`: counter-clockwise angle in radians from a member of the first face
+        to the nearest member of the second face, from -pi / N to pi / N.
     """
 
     def angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         source, target = z[surface.corner_face[a]], z[surface.corner_face[b]]
-        unfolding = edge_unfolding(surface, x, y, a, b)
+        unfolding = edge_unfolding(surface, a, b)
         return np.angle(target * (source * power(unfolding, degree)).conj()) / degree
 
-    return by_rows(angles, a, b)
+    return by_rows(angles, *surface.edges.halfedges.T)

@@ -9,10 +9,9 @@ import numpy as np
 from ..core.errors import counted
 from ..core.progress import report
 from .blocks import mask
-from .connectivity import build_edges
 from .frames import dot
 from .polygon_arrays import face_blocks, next_corners
-from .representation import face_frames, matching_angles, to_representation
+from .representation import face_representation, matching_angles
 from .rosy_field import RosyField
 from .surface import Surface
 
@@ -42,26 +41,19 @@ def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, 
         Singularity indices in units of 1 / N; never 0.
     """
     report(0.0, "counting singularities")
-    x, y = face_frames(surface)
-    z = to_representation(field.vectors, x, y, field.degree)
-    edges = build_edges(surface.corner_vertex, surface.face_start)
-    a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
-    matching = matching_angles(surface, x, y, z, field.degree, a, b)
-    count = len(surface.vertices)
-    tail, head = surface.corner_vertex[a], surface.corner_vertex[b]
+    z = face_representation(surface, field)
+    matching = matching_angles(surface, z, field.degree)
+    edges, corner_vertex, count = surface.edges, surface.corner_vertex, len(surface.vertices)
+    tail, head = corner_vertex[edges.halfedges].T
     report(0.7, "counting singularities")
     # A counter-clockwise loop around the head of an edge crosses the edge from side a to side b. A loop
     # around its tail crosses it from side b to side a.
     angle_sum = np.bincount(head, matching, count) - np.bincount(tail, matching, count)
-    corner_vertex = surface.corner_vertex
-    corner_angles = signed_corner_angles(surface, x, y)
-    angle_defect = 2 * np.pi - np.bincount(corner_vertex, corner_angles, count)
-    angle_sum = angle_sum + angle_defect
-    index = np.rint(angle_sum * field.degree / (2 * np.pi)).astype(np.int32)
+    defect = 2 * np.pi - np.bincount(corner_vertex, signed_corner_angles(surface), count)
+    index = np.rint((angle_sum + defect) * field.degree / (2 * np.pi)).astype(np.int32)
 
     has_index = mask(count, corner_vertex)
-    not_interior = ~mask(len(edges.face_count), edges.interior)
-    has_index[edges.ends[not_interior].ravel()] = False
+    has_index[edges.ends[~mask(len(edges.ends), edges.interior)]] = False
     has_index[corner_vertex[(z == 0)[surface.corner_face]]] = False
     vertex = np.flatnonzero(has_index & (index != 0)).astype(np.int32)
     return vertex, index[vertex]
@@ -123,11 +115,13 @@ def first_pairs(pairs: np.ndarray) -> np.ndarray:
     return np.array(chosen, dtype=np.intp)
 
 
-def signed_corner_angles(surface: Surface, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+def signed_corner_angles(surface: Surface) -> np.ndarray:
     """Return (C,) interior angles at the corners of the faces, in radians from 0 to 2 pi.
 
-    Angles are measured in the plane of each face, whose frame is x, y. Concave corners have angles above pi.
+    Angles are measured in the plane of each face, from the next edge counter-clockwise to the previous edge.
+    So concave corners have angles above pi.
     """
+    x, y = surface.face_frames
     angles = np.empty(len(surface.corner_vertex))
     for _, corners, starts in face_blocks(surface.face_start):
         points, following = surface.vertices[surface.corner_vertex[corners]], next_corners(starts)

@@ -7,7 +7,6 @@ import numpy as np
 from ..core.errors import RosyError
 from ..core.progress import progress, report
 from .blocks import concatenated_ranges, mask, neighbors_of_nodes
-from .connectivity import build_edges
 from .prescribed import TurningError, change_singularities
 from .rosy_field import RosyField
 from .singularities import find_singularities, first_pairs
@@ -82,7 +81,10 @@ def move_index(
 
 
 def _distance(surface: Surface, ends: np.ndarray) -> float:
-    """Return the distance between two vertices; 0 if one of them is `OUTSIDE` or not in the mesh."""
+    """Return the straight-line distance between two vertices, in object space.
+
+    It is 0 if one of them is `OUTSIDE` or not in the mesh.
+    """
     if (ends < 0).any() or (ends >= len(surface.vertices)).any():
         return 0.0
     return float(np.linalg.norm(np.diff(surface.vertices[ends].astype(np.float64), axis=0)))
@@ -134,7 +136,8 @@ def cancel_pairs(surface: Surface, field: RosyField, max_distance: float) -> Ros
 def _are_near(surface: Surface, pairs: np.ndarray, vertices: np.ndarray) -> np.ndarray:
     """Return (P,) bool: which of the (P, 2) pairs of vertices are nearest to the given other vertices.
 
-    Distances are counted in faces. All pairs with the smallest distance are marked.
+    The distance of a pair is the number of rings of faces from the given vertices to the nearer vertex of the
+    pair. All pairs with the smallest distance are marked.
     """
     is_near = mask(len(surface.vertices), vertices)
     corner_vertex, corner_face = surface.corner_vertex, surface.corner_face
@@ -185,7 +188,7 @@ def _near(
     distance : (n,) float64 ndarray
         Length of the shortest path along edges between them.
     """
-    ends = build_edges(surface.corner_vertex, surface.face_start).ends
+    ends = surface.edges.ends
     count = len(surface.vertices)
     length = np.linalg.norm(surface.vertices[ends[:, 0]] - surface.vertices[ends[:, 1]], axis=1)
     near = length <= max_distance

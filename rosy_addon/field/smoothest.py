@@ -15,7 +15,7 @@ from ..core.errors import RosyError
 from ..core.memory import raise_mmap_threshold
 from ..core.progress import progress, report
 from .connection import Connection, build_connection, laplacian
-from .representation import complex_bincount, face_frames, from_representation, unit_complex
+from .representation import complex_bincount, from_representation, unit_complex
 from .rosy_field import RosyField, check_degree
 from .sparse_multigrid import CSRMatrix, Level, hierarchy, w_cycle
 from .surface import Surface
@@ -68,7 +68,7 @@ def smoothest_field(surface: Surface, degree: int) -> RosyField:
         z, _ = smallest_eigenvectors(connection, degree)
     z = _align_to_edges(connection, z, degree)
     report(0.95, "averaging the field on the faces")
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     mean = SurfaceAverages(surface, connection, x, y).face_sums(z, degree)
     return RosyField(degree, from_representation(unit_complex(mean), x, y, degree))
 
@@ -87,13 +87,15 @@ def smallest_eigenvectors(connection: Connection, degree: int) -> tuple[np.ndarr
     """
     mass = connection.positive_mass
     shift = spectral_shift(mass)
-    matrix = laplacian(connection, degree, shift)
-    z, energy = eigenproblem(matrix, mass, connection.component)
+    z, energy = eigenproblem(laplacian(connection, degree, shift), mass, connection.component)
     return z, energy - shift
 
 
 def spectral_shift(mass: np.ndarray) -> float:
-    """Return the factor of the mass matrix to add to an energy matrix, so that multigrid can solve it."""
+    """Return the factor s for which multigrid converges well for A + s M, where A is the matrix of an energy.
+
+    M is the mass matrix: the diagonal matrix of the masses of the nodes.
+    """
     return SPECTRAL_SHIFT * 4 * np.pi / float(mass.sum())
 
 
@@ -196,7 +198,11 @@ def _lobpcg(
 
 
 class _ComponentProducts:
-    """Inner products and linear combinations of vectors, separately on each connected component."""
+    """Inner products and linear combinations of vectors, separately on each connected component.
+
+    Some methods take a *pair*: a (2, n) array of a vector and its image, which is the product of the matrix
+    and the vector.
+    """
 
     def __init__(self, mass: np.ndarray, component: np.ndarray) -> None:
         self._mass, self._component = mass, component
@@ -215,19 +221,16 @@ class _ComponentProducts:
         return np.sqrt(self.sums(self._mass * (vector.real**2 + vector.imag**2)).real)
 
     def normalize(self, pair: np.ndarray) -> np.ndarray:
-        """Divide a vector and its image, given as a (2, n) pair, in place by the norm of the vector.
+        """Divide a pair in place by the norm of the vector, on each component, and return it.
 
-        The norm is that of `norms`, separate for each component. The pair is also returned.
+        See `norms`. A component on which the norm is 0 stays 0.
         """
         norm = self.norms(pair[0])
         pair *= self.at_nodes(1 / np.where(norm > 0, norm, 1))
         return pair
 
     def combine(self, pairs: list[np.ndarray], coefficients: np.ndarray) -> np.ndarray:
-        """Return the linear combination of k (2, n) pairs of vector and image, as a new pair.
-
-        The coefficients are (components, k).
-        """
+        """Return a linear combination of k pairs, as a new pair; `coefficients` is (components, k)."""
         total = pairs[0] * self.at_nodes(coefficients[:, 0])
         for index, pair in enumerate(pairs[1:], 1):
             total += pair * self.at_nodes(coefficients[:, index])
@@ -266,9 +269,8 @@ def _rayleigh_ritz(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray
     """
     eigenvalue, basis = np.linalg.eigh(b)
     usable = eigenvalue > 1e-10 * eigenvalue[:, -1:]
-    whitening = (
-        basis * np.where(usable, 1 / np.sqrt(np.where(usable, eigenvalue, 1)), 0)[:, None, :]
-    )
+    scale = np.where(usable, 1 / np.sqrt(np.where(usable, eigenvalue, 1)), 0)
+    whitening = basis * scale[:, None, :]
     reduced = whitening.conj().swapaxes(1, 2) @ a @ whitening
     penalty = np.abs(reduced).max(axis=(1, 2)) * 10 + 1
     reduced += np.einsum("pk,kl->pkl", np.where(usable, 0, penalty[:, None]), np.eye(a.shape[1]))

@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from ..core.progress import progress, report
-from .blocks import concatenated_ranges
+from .blocks import concatenated_ranges, run_starts
 
 #: Relative increase of the diagonal of a singular matrix, and smallest value on a diagonal, relative to the
 #: largest value.
@@ -74,10 +74,6 @@ class CSRMatrix:
             np.add.reduceat(terms, starts[:-1] - starts[0], out=result[first : first + BLOCK_ROWS])
         return result
 
-    def with_values(self, data: np.ndarray) -> CSRMatrix:
-        """Return a matrix with the same sparsity pattern and other values (m,) of its entries."""
-        return replace(self, data=data)
-
     @cached_property
     def row_indices(self) -> np.ndarray:
         """(m,) intp: the row of each entry."""
@@ -93,7 +89,7 @@ class CSRMatrix:
         """Return the matrix with (n,) values added to its diagonal. All diagonal elements must be stored."""
         data = self.data.copy()
         data[self.diagonal_entries] += values
-        return self.with_values(data)
+        return replace(self, data=data)
 
     @cached_property
     def diagonal_entries(self) -> np.ndarray:
@@ -114,23 +110,22 @@ class CSRMatrix:
         return CSRMatrix(indptr, self.indices[entries], self.data[entries], self.column_count)
 
     def columns(self, columns: np.ndarray) -> CSRMatrix:
-        """Return the matrix that consists of the given columns, without duplicates.
+        """Return the matrix that consists of the given columns, in their order.
 
-        Each row of the result must have an entry.
+        No column may be given twice, and each row of the result must have an entry.
         """
         new_column = np.full(self.column_count, -1)
         new_column[columns] = np.arange(len(columns))
-        kept = np.flatnonzero(new_column[self.indices] >= 0)
+        indices = new_column[self.indices]
+        kept = np.flatnonzero(indices >= 0)
         indptr = np.searchsorted(kept, self.indptr)
-        indices = new_column[self.indices[kept]]
-        return CSRMatrix(indptr, indices, self.data[kept], len(columns))
+        return CSRMatrix(indptr, indices[kept], self.data[kept], len(columns))
 
     @cached_property
     def adjoint(self) -> CSRMatrix:
         """Return the conjugate transpose of the matrix."""
-        return from_coo(
-            self.indices, self.row_indices, self.data.conj(), self.column_count, len(self)
-        )
+        row, column = self.indices, self.row_indices
+        return from_coo(row, column, self.data.conj(), self.column_count, len(self))
 
 
 def from_coo(
@@ -183,21 +178,18 @@ def from_edges(
 
 def matrix_product(a: CSRMatrix, b: CSRMatrix) -> CSRMatrix:
     """Return the matrix product a b."""
-    return _assemble_by_rows(a, b.column_count, lambda part: _product_terms(a, b, part))
 
+    def terms(block: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        inner = a.indices[block]
+        first = b.indptr.take(inner)
+        count = b.indptr.take(inner + 1) - first
+        entry = np.repeat(np.arange(len(inner)), count)
+        source = concatenated_ranges(first, count)
+        value = a.data[block].take(entry)
+        value *= b.data.take(source)
+        return a.row_indices[block].take(entry), b.indices.take(source), value
 
-def _product_terms(
-    a: CSRMatrix, b: CSRMatrix, block: slice
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the terms that a block of entries of `a` adds to the product a b: rows, columns and values."""
-    inner = a.indices[block]
-    first = b.indptr.take(inner)
-    count = b.indptr.take(inner + 1) - first
-    entry = np.repeat(np.arange(len(inner)), count)
-    source = concatenated_ranges(first, count)
-    value = a.data[block].take(entry)
-    value *= b.data.take(source)
-    return a.row_indices[block].take(entry), b.indices.take(source), value
+    return _assemble_by_rows(a, b.column_count, terms)
 
 
 def _assemble_by_rows(
@@ -215,7 +207,7 @@ def _assemble_by_rows(
         Number of columns of the result.
     entries : callable
         Function that takes a slice of the entries of `matrix`. It returns the rows, columns and values of the
-        entries of the result that they contribute. Values at the same position are summed.
+        entries of the result to which this slice contributes. Values at the same position are summed.
     """
     bits = int(column_count).bit_length()
     row_counts, index_blocks, value_blocks = [], [], []
@@ -224,23 +216,18 @@ def _assemble_by_rows(
             report(first / len(matrix), "building multigrid levels")
         last = min(first + BLOCK_ROWS, len(matrix))
         row, column, value = entries(slice(matrix.indptr[first], matrix.indptr[last]))
-        key, value = _sum_duplicates((row - first) << bits | column, value)
+        key = (row - first) << bits | column
+        order = np.argsort(key, kind="stable")
+        key = key.take(order)
+        starts = run_starts(key)
+        key = key.take(starts)
         row_counts.append(np.bincount(key >> bits, minlength=last - first))
         index_blocks.append(key & ((1 << bits) - 1))
-        value_blocks.append(value)
+        value_blocks.append(np.add.reduceat(value.take(order), starts))
     report(1.0, "building multigrid levels")
     indptr = np.concatenate([[0], np.cumsum(np.concatenate(row_counts))])
-    return CSRMatrix(
-        indptr, np.concatenate(index_blocks), np.concatenate(value_blocks), column_count
-    )
-
-
-def _sum_duplicates(key: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the distinct keys in ascending order, and for each key the sum of its values."""
-    order = np.argsort(key, kind="stable")
-    key = key.take(order)
-    first = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]]))
-    return key.take(first), np.add.reduceat(value.take(order), first)
+    indices, data = np.concatenate(index_blocks), np.concatenate(value_blocks)
+    return CSRMatrix(indptr, indices, data, column_count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -437,12 +424,10 @@ def _aggregates(matrix: CSRMatrix) -> tuple[np.ndarray, int, np.ndarray]:
     strength = np.where(row == column, 0, np.abs(matrix.data))
     largest = np.maximum.reduceat(strength, matrix.indptr[:-1])
     strength[strength < STRENGTH_THRESHOLD * np.minimum(largest[row], largest[column])] = 0
-    strong = strength > 0
+    linked = (strength > 0) | (row == column)
 
     def max_over_neighbors(values: np.ndarray) -> np.ndarray:
-        return np.maximum.reduceat(
-            np.where(strong | (row == column), values.take(column), -1), matrix.indptr[:-1]
-        )
+        return np.maximum.reduceat(np.where(linked, values.take(column), -1), matrix.indptr[:-1])
 
     # A root of a new aggregate is a free unknown whose random priority is the largest among the free unknowns
     # that are at most two steps away.
@@ -461,14 +446,11 @@ def _aggregates(matrix: CSRMatrix) -> tuple[np.ndarray, int, np.ndarray]:
         report(1.0, "building multigrid levels")
         # A free unknown joins the aggregate of the neighbor with the strongest connection.
         weight = np.where(aggregate[column] >= 0, strength, 0)
-        strongest = np.maximum.reduceat(weight, matrix.indptr[:-1])
-        joins = (weight == strongest[row]) & (strongest[row] > 0) & (aggregate[row] < 0)
-        entry = np.flatnonzero(joins)
+        strongest = np.maximum.reduceat(weight, matrix.indptr[:-1])[row]
+        entry = np.flatnonzero((weight == strongest) & (strongest > 0) & (aggregate[row] < 0))
         unknown, neighbor = row[entry], column[entry]
-        phase_step = -matrix.data[entry] / np.abs(matrix.data[entry])
-        neighbor_aggregate = aggregate[neighbor]
-        phase[unknown] = phase_step * phase[neighbor]
-        aggregate[unknown] = neighbor_aggregate
+        phase[unknown] = -matrix.data[entry] / np.abs(matrix.data[entry]) * phase[neighbor]
+        aggregate[unknown] = aggregate[neighbor]
     singleton = aggregate < 0
     aggregate[singleton] = np.count_nonzero(root) + np.arange(np.count_nonzero(singleton))
     return aggregate, int(aggregate.max()) + 1, phase

@@ -9,8 +9,8 @@ spacing. On a curved surface, no phase satisfies this exactly. `stripe_pattern` 
 least squared error of exp(2 pi i phase). Where stripes diverge too much, new stripes begin, at triangles
 around which the phase changes by an integer.
 
-The energy, the covering and the interpolation are those of Knöppel, Crane, Pinkall and Schröder, "Stripe
-Patterns on Surfaces" (SIGGRAPH 2015). But the energy is minimized over numbers of modulus 1
+For the energy, the covering and the interpolation, see Knöppel, Crane, Pinkall and Schröder, "Stripe Patterns
+on Surfaces" (SIGGRAPH 2015). But here the energy is minimized over numbers of modulus 1
 (`angular_synchronization`) instead of eigenvectors, because an eigenvector would be small on most parts of
 the surface, and would take longer to compute.
 
@@ -46,8 +46,9 @@ class CornerDirections:
     ----------
     degree : int
         N.
-    has_opposites : bool
-        Whether direction k + N / 2 is the opposite of direction k (see `FieldSymmetry`).
+    family_count : int
+        M, the number of families of stripes: `FieldSymmetry.line_count`. It is N / 2 if direction k + N / 2
+        is the opposite of direction k, and N otherwise.
     offset : (T, 3) complex128 ndarray
         Positions of the corners in a frame of the plane of the triangle.
     angle : (T, 3) float64 ndarray
@@ -60,16 +61,11 @@ class CornerDirections:
     """
 
     degree: int
-    has_opposites: bool
+    family_count: int
     offset: np.ndarray
     angle: np.ndarray
     deviation: np.ndarray | None
     defined: np.ndarray
-
-    @property
-    def family_count(self) -> int:
-        """M, the number of families of stripes: N / 2 with opposites, N otherwise."""
-        return self.degree // 2 if self.has_opposites else self.degree
 
     def phase_changes(self, spacing: float) -> np.ndarray:
         """Return the (3 T, M) changes that the phase of each family should have from each corner to the next.
@@ -99,7 +95,8 @@ class StripePattern:
     phase : (T, M, 3) float32 ndarray
         The linear part of the phase, at the corners (see `evaluate`).
     index : (T, M) float32 ndarray
-        Number of stripes that end in each triangle: an integer, 0 in most triangles.
+        Number of stripes that begin or end in each triangle: the integer by which the phase grows on the way
+        around the triangle, counter-clockwise. It may be negative, and is 0 in most triangles.
     """
 
     phase: np.ndarray
@@ -232,8 +229,7 @@ def _gluing(triangle_vertex: np.ndarray, directions: CornerDirections) -> _Gluin
     """Match the directions of neighboring triangles, after unfolding the two triangles into one plane."""
     corner_vertex = np.ascontiguousarray(triangle_vertex, dtype=np.int32).reshape(-1)
     start = np.arange(0, len(corner_vertex) + 1, 3, dtype=np.int32)
-    edges = build_edges(corner_vertex, start)
-    a, b = edges.halfedges.T
+    a, b = build_edges(corner_vertex, start).halfedges.T
     is_defined = directions.defined[a // 3] & directions.defined[b // 3]
     a, b = a[is_defined], b[is_defined]
     edge = (np.roll(directions.offset, -1, axis=1) - directions.offset).reshape(-1)
@@ -241,7 +237,7 @@ def _gluing(triangle_vertex: np.ndarray, directions: CornerDirections) -> _Gluin
     unfolding = np.angle(-edge[b] * edge[a].conj())
     turn = (angle[a] + unfolding - angle[b]) * directions.degree / (2 * np.pi)
     shift_from_a = np.rint(turn).astype(np.int32) % directions.degree
-    twin, shift = np.full(len(corner_vertex), -1, dtype=np.int32), np.zeros_like(corner_vertex)
+    twin, shift = np.full_like(corner_vertex, -1), np.zeros_like(corner_vertex)
     twin[a], twin[b] = b, a
     shift[a], shift[b] = shift_from_a, (-shift_from_a) % directions.degree
     return _Gluing(twin, shift, next_corners(start))

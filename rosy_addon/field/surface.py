@@ -17,11 +17,13 @@ from numpy.typing import ArrayLike
 
 from ..core.cache import content_hash
 from ..core.errors import RosyError, counted
-from .blocks import mask, row_blocks
-from .connectivity import build_edges, smooth_fans
+from .blocks import bincount_rows, mask, row_blocks
+from .connectivity import Edges, build_edges, smooth_fans
+from .formats.obj import read_uv
+from .formats.ply import read_vertex_values
 from .frames import dot, normalize
 from .mesh_arrays import mesh_arrays
-from .mesh_io import SHARP_ANGLE, read_uv_map, read_vertex_data
+from .mesh_io import SHARP_ANGLE
 from .polygon_arrays import (
     BLOCK_ELEMENTS,
     box_corners,
@@ -31,7 +33,6 @@ from .polygon_arrays import (
     fan_normals,
     mean_per_face,
     next_corners,
-    sum_per_fan,
 )
 from .triangulate import triangulate
 from .up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
@@ -66,8 +67,9 @@ class Surface:
         The axis that points up in pictures. By default "y" for ``.obj`` and ``.off`` files, otherwise
         "z".
     uv : (V, 2) or (C, 2) array_like, optional
-        Texture coordinates of the vertices, or of the corners, face by face. By default those of the
-        ``.obj`` file or of the mesh of trimesh, PyVista or Open3D, if it has any.
+        Texture coordinates of the vertices, or of the corners, face by face. By default they are read from
+        the ``.obj`` file, or from the mesh object of trimesh, PyVista or Open3D, if it has texture
+        coordinates.
     sharp_angle : float, optional
         Angle in radians between the normals of two faces above which their edge is sharp. Field values
         and normals do not mix across sharp edges. By default 60 degrees.
@@ -135,9 +137,9 @@ class Surface:
     rest_vertices: np.ndarray | None = None
     up: str = "z"
 
-    #: Path of the file that the surface was read from. Like `uv` and the arrays below, this is not a field of
-    #: the dataclass, so it is not passed to other processes.
-    _path = None
+    #: Path of the file that the surface was read from; empty if there is none. Like `uv` and the arrays below,
+    #: this is not a field of the dataclass, so it is not passed to other processes.
+    _path = Path()
 
     def __init__(
         self,
@@ -158,23 +160,20 @@ class Surface:
             raise RosyError(f"{name}: up is {up!r}: choose 'y' or 'z'")
         arrays = mesh_arrays(vertices, faces, name, uv, step)
         built = build_surface(
-            arrays.vertices,
-            arrays.corner_vertex,
-            arrays.face_start,
+            *arrays.polygons,
             name=name,
             sharp_angle=SHARP_ANGLE if sharp_angle is None else sharp_angle,
             sharp_edges=None if sharp_edges is None else np.asarray(sharp_edges),
         )
         own = vars(self)
-        own.update(vars(built), up=up, _path=Path(vertices) if is_path else None)
+        own.update(vars(built), up=up, _path=Path(vertices) if is_path else Path())
         given = {"uv": arrays.uv, "vertex_data": arrays.vertex_data, "face_data": arrays.face_data}
         own.update((key, value) for key, value in given.items() if value is not None)
 
     def __repr__(self) -> str:
         faces = counted(self.face_count, "face")
-        return (
-            f"<Surface {self.name!r}: {faces}, {counted(len(self.vertices), 'vertex', 'vertices')}>"
-        )
+        vertices = counted(len(self.vertices), "vertex", "vertices")
+        return f"<Surface {self.name!r}: {faces}, {vertices}>"
 
     def with_parts(self, **parts: Any) -> Surface:
         """Return a copy of the surface in which some attributes are replaced; they must fit the others."""
@@ -197,44 +196,61 @@ class Surface:
     @cached_property
     def uv(self) -> np.ndarray | None:
         """(C, 2) float64: texture coordinates of the corners, face by face; None if there is no UV map."""
-        return None if self._path is None else read_uv_map(self._path)
+        return read_uv(self._path) if self._path.suffix.lower() == ".obj" else None
 
     @cached_property
     def vertex_data(self) -> Mapping[str, np.ndarray]:
-        """Named arrays with a row for each vertex, from a ``.ply`` file, a simulation or a mesh object.
+        """Named arrays with a row for each vertex.
 
-        Mesh objects are those of other libraries, such as PyVista.
+        They come from a ``.ply`` file, from the file of a simulation, or from a mesh object of another
+        library, such as PyVista.
         """
-        return {} if self._path is None else read_vertex_data(self._path)
+        return read_vertex_values(self._path) if self._path.suffix.lower() == ".ply" else {}
 
     @cached_property
     def face_data(self) -> Mapping[str, np.ndarray]:
-        """Named arrays with a row for each face, from the file of a simulation or a mesh object.
+        """Named arrays with a row for each face.
 
-        Mesh objects are those of other libraries, such as PyVista.
+        They come from the file of a simulation, or from a mesh object of another library, such as PyVista.
         """
         return {}
+
+    @cached_property
+    def edges(self) -> Edges:
+        """The edges of the mesh, and the two halfedges of each interior edge."""
+        return build_edges(self.corner_vertex, self.face_start)
 
     @cached_property
     def face_frames(self) -> tuple[np.ndarray, np.ndarray]:
         """The tangent frames x, y of the faces: x along the first edge of a face, y a quarter turn from x.
 
-        Both are (F, 3) float64. `Field.angles` are measured from x. The frames are the same as those of
+        Both are (F, 3) float64, and zero for faces without area, so that representations are zero there. An
+        edge of length 0 is skipped. `Field.angles` are measured from x. The frames are the same as those of
         ``igl.local_basis``.
         """
-        return face_frames(self)
+        normal = self.face_normal
+        x = np.empty_like(normal)
+        for faces, corners, starts in face_blocks(self.face_start):
+            points = self.vertices.take(self.corner_vertex[corners], axis=0)
+            corner_normal = np.repeat(normal[faces], np.diff(starts), axis=0)
+            edge = points[next_corners(starts)] - points
+            edge -= dot(edge, corner_normal)[:, None] * corner_normal
+            length = np.sqrt(dot(edge, edge))
+            last_corner = np.repeat(starts[1:] - 1, np.diff(starts))
+            candidate = np.where(length > 0, np.arange(len(length)), last_corner)
+            x[faces] = normalize(edge[np.minimum.reduceat(candidate, starts[:-1])])
+        x[~normal.any(axis=1)] = 0.0
+        return x, np.cross(normal, x)
 
     @property
     def euler_characteristic(self) -> int:
         """Number of vertices - edges + faces: 2 for a sphere, 0 for a torus. Unused vertices do not count."""
-        edges = build_edges(self.corner_vertex, self.face_start)
-        return len(self.used_vertices) - len(edges.face_count) + self.face_count
+        return len(self.used_vertices) - len(self.edges.ends) + self.face_count
 
     def in_rest_shape(self) -> Surface:
         """Return the surface before deformation, in the shape to which the vectors of a field are tangent."""
-        if self.rest_vertices is None:
-            return self
-        return self.with_vertices(self.rest_vertices)
+        rest = self.rest_vertices
+        return self if rest is None else self.with_vertices(rest)
 
     def with_vertices(self, vertices: np.ndarray) -> Surface:
         """Return the surface with other (V, 3) positions, and without a rest shape.
@@ -289,22 +305,27 @@ class Surface:
     @cached_property
     def fan_normal(self) -> np.ndarray:
         """(K, 3) float64: normalized mean of the corner normals of each of the K smooth fans."""
-        return normalize(sum_per_fan(self.corner_normal, self.corner_fan))
+        return normalize(bincount_rows(self.corner_fan, self.corner_normal))
 
     @cached_property
     def fans_share_normals(self) -> bool:
         """Whether all corner normals equal the mean normal of their fan; custom normals may differ."""
-        normals = self.fan_normal
-        return all(
-            np.abs(self.corner_normal[block] - normals.take(self.corner_fan[block], axis=0)).max()
-            <= NORMAL_TOLERANCE
-            for block in row_blocks(len(self.corner_fan), BLOCK_ELEMENTS)
-        )
+        for block in row_blocks(len(self.corner_fan), BLOCK_ELEMENTS):
+            mean = self.fan_normal.take(self.corner_fan[block], axis=0)
+            if np.abs(self.corner_normal[block] - mean).max() > NORMAL_TOLERANCE:
+                return False
+        return True
 
     @cached_property
     def face_normal(self) -> np.ndarray:
         """(F, 3) float64: unit normals of the faces by Newell's formula; zero for a face without area."""
         return normalize(face_area_vectors(self.vertices, self.corner_vertex, self.face_start))
+
+    @cached_property
+    def face_area(self) -> np.ndarray:
+        """(F,) float64: areas of the faces, in object space, by Newell's formula."""
+        area = face_area_vectors(self.vertices, self.corner_vertex, self.face_start)
+        return np.linalg.norm(area, axis=1)
 
     @cached_property
     def face_center(self) -> np.ndarray:
@@ -372,6 +393,8 @@ def build_surface(
         )
     if corner_normal is None:
         corner_normal = fan_normals(vertices, corner_vertex, face_start, corner_fan)
+    if rest_vertices is not None:
+        rest_vertices = np.ascontiguousarray(rest_vertices, dtype=np.float64)
     return _surface_of_parts(
         name=name,
         vertices=vertices,
@@ -381,9 +404,7 @@ def build_surface(
         triangle_face=np.ascontiguousarray(triangle_face, dtype=np.int32).ravel(),
         corner_normal=np.ascontiguousarray(corner_normal, dtype=np.float64),
         corner_fan=corner_fan,
-        rest_vertices=None
-        if rest_vertices is None
-        else np.ascontiguousarray(rest_vertices, dtype=np.float64),
+        rest_vertices=rest_vertices,
     )
 
 
@@ -399,41 +420,16 @@ def _used_vertices(corner_vertex: np.ndarray, vertex_count: int) -> np.ndarray:
     return np.flatnonzero(mask(vertex_count, corner_vertex))
 
 
-def face_frames(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """Return the tangent frame x, y of each face.
-
-    Returns
-    -------
-    x, y : (F, 3) ndarray
-        Unit tangents. x runs along the first edge of nonzero length, y is the cross product of the
-        normal and x. Both are zero for faces without area, so that representations are zero there.
-    """
-    normal = surface.face_normal
-    x = np.empty_like(normal)
-    for faces, corners, starts in face_blocks(surface.face_start):
-        points = surface.vertices.take(surface.corner_vertex[corners], axis=0)
-        corner_normal = np.repeat(normal[faces], np.diff(starts), axis=0)
-        edge = points[next_corners(starts)] - points
-        edge -= dot(edge, corner_normal)[:, None] * corner_normal
-        length = np.sqrt(dot(edge, edge))
-        last_corner = np.repeat(starts[1:] - 1, np.diff(starts))
-        candidate = np.where(length > 0, np.arange(len(length)), last_corner)
-        x[faces] = normalize(edge[np.minimum.reduceat(candidate, starts[:-1])])
-    x[~normal.any(axis=1)] = 0.0
-    return x, np.cross(normal, x)
-
-
 def count_inconsistent_edges(surface: Surface) -> int:
     """Count the inconsistent edges: those between two faces that disagree on which side is outward.
 
     Faces without area are ignored. A field is not continued across such an edge. Flipping faces removes
     inconsistent edges, except on nonorientable surfaces such as a Möbius strip.
     """
-    edges = build_edges(surface.corner_vertex, surface.face_start)
-    degenerate = ~surface.face_normal.any(axis=1)
-    degenerate_edge = edges.corner_edge[degenerate[surface.corner_face]]
-    borders_degenerate = mask(len(edges.face_count), degenerate_edge)
-    inconsistent = (edges.face_count == 2) & ~borders_degenerate
+    edges = surface.edges
+    degenerate = ~surface.face_normal.any(axis=1)[surface.corner_face]
+    inconsistent = edges.face_count == 2
+    inconsistent[edges.corner_edge[degenerate]] = False
     inconsistent[edges.interior] = False
     return int(np.count_nonzero(inconsistent))
 

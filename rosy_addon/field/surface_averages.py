@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from .blocks import row_blocks
 from .connection import BLOCK_TRIANGLES, Connection, laplacian
 from .frames import dot
 from .representation import complex_bincount
@@ -24,7 +25,7 @@ MAX_STEPS = 500
 class SurfaceAverages:
     """Operators that average RoSy representations from F faces to n nodes, and from nodes to faces.
 
-    The nodes are those of a `Connection`: the vertices, with several nodes for a nonmanifold vertex.
+    The nodes are defined by a `Connection`: a node for each vertex, and several for a nonmanifold vertex.
 
     Attributes
     ----------
@@ -49,8 +50,7 @@ class SurfaceAverages:
         """
         surface = self.surface
         angle = np.empty(surface.triangle_vertex.shape)
-        for start in range(0, len(angle), BLOCK_TRIANGLES):
-            block = slice(start, start + BLOCK_TRIANGLES)
+        for block in row_blocks(len(angle), BLOCK_TRIANGLES):
             face = surface.triangle_face[block]
             x, y = self.x.take(face, axis=0), self.y.take(face, axis=0)
             points = [surface.vertices.take(v, axis=0) for v in surface.triangle_vertex[block].T]
@@ -111,12 +111,9 @@ class SurfaceAverages:
         """
         area = self.connection.area
         weighted = np.empty((len(area), 3), dtype=np.complex128)
-        node, frame_angle = (
-            self.connection.corner_node.reshape(-1, 3),
-            self.frame_angle.reshape(-1, 3),
-        )
-        for start in range(0, len(weighted), BLOCK_TRIANGLES):
-            block = slice(start, start + BLOCK_TRIANGLES)
+        node = self.connection.corner_node.reshape(-1, 3)
+        frame_angle = self.frame_angle.reshape(-1, 3)
+        for block in row_blocks(len(weighted), BLOCK_TRIANGLES):
             angle = degree * frame_angle[block]
             to_face = np.cos(angle) + 1j * np.sin(angle)
             np.multiply(values.take(node[block]), to_face, out=weighted[block])
@@ -138,8 +135,8 @@ class SurfaceAverages:
         """Return the matrix of `connection.laplacian`, as complex64 (as float32 if the degree is 0)."""
         matrix = laplacian(self.connection, degree)
         if degree:
-            return matrix.with_values(matrix.data.astype(np.complex64))
-        return matrix.with_values(matrix.data.real.astype(np.float32))
+            return replace(matrix, data=matrix.data.astype(np.complex64))
+        return replace(matrix, data=matrix.data.real.astype(np.float32))
 
     def smooth(
         self, matrix: CSRMatrix, area: float, sums: np.ndarray, start: np.ndarray | None = None

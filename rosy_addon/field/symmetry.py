@@ -37,7 +37,7 @@ class FieldSymmetry:
 
     @property
     def sheets_per_turn(self) -> int:
-        """Number of sheets of the covering surface that a full turn of 2 pi passes.
+        """Number of sheets of the covering surface that a direction passes when it turns by 2 pi at a point.
 
         The covering surface contains each point of the surface once for each direction in which a streamline
         can pass it, on a separate *sheet*. There are 2 M sheets: forward and backward for each of the M lines

@@ -72,11 +72,9 @@ def _triangle_fans(face_start: np.ndarray, apex: np.ndarray) -> tuple[np.ndarray
     first_triangle = (np.cumsum(count) - count)[triangle_face]
     step = np.arange(len(triangle_face), dtype=np.int32) - first_triangle
     first, size, apex = face_start[triangle_face], size[triangle_face], apex[triangle_face]
-    local_corners = np.stack([apex, apex + step + 1, apex + step + 2], axis=1)
-    local_corners -= np.where(local_corners >= size[:, None], size[:, None], 0).astype(
-        local_corners.dtype
-    )
-    return (first[:, None] + local_corners).astype(np.int32), triangle_face
+    local, size = np.stack([apex, apex + step + 1, apex + step + 2], axis=1), size[:, None]
+    np.subtract(local, size, out=local, where=local >= size)
+    return (first[:, None] + local).astype(np.int32), triangle_face
 
 
 def _fan_apexes(
@@ -131,7 +129,7 @@ def _corner_sines(points: np.ndarray) -> np.ndarray:
 
 
 def _project_to_plane(points: np.ndarray) -> np.ndarray:
-    """Return the (k, 2) corners of a polygon projected along its normal, which are counter-clockwise."""
+    """Return the (k, 2) corners of a polygon, projected along its normal. They run counter-clockwise."""
     relative = points - points[0]
     normal = np.cross(relative, np.roll(relative, -1, axis=0)).sum(axis=0)
     axis = np.zeros(3)

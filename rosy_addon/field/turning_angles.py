@@ -21,11 +21,11 @@ from functools import partial
 import numpy as np
 
 from ..core.progress import progress, report
+from .blocks import mask
 from .conjugate_gradient import conjugate_gradient
 from .connectivity import connected_components
 from .face_graph import LABEL, FaceGraph, SpanningForest, spanning_forest, triangle_graph
 from .sparse_multigrid import CSRMatrix, from_edges, hierarchy, w_cycle
-from .surface import Surface
 
 #: Residual norm at which the solver stops, relative to the norm of the right-hand side.
 TOLERANCE = 1e-10
@@ -50,21 +50,20 @@ MIN_EIGENVALUE = 1e-8
 #: With at most this number of loops, the search also changes the multiples of 2 pi / N of two loops at once.
 MAX_PAIRED_LOOPS = 20
 
+#: Loops of faces. Each is an array of the edges that it crosses, and an array of signs: 1 for an edge that is
+#: crossed from its source to its target, -1 otherwise.
+Loops = list[tuple[np.ndarray, np.ndarray]]
+
 
 def turning_angles(
-    surface: Surface,
-    graph: FaceGraph,
-    degree: int,
-    required: np.ndarray,
-    present: np.ndarray | float = 0.0,
+    graph: FaceGraph, degree: int, required: np.ndarray, present: np.ndarray | float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute turning angles at the interior edges that have given sums around the vertices.
 
     Parameters
     ----------
-    surface : Surface
     graph : FaceGraph
-        Graph of the faces of the surface. Its n nodes are the vertices (several for a nonmanifold vertex).
+        Graph of the faces of a surface. Its n nodes are the vertices (several for a nonmanifold vertex).
     degree : int
         N.
     required : (n,) ndarray
@@ -82,10 +81,9 @@ def turning_angles(
         Direction on each face of the field that turns by the present angles plus these angles, in radians in
         the frame of the face.
     """
-    triangles = triangle_graph(surface, graph)
+    triangles = triangle_graph(graph)
     present_between = triangles.on_triangles(present)
-    count = len(triangles.area)
-    tree = spanning_forest(count, triangles.graph.source, triangles.graph.target)
+    tree = spanning_forest(len(triangles.area), triangles.graph.source, triangles.graph.target)
     with progress(0.0, 0.2):
         loops = _loops(triangles.graph, tree)
     with progress(0.2, 0.8):
@@ -97,38 +95,29 @@ def turning_angles(
             break
         factor = added_resistance(angle, present, limit)
         triangles = triangles.with_resistance(factor)
-        start, stop = 1 - 0.2 * 0.5**attempt, 1 - 0.1 * 0.5**attempt
-        with progress(start, stop):
-            changed = _least_angles_near(
-                triangles.graph, required, loops, between, np.flatnonzero(factor > 1)
-            )
+        edges = np.flatnonzero(factor > 1)
+        with progress(1 - 0.2 * 0.5**attempt, 1 - 0.1 * 0.5**attempt):
+            changed = _least_angles_near(triangles.graph, required, loops, between, edges)
             if changed is None:
-                changed = triangles.graph.conductance * least_angles(
-                    triangles.graph, degree, required, loops, present_between
-                )
+                drop = least_angles(triangles.graph, degree, required, loops, present_between)
+                changed = triangles.graph.conductance * drop
         # The resistances apply to the angles between triangles, not to those from triangles to face centers.
-        is_changed = changed != between
-        to_center[triangles.graph.source[is_changed]] = 0
-        to_center[triangles.graph.target[is_changed]] = 0
+        for triangle in (triangles.graph.source, triangles.graph.target):
+            to_center[triangle[changed != between]] = 0
         between, angle = changed, triangles.on_faces(changed, to_center)
     direction = tree.sums_from_root(triangles.graph.unfolding + present_between + between)
     return angle, triangles.directions_of_faces(direction, between, to_center)
 
 
 def _least_angles_near(
-    graph: FaceGraph,
-    required: np.ndarray,
-    loops: list[tuple[np.ndarray, np.ndarray]],
-    angle: np.ndarray,
-    changed: np.ndarray,
+    graph: FaceGraph, required: np.ndarray, loops: Loops, angle: np.ndarray, changed: np.ndarray
 ) -> np.ndarray | None:
     """Return (I,) least-squares angles that differ from `angle` only near the edges `changed`.
 
     The result is None if the sum of the angles around a loop would change. That can happen if the changed
     neighborhood surrounds a part of the surface.
     """
-    is_near = np.zeros(graph.node_count, dtype=bool)
-    is_near[graph.tail[changed]] = is_near[graph.head[changed]] = True
+    is_near = mask(graph.node_count, np.stack([graph.tail[changed], graph.head[changed]]))
     for step in range(REACH):
         report(0.2 * step / REACH, LABEL)
         touches = is_near[graph.tail] | is_near[graph.head]
@@ -151,7 +140,7 @@ def _least_angles_near(
         solver = potential_solver(near)
     with progress(0.5, 1.0):
         fixed[edges] = near.conductance * near.drop(solver(rest))
-    change = [(signs * (fixed - angle)[crossed]).sum() for crossed, signs in loops]
+    change = _sums_around(loops, fixed - angle)
     return fixed if np.abs(change).max(initial=0.0) < MAX_LOOP_CHANGE else None
 
 
@@ -166,15 +155,13 @@ def added_resistance(angle: np.ndarray, present: np.ndarray | float, limit: floa
 
 
 def least_angles(
-    graph: FaceGraph,
-    degree: int,
-    required: np.ndarray,
-    loops: list[tuple[np.ndarray, np.ndarray]],
-    present: np.ndarray | float,
+    graph: FaceGraph, degree: int, required: np.ndarray, loops: Loops, present: np.ndarray | float
 ) -> np.ndarray:
-    """Return (I,) least-squares angles divided by the conductances of the edges, for a graph of triangles.
+    """Return (M,) float64, each turning angle divided by the conductance of its edge.
 
-    `loops` is the result of `_loops`. For the other parameters, see `turning_angles`.
+    The angles have the least sum of squares, each divided by the conductance. `graph` is the graph of
+    triangles with M edges (see `TriangleGraph`), and `loops` is the result of `_loops`. For the other
+    parameters, see `turning_angles`.
     """
     with progress(0.0, 0.5):
         solver = potential_solver(graph)
@@ -192,17 +179,17 @@ def least_angles(
     if loops:
         turn = 2 * np.pi / degree
         total = graph.conductance * drop + present + graph.unfolding
-        sums = np.array([(signs * total[edges]).sum() for edges, signs in loops])
-        matrix_of_loops = np.array(
-            [
-                [(signs * (graph.conductance * harmonic)[edges]).sum() for harmonic in harmonics]
-                for edges, signs in loops
-            ]
-        )
-        coefficients = _nearest_lattice_coefficients(matrix_of_loops, -sums, turn)
+        matrix = [_sums_around(loops, graph.conductance * harmonic) for harmonic in harmonics]
+        sums = _sums_around(loops, total)
+        coefficients = _nearest_lattice_coefficients(np.transpose(matrix), -sums, turn)
         for coefficient, harmonic in zip(coefficients, harmonics, strict=True):
             drop += coefficient * harmonic
     return drop
+
+
+def _sums_around(loops: Loops, angle: np.ndarray) -> np.ndarray:
+    """Return the sum of (I,) angles around each of the loops, as a float64 array."""
+    return np.array([(signs * angle[edges]).sum() for edges, signs in loops])
 
 
 def potential_solver(
@@ -223,10 +210,9 @@ def potential_solver(
     def solve(sums: np.ndarray) -> np.ndarray:
         potential = np.zeros(graph.node_count)
         if matrix is not None:
-            rhs, precondition = sums[graph.is_interior], partial(w_cycle, levels)
-            potential[graph.is_interior] = conjugate_gradient(
-                matrix, rhs, tolerance, precondition, LABEL
-            )
+            rhs = sums[graph.is_interior]
+            solution = conjugate_gradient(matrix, rhs, tolerance, partial(w_cycle, levels), LABEL)
+            potential[graph.is_interior] = solution
         return potential
 
     return solve
@@ -243,9 +229,7 @@ def _potential_matrix(graph: FaceGraph) -> CSRMatrix:
     tail, head, conductance = graph.tail, graph.head, graph.conductance
     diagonal = np.bincount(np.concatenate([tail, head]), np.tile(conductance, 2), graph.node_count)
     _, first = np.unique(graph.node_component, return_index=True)
-    is_open = np.zeros(len(first), dtype=bool)
-    is_open[graph.node_component[~graph.is_interior]] = True
-    tied = first[~is_open]
+    tied = first[~mask(len(first), graph.node_component[~graph.is_interior])]
     diagonal[tied] += diagonal[tied] / 6
     inside = graph.is_interior[tail] & graph.is_interior[head]
     tail, head = unknown[tail[inside]], unknown[head[inside]]
@@ -282,7 +266,7 @@ def _nearest_lattice_coefficients(matrix: np.ndarray, sums: np.ndarray, turn: fl
     return inverse @ (sums + turn * multiple)
 
 
-def _loops(graph: FaceGraph, tree: SpanningForest) -> list[tuple[np.ndarray, np.ndarray]]:
+def _loops(graph: FaceGraph, tree: SpanningForest) -> Loops:
     """Find the loops of faces that cannot be contracted to a vertex, by a tree-cotree decomposition.
 
     The result has, for each loop, the edges that it crosses, and the direction of each crossing as 1 or -1.

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.errors import RosyError, counted
-from .blocks import by_rows, row_blocks
+from .blocks import bincount_rows, by_rows, row_blocks
 from .corner_fans import corner_angles, corner_rotations
 from .directional_field import (
     closest_rosy,
@@ -20,12 +20,7 @@ from .directional_field import (
 )
 from .frames import coordinates, dot, normalize, tangent_frame
 from .polygon_arrays import mean_per_face
-from .representation import (
-    face_frames,
-    from_representation,
-    signed_power,
-    to_representation,
-)
+from .representation import from_representation, signed_power, to_representation
 from .rosy_field import RosyField, check_degree
 from .surface import Surface
 
@@ -90,36 +85,36 @@ def validated_field(
     Raises
     ------
     RosyError
-        If the number of vectors is neither that of the faces nor that of the vertices, if a vector is not
-        finite, or if more than `MAX_OUTLIER_FRACTION` of the vectors are off the tangent plane.
+        If there is neither one vector for each face nor one for each vertex, if a vector is not finite, or if
+        more than `MAX_OUTLIER_FRACTION` of the vectors are off the tangent plane.
     """
     degree = check_degree(degree)
     vectors = np.array(vectors, dtype=np.float64).reshape(-1, 3)
-    domain = _checked_domain(surface, len(vectors), domain, source)
+    domain = checked_domain(surface, len(vectors), domain, source)
     apply_nonfinite_policy(vectors, source, domain, nonfinite)
     normal = tangent_normals(surface, domain)
     vectors = project_to_tangent(vectors, normal, TOLERANCE_DEG[domain], source, domain)
     if domain == "vertex":
         rest = surface.in_rest_shape()
-        x, y = face_frames(rest)
         z = to_representation(vectors, *tangent_frame(normal), degree)
-        face_z = _vertex_averages(rest, normal, x)(z, degree)
-        vectors = from_representation(face_z, x, y, degree)
+        face_z = _vertex_averages(rest, normal)(z, degree)
+        vectors = from_representation(face_z, *rest.face_frames, degree)
     return RosyField(degree, vectors)
 
 
-def _checked_domain(surface: Surface, count: int, domain: str | None, source: str) -> str:
-    """Return the domain ("face" or "vertex") of `count` vectors, or raise an error if the count does not fit.
+def checked_domain(surface: Surface, count: int, domain: str | None, source: str) -> str:
+    """Return the domain ("face" or "vertex") of `count` rows, or raise an error if the count does not fit.
 
-    If `domain` is given, `count` must fit it.
+    If `domain` is given, `count` must fit it. Otherwise, it is "face" if the mesh has `count` faces, even if it
+    has as many vertices.
     """
-    domain = infer_domain(surface, count) if domain is None else domain
     faces, vertices = surface.face_count, len(surface.vertices)
+    if domain is None:
+        domain = "face" if count == faces else "vertex"
     if count != {"face": faces, "vertex": vertices}.get(domain):
         raise RosyError(
-            f"{source}: contains {counted(count, 'vector')}, "
-            f"but {surface.name} has {counted(faces, 'face')} and "
-            f"{counted(vertices, 'vertex', 'vertices')}"
+            f"{source}: contains {counted(count, 'row')}, but {surface.name} has "
+            f"{counted(faces, 'face')} and {counted(vertices, 'vertex', 'vertices')}"
         )
     return domain
 
@@ -152,12 +147,12 @@ def validated_directions(
     Raises
     ------
     RosyError
-        If the number of rows is neither that of the faces nor that of the vertices, if a direction is not
-        finite, or if more than `MAX_OUTLIER_FRACTION` of the directions are off the tangent plane.
+        If there is neither one row for each face nor one for each vertex, if a direction is not finite, or if
+        more than `MAX_OUTLIER_FRACTION` of the directions are off the tangent plane.
     """
     directions = np.array(directions, dtype=np.float64)
     count, degree = len(directions), check_degree(directions.shape[1])
-    domain = _checked_domain(surface, count, domain, source)
+    domain = checked_domain(surface, count, domain, source)
     with np.errstate(invalid="ignore"):
         unusable = ~(np.abs(directions) < MAX_COMPONENT).all(axis=(1, 2))
     usable_directions = np.where(unusable[:, None, None], 0.0, directions)
@@ -166,21 +161,18 @@ def validated_directions(
     normal = tangent_normals(surface, domain)
 
     def are_rosys(rows: slice) -> bool:
-        x, y = tangent_frame(normal[rows])
-        return is_rosy(coordinates(usable_directions[rows], x, y))
+        return is_rosy(coordinates(usable_directions[rows], *tangent_frame(normal[rows])))
 
     if all(map(are_rosys, row_blocks(count))):
         vectors = directions[:, 0].copy()
         vectors[~unusable & ~directions.any(axis=2).all(axis=1)] = 0
         field = validated_field(surface, vectors, degree, source, nonfinite, domain)
-        return replace(
-            detect_families(surface.in_rest_shape(), field), source_directions=source_directions
-        )
+        field = detect_families(surface.in_rest_shape(), field)
+        return replace(field, source_directions=source_directions)
     apply_nonfinite_policy(directions.reshape(count, -1), source, domain, nonfinite)
-    flat_directions, normals = directions.reshape(-1, 3), np.repeat(normal, degree, axis=0)
-    directions = project_to_tangent(
-        flat_directions, normals, TOLERANCE_DEG[domain], source, domain
-    ).reshape(count, degree, 3)
+    rows, normals = directions.reshape(-1, 3), np.repeat(normal, degree, axis=0)
+    rows = project_to_tangent(rows, normals, TOLERANCE_DEG[domain], source, domain)
+    directions = rows.reshape(count, degree, 3)
     surface = surface.in_rest_shape()
     if domain == "face":
         field = field_from_directions(surface, directions)
@@ -195,48 +187,34 @@ def _average_directions(surface: Surface, directions: np.ndarray, normal: np.nda
     holds the (V, 3) vertex normals.
     """
     degree = directions.shape[1]
-    x, y = tangent_frame(normal)
-    w = coordinates(directions, x, y)
+    w = coordinates(directions, *tangent_frame(normal))
     first_angle, rho, direction_ratios = by_rows(closest_rosy, w)
-    face_x, face_y = face_frames(surface)
-    average = _vertex_averages(surface, normal, face_x)
+    average = _vertex_averages(surface, normal)
     z = average(rho * np.exp(1j * degree * first_angle), degree)
     member = np.exp(1j * np.angle(z) / degree)
     coefficients = {}
     for j, values in ratio_harmonics(direction_ratios).items():
         mean = average(values * np.exp(-1j * j * first_angle), -j)
         coefficients[j] = mean * signed_power(member, j)
-    vectors = from_representation(z, face_x, face_y, degree)
+    vectors = from_representation(z, *surface.face_frames, degree)
     return RosyField(degree, vectors, ratios_from_harmonics(coefficients, degree))
 
 
 def _vertex_averages(
-    surface: Surface, normal: np.ndarray, face_x: np.ndarray
+    surface: Surface, normal: np.ndarray
 ) -> Callable[[np.ndarray, int], np.ndarray]:
     """Return a function that averages (V,) complex values at the vertices onto the faces.
 
     The second argument of the function is the order k of the values: if a tangent vector is rotated by t,
-    its value is multiplied by exp(i k t). `normal` holds the (V, 3) vertex normals, and `face_x` the (F, 3)
-    x axes of the frames of the faces.
+    its value is multiplied by exp(i k t). `normal` holds the (V, 3) vertex normals.
     """
-    corner_normal = normal[surface.corner_vertex]
-    rotation = corner_rotations(surface.face_normal, face_x, surface.corner_face, corner_normal)
+    rotation = corner_rotations(surface, normal[surface.corner_vertex])
 
     def average(values: np.ndarray, order: int) -> np.ndarray:
         corner_values = values[surface.corner_vertex] * np.conj(signed_power(rotation, order))
         return mean_per_face(corner_values, surface.face_start)
 
     return average
-
-
-def infer_domain(surface: Surface, count: int) -> str | None:
-    """Return "face" or "vertex" if the mesh has `count` faces or vertices; None if it has neither.
-
-    If the mesh has as many faces as vertices, it is "face".
-    """
-    if count == surface.face_count:
-        return "face"
-    return "vertex" if count == len(surface.vertices) else None
 
 
 def tangent_normals(surface: Surface, domain: str) -> np.ndarray:
@@ -257,19 +235,16 @@ def tangent_normals(surface: Surface, domain: str) -> np.ndarray:
 def vertex_normals(surface: Surface) -> np.ndarray:
     """Return vertex normals: the face normals around each vertex, averaged with the corner angles as weights.
 
-    Sharp edges are ignored. The normals are those of the deformed shape, `Surface.vertices`.
+    Sharp edges are ignored. The normals are perpendicular to the shape `Surface.vertices`. For the rest
+    shape, pass `surface.in_rest_shape()`.
 
     Returns
     -------
     (V, 3) float64 ndarray
         Unit normals; zero on vertices without a face.
     """
-    count = len(surface.vertices)
-    angles = corner_angles(surface)
-    face_normal = surface.face_normal
-    weighted = face_normal[surface.corner_face] * angles[:, None]
-    columns = [np.bincount(surface.corner_vertex, column, count) for column in weighted.T]
-    return normalize(np.stack(columns, axis=1))
+    weighted = surface.face_normal[surface.corner_face] * corner_angles(surface)[:, None]
+    return normalize(bincount_rows(surface.corner_vertex, weighted, len(surface.vertices)))
 
 
 def project_to_tangent(
@@ -314,15 +289,11 @@ def _project(vectors: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.nd
     Further results are the angles between vectors and planes in degrees, and whether each vector is zero.
     """
     length = np.sqrt(dot(vectors, vectors))
-    normal_component = dot(vectors, normal)
-    sine = np.divide(
-        np.abs(normal_component), length, out=np.zeros_like(normal_component), where=length > 0
-    )
+    component = dot(vectors, normal)
+    sine = np.divide(np.abs(component), length, out=np.zeros_like(component), where=length > 0)
     angle = np.degrees(np.arcsin(np.minimum(sine, 1.0)))
     # If a vector is parallel to the normal, its projection is only a rounding error.
-    tangent = np.where(
-        (sine < 1 - 1e-12)[:, None], vectors - normal_component[:, None] * normal, 0.0
-    )
+    tangent = np.where((sine < 1 - 1e-12)[:, None], vectors - component[:, None] * normal, 0.0)
     tangent = np.where(
         (sine > ROUNDING_SINE)[:, None], normalize(tangent) * length[:, None], vectors
     )
@@ -330,10 +301,11 @@ def _project(vectors: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def apply_nonfinite_policy(values: np.ndarray, source: str, domain: str, nonfinite: str) -> None:
-    """Check in place that values are finite: raise an error, or set those that are not finite to zero.
+    """Raise an error if a value is not finite, or set values that are not finite to zero, in place.
 
-    Values of modulus `MAX_COMPONENT` or more count as infinite. Vectors whose components are all below
-    `MIN_COMPONENT` are set to zero as well.
+    A value is an angle, a vector or a tensor. It is not finite if one of its components is NaN, or has a
+    modulus of `MAX_COMPONENT` or more. All of its components are then set to zero. Vectors and tensors whose
+    components are all smaller than `MIN_COMPONENT` are set to zero as well.
 
     Parameters
     ----------

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ..rendering.view_input import Background
-from .device import Device
+from .device import Batches, Device
 from .passes import RasterPass
 
 
 def draw_texture(
-    device: Device,
-    texture: Any,
-    batches: Sequence[tuple[Any, dict[str, Any]]],
-    opacity: float,
-    depth_bias: float = 0.0,
+    device: Device, texture: Any, batches: Batches, opacity: float, depth_bias: float = 0.0
 ) -> None:
     """Draw a picture over the 3D view that is being drawn.
 

@@ -17,7 +17,7 @@ from ..worker.job import Call, Steps
 from .background import draw_texture
 from .device import Device
 from .passes import RasterPass
-from .preparation import compile_lookups, prepare_steps
+from .preparation import compile_steps
 from .uniforms import NO_CLIP_PLANES, matrix_rows
 
 
@@ -41,16 +41,13 @@ class CpuViewportRenderer(ViewportRenderer):
         vertices = np.zeros((6, 4), dtype=np.float32)
         vertices[:, :2] = [(-1, -1), (1, -1), (1, 1), (-1, -1), (1, 1), (-1, 1)]
         vertices[:, 2] = -0.9999
-        uniforms = {
-            **matrix_rows("clip", "xyzw", np.eye(4)),
-            **matrix_rows("plane", range(6), NO_CLIP_PLANES),
-        }
+        uniforms = matrix_rows("clip", "xyzw", np.eye(4))
+        uniforms |= matrix_rows("plane", range(6), NO_CLIP_PLANES)
         self._fullscreen_batch = device.batch(vertices), uniforms
 
     def prepare_steps(self, instances: Sequence[MeshInstance], display: str) -> Steps[Any]:
         """Compile the two shaders that draw into views."""
-        shaders = RasterPass("composite"), RasterPass("background")
-        return prepare_steps(compile_lookups(self.device, shaders))
+        return compile_steps(self.device, [RasterPass("composite"), RasterPass("background")])
 
     def texture_steps(
         self, items: Sequence[MeshInstance], view: ViewInput, target_key: Hashable = None
@@ -60,8 +57,7 @@ class CpuViewportRenderer(ViewportRenderer):
             picture = yield Call(bake_picture, (replace(view, instances=tuple(items)), True, 1))
         except NothingInViewError:
             return None
-        height, width = picture.rgba.shape[:2]
-        return self.device.texture(width, height, "RGBA16F", data=picture.rgba)
+        return self.device.texture(picture.rgba.shape[1::-1], "RGBA16F", data=picture.rgba)
 
     def composite(
         self, texture: Any, items: Sequence[MeshInstance], view: ViewInput, opacity: float = 1.0

@@ -19,24 +19,23 @@ from ..compositor import (
     even_lines,
     flow,
     hatching,
+    image_noise,
     outline,
     streak_statistics,
     surface_noise,
     wobble,
 )
 from ..compositor.filter_kernel import Kernel
-from ..compositor.image_noise import (
-    CHANNEL_FACTOR,
-    FINALIZER_FACTORS,
-    HASH_FACTORS,
-    NOISE_MEAN,
-    SEED_FACTOR,
-)
 from ..compositor.undirected import SAMPLE_COUNT as DISC_SAMPLE_COUNT
 from ..core.color import REC709_LUMINANCE
-from ..projection import crease_pixels, pixel_coverage, pixel_neighbors, shadow_maps
+from ..projection import (
+    crease_pixels,
+    pixel_coverage,
+    pixel_neighbors,
+    shadow_maps,
+    surface_sampling,
+)
 from ..projection.rest_coordinates import BARYCENTRIC_RANGE
-from ..projection.surface_sampling import MIN_FACING_COSINE
 from . import mesh_buffers, surface_records
 
 #: The numbers of the filter kernels (`filter_kernel`) in shaders.
@@ -68,6 +67,7 @@ SHARED_NAMES: dict[ModuleType, tuple[str, ...]] = {
     even_lines: ("COARSE_RATIO", "MAX_BREAK_AMOUNT"),
     flow: ("ONE_WAY_COSINE",),
     hatching: ("MIN_COVERAGE", "PIXEL_SOFTNESS", "RANK_BLEND"),
+    image_noise: ("NOISE_MEAN",),
     outline: (
         *("DEPTH_JUMP", "MIN_STEP", "STEP_RATIO", "PART_BORDER", "EMPTY_BORDER"),
         *("MIN_MARK_LENGTH", "FULL_MARK_LENGTH"),
@@ -78,6 +78,7 @@ SHARED_NAMES: dict[ModuleType, tuple[str, ...]] = {
     crease_pixels: ("LINE_TOLERANCE", "MIN_RELATIVE_DEPTH"),
     pixel_neighbors: ("MAX_SLOPE", "DEPTH_TOLERANCE", "SLOPE_TOLERANCE"),
     shadow_maps: ("PCF_WIDTH",),
+    surface_sampling: ("MIN_FACING_COSINE",),
     mesh_buffers: ("ROW_BITS", "POSITION_TEXEL", "NORMAL_TEXEL", "VALUE_TEXEL"),
     surface_records: ("MAX_TREE_DEPTH",),
 }
@@ -85,7 +86,6 @@ SHARED_NAMES: dict[ModuleType, tuple[str, ...]] = {
 #: Constants of shaders, by their names there: floats, integers and vectors.
 CONSTANTS: dict[str, float | int | Sequence[float]] = {
     **{name: getattr(module, name) for module, names in SHARED_NAMES.items() for name in names},
-    "NOISE_MEAN": NOISE_MEAN,
     "MIN_CONTRAST_SCALE": surface_noise.CONTRAST_SCALE_RANGE[0],
     "MAX_CONTRAST_SCALE": surface_noise.CONTRAST_SCALE_RANGE[1],
     "MIN_BARYCENTRIC": float(BARYCENTRIC_RANGE[0]),
@@ -93,14 +93,10 @@ CONSTANTS: dict[str, float | int | Sequence[float]] = {
     "WOBBLE_AMPLITUDE": wobble.UNIT_VARIANCE_SCALE * wobble.WOBBLE_STD,
     "GROWTH_START": even_lines.GROWTH_OCTAVES[0],
     "GROWTH_STOP": even_lines.GROWTH_OCTAVES[1],
-    "MIN_FACING_COSINE": MIN_FACING_COSINE,
     "MIN_SAMPLE_COSINE": pixel_coverage.MIN_NORMAL_COSINE,
     "LUMINANCE_WEIGHTS": REC709_LUMINANCE,
     "SUBPIXEL_COUNT": len(surface_noise.SUBPIXEL_OFFSETS),
-    **{
-        f"SUBPIXEL_OFFSET_{index}": offset
-        for index, offset in enumerate(surface_noise.SUBPIXEL_OFFSETS)
-    },
+    **{f"SUBPIXEL_OFFSET_{i}": xy for i, xy in enumerate(surface_noise.SUBPIXEL_OFFSETS)},
     "DISC_SAMPLE_COUNT": DISC_SAMPLE_COUNT,
     "CREASES_PER_ROW": CREASES_PER_ROW,
     "CREASE_SLICES": CREASE_SLICES,
@@ -118,18 +114,14 @@ CONSTANTS: dict[str, float | int | Sequence[float]] = {
     "HEADLIGHT": HEADLIGHT,
 }
 
+_HASH_NAMES = ("HASH_X", "HASH_Y", "HASH_Z", "HASH_OCTAVE", "HASH_INSTANCE")
+
 UNSIGNED_CONSTANTS = {
-    **dict(
-        zip(
-            ("HASH_X", "HASH_Y", "HASH_Z", "HASH_OCTAVE", "HASH_INSTANCE"),
-            HASH_FACTORS,
-            strict=True,
-        )
-    ),
-    "HASH_SEED": SEED_FACTOR,
-    "HASH_CHANNEL": CHANNEL_FACTOR,
-    "HASH_FINALIZER_0": FINALIZER_FACTORS[0],
-    "HASH_FINALIZER_1": FINALIZER_FACTORS[1],
+    **dict(zip(_HASH_NAMES, image_noise.HASH_FACTORS, strict=True)),
+    "HASH_SEED": image_noise.SEED_FACTOR,
+    "HASH_CHANNEL": image_noise.CHANNEL_FACTOR,
+    "HASH_FINALIZER_0": image_noise.FINALIZER_FACTORS[0],
+    "HASH_FINALIZER_1": image_noise.FINALIZER_FACTORS[1],
 }
 
 

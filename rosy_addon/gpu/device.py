@@ -12,9 +12,13 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import DeviceError
+from .defines import shader_defines
 from .passes import WORKGROUP_SIZE, ComputePass, RasterPass, Uniforms
 
 NamedValues = Mapping[str, Any]
+
+#: Triangles to draw: vertex buffers, each with its own uniforms.
+Batches = Sequence[tuple[Any, NamedValues]]
 
 #: Name of the uniform block in shaders.
 UNIFORM_BLOCK = "rosy_constants"
@@ -59,14 +63,9 @@ class Device:
             self._program(shader)
 
     def texture(
-        self,
-        width: int,
-        height: int,
-        texel_format: str,
-        layers: int = 0,
-        data: np.ndarray | None = None,
+        self, size: Sequence[int], texel_format: str, layers: int = 0, data: Any = None
     ) -> Any:
-        """Return a new texture. If `layers` is not 0, it is a texture array.
+        """Return a new texture of a width and height. If `layers` is not 0, it is a texture array.
 
         `data` is its contents, (height, width, 4) float32. By default, the contents are undefined.
         """
@@ -74,9 +73,7 @@ class Device:
         if data is not None:
             flat = np.ascontiguousarray(data, dtype=np.float32).reshape(-1)
             options["data"] = self._gpu.types.Buffer("FLOAT", len(flat), flat)
-        return self._gpu.types.GPUTexture(
-            (width, height), layers=layers, format=texel_format, **options
-        )
+        return self._gpu.types.GPUTexture(size, layers=layers, format=texel_format, **options)
 
     def batch(self, vertices: np.ndarray) -> Any:
         """Return a vertex buffer of triangles from (3 T, 4) float32 corners."""
@@ -87,32 +84,22 @@ class Device:
         return self._gpu.types.GPUBatch(type="TRIS", buf=buffer)
 
     def compute(
-        self,
-        shader: ComputePass,
-        size: Sequence[int],
-        textures: NamedValues,
-        images: NamedValues,
-        uniforms: NamedValues,
+        self, shader: ComputePass, size: Sequence[int], textures: NamedValues, uniforms: NamedValues
     ) -> None:
-        """Run a compute shader; `size` is the width, the height and, optionally, the number of layers.
+        """Run a compute shader; `size` is the width, the height and the number of layers.
 
-        A shader with switches must be the result of `ComputePass.variant`.
+        `textures` are the textures and images that the shader reads and writes, by their names there. A
+        shader with switches must be the result of `ComputePass.variant`.
         """
         program, _block = self._bind(shader, textures, uniforms)
         for name, _ in shader.images:
-            program.image(_base_name(name), images[_base_name(name)])
-        width, height, layers = (*size, 1)[:3]
+            program.image(_base_name(name), textures[_base_name(name)])
+        width, height, layers = size
         groups = -(-width // WORKGROUP_SIZE[0]), -(-height // WORKGROUP_SIZE[1]), layers
         self._gpu.compute.dispatch(program, *groups)
 
-    def draw(
-        self,
-        shader: RasterPass,
-        batches: Sequence[tuple[Any, NamedValues]],
-        color: Any,
-        depth: Any,
-    ) -> None:
-        """Draw batches, each with its own uniforms, into a color and a depth texture."""
+    def draw(self, shader: RasterPass, batches: Batches, color: Any, depth: Any) -> None:
+        """Draw batches into a color and a depth texture."""
         state = self._gpu.state
         framebuffer = self._gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
         saved = state.depth_test_get(), state.depth_mask_get(), state.blend_get()
@@ -129,11 +116,7 @@ class Device:
                 self._set_state(*saved)
 
     def draw_to_view(
-        self,
-        shader: RasterPass,
-        batches: Sequence[tuple[Any, NamedValues]],
-        textures: NamedValues,
-        uniforms: NamedValues,
+        self, shader: RasterPass, batches: Batches, textures: NamedValues, uniforms: NamedValues
     ) -> None:
         """Draw batches into the current 3D view, tested against the depths in it."""
         # With depth writes, the picture is drawn once where surfaces overlap.
@@ -150,23 +133,23 @@ class Device:
         self._gpu.state.blend_set(blend)
 
     def viewport(self) -> tuple[int, int, int, int]:
-        """Return the left and bottom border, width and height of the current view in its frame buffer."""
+        """Return x and y of the lower left corner, width and height of the current view, in pixels.
+
+        The corner is relative to the frame buffer.
+        """
         return tuple(self._gpu.state.viewport_get())
 
     def _draw_batches(
-        self,
-        shader: RasterPass,
-        batches: Sequence[tuple[Any, NamedValues]],
-        textures: NamedValues,
-        uniforms: NamedValues,
+        self, shader: RasterPass, batches: Batches, textures: NamedValues, uniforms: NamedValues
     ) -> None:
         for batch, item_uniforms in batches:
             program, _block = self._bind(shader, textures, {**uniforms, **item_uniforms})
             batch.draw(program)
 
-    def read(self, texture: Any, width: int, height: int) -> np.ndarray:
+    def read(self, texture: Any) -> np.ndarray:
         """Return the (height, width, 4) float32 contents of a texture."""
-        return np.asarray(texture.read(), dtype=np.float32).reshape(height, width, 4)
+        texels = np.asarray(texture.read(), dtype=np.float32)
+        return texels.reshape(texture.height, texture.width, 4)
 
     def _bind(
         self, shader: ComputePass | RasterPass, textures: NamedValues, uniforms: NamedValues
@@ -177,7 +160,7 @@ class Device:
         """
         program = self._program(shader)
         program.bind()
-        for name in shader.textures:
+        for name in shader.declared.textures:
             program.uniform_sampler(_base_name(name), textures[_base_name(name)])
         # A new block for each run: the device may not have read the previous one yet.
         block = self._gpu.types.GPUUniformBuf(_pack_uniforms(shader.uniforms, uniforms))
@@ -204,7 +187,7 @@ class Device:
     def _compiled(self, shader: ComputePass | RasterPass) -> Any:
         create = self._gpu.shader.create_from_info
         info = self._gpu.types.GPUShaderCreateInfo()
-        for slot, name in enumerate(shader.textures):
+        for slot, name in enumerate(shader.declared.textures):
             kind = "FLOAT_2D_ARRAY" if name.endswith("[]") else "FLOAT_2D"
             info.sampler(slot, kind, _base_name(name))
         # A uniform block: some devices have too few push constants.
@@ -220,13 +203,13 @@ class Device:
             info.compute_source(defines + shader.source)
             return create(info)
         interface = self._gpu.types.GPUStageInterfaceInfo(f"rosy_{shader.name}")
-        for name, kind in shader.varyings:
+        for name, kind in shader.vertex.outputs:
             (interface.flat if name == "triangle_id" else interface.smooth)(kind.upper(), name)
         info.vertex_in(0, "VEC4", "vertex_data")
         info.vertex_out(interface)
-        info.fragment_out(0, "VEC4", shader.output)
-        info.vertex_source(defines + shader.vertex_source)
-        info.fragment_source(defines + shader.fragment_source)
+        info.fragment_out(0, "VEC4", shader.fragment.outputs[0][0])
+        info.vertex_source(defines + shader.vertex.code)
+        info.fragment_source(defines + shader_defines() + shader.fragment.code)
         return create(info)
 
 

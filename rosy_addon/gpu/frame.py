@@ -13,10 +13,11 @@ import numpy as np
 from ..compositor.look_units import PixelLook
 from ..projection.camera import Camera
 from ..rendering.view_input import ViewInput
+from .device import Batches, NamedValues
 from .mesh_buffers import MAX_TRIANGLES, FieldKind
 from .passes import ComputePass, RasterPass
 from .resources import DrawItem, GpuResources
-from .uniforms import camera_uniforms, instance_uniforms
+from .uniforms import camera_uniforms, matrix_rows
 
 #: A rectangle of pixels: left, bottom, right and top; right and top are exclusive.
 Box = tuple[int, int, int, int]
@@ -69,7 +70,8 @@ class Frame:
     textures : dict of str to texture
         Results of the passes so far, by their names in shaders.
     prepared : dict
-        Handles of data that was computed from the meshes for this picture, by the keys of the stages.
+        Handles of data that was computed from the meshes for this picture. The keys are defined by the
+        functions of the stages that return lookups, such as `noise_stage.feature_lookups`.
     passes : list of FramePass
         The passes that are still to be run, including the passes over the samples.
     """
@@ -98,6 +100,11 @@ class Frame:
     def samples_per_side(self) -> int:
         """Samples along each side of a pixel."""
         return 1 if self.samples is None else self.samples.look.supersampling
+
+    @cached_property
+    def boxes(self) -> list[Box]:
+        """The box of the pixels that each item can cover."""
+        return [screen_box(item, self.camera) for item in self.items]
 
     @cached_property
     def first_triangle_ids(self) -> list[int]:
@@ -133,22 +140,20 @@ class Frame:
 
     def image(self, name: str, texel_format: str = "RGBA32F", layers: int = 0) -> Any:
         """Return the image with a name and the size of the frame; see `GpuResources.image`."""
-        return self.resources.image(name, *self.size, texel_format, layers)
+        return self.resources.image(name, self.size, texel_format, layers)
 
     def box_of_kind(self, kind: FieldKind) -> Box:
         """Return the box of the pixels that instances with a field of this kind can cover."""
-        return union_box(
-            [screen_box(item, self.camera) for item in self.items if item.kind == kind]
-        )
+        items = zip(self.items, self.boxes, strict=True)
+        return union_box(box for item, box in items if item.kind == kind)
 
-    def fields_in_view(self) -> list[tuple[int, DrawItem, Box]]:
-        """Return the index, draw item and box of each instance that has a field and may be visible."""
-        boxes = [
-            (instance_id, item, screen_box(item, self.camera))
-            for instance_id, item in enumerate(self.items)
-            if item.kind is not None
+    def fields_in_view(self) -> list[tuple[int, DrawItem]]:
+        """Return the index and the draw item of each instance that has a field and may be visible."""
+        return [
+            (index, item)
+            for index, item in enumerate(self.items)
+            if item.kind is not None and not is_empty(self.boxes[index])
         ]
-        return [entry for entry in boxes if not is_empty(entry[2])]
 
     def take_passes(self) -> list[FramePass]:
         """Remove all passes from the frame, and return them in the order in which they must be run."""
@@ -157,15 +162,9 @@ class Frame:
         return passes
 
     def run_on_instance(
-        self,
-        shader: ComputePass,
-        instance_id: int,
-        box: Box,
-        textures: dict[str, Any],
-        images: dict[str, Any],
-        uniforms: dict[str, Any],
+        self, shader: ComputePass, instance_id: int, textures: NamedValues, uniforms: NamedValues
     ) -> None:
-        """Add a compute pass over the pixels of one instance; see `run`.
+        """Add a compute pass over the pixels that one instance can cover; see `run`.
 
         The pass can also read the triangle records of the instance.
 
@@ -174,32 +173,37 @@ class Frame:
         shader : ComputePass
         instance_id : int
             Index into ``items``.
-        box : Box
-        textures, images : dict of str to texture
+        textures : dict of str to texture
         uniforms : dict
             Further uniforms, besides the uniforms of the instance.
         """
         records = {"triangle_records": self.items[instance_id].mesh.records_texture}
         uniforms = {**self.instance_uniforms(instance_id), **uniforms}
-        self.run(shader, box, {**records, **textures}, images, uniforms)
+        self.run(shader, self.boxes[instance_id], {**records, **textures}, uniforms)
 
     def instance_uniforms(self, instance_id: int) -> dict[str, Any]:
         """Return the uniforms of passes over the pixels of one instance, given its index."""
-        first_triangle_id, item = self.first_triangle_ids[instance_id], self.items[instance_id]
-        return instance_uniforms(instance_id, first_triangle_id, item, self.camera)
+        item = self.items[instance_id]
+        model_to_camera = self.camera.view @ item.model_matrix
+        return {
+            "instance_id": float(instance_id),
+            "first_triangle_id": self.first_triangle_ids[instance_id],
+            "triangle_count": item.mesh.buffers.triangle_count,
+            "texels_per_record": item.mesh.buffers.texels_per_record,
+            **matrix_rows("model_view", "xyz", model_to_camera[:3]),
+        }
 
     def clear(self, image: Any, texel_format: str | None = None) -> None:
         """Add a pass that sets an image of the size of the frame to 0. Its default format is RGBA32F."""
         formats = () if texel_format is None else (("cleared", texel_format),)
-        self.run(ComputePass("clear", formats), self.box, {}, {"cleared": image}, {})
+        self.run(ComputePass("clear", formats), self.box, {"cleared": image}, {})
 
     def run(
         self,
         shader: ComputePass,
         box: Box,
-        textures: dict[str, Any],
-        images: dict[str, Any],
-        uniforms: dict[str, Any],
+        textures: NamedValues,
+        uniforms: NamedValues,
         layers: int = 1,
         pause: float | None = None,
     ) -> None:
@@ -210,9 +214,8 @@ class Frame:
         shader : ComputePass
         box : Box
         textures : dict of str to texture
-            Textures that the pass reads, besides the ``textures`` of the frame.
-        images : dict of str to texture
-            Images that the pass writes.
+            Textures and images that the pass reads and writes, by their names in the shader. It can also
+            read the ``textures`` of the frame.
         uniforms : dict
             Further uniforms. The uniforms of the camera and all settings of the look are added by their
             names.
@@ -223,31 +226,13 @@ class Frame:
         """
         uniforms = {**self._shared_uniforms, **uniforms, "box_origin": box[:2]}
         textures = {**self.textures, **textures}
-        self.compute(shader, (*box_size(box), layers), textures, images, uniforms, pause)
-
-    def compute(
-        self,
-        shader: ComputePass,
-        size: Sequence[int],
-        textures: dict[str, Any],
-        images: dict[str, Any],
-        uniforms: dict[str, Any],
-        pause: float | None = None,
-    ) -> None:
-        """Add a compute pass; see `Device.compute`."""
-        shader = shader.variant(uniforms)
-        run = partial(self.resources.device.compute, shader, size, textures, images, uniforms)
+        shader, size = shader.variant(uniforms), (*box_size(box), layers)
+        run = partial(self.resources.device.compute, shader, size, textures, uniforms)
         self.passes.append(FramePass(shader, run, pause))
 
-    def draw(
-        self,
-        shader: RasterPass,
-        batches: Sequence[tuple[Any, dict[str, Any]]],
-        target: Any,
-    ) -> None:
+    def draw(self, shader: RasterPass, batches: Batches, target: Any) -> None:
         """Add a pass that draws triangles; see `Device.draw`."""
-        size = target.width, target.height
-        depth = self.resources.image("depth", *size, "DEPTH_COMPONENT32F")
+        depth = self.resources.image("depth", (target.width, target.height), "DEPTH_COMPONENT32F")
         run = partial(self.resources.device.draw, shader, batches, target, depth)
         self.passes.append(FramePass(shader, run, None))
 

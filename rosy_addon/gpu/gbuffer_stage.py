@@ -33,16 +33,10 @@ def render_gbuffer(frame: Frame) -> None:
 
 def _visibility(frame: Frame) -> Any:
     """Return an image with the id of the triangle that is visible at the center of each pixel."""
-    batches = [
-        (
-            item.mesh.batch,
-            {
-                "first_triangle_id": first_triangle_id,
-                **clip_uniforms(item, frame.camera, frame.view.clip_planes),
-            },
-        )
-        for first_triangle_id, item in zip(frame.first_triangle_ids, frame.items, strict=True)
-    ]
+    batches = []
+    for first_triangle_id, item in zip(frame.first_triangle_ids, frame.items, strict=True):
+        uniforms = clip_uniforms(item, frame.camera, frame.view.clip_planes)
+        batches.append((item.mesh.batch, {"first_triangle_id": first_triangle_id, **uniforms}))
     # Testing the clip planes takes a third of the time.
     is_clipped = frame.view.clip_planes is not None
     shader = RasterPass("visibility_clipped" if is_clipped else "visibility")
@@ -56,18 +50,14 @@ def _pixel_visibility(frame: Frame, samples: Frame) -> Any:
 
     It is the triangle at the center of the pixel or, if there is none, at the sample nearest to the center.
     """
-    visibility = frame.image("pixel_visibility", "R32F")
-    frame.run(
-        ComputePass("pixel_visibility"),
-        frame.box,
-        {
-            "center_visibility": _visibility(frame),
-            "sample_visibility": samples.textures["visibility"],
-        },
-        {"visibility": visibility},
-        {"samples_per_side": frame.samples_per_side, "occluder_id": frame.occluder_id},
-    )
-    return visibility
+    textures = {
+        "center_visibility": _visibility(frame),
+        "sample_visibility": samples.textures["visibility"],
+        "visibility": frame.image("pixel_visibility", "R32F"),
+    }
+    uniforms = {"samples_per_side": frame.samples_per_side, "occluder_id": frame.occluder_id}
+    frame.run(ComputePass("pixel_visibility"), frame.box, textures, uniforms)
+    return textures["visibility"]
 
 
 def _render_surfaces(frame: Frame, visibility: Any) -> None:
@@ -76,27 +66,27 @@ def _render_surfaces(frame: Frame, visibility: Any) -> None:
     channel_size = frame.size if channel_count else (1, 1)
     gbuffer = {name: frame.image(name) for name in ("normals", "field_values", "depth_slopes")}
     gbuffer["field_channels"] = frame.resources.image(
-        "field_channels", *channel_size, layers=max(channel_count, 1)
+        "field_channels", channel_size, layers=max(channel_count, 1)
     )
     frame.clear(gbuffer["field_values"])
     frame.textures["visibility"] = visibility
-    for instance_id, item, box in frame.fields_in_view():
+    for instance_id, item in frame.fields_in_view():
         uniforms = {
             "pixels_per_unit": frame.camera.pixels_per_unit,
             "channel_count": item.mesh.buffers.channel_count,
             "model_scale": float(np.linalg.norm(item.model_matrix[:3, 0])),  # a similarity
         }
-        frame.run_on_instance(ComputePass("resolve"), instance_id, box, {}, gbuffer, uniforms)
-    frame.textures.update(gbuffer)
+        frame.run_on_instance(ComputePass("resolve"), instance_id, gbuffer, uniforms)
+    frame.textures |= gbuffer
 
 
 def _sample_entries(frame: Frame, samples: Frame) -> Any:
     """Return an image of the samples, with the pixel whose surface each sample shows."""
     entries = samples.image("sample_entries", "R32F")
     samples.clear(entries, "R32F")
-    textures = {**frame.textures, "sample_visibility": samples.textures["visibility"]}
-    images, uniforms = {"sample_entries": entries}, {"samples_per_side": frame.samples_per_side}
-    shader = ComputePass("sample_entries")
-    for instance_id, _, box in samples.fields_in_view():
-        samples.run_on_instance(shader, instance_id, box, textures, images, uniforms)
+    visibility = samples.textures["visibility"]
+    textures = {**frame.textures, "sample_visibility": visibility, "sample_entries": entries}
+    uniforms = {"samples_per_side": frame.samples_per_side}
+    for instance_id, _ in samples.fields_in_view():
+        samples.run_on_instance(ComputePass("sample_entries"), instance_id, textures, uniforms)
     return entries

@@ -16,10 +16,10 @@ from ..compositor.look import is_even, is_hatched, magnitude_range, uses_magnitu
 from ..compositor.look_units import instance_line_spacing
 from . import lookup_tables
 from .defines import REDUCE_BLOCK
+from .device import NamedValues
 from .frame import Box, Frame
 from .mesh_buffers import FieldKind
 from .passes import WORKGROUP_SIZE, ComputePass
-from .resources import GpuResources
 from .uniforms import direction_uniforms, even_line_uniforms, look_uniforms
 
 #: Factor by which the contrast of streaks is reduced if their noise is interpolated between pixels:
@@ -34,13 +34,14 @@ MAX_DISPATCH_STEPS = 1 << 29
 def even_line_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
     """Return functions that look up the evenly spaced lines of instances, by the keys of `Frame.prepared`.
 
-    There are none if the look does not draw evenly spaced lines.
+    Each calls `GpuResources.line_records`: it returns the lines, or a `Preparation` if they are not on the
+    device. There are no functions if the look does not draw evenly spaced lines.
     """
     look = frame.look
     if not is_even(look):
         return {}
     lookups: dict[Hashable, Callable[[], Any]] = {}
-    for instance_id, item, _ in frame.fields_in_view():
+    for instance_id, item in frame.fields_in_view():
         spacing = instance_line_spacing(look, frame.camera, item.instance)
         for ratio in (1.0, COARSE_RATIO):
             lookups["lines", instance_id, ratio] = partial(
@@ -57,23 +58,18 @@ def render_even_lines(frame: Frame) -> None:
     draw evenly spaced lines, the image is an unused placeholder.
     """
     if not is_even(frame.look):
-        frame.textures["line_image"] = frame.resources.image("line_image", 1, 1, "RGBA16F", 1)
+        frame.textures["line_image"] = frame.resources.image("line_image", (1, 1), "RGBA16F", 1)
         return
     line_count = max((kind.line_count for kind in frame.kinds), default=1)
-    images = {"line_image": frame.image("line_image", "RGBA16F", 2 * line_count)}
-    for instance_id, item, box in frame.fields_in_view():
+    image = frame.image("line_image", "RGBA16F", 2 * line_count)
+    for instance_id, item in frame.fields_in_view():
         uniforms = even_line_uniforms(frame.look, item, frame.camera)
         for ratio, first_layer in ((1.0, 0), (COARSE_RATIO, item.kind.line_count)):
             records, node_count = frame.prepared["lines", instance_id, ratio]
-            frame.run_on_instance(
-                ComputePass("even_lines"),
-                instance_id,
-                box,
-                {"line_records": records},
-                images,
-                {**uniforms, "node_count": node_count, "first_layer": first_layer},
-            )
-    frame.textures |= images
+            textures = {"line_records": records, "line_image": image}
+            uniforms |= {"node_count": node_count, "first_layer": first_layer}
+            frame.run_on_instance(ComputePass("even_lines"), instance_id, textures, uniforms)
+    frame.textures["line_image"] = image
 
 
 def render_fields(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> None:
@@ -97,19 +93,19 @@ def render_fields(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> None
         "max_magnitude": textures["cells"],  # only read if the look shows it
         "color_map": lookup_tables.color_map(resources, look),
         "palette": lookup_tables.palette(resources),
+        "picture": picture,
     }
     if uses_magnitude(look) and magnitude_range(look) is None:
-        values, compute = frame.textures["field_values"], frame.compute
-        textures["max_magnitude"] = largest_magnitude(resources, values, kind.degree, compute)
+        textures["max_magnitude"] = largest_magnitude(frame, kind.degree)
     if frame.samples is not None:
         textures["noise_gradients"] = _noise_gradients(frame, box, textures)
         uniforms["gain"] = look.gain * INTERPOLATED_CONTRAST
     if not is_hatched(look):
-        _trace(frame, kind, box, ComputePass("lic"), textures, {"picture": picture}, uniforms)
+        _trace(frame, box, "lic", textures, uniforms)
         return
     textures["line_means"] = _streaks(frame, kind, box, textures, uniforms)
     textures |= _ink_textures(frame, kind)
-    frame.run(ComputePass("ink"), box, textures, {"picture": picture}, uniforms, pause=1.0)
+    frame.run(ComputePass("ink"), box, textures, uniforms, pause=1.0)
 
 
 def _streaks(
@@ -124,13 +120,13 @@ def _streaks(
     if not (has_streaks or uniforms["overshoot_steps"]):
         return textures["directions"]
     means = frame.image("line_means", "RGBA16F", layers)
-    images = {"line_means": means}
-    _trace(frame, kind, box, ComputePass("streaks"), textures, images, uniforms, layers)
+    textures = {**textures, "line_means": means}
+    _trace(frame, box, "streaks", textures, uniforms, layers)
     if frame.samples is None or not has_streaks:
         return means
     smooth = frame.image("smooth_means", "RGBA16F", layers)
-    textures, images = {**textures, "line_means": means}, {"smooth_means": smooth}
-    frame.run(ComputePass("smooth_streaks"), box, textures, images, uniforms, layers)
+    textures["smooth_means"] = smooth
+    frame.run(ComputePass("smooth_streaks"), box, textures, uniforms, layers)
     return smooth
 
 
@@ -146,43 +142,38 @@ def _ink_textures(frame: Frame, kind: FieldKind) -> dict[str, Any]:
         result["outline_coverage"] = frame.textures["depth_slopes"]
     if "paper_grain" not in frame.textures:
         result["paper_grain"] = lookup_tables.picture_grain(
-            resources, *frame.size, look, kind.line_count
+            resources, frame.size, look, kind.line_count
         )
     return result
 
 
 def _trace(
-    frame: Frame,
-    kind: FieldKind,
-    box: Box,
-    shader: ComputePass,
-    textures: dict[str, Any],
-    images: dict[str, Any],
-    uniforms: dict[str, Any],
-    layers: int = 1,
+    frame: Frame, box: Box, name: str, textures: NamedValues, uniforms: NamedValues, layers: int = 1
 ) -> None:
-    """Add the passes that trace streamlines, each over a band of rows of the box.
+    """Add the passes of a shader that traces streamlines, each over a band of rows of the box.
 
+    `name` is the name of the shader, and `uniforms` include the result of `look_uniforms`.
     With one layer, a thread traces the streamlines along all line directions at a pixel. Otherwise
     `layers` is the number of line directions, and a thread traces the streamline along one of them.
     """
     left, bottom, right, top = box
     half_steps = frame.look.streamline_reach() if uniforms["half_length"] else 0
-    row_steps = (right - left) * kind.line_count * 2 * half_steps
+    row_steps = (right - left) * uniforms["line_count"] * 2 * half_steps
     # Whole work groups: a partial one would reach into rows that belong to the next band.
     groups = max(MAX_DISPATCH_STEPS // max(row_steps, 1) // WORKGROUP_SIZE[1], 1)
     band_rows = groups * WORKGROUP_SIZE[1]
     for start in range(bottom, top, band_rows):
         band = left, start, right, min(start + band_rows, top)
         done = (start - bottom) / (top - bottom)
-        frame.run(shader, band, textures, images, uniforms, layers, pause=done)
+        frame.run(ComputePass(name), band, textures, uniforms, layers, pause=done)
 
 
 def _unfold(frame: Frame, kind: FieldKind, box: Box) -> dict[str, Any]:
     """Render the covering of the fields of one kind, and return its images by name.
 
-    ``cells`` holds the phase and the noise of each pixel, ``directions`` the directions on screen, and
-    ``angle_gradients`` the directions with the gradients of their angles.
+    ``cells`` holds the phase and the noise of each pixel. ``directions`` has a layer for each line
+    direction, with its vector on screen. ``angle_gradients`` has the same layers: x and y of the vector,
+    and the derivatives of its angle along x and y, in radians per pixel.
     """
     lines = kind.line_count
     cell_format = "RG32F" if noise_args(frame.look)["channels"] == 1 else "RGBA32F"
@@ -190,42 +181,31 @@ def _unfold(frame: Frame, kind: FieldKind, box: Box) -> dict[str, Any]:
     covering = {
         "cells": frame.image("cells", cell_format),
         "directions": frame.image("directions", "RGBA16F", lines),
+        "angle_gradients": frame.image("angle_gradients", "RGBA16F", lines),
     }
-    frame.run(ComputePass("directions", (("cells", cell_format),)), box, {}, covering, uniforms)
-    gradients = {"angle_gradients": frame.image("angle_gradients", "RGBA16F", lines)}
-    shader = ComputePass("angle_gradient")
-    frame.run(shader, box, covering, gradients, uniforms, lines, pause=0.0)
-    return {**covering, **gradients}
+    frame.run(ComputePass("directions", (("cells", cell_format),)), box, covering, uniforms)
+    frame.run(ComputePass("angle_gradient"), box, covering, uniforms, lines, pause=0.0)
+    return covering
 
 
 def _noise_gradients(frame: Frame, box: Box, textures: dict[str, Any]) -> Any:
     """Return an image of the derivatives of the noise along x and y. Each layer has two noise channels."""
     layers = 2 if noise_args(frame.look)["channels"] > 1 else 1
     gradients = frame.image("noise_gradients", "RGBA16F", layers)
-    images, uniforms = {"noise_gradients": gradients}, {"noise_layers": layers}
-    frame.run(ComputePass("noise_gradients"), box, textures, images, uniforms)
+    textures = {**textures, "noise_gradients": gradients}
+    frame.run(ComputePass("noise_gradients"), box, textures, {"noise_layers": layers})
     return gradients
 
 
-def largest_magnitude(
-    resources: GpuResources, field_values: Any, degree: int, compute: Callable[..., None]
-) -> Any:
-    """Return a texture of one texel: the largest magnitude of the visible fields with a degree.
-
-    `compute` runs the passes: `Device.compute` or `Frame.compute`.
-    """
-    source = field_values
-    width, height = source.width, source.height
+def largest_magnitude(frame: Frame, degree: int) -> Any:
+    """Return a texture of one texel: the largest magnitude of the visible fields with a degree."""
+    source, (width, height) = frame.image("field_values"), frame.size
     level, is_first = 0, 1
     while (width, height) != (1, 1) or is_first:
         width, height = -(-width // REDUCE_BLOCK), -(-height // REDUCE_BLOCK)
-        tiles = resources.image(f"tiles {level}", width, height)
-        compute(
-            ComputePass("max_reduce"),
-            (width, height),
-            {"source_values": source},
-            {"tiles": tiles},
-            {"degree": degree, "is_first": is_first},
-        )
+        tiles = frame.resources.image(f"tiles {level}", (width, height))
+        textures = {"source_values": source, "tiles": tiles}
+        uniforms = {"degree": degree, "is_first": is_first}
+        frame.run(ComputePass("max_reduce"), (0, 0, width, height), textures, uniforms)
         source, level, is_first = tiles, level + 1, 0
     return source

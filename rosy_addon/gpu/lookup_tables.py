@@ -41,11 +41,11 @@ def color_map(resources: GpuResources, look: PixelLook) -> Any:
 
 
 def thresholds(resources: GpuResources, look: PixelLook) -> Any:
-    """Return a texture of thresholds from `streak_statistics`, in the first channel.
+    """Return a texture of the ink thresholds for each coverage from 0 to 1, in the first channel.
 
-    Row 0 contains the thresholds of streaks or, for evenly spaced lines, the widths from
-    `even_lines.look_width_table`. Row 1 contains the thresholds of undirected texture. A look without
-    hatching gets the placeholder `palette`.
+    Row 0 contains `StreakStatistics.threshold` or, for evenly spaced lines, the widths from
+    `even_lines.look_width_table`. Row 1 contains `StreakStatistics.disc_threshold`, for the texture where
+    the field is undefined. A look without hatching gets the placeholder `palette`.
     """
     if not is_hatched(look):
         return palette(resources)
@@ -56,15 +56,15 @@ def thresholds(resources: GpuResources, look: PixelLook) -> Any:
 
 
 def undirected_offsets(resources: GpuResources, look: PixelLook) -> Any:
-    """Return a texture of `undirected.disc_offsets`, in the first two channels.
+    """Return a texture of sample positions in a disc, in the first two channels.
 
-    A look without hatching gets the placeholder `palette`.
+    They are `undirected.disc_offsets`: offsets in pixels from the center of the disc over which the noise is
+    averaged where the field is undefined. A look without hatching gets the placeholder `palette`.
     """
     if not is_hatched(look):
         return palette(resources)
-    return resources.lookup_texture(
-        "disc_offsets", look.line_width, lambda: disc_offsets(look.line_width)[None]
-    )
+    width = look.line_width
+    return resources.lookup_texture("disc_offsets", width, lambda: disc_offsets(width)[None])
 
 
 def ink_table(resources: GpuResources, kind: FieldKind, look: PixelLook) -> Any:
@@ -80,49 +80,43 @@ def waves(resources: GpuResources) -> Any:
 
 
 def picture_grain(
-    resources: GpuResources, width: int, height: int, look: PixelLook, line_count: int
+    resources: GpuResources, size: tuple[int, int], look: PixelLook, line_count: int
 ) -> Any:
     """Return a texture of `paper_grain.picture_paper_grain`, in the first channel.
 
-    It is at least as large as a frame of `width` x `height` pixels. It is wider than the frame, so that
+    It is at least as large as a frame with a `size` in pixels. It is wider than the frame, so that
     each of the `line_count` line directions at a pixel reads another column (`line_offset`). A look
     without paper grain gets the placeholder `palette`.
     """
     if not has_paper_grain(look):
         return palette(resources)
-    width += (line_count - 1) * line_offset(look.line_width)
+    size = size[0] + (line_count - 1) * line_offset(look.line_width), size[1]
 
     def values_at(pixel: np.ndarray, width: int) -> np.ndarray:
         return picture_paper_grain(pixel, width, look.line_width, look.seed)
 
     key = look.line_width, look.seed
-    return _pixel_texture(resources, "paper_grain", key, width, height, values_at)
+    return _pixel_texture(resources, "paper_grain", key, size, values_at)
 
 
-def picture_noise(resources: GpuResources, width: int, height: int, look: PixelLook) -> Any:
+def picture_noise(resources: GpuResources, size: tuple[int, int], look: PixelLook) -> Any:
     """Return a texture of the noise of `image_noise.image_noise` for a frame of this size."""
     settings = noise_args(look)
-    values_at = partial(image_noise, **settings)
-    return _pixel_texture(resources, "noise", settings, width, height, values_at)
+    return _pixel_texture(resources, "noise", settings, size, partial(image_noise, **settings))
 
 
 def _pixel_texture(
-    resources: GpuResources,
-    name: str,
-    key: Any,
-    width: int,
-    height: int,
-    values_at: Callable[[np.ndarray, int], np.ndarray],
+    resources: GpuResources, name: str, key: Any, size: tuple[int, int], values: Callable[..., Any]
 ) -> Any:
-    """Return a texture of values at the pixels of a frame, rounded up to whole tiles (`NOISE_TILE_PIXELS`).
+    """Return a texture of values at the pixels of a frame.
 
-    `values_at(pixel, width)` returns the values at (P,) flat indices into a frame of this width.
+    Width and height of the texture are rounded up to multiples of `NOISE_TILE_PIXELS`.
+    `values(pixel, width)` returns the values at (P,) flat indices into a frame of this width.
     """
-    tile = NOISE_TILE_PIXELS
-    width, height = -(-width // tile) * tile, -(-height // tile) * tile
+    width, height = (-(-side // NOISE_TILE_PIXELS) * NOISE_TILE_PIXELS for side in size)
 
     def create() -> np.ndarray:
         pixel = np.arange(width * height, dtype=np.int32)
-        return values_at(pixel, width).reshape(height, width, -1)
+        return values(pixel, width).reshape(height, width, -1)
 
     return resources.lookup_texture(name, key, create, (width, height))

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..compositor.color_values import ValueRange, value_range
 from ..core.errors import RosyError
+from ..field.blocks import row_blocks
 from ..field.directional_field import field_harmonics
 from ..field.frames import transform_components
 from ..field.polygon_arrays import box_corners
@@ -16,7 +17,7 @@ from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..field.symmetry import FieldSymmetry
 from ..projection.corner_field import CornerField, field_at_corners
-from ..projection.face_values import SIMILARITY_EPS
+from ..projection.face_values import similarity_scale
 from ..projection.field_channel import FieldChannel, rotation_order
 from ..projection.rest_coordinates import rest_positions
 from ..projection.surface_tone import MipMap, SurfaceTone
@@ -47,12 +48,14 @@ class MeshBuffers:
         Position of each corner of each triangle relative to `center`, and the id of the triangle.
     center : (3,) float64 ndarray
         Origin of all positions, so that surfaces far from the origin keep their precision.
+    bounds : (8, 3) float64 ndarray
+        Corners of the bounding box, relative to `center`.
     triangle_records : (rows, ROW_TEXELS, 4) float32 ndarray or None
         The record of each triangle: `texels_per_record` consecutive texels, see
         `_write_records`. None without a field.
     texels_per_record : int
-    bounds : (8, 3) float64 ndarray
-        Corners of the bounding box, relative to `center`.
+    channel_count : int
+        Number of channels of the field besides its representation.
     has_tone : bool
         Whether the records contain a tone of the surface.
     value_range : (float, float) or None
@@ -63,9 +66,10 @@ class MeshBuffers:
 
     corners: np.ndarray
     center: np.ndarray
-    triangle_records: np.ndarray | None
-    texels_per_record: int
     bounds: np.ndarray
+    triangle_records: np.ndarray | None = None
+    texels_per_record: int = 0
+    channel_count: int = 0
     has_tone: bool = False
     value_range: ValueRange = None
     values_texel: int = -1
@@ -75,11 +79,9 @@ class MeshBuffers:
         """Number of triangles."""
         return len(self.corners) // 3
 
-    @property
-    def channel_count(self) -> int:
-        """Number of channels of the field besides its representation."""
-        others = record_texels(0, self.has_tone, self.values_texel >= 0)
-        return max(self.texels_per_record - others, 0) // 2
+    def model_matrix(self, matrix: np.ndarray) -> np.ndarray:
+        """Return the (4, 4) map from `corners` to world space, given the map from object space."""
+        return split_matrix(matrix)[1] @ translation_matrix(self.center)
 
 
 def split_matrix(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -100,13 +102,9 @@ def split_matrix(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """
     matrix = np.asarray(matrix, dtype=np.float64)
     linear = matrix[:3, :3]
-    gram = linear.T @ linear
-    scale = np.trace(gram) / 3
     mirrored = np.cross(linear[0], linear[1]) @ linear[2] <= 0
-    if mirrored or np.abs(gram - scale * np.eye(3)).max() > SIMILARITY_EPS * scale:
-        model_matrix = np.eye(4)
-        model_matrix[:3, 3] = matrix[:3, 3]
-        return linear, model_matrix
+    if mirrored or similarity_scale(linear) is None:
+        return linear, translation_matrix(matrix[:3, 3])
     return np.eye(3), matrix
 
 
@@ -134,8 +132,8 @@ class FieldKind:
     degree : int
         N.
     channels : tuple of FieldChannel
-        Layers of the image of field channels: harmonics of all orders from the first to the last, then
-        the families.
+        Layers of the image of field channels: the harmonics of the deviation from a RoSy (see
+        `field.directional_field`) of all orders from the first to the last, then the families.
     symmetry : FieldSymmetry
     """
 
@@ -154,11 +152,6 @@ class FieldKind:
         return self.symmetry.line_count
 
     @property
-    def sheets_per_turn(self) -> int:
-        """Number of sheets of the covering that correspond to a full turn of the angle."""
-        return self.symmetry.sheets_per_turn
-
-    @property
     def family_count(self) -> int:
         """Number of families of labeled directions; 1 if the directions have no labels."""
         return self.channels[-1][1] if self.channels and self.channels[-1][0] == "family" else 1
@@ -169,10 +162,7 @@ def field_kinds(fields: Iterable[RosyField]) -> dict[int, FieldKind]:
     channels: dict[int, list[FieldChannel]] = {}
     for field in fields:
         channels.setdefault(field.degree, []).extend(field_channels(field))
-    return {
-        degree: _field_kind(degree, kind_channels)
-        for degree, kind_channels in sorted(channels.items())
-    }
+    return {degree: _field_kind(degree, found) for degree, found in sorted(channels.items())}
 
 
 def _field_kind(degree: int, channels: Sequence[FieldChannel]) -> FieldKind:
@@ -220,7 +210,6 @@ def mesh_buffers(
     RosyError
         If the surface has more than `MAX_TRIANGLES`.
     """
-    values = None if field is None else color_values
     if field is not None and len(surface.triangles) > MAX_TRIANGLES:
         raise RosyError(
             f"{surface.name}: has {len(surface.triangles)} triangles, but the graphics card draws at "
@@ -235,27 +224,20 @@ def mesh_buffers(
     corners = np.empty((count, 3, 4), dtype=np.float32)
     corners[:, :, :3] = positions.transpose(1, 2, 0)
     corners[:, :, 3] = np.arange(count, dtype=np.float32)[:, None]
-    rows, texels = None, 0
-    if field is not None:
-        matrix = np.eye(4)
-        matrix[:3, :3] = linear
-        corner_field = field_at_corners(surface, matrix, field, display)
-        tone_values = None if tone is None else tone.values[surface.triangles]
-        texels = record_texels(len(channels), tone is not None, values is not None)
-        rows, records = _empty_records(count, texels)
-        _write_records(
-            records, corners, rest_positions(surface), surface, corner_field, field.degree, channels,
-            tone_values, None if values is None else values[surface.triangles],
-        )  # fmt: skip
-    has_tone = field is not None and tone is not None
-    numbers = (None, -1)
-    if values is not None:
-        numbers = value_range(values), record_texels(len(channels)) - 1
-    corners, bounds = corners.reshape(-1, 4), bounds - center
-    return MeshBuffers(corners, center, rows, texels, bounds, has_tone, *numbers)
+    arrays = corners.reshape(-1, 4), center, bounds - center
+    if field is None:
+        return MeshBuffers(*arrays)
+    corner_field = field_at_corners(surface, linear, field, display)
+    tones = None if tone is None else tone.values[surface.triangles]
+    numbers = None if color_values is None else color_values[surface.triangles]
+    texels = record_texels(len(channels), tones is not None, numbers is not None)
+    rows, records = empty_records(count, texels)
+    _write_records(records, corners, surface, corner_field, channels, tones, numbers)
+    values = () if color_values is None else (value_range(color_values), _values_texel(channels))
+    return MeshBuffers(*arrays, rows, texels, len(channels), tone is not None, *values)
 
 
-def _empty_records(count: int, texels: int) -> tuple[np.ndarray, np.ndarray]:
+def empty_records(count: int, texels: int) -> tuple[np.ndarray, np.ndarray]:
     """Return new rows of the record texture, all zero, and a (count, texels, 4) view of the same memory."""
     row_count = max(-(-count * texels // ROW_TEXELS), 1)
     flat = np.zeros((row_count * ROW_TEXELS, 4), dtype=np.float32)
@@ -265,44 +247,46 @@ def _empty_records(count: int, texels: int) -> tuple[np.ndarray, np.ndarray]:
 def _write_records(
     records: np.ndarray,
     corners: np.ndarray,
-    rest: np.ndarray,
     surface: Surface,
     corner_field: CornerField,
-    degree: int,
     channels: Sequence[FieldChannel],
     tone: np.ndarray | None,
     numbers: np.ndarray | None,
 ) -> None:
     """Fill the (T, texels, 4) float32 records, block by block of triangles.
 
-    Texels 0 to 2 are the positions of the corners, 3 to 5 the normals there, 6 and 7 the values of
-    `CornerField.representation` with the order of its rotation. Each channel has two texels, with
-    the order of its rotation and its layer. `numbers`, the (T, 3) values for the color map, have one texel.
-    Its last component is 1 if all three values are finite. A tone with (T, 3, 1 or 2) values has two
-    texels. Of the (V, 3) rest positions, x is in the fourth components of the positions, y in the fourth
-    components of the normals, and z in the last texel.
+    Texels 0 to 2 are the positions of the corners, 3 to 5 the normals there. Texels 6 and 7 contain
+    `CornerField.representation`, and each channel has two further texels: six components are the real and
+    imaginary parts at the three corners, the seventh is the result of `field_channel.rotation_order`, and
+    the eighth is the layer of the channel (0 for the representation). `numbers`, the (T, 3) values for the
+    color map, have one texel. Its last component is 1 if all three values are finite. A tone with
+    (T, 3, 1 or 2) values has two texels. Of the `rest_positions`, x is in the fourth
+    components of the positions, y in the fourth components of the normals, and z in the last texel.
     """
+    rest = rest_positions(surface)
     channel_values = [corner_field.channels.get(channel) for channel in channels]
-    for start in range(0, len(records), RECORDS_PER_BLOCK):
-        extent = slice(start, start + RECORDS_PER_BLOCK)
+    for extent in row_blocks(len(records), RECORDS_PER_BLOCK):
         part = records[extent]
         rest_corners = rest.take(surface.triangle_vertex[extent], axis=0)
         part[:, POSITION_TEXEL:NORMAL_TEXEL, :3] = corners[extent, :, :3]
         part[:, POSITION_TEXEL:NORMAL_TEXEL, 3] = rest_corners[..., 0]
-        part[:, NORMAL_TEXEL:VALUE_TEXEL, :3] = corner_field.corner_normals[..., extent].transpose(
-            2, 0, 1
-        )
+        normals = corner_field.corner_normals[..., extent]
+        part[:, NORMAL_TEXEL:VALUE_TEXEL, :3] = normals.transpose(2, 0, 1)
         part[:, NORMAL_TEXEL:VALUE_TEXEL, 3] = rest_corners[..., 1]
         part[:, -1, :3] = rest_corners[..., 2]
-        _write_values(part, VALUE_TEXEL, corner_field.representation[:, extent], degree, 0)
+        _write_values(
+            part, VALUE_TEXEL, corner_field.representation[:, extent], corner_field.degree, 0
+        )
         for layer, (channel, values) in enumerate(zip(channels, channel_values, strict=True)):
             # A RoSy has the constant harmonic 1.
             default = np.complex64(1 if channel == ("deviation", 0) else 0)
             part_values = (default,) * 3 if values is None else values[:, extent]
             texel = VALUE_TEXEL + 2 + 2 * layer
-            _write_values(part, texel, part_values, rotation_order(channel, degree), layer)
+            _write_values(
+                part, texel, part_values, rotation_order(channel, corner_field.degree), layer
+            )
         if numbers is not None:
-            texel = record_texels(len(channels)) - 1
+            texel = _values_texel(channels)
             known = np.isfinite(numbers[extent]).all(axis=1)
             part[known, texel, :3] = numbers[extent][known]
             part[:, texel, 3] = known
@@ -315,6 +299,11 @@ def _write_records(
 def record_texels(channel_count: int, has_tone: bool = False, has_values: bool = False) -> int:
     """Return the number of texels in the record of a triangle; see `_write_records`."""
     return VALUE_TEXEL + 2 * (1 + channel_count) + has_values + 2 * has_tone + 1
+
+
+def _values_texel(channels: Sequence[FieldChannel]) -> int:
+    """Return the texel of a record that contains the values for the color map, if there are any."""
+    return record_texels(len(channels)) - 1
 
 
 def _write_values(
@@ -331,7 +320,7 @@ def to_texture_rows(values: np.ndarray) -> np.ndarray:
 
     All other components are 0.
     """
-    rows, texels = _empty_records(len(values), 1)
+    rows, texels = empty_records(len(values), 1)
     texels[:, 0, : values.shape[1]] = values
     return rows
 

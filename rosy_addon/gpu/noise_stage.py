@@ -22,15 +22,16 @@ from .uniforms import surface_cell_uniforms, surface_noise_uniforms, wobble_unif
 
 
 def feature_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
-    """Return functions that look up the feature curvatures of surfaces, by the keys of `Frame.prepared`.
+    """Return functions that look up the curvatures of surfaces, by the keys of `Frame.prepared`.
 
-    There are none if the noise does not depend on them.
+    Each calls `GpuResources.feature_curvature`: it returns a texture, or a `Preparation` if the curvature is
+    not on the device. There are no functions if the noise does not depend on the curvature.
     """
     if frame.look.anchor != "surface" or not frame.look.detail:
         return {}
     return {
         ("features", instance_id): partial(frame.resources.feature_curvature, item.instance.surface)
-        for instance_id, item, _ in frame.fields_in_view()
+        for instance_id, item in frame.fields_in_view()
     }
 
 
@@ -45,7 +46,7 @@ def render_noise(frame: Frame) -> None:
         settings = noise_args(look) | cell_size_args(look) | {"detail": look.detail}
         frame.textures["noise"] = _surface_noise(frame, settings, "noise")
     else:
-        frame.textures["noise"] = lookup_tables.picture_noise(frame.resources, *frame.size, look)
+        frame.textures["noise"] = lookup_tables.picture_noise(frame.resources, frame.size, look)
     if has_paper_grain(look) and look.anchor == "surface":
         settings = surface_paper_grain_args(look) | cell_size_args(look)
         frame.textures["paper_grain"] = _surface_noise(frame, settings, "paper_grain")
@@ -53,19 +54,19 @@ def render_noise(frame: Frame) -> None:
 
 
 def _render_wobble(frame: Frame) -> None:
-    """Render the angle by which lines wobble at each pixel into ``frame.textures["wobble_angles"]``.
+    """Render the angle in radians by which lines wobble at each pixel to ``frame.textures["wobble_angles"]``.
 
     `wobble.wobble_angle` does the same with numpy.
     """
     if not has_wobble(frame.look):
         frame.textures["wobble_angles"] = lookup_tables.palette(frame.resources)
         return
-    images = {"wobble_angles": frame.image("wobble_angles")}
-    textures = {"wave_table": lookup_tables.waves(frame.resources)}
-    for instance_id, item, box in frame.fields_in_view():
+    angles = frame.image("wobble_angles")
+    textures = {"wave_table": lookup_tables.waves(frame.resources), "wobble_angles": angles}
+    for instance_id, item in frame.fields_in_view():
         uniforms = wobble_uniforms(frame.look, item, frame.camera)
-        frame.run_on_instance(ComputePass("wobble"), instance_id, box, textures, images, uniforms)
-    frame.textures |= images
+        frame.run_on_instance(ComputePass("wobble"), instance_id, textures, uniforms)
+    frame.textures["wobble_angles"] = angles
 
 
 def _surface_noise(frame: Frame, settings: dict[str, Any], name: str) -> Any:
@@ -75,17 +76,17 @@ def _surface_noise(frame: Frame, settings: dict[str, Any], name: str) -> Any:
     shared_uniforms = surface_noise_uniforms(settings)
     names = [item.instance.surface.name for item in frame.items]
     hashes = instance_hashes(names).view(np.int32)
-    for instance_id, item, box in frame.fields_in_view():
-        textures = {"feature_curvature": lookup_tables.palette(frame.resources)}
+    for instance_id, item in frame.fields_in_view():
+        curvature = lookup_tables.palette(frame.resources)
         if settings.get("detail"):
-            textures["feature_curvature"] = frame.prepared["features", instance_id]
+            curvature = frame.prepared["features", instance_id]
+        textures = {"feature_curvature": curvature, "raw_noise": raw_noise}
         uniforms = {
             **shared_uniforms,
             **surface_cell_uniforms(settings, item, frame.camera),
             "instance_hash": int(hashes[instance_id]),
         }
-        images, shader = {"raw_noise": raw_noise}, ComputePass("surface_noise")
-        frame.run_on_instance(shader, instance_id, box, textures, images, uniforms)
+        frame.run_on_instance(ComputePass("surface_noise"), instance_id, textures, uniforms)
     return _high_passed(frame, raw_noise, settings["high_pass"], name)
 
 
@@ -95,22 +96,15 @@ def _high_passed(frame: Frame, raw_noise: Any, high_pass: float, name: str) -> A
     if high_pass:
         radius = box_radius(BLUR_FACTOR * high_pass)
         for index, axis in enumerate(((1, 0), (0, 1)) * 3):
-            next_blurred = frame.image(f"blurred {index % 2}")
-            frame.run(
-                ComputePass("box_blur"),
-                frame.box,
-                {"source_image": blurred},
-                {"blurred_image": next_blurred},
-                {"blur_axis": axis, "radius": radius},
-                pause=0.5,
-            )
-            blurred = next_blurred
+            textures = {
+                "source_image": blurred,
+                "blurred_image": frame.image(f"blurred {index % 2}"),
+            }
+            uniforms = {"blur_axis": axis, "radius": radius}
+            frame.run(ComputePass("box_blur"), frame.box, textures, uniforms, pause=0.5)
+            blurred = textures["blurred_image"]
     noise = frame.image(name)
-    frame.run(
-        ComputePass("center_noise"),
-        frame.box,
-        {"raw_noise": raw_noise, "blurred_noise": blurred},
-        {"noise": noise},
-        {"high_passed": int(high_pass > 0)},
-    )
+    textures = {"raw_noise": raw_noise, "blurred_noise": blurred, "noise": noise}
+    uniforms = {"high_passed": int(high_pass > 0)}
+    frame.run(ComputePass("center_noise"), frame.box, textures, uniforms)
     return noise

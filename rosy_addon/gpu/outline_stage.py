@@ -18,7 +18,8 @@ from .uniforms import clip_uniforms, min_normal_cosine
 def outline_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
     """Return functions that look up the creases of instances, by the keys of `Frame.prepared`.
 
-    There are none if the look has no outline.
+    Each calls `GpuResources.outline_textures`: it returns `OutlineTextures`, or a `Preparation` if they are
+    not on the device. There are no functions if the look has no outline.
     """
     if not has_outline(frame.look):
         return {}
@@ -26,7 +27,7 @@ def outline_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
     angle = crease_angle_of(frame.look)
     return {
         ("outline", instance_id): partial(frame.resources.outline_textures, item, angle)
-        for instance_id, item, _ in drawn.fields_in_view()
+        for instance_id, item in drawn.fields_in_view()
     }
 
 
@@ -41,16 +42,13 @@ def render_outline(frame: Frame) -> None:
     if frame.samples is None:
         frame.textures["outline_coverage"] = _coverage(frame, frame.prepared)
         return
-    coverage = _coverage(frame.samples, frame.prepared)
-    mean = frame.image("outline_coverage", "R32F")
-    frame.run(
-        ComputePass("outline_mean"),
-        frame.box,
-        {"sample_coverage": coverage},
-        {"outline_coverage": mean},
-        {"samples_per_side": frame.samples_per_side},
-    )
-    frame.textures["outline_coverage"] = mean
+    textures = {
+        "sample_coverage": _coverage(frame.samples, frame.prepared),
+        "outline_coverage": frame.image("outline_coverage", "R32F"),
+    }
+    uniforms = {"samples_per_side": frame.samples_per_side}
+    frame.run(ComputePass("outline_mean"), frame.box, textures, uniforms)
+    frame.textures["outline_coverage"] = textures["outline_coverage"]
 
 
 def _coverage(frame: Frame, prepared: dict[Hashable, Any]) -> Any:
@@ -59,11 +57,12 @@ def _coverage(frame: Frame, prepared: dict[Hashable, Any]) -> Any:
     edges = frame.image("outline_edges", "RG32F")
     frame.clear(crease_marks, "R32F")
     frame.clear(edges, "RG32F")
-    for instance_id, item, box in frame.fields_in_view():
+    for instance_id, item in frame.fields_in_view():
         found = prepared["outline", instance_id]
         if found.crease_count:
             _mark_creases(frame, instance_id, item, found, crease_marks)
         textures = {
+            "outline_edges": edges,
             "crease_marks": crease_marks,
             "triangle_parts": found.triangle_parts or frame.textures["visibility"],
         }
@@ -72,20 +71,19 @@ def _coverage(frame: Frame, prepared: dict[Hashable, Any]) -> Any:
             "has_creases": int(found.crease_count > 0),
             "has_parts": int(found.triangle_parts is not None),
         }
-        images, shader = {"outline_edges": edges}, ComputePass("outline_edges")
-        frame.run_on_instance(shader, instance_id, box, textures, images, uniforms)
+        frame.run_on_instance(ComputePass("outline_edges"), instance_id, textures, uniforms)
     width, height = (side // frame.look.supersampling for side in frame.size)
-    images = {
-        "outline_blocks": frame.resources.image("outline_blocks", width, height, "R32F"),
+    textures = {
+        "outline_edges": edges,
+        "outline_blocks": frame.resources.image("outline_blocks", (width, height), "R32F"),
         "outline_widths": frame.image("outline_widths", "R32F"),
         "outline_coverage": frame.image("outline_coverage", "R32F"),
     }
-    textures = {**images, "outline_edges": edges}
     blocks = 0, 0, width, height
-    frame.run(ComputePass("outline_blocks"), blocks, textures, images, {}, pause=0.5)
-    frame.run(ComputePass("outline_widths"), blocks, textures, images, {})
-    frame.run(ComputePass("outline_coverage"), frame.box, textures, images, {})
-    return images["outline_coverage"]
+    frame.run(ComputePass("outline_blocks"), blocks, textures, {}, pause=0.5)
+    frame.run(ComputePass("outline_widths"), blocks, textures, {})
+    frame.run(ComputePass("outline_coverage"), frame.box, textures, {})
+    return textures["outline_coverage"]
 
 
 def _mark_creases(
@@ -93,15 +91,11 @@ def _mark_creases(
 ) -> None:
     """Mark the pixels next to the visible creases of an instance."""
     columns = min(found.crease_count, CREASES_PER_ROW)
-    frame.run(
-        ComputePass("outline_creases"),
-        (0, 0, columns, -(-found.crease_count // columns)),
-        {"crease_points": found.crease_points},
-        {"crease_marks": crease_marks},
-        {
-            **clip_uniforms(item, frame.camera, frame.view.clip_planes),
-            **frame.instance_uniforms(instance_id),
-            "crease_count": found.crease_count,
-        },
-        layers=CREASE_SLICES,
-    )
+    box = 0, 0, columns, -(-found.crease_count // columns)
+    textures = {"crease_points": found.crease_points, "crease_marks": crease_marks}
+    uniforms = {
+        **clip_uniforms(item, frame.camera, frame.view.clip_planes),
+        **frame.instance_uniforms(instance_id),
+        "crease_count": found.crease_count,
+    }
+    frame.run(ComputePass("outline_creases"), box, textures, uniforms, layers=CREASE_SLICES)

@@ -118,41 +118,31 @@ class ComputePass:
         The compiler then removes the code that is switched off. Otherwise the registers of that code
         would let fewer threads run at once.
         """
-        return replace(self, constants=tuple((name, int(values[name])) for name in self.switches))
+        switches = self.declared.switches
+        return replace(self, constants=tuple((name, int(values[name])) for name in switches))
 
     @property
-    def _declared(self) -> Source:
+    def declared(self) -> Source:
+        """The code of the shader, and the declarations in it."""
         return read_source(f"{self.name}.comp.glsl")
-
-    @property
-    def switches(self) -> tuple[str, ...]:
-        """Integer uniforms whose values are compiled in."""
-        return self._declared.switches
-
-    @property
-    def textures(self) -> tuple[str, ...]:
-        """Names of the textures that the shader reads. Names that end in ``[]`` are texture arrays."""
-        return self._declared.textures
 
     @property
     def images(self) -> tuple[tuple[str, str], ...]:
         """Names and formats of the images that the shader writes. Names of array images end in ``[]``."""
-        return tuple({**self._declared.images, **dict(self.formats)}.items())
+        return tuple({**self.declared.images, **dict(self.formats)}.items())
 
     @property
     def uniforms(self) -> Uniforms:
         """Names and GLSL types of the uniforms that are not compiled in."""
         compiled_in = dict(self.constants)
-        return tuple(
-            uniform for uniform in self._declared.uniforms if uniform[0] not in compiled_in
-        )
+        return tuple(entry for entry in self.declared.uniforms if entry[0] not in compiled_in)
 
     @property
     def source(self) -> str:
         """Code of the shader: GLSL without declarations."""
         constants = "".join(f"#define {name} {value}\n" for name, value in self.constants)
         common = read_source("common.glsl")
-        return shader_defines() + constants + common.code + self._declared.code
+        return shader_defines() + constants + common.code + self.declared.code
 
 
 @dataclass(frozen=True)
@@ -166,51 +156,34 @@ class RasterPass:
     """
 
     name: str
-    switches = ()
 
     @property
-    def _files(self) -> tuple[str, str]:
-        return f"{self.name}.vert.glsl", f"{self.name}.frag.glsl"
+    def vertex(self) -> Source:
+        """The vertex shader. Its outputs are the inputs of the fragment shader."""
+        return read_source(f"{self.name}.vert.glsl")
 
     @property
-    def textures(self) -> tuple[str, ...]:
-        """Names of the textures that the shaders read."""
-        return read_source(*self._files).textures
+    def fragment(self) -> Source:
+        """The fragment shader, without the definitions of constants. Its only output is a vec4."""
+        return read_source("common.glsl", f"{self.name}.frag.glsl")
 
     @property
-    def varyings(self) -> Uniforms:
-        """Names and GLSL types of the values that the vertex shader passes on to the fragment shader."""
-        return read_source(self._files[0]).outputs
-
-    @property
-    def output(self) -> str:
-        """Name of the output variable of the fragment shader, a vec4."""
-        return read_source(self._files[1]).outputs[0][0]
+    def declared(self) -> Source:
+        """The code of both shaders, and the declarations in it."""
+        return read_source(f"{self.name}.vert.glsl", f"{self.name}.frag.glsl")
 
     @property
     def uniforms(self) -> Uniforms:
         """Names and GLSL types of the uniforms of both shaders."""
-        return read_source(*self._files).uniforms
-
-    @property
-    def vertex_source(self) -> str:
-        """Code of the vertex shader: GLSL without declarations."""
-        return read_source(self._files[0]).code
-
-    @property
-    def fragment_source(self) -> str:
-        """Code of the fragment shader: GLSL without declarations."""
-        return shader_defines() + read_source("common.glsl", self._files[1]).code
+        return self.declared.uniforms
 
 
 @cache
 def all_passes() -> tuple[ComputePass | RasterPass, ...]:
     """Return all shader passes: one for each compute shader, and one for each pair of other shaders."""
-    names = sorted(path.name for path in SHADER_FOLDER.glob("*.glsl"))
     kinds = {".comp.glsl": ComputePass, ".vert.glsl": RasterPass}
     return tuple(
-        kind(name.removesuffix(end))
+        kind(path.name.removesuffix(end))
         for end, kind in kinds.items()
-        for name in names
-        if name.endswith(end)
+        for path in sorted(SHADER_FOLDER.glob(f"*{end}"))
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import partial
 from typing import Any, NamedTuple
 
 from ..worker.job import Call, Step, Steps
@@ -22,7 +21,7 @@ class Preparation(NamedTuple):
     call : Call
         The function call that computes the result. It has a label, which the user sees meanwhile.
     seconds : float
-        Approximate time that the call takes; 0 if only Blender's process can make it.
+        Approximate time that the call takes.
     send : callable
         Function that sends the result of the call to the device and returns the handle of the data there.
     """
@@ -43,8 +42,8 @@ def prepare_steps(lookups: Iterable[Callable[[], Any]]) -> Steps[list[Any]]:
     Yields
     ------
     Call or Step
-        A `Call` that takes long, to be made by the caller. A call that does not is made here, after its
-        `Step` is yielded.
+        For a call that takes longer than `IN_PLACE_SECONDS`, the `Call`. The caller makes it, and sends its
+        result. For a shorter call, a `Step` with its label; then the call is made here.
 
     Returns
     -------
@@ -66,20 +65,9 @@ def prepare_steps(lookups: Iterable[Callable[[], Any]]) -> Steps[list[Any]]:
     return handles
 
 
-def compile_lookups(
-    device: Device, shaders: Sequence[ComputePass | RasterPass]
-) -> list[Callable[[], Preparation | None]]:
-    """Return a function for each shader: it returns None if the shader is compiled, else a `Preparation`."""
-    count = len(shaders)
-    return [
-        partial(_compilation, device, shader, index / count) for index, shader in enumerate(shaders)
-    ]
-
-
-def _compilation(
-    device: Device, shader: ComputePass | RasterPass, fraction: float
-) -> Preparation | None:
-    if device.is_compiled(shader):
-        return None
-    call = Call(device.compile, (shader,), fraction, fraction, "compiling shaders")
-    return Preparation(call, 0.0, lambda _: None)
+def compile_steps(device: Device, shaders: Sequence[ComputePass | RasterPass]) -> Steps[None]:
+    """Compile the shaders that are not compiled yet, step by step."""
+    for index, shader in enumerate(shaders):
+        if not device.is_compiled(shader):
+            yield Step(index / len(shaders), "compiling shaders")
+            device.compile(shader)

@@ -12,10 +12,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-import numpy as np
-
 from ..compositor.color_values import check_color_values
-from ..compositor.family_hues import PALETTE
 from ..compositor.look import Look, colors_magnitude, magnitude_range
 from ..compositor.look_units import pixel_look
 from ..compositor.picture import Picture, common_color_range
@@ -38,7 +35,7 @@ from .lic_stage import even_line_lookups, largest_magnitude, render_even_lines, 
 from .noise_stage import feature_lookups, render_noise
 from .outline_stage import outline_lookups, render_outline
 from .passes import ComputePass, all_passes
-from .preparation import compile_lookups, prepare_steps
+from .preparation import compile_steps, prepare_steps
 from .resources import DrawItem, GpuResources
 from .tone_stage import render_target_tones
 from .uniforms import clip_uniforms
@@ -90,17 +87,17 @@ class GpuRenderer(ViewportRenderer):
         DeviceError
             If there is no shader for the LIC method of the look.
         """
-        look, camera, instances = view.look, view.camera, view.instances
+        look, instances = view.look, view.instances
         check_method(look)
         check_tone(look, [instance.tone for instance in instances], view.reference)
         check_color_values(look, instances)
         check_instances(instances, view.sample_camera, look.display)
         yield from prepare_steps(self.resources.mesh_lookups(instances, look.display))
-        texture = yield from self.texture_steps(self.upload(instances, look.display), view)
-        rgba = self.read(texture, camera.width, camera.height)
+        items = self.upload(instances, look.display)
+        rgba = self.device.read((yield from self.texture_steps(items, view)))
         if not rgba[..., 3].any():
             raise_nothing_in_view(instances, view.sample_camera)
-        picture = Picture(rgba, color_range=self._color_range(view))
+        picture = Picture(rgba, color_range=self._color_range(items, view))
         if has_marks(look):
             return (yield Call(with_marks, (picture, view), 0.98, 1.0, "drawing marks"))
         return picture
@@ -108,9 +105,9 @@ class GpuRenderer(ViewportRenderer):
     def prepare_steps(self, instances: Sequence[MeshInstance], display: str) -> Steps[Any]:
         """Compile the shaders without switches, and send the meshes to the device."""
         # Shaders with switches are compiled when the values of the switches are known.
-        shaders = [shader for shader in all_passes() if not shader.switches]
-        meshes = self.resources.mesh_lookups(instances, display)
-        return prepare_steps([*compile_lookups(self.device, shaders), *meshes])
+        shaders = [shader for shader in all_passes() if not shader.declared.switches]
+        yield from compile_steps(self.device, shaders)
+        yield from prepare_steps(self.resources.mesh_lookups(instances, display))
 
     def upload(self, instances: Sequence[MeshInstance], display: str) -> list[DrawItem]:
         """Return a draw item for each mesh instance. Meshes that are on the device are not sent again."""
@@ -118,7 +115,7 @@ class GpuRenderer(ViewportRenderer):
 
     def covered_pixels(self, items: Sequence[DrawItem], camera: Camera) -> int:
         """Return the number of pixels in the bounding box on screen of all meshes."""
-        width, height = box_size(union_box([screen_box(item, camera) for item in items]))
+        width, height = box_size(union_box(screen_box(item, camera) for item in items))
         return width * height
 
     def texture_steps(
@@ -146,9 +143,8 @@ class GpuRenderer(ViewportRenderer):
         handles = yield from prepare_steps(lookups.values())
         frame.prepared.update(zip(lookups, handles, strict=True))
         texture, stages = self._stages(frame, target_key)
-        for (start, label, stage), stop in zip(
-            stages, [*(start for start, _, _ in stages[1:]), 1.0], strict=True
-        ):
+        stops = [*(start for start, _, _ in stages[1:]), 1.0]
+        for (start, label, stage), stop in zip(stages, stops, strict=True):
             yield Step(start, label)
             stage()
             for shader, run, pause in frame.take_passes():
@@ -170,7 +166,7 @@ class GpuRenderer(ViewportRenderer):
         function that adds its passes to the frame.
         """
         name = ("picture", target_key) if frame.samples is None else "shaded_picture"
-        texture = self.resources.image(name, *frame.size)
+        texture = self.resources.image(name, frame.size)
         stages: list[tuple[float, str, Callable[[], None]]] = [
             (0.0, "finding visible pixels", partial(render_gbuffer, frame)),
             (0.01, "drawing outlines", partial(render_outline, frame)),
@@ -186,15 +182,10 @@ class GpuRenderer(ViewportRenderer):
             stages.append((0.2 + 0.8 * index / len(kinds), "tracing streamlines", stage))
         if frame.samples is None:
             return texture, stages
-        picture = self.resources.image(("picture", target_key), *frame.size)
-        blend = partial(
-            frame.run,
-            ComputePass("blend_samples"),
-            frame.box,
-            {"shaded_picture": texture},
-            {"picture": picture},
-            {"samples_per_side": frame.samples_per_side},
-        )
+        picture = self.resources.image(("picture", target_key), frame.size)
+        textures = {"shaded_picture": texture, "picture": picture}
+        uniforms = {"samples_per_side": frame.samples_per_side}
+        blend = partial(frame.run, ComputePass("blend_samples"), frame.box, textures, uniforms)
         return picture, [*stages, (1.0, "averaging samples", blend)]
 
     def _frame(self, items: Sequence[DrawItem], view: ViewInput) -> Frame:
@@ -222,29 +213,23 @@ class GpuRenderer(ViewportRenderer):
 
     def finish(self) -> None:
         """Wait until the device has done all work, by reading a texture."""
-        self.device.read(lookup_tables.palette(self.resources), len(PALETTE), 1)
+        self.device.read(lookup_tables.palette(self.resources))
 
     def release(self) -> None:
         """Free all meshes, images and textures."""
         self.resources.release()
 
-    def read(self, texture: Any, width: int, height: int) -> np.ndarray:
-        """Return the (H, W, 4) float32 contents of a picture."""
-        return self.device.read(texture, width, height)
-
-    def _color_range(self, view: ViewInput) -> tuple[float, float] | None:
-        """Return `Picture.color_range` of the last picture."""
-        look, camera = view.look, view.camera
-        if not colors_magnitude(look) or magnitude_range(look):
-            return fixed_color_range(look, view.instances)
-        field_values = self.resources.image("field_values", camera.width, camera.height)
-        degrees = {
-            instance.field.degree for instance in view.instances if instance.field is not None
-        }
-        tops = set()
-        for degree in sorted(degrees):
-            compute = self.device.compute
-            texture = largest_magnitude(self.resources, field_values, degree, compute)
-            tops.add(float(self.read(texture, 1, 1)[0, 0, 0]))
+    def _color_range(
+        self, items: Sequence[DrawItem], view: ViewInput
+    ) -> tuple[float, float] | None:
+        """Return `Picture.color_range` of a picture. It must be the last one that was drawn."""
+        if not colors_magnitude(view.look) or magnitude_range(view.look):
+            return fixed_color_range(view.look, view.instances)
+        frame, tops = self._frame(items, view), set()
+        for kind in frame.kinds:
+            texture = largest_magnitude(frame, kind.degree)
+            for _, run, _ in frame.take_passes():
+                run()
+            tops.add(float(self.device.read(texture)[0, 0, 0]))
         # 0: no field of this degree is visible
         return common_color_range({(0.0, top) for top in tops if top})

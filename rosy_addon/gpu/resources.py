@@ -18,15 +18,7 @@ from ..projection.surface_lines import rest_matrix
 from ..projection.surface_tone import MipMap
 from ..worker.job import Call, run
 from .device import Device
-from .mesh_buffers import (
-    FieldKind,
-    MeshBuffers,
-    field_kinds,
-    mesh_buffers,
-    mip_atlas,
-    split_matrix,
-    translation_matrix,
-)
+from .mesh_buffers import FieldKind, MeshBuffers, field_kinds, mesh_buffers, mip_atlas, split_matrix
 from .preparation import Preparation, prepare_steps
 from .surface_records import feature_records, line_records, outline_records
 
@@ -136,7 +128,7 @@ class MipAtlas:
 class GpuResources:
     """The meshes, images and textures on a device.
 
-    Those that have not been used during the last uploads are freed; see `MESH_LIFETIME`.
+    A resource is freed if it was not used during a number of uploads, such as `MESH_LIFETIME`.
 
     Parameters
     ----------
@@ -180,23 +172,22 @@ class GpuResources:
         items = []
         for instance, mesh in zip(instances, meshes, strict=True):
             kind = None if instance.field is None else kinds[instance.field.degree]
-            _, model_matrix = split_matrix(instance.matrix)
-            model_matrix = model_matrix @ translation_matrix(mesh.buffers.center)
+            model_matrix = mesh.buffers.model_matrix(instance.matrix)
             items.append(DrawItem(instance, mesh, model_matrix, kind))
-        self._kept = {
-            key: kept for key, kept in self._kept.items() if kept[1] >= self._upload_count
-        }
+        for key in [key for key, kept in self._kept.items() if kept[1] < self._upload_count]:
+            del self._kept[key]
         return items
 
     def feature_curvature(self, surface: Surface) -> Any:
-        """Look up the curvature of features at the corners of each triangle of a surface.
+        """Look up the curvature of a surface at the corners of each triangle.
 
-        Return a texture, or a `Preparation` of it. See `field.feature_curvature`.
+        It is in units of 1 / length in object space; see `field.feature_curvature`. Return a texture, or a
+        `Preparation` of it.
         """
         call = Call(feature_records, (surface,), label="measuring features")
         key = "feature curvature", surface.rest_shape_key
         seconds = FEATURE_SECONDS * len(surface.triangles)
-        return self._look_up(key, call, seconds, self._texture)
+        return self._look_up(key, Preparation(call, seconds, self._texture))
 
     def outline_textures(
         self, item: DrawItem, crease_angle: float | None
@@ -222,7 +213,8 @@ class GpuResources:
         arguments = surface, linear, item.mesh.buffers.center, crease_angle
         call = Call(outline_records, arguments, label="finding outlines")
         key = "outline", surface, linear.tobytes(), crease_angle
-        return self._look_up(key, call, BUFFER_SECONDS * len(surface.triangles), send)
+        seconds = BUFFER_SECONDS * len(surface.triangles)
+        return self._look_up(key, Preparation(call, seconds, send))
 
     def line_records(
         self, item: DrawItem, display: str, spacing: float
@@ -254,28 +246,20 @@ class GpuResources:
 
         call = Call(line_records, (surface, matrix, field, display, spacing), label="spacing lines")
         key = "lines", surface, field, rest_matrix(matrix).tobytes(), display, spacing
-        return self._look_up(key, call, LINE_SECONDS * len(surface.triangles), send)
+        seconds = LINE_SECONDS * len(surface.triangles)
+        return self._look_up(key, Preparation(call, seconds, send))
 
     def image(
-        self,
-        name: Hashable,
-        width: int,
-        height: int,
-        texel_format: str = "RGBA32F",
-        layers: int = 0,
+        self, name: Hashable, size: tuple[int, int], texel_format: str = "RGBA32F", layers: int = 0
     ) -> Any:
-        """Return the image with a name, size and format. Its contents are those of its last use, if any."""
-        size_and_format = width, height, texel_format, layers
-        key = "image", name, *size_and_format
-        texture = self._kept[key][0] if key in self._kept else self.device.texture(*size_and_format)
-        return self._keep(key, texture, IMAGE_LIFETIME)
+        """Return the image with a name, size and format. It has the contents of its last use, if any."""
+        key = "image", name, size, texel_format, layers
+        if key not in self._kept:
+            self._keep(key, self.device.texture(size, texel_format, layers), IMAGE_LIFETIME)
+        return self._keep(key, self._kept[key][0], IMAGE_LIFETIME)
 
     def lookup_texture(
-        self,
-        name: str,
-        key: Any,
-        create: Callable[[], np.ndarray],
-        min_size: tuple[int, int] = (0, 0),
+        self, name: str, key: Any, create: Callable[[], Any], min_size: tuple[int, int] = (0, 0)
     ) -> Any:
         """Return a texture of values, created if it does not exist.
 
@@ -291,13 +275,8 @@ class GpuResources:
             Smallest width and height in texels. A texture that is smaller is created again.
         """
         last_key, texture = self._lookup_textures.get(name, (None, None))
-        is_kept = (
-            texture is not None
-            and last_key == key
-            and texture.width >= min_size[0]
-            and texture.height >= min_size[1]
-        )
-        if not is_kept:
+        is_kept = texture is not None and last_key == key
+        if not is_kept or texture.width < min_size[0] or texture.height < min_size[1]:
             texture = self._texture(create())
             self._lookup_textures[name] = key, texture
         return texture
@@ -310,21 +289,15 @@ class GpuResources:
             self._lookup_textures["rendered"] = cached
         return cached[1]
 
-    def _look_up(
-        self,
-        key: Hashable,
-        call: Call,
-        seconds: float,
-        send: Callable[[Any], Any],
-        lifetime: int = TABLE_LIFETIME,
-    ) -> Any:
-        """Return the handle that is kept under a key or, if there is none, a `Preparation`.
+    def _look_up(self, key: Hashable, missing: Preparation, lifetime: int = TABLE_LIFETIME) -> Any:
+        """Return the handle that is kept under a key or, if there is none, the preparation `missing`.
 
-        `call`, `seconds` and `send` are the attributes of the preparation.
+        After the preparation, the handle is kept.
         """
         if key in self._kept:
             return self._keep(key, self._kept[key][0], lifetime)
-        return Preparation(call, seconds, lambda answer: self._keep(key, send(answer), lifetime))
+        send = missing.send
+        return missing._replace(send=lambda answer: self._keep(key, send(answer), lifetime))
 
     def _keep(self, key: Hashable, handle: Any, lifetime: int) -> Any:
         """Return a handle, and keep it until it has not been used during `lifetime` uploads."""
@@ -354,7 +327,7 @@ class GpuResources:
         sources = surface, field, tone, instance.color_values
         key = "mesh", *map(id, sources), linear.tobytes(), display, channels
         seconds = BUFFER_SECONDS * len(surface.triangles)
-        return self._look_up(key, call, seconds, send, MESH_LIFETIME)
+        return self._look_up(key, Preparation(call, seconds, send), MESH_LIFETIME)
 
     def _rows_texture(
         self, rows: np.ndarray, surface: Surface, what: str, remedy: str = "choose the processor"
@@ -368,11 +341,10 @@ class GpuResources:
         """Return (H, W, C) values as a texture of four channels; those after the first C are 0."""
         height, width, channels = values.shape
         data = np.pad(values, ((0, 0), (0, 0), (0, 4 - channels))) if channels < 4 else values
-        return self.device.texture(width, height, "RGBA32F", data=data)
+        return self.device.texture((width, height), "RGBA32F", data=data)
 
     def _upload_atlas(self, mip_map: MipMap) -> MipAtlas:
         max_side = min(MAX_TONE_IMAGE_SIDE, self.device.max_texture_size // 2)
         texels, size, max_level = mip_atlas(mip_map, max_side)
-        height, width = texels.shape[:2]
-        texture = self.device.texture(width, height, "RGBA16F", data=texels)
+        texture = self.device.texture(texels.shape[1::-1], "RGBA16F", data=texels)
         return MipAtlas(texture, size, max_level, len(mip_map.levels) - 1 - max_level)

@@ -56,9 +56,7 @@ def select_device(device: str, look: Look) -> str:
     return "gpu"
 
 
-def picture_steps(
-    view: ViewInput, device: str, *, keep_gbuffers: bool = True, workers: int = 0
-) -> Steps[Picture]:
+def picture_steps(view: ViewInput, device: str) -> Steps[Picture]:
     """Draw a picture as part of a job: on the graphics card in steps, or with numpy in one call.
 
     Parameters
@@ -66,22 +64,23 @@ def picture_steps(
     view : ViewInput
     device : {"cpu", "gpu"}
         Result of `select_device`.
-    keep_gbuffers, workers
-        See `bake_picture`.
 
     Returns
     -------
     Picture
     """
     if device == "cpu":
-        return call_steps(bake_picture, view, keep_gbuffers, workers)
+        return call_steps(bake_picture, view)
     return GpuRenderer(blender_device()).picture_steps(view)
 
 
 def image_steps(
     view: ViewInput, device: str, as_float: bool, *, keep_gbuffers: bool = True, workers: int = 0
 ) -> Steps[tuple[Picture, ImageData]]:
-    """Draw a picture as part of a job, and convert it to an image; see `picture_steps`, `picture_image`."""
+    """Draw a picture as part of a job, and convert it to an image.
+
+    See `picture_steps` and `picture_image`, and `bake_picture` for `keep_gbuffers` and `workers`.
+    """
     if device == "cpu":
         return (yield Call(draw_image, (view, as_float, keep_gbuffers, workers)))
     picture = yield from part(picture_steps(view, device), 0.0, CONVERSION_START)

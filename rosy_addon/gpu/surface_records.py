@@ -13,7 +13,7 @@ from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..projection.outline_mesh import cached_outline_mesh
 from ..projection.surface_lines import SurfaceLines, cached_surface_lines
-from .mesh_buffers import ROW_TEXELS, to_texture_rows
+from .mesh_buffers import empty_records, to_texture_rows
 
 #: Largest number of bisections from a triangle of a mesh down to a leaf of its `BisectionTree`.
 MAX_TREE_DEPTH = 96
@@ -46,7 +46,8 @@ def line_rows(lines: SurfaceLines) -> tuple[np.ndarray, int]:
     rows : (rows, ROW_TEXELS, 4) float32 ndarray
         First, a texel for each node of the `BisectionTree`: the node's first child or -1, its bisected
         edge, and its leaf. Then 1 + M texels for each leaf: its heading (see `SurfaceLines`), and for each
-        of the M line directions the phases at the corners and the index of the phase.
+        of the M line directions the phases at the corners and the number of lines that end in the leaf
+        (see `StripePattern`).
     node_count : int
         Number of nodes in `rows`; 0 if no triangle is bisected, so that no nodes are needed.
     """
@@ -54,17 +55,15 @@ def line_rows(lines: SurfaceLines) -> tuple[np.ndarray, int]:
     leaf_count, family_count = pattern.index.shape
     node_count = len(tree.leaf) if len(tree.leaf) > leaf_count else 0
     texel_count = node_count + leaf_count * (1 + family_count)
-    row_count = max(-(-texel_count // ROW_TEXELS), 1)
-    flat = np.zeros((row_count * ROW_TEXELS, 4), dtype=np.float32)
+    rows, texels = empty_records(texel_count, 1)
     if node_count:
-        flat[:node_count, 0] = tree.first_child
-        flat[:node_count, 1] = tree.split_edge
-        flat[:node_count, 2] = tree.leaf
-    records = flat[node_count:texel_count].reshape(leaf_count, 1 + family_count, 4)
+        nodes = tree.first_child, tree.split_edge, tree.leaf
+        texels[:node_count, 0, :3] = np.stack(nodes, axis=1)
+    records = texels[node_count:].reshape(leaf_count, 1 + family_count, 4)
     records[:, 0, :2] = lines.heading.T
     records[:, 1:, :3] = pattern.phase
     records[:, 1:, 3] = pattern.index
-    return flat.reshape(row_count, ROW_TEXELS, 4), node_count
+    return rows, node_count
 
 
 def outline_records(
@@ -80,6 +79,7 @@ def outline_records(
     center : (3,) ndarray
         `MeshBuffers.center`.
     crease_angle : float or None
+        Smallest angle between the normals of the faces at a crease, in radians. None: there are no creases.
 
     Returns
     -------

@@ -10,7 +10,7 @@ from ..compositor.color_values import value_scale
 from ..compositor.look import colors_values
 from ..projection.shadow_maps import light_cameras
 from .defines import HEADLIGHT, SUN_LIGHT, TONE_SOURCES
-from .frame import Box, Frame, is_empty, screen_box, union_box
+from .frame import Box, Frame, is_empty, union_box
 from .passes import ComputePass, RasterPass
 from .uniforms import light_uniforms, light_view_uniforms, shadow_uniforms, tone_uniforms
 
@@ -18,9 +18,9 @@ from .uniforms import light_uniforms, light_view_uniforms, shadow_uniforms, tone
 def render_target_tones(frame: Frame) -> None:
     """Render the target tone of each pixel into ``frame.textures["tones"]``.
 
-    The light alone is rendered into the texture ``lighting``. If the look colors values of the surface,
-    the last component of ``tones`` is the position of the value in the color map, from 0 to 1, or -1 where
-    there is no value. `target_tone.target_tone` does the same with numpy.
+    The light alone is rendered into the texture ``lighting``. If the look shows values of the surface by a
+    color map, the last component of ``tones`` is the position of the value in the color map, from 0 to 1,
+    or -1 where there is no value. `target_tone.target_tone` does the same with numpy.
     """
     look, reference = frame.look, frame.view.reference
     tones = frame.image("tones")
@@ -31,10 +31,9 @@ def render_target_tones(frame: Frame) -> None:
         "values_bottom": low,
         "values_scale": scale,
     }
-    images, shader = {"tones": tones}, ComputePass("tone")
     reference_atlas = None if reference is None else frame.resources.reference_atlas(reference)
     lighting = frame.textures["lighting"] = _lighting(frame)
-    for instance_id, item, box in frame.fields_in_view():
+    for instance_id, item in frame.fields_in_view():
         atlas = item.mesh.tone_atlas if look.tone == "image" else reference_atlas
         level = 0 if atlas is None else atlas.max_level
         if atlas is not None and look.tone == "picture":
@@ -49,15 +48,14 @@ def render_target_tones(frame: Frame) -> None:
             "image_level": level,
             "values_texel": item.mesh.buffers.values_texel,
         }
-        textures = {"tone_image": lighting if atlas is None else atlas.texture}
-        frame.run_on_instance(shader, instance_id, box, textures, images, uniforms)
+        textures = {"tone_image": lighting if atlas is None else atlas.texture, "tones": tones}
+        frame.run_on_instance(ComputePass("tone"), instance_id, textures, uniforms)
     frame.textures["tones"] = tones
 
 
 def _lighting(frame: Frame) -> Any:
     """Return an image of the light of all light sources together, as `shading.diffuse` at full strength."""
-    boxes = [screen_box(item, frame.camera) for item in frame.items if item.kind is not None]
-    box = union_box(boxes)
+    box = union_box(frame.boxes[instance_id] for instance_id, _ in frame.fields_in_view())
     images = [frame.image(f"lighting {index}") for index in range(2)]
     lights = [] if is_empty(box) else light_uniforms(frame.look, frame.view.lights)
     for index, light in enumerate(lights):
@@ -67,9 +65,10 @@ def _lighting(frame: Frame) -> Any:
             if is_shadowed
             else frame.textures["normals"],
             "previous_lighting": images[1],
+            "lighting": images[0],
         }
         uniforms = {**light, "is_shadowed": int(is_shadowed), "is_first": int(index == 0)}
-        frame.run(ComputePass("lighting"), box, textures, {"lighting": images[0]}, uniforms)
+        frame.run(ComputePass("lighting"), box, textures, uniforms)
         images.reverse()
     return images[1]
 
@@ -84,15 +83,16 @@ def _shadow_visibility(frame: Frame, light: dict[str, Any], box: Box) -> Any:
     images = [frame.image(f"shadow visibility {index}", "RGBA16F") for index in range(2)]
     instances = [item.instance for item in frame.items]
     for index, light_view in enumerate(light_cameras(instances, frame.camera, kind, vector)):
-        shadow_map = frame.resources.image("shadow_map", light_view.width, light_view.height)
+        size = light_view.width, light_view.height
+        shadow_map = frame.resources.image("shadow_map", size)
         batches = [(item.mesh.batch, shadow_uniforms(item, light_view)) for item in frame.items]
         frame.draw(RasterPass("shadow_map"), batches, shadow_map)
-        frame.run(
-            ComputePass("shadow_visibility"),
-            box,
-            {"shadow_map": shadow_map, "previous_visibility": images[1]},
-            {"shadow_visibility": images[0]},
-            {**light_view_uniforms(light_view, frame.camera), "is_first": int(index == 0)},
-        )
+        textures = {
+            "shadow_map": shadow_map,
+            "previous_visibility": images[1],
+            "shadow_visibility": images[0],
+        }
+        uniforms = {**light_view_uniforms(light_view, frame.camera), "is_first": int(index == 0)}
+        frame.run(ComputePass("shadow_visibility"), box, textures, uniforms)
         images.reverse()
     return images[1]

@@ -8,12 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..compositor.contrast import expected_std, streak_args
-from ..compositor.even_lines import (
-    FADE_PIXELS,
-    MAX_EDGE_WIDTH,
-    WOBBLE_SHIFT,
-    crowded_pixels,
-)
+from ..compositor.even_lines import FADE_PIXELS, MAX_EDGE_WIDTH, WOBBLE_SHIFT, crowded_pixels
 from ..compositor.family_hues import SOFTMAX_SHARPNESS
 from ..compositor.filter_kernel import full_sample_count
 from ..compositor.flow import channel_shifts, channel_weights
@@ -48,25 +43,12 @@ from ..compositor.streak_statistics import (
     look_streak_statistics,
     softness,
 )
-from ..compositor.surface_noise import (
-    FEATURE_CELLS,
-    LATTICE_SCALE,
-    SUBPIXEL_OFFSETS,
-    lattice_axes,
-)
+from ..compositor.surface_noise import FEATURE_CELLS, LATTICE_SCALE, SUBPIXEL_OFFSETS, lattice_axes
 from ..compositor.target_tone import ReferenceRender, tone_curve
 from ..compositor.wobble import MEAN_WAVELENGTH_WIDTHS, WOBBLE_STD, has_wobble
 from ..projection.camera import Camera
 from ..projection.shadow_maps import NORMAL_BIAS_PIXELS
-from .defines import (
-    FLOW_ALONG,
-    FLOW_NONE,
-    FLOW_TO_ANGLE,
-    HEADLIGHT,
-    KERNELS,
-    POINT_LIGHT,
-    SUN_LIGHT,
-)
+from . import defines
 from .mesh_buffers import FieldKind
 from .resources import DrawItem
 
@@ -119,7 +101,7 @@ def look_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
     ends = magnitude_range(look)
     return {
         **covering_uniforms(kind),
-        "kernel": KERNELS[kernel],
+        "kernel": defines.KERNELS[kernel],
         **_flow_uniforms(kind, look),
         "half_length": 0 if is_even(look) else look.length,
         "full_samples": full_sample_count(look.length, kernel),
@@ -158,11 +140,16 @@ def look_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
 
 
 def _flow_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
-    """Return the uniforms of drifting streaks: the kind of drift, and the shifts and weights of channels."""
+    """Return the uniforms of drifting streaks: the kind of drift, and the state of the noise channels.
+
+    For each of the three channels, these are the shift along the line, in steps of the streamline, and the
+    weight; see `flow.channel_shifts` and `flow.channel_weights`.
+    """
     if not has_flow(look):
-        return {"flow_mode": FLOW_NONE, "flow_shifts": (0.0,) * 4, "flow_weights": (0.0,) * 4}
+        zeros = (0.0,) * 4
+        return {"flow_mode": defines.FLOW_NONE, "flow_shifts": zeros, "flow_weights": zeros}
     return {
-        "flow_mode": FLOW_TO_ANGLE if kind.symmetry.has_opposites else FLOW_ALONG,
+        "flow_mode": defines.FLOW_TO_ANGLE if kind.symmetry.has_opposites else defines.FLOW_ALONG,
         "flow_shifts": (*channel_shifts(look.flow_phase, look.flow_distance), 0.0),
         "flow_weights": (*channel_weights(look.flow_phase), 0.0),
     }
@@ -176,19 +163,18 @@ def _paper_grain_depth(look: PixelLook, statistics: StreakStatistics | None) -> 
 
 def light_uniforms(look: Look, lights: Sequence[Light]) -> list[dict[str, Any]]:
     """Return the uniforms of each light; if there is none, the uniforms of a black headlight."""
+    headlight = {"light_kind": defines.HEADLIGHT, "light_vector": (0.0,) * 4}
     if look.light == "headlight":
-        return [{"light_kind": HEADLIGHT, "light_vector": (0.0,) * 4, "light_color": (1.0,) * 4}]
+        return [{**headlight, "light_color": (1.0,) * 4}]
     result = [
         {
-            "light_kind": SUN_LIGHT if light.kind == "sun" else POINT_LIGHT,
+            "light_kind": defines.SUN_LIGHT if light.kind == "sun" else defines.POINT_LIGHT,
             "light_vector": (*np.asarray(light.vector, dtype=float), 0.0),
             "light_color": (*np.asarray(light.color) * light.strength, 1.0),
         }
         for light in lights_of(look, lights)
     ]
-    return result or [
-        {"light_kind": HEADLIGHT, "light_vector": (0.0,) * 4, "light_color": (0.0,) * 4}
-    ]
+    return result or [{**headlight, "light_color": (0.0,) * 4}]
 
 
 def tone_uniforms(look: Look, camera: Camera, reference: ReferenceRender | None) -> dict[str, Any]:
@@ -206,14 +192,22 @@ def tone_uniforms(look: Look, camera: Camera, reference: ReferenceRender | None)
 
 
 def shadow_uniforms(item: DrawItem, light_view: Camera) -> dict[str, Any]:
-    """Return the uniforms that render a shadow map: the matrices from model space to clip space and depth."""
+    """Return the uniforms that render a shadow map, as rows of matrices.
+
+    They are the matrix from model space to the clip space of the light, and the row that maps model space to
+    the depth along the axis of the light's camera.
+    """
     clip = light_view.projection @ light_view.view @ item.model_matrix
     depth_row = tuple(-(light_view.view @ item.model_matrix)[2])
     return {**matrix_rows("clip", "xyzw", clip), "depth_row": depth_row}
 
 
 def light_view_uniforms(light_view: Camera, camera: Camera) -> dict[str, Any]:
-    """Return the uniforms that look up a shadow map: the matrices from camera space, and the normal bias."""
+    """Return the uniforms that look up a shadow map: two matrices, as rows, and the normal bias.
+
+    The first matrix maps camera space to the camera space of the light, the second maps the latter to x and y
+    of the light's clip space. The bias is in Blender units, for a perspective light at depth 1.
+    """
     rotation, translation = camera.view[:3, :3], camera.view[:3, 3]
     camera_to_world = np.eye(4)
     camera_to_world[:3, :3], camera_to_world[:3, 3] = rotation.T, -rotation.T @ translation
@@ -226,20 +220,6 @@ def light_view_uniforms(light_view: Camera, camera: Camera) -> dict[str, Any]:
     }
 
 
-def instance_uniforms(
-    instance_id: int, first_triangle_id: int, item: DrawItem, camera: Camera
-) -> dict[str, Any]:
-    """Return the uniforms of passes over the pixels of one instance."""
-    model_to_camera = camera.view @ item.model_matrix
-    return {
-        "instance_id": float(instance_id),
-        "first_triangle_id": first_triangle_id,
-        "triangle_count": item.mesh.buffers.triangle_count,
-        "texels_per_record": item.mesh.buffers.texels_per_record,
-        **matrix_rows("model_view", "xyz", model_to_camera[:3]),
-    }
-
-
 def covering_uniforms(kind: FieldKind) -> dict[str, Any]:
     """Return the uniforms from which shaders compute the index of a sheet of the covering surface.
 
@@ -248,7 +228,7 @@ def covering_uniforms(kind: FieldKind) -> dict[str, Any]:
     return {
         "degree": kind.degree,
         "line_count": kind.line_count,
-        "sheet_count": kind.sheets_per_turn,
+        "sheet_count": kind.symmetry.sheets_per_turn,
     }
 
 
@@ -321,7 +301,10 @@ def surface_cell_uniforms(
 
 
 def wobble_uniforms(look: PixelLook, item: DrawItem, camera: Camera) -> dict[str, Any]:
-    """Return the uniforms for the wavelength of the wobble, in pixels or in units of a surface."""
+    """Return the uniforms for the wavelength of the wobble.
+
+    It is in units of the object space of the item if the noise is anchored to surfaces, otherwise in pixels.
+    """
     wavelength = look.line_width * MEAN_WAVELENGTH_WIDTHS
     cell_size = cell_size_args(look)
     on_surface = look.anchor == "surface"

@@ -52,11 +52,8 @@ def gif_bytes(frames: Sequence[np.ndarray], rate: float) -> bytes:
         parts.append(struct.pack("<BHHHHB", 0x2C, 0, 0, width, height, 0))
         parts.append(b"\x08")
         data = lzw_compress(np.ascontiguousarray(index, dtype=np.uint8).tobytes())
-        parts += [
-            bytes([len(block)]) + block
-            for start in range(0, len(data), 255)
-            if (block := data[start : start + 255])
-        ]
+        blocks = (data[start : start + 255] for start in range(0, len(data), 255))
+        parts += [bytes([len(block)]) + block for block in blocks]
         parts.append(b"\x00")
     return b"".join([*parts, b"\x3b"])
 

@@ -33,8 +33,7 @@ def image_of_pixels(pixels: np.ndarray, as_float: bool, *, is_color: bool) -> Im
 def image_size(contents: ImageData) -> tuple[int, int]:
     """Return the width and the height of an image in pixels."""
     if isinstance(contents, bytes):
-        width, height = struct.unpack_from(
-            ">II", contents, 16
-        )  # after the header of the first chunk
+        # After the header of the first chunk.
+        width, height = struct.unpack_from(">II", contents, 16)
         return width, height
     return contents.shape[1], contents.shape[0]

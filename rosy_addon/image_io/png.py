@@ -72,12 +72,7 @@ def png_bytes(rgba: np.ndarray, *, is_color: bool = True) -> bytes:
     compressed.append(compressor.flush())
     header = struct.pack(">IIBBBBB", width, height, _BIT_DEPTH, _RGBA_COLOR_TYPE, 0, 0, 0)
     color_space = [(b"sRGB", bytes([_PERCEPTUAL_INTENT]))] if is_color else []
-    chunks = [
-        (b"IHDR", header),
-        *color_space,
-        (b"IDAT", b"".join(compressed)),
-        (b"IEND", b""),
-    ]
+    chunks = [(b"IHDR", header), *color_space, (b"IDAT", b"".join(compressed)), (b"IEND", b"")]
     return _SIGNATURE + b"".join(_pack_chunk(kind, data) for kind, data in chunks)
 
 
@@ -118,11 +113,10 @@ def read_png(path: str | os.PathLike[str]) -> np.ndarray:
     chunks = _read_chunks(path, read_bytes(path))
     invalid_file = RosyError(f"{path}: is damaged, or not a valid .png file")
     try:
-        width, height, bits, color_type, _, _, interlaced = struct.unpack(
-            ">IIBBBBB", chunks[b"IHDR"]
-        )
+        header = struct.unpack(">IIBBBBB", chunks[b"IHDR"])
     except (KeyError, struct.error):
         raise invalid_file from None
+    width, height, bits, color_type, _, _, interlaced = header
     if bits not in (8, 16) or color_type not in _CHANNELS_BY_COLOR_TYPE or interlaced:
         raise RosyError(
             f"{path}: only .png files with 8 or 16 bits per channel, not interlaced, are supported"
@@ -223,11 +217,8 @@ def _undo_filters(rows: np.ndarray, filter_types: np.ndarray) -> np.ndarray:
         left, above, corner = out[row + 1, column], out[row, column + 1], out[row, column]
         estimate = left + above - corner
         errors = [np.abs(estimate - neighbor) for neighbor in (left, above, corner)]
-        paeth = np.where(
-            (errors[0] <= errors[1]) & (errors[0] <= errors[2]),
-            left,
-            np.where(errors[1] <= errors[2], above, corner),
-        )
+        is_left = (errors[0] <= errors[1]) & (errors[0] <= errors[2])
+        paeth = np.where(is_left, left, np.where(errors[1] <= errors[2], above, corner))
         predictions = np.stack([np.zeros_like(left), left, above, (left + above) // 2, paeth])
         row_filters = filter_types[row].astype(np.intp)
         predicted = predictions[row_filters, np.arange(len(row))]

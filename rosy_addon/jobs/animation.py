@@ -15,7 +15,6 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import bpy
@@ -29,6 +28,7 @@ from ..gpu.select import image_steps, select_device
 from ..projection.camera import Camera
 from ..rendering.marks import sequence_key
 from ..rendering.view_input import ViewInput
+from ..scene import pictures
 from ..scene.blender_images import frame_path, write_frame
 from ..scene.camera_planes import update_backdrops
 from ..scene.cameras import CameraSource, frame_camera
@@ -38,13 +38,6 @@ from ..scene.keys import update_keys
 from ..scene.look_inputs import nonfinite_policy
 from ..scene.look_properties import drift_in_scene, read_look
 from ..scene.picture_state import PictureState, read_picture_states
-from ..scene.pictures import (
-    ImageSequence,
-    OutputSettings,
-    apply_sequence,
-    check_targets,
-    read_output_settings,
-)
 from ..scene.read_view import read_views, scene_depsgraph
 from ..scene.scene_reader import SceneData
 from ..scene.visible_objects import field_objects
@@ -75,7 +68,7 @@ class SequenceResult:
     camera: str
     rendered: tuple[int, ...]
     skipped: tuple[int, ...]
-    sequence: ImageSequence
+    sequence: pictures.ImageSequence
     warnings: tuple[str, ...] = ()
 
 
@@ -88,7 +81,7 @@ def bake_animation(
     objects: Sequence[bpy.types.Object] | None = None,
     look: Look | None = None,
     size: tuple[int, int] | None = None,
-    settings: OutputSettings | None = None,
+    settings: pictures.OutputSettings | None = None,
     show: bool = True,
     workers: int = 0,
 ) -> Steps[list[SequenceResult]]:
@@ -115,6 +108,11 @@ def bake_animation(
     Call or Step
         The parts of the job. Their label has the frame number and the remaining time.
 
+    Returns
+    -------
+    list of SequenceResult
+        One result per image sequence.
+
     Raises
     ------
     RosyError
@@ -126,11 +124,8 @@ def bake_animation(
     depsgraph = scene_depsgraph(scene)
     targets = field_objects(depsgraph.view_layer) if objects is None else list(objects)
     if show:
-        check_targets(targets, settings)
+        pictures.check_targets(targets, settings)
     cache = Cache()  # meshes and fields; `_frame_steps` removes those that a frame has not used
-    draw_frame = partial(
-        _frame_steps, scene, cameras, objects, look, size, settings, cache, workers
-    )
     start_time, rendered_count = time.monotonic(), 0
     sequences: dict[str, list[_Frame]] = {}
     scene_data, warnings = None, {}
@@ -144,7 +139,9 @@ def bake_animation(
             yield Step(start, label)
             scene.frame_set(frame)
             try:
-                steps = draw_frame(frame)
+                steps = _frame_steps(
+                    scene, frame, cameras, objects, look, size, settings, cache, workers
+                )
                 scene_data, drawn = yield from part(steps, start, stop, label)
             except RosyError as error:
                 raise RosyError(f"frame {frame}: {error}") from None
@@ -166,18 +163,22 @@ def bake_animation(
             for result, drawn, source in zip(results, sequences.values(), sources, strict=True):
                 states = {one.frame: one.state for one in drawn}
                 camera, sequence = drawn[-1].camera, result.sequence
-                apply_sequence(scene, scene_data, sequence, camera, settings, source, states, key)
+                pictures.apply_sequence(
+                    scene, scene_data, sequence, camera, settings, source, states, key
+                )
             update_backdrops(scene)
             update_keys(scene)
         return results
 
 
-def _folder_settings(scene: bpy.types.Scene, settings: OutputSettings | None) -> OutputSettings:
+def _folder_settings(
+    scene: bpy.types.Scene, settings: pictures.OutputSettings | None
+) -> pictures.OutputSettings:
     """Return the output settings (by default the scene's) after a check that their folder can be written to.
 
     Temporary files that an interrupted job has left in the folder are removed.
     """
-    settings = read_output_settings(scene) if settings is None else settings
+    settings = pictures.read_output_settings(scene) if settings is None else settings
     if settings.folder is None:
         raise RosyError("frames need a folder: choose Output > Store > In a Folder")
     check_folder(settings.folder)
@@ -223,7 +224,7 @@ class _Frame:
 
 def _sequence_result(
     drawn: Sequence[_Frame],
-    settings: OutputSettings,
+    settings: pictures.OutputSettings,
     cameras: Sequence[CameraSource] | None,
     warnings: tuple[str, ...],
 ) -> SequenceResult:
@@ -231,7 +232,7 @@ def _sequence_result(
     first, last = drawn[0], drawn[-1]
     path = _path_of_frame(settings, first.name, cameras, first.frame)
     size = last.camera.width, last.camera.height
-    sequence = ImageSequence(first.name, path, first.frame, last.frame, *size)
+    sequence = pictures.ImageSequence(first.name, path, first.frame, last.frame, *size)
     rendered, skipped = (
         tuple(one.frame for one in drawn if one.up_to_date == up_to_date)
         for up_to_date in (False, True)
@@ -241,14 +242,14 @@ def _sequence_result(
 
 def _frame_steps(
     scene: bpy.types.Scene,
+    frame: int,
     cameras: Sequence[CameraSource] | None,
     objects: Sequence[bpy.types.Object] | None,
     look: Look | None,
     size: tuple[int, int] | None,
-    settings: OutputSettings,
+    settings: pictures.OutputSettings,
     cache: Cache,
     workers: int,
-    frame: int,
 ) -> Steps[tuple[SceneData, list[_Frame]]]:
     """Draw one frame from all cameras as part of a job.
 
@@ -301,9 +302,9 @@ def _frame_steps(
 
 
 def _path_of_frame(
-    settings: OutputSettings, name: str, cameras: Sequence[CameraSource] | None, frame: int
+    settings: pictures.OutputSettings, name: str, cameras: Sequence[CameraSource] | None, frame: int
 ) -> Path:
-    """Return the path of a frame. `name` is that of a camera, or of the scene if `cameras` is None."""
+    """Return the path of a frame. `name` is the name of the camera, or of the scene if `cameras` is None."""
     stem = settings.folder / picture_stem(name, "scene" if cameras is None else "camera")
     return frame_path(stem, frame, settings.as_float)
 
@@ -314,18 +315,11 @@ def _sidecar_text(input_hash: bytes, path: Path) -> bytes:
     return f"{SIDECAR_HEADER}\n{input_hash.hex()}\n{picture_hash.hex()}\n".encode()
 
 
-def _input_hash(view: ViewInput, device: str, settings: OutputSettings) -> bytes:
+def _input_hash(view: ViewInput, device: str, settings: pictures.OutputSettings) -> bytes:
     """Return a hash of everything that a picture is drawn from."""
     camera, reference = view.camera, view.reference
-    parts: list = [
-        view.look,
-        *view.drift,
-        camera.view,
-        camera.projection,
-        camera.width,
-        camera.height,
-        settings.as_float,
-    ]
+    parts: list = [view.look, *view.drift, camera.view, camera.projection]
+    parts += [camera.width, camera.height, settings.as_float]
     if device == "gpu":
         parts.append("by the graphics card")
     if view.look.light == "scene":

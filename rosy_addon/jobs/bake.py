@@ -11,36 +11,27 @@ from ..compositor.ink_thresholds import unlit_look
 from ..compositor.look import Look, is_hatched
 from ..core.cache import BAKE_CACHE
 from ..gpu.select import image_steps, select_device
+from ..scene import pictures
 from ..scene.camera_planes import update_backdrops
 from ..scene.cameras import CameraSource, render_camera
 from ..scene.keys import update_keys
 from ..scene.look_properties import drift_in_scene, read_look
 from ..scene.picture_state import read_picture_states
-from ..scene.pictures import (
-    BakeResult,
-    OutputSettings,
-    apply_picture,
-    check_targets,
-    read_output_settings,
-)
 from ..scene.read_view import read_views, scene_depsgraph
 from ..worker.job import Step, Steps, job, part
-
-__all__ = ["BakeResult", "bake"]
 
 
 @job
 def bake(
     scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph | None = None,
     *,
     objects: Sequence[bpy.types.Object] | None = None,
     cameras: Sequence[CameraSource] | None = None,
     look: Look | None = None,
     size: tuple[int, int] | None = None,
-    settings: OutputSettings | None = None,
+    settings: pictures.OutputSettings | None = None,
     workers: int = 0,
-) -> Steps[list[BakeResult]]:
+) -> Steps[list[pictures.BakeResult]]:
     """Draw the fields of a scene and apply the pictures to the objects.
 
     The scene is read before the first picture is drawn, and changed only after the last one is drawn. If the
@@ -49,8 +40,6 @@ def bake(
     Parameters
     ----------
     scene : bpy.types.Scene
-    depsgraph : bpy.types.Depsgraph, optional
-        Evaluated depsgraph of a view layer of the scene. By default the result of `scene_depsgraph`.
     objects : sequence of bpy.types.Object, optional
         Objects whose fields are drawn. By default all visible objects with a field. All other objects only
         hide what is behind them.
@@ -80,17 +69,17 @@ def bake(
     """
     look = read_look(scene.rosy) if look is None else look
     drift = drift_in_scene(scene, look, scene.frame_current_final)
-    settings = read_output_settings(scene) if settings is None else settings
+    settings = pictures.read_output_settings(scene) if settings is None else settings
     draws_thresholds = settings.relight and is_hatched(look)
     if draws_thresholds:
         look, settings = unlit_look(look), replace(settings, device="cpu")
     sources = [render_camera(scene)] if cameras is None else list(cameras)
-    depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
+    depsgraph = scene_depsgraph(scene)
     views, scene_data = read_views(
         scene, depsgraph, sources, look, objects=objects, size=size, cache=BAKE_CACHE
     )
     BAKE_CACHE.evict_over_limit()
-    check_targets(scene_data.objects, settings)
+    pictures.check_targets(scene_data.objects, settings)
     states = read_picture_states(scene, depsgraph, sources, scene_data.mesh_states)
     device = select_device(settings.device, look)
     drawings = []
@@ -102,7 +91,9 @@ def bake(
         state = replace(states[index], device=device)
         drawings.append((view, picture, image_data, sources[index], state))
     yield Step(0.97, "applying the pictures")
-    results = [apply_picture(scene, scene_data, settings, *drawing) for drawing in drawings]
+    results = [
+        pictures.apply_picture(scene, scene_data, settings, *drawing) for drawing in drawings
+    ]
     update_backdrops(scene)
     update_keys(scene)
     return results

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..compositor.look import Look
 from ..compositor.shading import Light
 from ..core.cache import BAKE_CACHE
 from ..core.errors import RosyError
@@ -16,14 +15,10 @@ from ..scene.look_inputs import color_attribute_of
 from ..scene.look_properties import drift_in_scene, read_look
 from ..scene.meshes import uv_map_name
 from ..scene.picture_state import bakes_light, read_texture_state
-from ..scene.pictures import OutputSettings, apply_texture, check_targets, read_output_settings
+from ..scene.pictures import apply_texture, check_targets, read_output_settings
 from ..scene.read_view import read_lights, read_texture_input, scene_depsgraph
 from ..scene.texture_nodes import Hatching
-from ..surface_texture.draw import (
-    TextureSettings,
-    draw_texture_images,
-    texture_colors_values,
-)
+from ..surface_texture.draw import TextureSettings, draw_texture_images, texture_colors_values
 from ..worker.job import Call, Step, Steps, job
 
 
@@ -46,30 +41,19 @@ class TextureResult:
 
 @job
 def bake_texture(
-    scene: bpy.types.Scene,
-    objects: Sequence[bpy.types.Object],
-    depsgraph: bpy.types.Depsgraph | None = None,
-    *,
-    look: Look | None = None,
-    settings: OutputSettings | None = None,
+    scene: bpy.types.Scene, objects: Sequence[bpy.types.Object]
 ) -> Steps[list[TextureResult]]:
     """Draw the fields of objects as textures for their UV maps, and show them on the objects.
 
-    The settings of the scene decide what the textures show, their size and their margin. Those of each object
-    decide its UV map. The scene is changed only after all textures are drawn. If the job is cancelled before,
-    the scene is unchanged.
+    The settings in ``scene.rosy`` say what the textures show, their size and margin, the look, and how images
+    are stored. The UV map of an object is named in ``object.rosy``. The scene is changed only after all
+    textures are drawn. If the job is cancelled before, the scene is unchanged.
 
     Parameters
     ----------
     scene : bpy.types.Scene
     objects : sequence of bpy.types.Object
         Mesh objects with a field and a UV map.
-    depsgraph : bpy.types.Depsgraph, optional
-        Evaluated depsgraph of a view layer of the scene. By default the result of `scene_depsgraph`.
-    look : Look, optional
-        Settings of the drawing. By default the look of the scene.
-    settings : OutputSettings, optional
-        How the textures are stored. By default the settings of the scene for pictures.
 
     Returns
     -------
@@ -81,26 +65,22 @@ def bake_texture(
     RosyError
         If an object has no field or no UV map, or a texture cannot be drawn or stored.
     """
-    look = read_look(scene.rosy) if look is None else look
+    look, settings = read_look(scene.rosy), read_output_settings(scene)
     content = scene.rosy.texture_content.lower()
-    settings = read_output_settings(scene) if settings is None else settings
     uv_maps = {
         obj: uv_map_name(obj.data, obj.rosy.texture_uv_map, f"object '{obj.name}'")
         for obj in objects
     }
     check_targets(objects, settings)
-    depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
+    depsgraph = scene_depsgraph(scene)
     lights = _lights_to_bake(scene, depsgraph) if bakes_light(scene.rosy, look) else None
     is_udim = scene.rosy.texture_udim
+    drift = drift_in_scene(scene, look, scene.frame_current_final)
     texture_settings = TextureSettings(
-        scene.rosy.texture_size,
-        scene.rosy.texture_margin,
-        is_udim,
-        content,
-        drift_in_scene(scene, look, scene.frame_current_final),
+        scene.rosy.texture_size, scene.rosy.texture_margin, is_udim, content, drift
     )
-    colors = texture_colors_values(look, content)
-    color_attribute = color_attribute_of(scene, look) if colors else None
+    has_colors = texture_colors_values(look, content)
+    color_attribute = color_attribute_of(scene, look) if has_colors else None
     drawn = []
     for index, (obj, uv_map) in enumerate(uv_maps.items()):
         start, stop = (0.98 * done / len(objects) for done in (index, index + 1))
@@ -111,23 +91,14 @@ def bake_texture(
         state = read_texture_state(scene, depsgraph, obj)
         inputs = instance, uv, look, texture_settings, lights, settings.as_float
         texture = yield Call(draw_texture_images, inputs, start, stop)
-        hatching = None
-        if content == "look" and texture.is_data:
-            hatching = Hatching(look, texture.line_count)
-        drawn.append((obj, texture, state, hatching))
+        is_hatching = content == "look" and texture.is_data
+        hatching = Hatching(look, texture.line_count) if is_hatching else None
+        drawn.append((obj, uv_map, texture, state, hatching))
     yield Step(0.98, "applying the textures")
     results = []
-    for obj, texture, state, hatching in drawn:
+    for obj, uv_map, texture, state, hatching in drawn:
         image = apply_texture(
-            scene,
-            obj,
-            uv_maps[obj],
-            texture.tiles,
-            settings,
-            state,
-            content,
-            hatching,
-            is_udim=is_udim,
+            scene, obj, uv_map, texture.tiles, settings, state, content, hatching, is_udim=is_udim
         )
         results.append(TextureResult(obj, image, (texture.note,) if texture.note else ()))
     return results

@@ -56,9 +56,14 @@ class CombStroke:
         BAKE_CACHE.evict_over_limit()
 
     def extend(self, points: np.ndarray, pressure: np.ndarray) -> bool:
-        """Extend the stroke by (n, 3) points of the original mesh, with (n,) pressures from 0 to 1.
+        """Extend the stroke by points on the surface. Return whether the field has changed.
 
-        Return whether the field has changed.
+        Parameters
+        ----------
+        points : (n, 3) ndarray
+            Points on the mesh without modifiers, in object space.
+        pressure : (n,) ndarray
+            Pressures of the pen, 0 to 1.
         """
         return self._follow(self._stroke.extend(points, pressure))
 

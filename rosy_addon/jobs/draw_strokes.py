@@ -53,7 +53,6 @@ class StrokeResult:
 @job
 def draw_strokes(
     scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph | None = None,
     *,
     kind: str | None = None,
     path: Path | str | None = None,
@@ -72,8 +71,6 @@ def draw_strokes(
     Parameters
     ----------
     scene : bpy.types.Scene
-    depsgraph : bpy.types.Depsgraph, optional
-        Evaluated depsgraph of a view layer of the scene. By default the result of `scene_depsgraph`.
     kind : {"PENCIL", "CURVES", "FILE"}, optional
         Grease Pencil object, curves object or file. By default ``scene.rosy.strokes.kind``.
     path : Path or str, optional
@@ -109,18 +106,15 @@ def draw_strokes(
     kind = settings.kind if kind is None else kind
     style = read_stroke_style(settings) if style is None else style
     pen = read_pen(settings) if pen is None else pen
-    suffix = ""
     if kind == "FILE":
-        path = drawing_path(settings.filepath if path is None else path)
-        suffix = check_drawing_suffix(path)
-    depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
+        path, suffix = _drawing_path(settings.filepath if path is None else path)
+    depsgraph = scene_depsgraph(scene)
     source = render_camera(scene) if camera is None else camera
     view = resolve_camera(scene, depsgraph, source, render_size(scene) if size is None else size)
     scene_data = read_scene(depsgraph, objects, ReadRequest(nonfinite_policy(scene)), BAKE_CACHE)
     BAKE_CACHE.evict_over_limit()
-    followed = None
-    if kind == "CURVES" and settings.follow:
-        followed = _followed_instance(scene_data)
+    is_following = kind == "CURVES" and settings.follow
+    followed = _followed_instance(scene_data) if is_following else None
     lights = lights_of(style, read_lights(depsgraph, view.view))
     inputs = scene_data.instances, view, style, pen, lights
     if kind == "FILE":
@@ -131,22 +125,16 @@ def draw_strokes(
     yield Step(0.97, "storing the strokes")
     # The strokes move with the drawn object, if there is only one.
     parent = scene_data.objects[0] if len(scene_data.objects) == 1 else None
-    obj = store_strokes(
-        scene,
-        kind,
-        curves,
-        view.name,
-        parent,
-        collection,
-        0 if followed is None else len(followed.surface.vertices),
-    )
-    return StrokeResult(
-        view.name, drawing, obj, notes=(*scene_data.warnings, *_notes(scene, obj, style))
-    )
+    vertex_count = 0 if followed is None else len(followed.surface.vertices)
+    obj = store_strokes(scene, kind, curves, view.name, parent, collection, vertex_count)
+    notes = (*scene_data.warnings, *_notes(scene, obj, style))
+    return StrokeResult(view.name, drawing, obj, notes=notes)
 
 
-def drawing_path(path: Path | str) -> Path:
-    """Return the absolute path of a file of strokes. ``//`` stands for the folder of the .blend file.
+def _drawing_path(path: Path | str) -> tuple[Path, str]:
+    """Return the absolute path of a file of strokes, and its suffix.
+
+    ``//`` stands for the folder of the .blend file.
 
     Raises
     ------
@@ -157,13 +145,13 @@ def drawing_path(path: Path | str) -> Path:
     if str(path).startswith("//") and not bpy.data.filepath:
         raise RosyError(f"{path}: save the .blend file first, or choose an absolute path")
     path = Path(bpy.path.abspath(str(path)))
-    check_drawing_suffix(path)
+    suffix = check_drawing_suffix(path)
     check_writable(path)
-    return path
+    return path, suffix
 
 
 def _followed_instance(scene_data: SceneData) -> MeshInstance:
-    """Return the only mesh instance with a field, whose surface the strokes will follow.
+    """Return the only mesh instance with a field. When it deforms, the strokes will deform with it.
 
     Raises
     ------

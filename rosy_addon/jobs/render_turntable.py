@@ -11,14 +11,7 @@ import bpy
 
 from ..core.file_io import write_bytes
 from ..gpu.select import picture_steps, select_device
-from ..rendering.turntable import (
-    check_still,
-    draw_frame,
-    is_gif,
-    turntable_views,
-    video_frame,
-    video_steps,
-)
+from ..rendering import turntable
 from ..rendering.view_input import ViewInput
 from ..scene.look_properties import read_look
 from ..scene.read_view import read_turntable, scene_depsgraph
@@ -80,12 +73,15 @@ def render_turntable(
     """
     look = read_look(scene.rosy)
     look = replace(look, supersampling=max(look.supersampling, MIN_SUPERSAMPLING))
-    check_still(look, still, obj.name)
+    turntable.check_still(look, still, obj.name)
     device = select_device(scene.rosy.device.lower(), look)
     instance, lights = read_turntable(scene, scene_depsgraph(scene), obj, look)
-    views = turntable_views(instance, look, count, size, view_angles, lights=lights, still=still)
-    draw = partial(_frame_steps, device=device, as_gif=is_gif(path), still=still, workers=workers)
-    contents = yield from video_steps(draw, views, count, path, rate, encode_video.begin)
+    views = turntable.turntable_views(
+        instance, look, count, size, view_angles, lights=lights, still=still
+    )
+    as_gif = turntable.is_gif(path)
+    draw = partial(_frame_steps, device=device, as_gif=as_gif, still=still, workers=workers)
+    contents = yield from turntable.video_steps(draw, views, count, path, rate, encode_video.begin)
     yield Step(1.0, "writing the file")
     write_bytes(path, contents)
     return path
@@ -96,6 +92,6 @@ def _frame_steps(
 ) -> Steps[Any]:
     """Draw a view as part of a job, and return its `video_frame`."""
     if device == "cpu":
-        return (yield Call(draw_frame, (view, as_gif, still, workers)))
+        return (yield Call(turntable.draw_frame, (view, as_gif, still, workers)))
     picture = yield from picture_steps(view, device)
-    return (yield Call(video_frame, (picture.rgba, as_gif), 1.0))
+    return (yield Call(turntable.video_frame, (picture.rgba, as_gif), 1.0))

@@ -20,16 +20,17 @@ def arrowheads(strokes: Strokes, distance: float, has_direction: np.ndarray) -> 
     """Return arrowheads along strokes, as additional strokes.
 
     They point from the first point of a stroke to its last, which is the direction of the field. Each is a
-    stroke of three points, from barb to tip to barb, in the tangent plane of the surface.
+    stroke of three points, from barb to tip to barb, in the tangent plane of the surface. The length of its
+    barbs is `BARB_LENGTH` times the spacing at the arrowhead.
 
     Parameters
     ----------
     strokes : Strokes
     distance : float
-        Distance between the arrowheads of a stroke, in spacings. Every stroke that is long enough gets at
-        least one.
+        Distance between the arrowheads of a stroke, as a multiple of the spacing at the middle of the stroke.
+        Every stroke that is long enough gets at least one arrowhead.
     has_direction : (S,) bool ndarray
-        Whether a stroke gets arrowheads, because the directions of its field have no opposite direction.
+        Whether a stroke gets arrowheads: its field contains no direction together with the opposite one.
 
     Returns
     -------
@@ -37,8 +38,7 @@ def arrowheads(strokes: Strokes, distance: float, has_direction: np.ndarray) -> 
         The arrowheads alone. Each has the family of its stroke.
     """
     arc, length = strokes.arc, strokes.length
-    middle = (strokes.start[:-1] + strokes.start[1:]) // 2
-    spacing = strokes.spacing[middle]
+    spacing = strokes.spacing[(strokes.start[:-1] + strokes.start[1:]) // 2]
     is_long = has_direction & (length > MIN_LENGTH * BARB_LENGTH * spacing)
     count = np.zeros(len(strokes), dtype=np.int64)
     count[is_long] = np.maximum(np.rint((length / distance)[is_long] / spacing[is_long]), 1)
@@ -48,20 +48,18 @@ def arrowheads(strokes: Strokes, distance: float, has_direction: np.ndarray) -> 
     offset = np.concatenate([[0.0], np.cumsum(length + 1.0)[:-1]])
     place = offset[stroke] + (rank + 0.5) / count[stroke] * length[stroke]
     key = offset[strokes.stroke] + arc
-    after = np.clip(
-        np.searchsorted(key, place), strokes.start[stroke] + 1, strokes.start[stroke + 1] - 1
-    )
+    first, last = strokes.start[stroke], strokes.start[stroke + 1] - 1
+    after = np.clip(np.searchsorted(key, place), first + 1, last)
     before = after - 1
     step = key[after] - key[before]
-    share = np.divide(place - key[before], step, out=np.zeros_like(step), where=step > 0)[:, None]
-    points, normals = strokes.points, strokes.normal
-    center = points[before] + share * (points[after] - points[before])
-    normal = normalize(normals[before] + share * (normals[after] - normals[before]))
-    along = points[after] - points[before]
+    share = np.divide(place - key[before], step, out=np.zeros_like(step), where=step > 0)
+    center = strokes.between(after, share)
+    normal = normalize(center.normal)
+    along = strokes.points[after] - strokes.points[before]
     along = normalize(along - dot(along, normal)[:, None] * normal)
     across = np.cross(normal, along)
     barb = (BARB_LENGTH * strokes.spacing[after])[:, None]
-    tip = center + 0.5 * np.cos(BARB_ANGLE) * barb * along
+    tip = center.points + 0.5 * np.cos(BARB_ANGLE) * barb * along
     back = tip - np.cos(BARB_ANGLE) * barb * along
     side = np.sin(BARB_ANGLE) * barb * across
     point = np.repeat(after, 3)

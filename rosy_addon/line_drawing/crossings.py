@@ -75,7 +75,7 @@ def find_crossings(strokes: Strokes) -> Crossings:
 
 
 def _first_of_each(stroke: np.ndarray, arc: np.ndarray, tolerance: np.ndarray) -> np.ndarray:
-    """Return the indices of m crossings, without repetitions of an earlier crossing.
+    """Return the indices of the crossings that do not repeat an earlier crossing, in ascending order.
 
     Parameters
     ----------
@@ -91,13 +91,9 @@ def _first_of_each(stroke: np.ndarray, arc: np.ndarray, tolerance: np.ndarray) -
     order = np.lexsort((arc[:, 0], stroke[:, 1], stroke[:, 0]))
     stroke, arc = stroke[order], arc[order]
     is_new = np.ones(len(order), dtype=bool)
-    is_new[1:] = (np.diff(stroke, axis=0) != 0).any(axis=1) | (
-        np.abs(np.diff(arc, axis=0)) > tolerance[order[1:], None]
-    ).any(axis=1)
-    group = np.cumsum(is_new) - 1
-    first = np.full(int(is_new.sum()), len(order))
-    np.minimum.at(first, group, order)
-    return np.sort(first)
+    is_far = np.abs(np.diff(arc, axis=0)) > tolerance[order[1:], None]
+    is_new[1:] = ((np.diff(stroke, axis=0) != 0) | is_far).any(axis=1)
+    return np.sort(np.minimum.reduceat(order, np.flatnonzero(is_new)))
 
 
 def _close_pairs(
@@ -139,10 +135,23 @@ def _close_pairs(
 
 
 def _strip_keys(strokes: Strokes, segment_end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (m,) sort keys of segments, and the (m,) largest difference of the keys of two that cross.
+    """Return keys by which segments are sorted, and the largest difference of the keys of crossing segments.
 
-    The key is the number of the strip times `STRIP_STRIDE`, plus the position along the strip, 0 to 1. Strips
-    are described in `_close_pairs`.
+    Strips are described in `_close_pairs`.
+
+    Parameters
+    ----------
+    strokes : Strokes
+    segment_end : (m,) ndarray of int
+        Index of the point at which each segment ends, sorted by the triangle of the segment.
+
+    Returns
+    -------
+    key : (m,) float64 ndarray
+        Number of the strip times `STRIP_STRIDE`, plus the position along the strip, 0 to 1.
+    window : (m,) float64 ndarray
+        For each segment, the largest difference between its key and the key of a segment in the same strip
+        that crosses it. If the other segment is in the next strip, `STRIP_STRIDE` is added.
     """
     start, end = strokes.points[segment_end - 1], strokes.points[segment_end]
     middle = (start + end) / 2
@@ -235,9 +244,8 @@ def _alternating_under(crossings: Crossings) -> np.ndarray:
     order = np.lexsort((crossings.arc[:, 0], crossings.stroke[:, 0]))
     stroke = crossings.stroke[order, 0]
     count = np.unique(stroke, return_counts=True)[1]
-    rank = concatenated_ranges(np.zeros_like(count), count)
     under = np.empty(len(order), dtype=np.int64)
-    under[order] = (rank + stroke) % 2
+    under[order] = (concatenated_ranges(np.zeros_like(count), count) + stroke) % 2
     return under
 
 
@@ -263,20 +271,17 @@ def cut_intervals(
     arc, point_stroke = strokes.arc, strokes.stroke
     stride = 2 * (float(arc.max(initial=0)) + float(np.max(high - low, initial=0))) + 1
     stroke_length = strokes.length[stroke]
-    reaches_start, reaches_end = low <= 0, high >= stroke_length
+    reaches_end = np.concatenate([low <= 0, high >= stroke_length])
     owner = np.concatenate([point_stroke, stroke, stroke])
-    key = owner * stride + np.concatenate(
-        [arc, np.maximum(low, 0), np.minimum(high, stroke_length)]
-    )
+    position = [arc, np.maximum(low, 0), np.minimum(high, stroke_length)]
+    key = owner * stride + np.concatenate(position)
     # Order at equal arc length: ends of intervals, points, beginnings of intervals. An interval
     # that reaches an end of the stroke also removes the point there.
     point_count, interval_count = len(point_stroke), len(stroke)
     event = np.repeat([0, 1, -1], [point_count, interval_count, interval_count])
     tie_break, survives = event.copy(), event == 0
-    tie_break[point_count:] = np.where(
-        np.concatenate([reaches_start, reaches_end]), -2 * event[point_count:], event[point_count:]
-    )
-    survives[point_count:] = ~np.concatenate([reaches_start, reaches_end])
+    tie_break[point_count:][reaches_end] *= -2
+    survives[point_count:] = ~reaches_end
     order = np.lexsort((tie_break, key))
     event, survives, owner = event[order], survives[order], owner[order]
     depth = np.cumsum(event)
@@ -293,9 +298,7 @@ def cut_intervals(
     cut = strokes.take_points(np.where(event == 0, order, 0))
     for name in POINT_COLUMNS:
         getattr(cut, name)[new] = getattr(inserted, name)
-    counts = np.bincount(owner, minlength=len(strokes))
-    with_cuts = replace(
-        cut, normal=normalize(cut.normal), start=np.concatenate([[0], np.cumsum(counts)])
-    )
+    start = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=len(strokes)))])
+    with_cuts = replace(cut, normal=normalize(cut.normal), start=start)
     # Split at each interval, also where no point lies inside it.
     return with_cuts.runs_where(kept, split_labels=np.cumsum(event == -1), free_at_removed=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from ..field.frames import dot
 from ..field.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
-from .pipeline import LightSource, StrokeDrawing, draw_instances
+from .pipeline import StrokeDrawing, draw_instances
 from .polyline_files import polyline_file, simplify_strokes
 from .stroke_set import Strokes
 from .style import StrokeStyle
@@ -82,7 +82,7 @@ def drawing_file(
     camera: Camera,
     style: StrokeStyle,
     pen: Pen,
-    lights: Sequence[LightSource],
+    lights: Sequence[Any],
 ) -> tuple[StrokeDrawing, bytes]:
     """Draw mesh instances with strokes. Return the drawing and the contents of its file.
 
@@ -109,7 +109,7 @@ def drawing_curves(
     camera: Camera,
     style: StrokeStyle,
     pen: Pen,
-    lights: Sequence[LightSource],
+    lights: Sequence[Any],
     follows: MeshInstance | None,
 ) -> tuple[StrokeDrawing, StrokeGeometry]:
     """Draw mesh instances with strokes. Return the drawing and its curves from `stroke_geometry`."""
@@ -122,7 +122,7 @@ def _draw(
     instances: Sequence[MeshInstance],
     camera: Camera,
     style: StrokeStyle,
-    lights: Sequence[LightSource],
+    lights: Sequence[Any],
     *,
     clip_to_frame: bool,
 ) -> StrokeDrawing:
@@ -170,8 +170,9 @@ def offset_toward_camera(strokes: Strokes, camera: Camera, width: float) -> np.n
     """Return the points of strokes, offset toward the camera that sees them.
 
     Their positions in the picture do not change. Ribbons of the given width that face the camera
-    are then in front of the surface. The offset grows with the angle between the surface and the
-    image plane, but the height above the surface hardly does.
+    are then in front of the surface. The offset along the view ray grows with the angle between the surface
+    and the image plane, so that points are between 1 and 1.5 ribbon widths above the surface. Only where it
+    is seen almost edge-on, they are lower; see `MAX_OFFSET_STEEPNESS`.
 
     Parameters
     ----------
@@ -203,8 +204,7 @@ def attach(strokes: Strokes, height: np.ndarray, instance: MeshInstance) -> Surf
     instance : MeshInstance
         The instance of all strokes.
     """
-    surface = instance.surface
-    corners = surface.triangle_vertex[strokes.triangle]
+    corners = instance.surface.triangle_vertex[strokes.triangle]
     a, b, c = instance.world_points()[corners].transpose(1, 0, 2)
     u, v, offset = b - a, c - a, strokes.points - a
     # Find the nearest point of the plane by least squares.

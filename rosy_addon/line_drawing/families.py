@@ -54,9 +54,8 @@ def label_families(strokes: Strokes, mesh: TangentMesh, right: np.ndarray | None
     middle = (strokes.start[:-1] + strokes.start[1:]) // 2
     triangle = strokes.triangle[middle]
     member = mesh.to_frame(triangle, strokes.member[middle])
-    family_slot = member_offset(member, reference[triangle], mesh.degree) % family_count
-    family = labels[triangle, family_slot].astype(np.int32)
-    return replace(strokes, family=family, names=names)
+    slot = member_offset(member, reference[triangle], mesh.degree) % family_count
+    return replace(strokes, family=labels[triangle, slot].astype(np.int32), names=names)
 
 
 def reference_members(mesh: TangentMesh) -> np.ndarray:
@@ -66,30 +65,27 @@ def reference_members(mesh: TangentMesh) -> np.ndarray:
     family (`TangentMesh.family_z`), it is a member in this direction.
     """
     near = np.ones(len(mesh.z), dtype=np.complex128)
-    if _has_family_z(mesh):
+    if mesh.family_z is not None:
         # The stored member follows the same line direction everywhere. Count from that direction.
         near = np.exp(1j * np.angle(mesh.family_z) * mesh.family_count / mesh.degree)
     return _members_at_centers(mesh, near)
 
 
-def _has_family_z(mesh: TangentMesh) -> bool:
-    """Return whether the field itself marks one of its line directions consistently (`family_z`)."""
-    return mesh.family_z is not None and bool(mesh.family_z.any())
-
-
 def _members_at_centers(mesh: TangentMesh, near: np.ndarray) -> np.ndarray:
-    """Return (T,) complex128: the unit member at the center of each triangle nearest to the tangent `near`.
+    """Return (T,) complex128: for each triangle, the unit member at its center that is nearest to a tangent.
 
-    Where the field is zero, the result is an arbitrary unit tangent.
+    `near`, (T,) complex, holds the tangents in the frames of the triangles. Where the field is zero, the
+    result is an arbitrary unit tangent.
     """
     z = mesh.z.sum(axis=1)
     return nearest_member(near, np.where(z != 0, z, 1), mesh.degree)
 
 
 def member_offset(member: np.ndarray, reference: np.ndarray, degree: int) -> np.ndarray:
-    """Return (n,) int64: how many members of the field `member` is counter-clockwise from `reference`.
+    """Return (n,) int64: by how many steps of 2 pi / N `member` is counter-clockwise from `reference`.
 
-    The result is from 0 to the degree - 1. Both are members, as complex numbers in the same frame.
+    The steps are from 0 to N - 1, where N is `degree`. Both arguments are members of the field, as complex
+    numbers in the same frame.
     """
     angle = np.angle(member * reference.conj())
     return np.rint(angle * degree / (2 * np.pi)).astype(np.int64) % degree
@@ -102,16 +98,13 @@ def global_labels(mesh: TangentMesh) -> np.ndarray | None:
     the surface connects different line directions of a triangle, so that no consistent labels exist.
     """
     family_count, count = mesh.family_count, len(mesh.z)
-    if _has_family_z(mesh):
+    if mesh.family_z is not None:
         return np.broadcast_to(np.arange(family_count), (count, family_count))
     reference = reference_members(mesh)
     triangle, other, edge, _ = shared_edges(mesh)
     transported = reference[triangle] * mesh.edge_transport[triangle, edge]
-    shift = member_offset(
-        nearest_member(transported, mesh.z[other].sum(axis=1), mesh.degree),
-        reference[other],
-        mesh.degree,
-    )
+    nearest = nearest_member(transported, mesh.z[other].sum(axis=1), mesh.degree)
+    shift = member_offset(nearest, reference[other], mesh.degree)
     slots = np.arange(family_count)
     node = triangle[:, None] * family_count + slots
     other_node = other[:, None] * family_count + (slots + shift[:, None]) % family_count
@@ -126,11 +119,12 @@ def global_labels(mesh: TangentMesh) -> np.ndarray | None:
 
 
 def _order_labels(mesh: TangentMesh, component: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Assign the families 0 to M - 1 to the connected components of line directions.
+    """Return the family, 0 to M - 1, of each line direction, given the components of line directions.
 
     A component consists of the line directions that are matched across edges. In each connected part of the
-    surface, the line directions of its first triangle are numbered counter-clockwise, beginning with the
-    nearest to the guide direction. The number of a line direction is the family of its component.
+    surface, the line directions of its first triangle are numbered counter-clockwise. Number 0 is nearest to
+    the first of `GUIDE_AXES` that is not almost normal to the triangle. The number of a line direction is the
+    family of its component.
 
     Parameters
     ----------
@@ -149,8 +143,7 @@ def _order_labels(mesh: TangentMesh, component: np.ndarray, reference: np.ndarra
     family = np.full(int(component.max()) + 1, -1, dtype=np.int64)
     order = np.argsort(component[:, 0], kind="stable")
     _, first_triangle = np.unique(component[order].min(axis=1), return_index=True)
-    guided = _members_near_guide(mesh, None)
-    shift = member_offset(guided, reference, mesh.degree) % family_count
+    shift = member_offset(_members_near_guide(mesh, None), reference, mesh.degree) % family_count
     for triangle in order[first_triangle]:
         components = component[triangle]
         if (family[components] >= 0).any():

@@ -136,9 +136,8 @@ def find_lateral_neighbors(
     forward = dot(pairs.offset, pairs.neighbor_frame[:, 2])
     lateral = np.sqrt(np.maximum(dot(pairs.offset, pairs.offset) - forward * forward, 0))
     # Strokes may come closer to each other head on than side by side.
-    forward_excess = np.maximum(np.abs(forward) - SAMPLE_STEP / 2 * spacing, 0) * (
-        max(min_separation, 1e-3) / HEAD_ON_DISTANCE
-    )
+    forward_excess = np.maximum(np.abs(forward) - SAMPLE_STEP / 2 * spacing, 0)
+    forward_excess *= max(min_separation, 1e-3) / HEAD_ON_DISTANCE
     distance = np.sqrt(lateral * lateral + forward_excess * forward_excess)
     too_near = np.flatnonzero(_is_older(samples, pairs) & (distance < min_separation * spacing))
     near_query, near_neighbor = pairs.query[too_near], pairs.neighbor[too_near]
@@ -151,22 +150,19 @@ def find_lateral_neighbors(
     neighbor_side = (_left_component(pairs.offset, pairs.neighbor_frame) < 0).astype(np.intp)
     covers = lateral_gap < MAX_COVERED_GAP
     # Positions of neighbors in `sample`, or -1. All are -1 if `previous` is not given.
-    first = samples.count
-    if previous is not None:
-        first = sample.min(initial=first)
+    if previous is None:
+        first, step = samples.count, np.zeros(len(sample), dtype=int)
+        previous = np.full(len(sample), -1)
+    else:
+        first, step = sample.min(initial=samples.count), samples.step[sample]
     index = np.maximum(pairs.neighbor - first, -1)
-    gap, yielded, rejected = _judge(
-        np.zeros(len(sample), dtype=int) if previous is None else samples.step[sample],
-        np.full(len(sample), -1) if previous is None else previous,
-        (near_query, np.maximum(near_neighbor - first, -1)),
-        (pairs.query, index, side, lateral_gap),
-        max_gap,
-    )
+    near = near_query, np.maximum(near_neighbor - first, -1)
+    beside = pairs.query, index, side, lateral_gap
+    gap, yielded, rejected = _judge(step, previous, near, beside, max_gap)
     covers &= ~np.append(rejected, False)[index]
     covers &= ~rejected[pairs.query]
-    covering = CoveringPairs(
-        *(column[covers] for column in (pairs.sample, pairs.neighbor, side, neighbor_side))
-    )
+    columns = pairs.sample, pairs.neighbor, side, neighbor_side
+    covering = CoveringPairs(*(column[covers] for column in columns))
     return LateralNeighbors(gap, rejected, yielded, covering)
 
 
@@ -234,14 +230,10 @@ def _rows_of(columns: tuple[np.ndarray, ...], first: int, end: int) -> tuple[np.
 
 def _comparable_pairs(samples: StrokeSamples, sample: np.ndarray) -> _Pairs:
     """Return all pairs of a given sample and another sample of its family that is near on the surface."""
-    radius = SEARCH_RADIUS * samples.spacing[sample]
-    query, neighbor = samples.grid.pairs_within(
-        samples.position[sample], radius, samples.direction[sample]
-    )
-    blocks = [
-        _comparable_block(samples, sample, query[part], neighbor[part])
-        for part in row_blocks(len(query), PAIR_BLOCK)
-    ]
+    radius, direction = SEARCH_RADIUS * samples.spacing[sample], samples.direction[sample]
+    query, neighbor = samples.grid.pairs_within(samples.position[sample], radius, direction)
+    parts = row_blocks(len(query), PAIR_BLOCK)
+    blocks = [_comparable_block(samples, sample, query[part], neighbor[part]) for part in parts]
     if len(blocks) == 1:
         return blocks[0]
     return _Pairs(*(np.concatenate(columns) for columns in zip(*blocks, strict=True)))
@@ -261,31 +253,23 @@ def _comparable_block(
     keep = np.flatnonzero(keep | (arc_gap > MIN_SELF_ARC * samples.spacing.take(current)))
     query, current, neighbor = query.take(keep), current.take(keep), neighbor.take(keep)
     frame, neighbor_frame = (samples.frame.take(one, axis=0) for one in (current, neighbor))
-    normal_cosine = dot(frame[:, 1], neighbor_frame[:, 1])
+    normal, neighbor_normal = frame[:, 1], neighbor_frame[:, 1]
+    normal_cosine = dot(normal, neighbor_normal)
     keep = normal_cosine > MIN_NORMAL_COSINE
-    keep &= samples.mesh.is_same_family(
-        frame[:, 3], frame[:, 1], neighbor_frame[:, 3], neighbor_frame[:, 1]
-    )
+    keep &= samples.mesh.is_same_family(frame[:, 3], normal, neighbor_frame[:, 3], neighbor_normal)
     delta = frame[:, 0] - neighbor_frame[:, 0]
-    normal_sum = frame[:, 1] + neighbor_frame[:, 1]
+    normal_sum = normal + neighbor_normal
     normal_sum_squared = np.maximum(2 + 2 * normal_cosine, 1e-9)
     height = dot(delta, normal_sum)
-    keep = np.flatnonzero(
-        keep & (height * height <= MAX_SLOPE**2 * dot(delta, delta) * normal_sum_squared)
-    )
+    keep &= height * height <= MAX_SLOPE**2 * dot(delta, delta) * normal_sum_squared
+    keep = np.flatnonzero(keep)
     # Project the difference of the positions along the mean normal.
     offset = delta.take(keep, axis=0)
     offset -= (height / normal_sum_squared).take(keep)[:, None] * normal_sum.take(keep, axis=0)
     # Correct the length of the chord to the length of the arc on the bent surface.
     offset *= (1 + (1 - normal_cosine.take(keep)) / 12)[:, None]
-    return _Pairs(
-        query.take(keep),
-        current.take(keep),
-        neighbor.take(keep),
-        frame.take(keep, axis=0),
-        neighbor_frame.take(keep, axis=0),
-        offset,
-    )
+    columns = query, current, neighbor, frame, neighbor_frame
+    return _Pairs(*(column.take(keep, axis=0) for column in columns), offset)
 
 
 def _is_older(samples: StrokeSamples, pairs: _Pairs) -> np.ndarray:

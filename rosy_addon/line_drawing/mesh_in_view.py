@@ -1,7 +1,7 @@
 """Cut from a tangent mesh the part on which strokes are traced: it is in the frame and visible.
 
-Beyond the frame and behind the camera, the size of a pixel has no lower limit, so the number of strokes
-there would have no upper limit.
+Without this cut, there would be no limit to the number of strokes outside the frame: toward the plane through
+the eye, the size of a pixel in world space falls to zero, and the spacing of strokes falls with it.
 
 Strokes on hidden triangles are not traced either. On most models, these are half of all strokes. A stroke
 keeps its distance only from the strokes beside it. So visible strokes are the same as on the whole mesh if
@@ -19,6 +19,7 @@ from ..field.blocks import row_blocks
 from ..field.frames import dot, normalize
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
+from ..projection.pixel_blocks import part_of
 from .stroke_set import Strokes
 from .tangent_mesh import TangentMesh, take_triangles, with_corners
 from .visibility import BLOCK_POINTS, DepthBuffer, in_frame, planes_around, project_to_pixels
@@ -85,7 +86,7 @@ class MeshInView(Parts):
 
 
 def mesh_in_view(mesh: TangentMesh, camera: Camera) -> MeshInView:
-    """Cut off what is outside the frame and its margin, or in front of the near plane.
+    """Cut off what is outside the frame and its margin, or nearer to the camera than the near plane.
 
     Parameters
     ----------
@@ -98,15 +99,14 @@ def mesh_in_view(mesh: TangentMesh, camera: Camera) -> MeshInView:
         The remaining part of the mesh. Edges at the cut have no neighbors. There may be no triangles.
     """
     report(0.0, "finding the part in view")
-    x, y, z, w = _clip_coordinates(mesh.points, camera)
-    right, top = (
-        w * (1 + 2 * min(MARGIN_PIXELS / side, MARGIN_RATIO))
-        for side in (camera.width, camera.height)
-    )
+    matrix = camera.projection @ camera.view
+    # Unlike the result of `@`, clip coordinates are equal for equal points.
+    x, y, z, w = np.einsum("ij,tkj->itk", matrix[:, :3], mesh.points) + matrix[:, 3, None, None]
+    margins = (min(MARGIN_PIXELS / side, MARGIN_RATIO) for side in (camera.width, camera.height))
+    right, top = (w * (1 + 2 * margin) for margin in margins)
     whole = whole_mesh(mesh)
-    pieces = _Pieces(
-        whole.triangle, whole.weights, mesh.neighbor, mesh.neighbor_edge, mesh.edge_transport
-    )
+    adjacency = mesh.neighbor, mesh.neighbor_edge, mesh.edge_transport
+    pieces = _Pieces(whole.triangle, whole.weights, *adjacency)
     for distance in (z + w, right - x, right + x, top - y, top + y):
         pieces = pieces.cut(distance, keeps_both=False)
     if camera.is_perspective:
@@ -121,21 +121,17 @@ def mesh_in_view(mesh: TangentMesh, camera: Camera) -> MeshInView:
 def whole_mesh(mesh: TangentMesh) -> MeshInView:
     """Return a `MeshInView` that contains a mesh without any cut."""
     count = len(mesh.points)
-    return MeshInView(
-        np.arange(count, dtype=np.int32), np.broadcast_to(np.eye(3), (count, 3, 3)), mesh
-    )
-
-
-def _clip_coordinates(points: np.ndarray, camera: Camera) -> np.ndarray:
-    """Return (4, T, 3): clip coordinates x, y, z, w of corners. They are equal for equal points."""
-    matrix = camera.projection @ camera.view
-    return np.einsum("ij,tkj->itk", matrix[:, :3], points) + matrix[:, 3, None, None]
+    weights = np.broadcast_to(np.eye(3), (count, 3, 3))
+    return MeshInView(np.arange(count, dtype=np.int32), weights, mesh)
 
 
 def _depths_of_cuts(depth: np.ndarray) -> np.ndarray:
-    """Return the depths at which triangles are cut, given the (T, 3) depths of their corners.
+    """Return the depths of the planes at which triangles are cut, given the (T, 3) depths of their corners.
 
-    The result is empty if no triangle has depths that differ by more than the factor `MAX_DEPTH_RATIO`.
+    The planes are parallel to the image plane, and depths are in Blender units. After the cuts, the depth
+    changes so little in each triangle that the spacing can be interpolated; see `DEPTH_STEP`. The result has
+    one dimension. It is empty if no triangle has depths that differ by more than the factor
+    `MAX_DEPTH_RATIO`.
     """
     low, high = np.maximum(depth.min(axis=1), 1e-300), depth.max(axis=1)
     is_deep = high > MAX_DEPTH_RATIO * low
@@ -182,24 +178,23 @@ class _Pieces(Parts):
         # negative numbers. The cut is an edge of the tip and of the rest, which is a quadrilateral. The
         # diagonal is an edge of the two triangles into which the rest is divided.
         edge_a, edge_b, edge_c = (3 * crossed + corner for corner in (a, b, c))
-        cut_of_tip, cut_of_rest, diagonal, diagonal_back = (
-            -(4 * np.arange(len(crossed)) + number) - 1 for number in range(4)
-        )
+        first = -4 * np.arange(len(crossed)) - 1
+        cut_of_tip, cut_of_rest, diagonal, diagonal_back = first, first - 1, first - 2, first - 3
         tip = np.stack([at_a, on_ab, on_ac], axis=1), (cut_of_tip, edge_b, edge_c)
         rest = np.stack([on_ab, at_b, at_c], axis=1), (edge_a, diagonal, edge_c)
         other_rest = np.stack([on_ab, at_c, on_ac], axis=1), (edge_b, cut_of_rest, diagonal_back)
-        parts = [
-            (uncut, self.weights[uncut], 3 * uncut[:, None] + np.arange(3), inside_count[uncut] > 0)
-        ]
+        edges = 3 * uncut[:, None] + np.arange(3)
+        parts = [(uncut, self.weights[uncut], edges, inside_count[uncut] > 0)]
         for (weights, edges), is_tip in ((tip, True), (rest, False), (other_rest, False)):
             side = is_alone_inside == is_tip
             kept = slice(None) if keeps_both else side
             edges = np.stack(edges, axis=1)[kept]
             parts.append((crossed[kept], weights[kept], edges, side[kept]))
-        source, weights, edge, side = (
-            np.concatenate(column) for column in zip(*parts, strict=True)
-        )
-        return self._with_parts(source, weights, edge, side, len(crossed))
+        columns = zip(*parts, strict=True)
+        source, weights, edge, side = (np.concatenate(column) for column in columns)
+        neighbor, neighbor_edge = self._neighbors(edge, side, len(crossed))
+        transport = np.where(edge < 0, 1, self.edge_transport.ravel()[np.maximum(edge, 0)])
+        return _Pieces(self.triangle[source], weights, neighbor, neighbor_edge, transport)
 
     def _crossing(
         self, value: np.ndarray, piece: np.ndarray, first: np.ndarray, second: np.ndarray
@@ -219,22 +214,13 @@ class _Pieces(Parts):
         fraction = (start / (start - end))[:, None]
         return (1 - fraction) * self.weights[piece, first] + fraction * self.weights[piece, second]
 
-    def _with_parts(
-        self,
-        source: np.ndarray,
-        weights: np.ndarray,
-        edge: np.ndarray,
-        side: np.ndarray,
-        cut_count: int,
-    ) -> _Pieces:
-        """Find the neighbors of m new pieces, and return the new pieces with them.
+    def _neighbors(
+        self, edge: np.ndarray, side: np.ndarray, cut_count: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the attributes `neighbor` and `neighbor_edge` of m new pieces, which are parts of these.
 
         Parameters
         ----------
-        source : (m,) ndarray of int
-            Index of the old piece that contains each new piece.
-        weights : (m, 3, 3) ndarray
-            Barycentric coordinates of the corners of the new pieces, in whole triangles.
         edge : (m, 3) ndarray of int
             For each edge of a new piece, the number 3 t + k of the edge of an old piece that contains it.
             Edges inside old pieces have negative numbers. Two of them are the same edge if their values of
@@ -244,48 +230,33 @@ class _Pieces(Parts):
         cut_count : int
             Number of old pieces that were cut.
         """
-        is_inner = edge < 0
+        is_inner, old = edge < 0, np.maximum(edge, 0)
         # Two parts of the same old edge are neighbors if they are on the same side of the plane.
-        slot = np.where(is_inner, 0, edge) + 3 * len(self.triangle) * side[:, None]
+        offset = 3 * len(self.triangle) * side[:, None]
         new_edge_at = np.full(6 * len(self.triangle), -1)
         new_edge = np.arange(edge.size).reshape(edge.shape)
-        new_edge_at[slot[~is_inner]] = new_edge[~is_inner]
+        new_edge_at[(old + offset)[~is_inner]] = new_edge[~is_inner]
         inner_edge_at = np.full(4 * cut_count, -1)
         inner_edge_at[-edge[is_inner] - 1] = new_edge[is_inner]
-        old = np.where(is_inner, 0, edge)
         old_neighbor = self.neighbor.ravel()[old].astype(np.int64)
-        beside = 3 * old_neighbor + self.neighbor_edge.ravel()[old]
+        beside = 3 * old_neighbor + self.neighbor_edge.ravel()[old] + offset
         has_neighbor = ~is_inner & (old_neighbor >= 0)
         other = np.full(edge.shape, -1)
-        row = np.broadcast_to(side[:, None], edge.shape)[has_neighbor]
-        other[has_neighbor] = new_edge_at[beside[has_neighbor] + 3 * len(self.triangle) * row]
+        other[has_neighbor] = new_edge_at[beside[has_neighbor]]
         # The numbers of the two sides of an inner edge differ in the last bit.
         other[is_inner] = inner_edge_at[(-edge[is_inner] - 1) ^ 1]
-        transport = np.where(is_inner, 1, self.edge_transport.ravel()[old])
-        return _Pieces(
-            self.triangle[source],
-            weights,
-            np.where(other >= 0, other // 3, -1).astype(np.int32),
-            np.where(other >= 0, other % 3, 0).astype(np.int8),
-            transport,
-        )
+        return (other // 3).astype(np.int32), (np.maximum(other, 0) % 3).astype(np.int8)
 
     def apply(self, mesh: TangentMesh) -> MeshInView:
         """Return the pieces as a mesh, with the values of `mesh` interpolated at their corners."""
-        per_triangle = {
-            name: getattr(mesh, name)[self.triangle]
-            for name in ("x", "y", "normal", "face", "triangle_vertex")
-        }
         part = replace(
-            mesh,
+            part_of(mesh, self.triangle),
             corner_normal=normalize(self.corner_values(mesh.corner_normal)),
             z=self.corner_values(mesh.z),
             harmonics=tuple((j, self.corner_values(values)) for j, values in mesh.harmonics),
-            family_z=None if mesh.family_z is None else mesh.family_z[self.triangle],
             neighbor=self.neighbor,
             neighbor_edge=self.neighbor_edge,
             edge_transport=self.edge_transport,
-            **per_triangle,
         )
         part = with_corners(part, self.corner_values(mesh.points))
         return MeshInView(self.triangle, self.weights, part)
@@ -366,9 +337,7 @@ def triangles_near(mesh: TangentMesh, seen: np.ndarray, spacing: np.ndarray) -> 
         target = mesh.neighbor[source, edge]
         beyond = ~seen[target]
         source, edge, target = source[beyond], edge[beyond], target[beyond]
-        entered = np.stack(
-            [mesh.points[source, (edge + 1) % 3], mesh.points[source, (edge + 2) % 3]], axis=1
-        )
+        entered = mesh.points[source[:, None], np.stack([edge + 1, edge + 2], axis=1) % 3]
         start = np.where(seen[source, None, None], entered, origin[source])
         reached = _edge_distance(start, entered) / spacing[target]
         nearer = np.flatnonzero((reached < distance[target]) & (reached <= HIDDEN_MARGIN))
@@ -389,5 +358,4 @@ def _edge_distance(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     edge = np.stack([second, first])
     along, offset = edge[:, :, 1] - edge[:, :, 0], point - edge[:, :, 0]
     fraction = np.clip(dot(offset, along) / np.maximum(dot(along, along), 1e-300), 0, 1)
-    distance = np.linalg.norm(offset - fraction[..., None] * along, axis=-1)
-    return distance.min(axis=(0, 1))
+    return np.linalg.norm(offset - fraction[..., None] * along, axis=-1).min(axis=(0, 1))

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.progress import progress
+from ..field.blocks import mask
 from ..field.connectivity import build_edges
 from ..field.creases import find_creases
 from ..field.frames import angle_between, dot, normalize
@@ -20,16 +21,11 @@ from ..projection.gbuffer import MeshInstance
 from ..projection.vector_components import cofactor_matrix
 from .stroke_set import Strokes
 from .tangent_mesh import CREASE_ANGLE, is_sharp_edge
-from .visibility import (
-    DepthBuffer,
-    pixel_size,
-    planes_around,
-    project_to_pixels,
-    visible_runs,
-)
+from .visibility import DepthBuffer, pixel_size, planes_around, project_to_pixels, visible_runs
 
 #: Names of the families in outlines; see `Strokes.names`.
 OUTLINE_KINDS = ("silhouettes", "creases", "borders")
+SILHOUETTES, CREASES, BORDERS = range(3)
 
 #: Creases shorter than `MIN_CREASE_PX` pixels are left out if their angle is `REFERENCE_ANGLE` radians. For
 #: other angles, the limit is inversely proportional to the angle. Angles above a right angle count as right
@@ -93,8 +89,8 @@ def outline_strokes(instance: MeshInstance, camera: Camera) -> Strokes:
     ----------
     instance : MeshInstance
     camera : Camera
-        Camera for which the silhouettes are found. Creases that are too short and blunt in its pixels are
-        left out.
+        Camera for which the silhouettes are found. Creases whose length in its pixels is too small for their
+        angle are left out; see `MIN_CREASE_PX`.
 
     Returns
     -------
@@ -114,8 +110,7 @@ def outline_strokes(instance: MeshInstance, camera: Camera) -> Strokes:
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     with progress(0.3, 0.7, "finding outlines"):
         is_crease = _are_pairs(vertex, a, find_creases(surface, CREASE_ANGLE).ends)
-    is_border = np.ones(len(edges.face_count), dtype=bool)
-    is_border[edges.interior] = False
+    is_border = ~mask(len(edges.face_count), edges.interior)
     borders = np.flatnonzero(is_border[edges.corner_edge])
     starts = a[is_crease]
     creases = _edge_segments(corners, starts)
@@ -125,13 +120,10 @@ def outline_strokes(instance: MeshInstance, camera: Camera) -> Strokes:
     silhouettes = Segments(*(np.concatenate(pair) for pair in zip(smooth, sharp, strict=True)))
     angle = angle_between(flat[starts // 3], flat[b[is_crease] // 3])
     salience = _pixel_salience(creases, angle, camera)
-    return Strokes.join(
-        [
-            _strokes(silhouettes, 0, surface),
-            _strokes(creases, 1, surface, salience),
-            _strokes(_edge_segments(corners, borders), 2, surface),
-        ]
-    )
+    silhouettes = _strokes(silhouettes, SILHOUETTES, surface)
+    creases = _strokes(creases, CREASES, surface, salience)
+    borders = _strokes(_edge_segments(corners, borders), BORDERS, surface)
+    return Strokes.join([silhouettes, creases, borders])
 
 
 def _smooth_silhouettes(corners: _Corners, camera: Camera) -> Segments:
@@ -175,26 +167,22 @@ def _sharp_silhouettes(corners: _Corners, a: np.ndarray, b: np.ndarray, camera: 
     with np.errstate(divide="ignore", invalid="ignore"):
         zero = np.clip(np.nan_to_num(facing[..., 0] / (facing[..., 0] - facing[..., 1])), 0, 1)
     cuts = np.sort(np.concatenate([zero, np.zeros((len(a), 1)), np.ones((len(a), 1))], axis=1))
-    middle = (cuts[:, :-1] + cuts[:, 1:]) / 2
-    at_middle = (
-        facing[:, None, :, 0] + middle[..., None] * (facing[..., 1] - facing[..., 0])[:, None]
-    )
+    middle = (cuts[:, :-1] + cuts[:, 1:])[..., None] / 2
+    at_middle = facing[:, None, :, 0] + middle * (facing[..., 1] - facing[..., 0])[:, None]
     is_contour = ((at_middle > 0).sum(axis=2) == 1) & (np.diff(cuts) > 1e-9)
     edge, part = np.nonzero(is_contour)
     fraction = np.stack([cuts[edge, part], cuts[edge, part + 1]], axis=1)[..., None]
     first, last = segments.ends[edge, :1], segments.ends[edge, 1:]
-    return Segments(
-        first + fraction * (last - first), segments.normals[edge], segments.triangle[edge]
-    )
+    ends = first + fraction * (last - first)
+    return Segments(ends, segments.normals[edge], segments.triangle[edge])
 
 
 def _edge_segments(corners: _Corners, starts: np.ndarray) -> Segments:
     """Return the edges of triangles that start at the given corners (3 t + k)."""
     triangle, k = starts // 3, starts % 3
     row, ends = triangle[:, None], np.stack([k, (k + 1) % 3], axis=1)
-    return Segments(
-        corners.points[row, ends], corners.normals[row, ends], triangle.astype(np.int64)
-    )
+    triangle = triangle.astype(np.int64)
+    return Segments(corners.points[row, ends], corners.normals[row, ends], triangle)
 
 
 def _are_pairs(vertex: np.ndarray, starts: np.ndarray, pairs: np.ndarray) -> np.ndarray:
@@ -344,22 +332,16 @@ def _join_at_junction(junction: np.ndarray, outward: np.ndarray, mate: np.ndarra
 # --- visibility --------------------------------------------------------------------------------------
 
 
-def clip_outline(
-    lines: Strokes,
-    instance: MeshInstance,
-    index: int,
-    camera: Camera,
-    depth_buffer: DepthBuffer | None,
+def visible_outline(
+    instance: MeshInstance, index: int, camera: Camera, depth_buffer: DepthBuffer | None
 ) -> Strokes:
-    """Return the parts of outlines that are in the frame and not hidden.
+    """Return the parts of the `outline_strokes` of an instance that are in the frame and not hidden.
 
     Outlines need another depth test than strokes, because silhouettes lie on triangles that may face away
     from the camera where the smooth surface does not.
 
     Parameters
     ----------
-    lines : Strokes
-        The `outline_strokes` of an instance.
     instance : MeshInstance
     index : int
         Index of the instance in the depth buffer.
@@ -372,6 +354,7 @@ def clip_outline(
     Strokes
         With a depth buffer, visible parts that are shorter than `MIN_MARK_PX` are left out.
     """
+    lines = outline_strokes(instance, camera)
     test = None if depth_buffer is None else _OutlineTest(instance, index, depth_buffer).is_visible
     return visible_runs(lines, camera, test, MAX_GAP_PX, MIN_MARK_PX)
 
@@ -405,9 +388,7 @@ class _OutlineTest:
         """Return (m,) bool: whether points of outlines are visible. Parameters are as in `visible_runs`."""
         camera, triangle = self.depth_buffer.camera, block.triangle[point]
         ring_depth = np.full(len(point), -1.0)
-        contour = np.flatnonzero(
-            block.family[block.stroke[point]] == OUTLINE_KINDS.index("silhouettes")
-        )
+        contour = np.flatnonzero(block.family[block.stroke[point]] == SILHOUETTES)
         crossed, inverse = np.unique(triangle[contour], return_inverse=True)
         ring_depth[contour] = self._ring_depth(crossed)[inverse]
         visible = ~self._is_hidden(block.points[point], pixels, triangle, ring_depth)
@@ -418,18 +399,18 @@ class _OutlineTest:
             outward = normalize(normal - dot(normal, to_eye)[:, None] * to_eye)
             moved = points + step * pixel_size(points, camera)[:, None] * outward
             pixels = np.nan_to_num(project_to_pixels(moved, camera)[0])
-            visible[pending] = ~self._is_hidden(
-                moved, pixels, triangle[pending], ring_depth[pending]
-            )
+            around = triangle[pending], ring_depth[pending]
+            visible[pending] = ~self._is_hidden(moved, pixels, *around)
         return visible
 
     def _ring_depth(self, triangle: np.ndarray) -> np.ndarray:
-        """Return (n,) float64: the depth within which adjacent triangles do not hide a silhouette.
+        """Return (n,) float64: tolerances of the depth test for the silhouettes in n triangles.
 
-        It is `MAX_RING_DEPTH` times the longest edge of the triangle, in world space, if the surface does not
-        hide its own silhouette. Then its radial curvature is positive: n . w (normal times the direction to
-        the camera) grows toward the camera. Otherwise, and in triangles that no silhouette crosses, the
-        result is negative.
+        Adjacent triangles do not hide a point of a silhouette that is behind them by less than the tolerance,
+        a distance along the view ray in world space. It is `MAX_RING_DEPTH` times the longest edge of the
+        triangle if the radial curvature of the surface is positive: n . w (normal times the direction to the
+        camera) grows toward the camera. There the surface itself does not hide its silhouette. Elsewhere, and
+        in triangles that no silhouette crosses, the tolerance is -1, so that all triangles are tested.
         """
         a, b, c = (self.points[self.triangle_vertex[triangle, k]] for k in range(3))
         to_eye = self.depth_buffer.camera.view_directions((a + b + c) / 3)
@@ -439,9 +420,8 @@ class _OutlineTest:
         uu, uv, vv = dot(u, u), dot(u, v), dot(v, v)
         along_u, along_v = dot(u, to_eye), dot(v, to_eye)
         # The derivative along the projection of the direction to the eye, times a positive factor.
-        slope = (vv * along_u - uv * along_v) * (fb - fa) + (uu * along_v - uv * along_u) * (
-            fc - fa
-        )
+        slope = (vv * along_u - uv * along_v) * (fb - fa)
+        slope += (uu * along_v - uv * along_u) * (fc - fa)
         longest = np.sqrt(np.maximum(np.maximum(uu, vv), dot(c - b, c - b)))
         crossed = (facing.min(axis=0) < 0) & (facing.max(axis=0) > 0)
         return np.where((slope > 0) & crossed, MAX_RING_DEPTH * longest, -1.0)
@@ -449,10 +429,10 @@ class _OutlineTest:
     def _is_hidden(
         self, points: np.ndarray, pixels: np.ndarray, triangle: np.ndarray, ring_depth: np.ndarray
     ) -> np.ndarray:
-        """Return (n,) bool: whether points are hidden by the triangles visible at all four pixels around.
+        """Return (n,) bool: whether each point is hidden by the triangles at all four pixels around it.
 
-        Triangles that share a vertex with the triangle of the point do not hide it if the distance behind
-        them is less than `ring_depth`, (n,).
+        A triangle that shares a vertex with the triangle of the point does not hide the point if the point is
+        behind it by less than `ring_depth`, (n,), along the view ray, in world space.
         """
         hidden = np.ones(len(points), dtype=bool)
         for plane in planes_around(points, pixels, self.depth_buffer):

@@ -40,13 +40,8 @@ class PathSamples(NamedTuple):
         """Return the samples at `indices`. These must include all samples before them on the same paths."""
         number = np.full(len(self.particle) + 1, -1)
         number[indices] = np.arange(len(indices))
-        return PathSamples(
-            self.particle[indices],
-            self.rank[indices],
-            number[self.previous[indices]],
-            self.arc[indices],
-            self.position.take(indices),
-        )
+        particle, rank, previous, arc = (column[indices] for column in self[:4])
+        return PathSamples(particle, rank, number[previous], arc, self.position.take(indices))
 
 
 class SampledPath:
@@ -80,8 +75,8 @@ class SampledPath:
     ) -> PathSamples:
         """Return samples along the paths, each one step after the sample before it.
 
-        A path that is shorter than its first step has a sample at its end. So has a path whose particle
-        ended.
+        A path also has a sample at its end if it is shorter than its first step, or if its particle cannot
+        continue there.
 
         Parameters
         ----------
@@ -104,22 +99,17 @@ class SampledPath:
             arc = arc + step
             is_beyond = arc > length + ARC_EPS * step
             kept = np.flatnonzero(~is_beyond | ended[particle] | (rank == 0))
-            arc = np.minimum(arc, length)[kept]
-            particle, step, row, is_beyond = (
-                column[kept] for column in (particle, step, row, is_beyond)
-            )
+            arc, is_beyond = np.minimum(arc, length)[kept], is_beyond[kept]
+            particle, step, row = particle[kept], step[kept], row[kept]
             along = self._start[particle] + arc
             segment = np.searchsorted(self._end, along - ARC_EPS * step)
             segment = np.maximum(segment, self._first_segment[particle])
             length, rest = path.length[segment], self._end[segment] - along
             fraction = 1 - np.divide(rest, length, out=np.zeros_like(rest), where=length > 0)
             begin, end = path.begin_weights[segment], path.end_weights[segment]
-            position = SurfaceParticles(
-                path.triangle[segment],
-                begin + np.clip(fraction, 0, 1)[:, None] * (end - begin),
-                path.member[segment],
-                self.sign[particle],
-            )
+            weights = begin + np.clip(fraction, 0, 1)[:, None] * (end - begin)
+            triangle, member = path.triangle[segment], path.member[segment]
+            position = SurfaceParticles(triangle, weights, member, self.sign[particle])
             columns.append((particle, np.full(len(particle), rank), row, arc, *position.columns))
             row = np.arange(sample_count, sample_count + len(particle))
             sample_count += len(particle)
@@ -129,10 +119,8 @@ class SampledPath:
             step = next_step(position.take(kept), particle)
         if not columns:
             return PathSamples(*np.empty((3, 0), np.intp), np.empty(0), SurfaceParticles.empty())
-        particle, rank, row, arc, *position = (
-            np.concatenate(column) for column in zip(*columns, strict=True)
-        )
-        return PathSamples(particle, rank, row, arc, SurfaceParticles(*position))
+        joined = [np.concatenate(column) for column in zip(*columns, strict=True)]
+        return PathSamples(*joined[:4], SurfaceParticles(*joined[4:]))
 
     def cut(self, arc: np.ndarray) -> TracedPath:
         """Return the segments of the paths up to the (n,) distances `arc` from their beginnings."""
@@ -142,11 +130,7 @@ class SampledPath:
         kept = np.flatnonzero(fraction > ARC_EPS)
         path, fraction = path.take(kept), fraction[kept]
         is_cut = fraction < 1 - ARC_EPS
-        end_weights = np.where(
-            is_cut[:, None],
-            path.begin_weights + fraction[:, None] * (path.end_weights - path.begin_weights),
-            path.end_weights,
-        )
-        return path._replace(
-            end_weights=end_weights, length=np.where(is_cut, fraction, 1) * path.length
-        )
+        begin, end = path.begin_weights, path.end_weights
+        end = np.where(is_cut[:, None], begin + fraction[:, None] * (end - begin), end)
+        length = np.where(is_cut, fraction, 1) * path.length
+        return path._replace(end_weights=end, length=length)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
+from typing import Any
 
 import numpy as np
 
@@ -21,11 +22,10 @@ from .arrowheads import arrowheads
 from .crossings import with_crossing_gaps
 from .families import label_families
 from .mesh_in_view import MeshInView, mesh_in_view, seen_triangles, triangles_near, whole_mesh
-from .outline import OUTLINE_KINDS, clip_outline, outline_strokes
+from .outline import OUTLINE_KINDS, outline_strokes, visible_outline
 from .spacing import (
     MAX_SPACING_RATIO,
     CornerSpacing,
-    LightSource,
     fan_vertices,
     lit_tone,
     spacing_by_curvature,
@@ -38,7 +38,7 @@ from .spacing import (
 from .stroke_ends import extend_free_ends, head_on_ends, mark_free_boundary_ends
 from .stroke_set import Strokes
 from .style import StrokeStyle
-from .tangent_mesh import TangentMesh, build_tangent_mesh
+from .tangent_mesh import CREASE_ANGLE, TangentMesh, build_tangent_mesh
 from .trace import trace_on_mesh
 from .visibility import (
     DepthBuffer,
@@ -116,7 +116,7 @@ def draw_instances(
     camera: Camera,
     style: StrokeStyle,
     *,
-    lights: Sequence[LightSource] = (),
+    lights: Sequence[Any] = (),
     clip_to_frame: bool = True,
     cache: Cache | None = None,
 ) -> StrokeDrawing:
@@ -129,7 +129,7 @@ def draw_instances(
     camera : Camera
         Camera of the drawing. Its resolution also sets the length of a pixel.
     style : StrokeStyle
-    lights : sequence of LightSource
+    lights : sequence of compositor.shading.Light
         Lights in camera space, from which the tone is computed. If there are none, the light is at the
         camera.
     clip_to_frame : bool
@@ -160,7 +160,12 @@ def draw_instances(
         with progress(0.01, 0.05, "finding visible strokes"):
             depth_buffer = rasterize_depth(instances, camera)
     view = _View(camera, style, clips, depth_buffer)
-    parts = _traced_parts(instances, drawn, view, lights, cache)
+    parts = []
+    for rank, index in enumerate(drawn):
+        with progress(0.05 + 0.87 * rank / len(drawn), 0.05 + 0.87 * (rank + 1) / len(drawn)):
+            strokes = _instance_strokes(instances[index], index, view, lights, cache)
+        if strokes is not None:
+            parts.append((index, strokes))
     if not parts:
         raise _no_visible_stroke(camera)
     # Families of different instances stay separate until the end. Each belongs to one instance.
@@ -175,10 +180,8 @@ def draw_instances(
             outlines = [(index, _outline(instances[index], index, view)) for index, _ in parts]
         strokes = reduce(Strokes.concatenate, [lines for _, lines in outlines], strokes)
         parts += outlines
-    instance_of_family = np.repeat(
-        np.array([index for index, _ in parts], dtype=np.int32),
-        [len(lines.names) for _, lines in parts],
-    )
+    owner = np.array([index for index, _ in parts], dtype=np.int32)
+    instance_of_family = np.repeat(owner, [len(lines.names) for _, lines in parts])
     heads = []
     if style.arrows:
         points_one_way = np.array([has_arrows(instance) for instance in instances])
@@ -190,39 +193,17 @@ def draw_instances(
             strokes = _overshoot(strokes, view)
     if not len(strokes):
         raise _no_visible_stroke(camera)
-    if heads:
-        strokes = Strokes.join([strokes, *heads])
+    strokes = Strokes.join([strokes, *heads])
     marks = None
     if shows_singularities(style):
         with progress(0.98, 1.0):
             marks = singularity_marks(instances, camera, style)
-    return StrokeDrawing(
-        _merge_families_by_name(strokes), instance_of_family[strokes.family], style.hidden, marks
-    )
-
-
-def _traced_parts(
-    instances: Sequence[MeshInstance],
-    drawn: Sequence[int],
-    view: _View,
-    lights: Sequence[LightSource],
-    cache: Cache,
-) -> list[tuple[int, Strokes]]:
-    """Trace strokes on the instances with the indices `drawn`.
-
-    Return pairs of the index of an instance and its strokes. Instances that cannot be in view are left out.
-    """
-    parts = []
-    for rank, index in enumerate(drawn):
-        with progress(0.05 + 0.87 * rank / len(drawn), 0.05 + 0.87 * (rank + 1) / len(drawn)):
-            strokes = _instance_strokes(instances[index], index, view, lights, cache)
-        if strokes is not None:
-            parts.append((index, strokes))
-    return parts
+    owner = instance_of_family[strokes.family]
+    return StrokeDrawing(_merge_families_by_name(strokes), owner, style.hidden, marks)
 
 
 def _instance_strokes(
-    instance: MeshInstance, index: int, view: _View, lights: Sequence[LightSource], cache: Cache
+    instance: MeshInstance, index: int, view: _View, lights: Sequence[Any], cache: Cache
 ) -> Strokes | None:
     """Return the strokes of a mesh instance before clipping, or None if no stroke can be in view.
 
@@ -237,13 +218,14 @@ def _instance_strokes(
     max_ratio = MAX_SPACING_RATIO ** (1 - style.swell)
     factor = np.ones(len(by_fan.surface.vertices))
     if tone is not None:
-        factor = spacing_by_tone(factor, tone, max_ratio)
+        factor = spacing_by_tone(tone, max_ratio)
     if style.curvature:
         with progress(0.01, 0.02):
-            at_vertices = spacing_by_curvature(instance.surface, 1.0, style.curvature)
+            at_vertices = spacing_by_curvature(instance.surface, style.curvature)
         factor = factor * at_vertices[fan_vertices(instance.surface)]
     with progress(0.02, 0.08):
-        mesh = build_tangent_mesh(instance, cross_creases=style.cross_creases, cache=cache)
+        crease_angle = None if style.cross_creases else CREASE_ANGLE
+        mesh = build_tangent_mesh(instance, crease_angle=crease_angle, cache=cache)
     with progress(0.08, 0.1):
         seen = _part_to_trace(instance, index, mesh, factor[by_fan.surface.triangle_vertex], view)
     if seen is None:
@@ -316,10 +298,9 @@ def _outline(instance: MeshInstance, index: int, view: _View) -> Strokes:
 
     `index` is the index of the instance in the depth buffer.
     """
-    lines = outline_strokes(instance, view.camera)
     if not view.clips:
-        return lines
-    lines = clip_outline(lines, instance, index, view.camera, view.depth_buffer)
+        return outline_strokes(instance, view.camera)
+    lines = visible_outline(instance, index, view.camera, view.depth_buffer)
     return smooth(lines, view.camera)
 
 
@@ -393,11 +374,9 @@ def _is_in_view(points: np.ndarray, camera: Camera) -> bool:
     tested.
     """
     clip = to_clip(points, camera)
-    outside = np.abs(clip[:, :2]) > clip[:, 3:]
-    outside_sides = np.concatenate(
-        [outside & (clip[:, :2] > 0), outside & (clip[:, :2] < 0)], axis=1
-    )
-    return not (outside_sides.all(axis=0).any() or (clip[:, 2] < -clip[:, 3]).all())
+    w = clip[:, 3:]
+    is_outside = np.concatenate([clip[:, :2] > w, clip[:, :3] < -w], axis=1)
+    return not is_outside.all(axis=0).any()
 
 
 def _no_visible_stroke(camera: Camera) -> RosyError:
@@ -409,8 +388,7 @@ def _no_visible_stroke(camera: Camera) -> RosyError:
 
 def _merge_families_by_name(strokes: Strokes) -> Strokes:
     """Return strokes in which families of the same name are merged. The families of outlines are last."""
-    names = sorted(
-        set(strokes.names), key=lambda name: (name in OUTLINE_KINDS, strokes.names.index(name))
-    )
+    # `dict.fromkeys` removes repeated names, and sorting keeps the order of the others.
+    names = sorted(dict.fromkeys(strokes.names), key=OUTLINE_KINDS.__contains__)
     new_family = np.array([names.index(name) for name in strokes.names], dtype=np.int32)
     return replace(strokes, family=new_family[strokes.family], names=tuple(names))

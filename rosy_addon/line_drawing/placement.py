@@ -145,18 +145,8 @@ class GrowingStrokes(ColumnTable):
 
     def add(self, parent_side: np.ndarray, spacing: np.ndarray) -> np.ndarray:
         """Add n strokes with two growing ends each, and return their indices."""
-        count = len(parent_side)
-        return self.append(
-            alive=np.ones(count, dtype=bool),
-            spacing=spacing,
-            parent_side=parent_side,
-            tip_count=np.full(count, 2),
-        )
-
-    def set_seeds(self, stroke: np.ndarray, sample: np.ndarray) -> None:
-        """Set the samples at the seeds of new strokes. They are also the samples at both ends."""
-        self.seed_sample[stroke] = sample
-        self.end_sample[stroke] = sample[:, None]
+        columns = {"spacing": spacing, "parent_side": parent_side}
+        return self.append(len(spacing), alive=True, tip_count=2, **columns)
 
     def add_active_children(self, parent_side: np.ndarray, change: int) -> None:
         """Add `change` to the number of growing strokes seeded beside each given side of a stroke.
@@ -181,18 +171,6 @@ class GrowingStrokes(ColumnTable):
         """Return (n,) float64: the lengths of strokes, in world space."""
         return self.max_arc[stroke] - self.min_arc[stroke]
 
-    def is_clear_of_tips(
-        self, stroke: np.ndarray, arc: np.ndarray, distance: np.ndarray
-    ) -> np.ndarray:
-        """Return (n,) bool: whether points on strokes are at least `distance` from each growing end.
-
-        All parameters are (n,): indices of strokes, signed arc lengths of the points, and distances along the
-        stroke, in world space.
-        """
-        is_clear = (arc <= self.max_arc[stroke] - distance) | self.end_done[stroke, 1]
-        is_clear &= (arc >= self.min_arc[stroke] + distance) | self.end_done[stroke, 0]
-        return is_clear
-
     def finish_ends(self, stroke: np.ndarray, end: np.ndarray) -> np.ndarray:
         """Mark n ends as finished. Return the indices of strokes that have no growing end left."""
         self.end_done[stroke, end] = True
@@ -205,17 +183,16 @@ class GrowingStrokes(ColumnTable):
     def resume_yielded_ends(self) -> tuple[np.ndarray, np.ndarray]:
         """Let the ends that have yielded grow again.
 
-        Strokes that had no growing end left are no longer counted as children of the stroke beside them.
+        A stroke that had no growing end left has already been subtracted from `active_children` of the stroke
+        beside which it was seeded. Its `parent_side` becomes -1, so that it is not subtracted again.
 
         Returns
         -------
         stroke, end : (k,) int64 ndarray
             Strokes, and their ends (0 or 1) that have to grow again.
         """
-        rows = slice(self.count)
-        stroke, end = np.nonzero(
-            self.end_yielded[rows] & self.alive[rows, None] & self.end_done[rows]
-        )
+        resumes = self.end_yielded & self.alive[:, None] & self.end_done
+        stroke, end = np.nonzero(resumes[: self.count])
         self.parent_side[stroke[self.tip_count[stroke] == 0]] = -1
         np.add.at(self.tip_count, stroke, 1)
         return stroke, end
@@ -309,9 +286,8 @@ class StreamlinePlacer:
 
         `sample` and `previous` are as in `find_lateral_neighbors`.
         """
-        neighbors = find_lateral_neighbors(
-            self.samples, sample, self.rules.min_separation, self.rules.max_gap, previous
-        )
+        min_separation, max_gap = self.rules.min_separation, self.rules.max_gap
+        neighbors = find_lateral_neighbors(self.samples, sample, min_separation, max_gap, previous)
         self.samples.remove(sample[neighbors.rejected])
         self.samples.mark_covered(neighbors.covering)
         self.samples.add_open_sides(sample[~neighbors.rejected])
@@ -335,14 +311,9 @@ class StreamlinePlacer:
         left = self.rules.max_length * strokes.spacing[tips.stroke] - strokes.length(tips.stroke)
         count = np.where(tips.step_scale < 1, min(sample_count, MAX_RETRIED_SAMPLES), sample_count)
         count = np.minimum(count, 1 + np.maximum(left / (2 * step), 0)).astype(np.intp)
-        max_segments = max(MIN_SEGMENTS, SEGMENTS_PER_SAMPLE * int(count.max()))
-        _, _, ended, path = advance(
-            mesh,
-            tips.particles,
-            count * step,
-            max_segment_length=SAMPLES_PER_SEGMENT * step,
-            max_segments=max_segments,
-        )
+        limit = max(MIN_SEGMENTS, SEGMENTS_PER_SAMPLE * int(count.max()))
+        longest = SAMPLES_PER_SEGMENT * step
+        _, _, ended, path = advance(mesh, tips.particles, count * step, None, longest, limit)
         path = SampledPath(path, tips.sign)
 
         def next_step(position: SurfaceParticles, tip: np.ndarray) -> np.ndarray:
@@ -353,10 +324,9 @@ class StreamlinePlacer:
         start = mesh.points_at(tips.triangle, tips.weights)
         points = mesh.points_at(traced.position.triangle, traced.position.weights)
         is_first = traced.previous < 0
-        chord = points - np.where(
-            is_first[:, None], start[traced.particle], points[traced.previous]
-        )
+        before = np.where(is_first[:, None], start[traced.particle], points[traced.previous])
         walked = traced.arc - np.where(is_first, 0, traced.arc[traced.previous])
+        chord = points - before
         least = MIN_MOVED_RATIO * step[traced.particle]
         has_moved = (walked > least) & (dot(chord, chord) > least * least)
         ended |= np.bincount(traced.particle, minlength=len(tips)) == 0
@@ -403,7 +373,8 @@ class StreamlinePlacer:
     def rescan(self, rules: SeparationRules) -> None:
         """Change the rules, and allow seeds again where strokes were removed or earlier seeds did not fit.
 
-        Sides of samples that had been treated as covered there are open again if no stroke is beside them.
+        The sides of samples that removed strokes covered, or that were closed after a seed did not fit, are
+        open again if no stroke is beside them.
         """
         self.rules = rules
         samples = self.samples
@@ -433,7 +404,7 @@ class StreamlinePlacer:
         stroke = strokes.add(parent_side, samples.spacing_at(particles))
         step = samples.next_steps(np.zeros(count, dtype=np.int32))
         sample = samples.add(particles, stroke, np.zeros(count), step)
-        strokes.set_seeds(stroke, sample)
+        strokes.seed_sample[stroke], strokes.end_sample[stroke] = sample, sample[:, None]
         is_accepted = ~self._compare(sample).rejected
         strokes.alive[stroke] = is_accepted
         accepted = np.flatnonzero(is_accepted)
@@ -458,9 +429,9 @@ class StreamlinePlacer:
         stroke = samples.stroke[sample]
         ready = strokes.active_children[stroke, side] == 0
         ready &= strokes.length(stroke) >= self.rules.min_length * strokes.spacing[stroke]
-        ready &= strokes.is_clear_of_tips(
-            stroke, samples.arc[sample], PARENT_LEAD * samples.spacing[sample]
-        )
+        arc, lead = samples.arc[sample], PARENT_LEAD * samples.spacing[sample]
+        ready &= (arc <= strokes.max_arc[stroke] - lead) | strokes.end_done[stroke, 1]
+        ready &= (arc >= strokes.min_arc[stroke] + lead) | strokes.end_done[stroke, 0]
         sample, side = sample[ready], side[ready]
         if not len(sample):
             return 0

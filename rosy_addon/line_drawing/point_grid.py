@@ -10,6 +10,7 @@ from functools import cache
 
 import numpy as np
 
+from ..field.blocks import row_blocks
 from ..field.frames import dot
 
 #: Factors of the three cell coordinates, and of the level, in the hash.
@@ -98,26 +99,28 @@ class PointGrid:
         self.point_count += len(points)
         self.point_slot = _grow_to(self.point_slot, self.point_count, 0)
         index = np.arange(first, self.point_count, dtype=np.int32)
-        key = self._hash_cells(self._cells(points, level), level)
+        cell = self.cell * LEVEL_RATIO ** level.astype(np.float64)
+        key = self._hash_cells(np.floor(points / cell[:, None]).astype(np.int64), level)
         order = np.argsort(key, kind="stable")
-        key = key[order]
-        starts_group = np.ones(len(key), dtype=bool)
-        starts_group[1:] = key[1:] != key[:-1]
-        group_start = np.flatnonzero(starts_group)
-        group = np.cumsum(starts_group) - 1
-        key = key[group_start]
-        group_size = np.diff(np.append(group_start, len(points)))
+        key, group_start, group, group_size = np.unique(
+            key[order], return_index=True, return_inverse=True, return_counts=True
+        )
         last_block, block_fill = self.last_block[key], self.last_block_fill[key].astype(np.int64)
         # Fill the last block of each cell, then new blocks.
         chain_position = block_fill[group] + np.arange(len(points)) - group_start[group]
         new_blocks = (block_fill + group_size - 1) // BLOCK_SIZE
         first_new_block = self.block_count + np.cumsum(new_blocks) - new_blocks
         block_ordinal = chain_position // BLOCK_SIZE
-        block = np.where(
-            block_ordinal == 0, last_block[group], first_new_block[group] + block_ordinal - 1
-        )
-        self._append_blocks(first_new_block, new_blocks, last_block)
+        new_block = first_new_block[group] + block_ordinal - 1
+        block = np.where(block_ordinal == 0, last_block[group], new_block)
+        # Link the first new block of a cell to the block that was its last one, and others to the one before.
+        count, self.block_count = self.block_count, self.block_count + int(new_blocks.sum())
+        self.next_block = _grow_to(self.next_block, self.block_count, -1)
+        self.point_index = _grow_to(self.point_index, self.block_count, -1)
+        self.position = _grow_to(self.position, self.block_count, np.nan)
+        self.next_block[count : self.block_count] = np.arange(count, self.block_count) - 1
         grows = new_blocks > 0
+        self.next_block[first_new_block[grows]] = last_block[grows]
         self.last_block[key[grows]] = (first_new_block + new_blocks - 1)[grows]
         self.last_block_fill[key] = block_fill + group_size - BLOCK_SIZE * new_blocks
         slot = chain_position % BLOCK_SIZE
@@ -125,27 +128,6 @@ class PointGrid:
         self.position[block, :, slot] = points[order]
         self.point_slot[index[order]] = block * BLOCK_SIZE + slot
         return index
-
-    def _append_blocks(
-        self, first_new_block: np.ndarray, new_blocks: np.ndarray, last_block: np.ndarray
-    ) -> None:
-        """Append new blocks and link them to the previous last blocks of their cells.
-
-        Parameters
-        ----------
-        first_new_block, new_blocks : (cells,) ndarray of int
-            First new block of each cell, and the number of its new blocks.
-        last_block : (cells,) int32 ndarray
-            Last block of each cell before the call, or -1.
-        """
-        first = self.block_count
-        self.block_count += int(new_blocks.sum())
-        self.next_block = _grow_to(self.next_block, self.block_count, -1)
-        self.point_index = _grow_to(self.point_index, self.block_count, -1)
-        self.position = _grow_to(self.position, self.block_count, np.nan)
-        self.next_block[first : self.block_count] = np.arange(first, self.block_count) - 1
-        grows = new_blocks > 0
-        self.next_block[first_new_block[grows]] = last_block[grows]
 
     def remove(self, index: np.ndarray) -> None:
         """Remove the points with the given indices. Their indices are not used again."""
@@ -165,8 +147,9 @@ class PointGrid:
             Radii of the queries. Points that are farther away than `MAX_RINGS` cells of their level may be
             missed.
         direction : (n, 3) ndarray, optional
-            Unit direction of each query. The query is then restricted to a small ball and a band
-            perpendicular to the direction; see `INNER_RATIO`.
+            Unit direction of each query. The query is then restricted to two parts of its ball: a smaller
+            ball of `INNER_RATIO` times the radius, and a slab perpendicular to the direction, `BAND_RATIO`
+            times the radius to both sides of the center.
 
         Returns
         -------
@@ -179,13 +162,11 @@ class PointGrid:
         for level in sorted(self.levels):
             cell = self.cell * LEVEL_RATIO**level
             rings = np.clip(np.ceil(radius / cell), 1, MAX_RINGS).astype(np.int64)
-            for ring_count in range(1, int(rings.max(initial=0)) + 1):
+            for ring_count in np.unique(rings).tolist():
                 queries = np.flatnonzero(rings == ring_count)
-                for start in range(0, len(queries), QUERY_BATCH_SIZE):
-                    batch = queries[start : start + QUERY_BATCH_SIZE]
-                    pairs += self._batch_pairs(
-                        points, radius * radius, batch, level, ring_count, direction
-                    )
+                for part in row_blocks(len(queries), QUERY_BATCH_SIZE):
+                    batch = queries[part], level, ring_count
+                    pairs += self._batch_pairs(points, radius * radius, *batch, direction)
         if not pairs:
             return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.int32)
         return tuple(np.concatenate(column) for column in zip(*pairs, strict=True))
@@ -213,9 +194,8 @@ class PointGrid:
             direction = direction.take(queries, axis=0)
         is_reached = _reached_cells(scaled - corner, ratio, rings, direction)
         row, column = np.divmod(np.flatnonzero(is_reached), is_reached.shape[1])
-        cells = corner.astype(np.int64).take(row, axis=0) + _ring_offsets(rings).take(
-            column, axis=0
-        )
+        cells = corner.astype(np.int64).take(row, axis=0)
+        cells += _ring_offsets(rings).take(column, axis=0)
         block = self.last_block.take(self._hash_cells(cells, np.int64(level)))
         occupied = np.flatnonzero(block >= 0)
         block, row = block.take(occupied), row.take(occupied)
@@ -229,11 +209,9 @@ class PointGrid:
             within = distance <= limit
             if direction is not None:
                 along = np.einsum("nij,ni->nj", delta, direction.take(row, axis=0))
-                within &= (distance <= INNER_RATIO**2 * limit) | (
-                    along * along <= BAND_RATIO**2 * limit
-                )
-            hit = np.flatnonzero(within)
-            hit_row, slot = np.divmod(hit, BLOCK_SIZE)
+                is_in_band = along * along <= BAND_RATIO**2 * limit
+                within &= (distance <= INNER_RATIO**2 * limit) | is_in_band
+            hit_row, slot = np.divmod(np.flatnonzero(within), BLOCK_SIZE)
             point_slot = block.take(hit_row) * BLOCK_SIZE + slot
             pairs.append((query.take(hit_row), self.point_index.take(point_slot)))
             block = self.next_block.take(block)
@@ -241,14 +219,9 @@ class PointGrid:
             block, row = block.take(has_next), row.take(has_next)
         return pairs
 
-    def _cells(self, points: np.ndarray, level: np.ndarray) -> np.ndarray:
-        cell = self.cell * LEVEL_RATIO ** level.astype(np.float64)
-        return np.floor(points / cell[:, None]).astype(np.int64)
-
     def _hash_cells(self, cells: np.ndarray, level: np.ndarray) -> np.ndarray:
-        hash_parts = cells * _PRIMES
-        key = hash_parts[:, 0] ^ hash_parts[:, 1] ^ hash_parts[:, 2] ^ level * _LEVEL_PRIME
-        return key & self.mask
+        x, y, z = (cells * _PRIMES).T
+        return (x ^ y ^ z ^ level * _LEVEL_PRIME) & self.mask
 
 
 @cache

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -64,8 +65,7 @@ def polyline_file(
     """
     with progress(0.0, 0.4, "writing strokes"):
         strokes = simplify_strokes(strokes, camera)
-    order = np.argsort(strokes.family, kind="stable")
-    strokes = strokes.select(order)
+    strokes = strokes.select(np.argsort(strokes.family, kind="stable"))
     width = pen.width * pixel_size(strokes.points, camera) * strokes.width
     matrix = np.eye(4) if matrix is None else matrix
     points = strokes.points @ matrix[:3, :3].T + matrix[:3, 3]
@@ -87,14 +87,11 @@ def simplify_strokes(strokes: Strokes, camera: Camera) -> Strokes:
     pixel_length = pixel_size(strokes.points, camera)
     min_pixel_length = np.minimum.reduceat(pixel_length, strokes.start[:-1])
     min_pixel_length = np.maximum(min_pixel_length, 1e-3 * pixel_length.max())[strokes.stroke]
-    features = np.column_stack(
-        [strokes.points / min_pixel_length[:, None], WIDTH_WEIGHT_PX * strokes.width]
-    )
+    pixels = strokes.points / min_pixel_length[:, None]
+    features = np.column_stack([pixels, WIDTH_WEIGHT_PX * strokes.width])
     kept = simplify_mask(features, strokes.start, SIMPLIFY_TOLERANCE_PX)
-    count = np.add.reduceat(kept, strokes.start[:-1])
-    return replace(
-        strokes.take_points(np.flatnonzero(kept)), start=np.concatenate([[0], np.cumsum(count)])
-    )
+    start = np.concatenate([[0], np.cumsum(kept)])[strokes.start]
+    return replace(strokes.take_points(np.flatnonzero(kept)), start=start)
 
 
 def check_drawing_suffix(path: str | os.PathLike[str]) -> str:
@@ -117,16 +114,15 @@ def _csv(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.nd
     A closed stroke repeats its first point at its end.
     """
     blocks = [b"stroke,family,x,y,z,nx,ny,nz,width\n"]
+    form = "%d,%s" + 3 * ",%.9g" + 4 * ",%.6g" + "\n"
     stroke = strokes.stroke
     for rows in row_blocks(len(points), POINTS_PER_BLOCK):
         report(rows.start / max(len(points), 1), "writing strokes")
         names = [strokes.names[family] for family in strokes.family[stroke[rows]]]
         values = np.column_stack([points[rows], normals[rows], width[rows]]).tolist()
         lines = (
-            f"{number},{name},{x:.9g},{y:.9g},{z:.9g},{nx:.6g},{ny:.6g},{nz:.6g},{w:.6g}\n"
-            for number, name, (x, y, z, nx, ny, nz, w) in zip(
-                stroke[rows].tolist(), names, values, strict=True
-            )
+            form % (number, name, *row)
+            for number, name, row in zip(stroke[rows].tolist(), names, values, strict=True)
         )
         blocks.append("".join(lines).encode())
     return b"".join(blocks)
@@ -153,9 +149,7 @@ def _obj(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.nd
     number = np.cumsum(kept)
     number[~kept] = number[first_of_closed]
     text, family = [], -1
-    for stroke, (first, last) in enumerate(
-        zip(strokes.start[:-1].tolist(), strokes.start[1:].tolist(), strict=True)
-    ):
+    for stroke, (first, last) in enumerate(pairwise(strokes.start.tolist())):
         if strokes.family[stroke] != family:
             family = int(strokes.family[stroke])
             text.append(f"g {strokes.names[family].replace(' ', '_')}\n")
@@ -181,10 +175,8 @@ def _ply(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.nd
     header += [f"comment family {number} {name}" for number, name in enumerate(strokes.names)]
     for name, rows in (("vertex", vertex), ("edge", edge)):
         header.append(f"element {name} {len(rows)}")
-        header += [
-            f"property {_PLY_TYPE_NAMES[rows.dtype[column].str[1:]]} {column}"
-            for column in rows.dtype.names
-        ]
+        for column, (kind, _) in rows.dtype.fields.items():
+            header.append(f"property {_PLY_TYPE_NAMES[kind.str[1:]]} {column}")
     text = "\n".join([*header, "end_header", ""])
     return text.encode() + vertex.tobytes() + edge.tobytes()
 

@@ -55,9 +55,11 @@ class ColumnTable:
             column = getattr(self, name)
             setattr(self, name, np.zeros((INITIAL_CAPACITY, *column.shape[1:]), column.dtype))
 
-    def append(self, **values: np.ndarray) -> np.ndarray:
-        """Append rows with the given columns and return their indices. Other columns are 0 there."""
-        row_count = len(next(iter(values.values())))
+    def append(self, row_count: int, **values: np.ndarray | float) -> np.ndarray:
+        """Append rows with the given columns, and return their indices.
+
+        Each value is an array with a value for each row, or one value for all. Other columns are 0 there.
+        """
         first, self.count = self.count, self.count + row_count
         for name in self._column_names:
             column = getattr(self, name)
@@ -129,8 +131,9 @@ class StrokeSamples(ColumnTable):
     covered : (2,) bool
         Whether the left and the right side are covered.
     side_neighbor : (2,) int32
-        Index of the neighbor that covers the left and the right side, or -1. If there are several, it is the
-        one found last. If this sample is removed, the side of the neighbor may be open again.
+        Index of the sample that covers the left and the right side, or -1. If there are several, it is the
+        one found last. When the sample of this row is removed, the sides of these neighbors are tested again,
+        because they may have become open.
     triangle, weights : int32, (3,) float64
         Position as a triangle and barycentric coordinates in it.
     local_member, local_direction : complex128
@@ -154,14 +157,12 @@ class StrokeSamples(ColumnTable):
         super().__init__()
         self.mesh, self.required_spacing = mesh, spacing
         mean_spacing = np.einsum("tk->t", spacing.values) / 3
-        self.expected_count = (
-            float((mesh.area / mean_spacing**2).sum()) * mesh.family_count / SAMPLE_STEP
-        )
+        squares = float((mesh.area / mean_spacing**2).sum())
+        self.expected_count = squares * mesh.family_count / SAMPLE_STEP
         if not self.expected_count < MAX_EXPECTED_SAMPLES:
             raise RosyError("there would be too many strokes: increase the spacing")
-        self.grid = PointGrid(
-            1.01 * SEARCH_RADIUS * float(np.median(mean_spacing)), int(self.expected_count)
-        )
+        cell = 1.01 * SEARCH_RADIUS * float(np.median(mean_spacing))
+        self.grid = PointGrid(cell, int(self.expected_count))
         self.current_step = 0
         # Open sides, as 2 * sample + side. Some of them may have been covered later. The next call of
         # `open_sides` removes these.
@@ -196,9 +197,10 @@ class StrokeSamples(ColumnTable):
     # --- adding and removing ----------------------------------------------------------------------
 
     def next_steps(self, step: np.ndarray) -> np.ndarray:
-        """Begin new steps of growth.
+        """Begin new steps of growth, and return their numbers among all steps so far.
 
-        `step` counts them from 0. The result counts them from the first step of all growth.
+        `step`, (n,) int, numbers the new steps from 0. The result, (n,) int, continues the numbers of earlier
+        steps. `current_step` becomes the number of the last new step.
         """
         first = self.current_step + 1
         self.current_step = first + int(step.max(initial=0))
@@ -224,7 +226,7 @@ class StrokeSamples(ColumnTable):
         (n,) ndarray of int
             Indices of the new samples.
         """
-        sample = self._append_at(particles, stroke, arc, step)
+        sample = self._append_at(particles, stroke=stroke, arc=arc, step=step)
         self.grid.add(self.position[sample], SEARCH_RADIUS * self.spacing[sample])
         return sample
 
@@ -237,16 +239,15 @@ class StrokeSamples(ColumnTable):
         """
         count = self.count
         try:
-            minus_one = np.full(len(particles), -1, dtype=np.int32)
-            step = np.full(len(particles), self.current_step)
-            yield self._append_at(particles, minus_one, np.zeros(len(particles)), step)
+            yield self._append_at(particles, stroke=-1, arc=0.0, step=self.current_step)
         finally:
             self.count = count
 
-    def _append_at(
-        self, particles: SurfaceParticles, stroke: np.ndarray, arc: np.ndarray, step: np.ndarray
-    ) -> np.ndarray:
-        """Append samples at particles to the table, but not to the grid. Return their indices; see `add`."""
+    def _append_at(self, particles: SurfaceParticles, **columns: np.ndarray | float) -> np.ndarray:
+        """Append samples at particles to the table, but not to the grid, and return their indices.
+
+        `columns` are the columns `stroke`, `arc` and `step`.
+        """
         mesh, triangle, weights = self.mesh, particles.triangle, particles.weights
         member = mesh.members_at(triangle, weights, particles.member)
         member = np.where(member == 0, particles.member, member)
@@ -258,17 +259,16 @@ class StrokeSamples(ColumnTable):
         if direction is not member:
             world_member = transport(mesh.to_world(triangle, member), flat, normal)
         return self.append(
+            len(triangle),
             frame=np.stack([position, normal, world_direction, world_member], axis=1),
             spacing=self.spacing_at(particles),
-            stroke=stroke,
-            arc=arc,
-            step=step,
-            alive=np.ones(len(triangle), dtype=bool),
-            side_neighbor=np.full((len(triangle), 2), -1),
+            alive=True,
+            side_neighbor=-1,
             triangle=triangle,
             weights=weights,
             local_member=member,
             local_direction=direction,
+            **columns,
         )
 
     def remove(self, sample: np.ndarray) -> None:
@@ -309,8 +309,8 @@ class StrokeSamples(ColumnTable):
     def add_open_sides(self, sample: np.ndarray) -> None:
         """Add the uncovered sides of the given samples to the list of open sides."""
         covered = self.covered[sample]
-        added = np.concatenate([2 * sample[~covered[:, 0]], 2 * sample[~covered[:, 1]] + 1])
-        self._open_sides = np.concatenate([self._open_sides, added])
+        added = 2 * sample[~covered[:, 0]], 2 * sample[~covered[:, 1]] + 1
+        self._open_sides = np.concatenate([self._open_sides, *added])
 
     @property
     def coverage(self) -> float:

@@ -4,10 +4,11 @@ Seeds beside strokes follow Jobard and Lefer (1997). Along each side of a stroke
 time, in the middle of the longest open run: consecutive samples of the stroke that have no stroke beside them
 on that side yet.
 
-Around singularities, there is one seed in each sector, all at the same distance. Near a singularity of
-index i, the streamlines of the field are parallel lines on a cone, which z -> z^(1 - i) unrolls. A streamline
-is nearest to the apex where its tangent is perpendicular to the direction from the apex. If the nearest
-streamlines have the same distance in all sectors, the spacing is consistent all around the singularity.
+Around singularities, there is one seed in each sector (the region between two streamlines that end at the
+singularity), all at the same distance. For a singularity of index i at z = 0 of the complex plane, the map
+z -> z^(1 - i) turns nearby streamlines into parallel straight lines on a cone. A streamline is nearest to the
+apex where its tangent is perpendicular to the direction from the apex. If the nearest streamlines have the
+same distance in all sectors, the spacing is consistent all around the singularity.
 Without these seeds, strokes would reach the singularity from elsewhere, at different distances in different
 sectors.
 """
@@ -17,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.progress import report
-from ..field.blocks import row_blocks
+from ..field.blocks import mask, row_blocks
 from ..field.frames import dot
 from .lateral_neighbors import MAX_COVERED_GAP, find_lateral_neighbors
 from .point_grid import LEVEL_RATIO, PointGrid, grid_levels
@@ -102,14 +103,12 @@ def seeds_around_singularities(mesh: TangentMesh, spacing: np.ndarray) -> Surfac
     """
     triangle, weights, index = singularities(mesh)
     local_spacing = np.einsum("nk,nk->n", weights, spacing[triangle])
-    isolated = np.flatnonzero(
-        _is_isolated(mesh.points_at(triangle, weights), MIN_ISOLATION * local_spacing) & (index < 1)
-    )
+    is_isolated = _is_isolated(mesh.points_at(triangle, weights), MIN_ISOLATION * local_spacing)
+    isolated = np.flatnonzero(is_isolated & (index < 1))
     distance = (seed_distance(index[isolated]) * local_spacing[isolated]).repeat(RAY_COUNT)
     ray = np.tile(np.exp(2j * np.pi * np.arange(RAY_COUNT) / RAY_COUNT), len(isolated))
-    triangle, weights = (
-        column[isolated].repeat(RAY_COUNT, axis=0) for column in (triangle, weights)
-    )
+    triangle = triangle[isolated].repeat(RAY_COUNT)
+    weights = weights[isolated].repeat(RAY_COUNT, axis=0)
     particles = SurfaceParticles(triangle, weights, 1j * ray, np.ones(len(ray)))
     arrived, _, walked = trace_geodesics(mesh, particles, ray, distance)
     radial = mesh.points_at(arrived.triangle, arrived.weights) - mesh.points_at(triangle, weights)
@@ -140,15 +139,13 @@ def seed_distance(index: np.ndarray) -> np.ndarray:
 
 
 def _is_isolated(points: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """Return (n,) bool: whether each point is isolated. No other point is within its `radius`, (n,), then."""
+    """Return (n,) bool: whether no other point is within the distance `radius`, (n,), of each point."""
     if not len(points):
         return np.zeros(0, dtype=bool)
     grid = PointGrid(float(np.median(radius)), len(points))
     grid.add(points, radius)
     query, other = grid.pairs_within(points, radius)
-    isolated = np.ones(len(points), dtype=bool)
-    isolated[query[query != other]] = False
-    return isolated
+    return ~mask(len(points), query[query != other])
 
 
 # --- on the mesh ----------------------------------------------------------------------------------
@@ -177,14 +174,11 @@ def candidate_seeds(mesh: TangentMesh, corner_spacing: np.ndarray) -> SurfacePar
     u, v = np.where(fold, 1 - u, u), np.where(fold, 1 - v, v)
     weights = np.stack([1 - u - v, u, v], axis=1)
     member = mesh.members_at(triangle, weights, np.ones(count, dtype=complex))
-    rotations = np.exp(2j * np.pi * np.arange(mesh.family_count) / mesh.degree)
-    seeds = SurfaceParticles(
-        np.repeat(triangle, mesh.family_count),
-        np.repeat(weights, mesh.family_count, axis=0),
-        (member[:, None] * rotations).ravel(),
-        np.ones(count * mesh.family_count),
-    )
-    return seeds.take(np.flatnonzero(seeds.member != 0))
+    family = np.arange(mesh.family_count)
+    member = (member[:, None] * np.exp(2j * np.pi * family / mesh.degree)).ravel()
+    point = np.repeat(np.arange(count), len(family))
+    seeds = SurfaceParticles(triangle[point], weights[point], member, np.ones(len(point)))
+    return seeds.take(np.flatnonzero(member != 0))
 
 
 def uncovered_seeds(samples: StrokeSamples, seeds: SurfaceParticles) -> SurfaceParticles:
@@ -201,9 +195,9 @@ def uncovered_seeds(samples: StrokeSamples, seeds: SurfaceParticles) -> SurfaceP
 def thinned_seeds(
     mesh: TangentMesh, seeds: SurfaceParticles, cell_size: float, spacing_ratio: np.ndarray
 ) -> SurfaceParticles:
-    """Return fewer seeds: all those at points that are chosen about `cell_size` apart in world space.
+    """Choose points of seeds about `cell_size` apart in world space, and return all seeds at these points.
 
-    Each point has a seed for each line direction of the field. All seeds at a chosen point are returned.
+    Each point has a seed for each line direction of the field.
 
     Parameters
     ----------
@@ -212,8 +206,9 @@ def thinned_seeds(
     cell_size : float
         Distance of the points where `spacing_ratio` is 1.
     spacing_ratio : (n,) ndarray
-        Spacing of strokes at the seeds, relative to their usual spacing. Where it is very different from 1,
-        the chosen points are farther apart or nearer accordingly; see `point_grid.grid_levels`.
+        Spacing of strokes at the seeds, relative to their usual spacing. Where it is much larger than 1, the
+        chosen points are farther apart, and where it is much smaller, they are closer: by the powers of
+        `LEVEL_RATIO` that `point_grid.grid_levels` returns.
     """
     position = mesh.points_at(seeds.triangle, seeds.weights)
     level = grid_levels(spacing_ratio, 1.0)
@@ -239,8 +234,7 @@ def _is_nearest_to_cell_center(position: np.ndarray, cell_size: float) -> np.nda
     cell_index = (cell[:, 0] * cell_counts[1] + cell[:, 1]) * cell_counts[2] + cell[:, 2]
     order = np.lexsort((np.round(dot(center_offset, center_offset), 9), cell_index))
     first = order[np.unique(cell_index[order], return_index=True)[1]]
-    cell_rank = np.searchsorted(cell_index[first], cell_index)
-    to_chosen = position - position[first[cell_rank]]
+    to_chosen = position - position[first[np.searchsorted(cell_index[first], cell_index)]]
     return dot(to_chosen, to_chosen) == 0
 
 
@@ -273,14 +267,12 @@ def longest_open_runs(
     order = np.lexsort((arc, key))
     sample, side, arc, key = sample[order], side[order], arc[order], key[order]
     starts_run = np.ones(len(key), dtype=bool)
-    starts_run[1:] = (key[1:] != key[:-1]) | (
-        np.diff(arc) > MAX_RUN_STEP * SAMPLE_STEP * samples.spacing[sample[1:]]
-    )
+    is_gap = np.diff(arc) > MAX_RUN_STEP * SAMPLE_STEP * samples.spacing[sample[1:]]
+    starts_run[1:] = (key[1:] != key[:-1]) | is_gap
     first = np.flatnonzero(starts_run)
     length = np.diff(np.append(first, len(key)))
     by_length = np.lexsort((-length, key[first]))
-    longest = np.unique(key[first][by_length], return_index=True)[1]
-    run = by_length[longest]
+    run = by_length[np.unique(key[first][by_length], return_index=True)[1]]
     middle = first[run] + length[run] // 2
     run_middle = middle[np.searchsorted(key[middle], key)]
     is_nearby = np.abs(arc - arc[run_middle]) <= RETRY_ARC * samples.spacing[sample]
@@ -312,11 +304,9 @@ def lateral_seeds(
     free_gap = _free_gap(samples, sample, seeds, has_room)
     bounded = np.flatnonzero(np.isfinite(free_gap))
     full_gap = 1 + free_gap[bounded]
-    shared_distance = full_gap / np.where(full_gap > MIN_TWO_STROKE_GAP, 3, 2)
-    moved_seeds, has_room[bounded] = _lateral_points(
-        samples, sample[bounded], side[bounded], shared_distance
-    )
-    seeds.assign(bounded, moved_seeds)
+    distance = full_gap / np.where(full_gap > MIN_TWO_STROKE_GAP, 3, 2)
+    moved, has_room[bounded] = _lateral_points(samples, sample[bounded], side[bounded], distance)
+    seeds.assign(bounded, moved)
     return seeds, has_room
 
 

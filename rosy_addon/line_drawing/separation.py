@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.progress import progress, report
-from ..field.blocks import concatenated_ranges, row_blocks
+from ..field.blocks import concatenated_ranges, mask, row_blocks
 from ..field.frames import dot, normalize, transport
 from .lateral_neighbors import MAX_SLOPE, MIN_NORMAL_COSINE, MIN_SELF_ARC
 from .point_grid import PointGrid
@@ -60,7 +60,7 @@ def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -
     mesh : TangentMesh
         The mesh on which the strokes were traced.
     strokes : Strokes
-        Strokes before `label_families`, with the same value of `Strokes.family`.
+        Strokes before `label_families`, all with the same value of `Strokes.family`.
     min_length : float
         Remaining parts of cut strokes that are shorter than this are removed, in spacings.
 
@@ -87,18 +87,15 @@ def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -
     too_close = _dilate(refined, too_close)
     cut = np.unique(refined.stroke[too_close])
     # Strokes that were not cut stay as they were, so their runs are left out.
-    is_cut = np.zeros(len(candidates), dtype=bool)
-    is_cut[cut] = True
+    is_cut = mask(len(candidates), cut)
     numbered = replace(refined, family=np.arange(len(refined), dtype=np.int32))
     remaining = numbered.runs_where(~too_close, free_at_removed=False)
     remaining = remaining.select(is_cut[remaining.family])
     remaining = replace(remaining, family=np.zeros(len(remaining), dtype=np.int32))
     remaining = replace(remaining, weights=mesh.weights_at(remaining.triangle, remaining.points))
-    remaining = remaining.select(
-        remaining.length >= min_length * remaining.spacing[remaining.start[:-1]]
-    )
-    untouched = np.ones(len(strokes), dtype=bool)
-    untouched[candidates[cut]] = False
+    least = min_length * remaining.spacing[remaining.start[:-1]]
+    remaining = remaining.select(remaining.length >= least)
+    untouched = ~mask(len(strokes), candidates[cut])
     return Strokes.join([strokes.select(untouched), remaining])
 
 
@@ -108,8 +105,8 @@ def _suspect_points(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
     suspect = _stroke_turn_per_spacing(strokes) > MAX_TURN
     for block in row_blocks(len(suspect), BLOCK_POINTS):
         report(block.start / max(len(suspect), 1), "separating strokes")
-        surface_turn[block] = _surface_turn_per_spacing(mesh, strokes, block)
-        suspect[block] |= _field_turn_per_spacing(mesh, strokes, block) > MAX_TURN
+        surface_turn[block], field_turn = _turns_per_spacing(mesh, strokes, block)
+        suspect[block] |= field_turn > MAX_TURN
     suspect |= surface_turn > FOLD_ANGLE
     ends = np.stack([strokes.start[:-1], strokes.start[1:] - 1], axis=1)
     gap = strokes.points[ends[:, 1]] - strokes.points[ends[:, 0]]
@@ -120,19 +117,24 @@ def _suspect_points(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
     return suspect
 
 
-def _surface_turn_per_spacing(mesh: TangentMesh, strokes: Strokes, block: slice) -> np.ndarray:
-    """Return the angle, in radians, by which the shading normal rotates within a spacing.
+def _turns_per_spacing(
+    mesh: TangentMesh, strokes: Strokes, block: slice
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the angles, in radians, by which the shading normal and the field rotate within a spacing.
 
-    The result has a value for each of the points in `block`. It is the norm of the derivatives in two
-    perpendicular directions, times the spacing.
+    Both have a value for each point in `block`. The first is the norm of the derivatives of the normal in
+    two perpendicular directions. The second is measured in the direction in which the field rotates most.
     """
-    triangle = strokes.triangle[block]
-    gradient, normal = mesh.gradient[triangle], mesh.corner_normal[triangle]
-    derivative_x = np.einsum("nk,nki->ni", gradient.real, normal)
-    derivative_y = np.einsum("nk,nki->ni", gradient.imag, normal)
-    return strokes.spacing[block] * np.sqrt(
-        dot(derivative_x, derivative_x) + dot(derivative_y, derivative_y)
-    )
+    triangle, spacing = strokes.triangle[block], strokes.spacing[block]
+    gradient, z = mesh.gradient[triangle], mesh.z[triangle]
+    turn_squared, rates = 0.0, []
+    value = mesh.z_at(triangle, strokes.weights[block])
+    for part in (gradient.real, gradient.imag):
+        turn = np.einsum("nk,nki->ni", part, mesh.corner_normal[triangle])
+        turn_squared = turn_squared + dot(turn, turn)
+        rates.append((np.einsum("nk,nk->n", part, z) * value.conj()).imag)
+    scale = np.maximum(mesh.degree * np.abs(value) ** 2, 1e-300)
+    return spacing * np.sqrt(turn_squared), spacing * np.hypot(*rates) / scale
 
 
 def _stroke_turn_per_spacing(strokes: Strokes) -> np.ndarray:
@@ -147,23 +149,7 @@ def _stroke_turn_per_spacing(strokes: Strokes) -> np.ndarray:
     half_window = 0.5 * strokes.spacing
     before = np.clip(np.searchsorted(key, key - half_window), first, last)
     after = np.clip(np.searchsorted(key, key + half_window), first, last)
-    member_before, member_after = strokes.member[before], strokes.member[after]
-    return np.arccos(np.clip(dot(member_before, member_after), -1, 1))
-
-
-def _field_turn_per_spacing(mesh: TangentMesh, strokes: Strokes, block: slice) -> np.ndarray:
-    """Return the angle, in radians, by which the field rotates within a spacing.
-
-    The result has a value for each of the points in `block`. It is measured in the direction in which the
-    field rotates most.
-    """
-    triangle = strokes.triangle[block]
-    z, gradient = mesh.z[triangle], mesh.gradient[triangle]
-    value = mesh.z_at(triangle, strokes.weights[block])
-    derivative_x = np.einsum("nk,nk->n", gradient.real, z) * value.conj()
-    derivative_y = np.einsum("nk,nk->n", gradient.imag, z) * value.conj()
-    scale = np.maximum(mesh.degree * np.abs(value) ** 2, 1e-300)
-    return strokes.spacing[block] * np.hypot(derivative_x.imag, derivative_y.imag) / scale
+    return np.arccos(np.clip(dot(strokes.member[before], strokes.member[after]), -1, 1))
 
 
 def _points_near(strokes: Strokes, suspect: np.ndarray) -> np.ndarray:
@@ -237,9 +223,8 @@ def _too_close(
         point, other = _pairs_of_one_family(mesh, refined, point[distinct], other[distinct])
         # Cut the shorter stroke, or within one stroke the point that is nearer to an end.
         same_stroke = stroke[point] == stroke[other]
-        priority, other_priority = (
-            np.where(same_stroke, end_distance[end], length[stroke[end]]) for end in (point, other)
-        )
+        priority = np.where(same_stroke, end_distance[point], length[stroke[point]])
+        other_priority = np.where(same_stroke, end_distance[other], length[stroke[other]])
         yields = (priority < other_priority) | ((priority == other_priority) & (point > other))
         rejected[np.where(yields, point, other)] = True
     return rejected
@@ -255,21 +240,18 @@ def _pairs_of_one_family(
     normal_a, normal_b = refined.normal[point], refined.normal[other]
     normal_sum, delta = normal_a + normal_b, refined.points[point] - refined.points[other]
     same_family = dot(normal_a, normal_b) > MIN_NORMAL_COSINE
-    same_family &= dot(delta, normal_sum) ** 2 <= MAX_SLOPE**2 * dot(delta, delta) * dot(
-        normal_sum, normal_sum
-    )
+    limit = MAX_SLOPE**2 * dot(delta, delta) * dot(normal_sum, normal_sum)
+    same_family &= dot(delta, normal_sum) ** 2 <= limit
     members = refined.member[point], refined.member[other]
     member_a = transport(members[0], mesh.normal[refined.triangle[point]], normal_a)
     member_b = transport(members[1], mesh.normal[refined.triangle[other]], normal_b)
     # At sharp bends, the result depends on how directions are compared. Accept a match by transport
     # or by projection along the mean normal.
-    mean_normal = normalize(normal_sum)
-    projected = [
-        normalize(member - dot(member, mean_normal)[:, None] * mean_normal) for member in members
-    ]
-    same_family &= mesh.is_same_family(
-        member_a, normal_a, member_b, normal_b, FAMILY_TOLERANCE
-    ) | mesh.is_same_family(projected[0], mean_normal, projected[1], mean_normal, FAMILY_TOLERANCE)
+    mean = normalize(normal_sum)
+    projected = [normalize(member - dot(member, mean)[:, None] * mean) for member in members]
+    matches = mesh.is_same_family(member_a, normal_a, member_b, normal_b, FAMILY_TOLERANCE)
+    matches |= mesh.is_same_family(projected[0], mean, projected[1], mean, FAMILY_TOLERANCE)
+    same_family &= matches
     return point[same_family], other[same_family]
 
 
@@ -281,16 +263,13 @@ def _dilate(refined: Strokes, removed: np.ndarray) -> np.ndarray:
     arc, stroke = refined.arc, refined.stroke
     stride = 2 * (float(arc.max()) + float(refined.spacing.max()))
     key = stroke * stride + arc
-    transitions = np.diff(np.concatenate([[0], (removed * (stroke + 1)), [0]]))
-    changes = np.flatnonzero(transitions)
+    changes = np.flatnonzero(np.diff(np.concatenate([[0], removed * (stroke + 1), [0]])))
     # A run at the end of a stroke and a run at the start of the next stroke share one change.
     first = changes[removed[np.minimum(changes, len(removed) - 1)] & (changes < len(removed))]
     last = changes[(changes > 0) & removed[np.maximum(changes - 1, 0)]] - 1
     min_extent = (MIN_SEPARATION + 2 * REFINED_STEP) * refined.spacing[first]
     padding = np.maximum(min_extent - (arc[last] - arc[first]), 0) / 2
-    low = np.searchsorted(key, key[first] - padding)
-    high = np.searchsorted(key, key[last] + padding, side="right")
     coverage = np.zeros(len(removed) + 1, dtype=np.int64)
-    np.add.at(coverage, low, 1)
-    np.add.at(coverage, high, -1)
+    np.add.at(coverage, np.searchsorted(key, key[first] - padding), 1)
+    np.add.at(coverage, np.searchsorted(key, key[last] + padding, side="right"), -1)
     return np.cumsum(coverage[:-1]) > 0

@@ -9,17 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
 from ..core.color import REC709_LUMINANCE
+from ..field.blocks import bincount_rows
 from ..field.curvature import face_magnitude
 from ..field.frames import dot, normalize
-from ..field.polygon_arrays import sum_per_fan
 from ..field.surface import Surface
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
+from ..projection.pixel_blocks import part_of
 from ..projection.vector_components import cofactor_matrix
 from .stroke_set import Strokes
 from .tangent_mesh import TangentMesh, unit
@@ -30,9 +31,6 @@ MAX_SPACING_RATIO, MIN_SPACING_RATIO = 3.0, 0.5
 
 #: Strokes end where the tone reduces their width to this fraction.
 MIN_STROKE_WIDTH = 0.12
-
-#: Luminance of linear red, green and blue, in double precision.
-LUMINANCE_WEIGHTS = np.array(REC709_LUMINANCE)
 
 
 # --- in the picture -------------------------------------------------------------------------------------
@@ -88,8 +86,7 @@ class CornerSpacing:
 
     def take(self, kept: np.ndarray) -> CornerSpacing:
         """Return the spacing on the triangles for which `kept`, (T,) bool, is true."""
-        columns = vars(self).values()
-        return CornerSpacing(*(None if column is None else column[kept] for column in columns))
+        return part_of(self, kept)
 
     def at(self, triangle: np.ndarray, weights: np.ndarray, direction: np.ndarray) -> np.ndarray:
         """Return (n,) float64: the spacing at points of triangles, for strokes in given directions.
@@ -136,9 +133,8 @@ def spacing_in_picture(mesh: TangentMesh, camera: Camera, pixels: float) -> Corn
     relative = MIN_PICTURE_RATIO / factor
     # On a surface of curvature k, c is below a limit in a band as wide as limit^2 / (2 k).
     band = 2 * SILHOUETTE_SPACINGS * facing_values * _curvature(mesh)[:, None]
-    steepness = relative**2 * (
-        1 / np.maximum(cosine, np.clip(np.sqrt(band), *MIN_COSINES)) ** 2 - 1
-    )
+    limit = np.clip(np.sqrt(band), *MIN_COSINES)
+    steepness = relative**2 * (1 / np.maximum(cosine, limit) ** 2 - 1)
     tangent = dot(to_eye, mesh.x[:, None]) + 1j * dot(to_eye, mesh.y[:, None])
     double = steepness / 2 * unit(tangent, np.zeros_like(tangent)) ** 2
     is_directional = (relative**2 + steepness > 1).any(axis=1)
@@ -163,30 +159,6 @@ def _curvature(mesh: TangentMesh) -> np.ndarray:
 # --- by tone and curvature ------------------------------------------------------------------------------
 
 
-class LightSource(Protocol):
-    """A light in camera space.
-
-    Attributes
-    ----------
-    kind : {"sun", "point"}
-    vector : (3,) ndarray
-        Unit direction to a sun, or position of a point light.
-    color : (3,) ndarray
-        Linear RGB.
-    strength : float
-        Radiance of a white surface that faces the light; for a point light, at distance 1.
-    """
-
-    @property
-    def kind(self) -> str: ...
-    @property
-    def vector(self) -> np.ndarray: ...
-    @property
-    def color(self) -> np.ndarray: ...
-    @property
-    def strength(self) -> float: ...
-
-
 def with_vertices_of_fans(instance: MeshInstance) -> MeshInstance:
     """Return a mesh instance with a vertex for each smooth fan, so that each vertex has one normal.
 
@@ -201,11 +173,8 @@ def with_vertices_of_fans(instance: MeshInstance) -> MeshInstance:
         Vertex k is at the vertex of fan k. Faces, corners and triangles are the same.
     """
     surface = instance.surface
-    split = surface.with_parts(
-        vertices=surface.vertices[fan_vertices(surface)],
-        corner_vertex=surface.corner_fan,
-        rest_vertices=None,
-    )
+    vertices, fan = surface.vertices[fan_vertices(surface)], surface.corner_fan
+    split = surface.with_parts(vertices=vertices, corner_vertex=fan, rest_vertices=None)
     return replace(instance, surface=split)
 
 
@@ -216,52 +185,38 @@ def fan_vertices(surface: Surface) -> np.ndarray:
     return vertex
 
 
-def spacing_by_tone(
-    spacing: np.ndarray | float, tone: np.ndarray, max_ratio: float = MAX_SPACING_RATIO
-) -> np.ndarray:
-    """Return the spacing for a tone: the spacing for black over the darkness, 1 - tone.
+def spacing_by_tone(tone: np.ndarray, max_ratio: float) -> np.ndarray:
+    """Return the factor of the spacing for each tone: 1 over the darkness, 1 - tone.
 
     The fraction of the paper that is covered with ink, the width of strokes over their spacing, is then
-    proportional to the darkness.
+    proportional to the darkness. The factor is 1 for black.
 
     Parameters
     ----------
-    spacing : float or ndarray
-        Spacing where the tone is black.
     tone : ndarray
         Tones at vertices or faces, from 0 (black) to 1 (white).
     max_ratio : float
-        Largest factor of the spacing.
-
-    Returns
-    -------
-    ndarray
-        A spacing for each tone.
+        Largest factor.
     """
-    ink = np.maximum(1 - np.clip(tone, 0, 1), 1 / max_ratio)
-    return np.asarray(spacing) / ink
+    return 1 / np.maximum(1 - np.clip(tone, 0, 1), 1 / max_ratio)
 
 
-def spacing_by_curvature(
-    surface: Surface, spacing: np.ndarray | float, exponent: float = 0.5
-) -> np.ndarray:
-    """Return spacings that are smaller where the surface is more curved.
+def spacing_by_curvature(surface: Surface, exponent: float) -> np.ndarray:
+    """Return factors of the spacing, which are smaller where the surface is more curved.
 
-    The spacing is divided by a power of the ratio of the curvature to its median. The factor by which it
-    changes is limited to the range from `MIN_SPACING_RATIO` to `MAX_SPACING_RATIO`.
+    The spacing is divided by a power of the ratio of the curvature to its median. The factor is limited to
+    the range from `MIN_SPACING_RATIO` to `MAX_SPACING_RATIO`.
 
     Parameters
     ----------
     surface : Surface
-    spacing : float or (V,) ndarray
-        Spacing at the median curvature.
     exponent : float
         The power. 0 changes nothing; with 1 the spacing is proportional to the radius of curvature.
 
     Returns
     -------
     (V,) float64 ndarray
-        Spacing at each vertex.
+        Factor at each vertex.
     """
     curvature = face_magnitude(surface, "curvature")
     corner = surface.corner_vertex
@@ -270,10 +225,10 @@ def spacing_by_curvature(
     vertex_curvature = vertex_curvature / np.maximum(count, 1)
     median = float(np.median(vertex_curvature[count > 0]))
     relative = np.maximum(vertex_curvature, 1e-3 * max(median, 1e-9)) / max(median, 1e-9)
-    return np.asarray(spacing) * np.clip(relative**-exponent, MIN_SPACING_RATIO, MAX_SPACING_RATIO)
+    return np.clip(relative**-exponent, MIN_SPACING_RATIO, MAX_SPACING_RATIO)
 
 
-def lit_tone(instance: MeshInstance, camera: Camera, lights: Sequence[LightSource]) -> np.ndarray:
+def lit_tone(instance: MeshInstance, camera: Camera, lights: Sequence[Any]) -> np.ndarray:
     """Return the tones of a matte surface under several lights, without shadows.
 
     Parameters
@@ -281,8 +236,8 @@ def lit_tone(instance: MeshInstance, camera: Camera, lights: Sequence[LightSourc
     instance : MeshInstance
     camera : Camera
         Camera. The lights are in its space.
-    lights : sequence of LightSource
-        If there are none, the light is at the camera.
+    lights : sequence of compositor.shading.Light
+        In camera space. If there are none, the light is at the camera.
 
     Returns
     -------
@@ -294,7 +249,7 @@ def lit_tone(instance: MeshInstance, camera: Camera, lights: Sequence[LightSourc
     rotation = camera.view[:3, :3]
     tone = np.zeros(len(instance.surface.vertices))
     for light in lights:
-        strength = light.strength * float(LUMINANCE_WEIGHTS @ light.color)
+        strength = light.strength * float(np.array(REC709_LUMINANCE) @ light.color)
         if light.kind == "sun":
             tone += strength * lambert_tone(instance, rotation.T @ light.vector)
             continue
@@ -315,7 +270,7 @@ def lambert_tone(instance: MeshInstance, to_light: np.ndarray) -> np.ndarray:
     """
     matrix = np.asarray(instance.matrix, dtype=np.float64)[:3, :3]
     surface = instance.surface
-    fan_normal = sum_per_fan(surface.corner_normal, surface.corner_vertex)
+    fan_normal = bincount_rows(surface.corner_vertex, surface.corner_normal)
     normal = np.zeros_like(surface.vertices)
     normal[: len(fan_normal)] = fan_normal @ cofactor_matrix(matrix).T
     direction = normalize(np.broadcast_to(to_light, normal.shape) + 0.0)
@@ -327,9 +282,10 @@ def weight_by_tone(
 ) -> Strokes:
     """Reduce the width of strokes in light areas, and remove strokes in the lightest areas.
 
-    As the tone gets darker, the families begin one after another. In lighter and lighter areas, the width of
-    the first family begins to fall where `spacing_by_tone` reaches its largest factor. So the ink coverage
-    falls continuously to zero.
+    With the darkness d = 1 - tone, the strokes of family k have the width 0 where d <= k * `layering`. Above
+    that, their width grows linearly, and they have their full width from d = k * `layering` + 1 / `max_ratio`
+    on. `spacing_by_tone` reaches its largest factor at d = 1 / `max_ratio`. Where d is smaller, only the
+    width of the first family still falls, so the ink coverage falls continuously to zero.
 
     Parameters
     ----------

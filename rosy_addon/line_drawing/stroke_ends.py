@@ -101,8 +101,7 @@ def extend_free_ends(
     report(0.0, "extending strokes")
     if depth_buffer is None:
         strokes = strokes.subdivided(pixel_counts(strokes, camera))
-    screen = np.nan_to_num(project_to_pixels(strokes.points, camera)[0])
-    arc = arc_lengths(screen, strokes.start)
+    arc = arc_lengths(np.nan_to_num(project_to_pixels(strokes.points, camera)[0]), strokes.start)
     ends = np.stack([strokes.start[:-1], strokes.start[1:] - 1], axis=1)
     is_free = strokes.free_end_mask & strokes.member[ends].any(axis=2)
     stroke, side = np.nonzero(is_free & (arc[ends[:, 1]] > 0)[:, None])
@@ -114,14 +113,11 @@ def extend_free_ends(
         step = pixel_size(origin, camera)[:, None] * normalize(origin - before)
     else:
         start_point, origin, step = _extension_in_picture(strokes, arc, end, backtrack, camera)
-    length = np.minimum(
-        max_pixels * _extension_ratios(len(strokes))[stroke, side], MAX_EXTENSION_RATIO * total
-    )
-    length = length + np.abs(arc[end] - arc[start_point])
+    length = max_pixels * _extension_ratios(len(strokes))[stroke, side]
+    length = np.minimum(length, MAX_EXTENSION_RATIO * total) + np.abs(arc[end] - arc[start_point])
     is_valid = step.any(axis=1) & np.isfinite(step).all(axis=1)
-    extended, distance = _append_extensions(
-        strokes, *(column[is_valid] for column in (start_point, side, origin, step, length))
-    )
+    lines = (column[is_valid] for column in (start_point, side, origin, step, length))
+    extended, distance = _append_extensions(strokes, *lines)
     if depth_buffer is None:
         return extended
     return _drop_onto_surfaces(extended, distance, depth_buffer, camera)
@@ -262,8 +258,8 @@ def _append_extensions(
     order = np.lexsort((sort_key, strokes.stroke[point]))
     point, distance = point[order], distance[order]
     extended = strokes.take_points(point)
-    counts = np.bincount(strokes.stroke[point], minlength=len(strokes))
     extended.weights[distance > 0] = np.nan
+    counts = np.bincount(strokes.stroke[point], minlength=len(strokes))
     start = np.concatenate([[0], np.cumsum(counts)])
     return replace(extended, points=points[order], start=start), distance
 
@@ -287,9 +283,8 @@ def _drop_onto_surfaces(
     extended = extended[moves]
     moved, normal = strokes.points.copy(), strokes.normal.copy()
     moved[extended] = _move_to_depth(points[moves], depth[moves], target_depth[moves], camera)
-    normal[extended] = (
-        depth_buffer.normal[depth_buffer.triangle[row, column][moves]] @ camera.view[:3, :3]
-    )
+    triangle = depth_buffer.triangle[row, column][moves]
+    normal[extended] = depth_buffer.normal[triangle] @ camera.view[:3, :3]
     return replace(strokes, points=moved, normal=normal)
 
 

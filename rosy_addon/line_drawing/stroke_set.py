@@ -12,16 +12,7 @@ from ..field.frames import dot, normalize
 from .tangent_mesh import TangentMesh
 
 #: The attributes of `Strokes` that have a row for each point.
-POINT_COLUMNS = (
-    "points",
-    "face",
-    "triangle",
-    "weights",
-    "normal",
-    "member",
-    "spacing",
-    "width",
-)
+POINT_COLUMNS = ("points", "face", "triangle", "weights", "normal", "member", "spacing", "width")
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,8 +148,8 @@ class Strokes:
         split_labels : (n,) ndarray, optional
             Strokes are also split between points with different labels.
         free_at_removed : bool or (n,) bool ndarray
-            Whether the ends of runs next to a removed point become free ends: one value for all, or one value
-            for each removed point.
+            Whether the ends of runs next to a removed point become free ends: one value for all, or a value
+            for each point, of which only the values of removed points are used.
 
         Returns
         -------
@@ -181,15 +172,14 @@ class Strokes:
         ends = np.stack([first, first + count[is_long] - 1], axis=1)
         stroke_ends = np.stack([self.start[owner], self.start[owner + 1] - 1], axis=1)
         outside = np.clip(ends + (-1, 1), 0, len(kept) - 1)
+        free = free_at_removed & ~kept
         is_whole = count[is_long] == np.diff(self.start)[owner]
         return replace(
             self.take_points(point),
             start=np.concatenate([[0], np.cumsum(count[is_long])]),
             family=self.family[owner],
             closed=self.closed[owner] & is_whole,
-            free_ends=np.where(
-                ends == stroke_ends, self.free_end_mask[owner], (free_at_removed & ~kept)[outside]
-            ),
+            free_ends=np.where(ends == stroke_ends, self.free_end_mask[owner], free[outside]),
         )
 
     def tapered(
@@ -212,9 +202,8 @@ class Strokes:
         total = self.length[stroke]
         taper_length = np.minimum(length * self.spacing, total / 2)
         taper_first, taper_last = (True, True) if ends is None else ends[stroke].T
-        end_distance = np.minimum(
-            np.where(taper_first, arc, np.inf), np.where(taper_last, total - arc, np.inf)
-        )
+        from_first = np.where(taper_first, arc, np.inf)
+        end_distance = np.minimum(from_first, np.where(taper_last, total - arc, np.inf))
         fraction = np.clip(end_distance / np.where(taper_length > 0, taper_length, 1), 0, 1)
         fraction[self.closed[stroke] | (taper_length <= 0)] = 1
         smooth = fraction * fraction * (3 - 2 * fraction)
@@ -297,9 +286,9 @@ class Strokes:
     def join(blocks: Sequence[Strokes]) -> Strokes:
         """Return the strokes of several sets with the same families, one set after another."""
         offsets = np.cumsum([0, *(len(block.points) for block in blocks)])
+        names = (*POINT_COLUMNS, "family", "closed")
         columns = {
-            name: np.concatenate([getattr(block, name) for block in blocks])
-            for name in (*POINT_COLUMNS, "family", "closed")
+            name: np.concatenate([getattr(block, name) for block in blocks]) for name in names
         }
         start = [block.start[:-1] + offset for block, offset in zip(blocks, offsets, strict=False)]
         return replace(
@@ -311,7 +300,7 @@ class Strokes:
 
     @staticmethod
     def concatenate(first: Strokes, second: Strokes) -> Strokes:
-        """Return the strokes of both sets, with the families of the second set after those of the first."""
+        """Return the strokes of both sets. The families of the second set are numbered after the others."""
         renumbered = replace(second, family=second.family + np.int32(len(first.names)))
         return replace(Strokes.join([first, renumbered]), names=first.names + second.names)
 

@@ -5,10 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..annotation.singularity_settings import (
-    singularity_dots_choice,
-    singularity_size_number,
-)
+from ..annotation.singularity_settings import singularity_dots_choice, singularity_size_number
 from ..core.errors import RosyError
 from ..core.settings import check_settings, choice, number, settings_of, switch
 
@@ -132,7 +129,10 @@ class StrokeStyle:
         check_settings(self)
 
     def with_settings(self, settings: dict[str, Any]) -> StrokeStyle:
-        """Return the style with some settings changed. The unit follows from `spacing` or `distance`.
+        """Return the style with some settings changed.
+
+        If `distance` is changed, the setting `unit` becomes "world". If only `spacing` is changed, it becomes
+        "pixels". A value of `unit` in `settings` takes precedence.
 
         Raises
         ------
@@ -144,6 +144,5 @@ class StrokeStyle:
         if unknown:
             raise RosyError(f"unknown setting '{unknown[0]}' of strokes: choose {', '.join(known)}")
         if settings.keys() & {"spacing", "distance"}:
-            unit = "world" if "distance" in settings else "pixels"
-            settings = {"unit": unit} | settings
+            settings = {"unit": "world" if "distance" in settings else "pixels"} | settings
         return replace(self, **settings)

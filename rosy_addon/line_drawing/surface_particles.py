@@ -59,9 +59,8 @@ class SurfaceParticles:
     @staticmethod
     def empty() -> SurfaceParticles:
         """Return a set of 0 particles."""
-        return SurfaceParticles(
-            np.empty(0, np.int32), np.empty((0, 3)), np.empty(0, complex), np.empty(0)
-        )
+        triangle, member = np.empty(0, np.int32), np.empty(0, complex)
+        return SurfaceParticles(triangle, np.empty((0, 3)), member, np.empty(0))
 
     def __len__(self) -> int:
         return len(self.triangle)
@@ -81,7 +80,7 @@ class SurfaceParticles:
             column[indices] = values
 
     def join(self, other: Self) -> Self:
-        """Return the particles of both sets, those of `other` last."""
+        """Return the particles of both sets: first these, then the particles of `other`."""
         pairs = zip(self.columns, other.columns, strict=True)
         return type(self)(*(np.concatenate(pair) for pair in pairs))
 
@@ -176,13 +175,11 @@ def advance(
         weights, direction, member, edge, step, stuck = _next_segment(
             mesh, current, max_length, max_segment_length[active], rotation[active]
         )
-        path = TracedPath(
-            active, current.triangle, current.weights, weights, direction, member, step
-        )
+        path = TracedPath(active, *current.columns[:2], weights, direction, member, step)
         paths.append(path.take(~stuck))
         current.weights, current.member = weights, member
         remaining[active] -= step
-        stopped = stuck | _cross_edges(mesh, current, edge)
+        stopped = stuck | _cross_edges(mesh, current, edge)[0]
         result.assign(active[~stuck], current.take(~stuck))
         ended[active[stopped]] = True
         active = active[~stopped & (remaining[active] > 1e-9 * length[active])]
@@ -219,17 +216,17 @@ def trace_geodesics(
     for _ in range(8 * MAX_SEGMENTS):
         if not len(active):
             break
-        current, current_direction = result.take(active), direction[active]
-        slope = _barycentric_slopes(mesh, current.triangle, current_direction)
+        current = result.take(active)
+        slope = _weight_slopes(mesh, current.triangle, direction[active])
         edge_distance, edge = _distance_to_edge(current.weights, slope)
         step = np.minimum(edge_distance, remaining[active])
         edge = np.where(edge_distance <= remaining[active], edge, -1)
         current.weights = _moved_weights(current.weights, slope, step)
         remaining[active] -= step
-        rotation = np.ones(len(active), dtype=np.complex128)
-        stopped = _cross_edges(mesh, current, edge, rotation)
+        stopped, crossed, transport = _cross_edges(mesh, current, edge)
         result.assign(active, current)
-        direction[active] = current_direction * rotation
+        crossing = active[crossed]
+        direction[crossing] = direction[crossing] * transport
         active = active[~stopped & (remaining[active] > 1e-9 * length[active])]
     result.member = mesh.members_at(result.triangle, result.weights, result.member)
     return result, direction, length - remaining
@@ -267,33 +264,22 @@ def _next_segment(
     member = nearest_member(particles.member, np.where(stuck, 1, z), mesh.degree)
     particles = replace(particles, member=member)
     direction = rotation * mesh.directions_at(particles.triangle, particles.weights, member)
-    slope = _barycentric_slopes(mesh, particles.triangle, direction)
+    slope = _weight_slopes(mesh, particles.triangle, direction)
     edge_distance, _ = _distance_to_edge(particles.weights, slope)
     turn_rate = np.abs((np.einsum("nk,nk->n", slope, corner_z) * z.conj()).imag)
     max_step = np.full(len(z), np.inf)
-    squared_norm = z.real**2 + z.imag**2
-    largest = MAX_TURN_PER_SEGMENT * mesh.degree * squared_norm
+    largest = MAX_TURN_PER_SEGMENT * mesh.degree * (z.real**2 + z.imag**2)
     np.divide(largest, turn_rate, out=max_step, where=turn_rate > 0)
     stuck |= max_step < MIN_SEGMENT_RATIO * usual_length
-    count = len(length)
-    segments = (
-        particles.weights.copy(),
-        direction,
-        member.copy(),
-        np.full(count, -1),
-        np.zeros(count),
-    )
+    edge, step = np.full(len(z), -1), np.zeros(len(z))
+    segments = particles.weights.copy(), direction, member.copy(), edge, step
     pending = np.flatnonzero(~stuck)
     for _ in range(MAX_HALVINGS):
         allowed = np.minimum(length, max_step)[pending]
-        midpoint = _moved_weights(
-            particles.weights[pending],
-            slope[pending],
-            0.5 * np.minimum(edge_distance[pending], allowed),
-        )
-        trial, is_straight = _midpoint_segments(
-            mesh, particles.take(pending), midpoint, rotation[pending], allowed
-        )
+        start = particles.take(pending)
+        half = 0.5 * np.minimum(edge_distance[pending], allowed)
+        midpoint = _moved_weights(start.weights, slope[pending], half)
+        trial, is_straight = _midpoint_segments(mesh, start, midpoint, rotation[pending], allowed)
         for column, values in zip(segments, trial, strict=True):
             column[pending[is_straight]] = values[is_straight]
         pending = pending[~is_straight]
@@ -336,7 +322,7 @@ def _midpoint_segments(
     z = mesh.z[start.triangle]
     member = nearest_member(start.member, np.einsum("nk,nk->n", midpoint, z), mesh.degree)
     direction = rotation * mesh.directions_at(start.triangle, midpoint, member)
-    slope = _barycentric_slopes(mesh, start.triangle, direction)
+    slope = _weight_slopes(mesh, start.triangle, direction)
     edge_distance, edge = _distance_to_edge(start.weights, slope)
     step = np.minimum(edge_distance, allowed)
     weights = _moved_weights(start.weights, slope, step)
@@ -346,9 +332,7 @@ def _midpoint_segments(
     return (weights, direction, member, edge, step), cosine >= np.cos(MAX_DIRECTION_ERROR)
 
 
-def _barycentric_slopes(
-    mesh: TangentMesh, triangle: np.ndarray, direction: np.ndarray
-) -> np.ndarray:
+def _weight_slopes(mesh: TangentMesh, triangle: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Return the (n, 3) derivatives of the barycentric coordinates along unit directions."""
     gradient = mesh.gradient[triangle]
     return gradient.real * direction.real[:, None] + gradient.imag * direction.imag[:, None]
@@ -375,11 +359,8 @@ def _moved_weights(weights: np.ndarray, slope: np.ndarray, step: np.ndarray) -> 
 
 
 def _cross_edges(
-    mesh: TangentMesh,
-    particles: SurfaceParticles,
-    edge: np.ndarray,
-    rotation: np.ndarray | None = None,
-) -> np.ndarray:
+    mesh: TangentMesh, particles: SurfaceParticles, edge: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Move particles across the edges that they have reached, in place.
 
     Parameters
@@ -388,35 +369,29 @@ def _cross_edges(
     particles : SurfaceParticles
     edge : (n,) ndarray of int
         Edge, 0 to 2, that each particle has reached, or -1.
-    rotation : (n,) complex128 ndarray, optional
-        Changed in place: for particles that cross an edge, it is set to the factor that transports tangents
-        across the edge.
 
     Returns
     -------
-    (n,) bool ndarray
+    stopped : (n,) bool ndarray
         Whether the particle is stopped by a border or a crease at its edge.
+    crossed : (k,) intp ndarray
+        Indices of the particles that crossed an edge.
+    transport : (k,) complex128 ndarray
+        Factors that transport tangents across these edges.
     """
-    reached = np.flatnonzero(edge >= 0)
-    stopped = np.zeros(len(edge), dtype=bool)
-    triangle, k = particles.triangle[reached], edge[reached]
-    neighbor = mesh.neighbor[triangle, k]
-    stopped[reached[neighbor < 0]] = True
-    crosses = neighbor >= 0
-    reached, triangle, k, neighbor = (
-        values[crosses] for values in (reached, triangle, k, neighbor)
-    )
+    neighbor = mesh.neighbor[particles.triangle, edge]
+    stopped = (edge >= 0) & (neighbor < 0)
+    crossed = np.flatnonzero((edge >= 0) & (neighbor >= 0))
+    triangle, k = particles.triangle[crossed], edge[crossed]
     j = mesh.neighbor_edge[triangle, k].astype(np.intp)
     transport = mesh.edge_transport[triangle, k]
-    weights = particles.weights[reached]
-    row = np.arange(len(reached))
+    weights = particles.weights[crossed]
+    row = np.arange(len(crossed))
     new_weights = np.zeros_like(weights)
     # Neighboring triangles have opposite directions along their common edge.
     new_weights[row, (j + 1) % 3] = weights[row, (k + 2) % 3]
     new_weights[row, (j + 2) % 3] = weights[row, (k + 1) % 3]
-    particles.weights[reached] = new_weights / new_weights.sum(axis=1, keepdims=True)
-    particles.triangle[reached] = neighbor
-    particles.member[reached] *= transport
-    if rotation is not None:
-        rotation[reached] = transport
-    return stopped
+    particles.weights[crossed] = new_weights / new_weights.sum(axis=1, keepdims=True)
+    particles.triangle[crossed] = neighbor[crossed]
+    particles.member[crossed] *= transport
+    return stopped, crossed, transport

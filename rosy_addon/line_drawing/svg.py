@@ -9,14 +9,9 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from ..annotation import singularity_marks
 from ..annotation.index_labels import HALO, HALO_COLOR, LABEL_COLOR, placed_labels, stroke_width
-from ..annotation.singularity_marks import (
-    COLOR_BY_SIGN,
-    HIDDEN_OPACITY,
-    OUTLINE,
-    OUTLINE_COLOR,
-    SingularityMarks,
-)
+from ..annotation.singularity_marks import SingularityMarks
 from ..core.errors import RosyError
 from ..core.progress import progress, report
 from ..field.blocks import concatenated_ranges
@@ -135,8 +130,8 @@ def svg_text(
     Returns
     -------
     str
-        A document of SVG 1.1. Each family is a group, which is a layer in Inkscape. So are the paper and the
-        singularities. Each stroke is one path.
+        A document of SVG 1.1. Each family is a group, which is a layer in Inkscape. The paper and the
+        singularities are layers of their own. Each stroke is one path.
     """
     pen = pen or Pen()
     pixels, _ = project_to_pixels(strokes.points, camera)
@@ -160,9 +155,8 @@ def svg_text(
             f'<rect width="100%" height="100%" fill={quoteattr(pen.paper)}/>',
             "</g>",
         ]
-    for family, (name, color) in enumerate(
-        zip(strokes.names, pen.family_colors(strokes.names), strict=True)
-    ):
+    colors = pen.family_colors(strokes.names)
+    for family, (name, color) in enumerate(zip(strokes.names, colors, strict=True)):
         family_strokes = strokes.select(strokes.family == family)
         if not len(family_strokes):
             continue
@@ -190,20 +184,19 @@ def _singularity_layer(marks: SingularityMarks, height: int) -> list[str]:
     `height` is the height of the picture in pixels.
     """
     marks = marks.in_drawing_order()
-    outline = OUTLINE * marks.size
+    outline = singularity_marks.OUTLINE * marks.size
     lines = [
         '<g id="singularities" inkscape:groupmode="layer" inkscape:label="singularities" '
-        f'stroke="{OUTLINE_COLOR}" stroke-width="{outline:.3g}" stroke-linecap="round" '
+        f'stroke="{singularity_marks.OUTLINE_COLOR}" stroke-width="{outline:.3g}" stroke-linecap="round" '
         'stroke-linejoin="round">'
     ]
     columns = marks.position, marks.radius, marks.index, marks.is_visible
-    for (x, y), radius, index, is_visible in zip(
-        *(column.tolist() for column in columns), strict=True
-    ):
-        opacity = "" if is_visible else f' opacity="{HIDDEN_OPACITY}"'
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    for (x, y), radius, index, is_visible in rows:
+        opacity = "" if is_visible else f' opacity="{singularity_marks.HIDDEN_OPACITY}"'
         lines.append(
             f'<circle cx="{x:.2f}" cy="{height - y:.2f}" r="{radius + outline / 2:.2f}" '
-            f'fill="{COLOR_BY_SIGN[1 if index > 0 else -1]}"{opacity}/>'
+            f'fill="{singularity_marks.COLOR_BY_SIGN[1 if index > 0 else -1]}"{opacity}/>'
         )
     width = stroke_width(marks.size)
     for label in placed_labels(marks):
@@ -243,9 +236,8 @@ def _stroke_paths(pixels: np.ndarray, strokes: Strokes, width: float, color: str
         kept = simplify_mask(features, strokes.start, SIMPLIFY_TOLERANCE_PX)
     start = np.concatenate([[0], np.cumsum(kept)])[strokes.start]
     points, radius = pixels[kept], radius[kept]
-    min_radius, max_radius = (
-        extremum.reduceat(radius, start[:-1]) for extremum in (np.minimum, np.maximum)
-    )
+    min_radius = np.minimum.reduceat(radius, start[:-1])
+    max_radius = np.maximum.reduceat(radius, start[:-1])
     left, right = _offset_sides(points, radius, start)
     paths = []
     for stroke, closed in enumerate(strokes.closed.tolist()):
@@ -289,9 +281,8 @@ def _offset_sides(
     mean_direction = forward + backward
     norm = np.hypot(*mean_direction.T)
     is_reversal = norm < 1e-6
-    mean_direction = np.where(
-        is_reversal[:, None], forward, mean_direction / np.where(is_reversal, 1, norm)[:, None]
-    )
+    mean_direction /= np.where(is_reversal, 1, norm)[:, None]
+    mean_direction[is_reversal] = forward[is_reversal]
     # The distance is measured from the segments, so it is larger where two meet at an angle.
     miter = np.minimum(2 / np.maximum(norm, 1e-6), MAX_MITER)
     offset = (radius * miter)[:, None] * mean_direction[:, ::-1] * (1, -1)
@@ -399,6 +390,7 @@ def plotter_order(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.n
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=bool)
     low, extent = ends.min(axis=0), np.maximum(np.ptp(ends, axis=0), 1e-9)
     cell_count = max(int(np.sqrt(count)), 1)
+    cell_size = extent.max() / cell_count
     cell = np.minimum(((ends - low) / extent.max() * cell_count).astype(np.int64), cell_count - 1)
     grid: dict[tuple[int, int], set[int]] = {}
     keys = [tuple(key) for key in cell.tolist()]
@@ -410,9 +402,7 @@ def plotter_order(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.n
     for _ in range(count):
         if len(order) % PATHS_PER_REPORT == 0:
             report(len(order) / count, "ordering strokes")
-        nearest = _nearest_end(
-            grid, positions, current, current_cell, cell_count, extent.max() / cell_count
-        )
+        nearest = _nearest_end(grid, positions, current, current_cell, cell_count, cell_size)
         stroke = nearest % count
         order.append(stroke)
         is_reversed.append(nearest >= count)

@@ -24,6 +24,7 @@ from ..field.surface import Surface
 from ..projection.corner_field import cached_corner_field
 from ..projection.field_channel import REPRESENTATION, rotation_order
 from ..projection.gbuffer import MeshInstance
+from ..projection.pixel_blocks import part_of
 
 #: An edge across which normals are not interpolated counts as a crease if the normals of its two triangles
 #: differ by at least this angle, in radians.
@@ -118,8 +119,7 @@ class TangentMesh:
 
         Points outside their triangle get coordinates on its boundary.
         """
-        delta = points - self.points[triangle, 0]
-        planar = self.to_frame(triangle, delta)
+        planar = self.to_frame(triangle, points - self.points[triangle, 0])
         weights = (self.gradient[triangle] * planar.conj()[:, None]).real
         weights[:, 0] += 1
         weights = np.maximum(weights, 0)
@@ -186,9 +186,8 @@ class TangentMesh:
         tolerance : float
             Tolerance in radians.
         """
-        cosine = dot(member_a, member_b) - dot(member_a, normal_b) * dot(
-            normal_a, member_b
-        ) / np.maximum(1 + dot(normal_a, normal_b), 1e-12)
+        product = dot(member_a, normal_b) * dot(normal_a, member_b)
+        cosine = dot(member_a, member_b) - product / np.maximum(1 + dot(normal_a, normal_b), 1e-12)
         if self.is_directed:
             return cosine > np.cos(np.pi / self.degree + tolerance)
         return np.abs(cosine) > np.cos(np.pi / (2 * self.family_count) + tolerance)
@@ -203,9 +202,8 @@ class TangentMesh:
         """
         if not self.harmonics:
             return member
-        harmonics = [
-            (j, np.einsum("nk,nk->n", weights, values[triangle])) for j, values in self.harmonics
-        ]
+        corners = [(j, values[triangle]) for j, values in self.harmonics]
+        harmonics = [(j, np.einsum("nk,nk->n", weights, values)) for j, values in corners]
         return unit(member * evaluate_harmonics(harmonics, member), member.copy())
 
 
@@ -230,17 +228,9 @@ class SharedEdges(NamedTuple):
 
         Each row has the corners, as 3 t + k, of the two triangles t that share the edge.
         """
-        first, second = (
-            np.stack(
-                [
-                    3 * self.triangle + (self.edge + own) % 3,
-                    3 * self.neighbor + (self.neighbor_edge + other) % 3,
-                ],
-                axis=1,
-            )
-            for own, other in ((1, 2), (2, 1))
-        )
-        return first, second
+        triangle = np.stack([self.triangle, self.neighbor], axis=1)
+        edge = np.stack([self.edge, self.neighbor_edge], axis=1)
+        return 3 * triangle + (edge + (1, 2)) % 3, 3 * triangle + (edge + (2, 1)) % 3
 
 
 def shared_edges(mesh: TangentMesh) -> SharedEdges:
@@ -272,8 +262,7 @@ def build_tangent_mesh(
     instance: MeshInstance,
     *,
     display: str = "smooth",
-    cross_creases: bool = False,
-    crease_angle: float = CREASE_ANGLE,
+    crease_angle: float | None = CREASE_ANGLE,
     cache: Cache | None = None,
 ) -> TangentMesh:
     """Build the tangent mesh of a mesh instance.
@@ -284,10 +273,9 @@ def build_tangent_mesh(
         Instance with a field.
     display : {"smooth", "flat"}
         Whether the field is interpolated, or constant on each face.
-    cross_creases : bool
-        If true, strokes continue across creases along the nearest member. Otherwise they stop.
-    crease_angle : float
-        Smallest angle between the normals of the triangles at a crease, in radians.
+    crease_angle : float or None
+        Smallest angle between the normals of the triangles at a crease, in radians. Streamlines stop at
+        creases. If None, they continue across all creases, along the nearest member.
     cache : Cache, optional
         Cache for corner fields.
 
@@ -315,9 +303,8 @@ def build_tangent_mesh(
     points = instance.world_points()[surface.triangle_vertex]
     normal, x, y, area = _triangle_frames(points)
     corner_normal = corner_field.corner_normals.astype(np.float64).transpose(2, 0, 1)
-    rotations = _rotations_to_planes(
-        corner_field.reference_tangent.astype(np.float64).T, corner_normal, normal, x, y
-    )
+    axis = corner_field.reference_tangent.astype(np.float64).T
+    rotations = _rotations_to_planes(axis, corner_normal, normal, x, y)
     z = corner_field.representation.T.astype(np.complex128) * power(rotations, field.degree)
     z *= (area > 0)[:, None]
     if not z.any():
@@ -327,7 +314,7 @@ def build_tangent_mesh(
         values = values.T * signed_power(rotations, rotation_order(channel, field.degree))
         if channel[0] == "deviation":
             harmonics.append((channel[1], values))
-        elif channel != REPRESENTATION:
+        elif channel != REPRESENTATION and values.any():
             family_z = values.sum(axis=1)
     mesh = TangentMesh(
         degree=field.degree,
@@ -349,7 +336,7 @@ def build_tangent_mesh(
         triangle_vertex=surface.triangle_vertex,
     )
     with progress(0.6, 1.0, "connecting triangles"):
-        _connect(mesh, surface, None if cross_creases else crease_angle)
+        _connect(mesh, surface, crease_angle)
     return mesh
 
 
@@ -359,16 +346,9 @@ def take_triangles(mesh: TangentMesh, kept: np.ndarray) -> TangentMesh:
     Strokes stop at edges to triangles that are not kept.
     """
     number = np.where(kept, np.cumsum(kept, dtype=np.int32) - np.int32(1), np.int32(-1))
-    kept_arrays = {
-        name: values[kept] for name, values in vars(mesh).items() if isinstance(values, np.ndarray)
-    }
-    taken = replace(
-        mesh,
-        harmonics=tuple((j, values[kept]) for j, values in mesh.harmonics),
-        **kept_arrays,
-    )
-    neighbor = np.where(taken.neighbor >= 0, number[taken.neighbor], np.int32(-1))
-    return replace(taken, neighbor=neighbor)
+    harmonics = tuple((j, values[kept]) for j, values in mesh.harmonics)
+    neighbor = np.where(mesh.neighbor >= 0, number[mesh.neighbor], np.int32(-1))[kept]
+    return replace(part_of(mesh, kept), harmonics=harmonics, neighbor=neighbor)
 
 
 def with_corners(mesh: TangentMesh, points: np.ndarray) -> TangentMesh:
@@ -399,8 +379,7 @@ def _triangle_frames(points: np.ndarray) -> tuple[np.ndarray, ...]:
     normal = normalize(cross)
     x = normalize(edge_a)
     area = np.sqrt(dot(cross, cross)) / 2
-    longest_squared = np.maximum(dot(edge_a, edge_a), dot(edge_b, edge_b))
-    area[area <= MIN_AREA_RATIO * longest_squared] = 0
+    area[area <= MIN_AREA_RATIO * np.maximum(dot(edge_a, edge_a), dot(edge_b, edge_b))] = 0
     return normal, x, np.cross(normal, x), area
 
 
@@ -419,12 +398,14 @@ def _barycentric_gradients(
 def _rotations_to_planes(
     axis: np.ndarray, corner_normal: np.ndarray, normal: np.ndarray, x: np.ndarray, y: np.ndarray
 ) -> np.ndarray:
-    """Return (T, 3) complex128: the reference tangent of the value at each corner, in the triangle's frame.
+    """Return (T, 3) complex128: rotations of the field values at corners to the frames of the triangles.
 
-    `CornerField` transports the values of all three corners to the first corner, and stores them relative
-    to one reference tangent there. This function undoes that transport: the reference tangent is transported
-    from the first corner to the corner of the value, and from there directly to the plane of the triangle.
-    Then the values along an edge depend only on its two ends.
+    `CornerField` stores the field at the three corners of a triangle relative to one reference tangent at the
+    first corner. The result is this tangent after transport, by minimal rotations, from the normal at the
+    first corner to the normal at each corner, and from there to the normal of the triangle. It is a unit
+    number in the frame of the triangle. A member of the field at a corner is multiplied by it, so a
+    representation of degree N is multiplied by its power N. Then two triangles that share an edge have
+    the same interpolated field along it.
 
     Parameters
     ----------
@@ -448,11 +429,9 @@ def _connect(mesh: TangentMesh, surface: Surface, crease_angle: float | None) ->
 
     Strokes stop at triangles on which the field is zero and, unless `crease_angle` is None, at creases.
     """
-    corner_count = mesh.neighbor.size
+    start = np.arange(0, mesh.neighbor.size + 1, 3, dtype=np.int32)
     with progress(0.0, 0.5):
-        edges = build_edges(
-            surface.triangle_vertex.ravel(), np.arange(0, corner_count + 1, 3, dtype=np.int32)
-        )
+        edges = build_edges(surface.triangle_vertex.ravel(), start)
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     defined = (mesh.z != 0).any(axis=1)
     passable = defined[a // 3] & defined[b // 3]
@@ -466,13 +445,12 @@ def _connect(mesh: TangentMesh, surface: Surface, crease_angle: float | None) ->
     along = mesh.points[triangle_a, (a + 1) % 3] - mesh.points[triangle_a, a % 3]
     edge_in_a = mesh.to_frame(triangle_a, along)
     factor = unit(mesh.to_frame(triangle_b, along) * edge_in_a.conj(), np.ones_like(edge_in_a))
-    for own, edge, other, other_edge, transported in (
-        (triangle_a, edge_a, triangle_b, edge_b, factor),
-        (triangle_b, edge_b, triangle_a, edge_a, factor.conj()),
+    for own, other, transported in (
+        ((triangle_a, edge_a), (triangle_b, edge_b), factor),
+        ((triangle_b, edge_b), (triangle_a, edge_a), factor.conj()),
     ):
-        mesh.neighbor[own, edge] = other
-        mesh.neighbor_edge[own, edge] = other_edge
-        mesh.edge_transport[own, edge] = transported
+        mesh.neighbor[own], mesh.neighbor_edge[own] = other
+        mesh.edge_transport[own] = transported
 
 
 def is_sharp_edge(surface: Surface, a: np.ndarray, b: np.ndarray) -> np.ndarray:

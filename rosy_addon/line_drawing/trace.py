@@ -8,15 +8,11 @@ import numpy as np
 
 from ..core.errors import RosyError
 from ..core.progress import progress, report
+from ..field.blocks import mask
 from ..field.frames import dot, normalize
 from .lateral_neighbors import SeparationRules
 from .placement import StreamlinePlacer
-from .seeding import (
-    candidate_seeds,
-    seeds_around_singularities,
-    thinned_seeds,
-    uncovered_seeds,
-)
+from .seeding import candidate_seeds, seeds_around_singularities, thinned_seeds, uncovered_seeds
 from .separation import enforce_separation
 from .spacing import CornerSpacing
 from .stroke_set import Strokes
@@ -116,9 +112,8 @@ def place_streamlines(placer: StreamlinePlacer) -> None:
     5. Fill the remaining gaps, with the minimum length of the rules.
     """
     rules = placer.rules
-    placer.rules = replace(
-        rules, min_separation=min(WARMUP_SEPARATION, rules.min_separation), max_gap=np.inf
-    )
+    separation = min(WARMUP_SEPARATION, rules.min_separation)
+    placer.rules = replace(rules, min_separation=separation, max_gap=np.inf)
     placer.add_seeds(seeds_around_singularities(placer.mesh, placer.spacing.values))
     for index, sample_count in enumerate(FIRST_WARMUP + SECOND_WARMUP):
         report(0.0, TRACING)
@@ -135,9 +130,8 @@ def place_streamlines(placer: StreamlinePlacer) -> None:
     placer.rescan(replace(rules, min_length=SECOND_LENGTH_FACTOR * rules.min_length))
     _add_uncovered_seeds(placer, candidates, SEED_SPACINGS[-1])
     _grow_until(placer, STRAGGLER_RATIO)
-    fill_rules = replace(
-        rules, min_separation=FILL_SEPARATION_FACTOR * rules.min_separation, max_gap=np.inf
-    )
+    separation = FILL_SEPARATION_FACTOR * rules.min_separation
+    fill_rules = replace(rules, min_separation=separation, max_gap=np.inf)
     placer.resume_yielded(replace(fill_rules, min_length=SECOND_LENGTH_FACTOR * rules.min_length))
     _grow_until(placer, STRAGGLER_RATIO)
     placer.rescan(fill_rules)
@@ -213,17 +207,11 @@ def collect(placer: StreamlinePlacer) -> Strokes:
     stroke = np.concatenate([stroke, stroke_ids])
     order = np.lexsort((rank, stroke))
     stroke = stroke[order]
-    triangle, weights, direction = (
-        np.concatenate(pair)[order]
-        for pair in (
-            (triangle, first_triangle),
-            (weights, first_weights),
-            (direction * sign, first_direction),
-        )
-    )
+    triangle = np.concatenate([triangle, first_triangle])[order].astype(np.int32)
+    weights = np.concatenate([weights, first_weights])[order]
+    direction = np.concatenate([direction * sign, first_direction])[order]
     count = np.bincount(np.searchsorted(stroke_ids, stroke), minlength=len(stroke_ids))
     spacing = placer.spacing.at(triangle, weights, direction)
-    triangle = triangle.astype(np.int32)
     return Strokes.on_mesh(placer.mesh, count, triangle, weights, direction, spacing)
 
 
@@ -243,7 +231,7 @@ def close_loops(mesh: TangentMesh, strokes: Strokes, spacing: CornerSpacing) -> 
     mesh : TangentMesh
         The mesh on which the strokes were traced.
     strokes : Strokes
-        Strokes before `label_families`, with the same value of `Strokes.family`.
+        Strokes before `label_families`, all with the same value of `Strokes.family`.
     spacing : CornerSpacing
 
     Returns
@@ -260,37 +248,29 @@ def close_loops(mesh: TangentMesh, strokes: Strokes, spacing: CornerSpacing) -> 
     # traced, and the angle that would remove this offset if the stroke were straight.
     angle_before = np.zeros(len(candidates))
     offset_before = _left_offset(strokes, first, strokes.points[last])
-    angle = np.clip(
-        -offset_before / strokes.length[candidates], -MAX_CLOSING_ANGLE, MAX_CLOSING_ANGLE
-    )
+    angle = -offset_before / strokes.length[candidates]
+    angle = np.clip(angle, -MAX_CLOSING_ANGLE, MAX_CLOSING_ANGLE)
     for iteration in range(MAX_ITERATIONS):
         with progress(iteration / MAX_ITERATIONS, (iteration + 1) / MAX_ITERATIONS):
             path, offset, passed = _trace_loops(mesh, strokes, candidates, angle)
         if (np.abs(offset) <= tolerance).all():
             break
         change = offset - offset_before
-        correction = np.divide(
-            -offset * (angle - angle_before), change, out=np.zeros_like(angle), where=change != 0
-        )
+        step = -offset * (angle - angle_before)
+        correction = np.divide(step, change, out=np.zeros_like(angle), where=change != 0)
         angle_before, offset_before = angle, offset
         angle = angle + np.clip(correction, -MAX_CLOSING_ANGLE, MAX_CLOSING_ANGLE)
     closes = passed & (np.abs(offset) <= tolerance) & (np.abs(angle) <= MAX_CLOSING_ANGLE)
     if not closes.any():
         return strokes
-    is_open = np.ones(len(strokes), dtype=bool)
-    is_open[candidates[closes]] = False
+    is_open = ~mask(len(strokes), candidates[closes])
     start = _particles_at_start(mesh, strokes, first[closes])
     keep = closes[path.particle]
     particle = np.concatenate([np.flatnonzero(closes), path.particle[keep]])
     order = np.argsort(particle, kind="stable")
-    triangle, weights, direction = (
-        np.concatenate([at_start, traced[keep]])[order]
-        for at_start, traced in (
-            (start.triangle, path.triangle),
-            (start.weights, path.end_weights),
-            (start.member, path.direction),
-        )
-    )
+    triangle = np.concatenate([start.triangle, path.triangle[keep]])[order]
+    weights = np.concatenate([start.weights, path.end_weights[keep]])[order]
+    direction = np.concatenate([start.member, path.direction[keep]])[order]
     count = np.bincount(particle, minlength=len(candidates))[closes]
     spacings = spacing.at(triangle, weights, direction)
     loops = Strokes.on_mesh(mesh, count, triangle, weights, direction, spacings, closed=True)
@@ -359,9 +339,8 @@ def _trace_loops(
         current = particles.take(active)
         to_origin = origin[active] - mesh.points_at(current.triangle, current.weights)
         forward = dot(to_origin, tangent[active])
-        is_near = (total_walked > length - 2 * spacing)[active] & (
-            dot(to_origin, to_origin) < spacing[active] ** 2
-        )
+        is_near = dot(to_origin, to_origin) < spacing[active] ** 2
+        is_near &= (total_walked > length - 2 * spacing)[active]
         arrived = is_near & (forward < 1e-6 * spacing[active])
         passed[active[arrived]] = True
         overran = total_walked[active] > length[active] + (MAX_FORWARD_GAP + 1) * spacing[active]
@@ -383,6 +362,5 @@ def _trace_loops(
 def _particles_at_start(mesh: TangentMesh, strokes: Strokes, first: np.ndarray) -> SurfaceParticles:
     """Return particles at the points with the indices `first`, which move along their strokes."""
     triangle, weights = strokes.triangle[first], strokes.weights[first]
-    reference = mesh.to_frame(triangle, strokes.member[first])
-    member = mesh.members_at(triangle, weights, reference)
+    member = mesh.members_at(triangle, weights, mesh.to_frame(triangle, strokes.member[first]))
     return SurfaceParticles(triangle, weights, member, np.ones(len(first)))

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.progress import progress, report
-from ..field.blocks import row_blocks
+from ..field.blocks import mask, row_blocks
 from ..field.frames import dot, normalize
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
@@ -114,8 +114,9 @@ def clip_to_visible(strokes: Strokes, camera: Camera, depth_buffer: DepthBuffer 
     -----
     A point is compared with the triangles that are visible at the four pixel centers around it. It
     is hidden if the planes of all four triangles are in front of it by more than a bias: `DEPTH_BIAS_PX` plus
-    the steepness of the plane, in pixels. Planes are used because the depth at a pixel center
-    differs from the depth at the point, by the slope times up to half a pixel. A point is also hidden by a
+    the tangent of the angle between the view ray and the normal of the plane, times the size of a pixel in
+    world space at the point. Planes are used because the depth at a pixel center differs from the depth
+    at the point, by the slope times up to half a pixel. A point is also hidden by a
     single triangle in front of it if the triangle faces the camera and the surface at the point faces away,
     or the reverse.
     """
@@ -179,8 +180,8 @@ def visible_runs(
 def _stroke_blocks(point_count: np.ndarray, size: int) -> Iterator[tuple[int, int]]:
     """Return the ranges ``(first, stop)`` of consecutive strokes that have about `size` points together.
 
-    `point_count` is the number of points up to the end of each stroke. Each block ends before the stroke
-    whose points reach the next multiple of `size`.
+    `point_count`, (S,), is the cumulative number of points: of each stroke and all strokes before it. A new
+    block begins with each stroke at which this number reaches the next multiple of `size`.
     """
     return pairwise([0, *np.flatnonzero(np.diff(point_count // size)) + 1, len(point_count)])
 
@@ -197,9 +198,8 @@ def _from_hidden_points(strokes: Strokes, visible: np.ndarray) -> np.ndarray:
         if len(hidden):
             # The last point is the same as the first.
             begin = first + hidden[0]
-            order[first : last + 1] = np.concatenate(
-                [np.arange(begin, last + 1), np.arange(first + 1, begin + 1)]
-            )
+            parts = np.arange(begin, last + 1), np.arange(first + 1, begin + 1)
+            order[first : last + 1] = np.concatenate(parts)
     return order
 
 
@@ -318,8 +318,8 @@ class PlanesAround(NamedTuple):
     facing : (n,) float64 ndarray
         Positive if the triangle faces the camera, negative if it faces away.
     distance : (n,) float64 ndarray
-        Distance from the plane back to the point, along the ray from the camera; negative if the point is in
-        front.
+        Distance, in world space, from the plane to the point along the ray from the camera. It is positive
+        if the point is behind the plane, and negative if it is in front.
     hides : (n,) bool ndarray
         Whether the plane hides the point: the distance is larger than a bias.
     """
@@ -362,8 +362,7 @@ def planes_around(
                 steepness = np.sqrt(np.maximum(length**2 / facing**2 - 1, 0))
             # NaN if the square of `facing` is 0 and the length as well.
             steepness = np.minimum(np.nan_to_num(steepness), MAX_BIAS_STEEPNESS)
-            bias = footprint * (DEPTH_BIAS_PX + steepness)
-            hides = (triangle >= 0) & (distance > bias)
+            hides = (triangle >= 0) & (distance > footprint * (DEPTH_BIAS_PX + steepness))
             yield PlanesAround(triangle, facing, distance, hides)
 
 
@@ -416,8 +415,7 @@ def clean_runs(
         flip = (visible[first] == value) & (arc[last] - arc[first] < min_length)
         if not value:
             # Hidden runs at the ends of strokes are not gaps between visible runs.
-            ends = np.zeros(len(visible) + 1, dtype=bool)
-            ends[start] = True
+            ends = mask(len(visible) + 1, start)
             flip &= ~ends[first] & ~ends[last + 1]
         visible = visible ^ flip[np.cumsum(starts_run) - 1]
     return visible

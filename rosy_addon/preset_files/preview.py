@@ -29,8 +29,9 @@ BACKGROUND = "#292929"
 def draw_preview(look: Look) -> np.ndarray:
     """Draw the preview picture of a look: a trefoil knot with a field along its principal curvatures.
 
-    The tone is that of the light, whatever the look takes it from. The values for the color map increase from
-    left to right. A preview takes about a second for any look, because expensive settings are reduced.
+    The tone always comes from the light, even if the look has another source of the tone. The values for the
+    color map increase from left to right. A preview takes about a second for any look, because expensive
+    settings are reduced.
 
     Parameters
     ----------
@@ -112,16 +113,9 @@ def _trefoil_mesh(
 def _trefoil_curve(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return (n, 3) points of a trefoil knot at (n,) curve parameters, and (n, 3) unit tangents there."""
     radius, height = 2 + np.cos(3 * t), 1.1
-    curve = np.stack(
-        [radius * np.cos(2 * t), radius * np.sin(2 * t), height * np.sin(3 * t)], axis=1
-    )
-    radius_derivative = -3 * np.sin(3 * t)
-    tangent = np.stack(
-        [
-            radius_derivative * np.cos(2 * t) - 2 * radius * np.sin(2 * t),
-            radius_derivative * np.sin(2 * t) + 2 * radius * np.cos(2 * t),
-            3 * height * np.cos(3 * t),
-        ],
-        axis=1,
-    )
+    slope = -3 * np.sin(3 * t)  # of the radius
+    cos, sin = np.cos(2 * t), np.sin(2 * t)
+    curve = np.column_stack([radius * cos, radius * sin, height * np.sin(3 * t)])
+    x, y = slope * cos - 2 * radius * sin, slope * sin + 2 * radius * cos
+    tangent = np.column_stack([x, y, 3 * height * np.cos(3 * t)])
     return curve, tangent / np.linalg.norm(tangent, axis=1, keepdims=True)

@@ -192,13 +192,13 @@ def read_preset(path: str | os.PathLike[str]) -> Preset:
     except KeyError as missing:
         raise RosyError(f"{path}: the preset has no {missing}") from None
     if data:
-        raise RosyError(f"{path}: unknown entry {_short_repr(next(iter(data)))}")
+        raise RosyError(f"{path}: unknown entry {reprlib.repr(next(iter(data)))}")
     if not isinstance(look, dict):
         raise RosyError(f"{path}: 'look' must be a JSON object of settings")
     unknown = sorted(set(look) - set(settings_of(Look)))
     if unknown:
         raise RosyError(
-            f"{path}: unknown setting {_short_repr(unknown[0])}: check its spelling, or update RoSy"
+            f"{path}: unknown setting {reprlib.repr(unknown[0])}: check its spelling, or update RoSy"
         )
     try:
         return _validated(Preset(name, description, Look().with_settings(look)))
@@ -245,7 +245,7 @@ def preset_key(name: str) -> str:
     normalized = unicodedata.normalize("NFC", name).lower()
     words = "".join(character if character.isalnum() else " " for character in normalized).split()
     if not words:
-        raise RosyError(f"preset {_short_repr(name)}: the name needs a letter or a digit")
+        raise RosyError(f"preset {reprlib.repr(name)}: the name needs a letter or a digit")
     key = "-".join(words)
     return f"{key}-preset" if key in WINDOWS_DEVICE_NAMES else key
 
@@ -334,14 +334,14 @@ def _validated(preset: Preset) -> Preset:
     for attribute, max_length in limits:
         text = getattr(preset, attribute)
         if not isinstance(text, str):
-            raise RosyError(f"the {attribute} of the preset must be text, not {_short_repr(text)}")
+            raise RosyError(f"the {attribute} of the preset must be text, not {reprlib.repr(text)}")
         if len(text) > max_length:
             raise RosyError(
                 f"the {attribute} of the preset has {len(text):,} characters, more than {max_length}"
             )
         if not text.isprintable():
             raise RosyError(
-                f"the {attribute} of the preset must be one line of text, not {_short_repr(text)}"
+                f"the {attribute} of the preset must be one line of text, not {reprlib.repr(text)}"
             )
     preset_key(preset.name)
     return preset
@@ -403,10 +403,5 @@ def _reject_duplicate_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(result) < len(pairs):
         names = [name for name, _ in pairs]
         duplicate = next(name for name in names if names.count(name) > 1)
-        raise RosyError(f"{_short_repr(duplicate)} appears twice")
+        raise RosyError(f"{reprlib.repr(duplicate)} appears twice")
     return result
-
-
-def _short_repr(value: Any) -> str:
-    """Return an abbreviated `repr` of a value from a file, for messages."""
-    return reprlib.repr(value)

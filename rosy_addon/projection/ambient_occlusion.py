@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from ..core.errors import RosyError
 from ..core.progress import progress
+from ..field.blocks import bincount_rows
 from ..field.frames import dot, normalize
-from ..field.polygon_arrays import sum_per_fan
-from .gbuffer import MeshInstance
-from .shadow_maps import (
-    NORMAL_BIAS_PIXELS,
-    render_depth_map,
-    sun_camera,
-    visibility_from,
-)
+from .gbuffer import MeshInstance, MeshInstances
+from .shadow_maps import NORMAL_BIAS_PIXELS, render_depth_map, sun_camera, visibility_from
 from .vector_components import cofactor_matrix
 
 #: Number of light directions by default, and width and height of each shadow map in pixels.
@@ -30,9 +23,7 @@ SAMPLE_INSET_PIXELS, MAX_INSET_FRACTION = 2 * NORMAL_BIAS_PIXELS, 0.3
 
 
 def ambient_occlusion(
-    instances: Sequence[MeshInstance],
-    instance_id: int,
-    direction_count: int = DIRECTION_COUNT,
+    instances: MeshInstances, instance_id: int, direction_count: int = DIRECTION_COUNT
 ) -> np.ndarray:
     """Compute the ambient occlusion at the corners of one mesh instance.
 
@@ -99,7 +90,7 @@ def _sample_points(instance: MeshInstance, inset: float) -> tuple[np.ndarray, np
     surface, linear = instance.surface, np.asarray(instance.matrix, dtype=np.float64)[:3, :3]
     vertex = np.empty((len(surface.fan_normal), 3))
     vertex[surface.corner_fan] = surface.vertices[surface.corner_vertex]
-    center_sums = sum_per_fan(surface.face_center[surface.corner_face], surface.corner_fan)
+    center_sums = bincount_rows(surface.corner_fan, surface.face_center[surface.corner_face])
     center = instance.to_world(center_sums / np.bincount(surface.corner_fan)[:, None])
     position = instance.to_world(vertex)
     offset = center - position

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.progress import report
-
-#: Triangles, spans or fragments per block. Bounds memory, and fits the caches of the processor.
-BLOCK_SIZE = 1 << 14
+from .pixel_blocks import pixel_blocks
 
 #: Largest sum of nonnegative barycentric coordinates that rounding explains. If the sum is larger, some
 #: coordinates were negative and set to 0, so the pixel center is outside of the triangle.
@@ -31,11 +29,25 @@ def barycentrics(
     Coordinates", 1997), which are also valid for triangles that extend behind the eye. They are
     evaluated relative to the pixel center, so that small triangles lose no precision.
 
+    Parameters
+    ----------
+    vertices : (V, 4) float64 ndarray
+        Clip space.
+    triangles : (T, 3) ndarray of int
+        Indices into `vertices`.
+    pixel : (P,) int32 ndarray
+        Flat indices into the frame.
+    triangle : (P,) ndarray of int
+        For each pixel, the index of the triangle whose coordinates are computed.
+    width, height : int
+        Size of the frame in pixels.
+
     Returns
     -------
     weights : (P, 3) float32 ndarray
-        Coordinates of a point in the triangle. If the pixel center is outside of the triangle, this is
-        another point. The coordinates are 1 / 3 each for triangles that have no area on screen.
+        Barycentric coordinates, not negative, with sum 1. If the pixel center is outside of the triangle,
+        negative coordinates are set to 0, and the others are scaled to the sum 1. The coordinates are
+        1 / 3 each for triangles that have no area on screen.
     front_facing : (P,) bool ndarray
         Whether the corners run counter-clockwise on screen.
     """
@@ -44,9 +56,8 @@ def barycentrics(
     corners = np.ascontiguousarray(triangles.T)
     weights = np.empty((3, len(pixel)), dtype=np.float32)
     front_facing = np.empty(len(pixel), dtype=bool)
-    for start in range(0, len(pixel), BLOCK_SIZE):
-        report(start / len(pixel), LABEL)
-        block = slice(start, start + BLOCK_SIZE)
+    for block in pixel_blocks(len(pixel)):
+        report(block.start / len(pixel), LABEL)
         row, column = np.divmod(pixel[block], np.int32(width))
         column, row = column + 0.5, row + 0.5
         offsets = []

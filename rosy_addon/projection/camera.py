@@ -340,7 +340,9 @@ def _view_from_axes(axes: np.ndarray, eye: np.ndarray) -> np.ndarray:
 
 
 def orbit_basis(azimuth: float, elevation: float) -> np.ndarray:
-    """Return a (3, 3) array with the unit vectors right, up and back of a camera, given angles in degrees.
+    """Return the axes of a camera, given angles in degrees: (3, 3), with the rows right, up and back.
+
+    They are unit vectors in world space.
 
     World z is up. Azimuth 0, elevation 0 looks along +y (Blender's front view), azimuth 90 along -x
     (its right view), elevation 90 down along -z (its top view).
@@ -372,7 +374,8 @@ def orbit_camera(
     width, height : int
         Pixels.
     perspective : bool
-        The angle of view is `DEFAULT_FOV`.
+        Whether the camera is perspective, with the angle of view `DEFAULT_FOV`. Otherwise, it is
+        orthographic.
     margin : float
         Fraction of the frame that stays empty at each border.
 
@@ -402,10 +405,8 @@ def orbit_camera(
     frame_fraction = 1 - 2 * margin
     extent = max(np.ptp(u), np.ptp(v), np.ptp(w)) or 1.0
     if not perspective:
-        scale = (
-            max(np.ptp(u) * longer_side / width, np.ptp(v) * longer_side / height) / frame_fraction
-            or extent
-        )
+        scale = max(np.ptp(u) * longer_side / width, np.ptp(v) * longer_side / height)
+        scale = scale / frame_fraction or extent
         back = w.max() + extent
         eye = np.array([(u.min() + u.max()) / 2, (v.min() + v.max()) / 2, back]) @ basis
         clip = (0.5 * extent, back - w.min() + 0.5 * extent)

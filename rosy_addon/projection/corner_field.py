@@ -31,9 +31,8 @@ from ..field.surface import Surface
 from .face_values import TangentValues, face_values
 from .field_channel import REPRESENTATION, FieldChannel, rotation_order
 from .gbuffer import MeshInstance
-from .pixel_blocks import part_of
+from .pixel_blocks import part_of, pixel_blocks
 from .vector_components import (
-    BLOCK_SIZE,
     VectorComponents,
     cofactor_matrix,
     cross_components,
@@ -60,6 +59,8 @@ class CornerField:
         n_0 . (n_1 x n_2).
     geometric_normal : (3, T) float32 ndarray
         Unit normals of the triangles, oriented by the order of their corners.
+    degree : int
+        N.
     channels : dict of FieldChannel to (3, T) complex64 ndarray
         z, and the other channels of the field, at each corner. The values at corners 1 and 2 are
         transported to corner 0, along the shortest arc between the normals.
@@ -70,6 +71,7 @@ class CornerField:
     normal_dots: np.ndarray
     normal_triple_product: np.ndarray
     geometric_normal: np.ndarray
+    degree: int
     channels: dict[FieldChannel, np.ndarray]
 
     @property
@@ -84,11 +86,10 @@ class CornerField:
 
     def rotated(self, rotation: np.ndarray) -> CornerField:
         """Return a copy in another space: all vectors are rotated by a (3, 3) matrix."""
+        corner_normals = [transform_components(corner, rotation) for corner in self.corner_normals]
         return replace(
             self,
-            corner_normals=np.stack(
-                [transform_components(corner, rotation) for corner in self.corner_normals]
-            ),
+            corner_normals=np.stack(corner_normals),
             reference_tangent=transform_components(self.reference_tangent, rotation),
             geometric_normal=transform_components(self.geometric_normal, rotation),
         )
@@ -102,7 +103,7 @@ def field_at_corners(
     Parameters
     ----------
     surface : Surface
-    matrix : (4, 4) float64 ndarray
+    matrix : (4, 4) or (3, 3) float64 ndarray
         Object to world space. The translation has no effect.
     field : RosyField
     display : {"smooth", "flat"}
@@ -129,16 +130,14 @@ def field_at_corners(
         normal_dots=np.empty((3, count), dtype=np.float32),
         normal_triple_product=np.empty(count, dtype=np.float32),
         geometric_normal=np.empty((3, count), dtype=np.float32),
+        degree=field.degree,
         channels={channel: np.empty((3, count), dtype=np.complex64) for channel in faces.channels},
     )
     custom_normals = None
     if fans is not None and not surface.fans_share_normals:
         custom_normals = transform_components(surface.corner_normal.T, cofactor_matrix(linear))
-    for start in range(0, count, BLOCK_SIZE):
-        block = slice(start, min(start + BLOCK_SIZE, count))
-        _fill_triangles(
-            corner_field, block, surface, deformed, faces, fans, custom_normals, field.degree
-        )
+    for block in pixel_blocks(count):
+        _fill_triangles(corner_field, block, surface, deformed, faces, fans, custom_normals)
     return corner_field
 
 
@@ -158,11 +157,7 @@ def cached_corner_field(
 
 
 def _fan_values(
-    surface: Surface,
-    linear: np.ndarray,
-    faces: TangentValues,
-    corner_angle: np.ndarray,
-    degree: int,
+    surface: Surface, linear: np.ndarray, faces: TangentValues, angle: np.ndarray, degree: int
 ) -> TangentValues:
     """Average the values of the faces around each fan, weighted by their corner angles.
 
@@ -175,47 +170,38 @@ def _fan_values(
     linear : (3, 3) float64 ndarray
         Object to world space, without the translation.
     faces : TangentValues
-    corner_angle : (C,) float32 ndarray
-        Result of `face_values`.
+    angle : (C,) float32 ndarray
+        Interior angle of the face at each of its corners, in radians.
     degree : int
     """
     normal = np.array(
-        normalize_components(transform_components(surface.fan_normal.T, cofactor_matrix(linear)))
+        normalize_components(transform_components(surface.fan_normal.T, cofactor_matrix(linear))),
+        dtype=np.float32,
     )
-    normal = normal.astype(np.float32)
-    frame_x, frame_y = tangent_frame_components(normal)
+    frames = tangent_frame_components(normal)
     count, fan_count = len(surface.corner_vertex), normal.shape[1]
     weight = np.empty(count)
-    values = [
-        (face_channel, rotation_order(channel, degree))
-        for channel, face_channel in faces.channels.items()
-    ]
-    sums = [(np.empty(count), np.empty(count)) for _ in values]
-    for start in range(0, count, BLOCK_SIZE):
-        block = slice(start, min(start + BLOCK_SIZE, count))
+    weighted = {channel: np.empty((2, count)) for channel in faces.channels}
+    for block in pixel_blocks(count):
         face, fan = surface.corner_face[block], surface.corner_fan[block].astype(np.intp)
-        phase = transport_phase(
-            [component.take(face) for component in faces.normal],
-            [component.take(fan) for component in normal],
-            [x.take(fan) for x in frame_x],
-            [y.take(fan) for y in frame_y],
-        )
+        x, y = ([component.take(fan) for component in axis] for axis in frames)
+        phase = transport_phase(faces.normal.take(face, axis=1), normal.take(fan, axis=1), x, y)
         is_defined = faces.channels[REPRESENTATION].take(face) != 0
-        np.multiply(corner_angle[block], is_defined, out=weight[block])
-        for (face_channel, order), (real, imaginary) in zip(values, sums, strict=True):
-            z = face_channel.take(face)
-            z *= signed_power(phase, order)
+        np.multiply(angle[block], is_defined, out=weight[block])
+        for channel, parts in weighted.items():
+            z = faces.channels[channel].take(face)
+            z *= signed_power(phase, rotation_order(channel, degree))
             z *= weight[block]
-            real[block], imaginary[block] = z.real, z.imag
+            parts[:, block] = z.real, z.imag
     total = np.bincount(surface.corner_fan, weight, fan_count)
     total[total == 0] = np.inf
-    averages = []
-    for real, imaginary in sums:
-        z = np.empty(fan_count, dtype=np.complex64)
-        z.real = np.bincount(surface.corner_fan, real, fan_count) / total
-        z.imag = np.bincount(surface.corner_fan, imaginary, fan_count) / total
-        averages.append(z)
-    return TangentValues(normal, dict(zip(faces.channels, averages, strict=True)))
+    averages = {}
+    for channel, parts in weighted.items():
+        averages[channel] = z = np.empty(fan_count, dtype=np.complex64)
+        z.real, z.imag = (
+            np.bincount(surface.corner_fan, part, fan_count) / total for part in parts
+        )
+    return TangentValues(normal, averages)
 
 
 def transport_phase(
@@ -261,7 +247,6 @@ def _fill_triangles(
     faces: TangentValues,
     fans: TangentValues | None,
     custom_normals: np.ndarray | None,
-    degree: int,
 ) -> None:
     """Write the field and the normals of one block of triangles into `corner_field`.
 
@@ -274,45 +259,40 @@ def _fill_triangles(
         vertices = [surface.corner_vertex.take(corner) for corner in corners]
         geometric_normal[:] = polygon_normals(relative_to_first(deformed, vertices))
     if fans is None:
-        normals = [[component.take(face) for component in faces.normal]] * 3
-        phases = None
+        values, index = faces, [face] * 3
+        normals, phases = [faces.normal.take(face, axis=1)] * 3, None
     else:
-        fan = [surface.corner_fan.take(corner).astype(np.intp) for corner in corners]
-        normals, phases = _corner_normals(fan, corners, fans, custom_normals)
+        values, index = (
+            fans,
+            [surface.corner_fan.take(corner).astype(np.intp) for corner in corners],
+        )
+        normals, phases = _corner_normals(index, corners, fans, custom_normals)
     normals = [_fill_missing_normals(normal, geometric_normal) for normal in normals]
     x, y = tangent_frame_components(normals[0])
     # Where the field of a face is undefined, it is undefined at all corners of the face.
     defined = faces.channels[REPRESENTATION].take(face) != 0
     for corner, normal in enumerate(normals):
         corner_field.corner_normals[corner, :, block] = normal
-        to_reference = (
-            transport_phase(normal, normals[0], x, y) if corner and fans is not None else None
-        )
+        rotations = [] if phases is None else [phases[corner]]
+        if corner and fans is not None:
+            rotations.append(transport_phase(normal, normals[0], x, y))
         for channel, out in corner_field.channels.items():
-            order = rotation_order(channel, degree)
-            if fans is None:
-                z = faces.channels[channel].take(face)
-            else:
-                z = fans.channels[channel].take(fan[corner])
-            if phases is not None:
-                z *= signed_power(phases[corner], order)
-            if to_reference is not None:
-                z *= signed_power(to_reference, order)
+            order = rotation_order(channel, corner_field.degree)
+            z = values.channels[channel].take(index[corner])
+            for rotation in rotations:
+                z *= signed_power(rotation, order)
             np.multiply(z, defined, out=out[corner, block])
     corner_field.reference_tangent[:, block] = x
     corner_field.geometric_normal[:, block] = geometric_normal
-    for pair_index, (first_corner, second_corner) in enumerate(((0, 1), (0, 2), (1, 2))):
-        corner_field.normal_dots[pair_index, block] = dot_components(
-            normals[first_corner], normals[second_corner]
-        )
-    corner_field.normal_triple_product[block] = dot_components(
-        normals[0], cross_components(normals[1], normals[2])
-    )
+    for out, (first, second) in zip(
+        corner_field.normal_dots, ((0, 1), (0, 2), (1, 2)), strict=True
+    ):
+        out[block] = dot_components(normals[first], normals[second])
+    cross_products = cross_components(normals[1], normals[2])
+    corner_field.normal_triple_product[block] = dot_components(normals[0], cross_products)
 
 
-def _fill_missing_normals(
-    normal: list[np.ndarray], geometric_normal: np.ndarray
-) -> list[np.ndarray]:
+def _fill_missing_normals(normal: np.ndarray, geometric_normal: np.ndarray) -> np.ndarray:
     """Return normals in which zero normals are replaced by the geometric normals.
 
     Where these are zero too, the result is the z axis.
@@ -321,18 +301,14 @@ def _fill_missing_normals(
     if missing.any():
         replacements = geometric_normal[:, missing]
         replacements[2, ~replacements.any(axis=0)] = 1
-        normal = [component.copy() for component in normal]
-        for component, replacement in zip(normal, replacements, strict=True):
-            component[missing] = replacement
+        normal = normal.copy()
+        normal[:, missing] = replacements
     return normal
 
 
 def _corner_normals(
-    fan: Sequence[np.ndarray],
-    corners: np.ndarray,
-    fans: TangentValues,
-    custom_normals: np.ndarray | None,
-) -> tuple[list[list[np.ndarray]], list[np.ndarray] | None]:
+    fan: Sequence[np.ndarray], corners: np.ndarray, fans: TangentValues, custom: np.ndarray | None
+) -> tuple[list[np.ndarray], list[np.ndarray] | None]:
     """Return the normals at the three corners of triangles, and the rotations of the tangent frames.
 
     Parameters
@@ -342,30 +318,22 @@ def _corner_normals(
     corners : (3, n) ndarray of int
         Corners of the triangles.
     fans : TangentValues
-    custom_normals : (3, C) ndarray or None
+    custom : (3, C) ndarray or None
         Custom normals at all corners of the surface, of any length. Corners of one fan may differ.
 
     Returns
     -------
-    normals : 3 lists of 3 (n,) float32 ndarrays
+    normals : 3 (3, n) float32 ndarrays
     phases : 3 (n,) complex64 ndarrays or None
-        Unit complex numbers: the rotations from the tangent frames of the fan normals to those of the
-        custom normals. None if there are no custom normals.
+        Unit complex numbers: the rotations from the tangent frames of the fan normals to the tangent
+        frames of the custom normals. None if there are no custom normals.
     """
-    normals = [[component.take(fan_index) for component in fans.normal] for fan_index in fan]
-    if custom_normals is None:
+    normals = [fans.normal.take(index, axis=1) for index in fan]
+    if custom is None:
         return normals, None
-    custom_normals_at_corners = [
-        [
-            component.astype(np.float32)
-            for component in normalize_components(
-                [values.take(corner) for values in custom_normals]
-            )
-        ]
-        for corner in corners
-    ]
-    phases = [
-        transport_phase(normal, target, *tangent_frame_components(target))
-        for normal, target in zip(normals, custom_normals_at_corners, strict=True)
-    ]
-    return custom_normals_at_corners, phases
+    targets, phases = [], []
+    for normal, corner in zip(normals, corners, strict=True):
+        target = normalize_components(custom.take(corner, axis=1))
+        targets.append(np.array(target, dtype=np.float32))
+        phases.append(transport_phase(normal, targets[-1], *tangent_frame_components(targets[-1])))
+    return targets, phases

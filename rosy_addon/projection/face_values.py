@@ -13,8 +13,8 @@ from ..field.representation import signed_power
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from .field_channel import REPRESENTATION, FieldChannel, rotation_order
+from .pixel_blocks import BLOCK_PIXELS, pixel_blocks
 from .vector_components import (
-    BLOCK_SIZE,
     VectorComponents,
     plane_coordinates,
     polygon_angles,
@@ -73,13 +73,9 @@ def face_values(
     }
     if field.family_count > 1:
         relative_channels["family", field.family_count] = np.ones(count)
-    faces = TangentValues(
-        np.empty((3, count), dtype=np.float32),
-        {
-            channel: np.empty(count, dtype=np.complex64)
-            for channel in (REPRESENTATION, *relative_channels)
-        },
-    )
+    names = REPRESENTATION, *relative_channels
+    channels = {channel: np.empty(count, dtype=np.complex64) for channel in names}
+    faces = TangentValues(np.empty((3, count), dtype=np.float32), channels)
     corner_angle = np.empty(len(surface.corner_vertex), np.float32) if with_angles else None
     scale = similarity_scale(linear) if surface.rest_vertices is None else None
     rest = None if scale else np.ascontiguousarray(surface.in_rest_shape().vertices.T)
@@ -90,19 +86,15 @@ def face_values(
         ]
         points = relative_to_first(deformed, corner_vertex)
         normal = polygon_normals(points)
-        for component, out in zip(normal, faces.normal, strict=True):
-            out[block] = component
-        x, y = tangent_frame_components(
-            [component[block].astype(np.float64) for component in faces.normal]
-        )
+        faces.normal[:, block] = normal
+        x, y = tangent_frame_components(faces.normal[:, block].astype(np.float64))
         vectors = [np.ascontiguousarray(component) for component in field.vectors[block].T]
         if rest is None:
             vectors = transform_components(vectors, linear * (1 / scale))
             member = dot_components(vectors, x) + 1j * dot_components(vectors, y)
         else:
-            member = _transport_member(
-                relative_to_first(rest, corner_vertex), points, vectors, x, y
-            )
+            rest_points = relative_to_first(rest, corner_vertex)
+            member = _transport_member(rest_points, points, vectors, x, y)
         rho = np.abs(member)
         member /= np.maximum(rho, np.finfo(np.float64).tiny)
         has_area = np.logical_or.reduce(normal)
@@ -120,13 +112,12 @@ def _faces_by_size(face_start: np.ndarray) -> list[tuple[int, slice | np.ndarray
     """Return blocks of faces with equally many corners: pairs of this number and the indices of the faces."""
     corner_counts = np.diff(face_start)
     if (corner_counts == corner_counts[0]).all():
-        starts = range(0, len(corner_counts), BLOCK_SIZE)
-        return [(int(corner_counts[0]), slice(start, start + BLOCK_SIZE)) for start in starts]
+        return [(int(corner_counts[0]), block) for block in pixel_blocks(len(corner_counts))]
     blocks = []
     for corner_count in np.unique(corner_counts).tolist():
         same_count = np.flatnonzero(corner_counts == corner_count)
         # Fewer faces per block if they have many corners, so that blocks need equal memory.
-        block_faces = max(4 * BLOCK_SIZE // max(corner_count, 4), 1)
+        block_faces = max(4 * BLOCK_PIXELS // max(corner_count, 4), 1)
         for start in range(0, len(same_count), block_faces):
             blocks.append((corner_count, same_count[start : start + block_faces]))
     return blocks

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -66,16 +67,21 @@ class MeshInstance:
         return self.world_points()[self.surface.used_vertices]
 
 
-class PixelCoverage(NamedTuple):
-    """How much of the frame is covered by the surface that each of the P pixels of a G-buffer shows.
+#: The mesh instances of a scene.
+MeshInstances = Sequence[MeshInstance]
 
-    A surface covers samples of the pixels at whose centers it is visible. Each of E further samples lies
-    in one pixel, but shows the surface of a neighboring pixel.
+
+class PixelCoverage(NamedTuple):
+    """The fractions of pixels that surfaces cover, for the P pixels of a G-buffer.
+
+    A pixel has several samples. A sample that a surface covers shows the surface that the G-buffer has at
+    its pixel. E samples, however, show the surface that the G-buffer has at a neighboring pixel.
 
     Attributes
     ----------
     own : (P,) float32 ndarray
-        Fraction of the pixel that its surface covers. It may be 0, if a triangle shows only at the center.
+        Fraction of the pixel that its own surface covers. It may be 0, if a triangle is visible only at the
+        center.
     pixel : (E,) int32 ndarray
         Pixel that contains the sample, as a flat index into the frame, in ascending order.
     entry : (E,) int32 ndarray
@@ -156,8 +162,8 @@ class GBuffer:
         Whether the corners of the visible triangle run counter-clockwise in the picture.
     channels : dict of FieldChannel to (P,) complex64 ndarray
         Additional values of some fields (see `field_channel.FieldChannel`), in the same frame as
-        `representation`. Instances that do not have a channel have the value that it has for a
-        plain RoSy field.
+        `representation`. Where the field does not have the channel, the value is 1 for the harmonic of
+        order 0, and otherwise 0. These are the values for evenly spaced directions without labels.
     coverage : PixelCoverage or None
         How much of the pixels the surfaces cover, if pixels have several samples. None if each surface
         covers its whole pixel.
@@ -193,9 +199,7 @@ class GBuffer:
         channels = {channel: values[extent] for channel, values in self.channels.items()}
         return replace(part_of(self, extent), channels=channels, coverage=None, samples=None)
 
-    def instance_blocks(
-        self,
-    ) -> list[tuple[int, list[slice | np.ndarray], tuple[float, float]]]:
+    def instance_blocks(self) -> list[tuple[int, list[slice | np.ndarray], tuple[float, float]]]:
         """Return a tuple for each visible mesh instance, in the order of instances: its pixels, in blocks.
 
         Returns

@@ -23,7 +23,16 @@ class ClippedTriangles(NamedTuple):
 
 
 def clip_near(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, ClippedTriangles]:
-    """Clip triangles at the near plane. Triangles behind it are removed.
+    """Clip triangles at the near plane, and remove the parts between this plane and the eye.
+
+    Triangles that are wholly between the near plane and the eye, or behind the eye, are left out.
+
+    Parameters
+    ----------
+    vertices : (V, 4) float64 ndarray
+        Clip space. The near plane is z = -w.
+    triangles : (T, 3) int32 ndarray
+        Indices into `vertices`.
 
     Returns
     -------
@@ -44,26 +53,25 @@ def clip_near(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, 
     triangle = np.concatenate([unclipped, new_triangle])
     order = np.argsort(triangle, kind="stable")
     corners = np.concatenate([triangles[unclipped], new_corners])[order]
-    return (
-        np.concatenate([vertices, new_vertices]),
-        ClippedTriangles(tuple(np.ascontiguousarray(corners.T)), triangle[order]),
-    )
+    clipped = ClippedTriangles(tuple(np.ascontiguousarray(corners.T)), triangle[order])
+    return np.concatenate([vertices, new_vertices]), clipped
 
 
 def _clip_crossing_triangles(
     vertices: np.ndarray, triangles: np.ndarray, inside: np.ndarray, crossing: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Clip K triangles that cross the near plane, and triangulate what is in front of it.
+    """Clip K triangles that cross the near plane, and triangulate the parts beyond the plane.
 
     In each crossing triangle, one vertex (`apex`) is on one side of the plane and two are on the
-    other. If the apex is in front, a triangle remains, otherwise a quadrilateral.
+    other. If the apex is beyond the plane, a triangle remains, otherwise a quadrilateral.
 
     Parameters
     ----------
     vertices : (V, 4) float64 ndarray
+        Clip space.
     triangles : (T, 3) int32 ndarray
     inside : (V,) bool ndarray
-        Whether each vertex is in front of the near plane.
+        Whether each vertex is beyond the near plane as seen from the eye, or on it: z >= -w.
     crossing : (K,) int32 ndarray
         Indices of the crossing triangles.
 
@@ -82,9 +90,7 @@ def _clip_crossing_triangles(
     lone_corner = np.argmax(sides == one_inside[:, None], axis=1)
     rotated_corners = (lone_corner[:, None] + np.arange(3)) % 3
     apex, left, right = np.take_along_axis(corners, rotated_corners, axis=1).T
-    new_vertices = np.concatenate(
-        [_intersect_near(vertices, apex, left), _intersect_near(vertices, apex, right)]
-    )
+    new_vertices = [_intersect_near(vertices, apex, end) for end in (left, right)]
     on_left = np.arange(len(crossing), dtype=np.int32) + len(vertices)
     on_right = on_left + len(crossing)
     tip, base = one_inside, ~one_inside
@@ -95,11 +101,8 @@ def _clip_crossing_triangles(
             np.stack([on_left, right, on_right], axis=1)[base],
         ]
     )
-    return (
-        new_vertices,
-        new_corners.astype(np.int32),
-        np.concatenate([crossing[tip], crossing[base], crossing[base]]),
-    )
+    triangle = np.concatenate([crossing[tip], crossing[base], crossing[base]])
+    return np.concatenate(new_vertices), new_corners.astype(np.int32), triangle
 
 
 def _intersect_near(vertices: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:

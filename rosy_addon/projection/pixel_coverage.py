@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.progress import report
+from .barycentrics import LABEL
 from .camera import Camera, pixel_rays, z_at_depth
 from .gbuffer import GBuffer, PixelCoverage, PixelSamples
 from .pixel_blocks import pixel_blocks
@@ -20,9 +21,6 @@ from .rasterized_samples import SampledTriangles
 
 #: Smallest cosine between the normals of two triangles that show the same surface: 30 degrees.
 MIN_NORMAL_COSINE = np.float32(np.sqrt(0.75))
-
-#: Text that the user sees while this step runs.
-LABEL = "finding visible pixels"
 
 
 class _OtherSamples(NamedTuple):
@@ -57,8 +55,8 @@ class _OtherSamples(NamedTuple):
 class _Entries(NamedTuple):
     """The P pixels of a G-buffer, as arrays that are compared with `_OtherSamples`.
 
-    Most arrays are those of `_OtherSamples`, at the centers of the pixels. `slope_x`, `slope_y` and
-    `tolerance` are results of `pixel_neighbors.depth_slopes`.
+    `x`, `y`, `depth`, `instance_id` and `normal` are as in `_OtherSamples`, at the centers of the pixels.
+    `slope_x`, `slope_y` and `tolerance` are results of `pixel_neighbors.depth_slopes`.
     """
 
     x: np.ndarray
@@ -82,11 +80,7 @@ class _Entries(NamedTuple):
 
 
 def pixel_coverage(
-    gbuffer: GBuffer,
-    sampled: SampledTriangles,
-    samples: int,
-    instance_id: np.ndarray,
-    triangle_normal: np.ndarray,
+    gbuffer: GBuffer, sampled: SampledTriangles, side: int, instance: np.ndarray, normal: np.ndarray
 ) -> tuple[PixelCoverage, PixelSamples]:
     """Find for each sample the pixel of the G-buffer whose surface it shows.
 
@@ -95,12 +89,12 @@ def pixel_coverage(
     gbuffer : GBuffer
         The G-buffer at the centers of pixels.
     sampled : SampledTriangles
-    samples : int
+    side : int
         Samples along each side of a pixel.
-    instance_id, triangle_normal
+    instance, normal
         Mesh instances and normals of ``sampled.other_triangle``; see `_OtherSamples`.
     """
-    others = _other_samples(sampled, gbuffer.camera, samples, instance_id, triangle_normal)
+    others = _other_samples(sampled, gbuffer.camera, side, instance, normal)
     camera = gbuffer.camera
     count = len(gbuffer.pixel)
     stride = np.int32(camera.width + 2)
@@ -139,36 +133,30 @@ def pixel_coverage(
             entry[part[exists[closer]]] = candidate[closer]
     is_own = entry == others.entry
     own = np.bincount(others.entry[is_own], minlength=count)
-    for bit in range(samples * samples):
+    for bit in range(side * side):
         own += sampled.own_samples >> np.uint16(bit) & np.uint16(1)
     moved = np.flatnonzero(~is_own)
     moved = moved[np.argsort(others.entry[moved], kind="stable")]
-    share = np.float32(1 / samples**2)
-    coverage = PixelCoverage(
-        own.astype(np.float32) * share, gbuffer.pixel[others.entry[moved]], entry[moved], share
-    )
-    return coverage, PixelSamples(
-        samples, sampled.own_samples, sampled.other_sample, sampled.other_triangle, entry
-    )
+    share = np.float32(1 / side**2)
+    own, home = own.astype(np.float32) * share, gbuffer.pixel[others.entry[moved]]
+    other = sampled.other_sample, sampled.other_triangle, entry
+    coverage = PixelCoverage(own, home, entry[moved], share)
+    return coverage, PixelSamples(side, sampled.own_samples, *other)
 
 
 def _other_samples(
-    sampled: SampledTriangles,
-    camera: Camera,
-    samples: int,
-    instance_id: np.ndarray,
-    normal: np.ndarray,
+    sampled: SampledTriangles, camera: Camera, side: int, instance: np.ndarray, normal: np.ndarray
 ) -> _OtherSamples:
     """Return the samples that show another triangle than the center of their pixel."""
-    frame = camera.scaled(samples)
+    frame = camera.scaled(side)
     count = len(sampled.other_entry)
     x, y, depth = np.empty((3, count), dtype=np.float32)
     for block in pixel_blocks(count):
         index = sampled.other_sample[block]
-        x[block], y[block] = _centers(index, frame.width, samples)
+        x[block], y[block] = _centers(index, frame.width, side)
         z = z_at_depth(frame, *pixel_rays(frame, index), sampled.other_depth[block])
         depth[block] = -1 / z if camera.is_perspective else z
-    return _OtherSamples(sampled.other_entry, x, y, depth, instance_id, normal)
+    return _OtherSamples(sampled.other_entry, x, y, depth, instance, normal)
 
 
 def _centers(index: np.ndarray, width: int, samples: int) -> tuple[np.ndarray, np.ndarray]:

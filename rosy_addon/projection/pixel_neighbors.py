@@ -106,9 +106,8 @@ def neighbor_masks(gbuffer: GBuffer, crease_angle: float | None) -> np.ndarray:
     for row_start in range(first_row, first_row + row_count, band_rows):
         report(0.1 + 0.9 * (row_start - first_row) / row_count, label)
         # The grid has one more row: the first row of the next band, or an empty row.
-        first, stop = np.searchsorted(
-            row, np.array([row_start, row_start + band_rows + 1], row.dtype)
-        ).tolist()
+        ends = np.array([row_start, row_start + band_rows + 1], row.dtype)
+        first, stop = np.searchsorted(row, ends).tolist()
         grid_index = (row[first:stop] - row_start) * width
         grid_index += column[first:stop] - (left_column - 1)
         grid = _pixel_grid(gbuffer, slice(first, stop), grid_index, (band_rows + 1, width))
@@ -118,9 +117,8 @@ def neighbor_masks(gbuffer: GBuffer, crease_angle: float | None) -> np.ndarray:
             left, right = max(-dx, 0), max(dx, 0)
             source = slice(0, band_rows + 1 - dy), slice(left, width - right)
             target = slice(dy, band_rows + 1), slice(right, width - left)
-            continuous = _is_continuous(grid, source, target, (dx, dy), min_normal_cosine).astype(
-                np.uint16
-            )
+            continuous = _is_continuous(grid, source, target, (dx, dy), min_normal_cosine)
+            continuous = continuous.astype(np.uint16)
             bit = (dy + 1) * 3 + (dx + 1)
             grid_masks[source] |= continuous << np.uint16(bit)
             grid_masks[target] |= continuous << np.uint16(8 - bit)
@@ -161,7 +159,10 @@ class _PixelGrid(NamedTuple):
 def _pixel_grid(
     gbuffer: GBuffer, pixels: slice, grid_index: np.ndarray, shape: tuple[int, int]
 ) -> _PixelGrid:
-    """Return some pixels of a G-buffer as a grid; `grid_index` holds their flat indices in it."""
+    """Return some pixels of a G-buffer as a grid of the given `shape`, rows and columns.
+
+    `grid_index` holds the flat index of each of these pixels into the grid.
+    """
 
     def scatter(values: np.ndarray, fill_value: float = 0) -> np.ndarray:
         grid = np.full(shape, fill_value, dtype=values.dtype)
@@ -202,9 +203,8 @@ def depth_slopes(
     """
     camera, z = gbuffer.camera, gbuffer.position[pixels, 2]
     normal = gbuffer.geometric_normal[pixels].T
-    pixel_to_camera = (camera.clip_to_camera_xy * (2.0 / camera.width, 2.0 / camera.height)).astype(
-        np.float32
-    )
+    pixel_to_camera = camera.clip_to_camera_xy * (2.0 / camera.width, 2.0 / camera.height)
+    pixel_to_camera = pixel_to_camera.astype(np.float32)
     slope_x = normal[0] * pixel_to_camera[0, 0] + normal[1] * pixel_to_camera[1, 0]
     slope_y = normal[0] * pixel_to_camera[0, 1] + normal[1] * pixel_to_camera[1, 1]
     per_unit = np.float32(camera.pixels_per_unit)

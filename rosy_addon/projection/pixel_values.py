@@ -17,7 +17,11 @@ HOLONOMY_EPS = 3e-4
 
 
 def _channel_pixels(gbuffer: GBuffer, channel: FieldChannel) -> np.ndarray:
-    """Return the values of a channel in a G-buffer; add it with the values of a plain RoSy field if new."""
+    """Return the (P,) values of a channel in a G-buffer.
+
+    If the G-buffer does not have the channel yet, it is added, with the values for evenly spaced directions
+    without labels: 1 for the harmonic of order 0, otherwise 0.
+    """
     if channel == REPRESENTATION:
         return gbuffer.representation
     if channel not in gbuffer.channels:
@@ -27,11 +31,7 @@ def _channel_pixels(gbuffer: GBuffer, channel: FieldChannel) -> np.ndarray:
 
 
 def fill_pixels(
-    gbuffer: GBuffer,
-    pixels: slice | np.ndarray,
-    triangle: np.ndarray,
-    corner_field: CornerField,
-    degree: int,
+    gbuffer: GBuffer, pixels: slice | np.ndarray, triangle: np.ndarray, corner_field: CornerField
 ) -> None:
     """Write the normals, the representation and the channels at some pixels of one instance.
 
@@ -43,9 +43,7 @@ def fill_pixels(
     view_direction = gbuffer.view_direction[pixels].T
     front_facing = gbuffer.front_facing[pixels]
     geometric_normal = corner_field.geometric_normal.take(triangle, axis=1)
-    corners = [
-        [component.take(triangle) for component in corner] for corner in corner_field.corner_normals
-    ]
+    corners = corner_field.corner_normals.take(triangle, axis=2)
     normal, length = _interpolated_normal(corners, weights)
     if not length.all():
         degenerate = length == 0
@@ -58,7 +56,7 @@ def fill_pixels(
         np.negative(geometric_normal, out=geometric_normal, where=~front_facing)
     rotation = view_plane_rotation(tangent, normal, view_direction)
     for channel, corner_values in corner_field.channels.items():
-        order = rotation_order(channel, degree)
+        order = rotation_order(channel, corner_field.degree)
         z = _interpolated_values(corner_field, corner_values, triangle, weights, length, order)
         if not front_facing.all():
             # Members keep their direction in space. Seen from behind, angles have the other sign.
@@ -69,9 +67,7 @@ def fill_pixels(
     gbuffer.geometric_normal[pixels] = geometric_normal.T
 
 
-def _interpolated_normal(
-    corners: Sequence[Sequence[np.ndarray]], weights: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _interpolated_normal(corners: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the (3, P) unit vectors along m = sum b_i n_i, and the (P,) lengths of m.
 
     b_i are the barycentric `weights`, and n_i are the corner normals. Where a length is below 1e-6, the

@@ -8,7 +8,6 @@ on which of the N members is stored.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -22,12 +21,12 @@ from ..field.frames import transform_components
 from .barycentrics import LABEL, barycentrics
 from .camera import Camera, pixel_rays, z_at_depth
 from .corner_field import cached_corner_field
-from .gbuffer import GBuffer, MeshInstance
+from .gbuffer import GBuffer, MeshInstance, MeshInstances
 from .pixel_blocks import pixel_blocks
 from .pixel_coverage import pixel_coverage
 from .pixel_values import fill_pixels
 from .rasterized_samples import SampledTriangles, rasterize_samples
-from .rasterizer import Fragments, rasterize
+from .rasterizer import Fragments, Rows, rasterize
 from .surface_points import SurfacePoints
 
 #: How a field is shown: averaged over smooth fans and interpolated, or constant on each face.
@@ -35,12 +34,12 @@ DISPLAYS = ("smooth", "flat")
 
 
 def project(
-    instances: Sequence[MeshInstance],
+    instances: MeshInstances,
     camera: Camera,
     display: str = "smooth",
     cache: Cache | None = None,
     samples: int = 1,
-    rows: tuple[int, int] | None = None,
+    rows: Rows = None,
 ) -> GBuffer:
     """Compute the G-buffer: the visible pixels of all surfaces with a field, and the field there.
 
@@ -50,15 +49,15 @@ def project(
         Instances without a field only occlude others.
     camera : Camera
     display : {"smooth", "flat"}
-        Average values and normals over smooth fans and interpolate them, or keep those of each
-        face.
+        "smooth": average values and normals over smooth fans, and interpolate them. "flat": keep the
+        values and the normal of each face.
     cache : Cache, optional
         Stores corner fields, which do not depend on the camera.
     samples : int
         Samples along each side of a pixel. If there are several, the G-buffer contains each pixel where
         at least one sample shows a field, and its `coverage` and `samples` are set.
-    rows : (int, int), optional
-        The first row of the frame to project, and the row after the last one. By default all rows.
+    rows : Rows
+        The rows of the frame to project.
 
     Returns
     -------
@@ -144,14 +143,9 @@ def project_samples(
     pixel = row // np.int32(side) * width + column // np.int32(side)
     place = np.minimum(np.searchsorted(gbuffer.pixel[entries], pixel), len(entries) - 1)
     others = np.flatnonzero(gbuffer.pixel[entries].take(place) == pixel)
-    columns.append(
-        (
-            pixel_samples.other[others],
-            entries[place[others]].astype(np.int32),
-            pixel_samples.other_entry[others],
-            pixel_samples.other_triangle[others],
-        )
-    )
+    home = entries[place[others]].astype(np.int32)
+    shown, triangle = pixel_samples.other_entry[others], pixel_samples.other_triangle[others]
+    columns.append((pixel_samples.other[others], home, shown, triangle))
     columns = [np.concatenate(values) for values in zip(*columns, strict=True)]
     order = np.argsort(columns[0], kind="stable")
     sample, home, shown, triangle = (values[order] for values in columns)
@@ -170,7 +164,7 @@ def project_samples(
 
 
 def surface_points(
-    instances: Sequence[MeshInstance],
+    instances: MeshInstances,
     camera: Camera,
     display: str,
     points: SurfacePoints,
@@ -203,13 +197,9 @@ def surface_points(
     z, w = (points.barycentric[:, :, None] * corners[..., 2:]).sum(axis=1).T
     size = np.array([camera.width, camera.height])
     column, row = np.clip(position.astype(np.int64), 0, size - 1).T
-    fragments = Fragments(
-        (row * camera.width + column).astype(np.int32),
-        triangle.astype(np.int32),
-        points.barycentric.astype(np.float32),
-        front_facing,
-        z / w,
-    )
+    pixel, triangle = (row * camera.width + column).astype(np.int32), triangle.astype(np.int32)
+    barycentric = points.barycentric.astype(np.float32)
+    fragments = Fragments(pixel, triangle, barycentric, front_facing, z / w)
     with progress(0.0, 0.1):
         gbuffer = _new_gbuffer(instances, camera, fragments)
     for instance_id in np.unique(points.instance_id).tolist():
@@ -218,12 +208,12 @@ def surface_points(
         with progress(0.1, 1.0):
             corner_field = cached_corner_field(instance, display, cache)
         corner_field = corner_field.part(points.triangle[chosen]).rotated(camera.view[:3, :3])
-        fill_pixels(gbuffer, chosen, np.arange(len(chosen)), corner_field, instance.field.degree)
+        fill_pixels(gbuffer, chosen, np.arange(len(chosen)), corner_field)
     return gbuffer
 
 
 def cached_project(
-    instances: Sequence[MeshInstance], camera: Camera, display: str, cache: Cache, samples: int = 1
+    instances: MeshInstances, camera: Camera, display: str, cache: Cache, samples: int = 1
 ) -> GBuffer:
     """Return the result of `project`, and store it in a cache.
 
@@ -236,7 +226,7 @@ def cached_project(
     )
 
 
-def check_instances(instances: Sequence[MeshInstance], camera: Camera, display: str) -> None:
+def check_instances(instances: MeshInstances, camera: Camera, display: str) -> None:
     """Check that mesh instances can be projected.
 
     Raises
@@ -269,9 +259,7 @@ def check_instances(instances: Sequence[MeshInstance], camera: Camera, display: 
 # --- visibility --------------------------------------------------------------------------------
 
 
-def _visible_pixels(
-    instances: Sequence[MeshInstance], camera: Camera, rows: tuple[int, int] | None
-) -> Fragments:
+def _visible_pixels(instances: MeshInstances, camera: Camera, rows: Rows) -> Fragments:
     """Find the pixels where the nearest surface has a field, in the given rows or all."""
     fragments = rasterize_instances(instances, camera, rows)
     has_field = _triangles_with_field(instances)
@@ -282,7 +270,7 @@ def _visible_pixels(
 
 
 def _visible_samples(
-    instances: Sequence[MeshInstance], camera: Camera, samples: int, rows: tuple[int, int] | None
+    instances: MeshInstances, camera: Camera, samples: int, rows: Rows
 ) -> tuple[Fragments, SampledTriangles]:
     """Find the visible triangles at the center of each pixel, and those at all samples."""
     clip, triangles = all_triangles(instances, camera)
@@ -299,21 +287,21 @@ def _visible_samples(
     return Fragments(pixel, triangle, weights, front_facing, sampled.depth), sampled
 
 
-def _triangles_with_field(instances: Sequence[MeshInstance]) -> np.ndarray:
+def _triangles_with_field(instances: MeshInstances) -> np.ndarray:
     """Return (T,) bool: which triangles of all instances have a field."""
     return np.concatenate(
         [np.full(len(part.surface.triangles), part.field is not None) for part in instances]
     )
 
 
-def first_triangles(instances: Sequence[MeshInstance]) -> np.ndarray:
+def first_triangles(instances: MeshInstances) -> np.ndarray:
     """Return the index of the first triangle of each instance, counted over all instances, (B,) int32."""
     counts = [len(instance.surface.triangles) for instance in instances]
     return np.cumsum([0, *counts[:-1]]).astype(np.int32)
 
 
 def _split_triangles(
-    instances: Sequence[MeshInstance], triangle: np.ndarray
+    instances: MeshInstances, triangle: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the instance of each of (n,) triangles, and the triangle's index in its instance, as int32.
 
@@ -328,9 +316,7 @@ def _split_triangles(
     return instance_id, triangle - first_triangle[instance_id]
 
 
-def rasterize_instances(
-    instances: Sequence[MeshInstance], camera: Camera, rows: tuple[int, int] | None = None
-) -> Fragments:
+def rasterize_instances(instances: MeshInstances, camera: Camera, rows: Rows = None) -> Fragments:
     """Rasterize all mesh instances together, in the given rows of the frame or in all.
 
     Triangles are counted over all instances, in their order.
@@ -338,9 +324,7 @@ def rasterize_instances(
     return rasterize(*all_triangles(instances, camera), camera.width, camera.height, rows)
 
 
-def all_triangles(
-    instances: Sequence[MeshInstance], camera: Camera
-) -> tuple[np.ndarray, np.ndarray]:
+def all_triangles(instances: MeshInstances, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
     """Return the vertices and triangles of all instances, in the order of instances.
 
     Returns
@@ -366,7 +350,7 @@ def clip_vertices(instance: MeshInstance, camera: Camera) -> np.ndarray:
     )
 
 
-def raise_nothing_in_view(instances: Sequence[MeshInstance], camera: Camera) -> None:
+def raise_nothing_in_view(instances: MeshInstances, camera: Camera) -> None:
     """Raise the error for a camera that sees no surface with a field.
 
     Raises
@@ -389,9 +373,7 @@ def raise_nothing_in_view(instances: Sequence[MeshInstance], camera: Camera) -> 
     )
 
 
-def _new_gbuffer(
-    instances: Sequence[MeshInstance], camera: Camera, fragments: Fragments
-) -> GBuffer:
+def _new_gbuffer(instances: MeshInstances, camera: Camera, fragments: Fragments) -> GBuffer:
     """Return a G-buffer of rasterized pixels. Its normals and representation are not yet initialized."""
     count = len(fragments.pixel)
     instance_id, triangle = _split_triangles(instances, fragments.triangle)
@@ -454,8 +436,6 @@ def _fill_instances(gbuffer: GBuffer, display: str, cache: Cache | None) -> dict
         label = "rotating the field into the view plane"
         report(middle, label)
         for number, block in enumerate(blocks, 1):
-            fill_pixels(
-                gbuffer, block, gbuffer.triangle[block], corner_field, instance.field.degree
-            )
+            fill_pixels(gbuffer, block, gbuffer.triangle[block], corner_field)
             report(middle + (stop - middle) * number / len(blocks), label)
     return geometric_normals

@@ -8,14 +8,14 @@ import numpy as np
 
 from ..core.progress import progress
 from .near_clipping import clip_near
-from .rasterizer import MAX_BAND_PIXELS, rasterize_rows, to_screen
+from .rasterizer import MAX_BAND_PIXELS, Rows, rasterize_rows, to_screen
 
 
 class SampledTriangles(NamedTuple):
     """The visible triangles at S x S samples of each of the P covered pixels, in ascending order of pixel.
 
-    Each pixel has a main triangle. The E samples that show another triangle than that of their pixel are
-    listed.
+    Each pixel has a main triangle. The E samples that show another triangle than the main triangle of
+    their pixel are listed.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class SampledTriangles(NamedTuple):
         Main triangle: the triangle at the center of the pixel. If there is none, the triangle at the
         sample that is nearest to the center.
     depth : (P,) float64 ndarray
-        Depth z / w of the main triangle there.
+        Depth z / w of the main triangle, at the center or sample where it was found.
     own_samples : (P,) uint16 ndarray
         Bit field of the samples that show the main triangle: bit ``row * S + column``.
     other_entry : (E,) int32 ndarray
@@ -55,7 +55,7 @@ def rasterize_samples(
     width: int,
     height: int,
     samples: int,
-    rows: tuple[int, int] | None = None,
+    rows: Rows = None,
 ) -> SampledTriangles:
     """Find the nearest triangle at several samples of each pixel, on a square grid.
 
@@ -87,10 +87,7 @@ def rasterize_samples(
                 )
             if not is_drawn.all():
                 triangle[~is_drawn.take(triangle, mode="clip")] = -1
-            buffers += (
-                triangle.reshape(-1, scale, width, scale),
-                depth.reshape(-1, scale, width, scale),
-            )
+            buffers += [values.reshape(-1, scale, width, scale) for values in (triangle, depth)]
         band = _group_samples(*buffers, row_start)
         bands.append(band._replace(other_entry=band.other_entry + np.int32(entry_count)))
         entry_count += len(band.pixel)
@@ -137,16 +134,11 @@ def _group_samples(
         is_own = sample_triangle == own_triangle
         own_samples |= is_own.astype(np.uint16) << np.uint16(row * samples + column)
         entry = np.flatnonzero((sample_triangle >= 0) & ~is_own)
-        sample_row = pixel_row[entry] * np.int32(samples) + np.int32(row)
-        sample_column = pixel_column[entry] * np.int32(samples) + np.int32(column)
-        others.append(
-            (
-                entry.astype(np.int32),
-                sample_row * np.int32(width * samples) + sample_column,
-                sample_triangle[entry],
-                depth[:, row, :, column].ravel()[pixel[entry]],
-            )
-        )
+        sample = pixel_row[entry] * np.int32(samples) + np.int32(row)
+        sample *= np.int32(width * samples)
+        sample += pixel_column[entry] * np.int32(samples) + np.int32(column)
+        sample_depth = depth[:, row, :, column].ravel()[pixel[entry]]
+        others.append((entry.astype(np.int32), sample, sample_triangle[entry], sample_depth))
     return SampledTriangles(
         pixel_row * np.int32(width) + pixel_column,
         own_triangle,

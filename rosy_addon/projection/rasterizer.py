@@ -9,18 +9,24 @@ intersection and left of the right one. So adjacent triangles leave no gaps and 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from ..core.progress import progress, report
 from ..field.blocks import blocks_by_count, concatenated_ranges
-from .barycentrics import BLOCK_SIZE, LABEL, barycentrics
+from .barycentrics import LABEL, barycentrics
 from .near_clipping import ClippedTriangles, clip_near
+
+#: Triangles, spans or fragments per block. Bounds memory, and fits the caches of the processor.
+BLOCK_SIZE = 1 << 14
 
 #: The bits of the column in an integer that packs a row and a column.
 COLUMN_MASK = 0xFFFF
+
+#: The first row of a range of rows, and the row after the last one; None for all rows of the frame.
+Rows = tuple[int, int] | None
 
 #: Largest size of the depth buffer, in pixels. Larger frames are rasterized in bands of rows.
 MAX_BAND_PIXELS = 1 << 22
@@ -103,11 +109,7 @@ class _Spans(NamedTuple):
 
 
 def rasterize(
-    clip_vertices: np.ndarray,
-    triangles: np.ndarray,
-    width: int,
-    height: int,
-    rows: tuple[int, int] | None = None,
+    clip_vertices: np.ndarray, triangles: np.ndarray, width: int, height: int, rows: Rows = None
 ) -> Fragments:
     """Find the nearest triangle at the center of every pixel.
 
@@ -123,8 +125,8 @@ def rasterize(
         are the same, or have equal coordinates.
     width, height : int
         Size of the frame in pixels.
-    rows : (int, int), optional
-        The first row to draw, and the row after the last one. By default all rows.
+    rows : Rows
+        The rows to draw.
 
     Returns
     -------
@@ -175,9 +177,8 @@ def rasterize_rows(
         Its z / w; a value just beyond the far plane where there is none.
     """
     screen = screen.clamped_to_rows(row_start, row_stop)
-    depth_buffer = np.full(
-        (row_stop - row_start) * width, np.nextafter(1.0, 2.0)
-    )  # just beyond the far plane
+    # Just beyond the far plane.
+    depth_buffer = np.full((row_stop - row_start) * width, np.nextafter(1.0, 2.0))
     triangle_buffer = np.full((row_stop - row_start) * width, -1, dtype=np.int32)
     for start in range(0, len(clipped.triangle), BLOCK_SIZE):
         block = slice(start, start + BLOCK_SIZE)
@@ -186,9 +187,8 @@ def rasterize_rows(
             spans.start[:] -= row_start * width
             for span_block in blocks_by_count(spans.count, BLOCK_SIZE):
                 report(start / len(clipped.triangle), LABEL)
-                _depth_test(
-                    _Spans(*(values[span_block] for values in spans)), depth_buffer, triangle_buffer
-                )
+                part = _Spans(*(values[span_block] for values in spans))
+                _depth_test(part, depth_buffer, triangle_buffer)
     return triangle_buffer, depth_buffer
 
 
@@ -225,8 +225,9 @@ def _scan_convert(
         local_triangle, row, first, last = (
             values.take(nonempty) for values in (local_triangle, row, first, last)
         )
-        spans = _spans_with_depth(row, local_triangle, first, last, depth_plane, width)
-        yield spans._replace(triangle=triangle.take(local_triangle))
+        plane = (values.take(local_triangle) for values in depth_plane)
+        spans = _spans_with_depth(row, first, last, plane, width)
+        yield _Spans(*spans, triangle.take(local_triangle))
 
 
 def _edge_x_at_row(
@@ -258,30 +259,21 @@ def _column_range(x_a: np.ndarray, x_b: np.ndarray, width: int) -> tuple[np.ndar
 
 
 def _spans_with_depth(
-    row: np.ndarray,
-    local_triangle: np.ndarray,
-    first: np.ndarray,
-    last: np.ndarray,
-    depth_plane: tuple[np.ndarray, ...],
-    width: int,
-) -> _Spans:
-    """Return the spans of a block of triangles, with their depths.
-
-    The triangles of the spans are indices within the block.
+    row: np.ndarray, first: np.ndarray, last: np.ndarray, plane: Iterable[np.ndarray], width: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the pixels and the depths of spans, as the first four attributes of `_Spans`.
 
     Parameters
     ----------
-    row, local_triangle : (S,) ndarray of int
+    row : (S,) ndarray of int
     first, last : (S,) float64 ndarray
         Results of `_column_range`.
-    depth_plane : tuple of ndarray
-        Result of `_depth_plane`.
+    plane : 5 (S,) float64 ndarrays
+        Result of `_depth_plane` for the triangle of each span.
     width : int
         Width of the frame in pixels.
     """
-    slope_x, slope_y, base, min_depth, max_depth = (
-        values.take(local_triangle) for values in depth_plane
-    )
+    slope_x, slope_y, base, min_depth, max_depth = plane
     slope_y *= row + 0.5
     base += slope_y
     end_depths = []
@@ -298,13 +290,8 @@ def _spans_with_depth(
     # The depth at the last pixel becomes the step from pixel to pixel, in place.
     depth_step -= first_depth
     depth_step /= np.maximum(pixel_count - 1, 1)
-    return _Spans(
-        start=row * width + first.astype(np.intp),
-        count=pixel_count.astype(np.intp),
-        depth=first_depth,
-        depth_step=depth_step,
-        triangle=local_triangle,
-    )
+    start = row * width + first.astype(np.intp)
+    return start, pixel_count.astype(np.intp), first_depth, depth_step
 
 
 def _depth_test(spans: _Spans, depth_buffer: np.ndarray, triangle_buffer: np.ndarray) -> None:

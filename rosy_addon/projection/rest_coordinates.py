@@ -5,7 +5,7 @@ Points of the surface keep these positions when the mesh is transformed or defor
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -38,8 +38,9 @@ class RestCoordinates:
     weights, weights_dx, weights_dy : (3, P) float32 ndarray
         Homogeneous barycentric coordinates at the pixel center, and their changes to the next pixel on
         the right and to the next pixel above, in the plane of the triangle.
-    rest_corners : 3 (3, P) float32 ndarrays
-        The corners of the triangle in the rest shape; see `rest_positions`.
+    rest_corners : (3, 3, P) float32 ndarray
+        The corners of the triangle in the rest shape; see `rest_positions`. The first axis is the corner,
+        the second the component.
     pixel_size : (P,) float32 ndarray
         Width of a pixel at the depth of the surface, parallel to the picture, in units of object
         space.
@@ -48,13 +49,12 @@ class RestCoordinates:
     weights: np.ndarray
     weights_dx: np.ndarray
     weights_dy: np.ndarray
-    rest_corners: tuple[np.ndarray, np.ndarray, np.ndarray]
+    rest_corners: np.ndarray
     pixel_size: np.ndarray
 
     def block(self, pixels: slice) -> RestCoordinates:
         """Return the coordinates of a block of pixels."""
-        rest_corners = tuple(corner[:, pixels] for corner in self.rest_corners)
-        return replace(part_of(self, (..., pixels)), rest_corners=rest_corners)
+        return part_of(self, (..., pixels))
 
     def at_offset(self, dx: float, dy: float) -> np.ndarray:
         """Return the (3, P) float32 rest positions at an offset from the pixel centers.
@@ -68,10 +68,7 @@ class RestCoordinates:
         total[np.abs(total) < 1e-30] = 1
         weight /= total
         np.clip(weight, *BARYCENTRIC_RANGE, out=weight)
-        return sum(
-            corner_weight * corner
-            for corner_weight, corner in zip(weight, self.rest_corners, strict=True)
-        )
+        return sum(w * corner for w, corner in zip(weight, self.rest_corners, strict=True))
 
 
 def rest_coordinates(gbuffer: GBuffer) -> RestCoordinates:
@@ -87,11 +84,8 @@ def rest_coordinates(gbuffer: GBuffer) -> RestCoordinates:
     """
     report(0.0, LABEL)
     count = len(gbuffer.pixel)
-    coordinates = RestCoordinates(
-        *(np.empty((3, count), dtype=np.float32) for _ in range(3)),
-        rest_corners=tuple(np.empty((3, count), dtype=np.float32) for _ in range(3)),
-        pixel_size=np.empty(count, dtype=np.float32),
-    )
+    shapes = (3, count), (3, count), (3, count), (3, 3, count), count
+    coordinates = RestCoordinates(*(np.empty(shape, dtype=np.float32) for shape in shapes))
     for instance_id, blocks, (start, stop) in gbuffer.instance_blocks():
         instance = gbuffer.instances[instance_id]
         rest = rest_positions(instance.surface)
@@ -111,7 +105,8 @@ def rest_positions(surface: Surface) -> np.ndarray:
     -------
     (V, 3) float64 ndarray
         Positions in object space. If the mesh is farther from the origin than `FAR_RATIO` times its size,
-        they are relative to a point at the mesh.
+        they are relative to the center of its bounding box, rounded to multiples of a length that is its
+        size, rounded up to a power of 2.
     """
     rest = surface.in_rest_shape().vertices
     corners = box_corners(rest[surface.used_vertices])
@@ -166,18 +161,14 @@ def _fill_pixels(
     total += weights[2]
     total[total == 0] = 1
     np.divide(1, total, out=total)
-    for target, values in (
-        (coordinates.weights, weights),
-        (coordinates.weights_dx, weights_dx),
-        (coordinates.weights_dy, weights_dy),
-    ):
+    targets = coordinates.weights, coordinates.weights_dx, coordinates.weights_dy
+    for target, values in zip(targets, (weights, weights_dx, weights_dy), strict=True):
         for edge, value in enumerate(values):
             value *= total
             target[edge, pixels] = value
     depth = -gbuffer.position[pixels, 2] if camera.is_perspective else 1.0
-    coordinates.pixel_size[pixels] = depth / (
-        camera.pixels_per_unit * matrix_scale(instance.matrix)
-    )
+    scale = camera.pixels_per_unit * matrix_scale(instance.matrix)
+    coordinates.pixel_size[pixels] = depth / scale
 
 
 def matrix_scale(matrix: np.ndarray) -> float:

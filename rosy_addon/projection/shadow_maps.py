@@ -16,7 +16,7 @@ import numpy as np
 from ..core.progress import progress, report
 from ..field.frames import normalize
 from .camera import Camera, look_at, orthographic_camera, perspective_camera
-from .gbuffer import GBuffer, MeshInstance
+from .gbuffer import GBuffer, MeshInstances
 from .pixel_blocks import pixel_blocks
 from .project import rasterize_instances
 
@@ -39,10 +39,7 @@ LABEL = "casting shadows"
 
 
 def light_cameras(
-    instances: Sequence[MeshInstance],
-    camera: Camera,
-    kind: str,
-    vector: np.ndarray,
+    instances: MeshInstances, camera: Camera, kind: str, vector: np.ndarray
 ) -> list[Camera]:
     """Return the cameras of the shadow maps of a light.
 
@@ -100,10 +97,8 @@ def sun_camera(
     margin = 0.01 * max(float(np.ptp(height)), scale)
     view[:2, 3] = -(low + high) / 2
     view[2, 3] = -(height.max() + margin)
-    depth_range = float(np.ptp(height)) + 2 * margin
-    return orthographic_camera(
-        view, resolution, resolution, scale=scale, clip=(0.0, depth_range), name="sun"
-    )
+    clip = 0.0, float(np.ptp(height)) + 2 * margin
+    return orthographic_camera(view, resolution, resolution, scale=scale, clip=clip, name="sun")
 
 
 def _point_cameras(
@@ -128,7 +123,7 @@ def _point_cameras(
     return [perspective_camera(view, size, size, fov=fov, clip=clip, name="lamp") for view in views]
 
 
-def render_depth_map(instances: Sequence[MeshInstance], camera: Camera) -> np.ndarray:
+def render_depth_map(instances: MeshInstances, camera: Camera) -> np.ndarray:
     """Return the (H, W) float32 depths of the nearest surfaces along the camera axis; inf at empty pixels."""
     fragments = rasterize_instances(instances, camera)
     depth = np.full(camera.width * camera.height, np.inf, dtype=np.float32)
@@ -164,9 +159,8 @@ def shadow_visibility(gbuffer: GBuffer, cameras: Sequence[Camera]) -> np.ndarray
             fraction = rendered + (done - rendered) * block.start / len(result)
             report(fraction, LABEL)
             points = (gbuffer.position[block] - translation) @ rotation
-            result[block] *= visibility_from(
-                camera, depth_map, points, gbuffer.normal[block] @ rotation
-            )
+            normals = gbuffer.normal[block] @ rotation
+            result[block] *= visibility_from(camera, depth_map, points, normals)
     return result
 
 
@@ -191,9 +185,8 @@ def visibility_from(
     rotation, translation = camera.view[:3, :3], camera.view[:3, 3]
     position = points @ rotation.T + translation
     bias_distance = np.abs(position[:, 2:]) if camera.is_perspective else 1.0
-    position = position + NORMAL_BIAS_PIXELS / camera.pixels_per_unit * bias_distance * (
-        normals @ rotation.T
-    )
+    normals = normals @ rotation.T
+    position = position + NORMAL_BIAS_PIXELS / camera.pixels_per_unit * bias_distance * normals
     clip = position @ camera.projection[:3, :3].T + camera.projection[:3, 3]
     # Positive in front of the camera. Points behind it stay visible.
     axial_depth = -position[:, 2]

@@ -15,12 +15,13 @@ from ..core.cache import Cache, content_hash
 from ..core.memory import check_memory
 from ..core.progress import progress, report
 from ..field.bisection import BisectionTree, bisect
+from ..field.curvature import with_smooth_normals
 from ..field.directional_field import evaluate_harmonics, field_symmetry
 from ..field.frames import dot_components, transform_components
 from ..field.representation import signed_power
 from ..field.rosy_field import RosyField
 from ..field.stripe_pattern import CornerDirections, StripePattern, stripe_pattern
-from ..field.surface import Surface, build_surface
+from ..field.surface import Surface
 from .corner_field import CornerField, field_at_corners, transport_phase
 from .face_values import SIMILARITY_EPS, similarity_scale
 from .field_channel import rotation_order
@@ -50,8 +51,10 @@ class SurfaceLines:
     pattern : StripePattern
         Phases on the L leaves.
     heading : (2, L) float32 ndarray
-        Direction 0 of the field in each leaf: a vector, as multiples of two sides of the surface's
-        triangle, from corner 0 to corner 1 and from corner 0 to corner 2. 0 where the field is undefined.
+        The direction in each leaf from which the lines of `pattern` are counted, counter-clockwise: one
+        member of the field, as a unit vector. Its two components are multiples of two sides of the
+        surface's triangle, from corner 0 to corner 1 and from corner 0 to corner 2. 0 where the field is
+        undefined.
     """
 
     tree: BisectionTree
@@ -60,10 +63,11 @@ class SurfaceLines:
 
 
 def rest_matrix(matrix: np.ndarray) -> np.ndarray:
-    """Return the (3, 3) part of a matrix that changes the shape: a scale along three orthogonal axes.
+    """Return the (3, 3) stretch of a matrix: the symmetric factor of the polar decomposition.
 
-    It is a uniform scale if the matrix is a similarity. Rotations have no effect, so an object that
-    is rotated keeps its lines.
+    The upper left (3, 3) block of a matrix is a rotation or reflection times the stretch, which scales along
+    three orthogonal axes. It is a uniform scale if the matrix is a similarity. An object that is rotated
+    keeps its lines, as a rotation does not change the stretch.
     """
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
     if similarity_scale(linear, 4 * SIMILARITY_EPS) is not None:
@@ -139,19 +143,9 @@ def surface_lines(
     rest = surface
     if surface.rest_vertices is not None:
         with progress(0.0, 0.05, label):
-            rest = build_surface(
-                surface.rest_vertices,
-                surface.corner_vertex,
-                surface.face_start,
-                name=surface.name,
-                corner_fan=surface.corner_fan,
-                triangles=surface.triangles,
-                triangle_face=surface.triangle_face,
-            )
-    matrix = np.eye(4)
-    matrix[:3, :3] = stretch
+            rest = with_smooth_normals(surface.in_rest_shape(), surface.corner_fan)
     with progress(0.05, 0.1, label):
-        corner_field = field_at_corners(rest, matrix, field, display)
+        corner_field = field_at_corners(rest, stretch, field, display)
     points = transform_components(np.ascontiguousarray(rest.vertices.T), stretch).T
     max_triangles = max(max_triangles, len(rest.triangles))
     report(0.1, label)
@@ -163,20 +157,19 @@ def surface_lines(
         "choose wider lines or streaks instead of even lines",
     )
     report(0.2, label)
-    directions, heading = _leaf_directions(tree, points, rest, corner_field, field)
+    corners = points.take(rest.triangle_vertex, axis=0)
+    directions, heading = _leaf_directions(tree, corners, corner_field, field)
     with progress(0.25, 1.0, label):
         pattern = stripe_pattern(tree.leaf_vertex, directions, spacing)
     return SurfaceLines(tree, pattern, heading)
 
 
 def _leaf_directions(
-    tree: BisectionTree,
-    points: np.ndarray,
-    surface: Surface,
-    corner_field: CornerField,
-    field: RosyField,
+    tree: BisectionTree, corners: np.ndarray, corner_field: CornerField, field: RosyField
 ) -> tuple[CornerDirections, np.ndarray]:
     """Interpolate a field to the corners of the leaves of a tree.
+
+    `corners` are the (T, 3, 3) positions of the corners of the surface's triangles.
 
     Returns
     -------
@@ -186,7 +179,6 @@ def _leaf_directions(
         See `SurfaceLines`.
     """
     x, y = tangent_frame_components(corner_field.geometric_normal)
-    corners = points.take(surface.triangle_vertex, axis=0)
     sides = (corners - corners[:, :1]).transpose(1, 2, 0)
     offset = np.stack(
         [dot_components(side, x) + 1j * dot_components(side, y) for side in sides], axis=1
@@ -199,10 +191,8 @@ def _leaf_directions(
 
         The values rotate with the frame by the power `order`.
         """
-        in_plane = np.stack(
-            [z * signed_power(phase, order) for z, phase in zip(values, to_plane, strict=True)],
-            axis=1,
-        )
+        pairs = zip(values, to_plane, strict=True)
+        in_plane = np.stack([z * signed_power(phase, order) for z, phase in pairs], axis=1)
         return np.einsum("lcr,lr->lc", weights, in_plane.take(tree.leaf_root, axis=0))
 
     degree = field.degree
@@ -221,12 +211,7 @@ def _leaf_directions(
     root_area = (offset[:, 1].conj() * offset[:, 2]).imag
     defined = corner_field.representation.any(axis=0) & (root_area > 0)
     directions = CornerDirections(
-        degree,
-        symmetry.has_opposites,
-        leaf_offset,
-        angle,
-        deviation,
-        defined[tree.leaf_root],
+        degree, symmetry.line_count, leaf_offset, angle, deviation, defined[tree.leaf_root]
     )
     unit = np.exp(1j * mean_angle)
     first, second = (offset[:, corner].take(tree.leaf_root) for corner in (1, 2))

@@ -63,9 +63,8 @@ def surface_values(gbuffer: GBuffer) -> np.ndarray:
         instance = gbuffer.instances[instance_id]
         if instance.color_values is not None:
             for block in blocks:
-                values[block] = values_in_triangles(
-                    instance, gbuffer.triangle[block], gbuffer.barycentric[block]
-                )
+                place = gbuffer.triangle[block], gbuffer.barycentric[block]
+                values[block] = values_in_triangles(instance, *place)
     return values
 
 
@@ -93,7 +92,9 @@ def values_in_triangles(
 
 
 def feature_curvatures(gbuffer: GBuffer, cache: Cache) -> np.ndarray:
-    """Interpolate the curvature of features at the pixels of a G-buffer.
+    """Interpolate the curvature of surfaces between sharp edges at the pixels of a G-buffer.
+
+    It is the larger absolute principal curvature, without noise; see `field.feature_curvature`.
 
     Parameters
     ----------

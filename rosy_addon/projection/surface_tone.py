@@ -49,18 +49,16 @@ class MipMap:
         level_index = np.clip(np.rint(level), 0, len(self.levels) - 1).astype(np.int32)
         for index in np.flatnonzero(np.bincount(level_index)).tolist():
             selected = np.flatnonzero(level_index == index)
-            result[selected] = _sample_bilinear(
-                self.levels[index], u[selected], v[selected], repeat
-            )
+            image = self.levels[index]
+            result[selected] = _sample_bilinear(image, u[selected], v[selected], repeat)
         return result
 
 
 def _downsample(image: np.ndarray) -> np.ndarray:
     """Halve an image by averaging 2 x 2 pixels; an odd last row or column is repeated."""
     height, width = image.shape
-    result = np.pad(
-        image, ((0, height % 2 if height > 1 else 0), (0, width % 2 if width > 1 else 0)), "edge"
-    )
+    added = [(0, size % 2 if size > 1 else 0) for size in (height, width)]
+    result = np.pad(image, added, "edge")
     if height > 1:
         result = 0.5 * (result[::2] + result[1::2])
     if width > 1:
@@ -73,17 +71,14 @@ def _sample_bilinear(image: np.ndarray, u: np.ndarray, v: np.ndarray, repeat: bo
     height, width = image.shape
     neighbors, fractions = [], []
     for position, size in ((v, height), (u, width)):
-        position = (
-            position - np.floor(position) if repeat else np.clip(position, 0, 1)
-        ) * size - 0.5
+        position = position - np.floor(position) if repeat else np.clip(position, 0, 1)
+        position = position * size - 0.5
         first = np.floor(position)
         fractions.append((position - first).astype(np.float32))
         first = first.astype(np.intp)
-        pair = first, first + 1
-        neighbors.append(
-            [index % size if repeat else np.clip(index, 0, size - 1) for index in pair]
-        )
-    (low, high), (left, right) = neighbors
+        for index in (first, first + 1):
+            neighbors.append(index % size if repeat else np.clip(index, 0, size - 1))
+    low, high, left, right = neighbors
     fraction_y, fraction_x = fractions
     below = image[low, left] * (1 - fraction_x) + image[low, right] * fraction_x
     above = image[high, left] * (1 - fraction_x) + image[high, right] * fraction_x

@@ -14,20 +14,13 @@ import numpy as np
 from ..core.deterministic_trig import vector_angle
 from ..field.frames import dot_components
 
-#: Faces, corners or triangles per block. Bounds memory, and fits the caches of the processor.
-BLOCK_SIZE = 1 << 14
-
 #: Vectors as three (n,) arrays: their x, y and z components.
 VectorComponents = Sequence[np.ndarray]
 
 
 def cross_components(a: VectorComponents, b: VectorComponents) -> list[np.ndarray]:
     """Return the components of the cross products of vectors."""
-    return [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 def subtract_components(a: VectorComponents, b: VectorComponents) -> list[np.ndarray]:
@@ -115,7 +108,7 @@ def plane_coordinates(
 
 
 def polygon_angles(points: Sequence[VectorComponents]) -> list[np.ndarray]:
-    """Return the interior angle at each corner of polygons, in radians, float32.
+    """Return the interior angles of n polygons with k corners, in radians: k (n,) float32 ndarrays.
 
     `points` are the corners as returned by `relative_to_first`.
     """
@@ -125,14 +118,10 @@ def polygon_angles(points: Sequence[VectorComponents]) -> list[np.ndarray]:
     corners = list(zip(edges, edges[-1:] + edges[:-1], strict=True))
     if len(corners) > 3:
         return [
-            _edge_angle(next_edge, previous_edge, cross_components(previous_edge, next_edge))
-            for next_edge, previous_edge in corners
+            _edge_angle(after, before, cross_components(before, after)) for after, before in corners
         ]
     area_vector = cross_components(edges[0], edges[1])
-    angle_0, angle_1 = (
-        _edge_angle(next_edge, previous_edge, area_vector)
-        for next_edge, previous_edge in corners[:2]
-    )
+    angle_0, angle_1 = (_edge_angle(after, before, area_vector) for after, before in corners[:2])
     return [angle_0, angle_1, np.maximum(np.float32(np.pi) - angle_0 - angle_1, 0)]
 
 

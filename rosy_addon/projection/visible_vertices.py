@@ -17,7 +17,7 @@ import numpy as np
 from ..core.progress import report
 from ..field.blocks import blocks_by_count, concatenated_ranges
 from .camera import Camera
-from .gbuffer import MeshInstance
+from .gbuffer import MeshInstances
 from .project import all_triangles, first_triangles
 from .surface_points import SurfacePoints
 
@@ -44,8 +44,8 @@ class ProjectedPoints(NamedTuple):
     depth : (K,) float64 ndarray
         Distances along the axis of the camera, in Blender units.
     is_in_view : (K,) bool ndarray
-        Whether the point is between the near and the far plane of the camera, in front of it, and not
-        cut away. It may be beside the frame.
+        Whether the point is between the near and the far plane of the camera, and no clip plane cuts it
+        away. It may be beside the frame.
     is_visible : (K,) bool ndarray
         Whether the point is in view and in the frame, and no surface hides it.
     """
@@ -62,7 +62,7 @@ class ProjectedPoints(NamedTuple):
 
 
 def project_vertices(
-    instances: Sequence[MeshInstance],
+    instances: MeshInstances,
     camera: Camera,
     vertices: Sequence[np.ndarray],
     clip_planes: np.ndarray | None = None,
@@ -98,7 +98,7 @@ def project_vertices(
 
 
 def project_points(
-    instances: Sequence[MeshInstance],
+    instances: MeshInstances,
     camera: Camera,
     points: SurfacePoints,
     clip_planes: np.ndarray | None = None,
@@ -147,7 +147,10 @@ def _project(
     touches: Callable[[np.ndarray, np.ndarray], np.ndarray],
     label: str,
 ) -> ProjectedPoints:
-    """Project K points, given in clip space and in world space, and find the visible ones.
+    """Project K points, and find the visible ones.
+
+    `clip`, (K, 4), and `world`, (K, 3), are their positions in clip space and in world space. `label` is the
+    text that the user sees meanwhile.
 
     `touches(triangle, point)` returns (n,) bool for (n,) indices of triangles of the scene and of points:
     whether the triangle contains the point. A triangle does not hide the points that it contains.
@@ -208,9 +211,7 @@ class _Scene:
     tolerance: float
 
     @classmethod
-    def of(
-        cls, instances: Sequence[MeshInstance], camera: Camera, clip_planes: np.ndarray | None
-    ) -> _Scene:
+    def of(cls, instances: MeshInstances, camera: Camera, clip_planes: np.ndarray | None) -> _Scene:
         """Return a scene of all triangles of mesh instances, as seen by a camera."""
         clip, triangles = all_triangles(instances, camera)
         world = np.concatenate([instance.world_points() for instance in instances])
@@ -229,10 +230,10 @@ class _Scene:
         ndc : (n, 2) float64 ndarray
             Positions of the points on screen, from -1 to 1.
 
-        Returns
-        -------
-        iterator of (triangle, point)
-            Indices of triangles and of points, (m,) intp ndarrays, block by block.
+        Yields
+        ------
+        triangle, point : (m,) intp ndarray
+            Indices of triangles and of points, block by block.
         """
         row_count = max(int(len(ndc) ** 0.5), 1)
         point_row = _grid_rows(ndc[:, 1], row_count)
@@ -256,13 +257,9 @@ class _Scene:
         first = np.searchsorted(key, 4.0 * row + low[box, 0])
         count = np.searchsorted(key, 4.0 * row + high[box, 0], side="right") - first
         box, first, count = (array[count > 0] for array in (box, first, count))
-        return (
-            (
-                triangle[kept[np.repeat(box[part], count[part])]],
-                order[concatenated_ranges(first[part], count[part])],
-            )
-            for part in blocks_by_count(count, PAIRS_PER_BLOCK)
-        )
+        for part in blocks_by_count(count, PAIRS_PER_BLOCK):
+            point = order[concatenated_ranges(first[part], count[part])]
+            yield triangle[kept[np.repeat(box[part], count[part])]], point
 
     def hides(self, triangle: np.ndarray, ndc: np.ndarray, distance: np.ndarray) -> np.ndarray:
         """Return (n,) bool: whether each triangle hides its point. The point must not be on the triangle.
@@ -279,9 +276,8 @@ class _Scene:
         a, b, c = np.moveaxis(self.clip[corner][..., (0, 1, 3)], 1, 0)
         point = np.concatenate([ndc, np.ones((len(ndc), 1))], axis=1)
         area = (a * np.cross(b, c)).sum(axis=1)
-        weights = np.stack(
-            [(point * np.cross(*pair)).sum(axis=1) for pair in ((b, c), (c, a), (a, b))], axis=1
-        )
+        edges = (b, c), (c, a), (a, b)
+        weights = np.stack([(point * np.cross(*edge)).sum(axis=1) for edge in edges], axis=1)
         weights = np.divide(weights, area[:, None], out=weights, where=area[:, None] != 0)
         covers = np.flatnonzero((weights >= 0).all(axis=1) & (area != 0))
         corner, weights = corner[covers], weights[covers]

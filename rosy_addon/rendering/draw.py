@@ -153,7 +153,8 @@ def _draw_strips(
 ) -> Picture:
     """Draw neighboring strips, and return a picture of their rows.
 
-    The mesh is also projected to some rows above and below, which streamlines of these rows may reach.
+    The meshes are also projected to some rows above and below the strips, because streamlines that begin in
+    the strips may reach them.
     """
     camera, look = view.shaded_camera, view.look
     scene = view.instances, camera, look.display
@@ -166,18 +167,9 @@ def _draw_strips(
             gbuffer = cached_project(*scene, gbuffer_cache, view.samples_per_side)
         else:
             gbuffer = project(*scene, cache, view.samples_per_side, rows)
+    inputs = gbuffer, look, view.lights, view.reference, gbuffer_cache, cache, strips
     with progress(PROJECTION_SHARE, 1.0):
-        return compose(
-            gbuffer,
-            look,
-            view.lights,
-            view.reference,
-            gbuffer_cache,
-            cache,
-            strips,
-            draws_thresholds=view.draws_thresholds,
-            drift=view.drift,
-        )
+        return compose(*inputs, view.draws_thresholds, view.drift)
 
 
 def _whole(strips: Sequence[Strip]) -> Strip:
@@ -217,19 +209,16 @@ def picture_memory(view: ViewInput, groups: Sequence[Sequence[Strip]], workers: 
         Number of processes.
     """
     look, camera = view.look, view.shaded_camera
-    fields = [instance.field for instance in view.instances if instance.field is not None]
-    lines = [
-        FieldSymmetry(field.degree, ()).line_count
-        if field.direction_ratios is None
-        else field.degree
-        for field in fields
-    ]
+    lines = 1
+    for field in [instance.field for instance in view.instances if instance.field is not None]:
+        is_rosy = field.direction_ratios is None
+        lines = max(lines, FieldSymmetry(field.degree).line_count if is_rosy else field.degree)
     many_images = is_hatched(look) or noise_channel_count(look) > 1 or look.method != "sheets"
     height = max(group[-1].stop - group[0].start for group in groups)
     if len(groups) > 1:
         height = min(height + 2 * context_rows(look, camera, view.instances), camera.height)
     process = PROCESS_BYTES
-    process += samples_memory(camera.width * height, max(lines, default=1), many_images)
+    process += samples_memory(camera.width * height, lines, many_images)
     process += TRIANGLE_BYTES * sum(len(instance.surface.triangles) for instance in view.instances)
     picture = PIXEL_BYTES * view.camera.width * view.camera.height
     return picture + process * min(workers, len(groups))

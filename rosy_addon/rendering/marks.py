@@ -52,19 +52,18 @@ def with_marks(picture: Picture, view: ViewInput, cache: Cache | None = BAKE_CAC
     Picture
         The same picture if there is nothing to draw, or if it has thresholds of ink instead of colors.
     """
+    look = view.look
     if view.draws_thresholds:
         return picture
-    if view.look.arrows:
+    if look.arrows:
         with progress(0.0, 0.5):
             arrows = view_arrows(view, cache)
         if len(arrows):
             with progress(0.5, 0.6):
                 picture = replace(picture, rgba=draw_arrows(picture.rgba, arrows))
-    if shows_singularities(view.look):
+    if shows_singularities(look):
         with progress(0.6, 0.9):
-            marks = singularity_marks(
-                view.instances, view.camera, view.look, view.clip_planes, cache
-            )
+            marks = singularity_marks(view.instances, view.camera, look, view.clip_planes, cache)
         with progress(0.9, 1.0):
             picture = replace(picture, rgba=draw_marks(picture.rgba, marks), marks=marks)
     if cache is BAKE_CACHE:  # the owners of other caches evict their entries
@@ -72,9 +71,7 @@ def with_marks(picture: Picture, view: ViewInput, cache: Cache | None = BAKE_CAC
     return picture
 
 
-def view_arrows(
-    view: ViewInput, cache: Cache | None = None, *, is_exact: bool = True
-) -> ArrowMarks:
+def view_arrows(view: ViewInput, cache: Cache | None, *, is_exact: bool = True) -> ArrowMarks:
     """Return the arrowheads of a view. Its look must draw them (`Look.arrows` above 0); see `arrow_marks`."""
     look = pixel_look(view.look, view.camera, view.instances)
     return arrow_marks(

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..compositor.look import Look
-from ..compositor.target_tone import ReferenceRender
 from ..core.errors import RosyError
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..field.up_axis import UP_AXIS_MATRIX
-from ..projection.camera import orbit_camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
-from .view_input import ViewInput
 
 
 def mesh_instance(
@@ -36,47 +32,6 @@ def mesh_instance(
         Values for the color map, at the C corners of the mesh.
     """
     return MeshInstance(surface, UP_AXIS_MATRIX[surface.up], field, tone, color_values)
-
-
-def mesh_view(
-    instance: MeshInstance,
-    look: Look,
-    view_angles: tuple[float, float],
-    size: tuple[int, int],
-    *,
-    perspective: bool = True,
-    reference_luminance: np.ndarray | None = None,
-    reference_name: str = "",
-) -> ViewInput:
-    """Return the input for a picture of one mesh, from a camera in whose frame the mesh just fits.
-
-    Parameters
-    ----------
-    instance : MeshInstance
-    look : Look
-    view_angles : (float, float)
-        Azimuth and elevation of the camera in degrees; see `orbit_camera`.
-    size : (int, int)
-        Width and height of the picture in pixels.
-    perspective : bool
-        Whether the camera is perspective. If not, it is orthographic.
-    reference_luminance : (H, W) ndarray, optional
-        Linear luminance of a picture from the same view. A look with the tone "picture" takes its tone from
-        it.
-    reference_name : str
-        Name of that picture in messages.
-
-    Raises
-    ------
-    RosyError
-        If the look uses the lights of a scene, or the size or the angles are impossible.
-    """
-    check_light(look.light, instance.surface.name)
-    camera = orbit_camera(instance.face_points(), *view_angles, *size, perspective=perspective)
-    reference = None
-    if reference_luminance is not None:
-        reference = ReferenceRender(reference_luminance, camera, reference_name)
-    return ViewInput((instance,), camera, look, reference=reference)
 
 
 def check_light(light: str, name: str) -> None:

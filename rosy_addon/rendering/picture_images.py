@@ -48,7 +48,7 @@ def picture_image(picture: Picture, as_float: bool) -> ImageData:
     Parameters
     ----------
     picture : Picture
-        If it has thresholds of ink, their spread is stored as the alpha of the image.
+        If it has thresholds of ink, `Picture.spread` is stored as the alpha of the image.
     as_float : bool
         Whether linear values in single precision are stored (for .exr), instead of 8-bit sRGB (.png).
 
@@ -108,9 +108,8 @@ def with_bleed(rgba: np.ndarray) -> np.ndarray:
     pixels[~is_filled, :3] = NEUTRAL_GRAY
     is_inside = np.zeros((height, width), dtype=bool)
     is_inside[1:-1, 1:-1] = True
-    neighbor_offsets = [
-        row * width + column for row in (1, 0, -1) for column in (1, 0, -1) if row or column
-    ]
+    steps = (1, 0, -1)
+    neighbor_offsets = [row * width + column for row in steps for column in steps if row or column]
     frontier = np.flatnonzero(is_filled)
     for _ in range(BLEED_PIXELS):
         is_adjacent = np.zeros_like(is_filled)

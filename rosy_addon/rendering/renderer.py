@@ -86,11 +86,11 @@ class ViewportRenderer:
         Parameters
         ----------
         texture : texture or None
-            Result of `texture_steps`. Its size may differ from that of the 3D view.
+            Result of `texture_steps`. It may be smaller or larger than the 3D view.
         items : sequence
             The draw items of the picture.
         view : ViewInput
-            Its camera and clip planes are those of the 3D view.
+            It has the camera and the clip planes of the 3D view.
         opacity : float
             Opacity of the picture, 0 to 1.
         """

@@ -176,16 +176,17 @@ def video_steps(
     fps: float,
     encode: Callable[..., Steps[None]],
 ) -> Steps[bytes]:
-    """Draw views as part of a job, and return the contents of a video file of them.
+    """Draw views as part of a job, encode the pictures, and return the contents of the video file.
 
     Parameters
     ----------
     draw : function
-        Function that returns, for a view, the steps of a job that draws it and returns its `video_frame`.
+        ``draw(view)`` returns the steps of a job. The job draws the view, and its result is the `video_frame`
+        of the picture.
     views, count, path, fps
         See `turntable`. Only the suffix of the path is used, for the format. Nothing is written to it.
     encode : function
-        Function that returns the steps of a job that encodes an .mp4. It has the arguments of an `Encoder`.
+        Takes the arguments of an `Encoder`, and returns the steps of a job that encodes an .mp4.
     """
     pictures = []
     with nullcontext("") if is_gif(path) else GuardedFolder() as name:

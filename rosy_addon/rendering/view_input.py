@@ -74,7 +74,7 @@ class ViewInput:
 
     @property
     def samples_per_side(self) -> int:
-        """Samples along each side of a pixel that share one shading; 1 if every sample is shaded."""
+        """The supersampling factor if each pixel is shaded once; 1 if each of its samples is shaded."""
         return self.look.supersampling if is_shaded_by_pixel(self.look) else 1
 
     @property

@@ -21,7 +21,7 @@ from ..core.errors import RosyError
 from ..projection.camera import Camera
 from .camera_planes import update_backdrops
 from .cameras import FRAME_CAMERAS, CameraSource, frame_camera
-from .datablocks import delete_owned, delete_unused, is_rosy_modifier, removable_modifiers
+from .datablocks import delete_owned, delete_unused, removable_modifiers, rosy_modifiers
 from .keys import update_keys
 from .look_properties import read_look
 from .picture_nodes import (
@@ -177,19 +177,16 @@ def _find_texture_record(
 
 def _texture_objects(record: bpy.types.PropertyGroup) -> list[bpy.types.Object]:
     """Return the objects whose modifier has the texture of a record, sorted by name."""
-    return sorted(
-        (
-            obj
-            for obj in bpy.data.objects
-            if obj.users_collection
-            and any(
-                record.material in projections_of_group(modifier.node_group)
-                for modifier in obj.modifiers
-                if is_rosy_modifier(modifier)
-            )
-        ),
-        key=lambda obj: obj.name,
-    )
+    objects = [
+        obj
+        for obj in bpy.data.objects
+        if obj.users_collection
+        and any(
+            record.material in projections_of_group(modifier.node_group)
+            for modifier in rosy_modifiers(obj)
+        )
+    ]
+    return sorted(objects, key=lambda obj: obj.name)
 
 
 def _replace_datablocks(
@@ -224,8 +221,8 @@ def camera_name(record: bpy.types.PropertyGroup) -> str:
 
 
 def _view_to_json(camera: Camera) -> str:
-    values = camera.view.tolist(), camera.projection.tolist(), camera.width, camera.height
-    return json.dumps([*values, camera.name])
+    matrices = camera.view.tolist(), camera.projection.tolist()
+    return json.dumps([*matrices, camera.width, camera.height, camera.name])
 
 
 def _view_from_json(text: str) -> Camera:
@@ -238,21 +235,18 @@ def _is_recorded(datablock: bpy.types.ID | None) -> bool:
 
     Copies of a scene have records of the same images.
     """
-    return any(
-        datablock in (record.image, record.material)
-        for scene in bpy.data.scenes
-        for record in scene.rosy.bakes
-    )
+    return any(datablock in (record.image, record.material) for record in _all_records())
+
+
+def _all_records() -> list[bpy.types.PropertyGroup]:
+    """Return the records of all scenes."""
+    return [record for scene in bpy.data.scenes for record in scene.rosy.bakes]
 
 
 def recorded_materials(*, textures: bool = True) -> set[bpy.types.Material]:
-    """Return the materials of the records of all scenes. Those of textures are included by default."""
-    return {
-        record.material
-        for scene in bpy.data.scenes
-        for record in scene.rosy.bakes
-        if textures or record.view != TEXTURE_VIEW
-    }
+    """Return the materials of the pictures that all scenes record. `textures` says whether textures count."""
+    records = _all_records()
+    return {record.material for record in records if textures or record.view != TEXTURE_VIEW}
 
 
 def list_bakes(
@@ -275,12 +269,13 @@ def list_bakes(
     """
     recorded = [record for record in scene.rosy.bakes if record.image is not None]
     shown = {material for obj in baked_objects(scene) for material in shown_materials(obj)}
-    if for_panel and not recorded:
-        SCENE_STATES.clear()
     state = None
-    if recorded:
-        depsgraph = scene_depsgraph(scene)
-        state = SCENE_STATES.get(scene, depsgraph) if for_panel else SceneState(scene, depsgraph)
+    if recorded and for_panel:
+        state = SCENE_STATES.get(scene, scene_depsgraph(scene))
+    elif recorded:
+        state = SceneState(scene, scene_depsgraph(scene), {})
+    elif for_panel:
+        SCENE_STATES.clear()
     infos = [
         BakeInfo(
             camera_name(record),
@@ -297,10 +292,9 @@ def list_bakes(
     for material in shown - {record.material for record in scene.rosy.bakes}:
         node = image_node(material)
         if node is not None and node.image is not None:
-            image = node.image
             name = material.name.removeprefix(NAME_PREFIX)
             note = "baked in another file or scene"
-            infos.append(BakeInfo(name, *image.size, image, True, unknown_reason=note))
+            infos.append(BakeInfo(name, *node.image.size, node.image, True, unknown_reason=note))
     return sorted(infos, key=lambda info: info.camera)
 
 
@@ -310,9 +304,23 @@ def _present_reason(
     state: SceneState,
     automatic_device: Callable[[Look], str] | None,
 ) -> dict[str, str]:
-    """Return the ``stale_reason`` or the ``unknown_reason`` of a picture, as an argument of `BakeInfo`.
+    """Return why a picture is out of date, or why this is not known, as a keyword argument of `BakeInfo`.
 
-    `state` is the present state of the scene. See `list_bakes` for the other parameters.
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    record : bpy.types.PropertyGroup
+        The record of the picture.
+    state : SceneState
+        The present state of the scene.
+    automatic_device : callable or None
+        See `list_bakes`.
+
+    Returns
+    -------
+    dict of str to str
+        One item, with the key ``stale_reason`` or ``unknown_reason``. An empty ``stale_reason`` says that the
+        picture is up to date.
     """
     text, frame = record.state, scene.frame_current
     if record.frames and record.frame_states:
@@ -356,9 +364,9 @@ def has_pictures(scene: bpy.types.Scene) -> bool:
 
 
 def baked_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """Return the objects with pictures that are in a scene, or in no scene at all.
+    """Return the objects with a picture that belong to a scene, including objects of instanced collections.
 
-    Objects of instanced collections are included.
+    Objects that are in no scene are included too, so that their pictures can be removed.
     """
     baked = [
         obj for obj in bpy.data.objects if removable_modifiers(obj) or has_applied_picture(obj.data)
@@ -371,7 +379,7 @@ def baked_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 
 def _reached_objects(scene: bpy.types.Scene) -> set[bpy.types.Object]:
-    """Return the objects of a scene, and those of the collections that its objects instance."""
+    """Return the objects of a scene, and the objects of all collections that these objects instance."""
     reached: set[bpy.types.Object] = set()
 
     def add_objects(collection: bpy.types.Collection) -> None:

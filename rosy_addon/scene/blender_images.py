@@ -14,12 +14,7 @@ from ..image_io.image_data import ImageData, image_size
 
 
 def new_image(
-    name: str,
-    image_data: ImageData,
-    *,
-    as_float: bool = False,
-    is_color: bool = True,
-    stem: Path | None = None,
+    name: str, image_data: ImageData, *, is_color: bool = True, stem: Path | None = None
 ) -> bpy.types.Image:
     """Create a Blender image.
 
@@ -28,9 +23,8 @@ def new_image(
     name : str
         Name of the datablock.
     image_data : ImageData
-        The bytes of a PNG file if values have 8 bits; an array of pixels if they have single precision.
-    as_float : bool
-        Whether the image stores linear values in single precision.
+        The bytes of a PNG file for an image with 8 bits per channel, or an array of linear values for an
+        image in single precision.
     is_color : bool
         Whether 8-bit values are colors (sRGB). Otherwise they are data, which Blender does not convert.
     stem : Path, optional
@@ -42,6 +36,7 @@ def new_image(
     RosyError
         If the file cannot be written. The image is deleted in this case.
     """
+    as_float = not isinstance(image_data, bytes)
     image = bpy.data.images.new(name, *image_size(image_data), alpha=True, float_buffer=as_float)
     try:
         image.alpha_mode = "CHANNEL_PACKED"
@@ -50,7 +45,7 @@ def new_image(
             image.pixels.foreach_set(image_data.ravel())
             image.update()
         if stem is not None:
-            _save_image(image, None if as_float else image_data, stem)
+            _save_image(image, image_data, stem)
         elif as_float:
             image.pack()
         else:
@@ -63,18 +58,13 @@ def new_image(
 
 
 def new_tiled_image(
-    name: str,
-    tiles: Mapping[int, ImageData],
-    *,
-    as_float: bool = False,
-    is_color: bool = True,
-    stem: Path | None = None,
+    name: str, tiles: Mapping[int, ImageData], *, is_color: bool = True, stem: Path | None = None
 ) -> bpy.types.Image:
     """Create a Blender image of UDIM tiles.
 
     Parameters
     ----------
-    name, as_float, is_color
+    name, is_color
         See `new_image`.
     tiles : mapping of int to ImageData
         The tiles by their UDIM numbers.
@@ -88,30 +78,29 @@ def new_tiled_image(
         If a file cannot be written.
     """
     if stem is not None:
-        return _load_tiles(name, tiles, stem, as_float, is_color)
+        return _load_tiles(name, tiles, stem, is_color)
     # Blender packs tiles only from files.
     with tempfile.TemporaryDirectory(dir=bpy.app.tempdir or None) as folder:
-        image = _load_tiles(name, tiles, Path(folder) / "tile", as_float, is_color)
+        image = _load_tiles(name, tiles, Path(folder) / "tile", is_color)
         try:
             image.pack()
         except RuntimeError as reason:
             bpy.data.images.remove(image)
             raise RosyError(f"image '{name}': cannot be packed: {reason}") from reason
     # Paths to which Blender writes the tiles if the user unpacks them.
-    image.filepath_raw = f"//{name}.<UDIM>{'.exr' if as_float else '.png'}"
+    image.filepath_raw = f"//{name}.<UDIM>{Path(image.filepath_raw).suffix}"
     for file in image.packed_files:
         file.filepath = image.filepath_raw.replace("<UDIM>", str(file.tile_number))
     return image
 
 
 def _load_tiles(
-    name: str, tiles: Mapping[int, ImageData], stem: Path, as_float: bool, is_color: bool
+    name: str, tiles: Mapping[int, ImageData], stem: Path, is_color: bool
 ) -> bpy.types.Image:
     """Write tiles to files, and load them as one image."""
-    paths = {
-        number: stem.with_name(f"{stem.name}.{number}{'.exr' if as_float else '.png'}")
-        for number in sorted(tiles)
-    }
+    as_float = not all(isinstance(tile, bytes) for tile in tiles.values())
+    suffix = _suffix(as_float)
+    paths = {number: stem.with_name(f"{stem.name}.{number}{suffix}") for number in sorted(tiles)}
     for number, path in paths.items():
         write_frame(path, tiles[number])
     first = next(iter(paths.values()))
@@ -130,7 +119,12 @@ def _load_tiles(
 
 def frame_path(stem: Path, frame: int, as_float: bool) -> Path:
     """Return the path of a frame of an image sequence: stem, frame number in at least 4 digits, suffix."""
-    return stem.with_name(f"{stem.name}_{frame:04d}{'.exr' if as_float else '.png'}")
+    return stem.with_name(f"{stem.name}_{frame:04d}{_suffix(as_float)}")
+
+
+def _suffix(as_float: bool) -> str:
+    """Return the suffix of image files with linear values, or with 8 bits per channel."""
+    return ".exr" if as_float else ".png"
 
 
 def write_frame(path: Path, image_data: ImageData) -> None:
@@ -149,7 +143,6 @@ def write_frame(path: Path, image_data: ImageData) -> None:
         If the file cannot be written.
     """
     make_folder(path.parent)
-    check_writable(path)
     if isinstance(image_data, bytes):
         write_bytes(path, image_data)
         return
@@ -159,12 +152,8 @@ def write_frame(path: Path, image_data: ImageData) -> None:
     try:
         image.colorspace_settings.name = "Non-Color"
         image.pixels.foreach_set(image_data.ravel())
-        image_settings = scene.render.image_settings
-        image_settings.file_format, image_settings.color_mode, image_settings.color_depth = (
-            "OPEN_EXR",
-            "RGBA",
-            "16",
-        )
+        settings = scene.render.image_settings
+        settings.file_format, settings.color_mode, settings.color_depth = "OPEN_EXR", "RGBA", "16"
         with replacing(path) as temporary:
             image.save_render(str(temporary), scene=scene)
     except RuntimeError as reason:
@@ -184,15 +173,15 @@ def load_sequence(path: Path, as_float: bool) -> bpy.types.Image:
     return image
 
 
-def _save_image(image: bpy.types.Image, png: bytes | None, stem: Path) -> None:
+def _save_image(image: bpy.types.Image, image_data: ImageData, stem: Path) -> None:
     """Save an image to a file, and make the image use this file. An existing file is replaced.
 
-    If `png` is given, it is the contents of the file. Otherwise Blender writes an .exr file.
+    A PNG file is written as it is. If the image has pixels in single precision, Blender writes an .exr file.
     """
-    path = stem.with_name(stem.name + (".exr" if image.is_float else ".png"))
+    path = stem.with_name(f"{stem.name}{_suffix(image.is_float)}")
     make_folder(path.parent)
-    check_writable(path)
-    if png is None:
+    if image.is_float:
+        check_writable(path)
         image.file_format = "OPEN_EXR"
         image.filepath_raw = str(path)
         try:
@@ -200,7 +189,7 @@ def _save_image(image: bpy.types.Image, png: bytes | None, stem: Path) -> None:
         except RuntimeError as reason:
             raise RosyError(f"{path}: cannot be written: {reason}") from reason
     else:
-        write_bytes(path, png)
+        write_bytes(path, image_data)
         image.file_format = "PNG"
     image.source = "FILE"
     image.filepath = _blend_relative(path)

@@ -46,10 +46,8 @@ class BrushSurface:
         with evaluated_mesh(self._evaluated) as mesh:
             source = mesh_of_own_vertices(obj, mesh)
             self._shown = vertex_positions(source)[: len(surface.vertices)].astype(np.float64)
-            self._keeps_faces = len(source.polygons) == surface.face_count and len(
-                source.vertices
-            ) == len(surface.vertices)
-        self._shown_tree: BVHTree | None = None
+            counts = len(source.polygons), len(source.vertices)
+            self._keeps_faces = counts == (surface.face_count, len(surface.vertices))
 
     def cast_ray(self, origin: Vector, direction: Vector) -> np.ndarray | None:
         """Return the point of the original mesh under a ray, (3,) float32 in object space; None for a miss.
@@ -68,17 +66,12 @@ class BrushSurface:
         if self._keeps_faces:
             triangle = np.flatnonzero(self._surface.triangle_face == face)
         else:
-            if self._shown_tree is None:
-                self._shown_tree = BVHTree.FromPolygons(
-                    self._shown.tolist(), vertex.tolist(), all_triangles=True
-                )
             location, _, index, _ = self._shown_tree.find_nearest(location)
             triangle = np.array([index])
         # Of the triangles of the face, choose the one whose smallest barycentric coordinate is largest: the
         # point lies in it.
-        weights = [
-            _barycentric(self._shown[vertex[index]], np.array(location)) for index in triangle
-        ]
+        point = np.array(location)
+        weights = [_barycentric(corners, point) for corners in self._shown[vertex[triangle]]]
         best = int(np.argmax([weight.min() for weight in weights]))
         return (weights[best] @ self._surface.vertices[vertex[triangle[best]]]).astype(np.float32)
 
@@ -88,7 +81,8 @@ class BrushSurface:
         """Return dashes (short line segments) along a field around a point, on the evaluated mesh.
 
         For an even degree there is one dash for each pair of opposite members, centered on the face. For an
-        odd degree there is one for each member, from the center of the face.
+        odd degree there is one for each member, from the center of the face. The length of a dash follows
+        from the size of its face; see `DASH_LENGTH`.
 
         Parameters
         ----------
@@ -99,14 +93,15 @@ class BrushSurface:
         place : (3,) ndarray
             Center of the brush: a point of the original mesh, object space.
         radius : float
-            Radius around `place` in which faces get dashes, object space.
+            Faces of the original mesh get dashes if their centers are nearer to `place` than this, object
+            space.
 
         Returns
         -------
         ends : (K, 2, 3) float64 ndarray
-            Both end points of each dash, object space.
+            Both end points of each dash on the evaluated mesh, object space.
         face : (K,) intp ndarray
-            Face of each dash.
+            The face of the original mesh that each dash belongs to.
         """
         surface = self._surface
         offset = surface.face_center - place
@@ -115,23 +110,27 @@ class BrushSurface:
         normal = surface.face_normal[near]
         near = near[normal @ surface.face_normal[square.argmin()] > 0]
         near = near[:: -(-len(near) // MAX_DASH_FACES) or 1]
-        normal, member = surface.face_normal[near], normalize(vectors[near])
+        member = normalize(vectors[near])
+        side = np.cross(surface.face_normal[near], member)
         angles = 2 * np.pi / degree * np.arange(degree if degree % 2 else degree // 2)
-        directions = [
-            np.cos(angle) * member + np.sin(angle) * np.cross(normal, member) for angle in angles
-        ]
         # The deformation of a face is taken from its first triangle.
+        rest = surface.vertices
         vertex = surface.triangle_vertex[np.searchsorted(surface.triangle_face, near)]
-        half_length = DASH_LENGTH / 2 * np.sqrt(np.abs(_edge_cross(surface.vertices, vertex)))
+        half_length = DASH_LENGTH / 2 * np.sqrt(_double_areas(rest, vertex))
         center = self._shown_center[near]
         dashes = []
-        for direction in directions:
-            along = half_length[:, None] * _deformed(
-                direction, vertex, surface.vertices, self._shown
-            )
+        for angle in angles:
+            direction = np.cos(angle) * member + np.sin(angle) * side
+            along = half_length[:, None] * _deformed(direction, vertex, rest, self._shown)
             start = center if degree % 2 else center - along
             dashes.append(np.stack([start, center + along], axis=1))
         return np.concatenate(dashes), np.tile(near, len(dashes))
+
+    @cached_property
+    def _shown_tree(self) -> BVHTree:
+        """The triangles of the original mesh, with the vertices moved by the modifiers."""
+        triangles = self._surface.triangle_vertex.tolist()
+        return BVHTree.FromPolygons(self._shown.tolist(), triangles, all_triangles=True)
 
     @cached_property
     def _shown_center(self) -> np.ndarray:
@@ -139,7 +138,7 @@ class BrushSurface:
         return mean_per_face(self._shown[self._surface.corner_vertex], self._surface.face_start)
 
 
-def _edge_cross(points: np.ndarray, vertex: np.ndarray) -> np.ndarray:
+def _double_areas(points: np.ndarray, vertex: np.ndarray) -> np.ndarray:
     """Return twice the areas, (n,), of triangles that are given by (n, 3) vertex indices."""
     a, b, c = (points[column] for column in vertex.T)
     cross = np.cross(b - a, c - a)
@@ -165,7 +164,20 @@ def _deformed(
 
 
 def closest_faces(mesh: bpy.types.Mesh, surface: Surface, cache: Cache) -> FaceLocator:
-    """Return a function that finds the (n,) faces of a mesh that are closest to (n, 3) points."""
+    """Return a function that finds the faces of a mesh closest to points in object space.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+    surface : Surface
+        The surface of the mesh. It is the key of the search tree in the cache.
+    cache : Cache
+
+    Returns
+    -------
+    callable
+        For (n, 3) points it returns the (n,) indices of the closest faces; -1 if there is none.
+    """
 
     def create() -> BVHTree:
         copy = bmesh.new()

@@ -29,39 +29,38 @@ HIDDEN_FROM = (
 def pictured_cameras(scene: bpy.types.Scene) -> dict[bpy.types.Object, bpy.types.PropertyGroup]:
     """Return the cameras from which pictures were baked, each with the record of one of its pictures.
 
-    If a camera has several pictures, one that objects show is preferred. An animation that is
-    drawn from the cameras of its frames counts as one of the active camera of the scene.
+    If a camera has several pictures, one that objects show is preferred. An animation in which each frame is
+    drawn from the camera that renders it counts as a picture of the active camera.
     """
-    shown = set[bpy.types.Material]().union(*(shown_materials(obj) for obj in scene.objects))
+    shown = {material for obj in scene.objects for material in shown_materials(obj)}
     cameras: dict[bpy.types.Object, bpy.types.PropertyGroup] = {}
     for record in scene.rosy.bakes:
         camera = scene.camera if record.view == FRAME_CAMERAS else record.camera
-        if camera is None or camera.type != "CAMERA":
-            continue
-        if camera not in cameras or record.material in shown:
+        is_camera = camera is not None and camera.type == "CAMERA"
+        if is_camera and (camera not in cameras or record.material in shown):
             cameras[camera] = record
     return cameras
 
 
 def remove_camera_planes(scene: bpy.types.Scene, tag: str) -> list[bpy.types.Image]:
-    """Remove the planes that have a tag from a scene, and their meshes and materials.
+    """Delete the planes of a scene that have the custom property `tag`, with their meshes and materials.
 
     Returns
     -------
     list of bpy.types.Image
-        The images of the deleted materials that nothing uses now.
+        Images of the deleted materials. Only images without any user are returned.
     """
     images = []
     for obj in [obj for obj in scene.objects if obj.get(tag)]:
-        mesh, materials = obj.data, list(obj.data.materials)
+        mesh, materials = obj.data, [material for material in obj.data.materials if material]
         delete_owned(obj)
         if not mesh.users:
             delete_owned(mesh)
         for material in materials:
-            if material is None or material.users:
-                continue
-            images += [node.image for node in material.node_tree.nodes if hasattr(node, "image")]
-            delete_owned(material)
+            if not material.users:
+                nodes = material.node_tree.nodes
+                images += [node.image for node in nodes if hasattr(node, "image")]
+                delete_owned(material)
     return [image for image in dict.fromkeys(images) if image is not None and not image.users]
 
 
@@ -123,10 +122,8 @@ def frame_corners(camera: Camera, distance: float, size: float = 1.0) -> np.ndar
         Camera space. The camera looks along its negative z axis.
     """
     depth = camera.projection @ (0.0, 0.0, -distance, 1.0)
-    clip = [
-        (size * x, size * y, depth[2] / depth[3], 1.0)
-        for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))
-    ]
+    signs = (-1, -1), (1, -1), (1, 1), (-1, 1)
+    clip = [(size * x, size * y, depth[2] / depth[3], 1.0) for x, y in signs]
     corners = np.array(clip) @ np.linalg.inv(camera.projection).T
     return corners[:, :3] / corners[:, 3:]
 

@@ -27,13 +27,10 @@ def scene_cameras(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     RosyError
         If the scene has no camera.
     """
-    cameras = sorted(
-        (obj for obj in scene.objects if obj.type == "CAMERA"),
-        key=lambda obj: (obj == scene.camera, obj.name),
-    )
+    cameras = [obj for obj in scene.objects if obj.type == "CAMERA"]
     if not cameras:
         raise RosyError(f"scene '{scene.name}' has no camera: add one")
-    return cameras
+    return sorted(cameras, key=lambda obj: (obj == scene.camera, obj.name))
 
 
 def render_camera(scene: bpy.types.Scene) -> bpy.types.Object:
@@ -70,17 +67,17 @@ def frame_camera(scene: bpy.types.Scene, frame: int) -> bpy.types.Object:
     return min(bound, key=lambda marker: marker.frame).camera
 
 
-def render_size(scene: bpy.types.Scene, percentage: float | None = None) -> tuple[int, int]:
+def render_size(scene: bpy.types.Scene, percentage: float = 100.0) -> tuple[int, int]:
     """Return the (width, height) in pixels at which Blender renders a scene.
 
     Parameters
     ----------
     scene : bpy.types.Scene
-    percentage : float, optional
-        The size is scaled by it, in percent, after the resolution percentage of the scene.
+    percentage : float
+        Percentage by which the size is scaled, after the resolution percentage of the scene.
     """
     render = scene.render
-    scale = render.resolution_percentage / 100 * (1 if percentage is None else percentage / 100)
+    scale = render.resolution_percentage / 100 * (percentage / 100)
     # Round down, as Blender does.
     width, height = int(render.resolution_x * scale), int(render.resolution_y * scale)
     return check_size(max(width, 1), max(height, 1))
@@ -90,8 +87,7 @@ def camera_of_object(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     camera_object: bpy.types.Object,
-    width: int | None = None,
-    height: int | None = None,
+    size: tuple[int, int] | None = None,
 ) -> Camera:
     """Return the view and projection of a camera object as a `Camera`.
 
@@ -102,8 +98,8 @@ def camera_of_object(
     depsgraph : bpy.types.Depsgraph
     camera_object : bpy.types.Object
         A perspective or orthographic camera.
-    width, height : int, optional
-        Pixels. By default `render_size`.
+    size : (int, int), optional
+        Width and height in pixels. By default `render_size`.
 
     Raises
     ------
@@ -115,21 +111,12 @@ def camera_of_object(
     check_object_type(camera_object, "CAMERA")
     kind = camera_object.data.type
     if kind not in ("PERSP", "ORTHO"):
-        description = {"PANO": "panoramic", "CUSTOM": "custom"}.get(kind, kind.lower())
-        raise RosyError(
-            f"camera '{name}' is {description}: choose a perspective or orthographic camera"
-        )
-    if width is None or height is None:
-        width, height = render_size(scene)
-    width, height = check_size(width, height)
+        kind = {"PANO": "panoramic"}.get(kind, kind.lower())
+        raise RosyError(f"camera '{name}' is {kind}: choose a perspective or orthographic camera")
+    width, height = render_size(scene) if size is None else check_size(*size)
     evaluated = camera_object.evaluated_get(depsgraph)
-    projection = evaluated.calc_matrix_camera(
-        depsgraph,
-        x=width,
-        y=height,
-        scale_x=scene.render.pixel_aspect_x,
-        scale_y=scene.render.pixel_aspect_y,
-    )
+    aspect = {"scale_x": scene.render.pixel_aspect_x, "scale_y": scene.render.pixel_aspect_y}
+    projection = evaluated.calc_matrix_camera(depsgraph, x=width, y=height, **aspect)
     view = evaluated.matrix_world.normalized().inverted_safe()
     return Camera(np.array(view), np.array(projection), width, height, name)
 
@@ -161,28 +148,10 @@ def resolve_camera(
         return source
     if size is None:
         size = render_size(scene, scene.rosy.percentage)
-    return camera_of_object(scene, depsgraph, source, *check_size(*size))
+    return camera_of_object(scene, depsgraph, source, size)
 
 
-def camera_of_view(
-    region: bpy.types.Region,
-    region_3d: bpy.types.RegionView3D,
-    width: int | None = None,
-    height: int | None = None,
-) -> Camera:
-    """Return the view and projection of a 3D view as a `Camera` named `VIEW_NAME`.
-
-    Parameters
-    ----------
-    region : bpy.types.Region
-    region_3d : bpy.types.RegionView3D
-    width, height : int, optional
-        Pixels. By default the size of the region.
-    """
-    return Camera(
-        np.array(region_3d.view_matrix),
-        np.array(region_3d.window_matrix),
-        region.width if width is None else width,
-        region.height if height is None else height,
-        VIEW_NAME,
-    )
+def camera_of_view(region: bpy.types.Region, region_3d: bpy.types.RegionView3D) -> Camera:
+    """Return the view and projection of a 3D view as a `Camera` named `VIEW_NAME`, of the region's size."""
+    view, projection = np.array(region_3d.view_matrix), np.array(region_3d.window_matrix)
+    return Camera(view, projection, region.width, region.height, VIEW_NAME)

@@ -1,7 +1,7 @@
 """Jobs that compute mesh attributes: tangents, the angles between two fields, ambient occlusion.
 
-Each job reads meshes, computes the values, and stores them. If an attribute cannot be stored, an error is
-raised before anything is computed or changed.
+The jobs read meshes, compute values, and store them; `assign_tangents` stores the tangents. If an attribute
+cannot be stored, an error is raised before anything is computed or changed.
 """
 
 from __future__ import annotations
@@ -15,16 +15,12 @@ import numpy as np
 
 from ..core.errors import RosyError
 from ..field.analysis import FieldComparison, compare_fields
+from ..field.surface import have_same_polygons
 from ..projection.ambient_occlusion import DIRECTION_COUNT, ambient_occlusion
 from ..projection.gbuffer import MeshInstance
 from ..surface_texture.line_order import corner_tangents
 from ..worker.job import Call, Steps, call_steps, job
-from .field_attributes import (
-    VECTOR_TYPE,
-    attribute_name,
-    check_attribute_type,
-    get_or_create_attribute,
-)
+from .field_attributes import VECTOR_TYPE, attribute_name, check_attribute_type, store_attribute
 from .guides import GUIDE_ATTRIBUTE
 from .look_inputs import ReadRequest
 from .mesh_fields import check_writable, read_mesh_field
@@ -49,8 +45,9 @@ def mesh_tangents(mesh: bpy.types.Mesh, guiding_angle: float, name: str = "") ->
     ----------
     mesh : bpy.types.Mesh
     guiding_angle : float
-        Decides which member of the field is stored: one near the direction at this angle from the horizontal,
-        in radians.
+        Which direction of the field is stored: one near this angle, in radians. On each face the angle is
+        measured from the direction in the face that is horizontal in object space, counter-clockwise as seen
+        from outside; see `line_order`.
     name : str
         Name of the attribute in which the tangents will be stored; see `assign_tangents`. It is only checked
         here, and nothing is stored.
@@ -89,8 +86,7 @@ def assign_tangents(tangents: Mapping[bpy.types.Mesh, np.ndarray], name: str = "
     for mesh in tangents:
         _check_tangents_storable(mesh, name)
     for mesh, vectors in tangents.items():
-        attribute = get_or_create_attribute(mesh, name or TANGENT_ATTRIBUTE, VECTOR_TYPE, "CORNER")
-        attribute.data.foreach_set("vector", vectors.ravel())
+        store_attribute(mesh, name or TANGENT_ATTRIBUTE, VECTOR_TYPE, vectors, "CORNER")
         mesh.update()
 
 
@@ -145,8 +141,8 @@ def store_difference(
     check_writable(mesh)
     label = mesh_label(mesh)
     names = other_field_names(mesh)
-    if not other and len(names) == 1:
-        (other,) = names
+    if len(names) == 1:
+        other = other or names[0]
     if not other or other == attribute_name(mesh):
         choice = " or ".join(f"'{known}'" for known in names)
         hint = f"choose {choice}" if choice else "make one with another name of the attribute"
@@ -156,8 +152,7 @@ def store_difference(
     field = read_mesh_field(mesh, surface=surface)
     other_field = read_mesh_field(mesh, other, field.degree, surface)
     comparison = yield Call(compare_fields, (surface, field, other_field))
-    attribute = get_or_create_attribute(mesh, name, "FLOAT")
-    attribute.data.foreach_set("value", np.degrees(comparison.angles).astype(np.float32))
+    store_attribute(mesh, name, "FLOAT", np.degrees(comparison.difference.angle))
     mesh.update()
     return other, field.degree, comparison
 
@@ -204,8 +199,7 @@ def store_occlusion(
         inputs = *_with_original_faces(scene_data, obj), direction_count
         values_by_mesh[obj.data] = yield Call(ambient_occlusion, inputs, start, stop)
     for mesh, values in values_by_mesh.items():
-        attribute = get_or_create_attribute(mesh, name, "FLOAT", "CORNER")
-        attribute.data.foreach_set("value", values)
+        store_attribute(mesh, name, "FLOAT", values, "CORNER")
         mesh.update()
 
 
@@ -216,11 +210,8 @@ def _with_original_faces(
 
     If the modifiers of the object change the faces, its instance has the surface of the original mesh.
     """
-    instance_index = scene_data.objects.index(obj)
-    instances = list(scene_data.instances)
-    evaluated = instances[instance_index].surface
+    index, instances = scene_data.objects.index(obj), list(scene_data.instances)
     original = mesh_surface(obj.data, f"object '{obj.name}'")
-    same_faces = np.array_equal(original.face_start, evaluated.face_start)
-    if not (same_faces and np.array_equal(original.corner_vertex, evaluated.corner_vertex)):
-        instances[instance_index] = replace(instances[instance_index], surface=original)
-    return instances, instance_index
+    if not have_same_polygons(original, instances[index].surface):
+        instances[index] = replace(instances[index], surface=original)
+    return instances, index

@@ -25,10 +25,14 @@ STROKES_TAG = "rosy_surface_strokes"
 KEY_TAG = "rosy_key"
 
 
-def is_rosy_modifier(modifier: bpy.types.Modifier) -> bool:
-    """Return whether RoSy added a modifier that shows a picture."""
-    group = getattr(modifier, "node_group", None) if modifier.type == "NODES" else None
+def _is_rosy_modifier(modifier: bpy.types.Modifier) -> bool:
+    group = modifier.node_group if modifier.type == "NODES" else None
     return group is not None and bool(group.get(OWNED_TAG)) and not group.get(STROKES_TAG)
+
+
+def rosy_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
+    """Return the modifiers of an object that RoSy added to show pictures."""
+    return [modifier for modifier in obj.modifiers if _is_rosy_modifier(modifier)]
 
 
 def removable_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
@@ -36,16 +40,13 @@ def removable_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     if obj.library is not None:
         return []
     is_override = obj.override_library is not None
-    return [
-        modifier
-        for modifier in obj.modifiers
-        if is_rosy_modifier(modifier) and not (is_override and modifier.is_override_data)
-    ]
+    modifiers = rosy_modifiers(obj)
+    return [modifier for modifier in modifiers if not (is_override and modifier.is_override_data)]
 
 
 def user_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     """Return the modifiers of an object that RoSy did not add."""
-    return [modifier for modifier in obj.modifiers if not is_rosy_modifier(modifier)]
+    return [modifier for modifier in obj.modifiers if not _is_rosy_modifier(modifier)]
 
 
 @contextmanager
@@ -81,11 +82,8 @@ def delete_unused() -> int:
     """
     # The order matters: a geometry node group uses a material, which uses an image and a shader node group.
     for name in ("node_groups", "materials", "node_groups", "images"):
-        unused = [
-            block
-            for block in getattr(bpy.data, name)
-            if block.get(OWNED_TAG) and not block.users and block.library is None
-        ]
+        owned = [block for block in getattr(bpy.data, name) if block.get(OWNED_TAG)]
+        unused = [block for block in owned if not block.users and block.library is None]
         bpy.data.batch_remove(unused)
     return len(unused)
 
@@ -108,18 +106,16 @@ def check_not_missing(obj: bpy.types.Object) -> None:
     """Raise an error if an object or its data is a placeholder for data missing in a library."""
     for datablock in (obj, obj.data):
         if datablock is not None and datablock.is_missing:
-            path = datablock.library.filepath
+            path, problem = datablock.library.filepath, f"does not contain '{datablock.name}'"
             if datablock.library.is_missing:
-                raise RosyError(f"object '{obj.name}': its library {path} is missing: relink it")
-            raise RosyError(
-                f"object '{obj.name}': its library {path} does not contain '{datablock.name}': relink it"
-            )
+                problem = "is missing"
+            raise RosyError(f"object '{obj.name}': its library {path} {problem}: relink it")
 
 
 def remedy_for_absence(otherwise: str) -> str:
-    """Return advice for a message that something is absent.
+    """Return advice for a message that an object is absent: to relink missing libraries, if there are any.
 
-    If libraries are missing, it is to relink them. If not, it is `otherwise`.
+    If no library is missing, return the advice `otherwise`.
     """
     paths = [library.filepath for library in bpy.data.libraries if library.is_missing]
     return f"relink the missing library {', '.join(paths)}" if paths else otherwise

@@ -16,21 +16,17 @@ from ..field.blocks import as_float64
 from ..field.frames import dot, normalize, transport
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
-from ..field.validate import (
-    apply_nonfinite_policy,
-    project_to_tangent,
-    tangent_normals,
-)
+from ..field.validate import apply_nonfinite_policy, project_to_tangent, tangent_normals
 from .datablocks import is_editable, user_modifiers
 from .field_attributes import (
     VECTOR_TYPE,
     attribute_name,
-    cached_field,
+    cached_for_surface,
     field_degree,
     field_values,
     follow_mesh,
     is_face_vector_field,
-    read_rest_shape,
+    store_attribute,
 )
 from .mesh_fields import read_mesh_field
 from .meshes import mesh_surface, no_faces_error, polygon_arrays, read_attribute
@@ -54,13 +50,14 @@ class FieldLayout:
     Attributes
     ----------
     name : str
-        Name of the attribute with one member vector per face. If there are deviations, the attribute
-        ``name_k`` has the k-th of the direction ratios per face.
+        Name of the attribute with one member vector per face.
     degree : int
+        Degree N of the field.
     has_deviations : bool
-        Whether the field has `RosyField.direction_ratios`: its directions deviate from equal angles.
+        Whether the directions deviate from equal angles. The attributes ``name_0`` ... ``name_{N-1}`` then
+        have the real and imaginary parts of the N ratios of each face; see `RosyField.direction_ratios`.
     family_count : int
-        `RosyField.family_count`.
+        Number of families of directions; see `RosyField.family_count`.
     """
 
     name: str
@@ -70,7 +67,7 @@ class FieldLayout:
 
     @property
     def attribute_names(self) -> list[str]:
-        """Names of all attributes: first that of the member vectors, then those of the direction ratios."""
+        """Names of all attributes: first the one of member vectors, then one for each direction ratio."""
         indices = range(self.degree if self.has_deviations else 0)
         return [self.name, *(f"{self.name}_{index}" for index in indices)]
 
@@ -80,24 +77,6 @@ class FieldLayout:
         Modifiers may have dropped some.
         """
         return all(name in mesh.attributes for name in self.attribute_names)
-
-
-def _add_temp_field(mesh: bpy.types.Mesh, field: RosyField, layout: FieldLayout) -> None:
-    """Store a field in temporary attributes on the faces of a mesh."""
-    _add_temp_vectors(mesh, layout.name, field.vectors)
-    for index, deviation_name in enumerate(layout.attribute_names[1:]):
-        deviation = field.direction_ratios[:, index]
-        attribute = mesh.attributes.new(deviation_name, "FLOAT2", "FACE")
-        pairs = np.stack([deviation.real, deviation.imag], axis=1).astype(np.float32)
-        attribute.data.foreach_set("vector", pairs.ravel())
-    mesh.update_tag()
-
-
-def _add_temp_vectors(mesh: bpy.types.Mesh, name: str, vectors: np.ndarray) -> None:
-    """Store vectors, (F, 3), in a temporary attribute on the faces of a mesh."""
-    attribute = mesh.attributes.new(name, VECTOR_TYPE, "FACE")
-    attribute.data.foreach_set("vector", vectors.astype(np.float32).ravel())
-    mesh.update_tag()
 
 
 def read_evaluated_field(
@@ -137,21 +116,20 @@ def read_evaluated_field(
     """
     source = f"{label}, attribute '{layout.name}'"
     stored_values = field_values(mesh.attributes[layout.name], source, mesh)
-    values = follow_mesh(read_rest_shape(mesh, layout.name), stored_values, surface)
+    values = follow_mesh(mesh, layout.name, stored_values, surface)
     original_normals = read_attribute(mesh, FACE_NORMAL_ATTRIBUTE, np.float32, 3)
-    deviation_pairs = [
-        read_attribute(mesh, name, np.float32, 2) for name in layout.attribute_names[1:]
-    ]
+    names = layout.attribute_names[1:]
+    ratio_parts = [read_attribute(mesh, name, np.float32, 2) for name in names]
 
     def build() -> RosyField:
         vectors = _transport(values, original_normals, surface, source, nonfinite)
-        deviations = [pair.astype(np.float64) @ (1, 1j) for pair in deviation_pairs]
-        ratios = np.stack(deviations, axis=1) if deviations else None
+        columns = [parts.astype(np.float64) @ (1, 1j) for parts in ratio_parts]
+        ratios = np.stack(columns, axis=1) if columns else None
         return RosyField(layout.degree, vectors, ratios, layout.family_count)
 
-    key_parts = values, original_normals, *deviation_pairs, layout, source, nonfinite
+    key_parts = values, original_normals, *ratio_parts, layout, source, nonfinite
     if cache is None or surface.rest_vertices is None:
-        return cached_field(cache, surface, build, "evaluated", *key_parts)
+        return cached_for_surface(cache, surface, build, "evaluated", *key_parts)
     # The field depends only on the rest shape, so the key leaves out the deformed shape of each frame.
     shape = surface.rest_vertices, surface.corner_vertex, surface.face_start
     return cache.get_or_create(("evaluated field", content_hash(*shape, *key_parts)), build)
@@ -159,7 +137,7 @@ def read_evaluated_field(
 
 def _transport(
     values: np.ndarray,
-    original_normals: np.ndarray | None,
+    source_normals: np.ndarray | None,
     surface: Surface,
     source: str,
     nonfinite: str,
@@ -171,14 +149,14 @@ def _transport(
     report(0.0, label)
     normals = tangent_normals(surface, "face")
     report(0.3, label)
-    if original_normals is not None:
-        original_normals = normalize(original_normals.astype(np.float64))
+    if source_normals is not None:
+        source_normals = normalize(source_normals.astype(np.float64))
         # Mirroring reverses the normal of a face. Only the plane matters, so the sign is made equal.
-        original_normals *= np.where(dot(original_normals, normals) < 0, -1.0, 1.0)[:, None]
+        source_normals *= np.where(dot(source_normals, normals) < 0, -1.0, 1.0)[:, None]
         report(0.4, label)
-        vectors = project_to_tangent(vectors, original_normals, 180.0, source, "face")
+        vectors = project_to_tangent(vectors, source_normals, 180.0, source, "face")
         report(0.6, label)
-        vectors = transport(vectors, original_normals, normals)
+        vectors = transport(vectors, source_normals, normals)
         report(0.7, label)
     return project_to_tangent(vectors, normals, 180.0, source, "face")
 
@@ -193,12 +171,12 @@ def temp_attributes(
 ) -> Iterator[dict[bpy.types.Object, FieldLayout]]:
     """Context manager: add temporary attributes, which modifiers copy to evaluated meshes.
 
-    They are removed at the end of the block. The attributes are the rest positions, the normals of the
-    original faces, and the fields as vectors on faces if they are stored in another form. All fields are
+    They are removed at the end of the block. The attributes are the rest positions and the normals of the
+    original faces. A field that is not stored as vectors on faces is added in this form. All fields are
     checked on the original meshes.
 
-    Inside another such context with the same objects, nothing is added again. Around many calls of
-    `read_scene`, keep one context open.
+    Inside another such context with the same objects, nothing is added again. A caller that calls
+    `read_scene` many times is faster if it opens one context around all calls.
 
     Parameters
     ----------
@@ -228,7 +206,8 @@ def temp_attributes(
             if deforms and FACE_NORMAL_ATTRIBUTE not in mesh.attributes and _can_modify(mesh):
                 temp_meshes.append(mesh)
                 surface = mesh_surface(mesh, f"object '{obj.name}'", cache=cache)
-                _add_temp_vectors(mesh, FACE_NORMAL_ATTRIBUTE, surface.face_normal)
+                store_attribute(mesh, FACE_NORMAL_ATTRIBUTE, VECTOR_TYPE, surface.face_normal)
+                mesh.update_tag()
         if rest_enabled or temp_meshes:
             depsgraph.update()
         yield layouts
@@ -236,13 +215,9 @@ def temp_attributes(
         for obj in rest_enabled:
             obj.add_rest_position_attribute = False
         for mesh in set(temp_meshes):
-            temp_names = [
-                a.name
-                for a in mesh.attributes
-                if a.name.startswith((FACE_NORMAL_ATTRIBUTE, TEMP_FIELD_ATTRIBUTE))
-            ]
-            for name in temp_names:
-                mesh.attributes.remove(mesh.attributes[name])
+            for name in list(mesh.attributes.keys()):
+                if name.startswith((FACE_NORMAL_ATTRIBUTE, TEMP_FIELD_ATTRIBUTE)):
+                    mesh.attributes.remove(mesh.attributes[name])
             mesh.update_tag()
         if rest_enabled or temp_meshes:
             depsgraph.update()
@@ -253,14 +228,11 @@ def _prepare_field(
 ) -> FieldLayout:
     """Return the layout of the field of an object as vectors on faces; add temporary attributes if needed."""
     mesh, label = obj.data, f"object '{obj.name}'"
-    name = attribute_name(mesh)
-    if mesh.is_editmode and is_face_vector_field(mesh):
-        return FieldLayout(
-            name, field_degree(mesh)
-        )  # in this case, only the evaluated mesh can be read
+    if mesh.is_editmode and is_face_vector_field(mesh):  # only the evaluated mesh can be read
+        return FieldLayout(attribute_name(mesh), field_degree(mesh))
     field = read_mesh_field(mesh, nonfinite=nonfinite, label=label, cache=cache)
     if is_face_vector_field(mesh):
-        return FieldLayout(name, field.degree)
+        return FieldLayout(attribute_name(mesh), field.degree)
     if not _can_modify(mesh):
         raise RosyError(
             f"{label}: its mesh is {'in edit mode' if mesh.is_editmode else 'linked'}, and only fields "
@@ -270,7 +242,11 @@ def _prepare_field(
     layout = FieldLayout(TEMP_FIELD_ATTRIBUTE, field.degree, has_deviations, field.family_count)
     if TEMP_FIELD_ATTRIBUTE not in mesh.attributes:
         temp_meshes.append(mesh)
-        _add_temp_field(mesh, field, layout)
+        store_attribute(mesh, TEMP_FIELD_ATTRIBUTE, VECTOR_TYPE, field.vectors)
+        for index, name in enumerate(layout.attribute_names[1:]):
+            ratios = field.direction_ratios[:, index]
+            store_attribute(mesh, name, "FLOAT2", np.stack([ratios.real, ratios.imag], axis=1))
+        mesh.update_tag()
     return layout
 
 
@@ -292,8 +268,11 @@ def lost_field_error(obj: bpy.types.Object, attribute: str | None) -> RosyError:
 
 
 def topology_hash(mesh: bpy.types.Mesh, original: bpy.types.Mesh) -> bytes:
-    """Return a hash of the faces and the field attribute of an evaluated mesh, without positions."""
-    values = None
-    if is_face_vector_field(mesh, attribute_name(original)):
-        values = read_attribute(mesh, attribute_name(original), np.float32, 3)
+    """Return a hash of the faces and the field attribute of an evaluated mesh, without positions.
+
+    The name of the field attribute is a setting of the original mesh, `original`.
+    """
+    name, values = attribute_name(original), None
+    if is_face_vector_field(mesh, name):
+        values = read_attribute(mesh, name, np.float32, 3)
     return content_hash(*polygon_arrays(mesh), values)

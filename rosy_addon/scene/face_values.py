@@ -10,7 +10,7 @@ from ..core.errors import RosyError
 from ..field.polygon_arrays import mean_per_face
 from ..field.validate import apply_nonfinite_policy
 from .field_attributes import describe_type, field_values
-from .meshes import mesh_label, mesh_surface, polygon_arrays
+from .meshes import mesh_label, polygon_arrays, read_collection
 
 #: Blender's types of scalar attributes, with the dtypes of their values; and its types of color attributes.
 NUMBER_TYPES = {"FLOAT": np.float32, "INT": np.int32, "INT8": np.int32, "BOOLEAN": bool}
@@ -37,12 +37,7 @@ def read_face_vectors(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
     if values.ndim == 1:
         raise RosyError(f"{source}: expected a vector, found {describe_type(attribute)}")
     apply_nonfinite_policy(values, source, attribute.domain.lower(), "error")
-    if attribute.domain == "FACE":
-        return values
-    surface = mesh_surface(mesh)
-    if attribute.domain == "POINT":
-        values = values[surface.corner_vertex]
-    return mean_per_face(values, surface.face_start)
+    return _face_means(values, attribute.domain, mesh)
 
 
 def read_face_scalars(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
@@ -61,23 +56,15 @@ def read_face_scalars(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
         If there is neither an attribute nor a vertex group of this name, the type or domain of the
         attribute is not supported, or a value is not finite.
     """
-    surface = mesh_surface(mesh)
     source = f"{mesh_label(mesh)}, '{name}'"
     attribute = mesh.attributes.get(name)
     if attribute is not None:
         domain, values = attribute.domain, scalar_values(attribute, source)
     else:
-        obj = next(
-            (
-                other
-                for other in bpy.data.objects
-                if other.data == mesh and name in other.vertex_groups
-            ),
-            None,
-        )
-        if obj is None:
+        users = [obj for obj in bpy.data.objects if obj.data == mesh and name in obj.vertex_groups]
+        if not users:
             raise RosyError(f"{source}: no attribute or vertex group has this name")
-        group = obj.vertex_groups[name].index
+        group = users[0].vertex_groups[name].index
         domain, values = "POINT", np.zeros(len(mesh.vertices))
         for vertex in mesh.vertices:
             for membership in vertex.groups:
@@ -85,11 +72,15 @@ def read_face_scalars(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
                     values[vertex.index] = membership.weight
     if not np.isfinite(values).all():
         raise RosyError(f"{source}: has values that are not finite")
+    return _face_means(values, domain, mesh)
+
+
+def _face_means(values: np.ndarray, domain: str, mesh: bpy.types.Mesh) -> np.ndarray:
+    """Return values of faces, (F, ...), as they are; average values of points or corners over each face."""
     if domain == "FACE":
         return values
-    if domain == "POINT":
-        values = values[surface.corner_vertex]
-    return mean_per_face(values, surface.face_start)
+    corner_vertex, face_start = polygon_arrays(mesh)
+    return mean_per_face(values[corner_vertex] if domain == "POINT" else values, face_start)
 
 
 def filled_attribute(mesh: bpy.types.Mesh, name: str) -> bpy.types.Attribute | None:
@@ -140,17 +131,12 @@ def scalar_values(attribute: bpy.types.Attribute, source: str) -> np.ndarray:
     RosyError
         If the attribute is not on faces, points or corners, or has neither numbers nor colors.
     """
-    count, data_type = len(attribute.data), attribute.data_type
+    data_type, found = attribute.data_type, describe_type(attribute)
     if attribute.domain not in ("FACE", "POINT", "CORNER"):
-        raise RosyError(
-            f"{source}: expected values on FACE, POINT or CORNER, found {describe_type(attribute)}"
-        )
+        raise RosyError(f"{source}: expected values on FACE, POINT or CORNER, found {found}")
     if data_type in COLOR_TYPES:
-        values = np.empty(4 * count, dtype=np.float32)
-        attribute.data.foreach_get("color", values)
-        return values.reshape(-1, 4)[:, :3] @ REC709_LUMINANCE
+        colors = read_collection(attribute.data, "color", np.float32, 4)
+        return colors[:, :3] @ REC709_LUMINANCE
     if data_type not in NUMBER_TYPES:
-        raise RosyError(f"{source}: expected a number or a color, found {describe_type(attribute)}")
-    values = np.empty(count, dtype=NUMBER_TYPES[data_type])
-    attribute.data.foreach_get("value", values)
-    return values.astype(np.float64)
+        raise RosyError(f"{source}: expected a number or a color, found {found}")
+    return read_collection(attribute.data, "value", NUMBER_TYPES[data_type]).astype(np.float64)

@@ -20,7 +20,8 @@ rotated with their faces.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
+from typing import TypeVar
 
 import bpy
 import numpy as np
@@ -28,10 +29,11 @@ import numpy as np
 from ..core.cache import Cache, content_hash
 from ..core.errors import RosyError
 from ..field.carry import carried_vectors
-from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from .datablocks import has_rosy_properties
-from .meshes import read_attribute
+from .meshes import read_attribute, read_collection, write_attribute
+
+Result = TypeVar("Result")
 
 DEFAULT_FIELD_NAME = "rosy"
 DEFAULT_DEGREE = 4
@@ -64,11 +66,13 @@ def has_field(obj: bpy.types.Object) -> bool:
 
 def is_face_vector_field(mesh: bpy.types.Mesh, name: str | None = None) -> bool:
     """Return whether the field is stored in the standard form: vectors on faces."""
-    attribute = mesh.attributes.get(name or attribute_name(mesh))
-    return attribute is not None and (attribute.domain, attribute.data_type) == (
-        "FACE",
-        VECTOR_TYPE,
-    )
+    return _has_attribute(mesh, name or attribute_name(mesh), "FACE", VECTOR_TYPE)
+
+
+def _has_attribute(mesh: bpy.types.Mesh, name: str, domain: str, data_type: str) -> bool:
+    """Return whether a mesh has an attribute with this name, domain and type."""
+    attribute = mesh.attributes.get(name)
+    return attribute is not None and (attribute.domain, attribute.data_type) == (domain, data_type)
 
 
 def field_values(attribute: bpy.types.Attribute, source: str, mesh: bpy.types.Mesh) -> np.ndarray:
@@ -80,20 +84,18 @@ def field_values(attribute: bpy.types.Attribute, source: str, mesh: bpy.types.Me
         If the type or domain of the attribute is not supported, or the mesh is in edit mode and
         the attribute cannot be read.
     """
-    attribute_type = (attribute.domain, attribute.data_type)
-    vectors = [(domain, VECTOR_TYPE) for domain in ("FACE", "POINT", "CORNER")]
-    if attribute_type not in [*vectors, ("FACE", ANGLE_TYPE)]:
+    elements = {"FACE": mesh.polygons, "POINT": mesh.vertices, "CORNER": mesh.loops}
+    is_vector = attribute.data_type == VECTOR_TYPE and attribute.domain in elements
+    if not is_vector and (attribute.domain, attribute.data_type) != ("FACE", ANGLE_TYPE):
         raise RosyError(
             f"{source}: expected FLOAT_VECTOR on FACE, POINT or CORNER, or angles as FLOAT on FACE, "
             f"found {describe_type(attribute)}"
         )
-    columns = 3 if attribute.data_type == VECTOR_TYPE else 1
-    elements = {"FACE": mesh.polygons, "POINT": mesh.vertices, "CORNER": mesh.loops}
     if len(attribute.data) != len(elements[attribute.domain]):
         raise RosyError(f"{source}: cannot be read in edit mode: leave edit mode (Tab) first")
-    values = np.empty(len(attribute.data) * columns, dtype=np.float32)
-    attribute.data.foreach_get("vector" if columns == 3 else "value", values)
-    return values.reshape(-1, 3) if columns == 3 else values
+    if is_vector:
+        return read_collection(attribute.data, "vector", np.float32, 3)
+    return read_collection(attribute.data, "value", np.float32)
 
 
 def describe_type(attribute: bpy.types.Attribute) -> str:
@@ -148,23 +150,27 @@ def get_or_create_attribute(
     return attribute
 
 
-def cached_field(
-    cache: Cache | None, surface: Surface, build_field: Callable[[], RosyField], *key_parts: object
-) -> RosyField:
-    """Return the field that is cached for a surface and the other parts of a key, or build and cache it."""
-    if cache is None:
-        return build_field()
-    key = surface_key(surface, *key_parts)
-    return cache.get_or_create(key, lambda: (surface, build_field()))[1]
+def store_attribute(
+    mesh: bpy.types.Mesh, name: str, data_type: str, values: np.ndarray, domain: str = "FACE"
+) -> bpy.types.Attribute:
+    """Write the values of the attribute that `get_or_create_attribute` returns, and return it."""
+    attribute = get_or_create_attribute(mesh, name, data_type, domain)
+    write_attribute(attribute, values)
+    return attribute
 
 
-def surface_key(surface: Surface, *key_parts: object) -> Hashable:
-    """Return the cache key of a result that depends on a surface and on other values.
+def cached_for_surface(
+    cache: Cache | None, surface: Surface, build: Callable[[], Result], *key_parts: object
+) -> Result:
+    """Return a result that is cached for a surface and other values, or build and cache it.
 
-    The key contains the id of the surface. So the cached result must keep a reference to the surface: no
-    other object can then have the same id.
+    The key contains the id of the surface. So the cache also keeps the surface: no other object can then have
+    the same id.
     """
-    return "field", id(surface), content_hash(*key_parts)
+    if cache is None:
+        return build()
+    key = "field", id(surface), content_hash(*key_parts)
+    return cache.get_or_create(key, lambda: (surface, build()))[1]
 
 
 #: Coefficients of the checksum of a vector, which is a linear combination of its components. As it is linear,
@@ -174,10 +180,6 @@ CHECK_COEFFICIENTS = np.array([1.0, 1.618034, 2.718282])
 #: Largest difference between the checksum of an unchanged vector and the stored one, relative to the largest
 #: component of the vector.
 CHECK_TOLERANCE = 1e-4
-
-#: Positions of the vertices, (V, 3), and checksums of the vectors of the faces, (F,), when a field was
-#: stored.
-RestShape = tuple[np.ndarray, np.ndarray]
 
 
 def _attribute_names(name: str) -> tuple[str, str]:
@@ -200,51 +202,42 @@ def store_rest_shape(mesh: bpy.types.Mesh, name: str) -> None:
     except RosyError:
         return
     # Values are written after both attributes exist, as a new attribute may move the others in memory.
-    mesh.attributes[rest_name].data.foreach_set("vector", positions.ravel())
-    mesh.attributes[check_name].data.foreach_set("value", vector_checks(vectors).astype(np.float32))
+    write_attribute(mesh.attributes[rest_name], positions)
+    write_attribute(mesh.attributes[check_name], vector_checks(vectors))
 
 
-def read_rest_shape(mesh: bpy.types.Mesh, name: str) -> RestShape | None:
-    """Return the positions (V, 3) and checksums (F,) stored for an attribute; None if they are missing.
+def follow_mesh(
+    mesh: bpy.types.Mesh, name: str, vectors: np.ndarray, surface: Surface
+) -> np.ndarray:
+    """Rotate vectors with their faces, from the shape in which they were stored to the present one.
 
     Parameters
     ----------
     mesh : bpy.types.Mesh
         An original or evaluated mesh.
     name : str
-        Name of the attribute that was stored with `store_rest_shape`.
-    """
-    if not _has_rest_shape(mesh, name):
-        return None
-    rest_name, check_name = _attribute_names(name)
-    positions = read_attribute(mesh, rest_name, np.float32, 3)
-    checks = read_attribute(mesh, check_name, np.float32, 1)
-    return None if positions is None or checks is None else (positions, checks)
-
-
-def follow_mesh(rest_shape: RestShape | None, vectors: np.ndarray, surface: Surface) -> np.ndarray:
-    """Rotate vectors with their faces, from the shape in which they were stored to the present one.
-
-    Parameters
-    ----------
-    rest_shape : (ndarray, ndarray) or None
-        Result of `read_rest_shape`.
+        Name of the attribute. The shape in which it was stored is known if `store_rest_shape` was called.
     vectors : (F, 3) or (F, N, 3) ndarray
         Values of the attribute. If it is ``dir0``, the values of ``dir0`` ... ``dir{N-1}``.
     surface : Surface
-        The surface of the mesh. If it has a rest shape, the vectors are rotated to this.
+        The surface of the mesh. If it has `rest_vertices`, these are the present shape.
 
     Returns
     -------
     ndarray
-        `vectors` itself if no vertex has moved. A vector that does not fit its checksum, because it was
-        changed since, for example by a script, is not rotated. `carried_vectors` lists further exceptions.
+        The rotated vectors; see `carried_vectors`. A vector is not rotated if its checksum shows that it was
+        changed after it was stored, for example by a script. If no vertex has moved, or if the stored shape
+        is not known, `vectors` itself is returned.
     """
-    if rest_shape is None:
+    rest_name, check_name = _attribute_names(name)
+    # Users can convert attributes to other types.
+    has_positions = _has_attribute(mesh, rest_name, "POINT", VECTOR_TYPE)
+    if not (has_positions and _has_attribute(mesh, check_name, "FACE", ANGLE_TYPE)):
         return vectors
-    stored_positions, checks = rest_shape
+    stored_positions = read_attribute(mesh, rest_name, np.float32, 3)
+    checks = read_attribute(mesh, check_name, np.float32, 1)
     positions = surface.vertices if surface.rest_vertices is None else surface.rest_vertices
-    if len(stored_positions) != len(positions):
+    if stored_positions is None or checks is None or len(stored_positions) != len(positions):
         return vectors
     if np.array_equal(stored_positions, positions):
         return vectors
@@ -255,16 +248,6 @@ def follow_mesh(rest_shape: RestShape | None, vectors: np.ndarray, surface: Surf
     carried = carried_vectors(surface.in_rest_shape(), stored_positions, vectors)
     is_stored = is_stored.reshape(-1, *(1 for _ in vectors.shape[1:]))
     return np.where(is_stored, carried, vectors)
-
-
-def _has_rest_shape(mesh: bpy.types.Mesh, name: str) -> bool:
-    """Return whether both hidden attributes exist with their types. Users can convert them to other types."""
-    types = ("POINT", VECTOR_TYPE), ("FACE", ANGLE_TYPE)
-    attributes = (mesh.attributes.get(hidden) for hidden in _attribute_names(name))
-    return all(
-        attribute is not None and (attribute.domain, attribute.data_type) == expected
-        for attribute, expected in zip(attributes, types, strict=True)
-    )
 
 
 def vector_checks(vectors: np.ndarray) -> np.ndarray:

@@ -66,8 +66,8 @@ PLAIN_KINDS = ("camera", "scene")
 def picture_stem(name: str, kind: str = "camera") -> str:
     """Return the stem of the names of picture files, such as ``RoSy_Camera`` or ``RoSy_Cube_texture``.
 
-    `name` is that of a camera, of a scene or (for a texture) of an object. For a texture, `kind` is its kind,
-    which ends the stem.
+    `name` is the name of a camera (`kind` "camera"), of a scene (`kind` "scene") or of an object with a
+    texture. For a texture, `kind` says what it shows, such as "texture" or "flow", and ends the stem.
 
     Characters that file systems do not allow become underscores, and long names are cut. Two names may then
     have the same stem, perhaps except for case, which some file systems ignore. In that case the first of
@@ -79,22 +79,18 @@ def picture_stem(name: str, kind: str = "camera") -> str:
     if kind not in PLAIN_KINDS:
         siblings |= {(kind, obj.name) for obj in bpy.data.objects if obj.type == "MESH"}
     siblings.add((kind, name))
-    stem = _clean_stem(*_label(kind, name))
-    rivals = [key for key in siblings if _file_key(_clean_stem(*_label(*key))) == _file_key(stem)]
-    first = min(rivals, key=lambda key: (_clean_stem(*_label(*key)) != f"RoSy_{key[1]}", key))
+    stem = _clean_stem(kind, name)
+    rivals = [key for key in siblings if _file_key(_clean_stem(*key)) == _file_key(stem)]
+    first = min(rivals, key=lambda key: (_clean_stem(*key) != f"RoSy_{key[1]}", key))
     if (kind, name) == first:
         return stem
     return f"{stem}-{zlib.crc32(f'{kind} {name}'.encode()):08x}"
 
 
-def _label(kind: str, name: str) -> tuple[str, str]:
-    """Return both parts of a stem: a name, and the ending that tells the kind of texture."""
-    return name, "" if kind in PLAIN_KINDS else f" {kind}"
-
-
-def _clean_stem(name: str, ending: str) -> str:
+def _clean_stem(kind: str, name: str) -> str:
     """Return a stem with underscores for characters that are not allowed. Its name is cut if it is long."""
     stem = bpy.path.clean_name(f"RoSy {name}").encode()[:MAX_STEM_BYTES]
+    ending = "" if kind in PLAIN_KINDS else f" {kind}"
     return stem.decode(errors="ignore") + bpy.path.clean_name(ending)
 
 
@@ -141,6 +137,5 @@ def output_folder(scene: bpy.types.Scene) -> Path:
 def is_beside_blend(folder: Path) -> bool:
     """Return whether a folder is the folder of the .blend file, or inside it. Symbolic links are resolved."""
     blend = bpy.data.filepath
-    return bool(blend) and Path(os.path.realpath(folder)).is_relative_to(
-        os.path.realpath(Path(blend).parent)
-    )
+    blend_folder = os.path.realpath(Path(blend).parent)
+    return bool(blend) and Path(os.path.realpath(folder)).is_relative_to(blend_folder)

@@ -26,9 +26,8 @@ from .field_attributes import (
     attribute_name,
     check_attribute_type,
     follow_mesh,
-    get_or_create_attribute,
     is_face_vector_field,
-    read_rest_shape,
+    store_attribute,
     store_rest_shape,
     vector_checks,
 )
@@ -46,7 +45,7 @@ EmptyGuide = tuple[np.ndarray, np.ndarray, float]
 
 
 def guide_objects(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
-    """Return those of the objects that can guide a field, by their types."""
+    """Return the objects that can guide a field: Grease Pencil, curves, hair curves and empties."""
     return [obj for obj in objects if obj.type in GUIDE_TYPES]
 
 
@@ -123,16 +122,11 @@ def annotation_strokes(scene: bpy.types.Scene, owner: bpy.types.Object) -> list[
     matrix = _world_to_object(owner)
     # The property was renamed in Blender 5.0.
     annotation = scene.annotation if hasattr(scene, "annotation") else scene.grease_pencil
-    frames = [
-        _annotation_frame(layer, scene.frame_current)
-        for layer in (annotation.layers if annotation else ())
-        if not layer.annotation_hide and not layer.is_ruler
-    ]
     strokes = [
         _read_coordinates(stroke.points, "co", 3)
-        for frame in frames
-        if frame is not None
-        for stroke in frame.strokes
+        for layer in (annotation.layers if annotation else ())
+        if not layer.annotation_hide and not layer.is_ruler
+        for stroke in _annotation_strokes(layer, scene.frame_current)
         # Some versions (4.3) do not tell whether a stroke is placed in the scene or on the view.
         if len(stroke.points) > 1 and getattr(stroke, "display_mode", "3DSPACE") == "3DSPACE"
     ]
@@ -145,13 +139,13 @@ def annotation_strokes(scene: bpy.types.Scene, owner: bpy.types.Object) -> list[
     return [stroke @ matrix[:3, :3].T + matrix[:3, 3] for stroke in strokes]
 
 
-def _annotation_frame(layer: Any, number: int) -> Any | None:
-    """Return the frame of an annotation layer that is visible at a frame number.
+def _annotation_strokes(layer: Any, number: int) -> Any:
+    """Return the strokes of an annotation layer that are visible at a frame number.
 
     The layer's own ``active_frame`` is only valid after the layer was drawn.
     """
     frames = [frame for frame in layer.frames if frame.frame_number <= number]
-    return max(frames, key=lambda frame: frame.frame_number, default=None)
+    return max(frames, key=lambda frame: frame.frame_number).strokes if frames else ()
 
 
 def _world_to_object(obj: bpy.types.Object) -> np.ndarray:
@@ -165,7 +159,8 @@ def _world_to_object(obj: bpy.types.Object) -> np.ndarray:
 def guide_vectors(mesh: bpy.types.Mesh, name: str, surface: Surface) -> np.ndarray:
     """Read a vector attribute as one guide per face; see `read_face_vectors`.
 
-    If RoSy has stored the attribute, its vectors have followed later changes of the mesh; see `follow_mesh`.
+    If RoSy has stored the attribute and the mesh was deformed since, the vectors are rotated with their
+    faces; see `follow_mesh`.
 
     Parameters
     ----------
@@ -188,7 +183,7 @@ def guide_vectors(mesh: bpy.types.Mesh, name: str, surface: Surface) -> np.ndarr
         raise RosyError(
             f"{mesh_label(mesh)} has no attribute '{name}' to follow: choose a vector attribute"
         )
-    return follow_mesh(read_rest_shape(mesh, name), read_face_vectors(mesh, name), surface)
+    return follow_mesh(mesh, name, read_face_vectors(mesh, name), surface)
 
 
 def _object_strokes(obj: bpy.types.Object) -> list[np.ndarray]:
@@ -199,34 +194,25 @@ def _object_strokes(obj: bpy.types.Object) -> list[np.ndarray]:
         return _split_strokes(obj.data.attributes, obj.data.curve_offset_data)
     strokes = []
     for layer in obj.data.layers:
-        if layer.hide:
+        is_legacy = hasattr(layer, "active_frame")  # before Blender 4.3
+        frame = layer.active_frame if is_legacy else layer.current_frame()
+        if layer.hide or frame is None:
             continue
-        if hasattr(layer, "active_frame"):  # before Blender 4.3
-            frame = layer.active_frame
-            strokes += (
-                [_read_coordinates(stroke.points, "co", 3) for stroke in frame.strokes]
-                if frame
-                else []
-            )
-            continue
-        frame = layer.current_frame()
-        if frame is None:
-            continue
-        layer_matrix = np.array(layer.matrix_local, dtype=np.float64)
-        for stroke in _split_strokes(frame.drawing.attributes, frame.drawing.curve_offsets):
-            strokes.append(stroke @ layer_matrix[:3, :3].T + layer_matrix[:3, 3])
+        if is_legacy:
+            strokes += [_read_coordinates(stroke.points, "co", 3) for stroke in frame.strokes]
+        else:
+            drawing, matrix = frame.drawing, np.array(layer.matrix_local, dtype=np.float64)
+            points = _split_strokes(drawing.attributes, drawing.curve_offsets)
+            strokes += [stroke @ matrix[:3, :3].T + matrix[:3, 3] for stroke in points]
     return strokes
 
 
 def _split_strokes(attributes, offsets) -> list[np.ndarray]:
     """Return the points of each curve, (n, 3), from the ``position`` attribute and the offsets."""
-    points = (
-        _read_coordinates(attributes["position"].data, "vector", 3)
-        if "position" in attributes
-        else ()
-    )
-    if not len(points):  # Blender cannot read the offsets of an empty drawing
+    position = attributes.get("position")
+    if position is None or not len(position.data):  # the offsets of an empty drawing are unreadable
         return []
+    points = _read_coordinates(position.data, "vector", 3)
     return np.split(points, read_collection(offsets, "value", np.int32)[1:-1])
 
 
@@ -237,15 +223,11 @@ def _spline_points(spline: bpy.types.Spline) -> np.ndarray:
         return np.concatenate([points, points[:1]]) if spline.use_cyclic_u else points
     knots = list(spline.bezier_points)
     next_knots = knots[1:] + (knots[:1] if spline.use_cyclic_u else [])
-    segments = [
-        interpolate_bezier(
-            knot.co, knot.handle_right, next_knot.handle_left, next_knot.co, BEZIER_SEGMENT_SAMPLES
-        )
-        for knot, next_knot in zip(knots, next_knots, strict=False)
-    ]
-    return np.array([point for segment in segments for point in segment], dtype=np.float64).reshape(
-        -1, 3
-    )
+    points = []
+    for knot, following in zip(knots, next_knots, strict=False):
+        controls = knot.co, knot.handle_right, following.handle_left, following.co
+        points += interpolate_bezier(*controls, BEZIER_SEGMENT_SAMPLES)
+    return np.array(points, dtype=np.float64).reshape(-1, 3)
 
 
 def _read_coordinates(collection, key: str, columns: int) -> np.ndarray:
@@ -282,7 +264,7 @@ def read_combed_guides(mesh: bpy.types.Mesh, surface: Surface) -> np.ndarray:
     are_stored = is_face_vector_field(mesh, GUIDE_ATTRIBUTE) and is_face_vector_field(mesh)
     if not are_stored or checks is None:
         return guides
-    values = follow_mesh(read_rest_shape(mesh, GUIDE_ATTRIBUTE), values.astype(np.float64), surface)
+    values = follow_mesh(mesh, GUIDE_ATTRIBUTE, values.astype(np.float64), surface)
     length = np.abs(field).max(axis=1)
     with np.errstate(invalid="ignore"):
         is_current = np.abs(vector_checks(field) - checks) <= CHECK_TOLERANCE * length
@@ -306,10 +288,8 @@ def store_combed_guides(mesh: bpy.types.Mesh, guides: np.ndarray) -> None:
         If the mesh has an attribute with the name of the guides and another type.
     """
     check_guides_storable(mesh)
-    attribute = get_or_create_attribute(mesh, GUIDE_ATTRIBUTE, VECTOR_TYPE)
-    attribute.data.foreach_set("vector", guides.astype(np.float32).ravel())
+    store_attribute(mesh, GUIDE_ATTRIBUTE, VECTOR_TYPE, guides)
     store_rest_shape(mesh, GUIDE_ATTRIBUTE)
     field = read_attribute(mesh, attribute_name(mesh), np.float32, 3)
-    attribute = get_or_create_attribute(mesh, FIELD_CHECK_ATTRIBUTE, ANGLE_TYPE)
-    attribute.data.foreach_set("value", vector_checks(field).astype(np.float32))
+    store_attribute(mesh, FIELD_CHECK_ATTRIBUTE, ANGLE_TYPE, vector_checks(field))
     mesh.update()

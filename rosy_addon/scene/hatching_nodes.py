@@ -72,14 +72,11 @@ _INPUTS = (
 
 
 def hatching_group(created: list[bpy.types.ID]) -> bpy.types.NodeTree:
-    """Return the node group of this file. If it is missing, it is created and appended to `created`."""
+    """Return the node group in the open .blend file. A missing one is created and appended to `created`."""
     for group in bpy.data.node_groups:
-        if (
-            group.bl_idname == "ShaderNodeTree"
-            and group.library is None
-            and group.get(OWNED_TAG)
-            and group.name.startswith(GROUP_NAME)
-        ):
+        is_own = group.library is None and group.get(OWNED_TAG)
+        is_hatching = group.bl_idname == "ShaderNodeTree" and group.name.startswith(GROUP_NAME)
+        if is_own and is_hatching:
             return group
     created.append(_new_hatching_group())
     return created[-1]
@@ -93,7 +90,7 @@ def set_hatching_look(node: bpy.types.Node, look: Look, line_count: int) -> None
     node : bpy.types.Node
     look : Look
     line_count : int
-        Number of undirected directions of the field through a point.
+        Number of lines (pairs of opposite directions of the field) through a point.
     """
     layers, inks = layer_inks(look, line_count)
     ramp = look.ink_color_light if has_tone_inks(look) else look.ink_color
@@ -162,10 +159,8 @@ def _build_hatching(build: NodeBuilder, source: Any) -> None:
     solid = reduce(Number.at_least, [transmittance(source[name]) for name in INK_NAMES])
     required = solid + complement_if_light(tone) * (1 - solid)
     highlights = number("Highlights") * tone
-    inks = [
-        build.mix("RGBA", highlights.socket, source[name], source["Highlight Color"])
-        for name in INK_NAMES
-    ]
+    light_ink = source["Highlight Color"]
+    inks = [build.mix("RGBA", highlights.socket, source[name], light_ink) for name in INK_NAMES]
     # For each ink, the fraction of light that black ink would have to leave to give the same tone.
     left = [
         1 - ((1 - required) / (1 - transmittance(ink)).at_least(MIN_TRANSMITTANCE)).at_most(1.0)

@@ -18,12 +18,7 @@ from ..core.errors import RosyError
 from ..projection.camera import Camera
 from ..rendering.picture_images import picture_image
 from .blender_images import new_image
-from .camera_planes import (
-    add_camera_plane,
-    frame_corners,
-    pictured_cameras,
-    remove_camera_planes,
-)
+from .camera_planes import add_camera_plane, frame_corners, pictured_cameras, remove_camera_planes
 from .cameras import camera_of_object
 from .datablocks import KEY_TAG, delete_owned, rollback_on_error
 from .look_properties import read_look
@@ -92,10 +87,7 @@ def _add_key(
 
 
 def _draw(
-    scene: bpy.types.Scene,
-    view: Camera,
-    record: bpy.types.PropertyGroup,
-    fonts: FontShapes,
+    scene: bpy.types.Scene, view: Camera, record: bpy.types.PropertyGroup, fonts: FontShapes
 ) -> Picture | None:
     """Draw a key as a picture that fills the frame of the camera. Return None if the key would be empty."""
     settings = scene.rosy
@@ -209,9 +201,8 @@ def _new_material(name: str, image: bpy.types.Image, strength: float) -> bpy.typ
     emission = build("ShaderNodeEmission", {"Color": color, "Strength": strength})
     transparent = build("ShaderNodeBsdfTransparent")
     backfacing = build("ShaderNodeNewGeometry").outputs["Backfacing"]
-    opacity = build.math(
-        "MULTIPLY", image_node.outputs["Alpha"], build.math("SUBTRACT", 1.0, backfacing)
-    )
+    is_front = build.math("SUBTRACT", 1.0, backfacing)
+    opacity = build.math("MULTIPLY", image_node.outputs["Alpha"], is_front)
     shader = build.mix_shaders(opacity, transparent.outputs["BSDF"], emission.outputs["Emission"])
     build("ShaderNodeOutputMaterial", {"Surface": shader})
     return material

@@ -23,7 +23,7 @@ from ..core.errors import RosyError
 from ..core.file_io import check_readable
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
-from .cameras import camera_of_object, render_size
+from .cameras import camera_of_object, render_camera
 from .datablocks import has_rosy_properties
 from .face_values import COLOR_TYPES, corner_scalars, filled_attribute
 from .meshes import read_uvs
@@ -168,10 +168,7 @@ def tone_image_key(owner: bpy.types.Object, tone_request: ToneRequest | None) ->
 
 
 def read_color_values(
-    mesh: bpy.types.Mesh,
-    name: str | None,
-    label: str,
-    cache: Cache | None = None,
+    mesh: bpy.types.Mesh, name: str | None, label: str, cache: Cache | None = None
 ) -> np.ndarray | None:
     """Read the values for the color map from a mesh attribute.
 
@@ -244,31 +241,24 @@ def check_sources(
     names = ", ".join(f"'{owner.name}'" for owner in owners)
     if tone is not None and all(instance.tone is None for instance, _ in with_field):
         if tone.kind == "image":
-            raise RosyError(
-                f"{names}: choose an image for the tone, in the properties of the object"
-            )
-        if not tone.attribute:
-            raise RosyError(
-                f"{names}: there is no color attribute: choose an attribute for the tone"
-            )
-        listing = _attribute_listing(owners, ("FLOAT", *COLOR_TYPES))
-        raise RosyError(
-            f"{names}: there is no attribute '{tone.attribute}' for the tone, only {listing}"
-        )
+            problem = "choose an image for the tone, in the properties of the object"
+        elif not tone.attribute:
+            problem = "there is no color attribute: choose an attribute for the tone"
+        else:
+            listing = _attribute_listing(owners, ("FLOAT", *COLOR_TYPES))
+            problem = f"there is no attribute '{tone.attribute}' for the tone, only {listing}"
+        raise RosyError(f"{names}: {problem}")
     if numbers is not None and all(instance.color_values is None for instance, _ in with_field):
         # Boolean attributes are not listed, as most of them are Blender's own.
         listing = _attribute_listing(owners, ("FLOAT", "INT", *COLOR_TYPES))
+        problem = f"there is no attribute '{numbers}' for the colors, only {listing}"
         if not numbers:
-            raise RosyError(
-                f"{names}: choose an attribute for the colors, under Look > Color: {listing}"
-            )
-        raise RosyError(
-            f"{names}: there is no attribute '{numbers}' for the colors, only {listing}"
-        )
+            problem = f"choose an attribute for the colors, under Look > Color: {listing}"
+        raise RosyError(f"{names}: {problem}")
 
 
 def _attribute_listing(owners: Sequence[bpy.types.Object], types: Sequence[str]) -> str:
-    """Return a list for a message: the names of all attributes of the meshes that have one of some types."""
+    """Return the names of all attributes of objects with a data type in `types`, as text for a message."""
     available = dict.fromkeys(
         attribute.name
         for owner in owners
@@ -304,7 +294,7 @@ def reference_path(scene: bpy.types.Scene) -> Path:
 def load_reference(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
-    camera: bpy.types.Object,
+    camera: bpy.types.Object | None,
     look: Look,
     picture_luminance: np.ndarray | None = None,
 ) -> ReferenceRender | None:
@@ -315,8 +305,8 @@ def load_reference(
     scene : bpy.types.Scene
         The scene, at the frame of the reference render.
     depsgraph : bpy.types.Depsgraph
-    camera : bpy.types.Object
-        The camera that the reference render was rendered from.
+    camera : bpy.types.Object or None
+        The camera that the reference render was rendered from. None: the active camera of the scene.
     look : Look
     picture_luminance : (H, W) ndarray, optional
         The luminance of the reference render. By default it is read from the file.
@@ -324,18 +314,17 @@ def load_reference(
     Raises
     ------
     RosyError
-        If no file is chosen, the file cannot be read, or the picture does not have the aspect ratio of
-        renders.
+        If the scene has no active camera, no file is chosen, the file cannot be read, or the picture does not
+        have the aspect ratio of renders.
     """
     if look.tone != "picture":
         return None
+    camera = camera or render_camera(scene)
     path = reference_path(scene)
-    reference_camera = camera_of_object(scene, depsgraph, camera, *render_size(scene))
-    return ReferenceRender(
-        load_luminance(path) if picture_luminance is None else picture_luminance,
-        reference_camera,
-        str(path),
-    )
+    reference_camera = camera_of_object(scene, depsgraph, camera)
+    if picture_luminance is None:
+        picture_luminance = load_luminance(path)
+    return ReferenceRender(picture_luminance, reference_camera, str(path))
 
 
 def load_luminance(path: Path) -> np.ndarray:

@@ -30,9 +30,8 @@ def apply_look(settings: Any, look: Look) -> None:
     group = getattr(settings, "look", settings)
     for name, setting in settings_of(Look).items():
         value = getattr(look, name)
-        setattr(
-            group, name, color_components(value, setting) if isinstance(setting, Color) else value
-        )
+        is_color = isinstance(setting, Color)
+        setattr(group, name, color_components(value, setting) if is_color else value)
 
 
 def color_components(code: str, setting: Color) -> list[float]:
@@ -66,9 +65,8 @@ def _is_equal(one: Any, other: Any) -> bool:
 
 def read_settings(group: Any, cls: type) -> dict[str, Any]:
     """Return the values that a property group holds for the fields of a settings class."""
-    return {
-        name: _from_rna(getattr(group, name), setting) for name, setting in settings_of(cls).items()
-    }
+    settings = settings_of(cls).items()
+    return {name: _from_rna(getattr(group, name), setting) for name, setting in settings}
 
 
 def _from_rna(value: Any, setting: Setting) -> Any:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import bpy
 import numpy as np
 
@@ -12,7 +14,7 @@ from ..field.blocks import as_float64
 from ..field.directional_field import field_directions
 from ..field.frames import dot, normalize, tangent_frame
 from ..field.polygon_arrays import mean_per_face
-from ..field.representation import face_frames, from_representation, to_representation
+from ..field.representation import from_representation, to_representation
 from ..field.rosy_field import MAX_DEGREE, RosyField, check_degree
 from ..field.surface import Surface
 from ..field.validate import (
@@ -27,7 +29,7 @@ from .field_attributes import (
     DEFAULT_FIELD_NAME,
     VECTOR_TYPE,
     attribute_name,
-    cached_field,
+    cached_for_surface,
     check_attribute_type,
     describe_type,
     field_degree,
@@ -35,14 +37,17 @@ from .field_attributes import (
     follow_mesh,
     get_or_create_attribute,
     is_face_vector_field,
-    read_rest_shape,
+    store_attribute,
     store_rest_shape,
 )
-from .meshes import flush_edit_mode, mesh_label, mesh_surface, read_attribute
+from .meshes import flush_edit_mode, mesh_label, mesh_surface, read_attribute, write_attribute
 
 #: Largest angle between a vector on a face corner and the plane of the face, in degrees. It is large because
 #: such vectors may be tangent to the smooth surface rather than to the face.
-CORNER_TOLERANCE_DEGREES = 30.0
+CORNER_TOLERANCE = 30.0
+
+#: Names of the elements of a mesh in `field.validate`, by the domain of an attribute.
+ELEMENTS = {"FACE": "face", "POINT": "vertex"}
 
 
 def read_mesh_field(
@@ -102,22 +107,19 @@ def read_mesh_field(
     source = f"{label}, attribute '{field_name}'"
     values = field_values(attribute, source, mesh)
     if is_face_vector_field(mesh, field_name):
-        values = follow_mesh(read_rest_shape(mesh, field_name), values, surface)
-
-    attribute_type = domain, data_type = attribute.domain, attribute.data_type
+        values = follow_mesh(mesh, field_name, values, surface)
+    domain, data_type = attribute.domain, attribute.data_type
 
     def build() -> RosyField:
         if data_type == ANGLE_TYPE:
             return _field_from_angles(surface, values, degree, source, nonfinite)
         if domain == "CORNER":
             return _field_from_corners(surface, values, degree, source, nonfinite)
-        element = {"FACE": "face", "POINT": "vertex"}[domain]
-        return validated_field(surface, values, degree, source, nonfinite, element)
+        return validated_field(surface, values, degree, source, nonfinite, ELEMENTS[domain])
 
+    key_parts = "attribute", domain, data_type, values, degree, source, nonfinite
     with progress(0.5, 1.0, "reading the field"):
-        return cached_field(
-            cache, surface, build, "attribute", *attribute_type, values, degree, source, nonfinite
-        )
+        return cached_for_surface(cache, surface, build, *key_parts)
 
 
 def _field_from_directions(
@@ -131,41 +133,33 @@ def _field_from_directions(
         raise RosyError(
             f"{label}: has {degree} attributes dir0, dir1 ..., but at most {MAX_DEGREE} are supported"
         )
-    first_attribute = mesh.attributes["dir0"]
+    domain = mesh.attributes["dir0"].domain
     directions = []
     for index in range(degree):
         attribute = mesh.attributes[f"dir{index}"]
         source = f"{label}, attribute 'dir{index}'"
         attribute_type = (attribute.domain, attribute.data_type)
-        if (
-            attribute_type not in (("FACE", VECTOR_TYPE), ("POINT", VECTOR_TYPE))
-            or attribute.domain != first_attribute.domain
-        ):
+        if attribute_type != (domain, VECTOR_TYPE) or domain not in ELEMENTS:
             raise RosyError(
                 f"{source}: expected FLOAT_VECTOR on FACE or POINT, the same for all directions, "
                 f"found {describe_type(attribute)}"
             )
         directions.append(field_values(attribute, source, mesh))
     directions = np.stack(directions, axis=1)
-    if first_attribute.domain == "FACE":
-        directions = follow_mesh(read_rest_shape(mesh, "dir0"), directions, surface)
+    if domain == "FACE":
+        directions = follow_mesh(mesh, "dir0", directions, surface)
     source = f"{label}, attributes dir0 to dir{degree - 1}"
-    domain = {"FACE": "face", "POINT": "vertex"}[first_attribute.domain]
-
-    def build() -> RosyField:
-        return validated_directions(surface, directions, source, nonfinite, domain)
-
+    arguments = directions, source, nonfinite, ELEMENTS[domain]
+    build = partial(validated_directions, surface, *arguments)
     with progress(0.0, 1.0, "reading the field"):
-        return cached_field(
-            cache, surface, build, "directions", directions, source, nonfinite, domain
-        )
+        return cached_for_surface(cache, surface, build, "directions", *arguments)
 
 
 def _field_from_angles(
     surface: Surface, angles: np.ndarray, degree: int, source: str, nonfinite: str
 ) -> RosyField:
     """Return a field from (F,) angles between its members and the first edges of faces, in radians."""
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     report(0.5, "reading the field")
     angles = as_float64(angles)
     defined = np.isfinite(angles)
@@ -181,12 +175,10 @@ def _field_from_corners(
     vectors = as_float64(vectors)
     apply_nonfinite_policy(vectors, source, "corner", nonfinite)
     normal = surface.face_normal
-    corner_face_normal = normal[surface.corner_face]
+    corner_normal = normal[surface.corner_face]
     report(0.2, "reading the field")
     with progress(0.2, 0.7):
-        vectors = project_to_tangent(
-            vectors, corner_face_normal, CORNER_TOLERANCE_DEGREES, source, "corner"
-        )
+        vectors = project_to_tangent(vectors, corner_normal, CORNER_TOLERANCE, source, "corner")
     x, y = tangent_frame(normal)
     z = to_representation(vectors, x[surface.corner_face], y[surface.corner_face], degree)
     report(0.9, "reading the field")
@@ -294,14 +286,12 @@ def _store(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str) -> bpy.
     if form == "DIRECTIONS" or field.direction_ratios is not None:
         attribute = _write_directions(mesh, field, name)
     elif form == "ANGLE":
-        attribute = get_or_create_attribute(mesh, name, ANGLE_TYPE)
-        x, y = face_frames(mesh_surface(mesh))
+        x, y = mesh_surface(mesh).face_frames
         angle = np.arctan2(dot(field.vectors, y), dot(field.vectors, x))
         angle[~field.vectors.any(axis=1)] = np.nan
-        attribute.data.foreach_set("value", angle.astype(np.float32))
+        attribute = store_attribute(mesh, name, ANGLE_TYPE, angle)
     else:
-        attribute = get_or_create_attribute(mesh, name, VECTOR_TYPE)
-        attribute.data.foreach_set("vector", field.vectors.astype(np.float32).ravel())
+        attribute = store_attribute(mesh, name, VECTOR_TYPE, field.vectors)
     if attribute.data_type == VECTOR_TYPE:
         stored_name = attribute.name
         store_rest_shape(mesh, stored_name)
@@ -331,7 +321,7 @@ def overwrite_vectors(mesh: bpy.types.Mesh, vectors: np.ndarray) -> np.ndarray:
     """
     name = attribute_name(mesh)
     before = read_attribute(mesh, name, np.float32, 3)
-    mesh.attributes[name].data.foreach_set("vector", vectors.astype(np.float32).ravel())
+    write_attribute(mesh.attributes[name], vectors)
     mesh.update()
     return before
 
@@ -352,14 +342,12 @@ def _check_storable(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str
         )
     if has_free_directions and name in mesh.attributes:
         check_attribute_type(mesh, name, VECTOR_TYPE)
-    names = [name]
+    names, data_type = [name], ANGLE_TYPE if form == "ANGLE" else VECTOR_TYPE
     if form == "DIRECTIONS" or has_free_directions:
         names = [f"dir{index}" for index in range(field.degree)]
     for new_name in names:
         is_new = new_name not in mesh.attributes
-        attribute = get_or_create_attribute(
-            mesh, new_name, ANGLE_TYPE if form == "ANGLE" else VECTOR_TYPE
-        )
+        attribute = get_or_create_attribute(mesh, new_name, data_type)
         if is_new:
             mesh.attributes.remove(attribute)
 
@@ -369,12 +357,9 @@ def _write_directions(mesh: bpy.types.Mesh, field: RosyField, name: str) -> bpy.
 
     Remove attributes ``dirN``, ``dir{N+1}`` ...
     """
-    directions = (
-        field_directions(mesh_surface(mesh), field)
-        if field.source_directions is None
-        else field.source_directions
-    )
-    names = [f"dir{index}" for index in range(field.degree)]
+    directions = field.source_directions
+    if directions is None:
+        directions = field_directions(mesh_surface(mesh), field)
     vector_attribute = mesh.attributes.get(name)
     if field.direction_ratios is not None and vector_attribute is not None:
         mesh.attributes.remove(vector_attribute)
@@ -382,9 +367,8 @@ def _write_directions(mesh: bpy.types.Mesh, field: RosyField, name: str) -> bpy.
     while f"dir{extra_index}" in mesh.attributes:
         mesh.attributes.remove(mesh.attributes[f"dir{extra_index}"])
         extra_index += 1
-    for direction_name, vectors in zip(names, directions.swapaxes(0, 1), strict=True):
-        attribute = get_or_create_attribute(mesh, direction_name, VECTOR_TYPE)
-        attribute.data.foreach_set("vector", vectors.astype(np.float32).ravel())
+    for index in range(field.degree):
+        store_attribute(mesh, f"dir{index}", VECTOR_TYPE, directions[:, index])
     return mesh.attributes["dir0"]
 
 

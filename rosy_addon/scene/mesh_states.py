@@ -43,9 +43,9 @@ MeshStates = dict[tuple, MeshState | None]
 def mesh_state_key(
     obj: bpy.types.Object, owner: bpy.types.Object, request: ReadRequest | None
 ) -> tuple:
-    """Return the key of the mesh of an evaluated object in `MeshStates`.
+    """Return the key under which a `MeshStates` dictionary holds the mesh of an evaluated object.
 
-    Its first item is the owner's session UID.
+    The first item of the key is the session UID of the original object.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def mesh_state_key(
     owner : bpy.types.Object
         The original object.
     request : ReadRequest or None
-        What is read of the mesh. None: the object has no field to draw, and only hides others.
+        What is read from the mesh. None: the object has no field to draw, and only hides others.
     """
     return owner.session_uid, obj.data.as_pointer(), request
 
@@ -91,7 +91,11 @@ def read_mesh_state(
 
 
 def field_parts(mesh: bpy.types.Mesh, original: bpy.types.Mesh) -> list:
-    """Return what the field of a mesh depends on: degree, and domains and values of its attributes."""
+    """Return the values on which the field of a mesh depends, for `digest`.
+
+    They are the degree, and the domain and the values of each attribute of the field. The degree and the name
+    of the attribute are settings of the original mesh, `original`. Values are read from `mesh`.
+    """
     name = attribute_name(original)
     if name in original.attributes:
         names, parts = [name], [field_degree(original)]

@@ -21,6 +21,9 @@ EDGE_MARKS = {
     "SEAM": ("use_seam", "Seams", "Edges that are marked as seams"),
 }
 
+#: Name of the RNA property with the values of an attribute, by its data type. For other types it is "value".
+VALUE_KEYS = {"FLOAT_VECTOR": "vector", "FLOAT2": "vector", "FLOAT_COLOR": "color"}
+
 #: Attribute in which Blender stores which edges are selected.
 EDGE_SELECTION_ATTRIBUTE = ".select_edge"
 
@@ -67,43 +70,30 @@ def mesh_surface(
         is not finite.
     """
     name = mesh_label(mesh) if name is None else name
-    shape = _read_shape(mesh, occluder_only=occluder_only)
+    vertices, topology, custom_normals = _read_shape(mesh, occluder_only)
     if not len(mesh.polygons):
         raise no_faces_error(mesh, name)
-    topology = {
-        key: value for key, value in shape.items() if key not in ("vertices", "corner_normal")
-    }
     if occluder_only:
         topology["flat_faces"] = np.ones(len(mesh.polygons), dtype=bool)
 
     def build_fans() -> np.ndarray:
-        return smooth_fans(shape["vertices"], **topology)
+        return smooth_fans(vertices, **topology)
 
     def build() -> Surface:
         with progress(0.0, 0.7):
-            # The fans are cached by the topology alone, which a deformation does not change.
-            fans = (
-                build_fans()
-                if cache is None
-                else cache.get_or_create(("fans", content_hash(*topology.values())), build_fans)
-            )
-        normals = shape["corner_normal"]
-        if normals is None:
-            normals = _corner_normals(mesh)
+            if cache is None:
+                fans = build_fans()
+            else:  # by the topology alone, which a deformation does not change
+                fans = cache.get_or_create(("fans", content_hash(*topology.values())), build_fans)
+        parts = {**topology, **_triangles(mesh), "corner_fan": fans}
+        parts["corner_normal"] = _corner_normals(mesh) if custom_normals is None else custom_normals
         with progress(0.7, 1.0):
-            return build_surface(
-                shape["vertices"],
-                **topology,
-                name=name,
-                corner_normal=normals,
-                corner_fan=fans,
-                **_triangles(mesh),
-            )
+            return build_surface(vertices, name=name, **parts)
 
     if cache is None:
         return build()
-    key = "surface", name, occluder_only, content_hash(*shape.values())
-    return cache.get_or_create(key, build)
+    shape_hash = content_hash(vertices, *topology.values(), custom_normals)
+    return cache.get_or_create(("surface", name, occluder_only, shape_hash), build)
 
 
 def no_faces_error(mesh: bpy.types.Mesh, name: str) -> RosyError:
@@ -114,33 +104,41 @@ def no_faces_error(mesh: bpy.types.Mesh, name: str) -> RosyError:
 
 def shape_digest(mesh: bpy.types.Mesh, *, occluder_only: bool = False) -> bytes:
     """Return a digest of everything that `mesh_surface` reads. Much faster than reading the surface."""
-    return content_hash(*_read_shape(mesh, occluder_only=occluder_only).values())
+    vertices, topology, custom_normals = _read_shape(mesh, occluder_only)
+    return content_hash(vertices, *topology.values(), custom_normals)
 
 
-def _read_shape(mesh: bpy.types.Mesh, *, occluder_only: bool) -> dict[str, np.ndarray | None]:
-    """Return those arguments of `build_surface` that determine all others.
+def _read_shape(
+    mesh: bpy.types.Mesh, occluder_only: bool
+) -> tuple[np.ndarray, dict[str, np.ndarray | None], np.ndarray | None]:
+    """Return the arguments of `build_surface` that determine all others.
 
     Triangles and normals are left out, because Blender computes them from the returned arrays. Only custom
     normals are included.
+
+    Returns
+    -------
+    vertices : (V, 3) float32 ndarray
+    topology : dict
+        The faces, and which edges and faces are sharp.
+    custom_normals : (C, 3) float32 ndarray or None
+        The shading normals at the corners, if the mesh has custom normals.
     """
     flush_edit_mode(mesh)
     corner_vertex, face_start = polygon_arrays(mesh)
-    shape = {
-        "vertices": vertex_positions(mesh),
-        "corner_vertex": corner_vertex,
-        "face_start": face_start,
-        "sharp_edges": None,
-        "flat_faces": None,
-        "corner_normal": None,
-    }
+    topology = {"corner_vertex": corner_vertex, "face_start": face_start}
+    topology |= {"sharp_edges": None, "flat_faces": None}
+    custom_normals = None
     if not occluder_only:
         flat_faces = read_attribute(mesh, "sharp_face", bool, 1)
         sharp_edges = read_attribute(mesh, "sharp_edge", bool, 1)
         if sharp_edges is not None and sharp_edges.any():
-            shape["sharp_edges"] = _edge_vertices(mesh)[sharp_edges]
-        shape["flat_faces"] = flat_faces if flat_faces is not None and flat_faces.any() else None
-        shape["corner_normal"] = _corner_normals(mesh) if mesh.has_custom_normals else None
-    return shape
+            topology["sharp_edges"] = _edge_vertices(mesh)[sharp_edges]
+        if flat_faces is not None and flat_faces.any():
+            topology["flat_faces"] = flat_faces
+        if mesh.has_custom_normals:
+            custom_normals = _corner_normals(mesh)
+    return vertex_positions(mesh), topology, custom_normals
 
 
 def _corner_normals(mesh: bpy.types.Mesh) -> np.ndarray:
@@ -193,15 +191,13 @@ def read_uvs(mesh: bpy.types.Mesh, name: str = "", label: str | None = None) -> 
 
 def polygon_arrays(mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
     """Return `Surface.corner_vertex`, (C,) int32, and `Surface.face_start`, (F + 1,) int32."""
-    corner_vertex = _attribute_or_collection(
-        mesh, ".corner_vert", mesh.loops, "vertex_index", np.int32
-    )
-    face_count, corner_count = len(mesh.polygons), len(mesh.loops)
-    if corner_count == 3 * face_count:
-        return corner_vertex, np.arange(0, corner_count + 1, 3, dtype=np.int32)
+    loops, face_count = mesh.loops, len(mesh.polygons)
+    corner_vertex = _attribute_or_collection(mesh, ".corner_vert", loops, "vertex_index", np.int32)
+    if len(loops) == 3 * face_count:
+        return corner_vertex, np.arange(0, len(loops) + 1, 3, dtype=np.int32)
     face_start = np.empty(face_count + 1, dtype=np.int32)
     mesh.polygons.foreach_get("loop_start", face_start[:-1])
-    face_start[-1] = corner_count
+    face_start[-1] = len(loops)
     return corner_vertex, face_start
 
 
@@ -221,13 +217,13 @@ def evaluated_mesh(obj: bpy.types.Object) -> Iterator[bpy.types.Mesh | None]:
 
 
 def marked_edges(mesh: bpy.types.Mesh, mark: str) -> np.ndarray:
-    """Return the vertex indices of the edges that are marked in a way.
+    """Return the vertex indices of the edges that are selected, marked sharp, or marked as seams.
 
     Parameters
     ----------
     mesh : bpy.types.Mesh
-    mark : str
-        A key of `EDGE_MARKS`.
+    mark : {"SELECTED", "SHARP", "SEAM"}
+        See `EDGE_MARKS`.
 
     Returns
     -------
@@ -263,8 +259,15 @@ def read_attribute(mesh: bpy.types.Mesh, name: str, dtype: type, columns: int) -
     attribute = mesh.attributes.get(name)
     if attribute is None or not len(attribute.data):  # in edit mode, attributes are empty
         return None
-    key = "vector" if attribute.data_type in ("FLOAT_VECTOR", "FLOAT2") else "value"
+    key = VALUE_KEYS.get(attribute.data_type, "value")
     return read_collection(attribute.data, key, dtype, columns)
+
+
+def write_attribute(attribute: bpy.types.Attribute, values: np.ndarray) -> None:
+    """Set the values of an attribute of a mesh, Curves or a Grease Pencil drawing."""
+    dtype = {"INT": np.int32, "INT8": np.int8}.get(attribute.data_type, np.float32)
+    key = VALUE_KEYS.get(attribute.data_type, "value")
+    attribute.data.foreach_set(key, np.ascontiguousarray(values, dtype=dtype).ravel())
 
 
 def _triangles(mesh: bpy.types.Mesh) -> dict[str, np.ndarray]:

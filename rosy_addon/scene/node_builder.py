@@ -65,12 +65,10 @@ class NodeBuilder:
         """Add a node that mixes shaders, and return its output: it is `a` for factor 0, `b` for factor 1."""
         return self("ShaderNodeMixShader", {0: factor, 1: a, 2: b}).outputs["Shader"]
 
-    def frame_image(
-        self, image: bpy.types.Image, coordinates: bpy.types.NodeSocket
-    ) -> bpy.types.Node:
+    def frame_image(self, image: bpy.types.Image, vector: bpy.types.NodeSocket) -> bpy.types.Node:
         """Add a node with the pixels of an image, not interpolated, mapped to coordinates from 0 to 1."""
         settings = {"image": image, "interpolation": "Closest", "extension": "EXTEND"}
-        return self("ShaderNodeTexImage", {"Vector": coordinates}, **settings)
+        return self("ShaderNodeTexImage", {"Vector": vector}, **settings)
 
     def stored_attribute(
         self,
@@ -85,11 +83,14 @@ class NodeBuilder:
         kind = "GeometryNodeStoreNamedAttribute"
         return self(kind, inputs, data_type=data_type, domain=domain).outputs["Geometry"]
 
-    def transformed(self, point: bpy.types.NodeSocket, rows: np.ndarray) -> bpy.types.NodeSocket:
-        """Add nodes that transform a point by an affine (3, 4) matrix, and return their output."""
+    def projected(self, point: bpy.types.NodeSocket, matrix: np.ndarray) -> bpy.types.NodeSocket:
+        """Add nodes that transform a point to clip space by a (4, 4) matrix.
+
+        Return their output, the vector (x, y, w) in clip space.
+        """
         components = {
             axis: self.math("ADD", self.vector_math("DOT_PRODUCT", point, row[:3]), row[3])
-            for axis, row in zip("XYZ", rows.tolist(), strict=True)
+            for axis, row in zip("XYZ", matrix[[0, 1, 3]].tolist(), strict=True)
         }
         return self("ShaderNodeCombineXYZ", components).outputs[0]
 
@@ -162,10 +163,8 @@ class Number:
 def new_empty_material(name: str) -> tuple[bpy.types.Material, NodeBuilder]:
     """Create a material without nodes. Return it with the builder of its node tree."""
     material = bpy.data.materials.new(name)
-    if material.node_tree is None:
-        material.use_nodes = (
-            True  # deprecated since Blender 5.0, where a material has nodes already
-        )
+    if material.node_tree is None:  # before Blender 5.0
+        material.use_nodes = True
     material.node_tree.nodes.clear()
     return material, NodeBuilder(material.node_tree)
 

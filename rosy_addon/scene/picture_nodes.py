@@ -7,13 +7,15 @@ modifier, the material and the attributes are on the mesh of the object.
 from __future__ import annotations
 
 from collections.abc import Container
+from dataclasses import dataclass
+from pathlib import Path
 
 import bpy
 import numpy as np
 
 from ..projection.camera import Camera
 from ..rendering.picture_images import NEUTRAL_GRAY
-from .datablocks import KEY_TAG, OWNED_TAG, is_editable, is_rosy_modifier
+from .datablocks import KEY_TAG, OWNED_TAG, is_editable, rosy_modifiers
 from .meshes import read_attribute
 from .node_builder import NodeBuilder, new_empty_material, new_modifier_group
 from .texture_nodes import Hatching, hatching_shader
@@ -32,14 +34,42 @@ MATERIAL_ATTRIBUTE = "rosy_material"
 _OUTSIDE_COLOR = (NEUTRAL_GRAY, NEUTRAL_GRAY, NEUTRAL_GRAY, 1.0)
 
 
+@dataclass(frozen=True)
+class OutputSettings:
+    """Settings for storing and showing pictures in a scene.
+
+    Attributes
+    ----------
+    window_coordinates : bool
+        Whether the picture fills the frame of the camera that renders (window coordinates), instead of being
+        projected from the camera from which it was baked.
+    emission, diffuse : float
+        Strength with which surfaces emit the picture, and factor of the picture as a diffuse color.
+    as_float : bool
+        Whether linear float values are stored instead of 8-bit sRGB.
+    folder : Path or None
+        Folder to save images in. None packs them into the .blend file.
+    device : {"cpu", "gpu", "auto"}
+        Device that draws the pictures.
+    relight : bool
+        Whether pictures of hatching store its thresholds, from which the material draws hatching in the light
+        of the scene. Such pictures are drawn on the CPU.
+    """
+
+    window_coordinates: bool = False
+    emission: float = 1.0
+    diffuse: float = 0.0
+    as_float: bool = False
+    folder: Path | None = None
+    device: str = "cpu"
+    relight: bool = False
+
+
 def new_material(
     image: bpy.types.Image,
     camera: Camera,
     created: list[bpy.types.ID],
-    *,
-    window_coordinates: bool,
-    emission: float,
-    diffuse: float,
+    settings: OutputSettings,
     hatching: Hatching | None = None,
 ) -> bpy.types.Material:
     """Create a material that shows a picture. It looks the same in Cycles and EEVEE.
@@ -49,7 +79,7 @@ def new_material(
     is neutral gray.
 
     If `hatching` is given, the material draws hatching in the present light on the surface
-    (`hatching_shader`), and `emission` and `diffuse` are not used.
+    (`hatching_shader`), and the settings of emission and diffuse reflection are not used.
 
     Parameters
     ----------
@@ -59,19 +89,14 @@ def new_material(
         The camera from which the picture was drawn.
     created : list of bpy.types.ID
         The new datablocks are appended; see `datablocks.rollback_on_error`.
-    window_coordinates : bool
-        Whether the picture fills the frame of the camera that renders, instead of being mapped as above.
-    emission : float
-        Strength with which the surface emits the picture.
-    diffuse : float
-        Factor of the picture as a diffuse color.
+    settings : OutputSettings
     hatching : Hatching, optional
         How hatching is drawn. Given if the image has thresholds of ink instead of colors.
     """
     material, build = new_empty_material(image.name)
     created.append(material)
     is_inside = None
-    if window_coordinates:
+    if settings.window_coordinates:
         coordinates = build("ShaderNodeTexCoord").outputs["Window"]
     else:
         x, y, w = _clip_position(build, camera.projection @ camera.view).outputs
@@ -92,9 +117,10 @@ def new_material(
         color = image_node.outputs["Color"]
         if is_inside is not None:
             color = build.mix("RGBA", is_inside, _OUTSIDE_COLOR, color)
-        emitted = build("ShaderNodeEmission", {"Color": color, "Strength": emission}).outputs[0]
+        inputs = {"Color": color, "Strength": settings.emission}
+        emitted = build("ShaderNodeEmission", inputs).outputs[0]
         # A BSDF has no strength, so the diffuse factor scales the color.
-        scaled_color = build.scaled(color, diffuse)
+        scaled_color = build.scaled(color, settings.diffuse)
         reflected = build("ShaderNodeBsdfDiffuse", {"Color": scaled_color}).outputs[0]
         shader = build("ShaderNodeAddShader", {0: emitted, 1: reflected}).outputs[0]
     build("ShaderNodeOutputMaterial", {"Surface": shader})
@@ -102,7 +128,10 @@ def new_material(
 
 
 def set_sequence_frames(material: bpy.types.Material, first: int, last: int) -> None:
-    """Set the frames at which a material plays its image sequence: each file at the frame of its number."""
+    """Let a material show its image sequence: at each frame, the file with the number of the frame.
+
+    `first` and `last` are the numbers of the first and the last file.
+    """
     for node in material.node_tree.nodes:
         if node.bl_idname == "ShaderNodeTexImage":
             image_user = node.image_user
@@ -118,7 +147,7 @@ def _clip_position(build: NodeBuilder, view_projection: np.ndarray) -> bpy.types
     """
     baked_clip = build("ShaderNodeAttribute", attribute_name=CLIP_ATTRIBUTE).outputs["Vector"]
     world_position = build("ShaderNodeNewGeometry").outputs["Position"]
-    live_clip = build.transformed(world_position, _clip_rows(view_projection))
+    live_clip = build.projected(world_position, view_projection)
     has_baked_clip = build.math("GREATER_THAN", build.vector_math("LENGTH", baked_clip), 0.0)
     clip = build.mix("VECTOR", has_baked_clip, live_clip, baked_clip)
     return build("ShaderNodeSeparateXYZ", {0: clip})
@@ -145,10 +174,8 @@ def new_group(
     geometry = build("GeometryNodeSetMaterial", inputs).outputs["Geometry"]
     if matrix is not None:
         position = build("GeometryNodeInputPosition").outputs[0]
-        clip_position = build.transformed(position, _clip_rows(matrix))
-        geometry = build.stored_attribute(
-            geometry, CLIP_ATTRIBUTE, "FLOAT_VECTOR", "POINT", clip_position
-        )
+        clip = build.projected(position, matrix)
+        geometry = build.stored_attribute(geometry, CLIP_ATTRIBUTE, "FLOAT_VECTOR", "POINT", clip)
     build("NodeGroupOutput", {"Geometry": geometry})
     _add_projection(group, material, matrix)
     return group
@@ -163,25 +190,18 @@ def _add_projection(
     projection.matrix = (np.zeros(16) if matrix is None else matrix.ravel()).tolist()
 
 
-def projections_of_group(
-    group: bpy.types.NodeTree,
-) -> dict[bpy.types.Material, np.ndarray | None]:
+def projections_of_group(group: bpy.types.NodeTree) -> dict[bpy.types.Material, np.ndarray | None]:
     """Return the projections of the pictures that an object can show, by the materials of the pictures.
 
     The values are (4, 4) object-to-clip matrices, or None if the object has several instances.
     """
-    projections = {}
+    # Groups of earlier versions have no projections.
+    projections = {material_of_group(group): None}
     for projection in group.rosy.projections:
         matrix = np.array(projection.matrix).reshape(4, 4)
         projections[projection.material] = matrix if matrix.any() else None
-    # Groups of earlier versions have no projections. The user may have deleted a material, which is then
-    # None.
-    shown_material = material_of_group(group)
-    return {
-        material: matrix
-        for material, matrix in ({shown_material: None} | projections).items()
-        if material is not None
-    }
+    projections.pop(None, None)  # a material that the user has deleted
+    return projections
 
 
 def material_of_group(group: bpy.types.NodeTree) -> bpy.types.Material | None:
@@ -198,11 +218,6 @@ def image_node(material: bpy.types.Material) -> bpy.types.Node | None:
     return next((node for node in nodes if node.bl_idname == "ShaderNodeTexImage"), None)
 
 
-def _clip_rows(matrix: np.ndarray) -> np.ndarray:
-    """Return the (3, 4) rows of a projection matrix that give the clip-space x, y and w."""
-    return np.asarray(matrix)[[0, 1, 3]]
-
-
 def set_picture_modifier(
     obj: bpy.types.Object,
     node_group: bpy.types.NodeTree,
@@ -210,17 +225,16 @@ def set_picture_modifier(
 ) -> None:
     """Set the node group of RoSy's modifier, and move the modifier to the end of the object's stack.
 
-    The previous group may have projections of other pictures. Those of materials in `pictures` are copied to
-    the new group, so that the object can show these pictures again.
+    The previous group may have projections of other pictures. A projection is copied to the new group if its
+    material is in `pictures`, so that the object can show this picture again.
     """
-    existing = [modifier for modifier in obj.modifiers if is_rosy_modifier(modifier)]
+    existing = rosy_modifiers(obj)
     modifier = existing[0] if existing else obj.modifiers.new(MODIFIER_NAME, "NODES")
     modifier.show_expanded = False
     old_group, modifier.node_group = modifier.node_group, node_group
     for extra in existing[1:]:
         obj.modifiers.remove(extra)
-    last = len(obj.modifiers) - 1
-    obj.modifiers.move(obj.modifiers.find(modifier.name), last)
+    obj.modifiers.move(obj.modifiers.find(modifier.name), len(obj.modifiers) - 1)
     if old_group is not None and old_group != node_group:
         shown_material = material_of_group(node_group)
         for material, matrix in projections_of_group(old_group).items():
@@ -244,8 +258,7 @@ def applied_materials(data: bpy.types.ID | None) -> list[bpy.types.Material]:
 
 def shown_materials(obj: bpy.types.Object) -> set[bpy.types.Material]:
     """Return the materials of the pictures that an object shows, by a modifier or in its slots."""
-    modifiers = [modifier for modifier in obj.modifiers if is_rosy_modifier(modifier)]
-    materials = {material_of_group(modifier.node_group) for modifier in modifiers}
+    materials = {material_of_group(modifier.node_group) for modifier in rosy_modifiers(obj)}
     return (materials | set(applied_materials(obj.data))) - {None}
 
 

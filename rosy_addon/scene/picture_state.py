@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from itertools import product, starmap
 
@@ -19,9 +20,10 @@ from ..compositor.look import Look, is_hatched
 from ..core.errors import RosyError
 from ..core.file_io import read_bytes
 from ..core.settings import settings_of
+from ..field.polygon_arrays import box_corners
 from ..projection.camera import Camera
 from ..surface_texture.draw import DIRECTION_SETTINGS, TEXTURE_SETTINGS, texture_colors_values
-from .cameras import CameraSource, camera_of_object, render_camera, render_size, resolve_camera
+from .cameras import CameraSource, camera_of_object, render_camera, resolve_camera
 from .field_attributes import attribute_name, field_degree
 from .look_inputs import ReadRequest, color_values_digest, read_request, reference_path
 from .look_properties import read_look
@@ -122,24 +124,19 @@ class SceneState:
     scene : bpy.types.Scene
     depsgraph : bpy.types.Depsgraph
         The evaluated depsgraph of a view layer.
-    mesh_states : dict, optional
+    mesh_states : dict
         Known states of meshes that have not changed. The states of other meshes are read and added.
     """
 
     def __init__(
-        self,
-        scene: bpy.types.Scene,
-        depsgraph: bpy.types.Depsgraph,
-        mesh_states: MeshStates | None = None,
+        self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, mesh_states: MeshStates
     ) -> None:
         self._lacks_tone = False
         self._fields: dict[str, _Instances] = {}
         self._occluders: dict[str, _Instances] = {}
         self._texture_states: dict[tuple, PictureState] = {}
         look = read_look(scene.rosy)
-        self._read_meshes(
-            depsgraph, read_request(scene, look), {} if mesh_states is None else mesh_states
-        )
+        self._read_meshes(depsgraph, read_request(scene, look), mesh_states)
         self._lights = _light_digests(depsgraph) if _uses_lights(look) else {}
 
     def _read_meshes(
@@ -161,7 +158,8 @@ class SceneState:
             group = self._fields if draws_field else self._occluders
             instances = group.setdefault(owner.name_full, _Instances())
             instances.digests.append((digest(matrix + 0.0), mesh_state.digest))
-            instances.corners.append(_box_corners(mesh_state.bounds, matrix))
+            corners = box_corners(mesh_state.bounds.astype(np.float64))
+            instances.corners.append(corners @ matrix[:3, :3].T + matrix[:3, 3])
 
     def picture_state(
         self,
@@ -174,7 +172,9 @@ class SceneState:
 
         `is_frame` says whether the picture is a frame of an animation.
         """
-        camera = _resolved_camera(scene, depsgraph, source)
+        camera = None
+        with suppress(RosyError):  # no picture can be drawn from the camera
+            camera = resolve_camera(scene, depsgraph, source)
         look = read_look(scene.rosy)
         is_relit = scene.rosy.relight and is_hatched(look) and not is_frame
         if is_relit:
@@ -187,6 +187,7 @@ class SceneState:
         if output["store"] == "PACKED":
             del output["directory"]
         occluders = self._relevant_occluders(camera, settings["shadows"])
+        has_reference = settings["tone"] == "picture"
         return PictureState(
             look=settings,
             size=[] if camera is None else [camera.width, camera.height],
@@ -196,9 +197,7 @@ class SceneState:
             objects={name: instances.digest_pair() for name, instances in self._fields.items()},
             occluders={name: instances.digest_pair() for name, instances in occluders.items()},
             lights=self._lights if settings["light"] == "scene" else {},
-            reference=(
-                _reference_digest(scene, depsgraph) if settings["tone"] == "picture" else ""
-            ),
+            reference=_reference_digest(scene, depsgraph) if has_reference else "",
         )
 
     def texture_state(
@@ -267,7 +266,16 @@ def read_picture_states(
 
 
 def bakes_light(settings: bpy.types.PropertyGroup, look: Look) -> bool:
-    """Return whether the hatching of textures is baked in the light of the scene, with its settings."""
+    """Return whether textures show hatching that was drawn in the light of the scene.
+
+    Otherwise, a texture of hatching stores thresholds, and its material draws the ink in the present light.
+
+    Parameters
+    ----------
+    settings : bpy.types.PropertyGroup
+        ``scene.rosy``.
+    look : Look
+    """
     return settings.texture_bake_light and settings.texture_content == "LOOK" and is_hatched(look)
 
 
@@ -324,9 +332,8 @@ def settings_key(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> tup
     look = read_look(scene.rosy)
     objects = []
     for obj in field_objects(view_layer):
-        image = obj.rosy.tone_image
+        image, mesh = obj.rosy.tone_image, obj.data
         image_key = image and (image.session_uid, *image.size, image.is_dirty)
-        mesh = obj.data
         tone_key = image_key, obj.rosy.tone_uv_map
         objects.append((obj.session_uid, attribute_name(mesh), field_degree(mesh), tone_key))
     return read_request(scene, look), _uses_lights(look), tuple(objects)
@@ -349,16 +356,6 @@ def applied_settings(look: Look, lacks_tone: bool = False) -> dict:
     }
 
 
-def _resolved_camera(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, source: CameraSource
-) -> Camera | None:
-    """Return the result of `resolve_camera`; None if no picture can be drawn from the camera."""
-    try:
-        return resolve_camera(scene, depsgraph, source)
-    except RosyError:
-        return None
-
-
 def _reference_digest(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> str:
     """Return a digest of the file and the camera of the reference render.
 
@@ -366,7 +363,7 @@ def _reference_digest(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) ->
     """
     try:
         path = reference_path(scene)
-        camera = camera_of_object(scene, depsgraph, render_camera(scene), *render_size(scene))
+        camera = camera_of_object(scene, depsgraph, render_camera(scene))
         contents = np.frombuffer(read_bytes(path), dtype=np.uint8)
     except (RosyError, OSError) as error:
         return f"{error}"
@@ -374,13 +371,6 @@ def _reference_digest(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) ->
 
 
 # --- bounding boxes in a picture ------------------------------------------------------------------
-
-
-def _box_corners(bounds: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """Return the corners of a box, (8, 3), in world space."""
-    choice = np.indices((2, 2, 2)).reshape(3, 8).T
-    corners = np.take_along_axis(bounds.astype(np.float64), choice, axis=0)
-    return corners @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def _picture_box(camera: Camera, corners: np.ndarray) -> np.ndarray | None:

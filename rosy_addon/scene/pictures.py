@@ -12,7 +12,7 @@ transformed, and slides over one that deforms. A texture is mapped by a UV map, 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -47,6 +47,7 @@ from .datablocks import (
 from .files import output_folder, picture_stem
 from .keys import update_keys
 from .picture_nodes import (
+    OutputSettings,
     new_group,
     new_material,
     projections_of_group,
@@ -65,37 +66,6 @@ from .texture_nodes import (
 
 #: View transforms of Blender's color management that do not change the colors of a picture.
 NEUTRAL_VIEW_TRANSFORMS = ("Standard", "Raw")
-
-
-@dataclass(frozen=True)
-class OutputSettings:
-    """Settings for storing and showing pictures in a scene.
-
-    Attributes
-    ----------
-    window_coordinates : bool
-        Whether the picture fills the frame of the camera that renders (window coordinates), instead of being
-        projected from the camera from which it was baked.
-    emission, diffuse : float
-        Strength with which surfaces emit the picture, and factor of the picture as a diffuse color.
-    as_float : bool
-        Whether linear float values are stored instead of 8-bit sRGB.
-    folder : Path or None
-        Folder to save images in. None packs them into the .blend file.
-    device : {"cpu", "gpu", "auto"}
-        Device that draws the pictures.
-    relight : bool
-        Whether pictures of hatching store its thresholds, from which the material draws hatching in the light
-        of the scene. Such pictures are drawn on the CPU.
-    """
-
-    window_coordinates: bool = False
-    emission: float = 1.0
-    diffuse: float = 0.0
-    as_float: bool = False
-    folder: Path | None = None
-    device: str = "cpu"
-    relight: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,36 +203,15 @@ def apply_picture(
     """
     camera = view.camera
     hatching = Hatching(view.look, picture.line_count) if view.draws_thresholds else None
+    name, stem = f"{NAME_PREFIX}{camera.name}", _image_stem(settings, camera.name)
     with rollback_on_error() as created:
-        image = new_image(
-            f"{NAME_PREFIX}{camera.name}",
-            image_data,
-            as_float=settings.as_float,
-            is_color=hatching is None,
-            stem=None if settings.folder is None else settings.folder / picture_stem(camera.name),
-        )
+        image = new_image(name, image_data, is_color=hatching is None, stem=stem)
         created.append(image)
-        material = new_material(
-            image,
-            camera,
-            created,
-            window_coordinates=settings.window_coordinates,
-            emission=settings.emission,
-            diffuse=settings.diffuse,
-            hatching=hatching,
-        )
+        material = new_material(image, camera, created, settings, hatching)
         matrices = _object_to_clip_matrices(scene_data, camera)
         node_groups = _new_groups(material, matrices, created)
-    store_record(
-        scene,
-        camera.name,
-        image,
-        material,
-        source,
-        {None: state},
-        size=image_size(image_data),
-        key=picture_key(view.look, picture),
-    )
+    size, key = image_size(image_data), picture_key(view.look, picture)
+    store_record(scene, camera.name, image, material, source, {None: state}, size=size, key=key)
     _show_on_objects(node_groups)
     warnings = (*scene_data.warnings, *_display_warnings(scene))
     return BakeResult(camera.name, image, material, tuple(matrices), picture, warnings)
@@ -297,18 +246,12 @@ def apply_sequence(
     key : PictureKey
         Contents of the key (legend) of the pictures.
     """
+    settings = replace(settings, window_coordinates=True)
     with rollback_on_error() as created:
         image = load_sequence(sequence.path, settings.as_float)
         created.append(image)
         image.name = f"{NAME_PREFIX}{sequence.name}"
-        material = new_material(
-            image,
-            camera,
-            created,
-            window_coordinates=True,
-            emission=settings.emission,
-            diffuse=settings.diffuse,
-        )
+        material = new_material(image, camera, created, settings)
         set_sequence_frames(material, sequence.first, sequence.last)
         node_groups = _new_groups(material, dict.fromkeys(scene_data.objects), created)
     store_record(
@@ -348,7 +291,7 @@ def apply_texture(
     uv_map : str
         Name of the UV map.
     tiles : mapping of int to ImageData
-        The UDIM tiles by their numbers, or one picture by any number if there are no UDIM tiles.
+        The UDIM tiles by their numbers. If `is_udim` is False, only the first item is used.
     settings : OutputSettings
     state : PictureState
         The state of the scene that the texture was drawn from.
@@ -365,19 +308,12 @@ def apply_texture(
         If the file cannot be written.
     """
     name = f"{NAME_PREFIX}{obj.name}"
-    stem = None
-    if settings.folder is not None:
-        kind = "texture" if content == "look" else content
-        stem = settings.folder / picture_stem(obj.name, kind)
+    stem = _image_stem(settings, obj.name, "texture" if content == "look" else content)
     first = next(iter(tiles.values()))
     is_color = content == "look" and hatching is None
-    options = {"as_float": settings.as_float, "is_color": is_color, "stem": stem}
+    create, image_data = (new_tiled_image, tiles) if is_udim else (new_image, first)
     with rollback_on_error() as created:
-        image = (
-            new_tiled_image(name, tiles, **options)
-            if is_udim
-            else new_image(name, first, **options)
-        )
+        image = create(name, image_data, is_color=is_color, stem=stem)
         created.append(image)
         add_shader = color_shader
         if content == "anisotropy":
@@ -392,6 +328,11 @@ def apply_texture(
     # The object can still show its pictures, but no longer an earlier texture.
     _show_on_objects(node_groups, keep_textures=False)
     return image
+
+
+def _image_stem(settings: OutputSettings, name: str, kind: str = "camera") -> Path | None:
+    """Return the path of an image file without its suffix (see `picture_stem`); None if it is packed."""
+    return None if settings.folder is None else settings.folder / picture_stem(name, kind)
 
 
 def _new_groups(
@@ -412,7 +353,9 @@ def _show_on_objects(
 ) -> None:
     """Show a recorded picture on objects, with one new node group for each, and delete the earlier groups.
 
-    The earlier groups cannot be kept: `store_record` has made them refer to the new picture.
+    `keep_textures` says whether an object can still show an earlier texture; see `set_picture_modifier`. The
+    earlier groups are not used again, because `store_record` has replaced the material in them by the new
+    one.
     """
     materials = recorded_materials(textures=keep_textures)
     for obj, node_group in node_groups.items():

@@ -13,7 +13,7 @@ from ..core.cache import Cache
 from ..core.errors import RosyError
 from ..projection.gbuffer import MeshInstance
 from ..rendering.view_input import ViewInput
-from .cameras import CameraSource, render_camera, resolve_camera
+from .cameras import CameraSource, resolve_camera
 from .look_inputs import ReadRequest, load_reference, nonfinite_policy, read_request
 from .meshes import evaluated_mesh, read_uvs
 from .scene_reader import SceneData, read_scene
@@ -73,10 +73,7 @@ def read_views(
             "rename them in their libraries, or draw from one"
         )
     scene_data = read_scene(depsgraph, objects, read_request(scene, look), cache)
-    reference = None
-    if look.tone == "picture":
-        reference_camera = reference_camera or render_camera(scene)
-        reference = load_reference(scene, depsgraph, reference_camera, look)
+    reference = load_reference(scene, depsgraph, reference_camera, look)
     instances = tuple(scene_data.instances)
     views = []
     for camera in resolved_cameras:
@@ -109,8 +106,7 @@ def read_turntable(
 def scene_depsgraph(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
     """Return the evaluated depsgraph of a scene.
 
-    It is that of the view layer in the context if this belongs to the scene, otherwise that of the first view
-    layer of the scene.
+    If the scene is the current one, its current view layer is evaluated, otherwise its first view layer.
     """
     context = bpy.context
     if context.scene == scene:
@@ -124,7 +120,8 @@ def read_lights(depsgraph: bpy.types.Depsgraph, view_matrix: np.ndarray) -> list
 
     A white diffuse surface that faces a sun with a strength of pi W/m2 has a radiance of 1. At the distance r
     from a point light of power P, it has a radiance of P / (4 pi^2 r^2). Spots and area lights are treated as
-    point lights. Area lights are four times as bright, as they are along their axes.
+    point lights. An area light counts as a point light of four times its power: on the axis of the area
+    light, this gives the same radiance.
 
     Parameters
     ----------
@@ -154,20 +151,15 @@ def rendered_lights(
 
 def _convert_light(data: bpy.types.Light, matrix: np.ndarray) -> Light:
     """Convert a light of Blender to a `Light`. `matrix` transforms its local space to camera space."""
-    color = np.array(data.color) * _temperature_color(data)
+    has_temperature = getattr(data, "use_temperature", False)
+    temperature_color = data.temperature_color if has_temperature else np.ones(3)
+    color = np.array(data.color) * np.array(temperature_color)
     energy = data.energy * 2.0 ** getattr(data, "exposure", 0.0)
     if data.type == "SUN":
         direction = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
         return Light("sun", direction, color, energy / np.pi)
     axial_gain = 4.0 if data.type == "AREA" else 1.0
     return Light("point", matrix[:3, 3].copy(), color, axial_gain * energy / (4 * np.pi**2))
-
-
-def _temperature_color(data: bpy.types.Light) -> np.ndarray:
-    """Return the RGB factor of the color temperature of a light; ones if the light does not use one."""
-    if not getattr(data, "use_temperature", False):
-        return np.ones(3)
-    return np.array(data.temperature_color)
 
 
 def read_texture_input(

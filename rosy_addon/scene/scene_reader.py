@@ -13,7 +13,7 @@ import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from dataclasses import field as dataclass_field
+from functools import partial
 
 import bpy
 import numpy as np
@@ -33,7 +33,7 @@ from .evaluated_field import (
     temp_attributes,
     topology_hash,
 )
-from .field_attributes import attribute_name, field_degree, is_face_vector_field, surface_key
+from .field_attributes import attribute_name, cached_for_surface, field_degree, is_face_vector_field
 from .look_inputs import (
     FIELDS_ONLY,
     ReadRequest,
@@ -44,12 +44,7 @@ from .look_inputs import (
 )
 from .mesh_fields import read_mesh_field
 from .mesh_states import MeshStates, mesh_state_key, read_mesh_state
-from .meshes import (
-    REST_ATTRIBUTE,
-    evaluated_mesh,
-    mesh_surface,
-    read_attribute,
-)
+from .meshes import REST_ATTRIBUTE, evaluated_mesh, mesh_surface, read_attribute
 from .visible_objects import Instances, field_objects, rendered_instances
 
 #: Cache key of the mesh instances of the last call of `SceneReader.read`.
@@ -78,8 +73,8 @@ class SceneData:
 
     instances: list[MeshInstance]
     objects: list[bpy.types.Object]
-    warnings: tuple[str, ...] = ()
-    mesh_states: MeshStates = dataclass_field(default_factory=dict)
+    warnings: tuple[str, ...]
+    mesh_states: MeshStates
 
 
 def read_scene(
@@ -253,10 +248,7 @@ class SceneReader:
                 del by_name[name]
 
     def read(
-        self,
-        instances: Instances,
-        request: ReadRequest = FIELDS_ONLY,
-        deadline: float = math.inf,
+        self, instances: Instances, request: ReadRequest = FIELDS_ONLY, deadline: float = math.inf
     ) -> list[SceneInstance]:
         """Return the mesh instances of a scene in their current state.
 
@@ -297,10 +289,8 @@ class SceneReader:
             matrix = np.array(instance.matrix_world, dtype=np.float64)
             key = *(id(part) for part in mesh_data), matrix.tobytes()
             if key not in mesh_instances:
-                surface, *values = mesh_data
-                mesh_instances[key] = last_instances.get(key) or MeshInstance(
-                    surface, matrix, *values
-                )
+                new_instance = MeshInstance(mesh_data[0], matrix, *mesh_data[1:])
+                mesh_instances[key] = last_instances.get(key, new_instance)
             is_shown_by_parent = instance.is_instance and instance.parent
             visibility_object = instance.parent.original if is_shown_by_parent else owner
             entries.append(SceneInstance(mesh_instances[key], owner, visibility_object))
@@ -406,7 +396,14 @@ class SceneReader:
         self._has_read_any = True
         try:
             with evaluated_mesh(obj) as mesh:
-                mesh_data = self._read_mesh(mesh, owner, draws_field)
+                if mesh is None:
+                    mesh_data = None
+                elif draws_field:
+                    mesh_data = self._read_field_mesh(mesh, owner)
+                else:
+                    label = f"object '{owner.name}'"
+                    surface = mesh_surface(mesh, label, occluder_only=True, cache=self.cache)
+                    mesh_data = surface, None, None, None
                 is_waiting = mesh is not None and mesh_data is None
                 if self.mesh_states is not None and not is_waiting:
                     state_request = request if draws_field else None
@@ -419,39 +416,24 @@ class SceneReader:
             self._meshes[key] = mesh_data
         return mesh_data
 
-    def _read_mesh(
-        self, mesh: bpy.types.Mesh | None, owner: bpy.types.Object, draws_field: bool
-    ) -> _MeshData | None:
-        """Read an evaluated mesh. Return None if it has no faces, or needs `resolve_topologies` first."""
-        if mesh is None:
-            return None
-        if draws_field:
-            return self._read_field_mesh(mesh, owner)
-        label = f"object '{owner.name}'"
-        return mesh_surface(mesh, label, occluder_only=True, cache=self.cache), None, None, None
-
     def _read_field_mesh(self, mesh: bpy.types.Mesh, owner: bpy.types.Object) -> _MeshData | None:
         """Read an evaluated mesh with its field. Return None if it needs `resolve_topologies` first."""
-        request, label, original = self._request, f"object '{owner.name}'", owner.data
-        surface = mesh_surface(mesh, label, cache=self.cache)
-        tone = read_tone(mesh, owner, request.tone, self.cache)
-        values = read_color_values(mesh, request.color_attribute, label, self.cache)
+        request, cache, label = self._request, self.cache, f"object '{owner.name}'"
+        original = owner.data
+        surface = mesh_surface(mesh, label, cache=cache)
+        tone = read_tone(mesh, owner, request.tone, cache)
+        values = read_color_values(mesh, request.color_attribute, label, cache)
         if original.is_editmode:
             return surface, self._edit_mode_field(mesh, owner, surface, label), tone, values
-        is_deformed = bool(user_modifiers(owner) or original.shape_keys)
-        original_surface = (
-            mesh_surface(original, label, cache=self.cache) if is_deformed else surface
-        )
-        keeps_field = all(modifier.type != "NODES" for modifier in user_modifiers(owner))
-        if keeps_field and have_same_polygons(surface, original_surface):
+        modifiers, undeformed = user_modifiers(owner), surface
+        if modifiers or original.shape_keys:
+            undeformed = mesh_surface(original, label, cache=cache)
+        keeps_field = all(modifier.type != "NODES" for modifier in modifiers)
+        if keeps_field and have_same_polygons(surface, undeformed):
             field = read_mesh_field(
-                original,
-                nonfinite=request.nonfinite,
-                label=label,
-                surface=original_surface,
-                cache=self.cache,
+                original, surface=undeformed, nonfinite=request.nonfinite, label=label, cache=cache
             )
-            return self._with_rest(surface, original_surface.vertices), field, tone, values
+            return self._with_rest(surface, undeformed.vertices), field, tone, values
         key = owner.name_full, topology_hash(mesh, original)
         topology = self._topologies.get(key)
         if topology is None:
@@ -487,7 +469,5 @@ class SceneReader:
         if rest is None or np.array_equal(rest, surface.vertices):
             return surface
         rest = np.asarray(rest, dtype=np.float64)
-        key = surface_key(surface, "rest", rest)
-        return self.cache.get_or_create(
-            key, lambda: (surface, surface.with_parts(rest_vertices=rest))
-        )[1]
+        with_rest = partial(surface.with_parts, rest_vertices=rest)
+        return cached_for_surface(self.cache, surface, with_rest, "rest", rest)

@@ -21,6 +21,7 @@ from .meshes import (
     read_attribute,
     read_collection,
     vertex_positions,
+    write_attribute,
 )
 from .scene_reader import read_scene
 
@@ -92,7 +93,8 @@ def read_editable_singularities(
 ) -> Singularities:
     """Find the singularities of the field of an object's original mesh, which can be edited.
 
-    Their positions are those of their vertices on the evaluated mesh. The evaluated field may have others.
+    A singularity is at a vertex. Its position is the position of this vertex on the evaluated mesh. The
+    evaluated field may have other singularities.
 
     Raises
     ------
@@ -137,8 +139,7 @@ def add_singularity_points(
         (INDEX_ATTRIBUTE, singularity_data.index),
         (DEGREE_ATTRIBUTE, np.full(len(singularity_data), singularity_data.degree)),
     ):
-        attribute = data.attributes.new(key, "INT", "POINT")
-        attribute.data.foreach_set("value", values.astype(np.int32))
+        write_attribute(data.attributes.new(key, "INT", "POINT"), values)
     point_object.parent = obj
     for collection in obj.users_collection or (scene.collection,):
         collection.objects.link(point_object)
@@ -177,17 +178,15 @@ def read_singularity_points(
     own_points = next(iter(_point_objects(scene, obj)), None)
     source = scene.objects.get(name) if name else own_points
     if source is None:
-        missing = (
-            f"object '{name}' is not in this scene"
-            if name
-            else f"object '{obj.name}': has no points"
-        )
+        missing = f"object '{obj.name}': has no points"
+        if name:
+            missing = f"object '{name}' is not in this scene"
         raise RosyError(
             f"{missing}: press Singularities to get points, then move them and change their index"
         )
-    index = (
-        read_attribute(source.data, INDEX_ATTRIBUTE, np.int64, 1) if has_points(source) else None
-    )
+    index = None
+    if has_points(source):
+        index = read_attribute(source.data, INDEX_ATTRIBUTE, np.int64, 1)
     if index is None:
         raise RosyError(
             f"object '{source.name}': has no integer attribute '{INDEX_ATTRIBUTE}' on its points, or is in "
@@ -207,10 +206,8 @@ def read_singularity_points(
     to_mesh = np.array(obj.matrix_world.inverted_safe() @ source.matrix_world)
     points = points @ to_mesh[:3, :3].T + to_mesh[:3, 3]
     vertices = vertex_positions(obj.data)
-    nearest = np.array(
-        [np.square(vertices - point).sum(axis=1).argmin() for point in points], dtype=np.int64
-    )
-    vertex, position = np.unique(nearest, return_inverse=True)
+    nearest = [np.square(vertices - point).sum(axis=1).argmin() for point in points]
+    vertex, position = np.unique(np.array(nearest, dtype=np.int64), return_inverse=True)
     total = np.zeros(len(vertex), dtype=np.int64)
     np.add.at(total, position, index)
     return vertex[total != 0], total[total != 0]

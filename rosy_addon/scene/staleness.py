@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import atexit
 import time
-from collections.abc import Mapping
 from typing import Any
 
 import bpy
 
 from .picture_state import MeshStates, PictureState, SceneState, settings_key
+
+#: Digests of objects or lights by name, as in the attributes of `PictureState`.
+Digests = dict[str, list[str]]
 
 #: Least time between two readings of a scene, as a multiple of the time that a reading takes. So panels spend
 #: at most a tenth of the time on readings, and playback and sculpting stay fluent.
@@ -45,16 +47,19 @@ class SceneStateCache:
         self._next_reading = 0.0
 
     def get(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> SceneState:
-        """Return the state of the view layer of a depsgraph. It may be a moment old; see `TTL_READINGS`."""
+        """Return the state of the view layer of a depsgraph.
+
+        After a change, the scene is read again, but only after a pause of `TTL_READINGS` times the duration
+        of the last reading. Until then, the earlier state is returned.
+        """
         view_layer = depsgraph.view_layer
         key = scene.session_uid, view_layer.name, settings_key(scene, view_layer)
         if key != self._key or not self._is_watching():
             self.clear()
             self._key = key
             self._watch()
-        if self._scene_state is None or (
-            self._is_outdated and time.monotonic() >= self._next_reading
-        ):
+        is_due = self._is_outdated and time.monotonic() >= self._next_reading
+        if self._scene_state is None or is_due:
             start = time.monotonic()
             self._scene_state = SceneState(scene, depsgraph, self._mesh_states)
             self._is_outdated = False
@@ -151,17 +156,13 @@ def difference(recorded: PictureState, present: PictureState, source: str) -> st
 
 
 def _object_difference(
-    recorded: Mapping[str, list[str]],
-    present: Mapping[str, list[str]],
-    *,
-    kind: str = "",
-    of_mesh: str = "",
+    recorded: Digests, present: Digests, *, kind: str = "", of_mesh: str = ""
 ) -> str:
     """Return how objects or lights have changed; empty if they have not. Objects may have been renamed.
 
     Parameters
     ----------
-    recorded, present : mapping of str to list of str
+    recorded, present : dict of str to list of str
         The same attribute of two `PictureState`: digests by the names of objects.
     kind : str
         Text before the names. If it is empty, the result tells moved objects from changed ones.
@@ -183,9 +184,7 @@ def _object_difference(
     return ""
 
 
-def _without_renamed(
-    recorded: Mapping[str, list[str]], present: Mapping[str, list[str]]
-) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
+def _without_renamed(recorded: Digests, present: Digests) -> tuple[Digests, Digests]:
     """Return copies of both arguments in which renamed objects have their new names.
 
     An object counts as renamed if its name is gone, and a new name has one of its digests.

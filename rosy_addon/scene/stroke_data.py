@@ -13,9 +13,10 @@ import bpy
 import numpy as np
 
 from ..core.color import from_hex, to_linear
-from ..line_drawing.drawing_outputs import StrokeGeometry, SurfaceAttachment
+from ..line_drawing.drawing_outputs import StrokeGeometry
 from ..line_drawing.outline import OUTLINE_KINDS
 from .datablocks import OWNED_TAG, STROKES_TAG
+from .meshes import write_attribute
 from .node_builder import NodeBuilder, enabled_output, new_emissive_material, new_modifier_group
 
 #: A function that is called with each new datablock and the name that it should have.
@@ -62,8 +63,11 @@ def new_curves(
     set_attribute(data, "surface_normal", "FLOAT_VECTOR", "POINT", strokes.normal)
     set_attribute(data, "face_index", "INT", "POINT", strokes.face)
     if geometry.attachment is not None:
-        for key, (data_type, column) in attribute_values(geometry.attachment).items():
-            set_attribute(data, key, data_type, "POINT", column)
+        for key, vertices in zip(VERTEX_ATTRIBUTES, geometry.attachment.vertices.T, strict=True):
+            set_attribute(data, key, "INT", "POINT", vertices)
+        weights, height = geometry.attachment.weights, geometry.attachment.height
+        set_attribute(data, WEIGHTS_ATTRIBUTE, "FLOAT_VECTOR", "POINT", weights)
+        set_attribute(data, HEIGHT_ATTRIBUTE, "FLOAT", "POINT", height)
     material = new_emissive_material(name, INK_ATTRIBUTE)
     register(material, name)
     data.materials.append(material)
@@ -73,9 +77,7 @@ def new_curves(
 def set_attribute(data: Any, name: str, data_type: str, domain: str, values: np.ndarray) -> None:
     """Write an attribute of Curves or of a Grease Pencil drawing, and create it if it is missing."""
     attribute = data.attributes.get(name) or data.attributes.new(name, data_type, domain)
-    key = {"FLOAT_VECTOR": "vector", "FLOAT_COLOR": "color"}.get(data_type, "value")
-    dtype = {"INT": np.int32, "INT8": np.int8}.get(data_type, np.float32)
-    attribute.data.foreach_set(key, np.ascontiguousarray(values, dtype=dtype).ravel())
+    write_attribute(attribute, values)
 
 
 #: Name of the Grease Pencil layer for outlines: silhouettes, creases and borders.
@@ -115,13 +117,11 @@ def new_grease_pencil(
     add_strokes = _add_to_drawing if has_grease_pencil_drawings() else _add_to_frame
     strokes = geometry.strokes
     layer_names = [
-        OUTLINE_LAYER if family_name in OUTLINE_KINDS else family_name.capitalize()
-        for family_name in strokes.names
+        OUTLINE_LAYER if name in OUTLINE_KINDS else name.capitalize() for name in strokes.names
     ]
     for material_index, layer_name in enumerate(dict.fromkeys(layer_names)):
-        material = _new_material(
-            f"RoSy {layer_name}", geometry.colors[layer_names.index(layer_name)]
-        )
+        color = geometry.colors[layer_names.index(layer_name)]
+        material = _new_material(f"RoSy {layer_name}", color)
         register(material, f"RoSy {layer_name}")
         data.materials.append(material)
         layer = data.layers.new(layer_name)
@@ -142,29 +142,21 @@ def new_grease_pencil(
 
 
 def _add_to_drawing(
-    frame: Any,
-    point_counts: np.ndarray,
-    points: np.ndarray,
-    radius: np.ndarray,
-    material_index: int,
+    frame: Any, counts: np.ndarray, points: np.ndarray, radius: np.ndarray, material_index: int
 ) -> None:
     """Add strokes to a frame of a Grease Pencil layer, in Blender 4.3 and later."""
     drawing = frame.drawing
-    drawing.add_strokes(point_counts.tolist())
+    drawing.add_strokes(counts.tolist())
     set_attribute(drawing, "position", "FLOAT_VECTOR", "POINT", points)
     set_attribute(drawing, "radius", "FLOAT", "POINT", radius)
     set_attribute(drawing, "opacity", "FLOAT", "POINT", np.ones(len(points)))
-    materials = np.full(len(point_counts), material_index)
+    materials = np.full(len(counts), material_index)
     set_attribute(drawing, "material_index", "INT", "CURVE", materials)
     drawing.tag_positions_changed()
 
 
 def _add_to_frame(
-    frame: Any,
-    point_counts: np.ndarray,
-    points: np.ndarray,
-    radius: np.ndarray,
-    material_index: int,
+    frame: Any, counts: np.ndarray, points: np.ndarray, radius: np.ndarray, material_index: int
 ) -> None:
     """Add strokes to a frame of a Grease Pencil layer, before Blender 4.3.
 
@@ -172,14 +164,13 @@ def _add_to_frame(
     point.
     """
     line_width = int(np.clip(np.ceil(LEGACY_WIDTH_PER_UNIT * radius.max()), 1, MAX_LEGACY_WIDTH))
-    ends = np.cumsum(point_counts)
-    for start, end in zip((ends - point_counts).tolist(), ends.tolist(), strict=True):
+    pressure = radius * (LEGACY_WIDTH_PER_UNIT / line_width)
+    ends = np.cumsum(counts)
+    for start, end in zip((ends - counts).tolist(), ends.tolist(), strict=True):
         stroke = frame.strokes.new()
         stroke.points.add(end - start)
         stroke.points.foreach_set("co", points[start:end].ravel())
-        stroke.points.foreach_set(
-            "pressure", radius[start:end] * (LEGACY_WIDTH_PER_UNIT / line_width)
-        )
+        stroke.points.foreach_set("pressure", pressure[start:end])
         stroke.points.foreach_set("strength", np.ones(end - start, dtype=np.float32))
         stroke.line_width, stroke.material_index = line_width, material_index
 
@@ -201,27 +192,18 @@ VERTEX_ATTRIBUTES = ("surface_vertex_0", "surface_vertex_1", "surface_vertex_2")
 WEIGHTS_ATTRIBUTE, HEIGHT_ATTRIBUTE = "surface_weights", "surface_height"
 
 
-def attribute_values(attachment: SurfaceAttachment) -> dict[str, tuple[str, object]]:
-    """Return the attributes that attach points to a surface: data types and values, by name."""
-    values: dict[str, tuple[str, object]] = {
-        name: ("INT", attachment.vertices[:, index]) for index, name in enumerate(VERTEX_ATTRIBUTES)
-    }
-    values[WEIGHTS_ATTRIBUTE] = ("FLOAT_VECTOR", attachment.weights)
-    values[HEIGHT_ATTRIBUTE] = ("FLOAT", attachment.height)
-    return values
-
-
 def follow_surface(obj: bpy.types.Object, surface: bpy.types.Object, vertex_count: int) -> None:
     """Add a modifier to strokes with which they follow the surface of an object. It replaces an earlier one.
 
     Parameters
     ----------
     obj : bpy.types.Object
-        The strokes: Curves that have the attributes of `attribute_values`.
+        The strokes: Curves with `VERTEX_ATTRIBUTES`, `WEIGHTS_ATTRIBUTE` and `HEIGHT_ATTRIBUTE`.
     surface : bpy.types.Object
         The object that the strokes were drawn on.
     vertex_count : int
-        Number of vertices of the evaluated mesh of `surface`. While it is another one, strokes do not follow.
+        Number of vertices of the evaluated mesh of `surface`. While the mesh has another number of vertices,
+        the strokes stay where they were drawn.
     """
     group = _new_group(f"{obj.name} {MODIFIER_NAME}", surface, vertex_count)
     modifier = _modifier_of(obj)
@@ -262,23 +244,16 @@ def _new_group(name: str, surface: bpy.types.Object, vertex_count: int) -> bpy.t
     info = build("GeometryNodeObjectInfo", {"Object": surface}, transform_space="RELATIVE")
     mesh = info.outputs["Geometry"]
     weights = build("ShaderNodeSeparateXYZ", {0: _named(build, WEIGHTS_ATTRIBUTE, "FLOAT_VECTOR")})
-    position, normal = (
-        _weighted_mean(build, mesh, build(kind).outputs[0], weights)
-        for kind in ("GeometryNodeInputPosition", "GeometryNodeInputNormal")
-    )
+    position = _weighted_mean(build, mesh, "GeometryNodeInputPosition", weights)
+    normal = _weighted_mean(build, mesh, "GeometryNodeInputNormal", weights)
     unit_normal = build.vector_math("NORMALIZE", normal)
     height = build.scaled(unit_normal, _named(build, HEIGHT_ATTRIBUTE, "FLOAT"))
     size = build("GeometryNodeAttributeDomainSize", {0: mesh}).outputs["Point Count"]
     inputs = {"A": size, "B": vertex_count}
     is_same = build("FunctionNodeCompare", inputs, data_type="INT", operation="EQUAL")
-    moved = build(
-        "GeometryNodeSetPosition",
-        {
-            "Geometry": strokes,
-            "Selection": is_same.outputs[0],
-            "Position": build.vector_math("ADD", position, height),
-        },
-    )
+    place = build.vector_math("ADD", position, height)
+    inputs = {"Geometry": strokes, "Selection": is_same.outputs[0], "Position": place}
+    moved = build("GeometryNodeSetPosition", inputs)
     build("NodeGroupOutput", {"Geometry": moved.outputs["Geometry"]})
     return group
 
@@ -290,16 +265,16 @@ def _named(build: NodeBuilder, name: str, data_type: str) -> bpy.types.NodeSocke
 
 
 def _weighted_mean(
-    build: NodeBuilder,
-    mesh: bpy.types.NodeSocket,
-    value: bpy.types.NodeSocket,
-    weights: bpy.types.Node,
+    build: NodeBuilder, mesh: bpy.types.NodeSocket, kind: str, weights: bpy.types.Node
 ) -> bpy.types.NodeSocket:
-    """Add nodes that interpolate a vector in the triangle of each point, and return their output."""
-    terms = []
+    """Add nodes that interpolate a vector of a mesh in the triangle of each point, and return their output.
+
+    `kind` is the type of the input node of the vector.
+    """
+    value, terms = build(kind).outputs[0], []
+    types = {"data_type": "FLOAT_VECTOR", "domain": "POINT"}
     for name, weight in zip(VERTEX_ATTRIBUTES, weights.outputs, strict=True):
         inputs = {"Geometry": mesh, "Value": value, "Index": _named(build, name, "INT")}
-        kind = "GeometryNodeSampleIndex"
-        sample = build(kind, inputs, data_type="FLOAT_VECTOR", domain="POINT")
+        sample = build("GeometryNodeSampleIndex", inputs, **types)
         terms.append(build.scaled(enabled_output(sample), weight))
     return reduce(partial(build.vector_math, "ADD"), terms)

@@ -7,7 +7,6 @@ When strokes are drawn again, the object gets new data, and keeps its modifiers,
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import bpy
@@ -35,10 +34,7 @@ from .stroke_data import (
 from .visible_objects import field_objects
 
 #: Functions that create the data of an object with strokes, by the kind of object.
-DATA_BUILDERS: dict[str, Callable[..., bpy.types.ID]] = {
-    "PENCIL": new_grease_pencil,
-    "CURVES": new_curves,
-}
+DATA_BUILDERS = {"PENCIL": new_grease_pencil, "CURVES": new_curves}
 
 #: Attributes that define strokes. Others, such as the selection, may change although strokes are not edited.
 STROKE_ATTRIBUTES = ("position", "radius", "opacity", "material_index", INK_ATTRIBUTE)
@@ -126,7 +122,7 @@ def store_strokes(
     bpy.types.Object
         The object with the strokes.
     """
-    name = f"RoSy Strokes {camera}"
+    name, first_frame = f"RoSy Strokes {camera}", min(scene.frame_start, scene.frame_current)
     final_names: dict[bpy.types.ID, str] = {}
     with rollback_on_error() as created:
 
@@ -134,9 +130,7 @@ def store_strokes(
             created.append(datablock)
             final_names[datablock] = final_name
 
-        data = DATA_BUILDERS[kind](
-            name, geometry, min(scene.frame_start, scene.frame_current), register
-        )
+        data = DATA_BUILDERS[kind](name, geometry, first_frame, register)
         record = _find_record(scene, kind, camera)
         obj = None if record is None else record.thing
         if obj is None:

@@ -25,7 +25,7 @@ class Hatching(NamedTuple):
     look : Look
         Its settings of ink, paper and tone are used.
     line_count : int
-        Number of undirected directions of the field through a point.
+        Number of lines (pairs of opposite directions of the field) through a point.
     """
 
     look: Look
@@ -64,10 +64,7 @@ def color_shader(build: NodeBuilder, image_node: bpy.types.Node) -> bpy.types.No
 
 
 def hatching_shader(
-    build: NodeBuilder,
-    image_node: bpy.types.Node,
-    hatching: Hatching,
-    created: list[bpy.types.ID],
+    build: NodeBuilder, image_node: bpy.types.Node, hatching: Hatching, created: list[bpy.types.ID]
 ) -> bpy.types.NodeSocket:
     """Add nodes that draw hatching from an image of thresholds. The darker the surface, the denser it is.
 
@@ -154,9 +151,20 @@ def brushed_metal_shader(
 def _along_bitangent(
     build: NodeBuilder, decoded: bpy.types.NodeSocket, tangent: bpy.types.NodeSocket, uv_map: str
 ) -> bpy.types.NodeSocket:
-    """Add nodes for the component along the bitangent, and return their output.
+    """Add nodes that compute the bitangent component of an anisotropy direction, and return their output.
 
     Where the UV map is mirrored, the component is negated, as Blender does not mirror the bitangent there.
+
+    Parameters
+    ----------
+    build : NodeBuilder
+    decoded : bpy.types.NodeSocket
+        The anisotropy direction: its components along the tangent and the bitangent, from -1 to 1, and its
+        strength.
+    tangent : bpy.types.NodeSocket
+        The tangent of the UV map.
+    uv_map : str
+        Name of the UV map.
     """
     # As a tangent-space normal map, this color is the direction of the bitangent.
     bitangent = build("ShaderNodeNormalMap", {"Color": (0.5, 1.0, 0.5, 1.0)}, uv_map=uv_map)

@@ -27,7 +27,7 @@ def field_objects(
     Raises
     ------
     RosyError
-        If `names` has a name of no object, or of an object that has no field, is hidden, or is switched off.
+        If there is no object with one of the names, or the object has no field, is hidden or is switched off.
     """
     candidates = {obj.name: obj for obj in _visible_objects(view_layer) if _draws_field(obj)}
     if names is None:
@@ -57,17 +57,13 @@ def rendered_instances(
 
 
 def shown_instances(depsgraph: bpy.types.Depsgraph, *, include_occluders: bool) -> Instances:
-    """Return the instances of meshes that are visible in 3D views: all, or only those with a field."""
-    meshes = (
-        (instance, _draws_field(instance.object.original))
-        for instance in depsgraph.object_instances
-        if instance.object.type == "MESH" and instance.show_self
-    )
-    return (
-        (instance, draws_field)
-        for instance, draws_field in meshes
-        if draws_field or (include_occluders and not instance.object.original.get(OWNED_TAG))
-    )
+    """Yield the instances of meshes that are visible in 3D views: all, or only meshes with a field."""
+    for instance in depsgraph.object_instances:
+        obj = instance.object
+        if obj.type == "MESH" and instance.show_self:
+            draws_field = _draws_field(obj.original)
+            if draws_field or (include_occluders and not obj.original.get(OWNED_TAG)):
+                yield instance, draws_field
 
 
 def _is_rendered(
@@ -82,9 +78,8 @@ def _is_rendered(
         return False
     if instance.is_instance:
         instancer = instance.parent
-        return not obj.original.hide_render and (
-            instancer is None or instancer.original in visible_objects
-        )
+        is_shown = instancer is None or instancer.original in visible_objects
+        return is_shown and not obj.original.hide_render
     return obj.original in visible_objects
 
 

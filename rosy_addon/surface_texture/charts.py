@@ -6,7 +6,8 @@ tangents to displacements in the UV map is linear: w becomes a w + b conj(w).
 
 The angles of the field are compared from texel to texel, relative to frames. For this, frames must rotate as
 little from texel to texel as the surface allows. The frame used is the direction that the UV map rotates to
-its u axis. It is averaged at the corners over each smooth fan and interpolated like the field.
+its u axis. It is averaged at the corners and interpolated like the field. Each average is over the triangles
+around a vertex that are in the same chart and not separated by sharp edges (a smooth fan).
 """
 
 from __future__ import annotations
@@ -211,9 +212,8 @@ def _averaged_at_corners(
         group = connected_components(len(fan), pairs)
     report(0.6, LABEL)
     vector = mesh.to_world(np.arange(len(direction)), direction) * mesh.area[:, None]
-    total = np.stack(
-        [np.bincount(group, np.repeat(component, 3)) for component in vector.T], axis=1
-    )
+    sums = [np.bincount(group, np.repeat(component, 3)) for component in vector.T]
+    total = np.stack(sums, axis=1)
     frame = np.empty((len(direction), 3), dtype=np.complex128)
     for corner in range(3):
         report(0.7 + 0.1 * corner, LABEL)

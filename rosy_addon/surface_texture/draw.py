@@ -8,26 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compositor.color_values import (
-    check_color_values,
-    scaled_positions,
-    value_range,
-    value_scale,
-)
+from ..compositor.color_values import check_color_values, scaled_positions, value_range, value_scale
 from ..compositor.compose import colorize, streak_tone
 from ..compositor.flow import NO_DRIFT, Drift, noise_channel_count
 from ..compositor.ink_thresholds import sharp_look
 from ..compositor.lic import lic_lengths, noise_args
 from ..compositor.lic_images import with_magnitude_range
-from ..compositor.look import (
-    Look,
-    colors_magnitude,
-    colors_values,
-    crease_angle_of,
-    is_hatched,
-)
+from ..compositor.look import Look, colors_magnitude, colors_values, crease_angle_of, is_hatched
 from ..compositor.look_units import PixelLook, surface_pixel_look
 from ..compositor.pixel_field import PixelField
+from ..compositor.reported_blocks import reported_blocks
 from ..compositor.shading import Light
 from ..core.cache import BAKE_CACHE, Cache
 from ..core.errors import RosyError
@@ -39,24 +29,16 @@ from ..core.memory import (
     raise_mmap_threshold,
     samples_memory,
 )
-from ..core.progress import progress, report
+from ..core.progress import progress
 from ..image_io.image_data import ImageData, image_of_pixels
 from ..line_drawing.tangent_mesh import TangentMesh, build_tangent_mesh
 from ..projection.gbuffer import MeshInstance
-from ..projection.pixel_blocks import pixel_blocks
 from ..projection.surface_sampling import values_in_triangles
 from .charts import UvCharts, uv_charts
 from .hatching import lit_ink, thresholds
 from .line_order import direction_map
 from .texel_field import texel_field, texel_noise
-from .texels import (
-    Texels,
-    TexelSurface,
-    TextureFrame,
-    fill_margin,
-    rasterize_charts,
-    texture_frame,
-)
+from .texels import Texels, TexelSurface, TextureFrame, fill_margin, rasterize_charts, texture_frame
 
 #: Lengths of a look in pixels are converted to lengths on the surface: this number of pixels is the side of a
 #: square with the area of the surface. Lines are then about as wide as in a picture of 1000 pixels that the
@@ -113,7 +95,7 @@ class Texture:
     rgba : (H, W, 4) float32 ndarray
         Pixels. The bottom row is first. The tiles of a UDIM texture are stacked.
     overlap : float
-        Fraction of the area of the UV map that is covered by another chart, so that both share texels.
+        Fraction of the area of all charts that is not shown because other charts overlap it.
     is_data : bool
         Whether the pixels are thresholds of ink (`compositor.ink_thresholds`) or directions. Otherwise
         they are linear colors.
@@ -169,7 +151,8 @@ def draw_texture(
     uv : (C, 2) ndarray
         u and v at the corners of the surface.
     look : Look
-        Settings of light and camera have no effect. Lengths in pixels are converted with `SURFACE_PIXELS`.
+        Settings of light and camera have no effect. A length in pixels becomes a length on the surface:
+        `SURFACE_PIXELS` (1024) pixels are the side of a square with the area of the surface.
     size : int
         Texels on each side of the texture, or of a tile of it.
     margin : int
@@ -179,8 +162,9 @@ def draw_texture(
     lights : sequence of Light, optional
         Lights in world space. If they are given, hatching is drawn as ink under this light. Otherwise a
         texture of hatching contains thresholds, and the material draws the ink.
-    content : str
-        One of `CONTENTS`.
+    content : {"look", "anisotropy", "flow"}
+        What the texture shows: the picture of the look, or the direction of the field as an anisotropy map
+        or as a flow map; see `direction_map`.
     drift : Drift
         How far streaks have drifted, if the look has flow.
     cache : Cache, optional
@@ -204,11 +188,7 @@ def draw_texture(
     crease_angle = crease_angle_of(look)
     with progress(0.0, 0.05):
         mesh = build_tangent_mesh(
-            instance,
-            display=look.display,
-            cross_creases=crease_angle is None,
-            crease_angle=look.crease_angle,
-            cache=cache,
+            instance, display=look.display, crease_angle=crease_angle, cache=cache
         )
     with progress(0.05, 0.1):
         charts = uv_charts(instance.surface, mesh, uv)
@@ -216,7 +196,7 @@ def draw_texture(
     _check_texture_memory(frame, charts, mesh, look)
     with progress(0.1, 0.15):
         texels = rasterize_charts(charts, frame, name)
-    on = TexelSurface(instance, mesh, charts, texels, step_length(mesh, charts, texels))
+    on = TexelSurface(instance, mesh, charts, texels, step_length(mesh, charts, texels), cache)
     with progress(0.15, 0.3):
         field = texel_field(on, crease_angle)
     is_direction = content != "look"
@@ -225,14 +205,14 @@ def draw_texture(
         if is_direction:
             pixels = direction_map(on, content, look.guiding_angle)
         else:
-            pixels = _look_pixels(on, field, look, drift, cache)
+            pixels = _look_pixels(on, field, look, drift)
     is_lit = is_ink and lights is not None
     if is_lit:
         with progress(0.9, 0.95):
             pixels = lit_ink(on, pixels, lights, look)
     # Directions are relative to their chart.
     with progress(0.95, 1.0):
-        rgba = fill_margin(frame, field, pixels, margin, crosses_seams=not is_direction)
+        rgba = fill_margin(frame, field, pixels, margin, not is_direction)
     is_data = is_direction or (is_ink and not is_lit)
     return Texture(frame, rgba, texels.overlap, is_data, mesh.family_count)
 
@@ -250,14 +230,11 @@ def check_texture_size(size: int, margin: int) -> None:
     RosyError
         If one of them is out of range.
     """
-    for value, low, high, what in (
-        (size, MIN_SIZE, MAX_SIZE, "a size"),
-        (margin, 0, MAX_MARGIN, "a margin"),
-    ):
+    ranges = (size, MIN_SIZE, MAX_SIZE, "a size"), (margin, 0, MAX_MARGIN, "a margin")
+    for value, low, high, what in ranges:
         if not low <= value <= high:
-            raise RosyError(
-                f"a texture cannot have {what} of {value} texels: choose {low} to {high}"
-            )
+            what = f"{what} of {value} texels"
+            raise RosyError(f"a texture cannot have {what}: choose {low} to {high}")
 
 
 def _check_texture_memory(
@@ -270,11 +247,8 @@ def _check_texture_memory(
     needed = PROCESS_BYTES + PIXEL_BYTES * texels + TRIANGLE_BYTES * len(mesh.area)
     needed += samples_memory(used, mesh.family_count, many_images)
     tiles = f"{len(frame.tiles)} tiles of " if frame.is_udim and len(frame.tiles) > 1 else ""
-    check_memory(
-        needed,
-        f"a texture of {tiles}{frame.size} x {frame.size} texels",
-        "choose a smaller size",
-    )
+    texture = f"a texture of {tiles}{frame.size} x {frame.size} texels"
+    check_memory(needed, texture, "choose a smaller size")
 
 
 def step_length(mesh: TangentMesh, charts: UvCharts, texels: Texels) -> float:
@@ -288,19 +262,14 @@ def step_length(mesh: TangentMesh, charts: UvCharts, texels: Texels) -> float:
     return max(1 / finest if finest else 0.0, MIN_STEP * mean_size)
 
 
-def _look_pixels(
-    on: TexelSurface, field: PixelField, look: Look, drift: Drift, cache: Cache | None
-) -> np.ndarray:
+def _look_pixels(on: TexelSurface, field: PixelField, look: Look, drift: Drift) -> np.ndarray:
     """Return (P, 4) values at texels: thresholds for a look with ink, linear colors for any other look."""
     is_ink = is_hatched(look)
-    step_look = surface_pixel_look(
-        sharp_look(look) if is_ink else look,
-        on.step,
-        float(np.sqrt(on.mesh.area.sum())) / SURFACE_PIXELS,
-        drift,
-    ).for_symmetry(field.symmetry)
+    pixel = float(np.sqrt(on.mesh.area.sum())) / SURFACE_PIXELS
+    step_look = surface_pixel_look(sharp_look(look) if is_ink else look, on.step, pixel, drift)
+    step_look = step_look.for_symmetry(field.symmetry)
     if is_ink:
-        return thresholds(on, field, step_look, look.guiding_angle, cache)
+        return thresholds(on, field, step_look, look.guiding_angle)
     return _colors(on, field, step_look)
 
 
@@ -320,10 +289,8 @@ def _colors(on: TexelSurface, field: PixelField, look: PixelLook) -> np.ndarray:
         low, scale = value_scale(look.look, [value_range(on.instance.color_values)])
         field = replace(field, map_position=scaled_positions(values, low, scale))
     color = np.ones((len(field.pixel), 4), dtype=np.float32)
-    for block in pixel_blocks(len(color)):
-        report(0.97 + 0.03 * block.start / len(color), "drawing the colors")
-        part = field.part(block), images.part(block), tone[block]
-        color[block, :3] = colorize(*part, look)
+    for block in reported_blocks(len(color), "drawing the colors", 0.97, 1.0):
+        color[block, :3] = colorize(field.part(block), images.part(block), tone[block], look)
     return color
 
 

@@ -9,13 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..compositor.even_lines import (
-    WOBBLE_SHIFT,
-    EvenLines,
-    resolved_share,
-)
-from ..compositor.hatching import HatchedLines, has_breaks, has_paper_grain
-from ..compositor.image_noise import NOISE_MEAN
+from ..compositor.even_lines import WOBBLE_SHIFT, EvenLines, resolved_share
+from ..compositor.hatching import HatchedLines, has_breaks, has_paper_grain, line_images
 from ..compositor.ink_from_thresholds import ink_of_thresholds
 from ..compositor.ink_thresholds import (
     cyclic_places,
@@ -27,20 +22,16 @@ from ..compositor.inks import inks_of
 from ..compositor.lic import lic_lengths, noise_args, unconvolved_noise
 from ..compositor.look import Look, is_even
 from ..compositor.look_units import PixelLook
-from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, surface_paper_grain_args
+from ..compositor.paper_grain import surface_paper_grain, surface_paper_grain_args
 from ..compositor.pixel_field import PixelField, all_members
+from ..compositor.reported_blocks import reported_blocks
 from ..compositor.shading import Light
-from ..compositor.streak_statistics import (
-    break_steps,
-    look_streak_statistics,
-)
+from ..compositor.streak_statistics import look_streak_statistics
 from ..compositor.target_tone import apply_tone_curve
 from ..compositor.undirected import undirected_texture
 from ..compositor.wobble import WOBBLE_STD, has_wobble, rotate_pixel_field, solid_wobble_angle
-from ..core.cache import Cache
 from ..core.color import LUMINANCE_WEIGHTS
-from ..core.progress import progress, report
-from ..projection.pixel_blocks import pixel_blocks
+from ..core.progress import progress
 from ..projection.rest_coordinates import matrix_scale, rest_positions
 from ..projection.surface_lines import MAX_TRIANGLES, cached_surface_lines
 from .line_order import first_line_weights, line_order
@@ -62,7 +53,7 @@ LABEL = "drawing hatching"
 
 
 def thresholds(
-    on: TexelSurface, field: PixelField, look: PixelLook, guiding_angle: float, cache: Cache | None
+    on: TexelSurface, field: PixelField, look: PixelLook, guiding_angle: float
 ) -> np.ndarray:
     """Compute the thresholds of hatching at P texels.
 
@@ -76,8 +67,6 @@ def thresholds(
         Look with ink, from `sharp_look`. Its lengths are in steps of streamlines.
     guiding_angle : float
         Angle that the first line direction is near to; see `line_order`.
-    cache : Cache or None
-        Cache for evenly spaced lines.
 
     Returns
     -------
@@ -93,11 +82,10 @@ def thresholds(
         with progress(0.13, 0.15):
             field = rotate_pixel_field(field, np.float32(look.wobble) * wobble_angle)
     with progress(0.15, 0.85):
-        lines = _lines(on, field, look, wobble_angle, cache)
+        lines = _lines(on, field, look, wobble_angle)
     members = all_members(field, look.guiding_angle)[: field.line_count]
     pixels = np.empty((len(field.pixel), 4), dtype=np.float32)
-    for block in pixel_blocks(len(pixels)):
-        report(0.85 + 0.15 * block.start / len(pixels), LABEL)
+    for block in reported_blocks(len(pixels), LABEL, 0.85, 1.0):
         part = lines.part(block)
         thresholds = np.stack([line_thresholds(line, part) for line in range(field.line_count)])
         triangle, weights = on.texels.triangle[block], on.texels.barycentric[block]
@@ -136,8 +124,7 @@ def lit_ink(
     """
     inks = inks_of(look)
     colors = np.ones_like(pixels)
-    for block in pixel_blocks(len(pixels)):
-        report(block.start / len(pixels), LABEL)
+    for block in reported_blocks(len(pixels), LABEL):
         triangle, weights = on.texels.triangle[block], on.texels.barycentric[block]
         position = on.mesh.points_at(triangle, weights)
         normal = on.mesh.shading_normals_at(triangle, weights)
@@ -156,61 +143,37 @@ def lit_ink(
 
 
 def _lines(
-    on: TexelSurface,
-    field: PixelField,
-    look: PixelLook,
-    wobble_angle: np.ndarray | None,
-    cache: Cache | None,
+    on: TexelSurface, field: PixelField, look: PixelLook, wobble_angle: np.ndarray | None
 ) -> HatchedLines:
     """Return the streaks or the evenly spaced lines of a field at the texels, with what makes them uneven:
     breaks, paper grain, and spots where the field is undefined.
     """
-    is_spaced, is_broken = is_even(look), has_breaks(look)
-    undefined = not field.representation.all()
+    is_spaced, undefined = is_even(look), not field.representation.all()
     even_lines = noise = undirected = paper_grain = None
-    if not is_spaced or is_broken or undefined:
+    if not is_spaced or has_breaks(look) or undefined:
         with progress(0.0, 0.3):
             noise = texel_noise(on, **noise_args(look))
     if is_spaced:
         with progress(0.3, 0.6):
-            even_lines = _even_lines(on, field, look, wobble_angle, cache)
-    looks = [] if is_spaced else [look]
-    if is_broken:
-        looks.append(look.with_length(break_steps(look)))
+            even_lines = _even_lines(on, field, look, wobble_angle)
     with progress(0.6 if is_spaced else 0.3, 0.8):
-        lic = lic_lengths(field, looks, noise) if looks else []
+        images, break_images = line_images(look, lambda looks: lic_lengths(field, looks, noise))
     with progress(0.8, 0.9):
-        look_streak_statistics(look)
+        std = look_streak_statistics(look).paper_grain_std
     if undefined:
         texels_per_unit = np.sqrt(np.abs(on.charts.density[on.texels.triangle]))
         size = on.texels.frame.size
         # All spots have the same size in texels: the median of the line width.
         spot = look.line_width * on.step * float(np.median(texels_per_unit)) * size
         spot = min(spot, size / MIN_SPOTS)
-        seen_noise = unconvolved_noise(noise, look)
-        undirected = undirected_texture(field, seen_noise, spot)
+        undirected = undirected_texture(field, unconvolved_noise(noise, look), spot)
     if has_paper_grain(look):
         with progress(0.9, 1.0):
-            paper_grain = _paper_grain(on, field, look)
+            heights = texel_noise(on, **surface_paper_grain_args(look))
+            paper_grain = surface_paper_grain(heights, std, field.line_count)
     return HatchedLines(
-        look,
-        images=None if is_spaced else lic[0],
-        break_images=lic[-1] if is_broken else None,
-        paper_grain=paper_grain,
-        undirected=undirected,
-        even_lines=even_lines,
+        look, images, break_images, paper_grain, undirected=undirected, even_lines=even_lines
     )
-
-
-def _paper_grain(on: TexelSurface, field: PixelField, look: PixelLook) -> np.ndarray:
-    """Return (M, P): heights of the paper grain at P texels for each of the M line directions.
-
-    Their mean is 0 and their standard deviation 1.
-    """
-    noise = texel_noise(on, **surface_paper_grain_args(look))
-    noise -= np.float32(NOISE_MEAN)
-    noise /= np.float32(look_streak_statistics(look).paper_grain_std)
-    return noise.T[np.arange(field.line_count) % PAPER_GRAIN_CHANNELS]
 
 
 def _wobble_angle(on: TexelSurface, look: PixelLook) -> np.ndarray:
@@ -218,19 +181,14 @@ def _wobble_angle(on: TexelSurface, look: PixelLook) -> np.ndarray:
     rest = rest_positions(on.instance.surface).astype(np.float32)
     line_width = look.line_width * on.step / matrix_scale(on.instance.matrix)
     angle = np.empty(len(on.texels), dtype=np.float32)
-    for block in pixel_blocks(len(angle)):
-        report(block.start / len(angle), "bending lines")
+    for block in reported_blocks(len(angle), "bending lines"):
         position = on.interpolated(rest, block)
         angle[block] = solid_wobble_angle(np.ascontiguousarray(position.T), np.float32(line_width))
     return angle
 
 
 def _even_lines(
-    on: TexelSurface,
-    field: PixelField,
-    look: PixelLook,
-    wobble_angle: np.ndarray | None,
-    cache: Cache | None,
+    on: TexelSurface, field: PixelField, look: PixelLook, wobble_angle: np.ndarray | None
 ) -> EvenLines:
     """Return evenly spaced lines along the field, evaluated at the texels."""
     instance, texels = on.instance, on.texels
@@ -238,15 +196,14 @@ def _even_lines(
     max_triangles = min(MAX_TRIANGLES, TRIANGLES_PER_TEXEL * len(texels))
     with progress(0.0, 0.8):
         geometry = instance.surface, instance.matrix, instance.field, look.display
-        lines = cached_surface_lines(*geometry, spacing, cache, max_triangles)
+        lines = cached_surface_lines(*geometry, spacing, on.cache, max_triangles)
     triangles, corners = np.arange(len(on.mesh.points)), on.mesh.points
     sides = [on.mesh.to_frame(triangles, corners[:, k] - corners[:, 0]) for k in (1, 2)]
     members = all_members(field, look.guiding_angle)
     streaks, period = np.empty((2, field.line_count, len(texels)), dtype=np.float32)
     jacobian = field.screen_jacobian
     area = np.abs((jacobian[:, 0].conj() * jacobian[:, 1]).imag)
-    for block in pixel_blocks(len(texels)):
-        report(0.8 + 0.2 * block.start / len(texels), LABEL)
+    for block in reported_blocks(len(texels), LABEL, 0.8, 1.0):
         triangle, weights = texels.triangle[block], texels.barycentric[block]
         leaf, in_leaf = lines.tree.locate(triangle, weights)
         first, second = lines.heading.take(leaf, axis=1)

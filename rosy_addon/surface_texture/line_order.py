@@ -32,6 +32,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..compositor.reported_blocks import reported_blocks
 from ..core.progress import progress, report
 from ..field.bisection import BisectionTree, bisect
 from ..field.connection import build_connection
@@ -47,7 +48,6 @@ from ..line_drawing.tangent_mesh import (
     shared_edges,
 )
 from ..projection.gbuffer import MeshInstance
-from ..projection.pixel_blocks import pixel_blocks
 from .charts import uv_tangents
 from .texels import TexelSurface
 
@@ -98,9 +98,8 @@ class LineOrder:
             Barycentric coordinates of the points in their triangles.
         """
         leaf, weights = self.tree.locate(triangle, weights)
-        return sum(
-            weight * corner.take(leaf) for weight, corner in zip(weights, self.first.T, strict=True)
-        )
+        corners = zip(weights, self.first.T, strict=True)
+        return sum(weight * corner.take(leaf) for weight, corner in corners)
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,9 +256,8 @@ def _first_lines(
     """
     degree = mesh.degree // mesh.family_count
     tree = refined.tree
-    z = np.einsum(
-        "lck,lk->l", tree.leaf_weights / np.float32(3), mesh.z.take(tree.leaf_root, axis=0)
-    )
+    weights = tree.leaf_weights / np.float32(3)
+    z = np.einsum("lck,lk->l", weights, mesh.z.take(tree.leaf_root, axis=0))
     if mesh.family_z is None:
         first, lengths = _guide(mesh, guiding_angle, degree)[tree.leaf_root], AVERAGE_LENGTHS
     else:  # the field marks its first line direction
@@ -332,8 +330,7 @@ def _welded(mesh: TangentMesh) -> tuple[np.ndarray, np.ndarray]:
         Indices of the corners of triangles into `points`.
     """
     pairs = np.concatenate(shared_edges(mesh).ends())
-    with progress(0.0, 1.0):
-        group = connected_components(3 * len(mesh.neighbor), pairs)
+    group = connected_components(3 * len(mesh.neighbor), pairs)
     points = np.empty((int(group.max()) + 1, 3))
     points[group] = mesh.points.reshape(-1, 3)
     return points, group.reshape(-1, 3).astype(np.int32)
@@ -368,8 +365,7 @@ def direction_map(on: TexelSurface, content: str, guiding_angle: float) -> np.nd
             tangents = uv_tangents(on.instance.surface, mesh, charts)
     is_mirrored = charts.density < 0
     values = np.ones((len(texels), 4), dtype=np.float32)
-    for block in pixel_blocks(len(texels)):
-        report(0.8 + 0.2 * block.start / len(texels), MAP_LABEL)
+    for block in reported_blocks(len(texels), MAP_LABEL, 0.8, 1.0):
         triangle, weights = texels.triangle[block], texels.barycentric[block]
         direction, is_defined = _directions_at(mesh, combed, triangle, weights)
         if is_flow:

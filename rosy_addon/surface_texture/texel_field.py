@@ -15,15 +15,15 @@ import numpy as np
 
 from ..compositor.image_noise import BLUR_FACTOR, NOISE_MEAN
 from ..compositor.pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps
+from ..compositor.reported_blocks import reported_blocks
 from ..compositor.surface_noise import instance_hashes, solid_noise
 from ..core.progress import progress, report
 from ..field.blocks import row_blocks
 from ..field.frames import dot
-from ..field.representation import power, signed_power
+from ..field.representation import signed_power
 from ..line_drawing.surface_particles import SurfaceParticles, trace_geodesics
 from ..line_drawing.tangent_mesh import unit
-from ..projection.field_channel import FieldChannel, rotation_order
-from ..projection.pixel_blocks import pixel_blocks
+from ..projection.field_channel import REPRESENTATION, FieldChannel, rotation_order
 from ..projection.rest_coordinates import RestCoordinates, matrix_scale, rest_positions
 from .charts import UvCharts
 from .texels import TexelSurface, neighbor_places
@@ -82,31 +82,25 @@ def texel_field(on: TexelSurface, crease_angle: float | None) -> PixelField:
     """
     mesh, charts, texels = on.mesh, on.charts, on.texels
     count, degree = len(texels), mesh.degree
-    z = np.empty(count, dtype=np.complex64)
     jacobian = np.empty((2, count), dtype=np.complex64).T
-    channels: dict[FieldChannel, np.ndarray] = {
-        ("deviation", number): np.empty(count, dtype=np.complex64) for number, _ in mesh.harmonics
-    }
-    family = ("family", mesh.family_count)
+    # Values at the corners of triangles, (T, 3), or on triangles, (T,).
+    sources: dict[FieldChannel, np.ndarray] = {REPRESENTATION: mesh.z.astype(np.complex64)}
+    for number, values in mesh.harmonics:
+        sources["deviation", number] = values.astype(np.complex64)
     if mesh.family_z is not None:
-        channels[family] = np.empty(count, dtype=np.complex64)
+        sources["family", mesh.family_count] = mesh.family_z
+    channels = {channel: np.empty(count, dtype=np.complex64) for channel in sources}
     to_texels = texels.frame.size * on.step
-    corner_z = mesh.z.astype(np.complex64)
-    corner_harmonics = [(number, values.astype(np.complex64)) for number, values in mesh.harmonics]
-    for block in pixel_blocks(count):
-        report(0.3 * block.start / count, "finding directions")
+    for block in reported_blocks(count, "finding directions", 0.0, 0.3):
         triangle, weights = texels.triangle[block], texels.barycentric[block]
         frame = frames_at(charts, triangle, weights)
-        z[block] = _interpolated(weights, corner_z, triangle) * power(frame.conj(), degree)
         for axis, tangent in enumerate((frame, 1j * frame)):
             jacobian[block, axis] = to_texels * charts.to_uv(triangle, tangent)
-        for number, values in corner_harmonics:
-            channel = ("deviation", number)
+        for channel, source in sources.items():
             turn = signed_power(frame.conj(), rotation_order(channel, degree))
-            channels[channel][block] = _interpolated(weights, values, triangle) * turn
-        if mesh.family_z is not None:
-            turn = signed_power(frame.conj(), rotation_order(family, degree))
-            channels[family][block] = mesh.family_z[triangle] * turn
+            z = _interpolated(weights, source, triangle) if source.ndim == 2 else source[triangle]
+            channels[channel][block] = z * turn
+    z = channels.pop(REPRESENTATION)
     # The texel at each flat index of the frame, or -1. The last element is for the index -1.
     entry = np.full(texels.frame.width * texels.frame.height + 1, -1, dtype=np.int32)
     entry[texels.index] = np.arange(count, dtype=np.int32)
@@ -157,8 +151,7 @@ def _neighbor_masks(
     reach_squared = (reach * reach).astype(np.float32)
     corners, normals = mesh.points.astype(np.float32), mesh.corner_normal.astype(np.float32)
     min_cosine = -2.0 if crease_angle is None else np.cos(crease_angle)
-    for block in pixel_blocks(len(texels)):
-        report(block.start / len(texels), LABEL)
+    for block in reported_blocks(len(texels), LABEL):
         start = block.start
         # The block, and the neighbors of its texels in the next row.
         around = slice(start, block.stop + texels.frame.width + 1)
@@ -198,22 +191,15 @@ def _find_seam_steps(
     border = np.flatnonzero(defined & (mask != 0b111_111_111))
     source, bit = np.nonzero(mask[border, None] >> np.arange(9, dtype=np.uint16) & 1 == 0)
     source, bit = border[source].astype(np.int32), bit.astype(np.uint8)
-    offsets = np.array([dx + 1j * dy for dx, dy in NEIGHBOR_OFFSETS])
     parts = []
     for part in row_blocks(len(source), SEAM_BLOCK):
         report(part.start / max(len(source), 1), LABEL)
-        steps = source[part], bit[part], offsets[bit[part]]
-        parts.append(_seam_steps(on, defined, entry, *steps))
+        parts.append(_seam_steps(on, defined, entry, source[part], bit[part]))
     return SeamSteps(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
 def _seam_steps(
-    on: TexelSurface,
-    defined: np.ndarray,
-    entry: np.ndarray,
-    source: np.ndarray,
-    bit: np.ndarray,
-    offset: np.ndarray,
+    on: TexelSurface, defined: np.ndarray, entry: np.ndarray, source: np.ndarray, bit: np.ndarray
 ) -> SeamSteps:
     """Trace n steps as straight lines on the surface, and return the steps that lead to a texel.
 
@@ -228,13 +214,12 @@ def _seam_steps(
         Texel at which each step starts.
     bit : (n,) uint8 ndarray
         Index of the step in `NEIGHBOR_OFFSETS`.
-    offset : (n,) complex128 ndarray
-        The step as a complex number, in texels.
     """
     mesh, charts, texels = on.mesh, on.charts, on.texels
     size = texels.frame.size
     triangle = texels.triangle[source]
     weights = texels.barycentric[source].astype(np.float64)
+    offset = np.array([dx + 1j * dy for dx, dy in NEIGHBOR_OFFSETS])[bit]
     tangent = charts.to_surface(triangle, offset / size)
     length, ahead = np.abs(tangent), unit(tangent, np.ones_like(tangent))
     frame = frames_at(charts, triangle, weights)
@@ -254,15 +239,9 @@ def _seam_steps(
     arrived &= np.abs(linear) + np.abs(conjugate) <= MAX_SEAM_STRETCH
     kept = np.flatnonzero(arrived)
     end_frame = frames_at(charts, end.triangle[kept], end.weights[kept])
-    return SeamSteps(
-        source=source[kept],
-        bit=bit[kept],
-        target=target[kept],
-        offset=reached[kept].astype(np.complex64),
-        linear=linear[kept].astype(np.complex64),
-        conjugate=conjugate[kept].astype(np.complex64),
-        rotation=np.angle(frame[kept] * turn[kept] * end_frame.conj()).astype(np.float32),
-    )
+    rotation = np.angle(frame[kept] * turn[kept] * end_frame.conj()).astype(np.float32)
+    maps = (values[kept].astype(np.complex64) for values in (reached, linear, conjugate))
+    return SeamSteps(source[kept], bit[kept], target[kept], *maps, rotation)
 
 
 def _nearest_texels(
@@ -329,34 +308,25 @@ def texel_noise(
     # Length in world space of one Blender unit of object space.
     scale = matrix_scale(on.instance.matrix)
     rest = rest_positions(surface).astype(np.float32)
-    triangle_vertex = surface.triangle_vertex
     gradient = (charts.gradient / texels.frame.size).astype(np.complex64)
     stretch = charts.stretch()[1] * (texels.frame.size * scale)
     coarse = np.divide(MIN_CELL_TEXELS, stretch, out=np.zeros(len(stretch)), where=stretch > 0)
     cell_size = np.maximum(cell * step / scale, coarse).astype(np.float32)
     instance_hash = instance_hashes([surface.name])
     total = np.empty((channels, len(texels)), dtype=np.float32)
-    for block in pixel_blocks(len(texels)):
-        report(0.7 * block.start / len(texels), "making noise")
+    for block in reported_blocks(len(texels), "making noise", 0.0, 0.7):
         triangle = texels.triangle[block]
-        corners = triangle_vertex.take(triangle, axis=0).T
+        vertices = surface.triangle_vertex.take(triangle, axis=0).T
+        corners = tuple(rest.take(vertex, axis=0).T for vertex in vertices)
         change = gradient.take(triangle, axis=0).T
-        size = cell_size.take(triangle)
-        coordinates = RestCoordinates(
-            texels.barycentric[block].T,
-            change.real,
-            change.imag,
-            tuple(rest.take(corner, axis=0).T for corner in corners),
-            size,
-        )
+        size, weights = cell_size.take(triangle), texels.barycentric[block].T
+        coordinates = RestCoordinates(weights, change.real, change.imag, corners, size)
         block_hash = np.broadcast_to(instance_hash, len(triangle))
         solid_noise(coordinates, size, block_hash, seed, density, out=total[:, block])
     if high_pass:
-        sigma = BLUR_FACTOR * high_pass * step / scale
-        _subtract_local_means(on, rest, total, sigma)
+        _subtract_local_means(on, rest, total, BLUR_FACTOR * high_pass * step / scale)
     noise = np.empty(total.shape[::-1], dtype=np.float32)
-    for block in pixel_blocks(len(noise)):
-        report(1.0, "making noise")
+    for block in reported_blocks(len(noise), "making noise", 1.0, 1.0):
         noise[block] = total[:, block].T + np.float32(NOISE_MEAN)
     return noise
 
@@ -387,8 +357,7 @@ def _subtract_local_means(
     stride = np.array([shape[1] * shape[2], shape[2], 1])
     area = np.abs(on.charts.density)
     area = np.divide(1, area, out=np.zeros(len(area)), where=area > 0)
-    count = len(texels)
-    blocks = [slice(start, start + GRID_BLOCK) for start in range(0, count, GRID_BLOCK)]
+    blocks = row_blocks(len(texels), GRID_BLOCK)
 
     def cells(block: slice) -> tuple[np.ndarray, np.ndarray]:
         """Return the grid cells of texels and the positions in them.

@@ -18,6 +18,7 @@ import numpy as np
 
 from ..compositor.covering import ALL_NEIGHBORS
 from ..compositor.pixel_field import NEIGHBOR_OFFSETS, PixelField
+from ..core.cache import Cache
 from ..core.errors import RosyError
 from ..core.progress import progress, report
 from ..line_drawing.tangent_mesh import TangentMesh
@@ -127,6 +128,8 @@ class TexelSurface(NamedTuple):
     texels : Texels
     step : float
         Length of a step of streamlines, in Blender units.
+    cache : Cache or None
+        Stores evenly spaced lines, which do not depend on the texels.
     """
 
     instance: MeshInstance
@@ -134,6 +137,7 @@ class TexelSurface(NamedTuple):
     charts: UvCharts
     texels: Texels
     step: float
+    cache: Cache | None = None
 
     def interpolated(self, vertex_values: np.ndarray, block: slice) -> np.ndarray:
         """Interpolate (V, K) values at vertices to the n texels of a block. The result is (n, K) float32."""
@@ -236,7 +240,10 @@ def rasterize_charts(charts: UvCharts, frame: TextureFrame, name: str) -> Texels
 
 
 def _reaches_tile(corners: np.ndarray) -> np.ndarray:
-    """Return the indices of triangles that may overlap the square from -1 to 1, given (T, 3, 2) corners."""
+    """Return the indices of triangles that may overlap a tile.
+
+    `corners`, (T, 3, 2), are relative to the center of the tile, in halves of its side.
+    """
     low, high = corners.min(axis=1), corners.max(axis=1)
     return np.flatnonzero(((low < 1) & (high > -1)).all(axis=1))
 
@@ -245,12 +252,7 @@ def _reaches_tile(corners: np.ndarray) -> np.ndarray:
 
 
 def fill_margin(
-    frame: TextureFrame,
-    field: PixelField,
-    color: np.ndarray,
-    margin: int,
-    *,
-    crosses_seams: bool = True,
+    frame: TextureFrame, field: PixelField, color: np.ndarray, margin: int, crosses_seams: bool
 ) -> np.ndarray:
     """Return the picture of a texture: the colors of texels, with a margin around charts.
 

@@ -32,8 +32,28 @@ def draw_settings(layout: bpy.types.UILayout, settings: Any) -> None:
     layout.row(heading="Mirror").prop(settings, "mirror", toggle=True, text="")
 
 
+def key_press(
+    operator: str, *modifiers: str, key: str = "LEFTMOUSE", **properties: Any
+) -> tuple[str, dict[str, Any], dict[str, Any]]:
+    """Return an entry for the keymap of a tool: a key that calls an operator.
+
+    Parameters
+    ----------
+    operator : str
+        Name of the operator.
+    *modifiers : {"ctrl", "shift"}
+        Keys that are held.
+    key : str
+        Blender's name of the key or mouse button.
+    **properties
+        Properties of the operator.
+    """
+    event = {"type": key, "value": "PRESS"} | dict.fromkeys(modifiers, True)
+    return operator, event, {"properties": list(properties.items())}
+
+
 class CombTool:
-    """Base class of the tool: what it has in common in Object Mode and in Sculpt Mode."""
+    """Base class of the tools for Object Mode and Sculpt Mode: Blender needs one class for each mode."""
 
     bl_space_type = "VIEW_3D"
     bl_label = "Comb Field"
@@ -43,26 +63,12 @@ class CombTool:
     )
     bl_icon = str(Path(__file__).parent / "icons" / "comb")  # Blender adds .dat
     bl_keymap = (
-        ("rosy.field_comb", {"type": "LEFTMOUSE", "value": "PRESS"}, None),
-        (
-            "rosy.field_comb",
-            {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True},
-            {"properties": [("effect", "ERASE")]},
-        ),
-        (
-            "rosy.field_comb",
-            {"type": "LEFTMOUSE", "value": "PRESS", "shift": True},
-            {"properties": [("effect", "SMOOTH")]},
-        ),
-        (
-            "wm.radial_control",
-            {"type": "F", "value": "PRESS"},
-            {"properties": [("data_path_primary", "scene.rosy.comb.size")]},
-        ),
-        (
-            "wm.radial_control",
-            {"type": "F", "value": "PRESS", "shift": True},
-            {"properties": [("data_path_primary", "scene.rosy.comb.strength")]},
+        key_press("rosy.field_comb"),
+        key_press("rosy.field_comb", "ctrl", effect="ERASE"),
+        key_press("rosy.field_comb", "shift", effect="SMOOTH"),
+        key_press("wm.radial_control", key="F", data_path_primary="scene.rosy.comb.size"),
+        key_press(
+            "wm.radial_control", "shift", key="F", data_path_primary="scene.rosy.comb.strength"
         ),
     )
 

@@ -9,6 +9,7 @@ from bpy.app.handlers import persistent
 
 from ..core.errors import RosyError
 from ..viewport import session
+from ..viewport.app_handlers import add_handlers, remove_handlers
 from .preferences import addon_preferences
 
 #: Scenes, by `session_uid`, in which the user has switched a live view off.
@@ -16,7 +17,10 @@ _declined_scenes: set[int] = set()
 
 
 def decline(scene: bpy.types.Scene) -> None:
-    """Note that the user has switched off a live view in a scene. Its first field then starts none."""
+    """Note that the user has switched off a live view in a scene.
+
+    The first field of this scene then does not switch on a live view.
+    """
     _declined_scenes.add(scene.session_uid)
 
 
@@ -70,19 +74,17 @@ def _restore_live_views(*_: Any) -> None:
                         return  # the graphics card can no longer be used
 
 
+#: Handlers of Blender's events, by the names of their lists in `bpy.app.handlers`.
+_HANDLERS = {"save_pre": _save_live_views, "load_post": _restore_live_views}
+
+
 def register() -> None:
     """Add the handlers that store live views in files. If Blender runs without windows, add none."""
     if not bpy.app.background:
-        bpy.app.handlers.save_pre.append(_save_live_views)
-        bpy.app.handlers.load_post.append(_restore_live_views)
+        add_handlers(_HANDLERS)
 
 
 def unregister() -> None:
     """Remove the handlers."""
-    for handlers, handler in (
-        (bpy.app.handlers.save_pre, _save_live_views),
-        (bpy.app.handlers.load_post, _restore_live_views),
-    ):
-        if handler in handlers:
-            handlers.remove(handler)
+    remove_handlers(_HANDLERS)
     _declined_scenes.clear()

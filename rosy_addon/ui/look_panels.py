@@ -10,40 +10,16 @@ import bpy
 from ..compositor.look import Look, colors_magnitude, colors_values, is_hatched
 from ..compositor.picture_key import fixed_color_range
 from ..core.errors import as_sentence
-from ..core.settings import Numbers, Setting, Switch, panel_settings, settings_of
-from . import preset_library
-from .sidebar import (
-    SidebarPanel,
-    draw_cycles_hint,
-    draw_wrapped,
-    use_property_columns,
-    wrap_to_sidebar,
-)
+from ..core.settings import Numbers, Setting, Switch, panel_settings, settings_of, title
+from . import preset_library, sidebar
+from .operator_settings import draw_settings
 
-#: Labels of the panels with settings of a look, from top to bottom. Settings refer to panels by these keys.
-LOOK_PANELS = {
-    "streaks": "Streaks",
-    "color": "Color",
-    "light": "Light",
-    "tone": "Tone",
-    "ink": "Ink",
-    "singularities": "Singularities",
-    "quality": "Quality",
-}
+#: Keys of the panels with settings of a look, from top to bottom. Settings refer to panels by these keys.
+LOOK_PANELS = ("streaks", "color", "light", "tone", "ink", "singularities", "quality")
 
-#: Properties of `Scene.rosy` that determine how the picture is made, stored and shown.
-OUTPUT_SETTINGS = (
-    "percentage",
-    "device",
-    "placement",
-    "relight",
-    "emission",
-    "diffuse",
-    "backdrop",
-    "store",
-    "directory",
-    "image_format",
-)
+#: Properties of `Scene.rosy` that determine how the picture is made and shown, and how it is stored.
+OUTPUT_SETTINGS = "percentage", "device", "placement", "relight", "emission", "diffuse", "backdrop"
+STORAGE_SETTINGS = "store", "directory", "image_format"
 
 #: Height of the picture of a preset, in the panel and in the pop-up to choose one, in units of Blender's
 #: layout. At a resolution scale of 1, it is 128 screen pixels: half the size of the picture.
@@ -73,7 +49,7 @@ SEARCH_COLLECTIONS = {
 }
 
 
-class VIEW3D_PT_rosy_look(SidebarPanel, bpy.types.Panel):
+class VIEW3D_PT_rosy_look(sidebar.SidebarPanel, bpy.types.Panel):
     """How fields are drawn."""
 
     bl_label = "Look"
@@ -97,7 +73,7 @@ class VIEW3D_PT_rosy_look(SidebarPanel, bpy.types.Panel):
         if entry is not None:
             lines = column.column(align=True)
             lines.scale_y, lines.active = 0.8, False
-            for line in wrap_to_sidebar(entry.preset.description, context):
+            for line in sidebar.wrap_to_sidebar(entry.preset.description, context):
                 lines.label(text=line)
 
 
@@ -117,18 +93,13 @@ class VIEW3D_MT_rosy_presets(bpy.types.Menu):
         layout.operator("rosy.preset_save", text="Save Look as Preset...", icon="ADD")
         column = layout.column()
         column.enabled = entry is not None and entry.is_user
-        for verb, text, icon in (
-            ("rename", "Rename...", "GREASEPENCIL"),
-            ("remove", "Delete...", "TRASH"),
-        ):
-            operator = column.operator(f"rosy.preset_{verb}", text=text, icon=icon)
-            operator.preset = settings.preset_name
+        column.operator("rosy.preset_rename", text="Rename...", icon="GREASEPENCIL")
+        column.operator("rosy.preset_remove", text="Delete...", icon="TRASH")
         layout.separator()
         layout.operator("rosy.preset_import", text="Import...", icon="IMPORT")
         row = layout.row()
         row.enabled = entry is not None
-        export = row.operator("rosy.preset_export", text="Export...", icon="EXPORT")
-        export.preset = settings.preset_name
+        row.operator("rosy.preset_export", text="Export...", icon="EXPORT")
         for error in preset_library.load_errors():
             layout.label(text=as_sentence(error), icon="ERROR")
 
@@ -136,14 +107,25 @@ class VIEW3D_MT_rosy_presets(bpy.types.Menu):
 def _make_settings_panel(
     label: str, parent: str, suffix: str, look_names: tuple[str, ...], names: tuple[str, ...] = ()
 ) -> type:
-    """Return the class of a subpanel that shows settings of a look, then properties of `Scene.rosy`.
+    """Return the class of a subpanel with settings. It is closed by default.
 
-    It is closed by default.
+    Parameters
+    ----------
+    label : str
+        Title of the panel.
+    parent : str
+        Class name of the panel that contains it.
+    suffix : str
+        End of the class name, after ``VIEW3D_PT_rosy_``.
+    look_names : tuple of str
+        Names of settings of the look, shown first.
+    names : tuple of str
+        Names of properties of `Scene.rosy`, shown below them.
     """
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
-        use_property_columns(layout)
+        sidebar.use_property_columns(layout)
         column = layout.column()
         settings = context.scene.rosy
         for name in look_names:
@@ -151,8 +133,8 @@ def _make_settings_panel(
             part = column.column()
             part.active = setting.applies(settings.look)
             _draw_setting(part, settings.look, setting)
-            if name == "hue":
-                _draw_color_source(column, context)
+            if name == "hue" and settings.look.hue == "values":
+                _draw_name(column.row(), settings, "color_attribute", _active_mesh_object(context))
             if name == "tone":
                 _draw_tone_source(column, context)
         unused = _unused_output(settings)
@@ -161,7 +143,7 @@ def _make_settings_panel(
             row.active = name not in unused
             row.prop(settings, name)
             if name == "relight" and name not in unused and settings.relight:
-                draw_cycles_hint(column, context)
+                sidebar.draw_cycles_hint(column, context)
         if "tone" in look_names:
             column.operator("rosy.occlusion", icon="SHADING_RENDERED")
 
@@ -172,7 +154,7 @@ def _make_settings_panel(
         "bl_options": {"DEFAULT_CLOSED"},
         "draw": draw,
     }
-    return type(f"VIEW3D_PT_rosy_{suffix}", (SidebarPanel, bpy.types.Panel), namespace)
+    return type(f"VIEW3D_PT_rosy_{suffix}", (sidebar.SidebarPanel, bpy.types.Panel), namespace)
 
 
 def _unused_output(settings: bpy.types.PropertyGroup) -> tuple[str, ...]:
@@ -202,14 +184,6 @@ def _draw_setting(
     split.prop(look, setting.name, text="")
 
 
-def _draw_color_source(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw the name of the attribute with values for the color map, if the look colors lines by values."""
-    settings = context.scene.rosy
-    if settings.look.hue != "values":
-        return
-    _draw_name(column.row(), settings, "color_attribute", _active_mesh_object(context))
-
-
 def _active_mesh_object(context: bpy.types.Context) -> bpy.types.Object | None:
     """Return the active object if it is a mesh, and None otherwise."""
     obj = context.view_layer.objects.active
@@ -219,9 +193,10 @@ def _active_mesh_object(context: bpy.types.Context) -> bpy.types.Object | None:
 def _draw_name(
     row: bpy.types.UILayout, owner: Any, name: str, mesh_object: bpy.types.Object | None
 ) -> None:
-    """Draw a property that holds a name.
+    """Draw a text property.
 
-    If there is a mesh, and `SEARCH_COLLECTIONS` has the property, the field can search the names of the mesh.
+    If it names an attribute or UV map (see `SEARCH_COLLECTIONS`), and there is a mesh, its text box suggests
+    the names of the attributes or UV maps of the mesh.
     """
     if name in SEARCH_COLLECTIONS and mesh_object is not None:
         row.prop_search(owner, name, mesh_object.data, SEARCH_COLLECTIONS[name])
@@ -244,7 +219,7 @@ def _draw_tone_source(column: bpy.types.UILayout, context: bpy.types.Context) ->
             _draw_name(row, owner, name, mesh_object)
 
 
-class VIEW3D_PT_rosy_look_key(SidebarPanel, bpy.types.Panel):
+class VIEW3D_PT_rosy_look_key(sidebar.SidebarPanel, bpy.types.Panel):
     """The key (legend) that explains a picture in renders."""
 
     bl_label = "Key"
@@ -256,7 +231,7 @@ class VIEW3D_PT_rosy_look_key(SidebarPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, context.scene.rosy
-        use_property_columns(layout)
+        sidebar.use_property_columns(layout)
         layout.active = settings.key
         column = layout.column()
         for part, names in KEY_PARTS.items():
@@ -265,18 +240,17 @@ class VIEW3D_PT_rosy_look_key(SidebarPanel, bpy.types.Panel):
                 row = column.row()
                 row.active = getattr(settings, part)
                 row.prop(settings, name)
-        column.prop(settings, "key_caption")
-        column.prop(settings, "key_size")
+        draw_settings(column, settings, "key_caption", "key_size")
         if settings.key and settings.key_bar and _range_may_differ(settings):
-            draw_wrapped(
-                layout,
-                context,
-                ["For numbers on the color bar of animations, set Color > Top Value"],
-            )
+            hint = "For numbers on the color bar of animations, set Color > Top Value"
+            sidebar.draw_wrapped(layout, context, [hint])
 
 
 def _range_may_differ(settings: bpy.types.PropertyGroup) -> bool:
-    """Return whether a scene has an animation whose frames may have different ranges of the color map."""
+    """Return whether the frames of a baked animation may have different ranges of the color map.
+
+    `settings` is the `Scene.rosy` of the scene with the animation.
+    """
     look = settings.look
     is_animated = any(record.frames for record in settings.bakes)
     has_colors = colors_magnitude(look) or colors_values(look)
@@ -287,10 +261,14 @@ CLASSES = (
     VIEW3D_MT_rosy_presets,
     VIEW3D_PT_rosy_look,
     *(
-        _make_settings_panel(label, "VIEW3D_PT_rosy_look", f"look_{key}", panel_settings(Look, key))
-        for key, label in LOOK_PANELS.items()
+        _make_settings_panel(
+            title(key), "VIEW3D_PT_rosy_look", f"look_{key}", panel_settings(Look, key)
+        )
+        for key in LOOK_PANELS
     ),
-    _make_settings_panel("Output", "VIEW3D_PT_rosy", "output", (), OUTPUT_SETTINGS),
+    _make_settings_panel(
+        "Output", "VIEW3D_PT_rosy", "output", (), OUTPUT_SETTINGS + STORAGE_SETTINGS
+    ),
     _make_settings_panel(
         "Advanced", "VIEW3D_PT_rosy", "advanced", panel_settings(Look, ""), ("undefined",)
     ),

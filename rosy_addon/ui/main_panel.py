@@ -15,22 +15,14 @@ from ..scene.staleness import SCENE_STATES
 from ..scene.visible_objects import field_objects
 from ..viewport import session
 from ..viewport.view3d import redraw
-from . import job_status, overlay
+from . import job_status, overlay, sidebar
 from .operator_settings import draw_convert_settings, draw_generator_settings, draw_settings
-from .sidebar import (
-    SidebarPanel,
-    closed_panel,
-    draw_cycles_hint,
-    draw_progress,
-    draw_wrapped,
-    use_property_columns,
-)
 
 #: Types of viewport shading in which a 3D view does not show baked pictures.
 SHADING_WITHOUT_MATERIALS = ("WIREFRAME", "SOLID")
 
 
-class VIEW3D_PT_rosy(SidebarPanel, bpy.types.Panel):
+class VIEW3D_PT_rosy(sidebar.SidebarPanel, bpy.types.Panel):
     """Make a field, bake its picture and look at it."""
 
     bl_label = "RoSy"
@@ -38,11 +30,10 @@ class VIEW3D_PT_rosy(SidebarPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         job_status.start_helper_once(context)
         layout = self.layout
-        use_property_columns(layout)
-        objects = field_objects(context.view_layer)
+        sidebar.use_property_columns(layout)
         _draw_field_section(layout, context)
         layout.separator()
-        _draw_picture_section(layout, context, objects)
+        _draw_picture_section(layout, context)
 
 
 def _draw_field_section(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -71,17 +62,16 @@ def _draw_existing_field(
     box.label(text=f"Degree {mesh.rosy.degree} on {faces}, {name}")
     row = layout.row(align=True)
     row.operator("rosy.field_export", text="Export", icon="EXPORT")
-    is_shown = overlay.is_shown(obj.name)
-    button = row.operator(
-        "rosy.singularities", text="Singularities", icon="OVERLAY", depress=is_shown
-    )
+    is_shown = overlay.shown(obj.name) is not None
+    button = row.operator("rosy.singularities", icon="OVERLAY", depress=is_shown)
     button.show = "NONE" if is_shown else "OVERLAY"
-    if (body := closed_panel(layout, "convert_field", "Convert")) is not None:
+    if (body := sidebar.closed_panel(layout, "convert_field", "Convert")) is not None:
         _draw_convert_settings(body, context)
     other_fields = other_field_names(mesh)
-    if other_fields and (body := closed_panel(layout, "compare_field", "Compare")) is not None:
+    body = sidebar.closed_panel(layout, "compare_field", "Compare") if other_fields else None
+    if body is not None:
         _draw_compare_settings(body, context, other_fields)
-    if (body := closed_panel(layout, "another_field", "Make Another Field")) is not None:
+    if (body := sidebar.closed_panel(layout, "another_field", "Make Another Field")) is not None:
         _draw_new_field(body, context)
 
 
@@ -116,32 +106,25 @@ def _draw_new_field(layout: bpy.types.UILayout, context: bpy.types.Context) -> N
     layout.operator("rosy.field_import", text="Import a Field File...", icon="IMPORT")
 
 
-def _draw_picture_section(
-    layout: bpy.types.UILayout, context: bpy.types.Context, objects: list[bpy.types.Object]
-) -> None:
+def _draw_picture_section(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the switch of the live view, the list of baked pictures, and the buttons that bake."""
     layout.label(text="2.  Picture", icon="RENDER_STILL")
     _draw_live_toggle(layout, context)
     if session.is_live(context.space_data):
         layout.prop(context.scene.rosy, "remember_live")
         if has_flow(context.scene.rosy.look):
-            is_playing = session.is_flow_playing()
-            layout.operator(
-                "rosy.flow_play",
-                text="Pause" if is_playing else "Play",
-                icon="PAUSE" if is_playing else "PLAY",
-            )
+            text = "Pause" if session.is_flow_playing() else "Play"
+            layout.operator("rosy.flow_play", text=text, icon=text.upper())
     if job_status.current is not None:
-        draw_progress(layout)
+        sidebar.draw_progress(layout)
     else:
-        _draw_bakes(layout, context, objects)
+        _draw_bakes(layout, context)
     # Messages are below the buttons, so that buttons do not move when messages come and go.
-    draw_wrapped(layout, context, session.messages(context.area))
+    sidebar.draw_wrapped(layout, context, session.messages(context.area))
 
 
-def _draw_bakes(
-    layout: bpy.types.UILayout, context: bpy.types.Context, objects: list[bpy.types.Object]
-) -> None:
+def _draw_bakes(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    objects = field_objects(context.view_layer)
     bake_infos = list_bakes(context.scene, for_panel=True, automatic_device=automatic_device)
     _redraw_later(SCENE_STATES.seconds_to_wait())
     for bake in bake_infos:
@@ -176,7 +159,7 @@ def bake_label(bake_infos: list[BakeInfo]) -> str:
 
 def _draw_texture_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the settings and the button that bake textures."""
-    if (body := closed_panel(layout, "texture", "Texture")) is None:
+    if (body := sidebar.closed_panel(layout, "texture", "Texture")) is None:
         return
     obj = context.view_layer.objects.active
     column = body.column()
@@ -189,24 +172,18 @@ def _draw_texture_settings(layout: bpy.types.UILayout, context: bpy.types.Contex
     elif is_hatched(settings.look):
         column.prop(settings, "texture_bake_light")
         if not settings.texture_bake_light:
-            draw_cycles_hint(column, context)
-    column.prop(settings, "texture_udim")
-    column.prop(settings, "texture_size")
-    column.prop(settings, "texture_margin")
+            sidebar.draw_cycles_hint(column, context)
+    draw_settings(column, settings, "texture_udim", "texture_size", "texture_margin")
     column.operator("rosy.bake_texture", icon="TEXTURE")
     if settings.texture_content == "ANISOTROPY" and context.scene.render.engine != "CYCLES":
         column.label(text="Only Cycles draws anisotropy", icon="INFO")
 
 
 def _draw_live_toggle(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    enabled = session.is_live(context.space_data)
-    button = layout.operator(
-        "rosy.viewport",
-        text="Live in This View",
-        icon="HIDE_OFF" if enabled else "HIDE_ON",
-        depress=enabled,
-    )
-    button.show = "OFF" if enabled else "ON"
+    is_live = session.is_live(context.space_data)
+    icon = "HIDE_OFF" if is_live else "HIDE_ON"
+    button = layout.operator("rosy.viewport", text="Live in This View", icon=icon, depress=is_live)
+    button.show = "OFF" if is_live else "ON"
 
 
 def draw_overlay_popover(popover: bpy.types.Menu, context: bpy.types.Context) -> None:
@@ -231,14 +208,13 @@ def _draw_bake_info(
     elif several:
         row.operator("rosy.show", text="Show").camera = bake.camera
     if bake.stale_reason:
-        draw_wrapped(box, context, [f"Out of date: {bake.stale_reason}"], "ERROR")
+        sidebar.draw_wrapped(box, context, [f"Out of date: {bake.stale_reason}"], "ERROR")
     elif bake.unknown_reason:
         reason = f"Not known to be up to date: {bake.unknown_reason}"
-        draw_wrapped(box, context, [reason], "QUESTION")
-    elif bake.frame_range:
-        box.label(text="Up to date at this frame", icon="CHECKMARK")
+        sidebar.draw_wrapped(box, context, [reason], "QUESTION")
     else:
-        box.label(text="Up to date", icon="CHECKMARK")
+        text = "Up to date at this frame" if bake.frame_range else "Up to date"
+        box.label(text=text, icon="CHECKMARK")
 
 
 def _redraw_later(seconds: float) -> None:
@@ -265,11 +241,8 @@ def _draw_view_hints(
         column.label(text=reason, icon="INFO")
         column.operator("rosy.show_here")
     in_camera_view = view.region_3d is not None and view.region_3d.view_perspective == "CAMERA"
-    if (
-        not in_camera_view
-        and camera is not None
-        and any(bake.camera == camera.name for bake in bake_infos)
-    ):
+    camera_names = [bake.camera for bake in bake_infos]
+    if not in_camera_view and camera is not None and camera.name in camera_names:
         column.operator("view3d.view_camera", text="Look Through the Camera")
 
 

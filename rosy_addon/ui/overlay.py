@@ -19,8 +19,9 @@ from ..scene.singularity_points import (
     read_editable_singularities,
     read_singularities,
 )
+from ..viewport.app_handlers import add_handlers, remove_handlers
 from ..viewport.overlays import SingularityDots, draw_dots, draw_labels
-from ..viewport.view3d import redraw
+from ..viewport.view3d import redraw, to_world
 
 #: Diameter in pixels of the dot of a singularity of index 1 / N, without its outline, at a resolution scale
 #: of 1.
@@ -40,9 +41,7 @@ DRAW_HANDLERS: list[Any] = []
 def show(object_name: str, singularities: Singularities) -> None:
     """Show the singularities of an object, in place of those shown before."""
     _SINGULARITIES[object_name] = singularities
-    for handlers, handler in _app_handlers():
-        if handler not in handlers:
-            handlers.append(handler)
+    add_handlers(_APP_HANDLERS)
     if not DRAW_HANDLERS and not bpy.app.background:
         add = bpy.types.SpaceView3D.draw_handler_add
         DRAW_HANDLERS.append(add(_draw_dots, (), "WINDOW", "POST_VIEW"))
@@ -57,9 +56,7 @@ def hide(object_name: str | None = None) -> None:
     else:
         _SINGULARITIES.pop(object_name, None)
     if not _SINGULARITIES:
-        for handlers, handler in _app_handlers():
-            if handler in handlers:
-                handlers.remove(handler)
+        remove_handlers(_APP_HANDLERS)
         while DRAW_HANDLERS:
             bpy.types.SpaceView3D.draw_handler_remove(DRAW_HANDLERS.pop(), "WINDOW")
     redraw()
@@ -81,16 +78,6 @@ def refresh(context: bpy.types.Context, meshes: Container[bpy.types.Mesh]) -> No
             hide(name)
 
 
-def _app_handlers() -> list[tuple[Any, Any]]:
-    """Return pairs: a list of Blender's application handlers, and the handler of this module for it."""
-    handlers = bpy.app.handlers
-    return [
-        (handlers.load_pre, _clear_on_load),
-        (handlers.undo_post, _read_again),
-        (handlers.redo_post, _read_again),
-    ]
-
-
 def _clear_on_load(*_: Any) -> None:
     """Hide all singularities before a file is loaded, because its objects may have the same names."""
     hide()
@@ -102,9 +89,8 @@ def _read_again(*_: Any) -> None:
     refresh(context, {obj.data for obj in context.view_layer.objects if obj.type == "MESH"})
 
 
-def is_shown(object_name: str) -> bool:
-    """Return whether the singularities of an object are shown."""
-    return object_name in _SINGULARITIES
+#: Handlers of Blender's events while something is shown, by the names of their lists in `bpy.app.handlers`.
+_APP_HANDLERS = {"load_pre": _clear_on_load, "undo_post": _read_again, "redo_post": _read_again}
 
 
 def shown(object_name: str) -> Singularities | None:
@@ -112,29 +98,14 @@ def shown(object_name: str) -> Singularities | None:
     return _SINGULARITIES.get(object_name)
 
 
-def _visible_singularities() -> list[tuple[bpy.types.Object, Singularities]]:
-    """Return pairs of visible objects and their singularities.
-
-    Objects that were removed or renamed are left out.
-    """
-    view_layer = bpy.context.view_layer
-    candidates = (
-        (view_layer.objects.get(name), singularities)
-        for name, singularities in _SINGULARITIES.items()
-    )
-    return [
-        (obj, singularities)
-        for obj, singularities in candidates
-        if obj is not None and obj.visible_get()
-    ]
-
-
 def _all_dots() -> list[SingularityDots]:
-    """Return the dots of the singularities of each visible object."""
-    return [
-        SingularityDots(offset_points(obj, shown), shown.index, shown.degree)
-        for obj, shown in _visible_singularities()
-    ]
+    """Return the dots of each visible object. Objects that were removed or renamed are left out."""
+    dots = []
+    for name, shown in _SINGULARITIES.items():
+        obj = bpy.context.view_layer.objects.get(name)
+        if obj is not None and obj.visible_get():
+            dots.append(SingularityDots(offset_points(obj, shown), shown.index, shown.degree))
+    return dots
 
 
 def _draw_dots() -> None:
@@ -151,8 +122,7 @@ def _draw_labels() -> None:
 
 def offset_points(obj: bpy.types.Object, singularities: Singularities) -> np.ndarray:
     """Return (K, 3) positions of the dots of singularities in world space, slightly above the surface."""
-    matrix = np.array(obj.matrix_world)
     offset = SURFACE_OFFSET * max(obj.dimensions)
-    scale = np.cbrt(abs(np.linalg.det(matrix[:3, :3]))) or 1.0
+    scale = np.cbrt(abs(np.linalg.det(np.array(obj.matrix_world)[:3, :3]))) or 1.0
     points = singularities.points + singularities.normals * (offset / scale)
-    return points @ matrix[:3, :3].T + matrix[:3, 3]
+    return to_world(obj, points)

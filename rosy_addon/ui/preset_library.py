@@ -10,15 +10,7 @@ import bpy
 import bpy.utils.previews
 
 from ..core.errors import RosyError
-from ..preset_files.store import (
-    SHIPPED_FOLDER,
-    Preset,
-    find_preset_file,
-    merge_preset_files,
-    preview_path,
-    read_preset,
-    user_preset_files,
-)
+from ..preset_files import store
 from ..scene.files import user_presets_folder
 from ..scene.look_properties import apply_look, matches_look
 
@@ -33,7 +25,7 @@ class PresetEntry(NamedTuple):
     """A preset, its file, and whether it is the user's own and can be changed."""
 
     path: Path
-    preset: Preset
+    preset: store.Preset
     is_user: bool
 
 
@@ -60,25 +52,26 @@ class _PresetLibrary:
         change when files are added or removed. Edited files are looked for every `REFRESH_SECONDS`.
         """
         user_folder = user_presets_folder()
-        folder_keys = (user_folder, _stat_key(user_folder), _stat_key(SHIPPED_FOLDER))
+        folder_keys = (user_folder, _stat_key(user_folder), _stat_key(store.SHIPPED_FOLDER))
         if folder_keys == self.folder_keys and time.monotonic() < self.checked_at + REFRESH_SECONDS:
             return
         self.folder_keys, self.checked_at = folder_keys, time.monotonic()
         load_errors = []
         try:
-            user_files = user_preset_files(user_folder)
+            user_files = store.user_preset_files(user_folder)
         except RosyError as error:
             user_files, load_errors = {}, [str(error)]
-        paths = merge_preset_files(user_files)
+        paths = store.merge_preset_files(user_files)
         file_keys = {
-            path: (_stat_key(path), _stat_key(preview_path(path))) for path in paths.values()
+            path: (_stat_key(path), _stat_key(store.preview_path(path))) for path in paths.values()
         }
         if file_keys == self.file_keys:
             return
         self.file_keys, self.entries, self.load_errors = file_keys, {}, load_errors
         for key, path in paths.items():
             try:
-                self.entries[key] = PresetEntry(path, read_preset(path), path.parent == user_folder)
+                preset = store.read_preset(path)
+                self.entries[key] = PresetEntry(path, preset, path.parent == user_folder)
             except RosyError as error:
                 self.load_errors.append(str(error))
         self._load_previews()
@@ -90,7 +83,7 @@ class _PresetLibrary:
             return
         preview_names = {}
         for key, entry in self.entries.items():
-            image_path = preview_path(entry.path)
+            image_path = store.preview_path(entry.path)
             if image_path.is_file():
                 preview_names[key] = f"{image_path} {_stat_key(image_path)}"
                 if preview_names[key] not in self.previews:
@@ -155,8 +148,8 @@ def apply_preset(settings: Any, preset: str) -> None:
     RosyError
         If there is no such preset, or its file cannot be read.
     """
-    path = find_preset_file(preset, user_presets_folder())
-    apply_look(settings, read_preset(path).look)
+    path = store.find_preset_file(preset, user_presets_folder())
+    apply_look(settings, store.read_preset(path).look)
     keys = [key for key, entry in entries().items() if entry.path == path]
     settings.preset_name = keys[0] if keys else str(path)
 
@@ -170,16 +163,10 @@ def rename_references(old: str, new: str) -> None:
 
 def enum_items(settings: Any, _context: Any) -> list[tuple]:
     """Return the items of the enum property of presets."""
-    result = [
-        (
-            key,
-            entry.preset.name,
-            entry.preset.description,
-            _LIBRARY.icon_ids.get(key, DEFAULT_ICON),
-            index,
-        )
-        for index, (key, entry) in enumerate(entries().items())
-    ]
+    result: list[tuple] = []
+    for key, entry in entries().items():
+        icon = _LIBRARY.icon_ids.get(key, DEFAULT_ICON)
+        result.append((key, entry.preset.name, entry.preset.description, icon, len(result)))
     name = getattr(settings, "preset_name", None)
     if name and name not in _LIBRARY.entries:
         description = "This preset was not found. The look is unchanged"

@@ -15,14 +15,7 @@ from ..scene.camera_planes import update_backdrops
 from ..scene.datablocks import has_rosy_properties
 from ..scene.field_attributes import DEFAULT_DEGREE, DEFAULT_FIELD_NAME
 from ..scene.keys import update_keys
-from ..surface_texture.draw import (
-    CONTENTS,
-    DEFAULT_MARGIN,
-    DEFAULT_SIZE,
-    MAX_MARGIN,
-    MAX_SIZE,
-    MIN_SIZE,
-)
+from ..surface_texture import draw as texture_drawing
 from . import preset_library
 from .property_makers import (
     PATH_OPTIONS,
@@ -70,7 +63,9 @@ INK_ITEMS = [
 #: Items of the property that chooses the camera of strokes. Strokes are drawn from only one camera at a time,
 #: so there is no item for all cameras.
 STROKE_CAMERA_ITEMS = [item for item in CAMERA_ITEMS if item[0] != "ALL"]
-TEXTURE_CONTENT_ITEMS = [(name.upper(), name.capitalize(), text) for name, text in CONTENTS.items()]
+TEXTURE_CONTENT_ITEMS = [
+    (name.upper(), name.capitalize(), text) for name, text in texture_drawing.CONTENTS.items()
+]
 IMAGE_FORMAT_ITEMS = [
     ("BYTE", "8-Bit sRGB", "Display values in a .png file: small, and readable by most programs"),
     ("FLOAT", "Float", "Linear values in an .exr file"),
@@ -271,17 +266,17 @@ class RosyScene(bpy.types.PropertyGroup):
         "Size",
         "Width and height of textures in texels",
         subtype="PIXEL",
-        min=MIN_SIZE,
-        max=MAX_SIZE,
-        default=DEFAULT_SIZE,
+        min=texture_drawing.MIN_SIZE,
+        max=texture_drawing.MAX_SIZE,
+        default=texture_drawing.DEFAULT_SIZE,
     )
     texture_margin: integer(
         "Margin",
         "Width of the margin around the charts of textures, in texels",
         subtype="PIXEL",
         min=0,
-        max=MAX_MARGIN,
-        default=DEFAULT_MARGIN,
+        max=texture_drawing.MAX_MARGIN,
+        default=texture_drawing.DEFAULT_MARGIN,
     )
     backdrop: toggle(
         "Backdrop",
@@ -366,7 +361,7 @@ class RosyScene(bpy.types.PropertyGroup):
 
 
 class RosyMesh(bpy.types.PropertyGroup):
-    """The field of a mesh."""
+    """How the field of a mesh is stored: its degree, and the attribute that holds it."""
 
     degree: integer(
         "Degree",
@@ -381,7 +376,7 @@ class RosyMesh(bpy.types.PropertyGroup):
 
 
 class RosyObject(bpy.types.PropertyGroup):
-    """An object with a field."""
+    """Settings of an object with a field: whether it is drawn, its tone image, and its UV maps."""
 
     include: toggle(
         "Draw the Field",
@@ -397,18 +392,11 @@ class RosyObject(bpy.types.PropertyGroup):
     texture_uv_map: text("UV Map", "UV map of the texture. Empty: the active UV map")
 
 
-CLASSES = (
-    RosyLook,
-    RosyComb,
-    RosyFrameState,
-    RosyBake,
-    RosyProjection,
-    RosyNodeTree,
-    RosyStrokeObject,
-    RosyStrokes,
-    RosyScene,
-    RosyMesh,
-    RosyObject,
+#: The classes of this module, in the order of their definition.
+CLASSES = tuple(
+    value
+    for value in list(globals().values())
+    if isinstance(value, type) and issubclass(value, bpy.types.PropertyGroup)
 )
 POINTER_PROPERTIES = (
     (bpy.types.Scene, RosyScene),
@@ -418,10 +406,12 @@ POINTER_PROPERTIES = (
 )
 
 
+_register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
+
+
 def register() -> None:
     """Add the properties to Blender."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
+    _register_classes()
     for id_type, group in POINTER_PROPERTIES:
         id_type.rosy = bpy.props.PointerProperty(type=group, name="RoSy")
 
@@ -430,8 +420,7 @@ def unregister() -> None:
     """Remove the properties."""
     for id_type, _ in POINTER_PROPERTIES:
         del id_type.rosy
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+    _unregister_classes()
 
 
 def ensure_registered() -> None:

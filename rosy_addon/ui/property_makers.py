@@ -41,7 +41,7 @@ def real(name: str, description: str, **others: Any) -> Any:
 
 
 def fraction(name: str, description: str, **others: Any) -> Any:
-    """Return a property for a length, as a fraction (up to 10) of the size of the mesh."""
+    """Return a property for a length divided by the longest side of the bounding box, 0 to 10."""
     return real(name, description, min=0.0, max=10.0, precision=3, step=1, **others)
 
 

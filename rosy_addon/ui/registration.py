@@ -16,17 +16,17 @@ from . import (
     strokes_panel,
 )
 
-#: Modules whose classes (their `CLASSES`) are registered. Panels are shown in this order.
-MODULES = (preferences, main_panel, look_panels, strokes_panel)
+#: Functions that register all classes but those of properties. Panels are shown in this order.
+_register_classes, _unregister_classes = bpy.utils.register_classes_factory(
+    (*preferences.CLASSES, *main_panel.CLASSES, *look_panels.CLASSES, *strokes_panel.CLASSES)
+)
 
 
 def register() -> None:
     """Add properties, panels and preferences to Blender."""
     preset_library.register()
     properties.register()
-    for module in MODULES:
-        for cls in module.CLASSES:
-            bpy.utils.register_class(cls)
+    _register_classes()
     bpy.types.VIEW3D_PT_overlay.append(main_panel.draw_overlay_popover)
     live_views.register()
 
@@ -36,9 +36,7 @@ def unregister() -> None:
     live_views.unregister()
     bpy.types.VIEW3D_PT_overlay.remove(main_panel.draw_overlay_popover)
     main_panel.unregister()
-    for module in reversed(MODULES):
-        for cls in reversed(module.CLASSES):
-            bpy.utils.unregister_class(cls)
+    _unregister_classes()
     properties.unregister()
     preset_library.unregister()
     overlay.hide()

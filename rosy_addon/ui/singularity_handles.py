@@ -18,8 +18,9 @@ from ..scene.field_attributes import has_field
 from ..scene.meshes import vertex_positions
 from ..scene.singularity_points import mesh_of_own_vertices, read_editable_singularities
 from ..viewport.overlays import is_occluded
-from ..viewport.view3d import redraw
+from ..viewport.view3d import redraw, to_world
 from . import overlay
+from .comb_brush import key_press
 from .view_lines import draw_lines, to_pixels
 
 #: Largest distance in pixels between the mouse and a handle that is grabbed.
@@ -72,7 +73,7 @@ class Drag:
         context = bpy.context
         if context.region != self._region:
             return
-        points = to_pixels(context.region, context.region_data, _to_world(self._obj, self._ends))
+        points = to_pixels(context.region, context.region_data, to_world(self._obj, self._ends))
         angle = np.linspace(0, 2 * np.pi, RING_SEGMENTS + 1)
         ring = RING_RADIUS * np.stack([np.cos(angle), np.sin(angle)], axis=1)
         scale = context.preferences.system.ui_scale
@@ -119,7 +120,10 @@ def show_handles(context: bpy.types.Context, obj: bpy.types.Object) -> None:
 
 
 def _own_points(context: bpy.types.Context, obj: bpy.types.Object) -> np.ndarray:
-    """Return (V, 3) positions of an object's own vertices, as modifiers move them, in object space."""
+    """Return the (V, 3) vertices of an object's original mesh, moved by its modifiers, in object space.
+
+    Vertices that modifiers add are left out.
+    """
     evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
     return vertex_positions(mesh_of_own_vertices(obj, evaluated.data))[: len(obj.data.vertices)]
 
@@ -163,12 +167,6 @@ def _handle_under(
     return None
 
 
-def _to_world(obj: bpy.types.Object, points: np.ndarray) -> np.ndarray:
-    """Transform (K, 3) points from object space to world space."""
-    matrix = np.array(obj.matrix_world)
-    return points @ matrix[:3, :3].T + matrix[:3, 3]
-
-
 class VIEW3D_TOOL_rosy_singularities(bpy.types.WorkSpaceTool):
     """Move the singularities of a field"""
 
@@ -182,12 +180,8 @@ class VIEW3D_TOOL_rosy_singularities(bpy.types.WorkSpaceTool):
     )
     bl_icon = str(Path(__file__).parent / "icons" / "singularities")  # Blender adds .dat
     bl_keymap = (
-        ("rosy.drag_singularity", {"type": "LEFTMOUSE", "value": "PRESS"}, None),
-        (
-            "rosy.drag_singularity",
-            {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True},
-            {"properties": [("make_pair", True)]},
-        ),
+        key_press("rosy.drag_singularity"),
+        key_press("rosy.drag_singularity", "ctrl", make_pair=True),
         # A drag that starts beside the singularities selects. Blender's own keymap would move the object.
         ("view3d.select_box", {"type": "LEFTMOUSE", "value": "CLICK_DRAG"}, None),
     )

@@ -8,6 +8,7 @@ from ..core.settings import panel_settings, settings_of
 from ..line_drawing.style import StrokeStyle
 from ..scene.stroke_objects import stroke_objects
 from . import job_status
+from .operator_settings import draw_settings
 from .sidebar import SidebarPanel, closed_panel, draw_progress, use_property_columns
 
 #: Icons of stroke objects by type. The type of Grease Pencil was renamed in Blender 4.3.
@@ -37,17 +38,12 @@ class VIEW3D_PT_rosy_strokes(SidebarPanel, bpy.types.Panel):
         use_property_columns(layout)
         settings = context.scene.rosy.strokes
         column = layout.column()
-        column.prop(settings, "kind")
-        column.prop(settings, "camera")
-        column.prop(settings, "selected")
+        draw_settings(column, settings, "kind", "camera", "selected")
         if settings.kind == "CURVES":
             column.prop(settings, "follow")
         column.separator()
-        column.prop(settings, "unit")
-        column.prop(settings, "spacing" if settings.unit == "pixels" else "distance")
-        column.prop(settings, "width")
-        column.prop(settings, "outline")
-        column.prop(settings, "hidden")
+        spacing = "spacing" if settings.unit == "pixels" else "distance"
+        draw_settings(column, settings, "unit", spacing, "width", "outline", "hidden")
         for title, names in STROKE_PANELS.items():
             if title == "Singularities" and settings.kind != "FILE":
                 continue

@@ -6,6 +6,7 @@ changes, the picture may be a preview at reduced size. When the view is at rest,
 rendered in slices of time, one slice per redraw.
 
     view3d         queries about Blender's 3D views, and redraws
+    app_handlers   functions that Blender calls, such as after an undo
     layers         the meshes of view layers, and reference renders, as they were read last
     flow_clock     the clock by which streaks drift
     overlays       dots at singularities, arrowheads and messages, drawn over the pictures

@@ -6,11 +6,7 @@ from typing import Any
 
 import bpy
 import numpy as np
-from bpy_extras.view3d_utils import (
-    region_2d_to_location_3d,
-    region_2d_to_origin_3d,
-    region_2d_to_vector_3d,
-)
+from bpy_extras import view3d_utils
 from mathutils import Vector
 
 from ..core.cache import BAKE_CACHE
@@ -18,6 +14,8 @@ from ..scene.brush_surface import BrushSurface
 from ..scene.field_attributes import attribute_name, field_degree, is_face_vector_field
 from ..scene.guides import GUIDE_ATTRIBUTE, STROKE_FIRMNESS
 from ..scene.meshes import mesh_surface, read_attribute
+from .app_handlers import add_handlers, remove_handlers
+from .view3d import to_world
 
 
 class BrushMouse:
@@ -32,10 +30,11 @@ class BrushMouse:
     def place(self, mouse: tuple[float, float]) -> np.ndarray | None:
         """Return the point of the rest shape under the mouse, (3,) float32 in object space.
 
-        Return None if the object is not under the mouse.
+        `mouse` is in pixels from the lower left corner of the region. Return None if the object is not under
+        the mouse.
         """
-        origin = region_2d_to_origin_3d(self._region, self._view, mouse)
-        direction = region_2d_to_vector_3d(self._region, self._view, mouse)
+        origin = view3d_utils.region_2d_to_origin_3d(self._region, self._view, mouse)
+        direction = view3d_utils.region_2d_to_vector_3d(self._region, self._view, mouse)
         return self._surface.cast_ray(origin, direction)
 
     def radius(self, place: np.ndarray, pixels: float) -> float:
@@ -43,7 +42,7 @@ class BrushMouse:
         world = self._obj.matrix_world @ Vector(place.tolist())
         x, y = self._region.width / 2, self._region.height / 2
         start, end = (
-            region_2d_to_location_3d(self._region, self._view, position, world)
+            view3d_utils.region_2d_to_location_3d(self._region, self._view, position, world)
             for position in ((x, y), (x + 1, y))
         )
         return pixels * (end - start).length / (self._obj.matrix_world.median_scale or 1.0)
@@ -67,8 +66,7 @@ class BrushMouse:
         if is_face_vector_field(mesh, GUIDE_ATTRIBUTE):
             guides = read_attribute(mesh, GUIDE_ATTRIBUTE, np.float32, 3)
             is_guided = np.linalg.norm(guides[face], axis=1) > STROKE_FIRMNESS
-        matrix = np.array(self._obj.matrix_world)
-        return ends @ matrix[:3, :3].T + matrix[:3, 3], is_guided
+        return to_world(self._obj, ends), is_guided
 
 
 #: The `BrushMouse` that was created last, after the name of its object and the pointer of its region.
@@ -79,7 +77,10 @@ _is_held = False
 
 
 def current_mouse(context: bpy.types.Context, obj: bpy.types.Object) -> BrushMouse:
-    """Return the `BrushMouse` of an object in the region of the context; a new one after each change."""
+    """Return the `BrushMouse` of an object in the region of the context.
+
+    It is created again after each change of the scene, unless `hold_mouse` keeps it.
+    """
     key = obj.name, context.region.as_pointer()
     if _current is None or (_current[0] != key and not _is_held):
         _read(context, obj)
@@ -103,31 +104,23 @@ def release_mouse(*_: Any) -> None:
 def unregister() -> None:
     """Forget the object that was read, and stop watching for changes."""
     release_mouse()
-    for handlers, handler in _app_handlers():
-        if handler in handlers:
-            handlers.remove(handler)
+    remove_handlers(_HANDLERS)
 
 
 def _read(context: bpy.types.Context, obj: bpy.types.Object) -> None:
     global _current
     _current = (obj.name, context.region.as_pointer()), BrushMouse(context, obj)
-    for handlers, handler in _app_handlers():
-        if handler not in handlers:
-            handlers.append(handler)
-
-
-def _app_handlers() -> list[tuple[Any, Any]]:
-    """Return pairs of one of Blender's lists of application handlers and the handler that belongs in it."""
-    handlers = bpy.app.handlers
-    return [
-        (handlers.depsgraph_update_post, _after_change),
-        (handlers.load_pre, release_mouse),
-        (handlers.undo_pre, release_mouse),
-        (handlers.redo_pre, release_mouse),
-    ]
+    add_handlers(_HANDLERS)
 
 
 def _after_change(*_: Any) -> None:
     """Forget the object that was read, so that it is read again at the next redraw of the cursor."""
     if not _is_held:
         release_mouse()
+
+
+#: Handlers of Blender's events, by the names of their lists in `bpy.app.handlers`.
+_HANDLERS = {
+    "depsgraph_update_post": _after_change,
+    **dict.fromkeys(("load_pre", "undo_pre", "redo_pre"), release_mouse),
+}

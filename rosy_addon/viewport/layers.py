@@ -15,14 +15,8 @@ import numpy as np
 from ..compositor.look import Look
 from ..compositor.target_tone import ReferenceRender
 from ..core.errors import REPORTED_ERRORS, RosyError, error_text
+from ..scene import look_inputs
 from ..scene.cameras import render_camera
-from ..scene.look_inputs import (
-    ReadRequest,
-    load_luminance,
-    load_reference,
-    read_request,
-    reference_path,
-)
 from ..scene.scene_reader import SceneInstance, SceneReader
 from ..scene.visible_objects import shown_instances
 
@@ -55,7 +49,7 @@ class LayerState:
     reader: SceneReader = field(default_factory=SceneReader)
     instances: list[SceneInstance] = field(default_factory=list)
     stale: bool = True
-    request: ReadRequest | None = None
+    request: look_inputs.ReadRequest | None = None
     has_occluders: bool = False
     is_starting: bool = True
 
@@ -85,14 +79,15 @@ class LayerStates:
     ) -> LayerState:
         """Return the state of the context's view layer, up to date unless its `is_starting` is true.
 
-        The first call only creates the state, so that the view can show what is done next.
+        Reading may be slow. So the first call only creates the state: the view can first draw the message
+        that meshes are being read.
         """
         key = context.scene.name, context.view_layer.name
         if key not in self._layers:
             self._layers[key] = LayerState()
             return self._layers[key]
         layer = self._layers[key]
-        request = read_request(context.scene, look)
+        request = look_inputs.read_request(context.scene, look)
         if layer.stale or (layer.request, layer.has_occluders) != (request, include_occluders):
             layer.instances = layer.reader.read(
                 shown_instances(depsgraph, include_occluders=include_occluders),
@@ -105,11 +100,6 @@ class LayerStates:
                 layer.is_starting = False
         return layer
 
-    def mark_all_stale(self) -> None:
-        """Mark all layers as stale, so that they are read again."""
-        for layer in self._layers.values():
-            layer.stale = True
-
     def clear(self) -> None:
         """Forget the states of all layers."""
         self._layers.clear()
@@ -117,7 +107,7 @@ class LayerStates:
     def forget(self, *_: Any) -> None:
         """Mark everything to be read again, except data that is cached by its contents.
 
-        Blender calls this after an undo.
+        Blender calls this after an undo. It is also called when another device draws from now on.
         """
         self._layers = {
             key: LayerState(SceneReader(layer.reader.cache), is_starting=layer.is_starting)
@@ -219,7 +209,7 @@ class ReferenceImages:
             if image is not None:
                 continue
             try:
-                self._images[name] = file_key, load_luminance(file_key[0])
+                self._images[name] = file_key, look_inputs.load_luminance(file_key[0])
             except REPORTED_ERRORS as error:
                 self._images[name] = file_key, error_text(error)
 
@@ -241,7 +231,7 @@ class ReferenceImages:
         """
         if look.tone != "picture":
             return None
-        path = reference_path(scene)
+        path = look_inputs.reference_path(scene)
         file_key = path, _modified_time(path)
         if scene.name not in self._images or self._images[scene.name][0] != file_key:
             self._images[scene.name] = file_key, None
@@ -250,7 +240,7 @@ class ReferenceImages:
             raise RosyError(image)
         if image is None:
             return None
-        reference = load_reference(scene, depsgraph, render_camera(scene), look, image)
+        reference = look_inputs.load_reference(scene, depsgraph, render_camera(scene), look, image)
         key = file_key, reference.camera.key
         if scene.name not in self._current or self._current[scene.name][0] != key:
             self._current[scene.name] = key, reference

@@ -6,7 +6,6 @@ import textwrap
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import NamedTuple
 
 import blf
 import bpy
@@ -16,17 +15,10 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
-from ..annotation import arrow_marks
+from ..annotation import arrow_marks, singularity_marks
 from ..annotation.arrow_marks import ArrowMarks
 from ..annotation.draw_marks import head_outline
 from ..annotation.index_labels import MAX_LABELS, place_indices
-from ..annotation.singularity_marks import (
-    COLOR_BY_SIGN,
-    HIDDEN_OPACITY,
-    OUTLINE,
-    OUTLINE_COLOR,
-    dot_diameters,
-)
 from ..annotation.singularity_settings import shows_hidden_singularities, shows_indices
 from ..compositor.look import Look
 from ..core.cache import Cache
@@ -66,25 +58,19 @@ MAX_EXACT_TRIANGLES = 200_000
 ARC_POINTS = 4
 
 
-class PixelFrames(NamedTuple):
-    """Vectors in world space of the size of one pixel, at K points of a view.
+def pixel_frames(
+    context: bpy.types.Context, points: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the vectors of one pixel at (K, 3) points in world space, in the region that is drawn.
 
-    Attributes
-    ----------
+    Returns
+    -------
     right, up : (K, 3) float64 ndarray
-        Vectors that are parallel to the view plane.
+        Vectors in world space that are as long as a pixel and parallel to the view plane.
     nearer : (K, 3) float64 ndarray
         Vectors of the same length toward the eye. A point that moves along its vector does not move on
         screen.
     """
-
-    right: np.ndarray
-    up: np.ndarray
-    nearer: np.ndarray
-
-
-def pixel_frames(context: bpy.types.Context, points: np.ndarray) -> PixelFrames:
-    """Return the vectors of one pixel at (K, 3) points in world space, in the region that is drawn."""
     view, window = context.region_data, context.region
     view_to_world = np.array(view.view_matrix.inverted())
     right, up, back, eye = view_to_world[:3].T
@@ -93,7 +79,7 @@ def pixel_frames(context: bpy.types.Context, points: np.ndarray) -> PixelFrames:
         depth = (eye - points) @ back
         toward_eye = (eye - points) / depth[:, None]
     pixel = (depth * (2 / (view.window_matrix[0][0] * window.width)))[:, None]
-    return PixelFrames(pixel * right, pixel * up, pixel * toward_eye)
+    return pixel * right, pixel * up, pixel * toward_eye
 
 
 def _draw_triangles(vertices: np.ndarray, code: str, opacity: float) -> None:
@@ -131,11 +117,12 @@ class ViewOverlay:
     Attributes
     ----------
     problem : str or None
-        Why the view shows no picture, or a picture by another method.
+        Why the view shows no picture, or a picture by another LIC method than the look has.
     lines : list of str
         Rows of text in the view, as they were drawn last.
     labeled : (list of SingularityDots, float) or None
-        The dots that have labels, and their size. None if no dots have labels.
+        The dots that have labels, and the diameter in pixels of the dot of a singularity of index 1 / N. None
+        if no dots have labels.
     arrowheads : (hashable, ArrowMarks) or None
         A key of everything that the arrowheads depend on, and the arrowheads.
     """
@@ -210,7 +197,7 @@ def draw_dots(
     """
     if shows_hidden:
         gpu.state.blend_set("ALPHA")
-        _draw_all(context, objects, size, HIDDEN_OPACITY)
+        _draw_all(context, objects, size, singularity_marks.HIDDEN_OPACITY)
         gpu.state.blend_set("NONE")
     gpu.state.depth_test_set("LESS_EQUAL")
     _draw_all(context, objects, size, 1.0)
@@ -239,14 +226,15 @@ def draw_singularities(
 def _draw_all(
     context: bpy.types.Context, objects: Sequence[SingularityDots], size: float, opacity: float
 ) -> None:
+    outline = singularity_marks.OUTLINE * size
     for dots in objects:
-        radii = dot_diameters(dots.index, size) / 2
-        for sign, code in COLOR_BY_SIGN.items():
+        radii = singularity_marks.dot_diameters(dots.index, size) / 2
+        for sign, code in singularity_marks.COLOR_BY_SIGN.items():
             chosen = np.sign(dots.index) == sign
             points, radius = dots.points[chosen], radii[chosen]
             # The outline first, slightly behind the dot.
             for part_radius, depth_offset, color in (
-                (radius + OUTLINE * size, 2 * radius, OUTLINE_COLOR),
+                (radius + outline, 2 * radius, singularity_marks.OUTLINE_COLOR),
                 (radius, 3 * radius, code),
             ):
                 vertices = _disc_triangles(context, points, part_radius, depth_offset)
@@ -260,14 +248,14 @@ def _disc_triangles(
 
     The (K,) radii and the (K,) offsets toward the camera are in pixels.
     """
-    frames = pixel_frames(context, points)
+    right, up, nearer = pixel_frames(context, points)
     angles = np.linspace(0, 2 * np.pi, DISC_SEGMENTS + 1)
     x, y = (
         np.stack([np.zeros(DISC_SEGMENTS), values[:-1], values[1:]], axis=1).reshape(-1, 1)
         for values in (np.cos(angles), np.sin(angles))
     )
-    center = points + depth_offset[:, None] * frames.nearer
-    circle = x * frames.right[:, None] + y * frames.up[:, None]
+    center = points + depth_offset[:, None] * nearer
+    circle = x * right[:, None] + y * up[:, None]
     vertices = center[:, None] + radius[:, None, None] * circle
     return vertices.reshape(-1, 3).astype(np.float32)
 
@@ -319,22 +307,16 @@ def is_occluded(context: bpy.types.Context, point: np.ndarray) -> bool:
     """
     point = Vector(point)
     view_to_world = context.region_data.view_matrix.inverted()
-    view_direction = (
-        view_to_world.translation - point
-        if context.region_data.is_perspective
-        else view_to_world.col[2].xyz
-    )
+    view_direction = view_to_world.col[2].xyz
+    if context.region_data.is_perspective:
+        view_direction = view_to_world.translation - point
     view_direction.normalize()
     start = point + NEAR_SURFACE * context.region_data.view_distance * view_direction
     return context.scene.ray_cast(context.view_layer.depsgraph, start, view_direction)[0]
 
 
 def draw_view_arrowheads(
-    context: bpy.types.Context,
-    view: ViewInput,
-    key: Hashable,
-    overlay: ViewOverlay,
-    cache: Cache,
+    context: bpy.types.Context, view: ViewInput, key: Hashable, overlay: ViewOverlay, cache: Cache
 ) -> None:
     """Draw arrowheads over the lines of a view. Surfaces in front of arrowheads hide them.
 
@@ -367,18 +349,18 @@ def _head_triangles(
     offset = (marks.position - marks.place)[:, None] + (
         corners[:, :1] * forward[:, None] + corners[:, 1:] * left[:, None]
     )
-    frames = pixel_frames(context, marks.anchor)
+    right, up, nearer = pixel_frames(context, marks.anchor)
     nearness = nearness + SLOPE * np.hypot(*(marks.position - marks.place).T)[:, None]
-    vertices = (marks.anchor + nearness * frames.nearer)[:, None] + (
-        offset[..., :1] * frames.right[:, None] + offset[..., 1:] * frames.up[:, None]
+    vertices = (marks.anchor + nearness * nearer)[:, None] + (
+        offset[..., :1] * right[:, None] + offset[..., 1:] * up[:, None]
     )
     return vertices.reshape(-1, 3).astype(np.float32)
 
 
 def _outline_triangles(outline: np.ndarray, grown: float) -> np.ndarray:
-    """Return the (n, 2) corners of triangles that fill an arrowhead with a margin of width `grown`.
+    """Return the (n, 2) corners, in pixels, of triangles that fill an arrowhead and a margin around it.
 
-    The margin has round corners. `outline` is the result of `head_outline`.
+    The margin is `grown` pixels wide and has round corners. `outline` is the result of `head_outline`.
     """
     tip, barb, notch = outline
     # The sides run counter-clockwise from the tip, so their right sides are outside.

@@ -44,11 +44,12 @@ class Request(NamedTuple):
     Attributes
     ----------
     key : hashable
-        Key of everything that the picture depends on.
+        Key of everything that the picture depends on. It changes whenever the picture would change.
     still_key : hashable
         Key of everything but the drift of the streaks: it is equal for pictures in which only the streaks
         have drifted.
     view_input : ViewInput
+        Input of the picture. Its camera has the size of the region.
     lookups : sequence of callable
         Functions that look up data that must be prepared besides the meshes; see `prepare_steps`.
     """
@@ -56,7 +57,7 @@ class Request(NamedTuple):
     key: Hashable
     still_key: Hashable
     view_input: ViewInput
-    lookups: Sequence[Callable[[], Any]]
+    lookups: Sequence[Callable[[], Any]] = ()
 
 
 @dataclass(eq=False)
@@ -168,8 +169,8 @@ class ProgressiveRenderer:
     rest. A picture that could not be rendered is not tried again.
 
     A helper process makes the calls of numeric functions; meanwhile the views show their last pictures. If
-    the view changes while a preview or a preparation is in work, it is still finished and shown. A final
-    picture is abandoned instead.
+    the view changes in the meantime, a final picture is abandoned. A preview that was begun is finished and
+    shown, although it is outdated, and a preparation is finished.
 
     If only streaks drift, no previews are rendered, because they would flicker between the final pictures.
     The final pictures are rendered one after the other, and none is abandoned.
@@ -249,28 +250,14 @@ class ProgressiveRenderer:
             self._preparation = None
         self.renderer.release()
 
-    def update(
-        self,
-        view_pointers: tuple[int, int],
-        requested_key: Hashable,
-        view_input: ViewInput,
-        still_key: Hashable = None,
-        lookups: Sequence[Callable[[], Any]] = (),
-    ) -> ViewState:
+    def update(self, view_pointers: tuple[int, int], request: Request) -> ViewState:
         """Bring the picture of a view up to date, as far as the time budget allows, and return its state.
 
         Parameters
         ----------
         view_pointers : (int, int)
             Pointers of the space and the region.
-        requested_key : hashable
-            A key that changes whenever the picture would change.
-        view_input : ViewInput
-            Input of the picture. Its camera has the size of the region.
-        still_key : hashable, optional
-            A key that also changes then, except if only streaks have drifted. By default `requested_key`.
-        lookups : sequence of callable
-            Functions that look up data that must be prepared besides the meshes; see `prepare_steps`.
+        request : Request
 
         Raises
         ------
@@ -278,20 +265,18 @@ class ProgressiveRenderer:
             If this picture cannot be rendered. Later calls for it raise a RosyError with the same message.
         """
         view = self.views.setdefault(view_pointers, ViewState())
-        still_key = requested_key if still_key is None else still_key
-        view.requested_key = requested_key
-        if still_key != view.requested_still_key:
-            view.requested_still_key, view.requested_time = still_key, time.monotonic()
-        if view.error is not None and view.error_key == still_key:
+        view.requested_key = request.key
+        if request.still_key != view.requested_still_key:
+            view.requested_still_key, view.requested_time = request.still_key, time.monotonic()
+        if view.error is not None and view.error_key == request.still_key:
             raise RosyError(view.error)
         view.error = None
         try:
-            request = Request(requested_key, still_key, view_input, lookups)
             prepared = self._prepared(view, request)
             if prepared is not None:
                 self._update_picture(view, prepared)
         except Exception as error:
-            view.error, view.error_key = error_text(error), still_key
+            view.error, view.error_key = error_text(error), request.still_key
             view.stop_rendering()
             view.texture = view.texture_key = view.texture_still_key = None
             raise
@@ -343,6 +328,7 @@ class ProgressiveRenderer:
                 return
             view.stop_rendering()
         seconds = self._seconds_per_megapixel * self._megapixels(view, request)
+        is_at_rest = time.monotonic() - view.requested_time >= IDLE_SECONDS
         if not self._seconds_per_megapixel:
             self._start(view, request, full_downscale)
         elif seconds <= FRAME_BUDGET_SECONDS:
@@ -350,10 +336,7 @@ class ProgressiveRenderer:
         elif view.texture_still_key != request.still_key:
             self._start(view, request, preview_downscale, is_at_once=True)
             self._schedule_redraw(IDLE_SECONDS)
-        elif (
-            view.downscale != full_downscale
-            and time.monotonic() - view.requested_time < IDLE_SECONDS
-        ):
+        elif view.downscale != full_downscale and not is_at_rest:
             self._schedule_redraw(IDLE_SECONDS)
         else:
             self._start(view, request, full_downscale)
@@ -389,11 +372,9 @@ class ProgressiveRenderer:
         is_final = downscale == self.renderer.downscale_factors[1]
         # A final picture that is shown must not be overwritten: the other image is used.
         buffer = 1 - view.buffer if _shows(view, downscale) and not is_at_once else view.buffer
-        steps = self.renderer.texture_steps(
-            view.items,
-            downscaled(request.view_input, downscale),
-            (id(view), downscale, buffer if is_final else 0),
-        )
+        view_input = downscaled(request.view_input, downscale)
+        target = id(view), downscale, buffer if is_final else 0
+        steps = self.renderer.texture_steps(view.items, view_input, target)
         runner = StepRunner(steps, self._helper)
         view.picture = Work(view, request, runner, is_at_once, downscale, buffer)
         self._render(view)
@@ -427,11 +408,8 @@ class ProgressiveRenderer:
         """Update the estimated cost of pictures, given the time and the size of a finished picture."""
         # The minimum keeps the cost of single compilations and uploads out of the estimate.
         cost = seconds / max(megapixels, _MIN_MEGAPIXELS)
-        self._seconds_per_megapixel = (
-            cost
-            if not self._seconds_per_megapixel
-            else min(cost, 0.5 * (self._seconds_per_megapixel + cost))
-        )
+        old_cost = self._seconds_per_megapixel or cost
+        self._seconds_per_megapixel = min(cost, 0.5 * (old_cost + cost))
 
     def _continue(self, view: ViewState, work: Work, seconds: float) -> StopIteration | None:
         """Continue work for a view. Return the StopIteration with its result if it is done, otherwise None.

@@ -26,27 +26,12 @@ from ..scene.look_inputs import check_sources, read_request
 from ..scene.look_properties import drift_in_scene, read_look
 from ..scene.read_view import read_lights
 from ..worker.helper import Helper
+from . import overlays, view3d
+from .app_handlers import add_handlers, remove_handlers
 from .flow_clock import FlowClock
 from .layers import LayerState, LayerStates, ReferenceImages
-from .overlays import (
-    ViewOverlay,
-    draw_labels,
-    draw_messages,
-    draw_singularities,
-    draw_view_arrowheads,
-    look_up_singularities,
-)
-from .progressive import ProgressiveRenderer
-from .view3d import (
-    clip_planes,
-    is_timeline_playing,
-    is_visible,
-    open_view3d_spaces,
-    redraw,
-    redraw_sidebars,
-    shows_surfaces,
-    view_background,
-)
+from .overlays import ViewOverlay
+from .progressive import ProgressiveRenderer, Request
 
 #: Seconds between two checks for views that were closed.
 CLOSED_VIEWS_INTERVAL_SECONDS = 1.0
@@ -109,16 +94,14 @@ class ViewportSession:
             bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW"),
             bpy.types.SpaceView3D.draw_handler_add(self._draw_text, (), "WINDOW", "POST_PIXEL"),
         ]
-        handlers = bpy.app.handlers
-        self._app_handlers = [
-            (handlers.depsgraph_update_post, self.layers.invalidate),
-            (handlers.frame_change_post, self.layers.invalidate),
-            (handlers.undo_post, self.layers.forget),
-            (handlers.redo_post, self.layers.forget),
-            (handlers.load_pre, self._on_load),
-        ]
-        for handler_list, handler in self._app_handlers:
-            handler_list.append(handler)
+        self._app_handlers = {
+            "depsgraph_update_post": self.layers.invalidate,
+            "frame_change_post": self.layers.invalidate,
+            "undo_post": self.layers.forget,
+            "redo_post": self.layers.forget,
+            "load_pre": self._on_load,
+        }
+        add_handlers(self._app_handlers)
         #: The methods that timers call. Blender identifies a timer by its function object, and each access to
         #: a method makes a new one.
         self._timers: dict[Callable[[], float | None], Callable[[], float | None]] = {}
@@ -138,7 +121,7 @@ class ViewportSession:
     def add(self, space: bpy.types.SpaceView3D) -> None:
         """Make a view live: from now on, the fields of its objects are drawn over it."""
         self.spaces.add(space.as_pointer())
-        redraw()
+        view3d.redraw()
 
     def remove(self, space_pointer: int) -> None:
         """Stop drawing over a view, given its pointer."""
@@ -146,33 +129,31 @@ class ViewportSession:
         for pointers in [pointers for pointers in self._overlays if pointers[0] == space_pointer]:
             del self._overlays[pointers]
         self.progressive.remove_space(space_pointer)
-        redraw()
+        view3d.redraw()
 
     def stop(self) -> None:
         """Remove all handlers and timers, and free all resources."""
         for handler in self._draw_handlers:
             bpy.types.SpaceView3D.draw_handler_remove(handler, "WINDOW")
-        for handler_list, handler in self._app_handlers:
-            handler_list.remove(handler)
+        remove_handlers(self._app_handlers)
         for timer in self._timers.values():
             if bpy.app.timers.is_registered(timer):
                 bpy.app.timers.unregister(timer)
-        self._draw_handlers, self._app_handlers = [], []
         self.layers.clear()
         self.spaces.clear()
         self.progressive.release()
         self._helper.close()
-        redraw()
+        view3d.redraw()
 
     def play_flow(self, plays: bool) -> None:
         """Let streaks drift if `plays` is true, otherwise stop them."""
         if plays:
             self.flow_clock.play(time.monotonic())
             self._schedule(0.0, self._advance_flow)
-            redraw(self.spaces)
+            view3d.redraw(self.spaces)
         else:
             self.flow_clock.pause()
-        redraw_sidebars()
+        view3d.redraw_sidebars()
 
     # --- handlers and timers ---------------------------------------------------------------------
 
@@ -180,8 +161,11 @@ class ViewportSession:
         stop()
 
     def _drop_closed_views(self) -> float | None:
-        """Remove views that were closed, and stop the session if no view is left."""
-        open_spaces = {space.as_pointer() for space in open_view3d_spaces()}
+        """Timer: remove views that were closed, and stop the session if no view is left.
+
+        Return the seconds until the next call; None to end the timer.
+        """
+        open_spaces = {space.as_pointer() for space in view3d.open_view3d_spaces()}
         for space_pointer in self.spaces - open_spaces:
             self.remove(space_pointer)
         if self.spaces:
@@ -191,37 +175,45 @@ class ViewportSession:
 
     def _tag_redraw(self) -> None:
         """Tag the live views for a redraw, in which rendering continues."""
-        redraw(self.spaces)
+        view3d.redraw(self.spaces)
 
     def _poll_helper(self) -> float | None:
-        """Tag the live views for a redraw once `ProgressiveRenderer.poll` returns True."""
+        """Timer: tag the live views for a redraw once `ProgressiveRenderer.poll` returns True.
+
+        Return the seconds until the next call; None to end the timer.
+        """
         if not self.progressive.poll():
             return POLL_SECONDS
-        redraw(self.spaces)
+        view3d.redraw(self.spaces)
         return None
 
     def _resolve_topologies(self) -> float | None:
-        """Read the data that cannot be read while Blender draws, in slices of time."""
+        """Timer: call `LayerStates.resolve_topologies` until all data is read that views wait for.
+
+        Return the seconds until the next call; None to end the timer.
+        """
         if not self.layers.resolve_topologies():
             return 0.0
-        redraw(self.spaces)
+        view3d.redraw(self.spaces)
         return None
 
     def _load_references(self) -> None:
         """Load the pictures that tones come from."""
         self._references.load_pending()
-        redraw(self.spaces)
+        view3d.redraw(self.spaces)
 
     def _advance_flow(self) -> float | None:
-        """Advance the clock of the streaks, and tag the views for a redraw. Wait while pictures are rendered.
+        """Timer: advance the clock of the streaks, and tag the views for a redraw.
 
-        While the timeline plays, the clock stands still, because streaks drift with the frames of the scene.
+        While pictures are rendered, the clock is not advanced. While the timeline plays, it stands still, as
+        streaks drift with the frames of the scene. Return the seconds until the next call; None to end the
+        timer.
         """
         if not self.flow_clock.is_playing:
             return None
         render, now = bpy.context.scene.render, time.monotonic()
         rate = render.fps / render.fps_base
-        if is_timeline_playing():
+        if view3d.is_timeline_playing():
             self.flow_clock.skip(now)
         elif (
             self._has_shown_flow
@@ -229,7 +221,7 @@ class ViewportSession:
             and self.flow_clock.advance(now, rate)
         ):
             self._has_shown_flow = False
-            redraw(self.spaces)
+            view3d.redraw(self.spaces)
         return 1 / rate
 
     def _schedule(self, seconds: float, function: Callable[[], float | None]) -> None:
@@ -251,7 +243,7 @@ class ViewportSession:
         overlay = self._overlays[pointers]
         overlay.problem = overlay.labeled = None
         try:
-            if not shows_surfaces(context.space_data):
+            if not view3d.shows_surfaces(context.space_data):
                 raise RosyError("fields are not drawn in wireframe shading: choose another shading")
             self._draw_view(context, overlay)
         except DeviceError as error:
@@ -271,7 +263,7 @@ class ViewportSession:
         self.progressive.release()
         self.progressive = self._new_progressive("cpu")
         self.fallback_reason, self._fallback_time = str(error), time.monotonic()
-        self.layers.mark_all_stale()
+        self.layers.forget()
         self._schedule_redraw(0.0)
 
     def _draw_view(self, context: bpy.types.Context, overlay: ViewOverlay) -> None:
@@ -282,20 +274,17 @@ class ViewportSession:
         if view_input is None:
             return
         shows_dots = shows_singularities(look)
-        view = self.progressive.update(
-            _pointers(context),
-            _picture_key(view_input),
-            view_input,
-            _picture_key(replace(view_input, drift=NO_DRIFT)),
-            [
-                partial(look_up_singularities, instance, self._marks_cache)
-                for instance in view_input.instances
-                if shows_dots and instance.field is not None
-            ],
-        )
+        still_key = _picture_key(replace(view_input, drift=NO_DRIFT))
+        lookups = [
+            partial(overlays.look_up_singularities, instance, self._marks_cache)
+            for instance in view_input.instances
+            if shows_dots and instance.field is not None
+        ]
+        request = Request(_picture_key(view_input), still_key, view_input, lookups)
+        view = self.progressive.update(_pointers(context), request)
         renderer = self.progressive.renderer
         if self.progressive.is_prepared:
-            background = view_background(context, depsgraph, view_input.camera, look)
+            background = view3d.view_background(context, depsgraph, view_input.camera, look)
             if background is not None:
                 draw_background(renderer.device, background)
         if view.texture is None:
@@ -304,11 +293,12 @@ class ViewportSession:
         renderer.composite(view.texture, view.items, view_input, opacity)
         if look.arrows:
             still = replace(view_input, look=look, lights=(), reference=None, drift=NO_DRIFT)
-            draw_view_arrowheads(context, still, _picture_key(still), overlay, self._marks_cache)
+            key = _picture_key(still)
+            overlays.draw_view_arrowheads(context, still, key, overlay, self._marks_cache)
         else:
             overlay.arrowheads = None
         if shows_dots:
-            draw_singularities(context, view_input, look, overlay, self._marks_cache)
+            overlays.draw_singularities(context, view_input, look, overlay, self._marks_cache)
         self._marks_cache.evict_over_limit()
 
     def _read_view(
@@ -339,7 +329,7 @@ class ViewportSession:
         visible = [
             entry
             for entry in layer.instances
-            if is_visible(entry.visibility_object, depsgraph, context.space_data)
+            if view3d.is_visible(entry.visibility_object, depsgraph, context.space_data)
         ]
         with_field = [entry for entry in visible if entry.instance.field is not None]
         if not with_field:
@@ -360,7 +350,7 @@ class ViewportSession:
             look=look,
             lights=tuple(read_lights(depsgraph, camera.view)) if look.light == "scene" else (),
             reference=reference,
-            clip_planes=clip_planes(context.region_data),
+            clip_planes=view3d.clip_planes(context.region_data),
             drift=self._drift(look, context.scene),
         )
 
@@ -378,12 +368,12 @@ class ViewportSession:
             return
         overlay = self._overlays[pointers]
         if overlay.labeled is not None:
-            draw_labels(context, *overlay.labeled)
+            overlays.draw_labels(context, *overlay.labeled)
         lines = self._lines_of_view(pointers, self.layers.get(context.scene, context.view_layer))
-        draw_messages(lines, context)
+        overlays.draw_messages(lines, context)
         if lines != overlay.lines:
             overlay.lines = lines
-            self._schedule(0.0, redraw_sidebars)
+            self._schedule(0.0, view3d.redraw_sidebars)
 
     def _lines_of_view(self, pointers: ViewPointers, layer: LayerState | None) -> list[str]:
         """Return the rows of text that a view shows."""
@@ -419,18 +409,13 @@ def _pointers(context: bpy.types.Context) -> ViewPointers:
 def _picture_key(view_input: ViewInput) -> Hashable:
     """Return a key that changes whenever the picture of a view would change."""
     planes = view_input.clip_planes
-    return (
-        view_input.instances,
-        view_input.camera.key,
-        view_input.look,
-        view_input.drift,
-        None if planes is None else planes.tobytes(),
-        tuple(
-            (light.kind, tuple(light.vector), tuple(light.color), light.strength)
-            for light in view_input.lights
-        ),
-        view_input.reference,
+    scene_key = view_input.instances, view_input.camera.key, view_input.look, view_input.drift
+    light_keys = (
+        (light.kind, tuple(light.vector), tuple(light.color), light.strength)
+        for light in view_input.lights
     )
+    plane_key = None if planes is None else planes.tobytes()
+    return *scene_key, plane_key, *light_keys, view_input.reference
 
 
 # --- the session of this Blender -----------------------------------------------------------------

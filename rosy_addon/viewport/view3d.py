@@ -17,6 +17,12 @@ from ..scene.cameras import camera_of_object
 _NO_CLIP_PLANE = 0.0, 0.0, 0.0, 1.0
 
 
+def to_world(obj: bpy.types.Object, points: np.ndarray) -> np.ndarray:
+    """Transform (..., 3) points from the object space of an object to world space."""
+    matrix = np.array(obj.matrix_world)
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
 def open_view3d_spaces() -> list[bpy.types.SpaceView3D]:
     """Return the 3D views of all screens, shown or not."""
     return [

@@ -35,7 +35,9 @@ class _Reporter:
             return
         self._next_time = now + REPORT_SECONDS
         try:
-            has_ended = self._channel.poll()  # during a call, the parent sends nothing, but may end
+            has_ended = (
+                self._channel.connection.poll()
+            )  # during a call, the parent sends nothing, but may end
             self._channel.send(("progress", fraction, label))
         except OSError:
             has_ended = True
@@ -58,10 +60,10 @@ def main(handle: str, package: str) -> None:
     try:
         channel.send(("ready",))
         while True:
-            if not channel.poll(IDLE_SECONDS):
+            if not channel.connection.poll(IDLE_SECONDS):
                 BAKE_CACHE.clear()
                 POOL.close()
-                channel.poll(None)
+                channel.connection.poll(None)
             function, arguments = channel.receive()
             answer = _answer(function, arguments, reporter)
             del function, arguments

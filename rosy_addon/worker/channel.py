@@ -10,7 +10,7 @@ from __future__ import annotations
 import io
 import pickle
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from dataclasses import fields
 from multiprocessing.connection import Connection
 from typing import Any
@@ -55,10 +55,6 @@ class Channel:
         self._parts = _message_parts(connection)
         self._message: tuple[list[int], bytes, list[np.ndarray]] | None = None
 
-    def poll(self, timeout: float = 0.0) -> bool:
-        """Return whether a message arrives, or the connection ends, within `timeout` seconds."""
-        return self.connection.poll(timeout)
-
     def has_received(self, seconds: float) -> bool:
         """Receive parts of the next message that are available, for some seconds.
 
@@ -86,13 +82,12 @@ class Channel:
         OSError
             If the other process has ended.
         """
-        stream, buffers = io.BytesIO(), []
-        pickler = _Pickler(stream, self._sent, self._last_number, buffers.append)
+        pickler = _Pickler(self._sent, self._last_number)
         pickler.dump(message)
         forgotten = [number for number, _ in self._sent.values() if number not in pickler.used]
-        arrays = [buffer.raw() for buffer in buffers]
+        arrays = [buffer.raw() for buffer in pickler.buffers]
         self.connection.send((forgotten, [array.nbytes for array in arrays]))
-        self.connection.send_bytes(stream.getbuffer())
+        self.connection.send_bytes(pickler.stream.getbuffer())
         for array in arrays:
             for start in range(0, array.nbytes, CHUNK_BYTES):
                 self.connection.send_bytes(array[start : start + CHUNK_BYTES])
@@ -120,10 +115,6 @@ class Channel:
             next(self._parts)
         except StopIteration as end:
             self._message, self._parts = end.value, _message_parts(self.connection)
-
-    def close(self) -> None:
-        """Close this end of the connection. The other process notices that and ends."""
-        self.connection.close()
 
 
 def _message_parts(
@@ -157,20 +148,19 @@ class _Pickler(pickle.Pickler):
 
     Attributes
     ----------
+    stream : io.BytesIO
+        The pickle, without the data of arrays.
+    buffers : list of pickle.PickleBuffer
+        The data of the arrays.
     used : dict of int to object
         Objects of `KEPT_CLASSES` in the message, by number.
     last_number : int
         The largest number that was given to an object so far.
     """
 
-    def __init__(
-        self,
-        stream: io.BytesIO,
-        sent: dict[int, tuple[int, Any]],
-        last_number: int,
-        add_buffer: Callable[[pickle.PickleBuffer], Any],
-    ) -> None:
-        super().__init__(stream, 5, buffer_callback=add_buffer)
+    def __init__(self, sent: dict[int, tuple[int, Any]], last_number: int) -> None:
+        self.stream, self.buffers = io.BytesIO(), []
+        super().__init__(self.stream, 5, buffer_callback=self.buffers.append)
         self._sent, self.last_number = sent, last_number
         self.used: dict[int, Any] = {}
 
@@ -235,8 +225,8 @@ class _Unpickler(pickle.Unpickler):
 
 
 def _keep(number: int, kind: type, state: dict[str, Any]) -> Any:
-    """Stand in pickles for the function that creates an object and keeps it.
+    """Placeholder that is never called: pickles name it as the function that creates an object.
 
-    It is never called: `_Unpickler` calls its method `_keep` instead.
+    In its place, `_Unpickler` calls its own method `_keep`, which creates the object and keeps it.
     """
     raise NotImplementedError

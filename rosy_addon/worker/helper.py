@@ -29,17 +29,14 @@ class HelperLostError(Exception):
     """
 
     def __init__(self, message: str, has_started: bool) -> None:
-        super().__init__(message, has_started)
+        super().__init__(message)
         self.has_started = has_started
-
-    def __str__(self) -> str:
-        return self.args[0]
 
 
 class _RemoteTracebackError(Exception):
     """The traceback of an error in a helper process, as text.
 
-    It is the cause of the error that is raised here.
+    This process raises the error again, with this exception as its ``__cause__``.
     """
 
 
@@ -170,7 +167,7 @@ class Helper:
             process.kill()
             process.wait()
         if channel is not None:
-            channel.close()
+            channel.connection.close()
 
     def wait(self, seconds: float) -> None:
         """Wait for a message of the helper process, or for its end, at most for some seconds."""
@@ -189,7 +186,7 @@ class Helper:
 
     def _send_call(self) -> bool:
         """Send the call if the helper process is ready. Return whether it has been sent, now or before."""
-        if not self._is_ready and self._channel.poll():
+        if not self._is_ready and self._channel.connection.poll():
             self._channel.receive()
             self._is_ready = True
         if not self._is_ready and time.monotonic() - self._start_time > START_SECONDS:
@@ -209,7 +206,16 @@ class Helper:
 
 
 def _outcome(kind: str, answer: Any, traceback: str = "") -> Any:
-    """Return the result of a call, or raise its error. The traceback in the helper is its cause."""
+    """Return the result of a function call in the helper process, or raise its error.
+
+    Parameters
+    ----------
+    kind : {"result", "error"}
+    answer : object
+        The result, or the exception.
+    traceback : str
+        Traceback of the exception in the helper process. It becomes the ``__cause__`` of the exception.
+    """
     if kind == "error":
         raise answer from _RemoteTracebackError(f"\n{traceback}")
     return answer

@@ -56,8 +56,8 @@ class Pool:
         count : int
             Number of processes. 0 means one per processor core.
         function_here : function, optional
-            Function for the calls in this process, such as the same one with a cache of the caller. By
-            default `function`.
+            Function with the same results, for the calls in this process. For example, it may use a cache
+            that exists only in this process. By default `function`.
 
         Returns
         -------

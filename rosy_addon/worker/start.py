@@ -127,9 +127,15 @@ _guard: Connection | None = None
 
 
 def _tell_guard(what: str, item: int | str) -> None:
-    """Tell the guard process to watch a process (by ID) or folder, or to leave it.
+    """Tell the guard process to watch a process or a folder, or to stop watching it.
 
-    Start the guard if needed.
+    The guard process is started if it does not run.
+
+    Parameters
+    ----------
+    what : {"watch", "leave"}
+    item : int or str
+        ID of the process, or path of the folder.
     """
     global _guard
     with suppress(OSError):  # without a guard, cleanup still works unless this process is killed

@@ -55,7 +55,7 @@ class StepRunner:
         return self._outcome is not None
 
     def poll(self) -> bool:
-        """Return whether the job can continue. If not, it waits for the helper process."""
+        """Return at once whether the job can continue, or must wait for a result of the helper process."""
         if self._call is None or self._outcome is not None:
             return True
         try:

@@ -108,7 +108,9 @@ def test_parity_of_a_scene(rosy, card, scene, suzanne, kind):
     depsgraph = bpy.context.evaluated_depsgraph_get()
     instances = module_of(PACKAGE, "scene.scene_reader").read_scene(depsgraph).instances
     assert [instance.field is None for instance in instances] == [False, False, True]
-    view = module_of(PACKAGE, "scene.cameras").camera_of_object(scene, depsgraph, camera, 512, 512)
+    view = module_of(PACKAGE, "scene.cameras").camera_of_object(
+        scene, depsgraph, camera, (512, 512)
+    )
     look = rosy.Look(shading=0.0)
     pair = draw_pair(rosy, card, instances, view, look)
     assert set(np.unique(pair.gbuffer.instance_id)) == {0, 1}
@@ -145,7 +147,7 @@ def test_a_rejected_shader_is_an_error_of_one_line(rosy, card, capfd):
     class Broken(passes.ComputePass):
         source = "void main() { nonsense }"
 
-    image = card.device.texture(8, 8, "RGBA32F")
+    image = card.device.texture((8, 8), "RGBA32F")
     with pytest.raises(errors.RosyError, match="'clear'"):
-        card.device.compute(Broken("clear"), (8, 8), {}, {"cleared": image}, {"box_origin": (0, 0)})
+        card.device.compute(Broken("clear"), (8, 8, 1), {"cleared": image}, {"box_origin": (0, 0)})
     capfd.readouterr()

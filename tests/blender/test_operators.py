@@ -308,7 +308,7 @@ def test_singularities_as_points(scene):
     positions = points.data.attributes["position"].data
     assert all(abs(point.vector.length - 1) < 0.02 for point in positions)
     overlay = sys.modules["bl_ext.user_default.rosy.rosy_addon.ui.overlay"]
-    assert overlay.is_shown("Icosphere")
+    assert overlay.shown("Icosphere")
     # They replace the earlier ones.
     assert bpy.ops.rosy.singularities(show="POINTS") == {"FINISHED"}
     assert [obj.name for obj in bpy.data.objects if "singularities" in obj.name] == [name]
@@ -398,9 +398,9 @@ def test_opening_a_file_hides_singularities(scene):
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
     bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
     bpy.ops.rosy.singularities(show="OVERLAY")
-    assert overlay.is_shown("Icosphere") and len(bpy.app.handlers.load_pre) == handlers + 1
+    assert overlay.shown("Icosphere") and len(bpy.app.handlers.load_pre) == handlers + 1
     bpy.ops.wm.read_homefile(use_empty=True)
-    assert not overlay.is_shown("Icosphere") and len(bpy.app.handlers.load_pre) == handlers
+    assert not overlay.shown("Icosphere") and len(bpy.app.handlers.load_pre) == handlers
 
 
 def test_exports_and_imports(suzanne, tmp_path):

@@ -10,7 +10,7 @@ from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.field.directional_field import field_directions, field_from_directions
 from rosy.rosy_addon.field.frames import normalize
 from rosy.rosy_addon.field.generate import axis_field
-from rosy.rosy_addon.field.representation import face_frames, face_representation
+from rosy.rosy_addon.field.representation import face_representation
 from rosy.rosy_addon.field.rosy_field import RosyField
 from rosy.rosy_addon.projection.project import project
 from rosy.rosy_addon.scene import scene_reader
@@ -47,7 +47,7 @@ def representation(mesh, field):
 def test_fields_are_written_and_read(monkey, degree):
     mesh = monkey.data
     surface = mesh_surface(mesh)
-    x, _ = face_frames(surface)
+    x, _ = surface.face_frames
     write_mesh_field(mesh, RosyField(degree, 3 * x), "other")
     assert (mesh.rosy.degree, mesh.rosy.attribute) == (degree, "other")
     field = read_mesh_field(mesh)
@@ -106,7 +106,7 @@ def test_angles(scene):
 
 
 def add_directions(mesh, degree, angle_offset=0.0, length_factor=1.0):
-    x, y = face_frames(mesh_surface(mesh))
+    x, y = mesh_surface(mesh).face_frames
     for index in range(degree):
         angle = 2 * np.pi * index / degree + 0.2 + (angle_offset if index == 1 else 0.0)
         vectors = np.cos(angle) * x + np.sin(angle) * y
@@ -171,7 +171,7 @@ def test_directions_replace_an_earlier_field(scene):
     write_mesh_field(plane.data, axis_field(surface, 4, (1, 0, 0)))
     add_directions(plane.data, 6)
     phasor = np.exp(1j * np.array([0.0, 0.5, 3.0]))[None, :, None]
-    x, y = (axis[:, None] for axis in face_frames(surface))
+    x, y = (axis[:, None] for axis in surface.face_frames)
     field = field_from_directions(surface, phasor.real * x + phasor.imag * y)
     write_mesh_field(plane.data, field)
     names = {attribute.name for attribute in plane.data.attributes}

@@ -20,11 +20,13 @@ from rosy_addon.external.simulation_files import (
     list_steps,
     read_simulation,
 )
-from rosy_addon.extras.film import SimulationFields
+from rosy_addon.extras.film import FieldSeries, StepReader
 from rosy_addon.field.array_field import SurfaceArrays, array_field
 from rosy_addon.field.mesh_arrays import SIMULATION_READERS, MeshArrays
+from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.rendering.draw import draw_picture
-from rosy_addon.rendering.mesh_view import mesh_instance, mesh_view
+from rosy_addon.rendering.mesh_view import mesh_instance
+from rosy_addon.rendering.view_input import ViewInput
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -175,7 +177,7 @@ def test_film_has_one_camera_and_one_range(growing):
     """The largest step fills the frame. The range is the largest magnitude of all steps."""
     look = Look(length=8, hue="magnitude")
     steps = list_steps(growing)[::-1]
-    views = list(Film(SimulationFields(steps), look, (30.0, 20.0), (60, 50)).views())
+    views = list(Film(FieldSeries(steps, StepReader()), look, (30.0, 20.0, 60, 50)).views())
     assert len({id(view.camera) for view in views}) == 1
     fields = [view.instances[0].field for view in views]
     assert {view.look.color_range for view in views} == {(0.0, fields[0].magnitude.max())}
@@ -184,17 +186,19 @@ def test_film_has_one_camera_and_one_range(growing):
     arrays = SurfaceArrays(surface.name, surface, mesh.vertex_data, mesh.face_data)
     instance = mesh_instance(surface, array_field(arrays))
     look = views[0].look
-    expected = mesh_view(instance, look, (30.0, 20.0), (60, 50))
+    camera = orbit_camera(instance.face_points(), 30.0, 20.0, 60, 50)
+    expected = ViewInput((instance,), camera, look)
     assert views[0].camera.view == pytest.approx(expected.camera.view, abs=1e-12)
     pictures = [(draw_picture(v)) for v in (views[0], expected)]
     assert pictures[0].rgba == pytest.approx(pictures[1].rgba, abs=1e-4)
     given = Look(magnitude_length=True, color_range=(0.0, 3.0))
-    film = Film(SimulationFields(steps[:2]), given, (0.0, 0.0), (60, 50))
+    film = Film(FieldSeries(steps[:2], StepReader()), given, (0.0, 0.0, 60, 50))
     assert {view.look.color_range for view in film.views()} == {(0.0, 3.0)}
 
 
 def test_film_keeps_one_step_in_memory(growing):
-    for _ in Film(SimulationFields(list_steps(growing)), Look(), (0.0, 0.0), (60, 50)).views():
+    fields = FieldSeries(list_steps(growing), StepReader())
+    for _ in Film(fields, Look(), (0.0, 0.0, 60, 50)).views():
         meshes = [found for found in gc.get_objects() if isinstance(found, MeshArrays)]
         assert sum(bool(mesh.vertex_data) for mesh in meshes) <= 1
 

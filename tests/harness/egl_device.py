@@ -8,7 +8,8 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from rosy_addon.gpu.device import Device, NamedValues
+from rosy_addon.gpu.defines import shader_defines
+from rosy_addon.gpu.device import Batches, Device, NamedValues
 from rosy_addon.gpu.passes import WORKGROUP_SIZE, ComputePass, RasterPass
 
 #: Components and data type of each texel format.
@@ -32,44 +33,31 @@ class EglDevice(Device):
         return self.context.info["GL_RENDERER"]
 
     def texture(
-        self,
-        width: int,
-        height: int,
-        texel_format: str,
-        layers: int = 0,
-        data: np.ndarray | None = None,
+        self, size: Sequence[int], texel_format: str, layers: int = 0, data: Any = None
     ) -> Any:
         if texel_format == "DEPTH_COMPONENT32F":
-            return self.context.depth_texture((width, height))
+            return self.context.depth_texture(size)
         components, dtype = FORMATS[texel_format]
         if data is not None:
             data = np.ascontiguousarray(data, dtype=dtype)
         if layers:
-            size = width, height, layers
-            return self.context.texture_array(size, components, data, dtype=dtype)
-        return self.context.texture((width, height), components, data, dtype=dtype)
+            return self.context.texture_array((*size, layers), components, data, dtype=dtype)
+        return self.context.texture(size, components, data, dtype=dtype)
 
     def batch(self, vertices: np.ndarray) -> Any:
         return self.context.buffer(np.ascontiguousarray(vertices, dtype=np.float32))
 
     def compute(
-        self,
-        shader: ComputePass,
-        size: Sequence[int],
-        textures: NamedValues,
-        images: NamedValues,
-        uniforms: NamedValues,
+        self, shader: ComputePass, size: Sequence[int], textures: NamedValues, uniforms: NamedValues
     ) -> None:
         program = self._bind(shader, textures, uniforms)
         for slot, (name, _) in enumerate(shader.images):
-            images[_base_name(name)].bind_to_image(slot, read=False, write=True)
-        width, height, layers = (*size, 1)[:3]
+            textures[_base_name(name)].bind_to_image(slot, read=False, write=True)
+        width, height, layers = size
         program.run(-(-width // WORKGROUP_SIZE[0]), -(-height // WORKGROUP_SIZE[1]), layers)
         self.context.memory_barrier()
 
-    def draw(
-        self, shader: RasterPass, batches: Sequence[tuple[Any, NamedValues]], color: Any, depth: Any
-    ) -> None:
+    def draw(self, shader: RasterPass, batches: Batches, color: Any, depth: Any) -> None:
         framebuffer = self.context.framebuffer([color], depth)
         framebuffer.use()
         framebuffer.clear(depth=1.0)
@@ -80,8 +68,9 @@ class EglDevice(Device):
                 program = self._bind(shader, {}, item_uniforms)
                 self.context.vertex_array(program, [(batch, "4f", "vertex_data")]).render()
 
-    def read(self, texture: Any, width: int, height: int) -> np.ndarray:
-        return np.frombuffer(texture.read(), np.float32).reshape(height, width, 4)
+    def read(self, texture: Any) -> np.ndarray:
+        texels = np.frombuffer(texture.read(), np.float32)
+        return texels.reshape(texture.height, texture.width, 4)
 
     def finish(self) -> None:
         """Wait until all commands have finished."""
@@ -91,7 +80,7 @@ class EglDevice(Device):
         self, shader: ComputePass | RasterPass, textures: NamedValues, uniforms: NamedValues
     ) -> Any:
         program = self._program(shader)
-        for slot, name in enumerate(shader.textures):
+        for slot, name in enumerate(shader.declared.textures):
             textures[_base_name(name)].use(slot)
             if _base_name(name) in program:
                 program[_base_name(name)] = slot
@@ -103,7 +92,7 @@ class EglDevice(Device):
 
     def _compiled(self, shader: ComputePass | RasterPass) -> Any:
         header = "#version 430\n"
-        for name in shader.textures:
+        for name in shader.declared.textures:
             header += f"uniform sampler2D{'Array' * name.endswith('[]')} {_base_name(name)};\n"
         for name, kind in shader.uniforms:
             header += f"uniform {kind} {name};\n"
@@ -119,18 +108,17 @@ class EglDevice(Device):
             return self.context.compute_shader(header + shader.source)
         varyings = [
             f"{'flat ' * (name == 'triangle_id')}{{}} {kind} {name};\n"
-            for name, kind in shader.varyings
+            for name, kind in shader.vertex.outputs
         ]
         vertex = (
             header
             + "in vec4 vertex_data;\n"
             + "".join(varying.format("out") for varying in varyings)
         )
-        fragment = header + BLENDER_DEFINES + f"out vec4 {shader.output};\n"
+        fragment = header + BLENDER_DEFINES + f"out vec4 {shader.fragment.outputs[0][0]};\n"
         fragment += "".join(varying.format("in") for varying in varyings)
-        return self.context.program(
-            vertex + shader.vertex_source, fragment_shader=fragment + shader.fragment_source
-        )
+        fragment += shader_defines() + shader.fragment.code
+        return self.context.program(vertex + shader.vertex.code, fragment_shader=fragment)
 
 
 def _base_name(name: str) -> str:

@@ -130,7 +130,7 @@ def draw_pair(
     )
     items = card.upload(instances, look.display)
     texture = rosy.run(card.texture_steps(items, view))
-    card_picture = card.read(texture, width, height)
+    card_picture = card.device.read(texture)
     images = read_gbuffer(card, width, height)
     gbuffer = rosy.project(instances, view.camera, look.display, samples=supersampling)
     is_center = None
@@ -156,7 +156,7 @@ def draw_pair(
 def read_gbuffer(card: Any, width: int, height: int) -> dict[str, np.ndarray]:
     """Return the G-buffer of the last picture of a card, by the names of its images."""
     return {
-        name: card.read(card.resources.image(name, width, height), width, height)
+        name: card.device.read(card.resources.image(name, (width, height)))
         for name in ("normals", "field_values")
     }
 
@@ -168,7 +168,7 @@ def draw_on_card(
     view = rosy.ViewInput(tuple(instances), camera, look)
     items = card.upload(instances, look.display)
     texture = rosy.run(card.texture_steps(items, view))
-    return card.read(texture, camera.width, camera.height)
+    return card.device.read(texture)
 
 
 def agreement(

@@ -12,7 +12,6 @@ from rosy_addon.compositor.flow import NO_DRIFT
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.directional_field import field_from_directions, tensor_field
 from rosy_addon.field.generate import axis_field, generate
-from rosy_addon.field.representation import face_frames
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
@@ -75,7 +74,7 @@ def smooth_field(surface, degree, families=1):
 
 def field_at_angles(surface, degree, offsets, lengths=1.0):
     """Return directions on each face, at angles to the first member of an axis field."""
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     base = axis_field(surface, degree, AXIS).vectors
     first_angle = np.arctan2((base * y).sum(axis=1), (base * x).sum(axis=1))[:, None]
     angles = (first_angle + offsets)[..., None]
@@ -154,7 +153,7 @@ def card_rgba(card, instances, look=LOOK, camera=None, **others):
     camera = view() if camera is None else camera
     items = card.upload(instances, look.display)
     texture = run(card.texture_steps(items, ViewInput((), camera, look, **others)))
-    return card.read(texture, camera.width, camera.height).copy()
+    return card.device.read(texture).copy()
 
 
 def assert_parity(

@@ -8,14 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from rosy_addon.field.generate import axis_field
-from rosy_addon.field.representation import face_frames
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.line_drawing.families import label_families
 from rosy_addon.line_drawing.lateral_neighbors import SeparationRules
 from rosy_addon.line_drawing.spacing import CornerSpacing
 from rosy_addon.line_drawing.stroke_set import Strokes
 from rosy_addon.line_drawing.svg import svg_text
-from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
+from rosy_addon.line_drawing.tangent_mesh import CREASE_ANGLE, build_tangent_mesh
 from rosy_addon.line_drawing.trace import trace_on_mesh
 from rosy_addon.line_drawing.visibility import clip_to_visible, rasterize_depth
 from rosy_addon.projection.camera import Camera
@@ -33,7 +32,7 @@ def trace_strokes(
 
     `spacing` is one value in world space, or (V,) values at vertices or (T, 3) at corners of triangles.
     """
-    mesh = build_tangent_mesh(instance, cross_creases=cross_creases)
+    mesh = build_tangent_mesh(instance, crease_angle=None if cross_creases else CREASE_ANGLE)
     values = np.asarray(spacing, dtype=np.float64)
     if values.ndim == 1:
         values = values[mesh.triangle_vertex]
@@ -54,7 +53,7 @@ def write_svg(path: Path, *drawing: object) -> None:
 
 def turned(surface, degree, angle=0.0):
     """Return an instance with a field at an angle to the first edges of its faces."""
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     return MeshInstance(
         surface, np.eye(4), RosyField(degree, np.cos(angle) * x + np.sin(angle) * y)
     )

@@ -10,7 +10,7 @@ from shapes import from_triangles, rebuilt
 
 from rosy_addon.field.convert import rotate_field
 from rosy_addon.field.field_io import load_field
-from rosy_addon.field.representation import face_frames, from_representation, to_representation
+from rosy_addon.field.representation import from_representation, to_representation
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
 
@@ -29,7 +29,7 @@ def bumpy(surface, amount=0.15, stretch=(1.0, 1.2, 1.5)):
 
 def angle_differences(surface, first, second, degree):
     """(F,) angles between nearest members of two fields, given by vectors on the faces; radians."""
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     z, w = (to_representation(vectors, x, y, degree) for vectors in (first, second))
     return np.abs(np.angle(z * w.conj())) / degree
 
@@ -59,7 +59,7 @@ def random_field(surface, degree, seed=0):
     random = np.random.default_rng(seed)
     z = random.uniform(0.5, 1.0, surface.face_count)
     z = z * np.exp(2j * np.pi * random.random(surface.face_count))
-    return RosyField(degree, from_representation(z, *face_frames(surface), degree))
+    return RosyField(degree, from_representation(z, *surface.face_frames, degree))
 
 
 def with_random_members(surface, field, seed=0):

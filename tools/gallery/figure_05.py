@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from rosy_addon.compositor.pixel_field import blend_weights
+from rosy_addon.compositor.per_pixel_lic import blend_weights
 from tests.harness.planar import DegreeLayer, compose_planar, planar_pixel_field
 from tests.harness.streaks import correlation
 

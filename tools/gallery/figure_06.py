@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from rosy_addon.compositor.contrast import blend_gain, expected_std, scale_contrast
 from rosy_addon.compositor.image_noise import NOISE_MEAN
 from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look_units import pixel_look
 
 from .looks import MEASURED
 from .page import fill_tables, picture
@@ -31,7 +32,11 @@ def constant(angle: float, degree: int) -> PlanarField:
 def write() -> None:
     """Draw the pictures and measure the tables."""
     layer = compose_field(constant(MEMBER, DEGREE), DEGREE, FIELD_SIZE, LOOK).layer
-    members, blend, expected = layer.images.members, layer.images.blend, expected_std(LOOK)
+    members, blend, expected = (
+        layer.images.members,
+        layer.images.blend,
+        expected_std(pixel_look(LOOK)),
+    )
     shown = [
         ("one member, I₀", members[0], expected),
         ("another one, I₁", members[1], expected),
@@ -56,7 +61,7 @@ def write() -> None:
 def _gain(degree: int, look: Look) -> float:
     """Return the factor by which the contrast of the blend is corrected, for streamlines of full length."""
     count = degree if degree % 2 else degree // 2
-    return float(blend_gain(count, np.float32([2 * look.length + 1]), look)[0])
+    return float(blend_gain(count, np.float32([2 * look.length + 1]), pixel_look(look))[0])
 
 
 def _corrected(degree: int) -> list[object]:
@@ -73,7 +78,7 @@ def _corrected(degree: int) -> list[object]:
             seeded = look.with_settings({"seed": seed})
             layer = compose_field(constant(MEMBER, degree), degree, FIELD_SIZE, seeded).layer
             deviations.append(float(_cut(layer.tone).std()))
-        row += [_gain(degree, look), float(np.mean(deviations)) / expected_std(look)]
+        row += [_gain(degree, look), float(np.mean(deviations)) / expected_std(pixel_look(look))]
     return row
 
 

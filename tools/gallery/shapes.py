@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from skimage.measure import marching_cubes
 
@@ -13,6 +15,21 @@ def plane(cells: int = 8) -> Surface:
     axis = np.linspace(-1, 1, cells + 1)
     x, y = np.meshgrid(axis, axis, indexing="ij")
     return grid_surface("plane", np.stack([x, y, 0 * x], axis=-1), closed=(False, False))
+
+
+def fine_plane() -> Surface:
+    """Return the square of `plane` with small faces."""
+    return plane(96)
+
+
+def fine_sphere() -> Surface:
+    """Return a sphere of many faces."""
+    return sphere(64)
+
+
+def coarse_sphere() -> Surface:
+    """Return a sphere of few faces."""
+    return sphere(5)
 
 
 def torus(radius: float = 1.0, tube: float = 0.45, around: int = 144, across: int = 72) -> Surface:
@@ -142,6 +159,15 @@ def suzanne(subdivisions: int = 3) -> Surface:
 
     add = bpy.ops.mesh.primitive_monkey_add
     return evaluated_surface(add, "SUBSURF", name="Suzanne", levels=subdivisions)
+
+
+def prism() -> Surface:
+    """Return a prism with seven sides. Its creases are not equally sharp."""
+    import bpy
+
+    from .in_blender import evaluated_surface
+
+    return evaluated_surface(partial(bpy.ops.mesh.primitive_cylinder_add, vertices=7))
 
 
 def _polygons(name: str, vertices: np.ndarray, faces: np.ndarray, **options: float) -> Surface:

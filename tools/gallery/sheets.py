@@ -23,6 +23,7 @@ from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.camera import Camera, look_at, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
+from rosy_addon.projection.surface_tone import SurfaceTone
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.turntable import draw_next, turntable, turntable_views
 from rosy_addon.rendering.view_input import ViewInput
@@ -30,7 +31,7 @@ from rosy_addon.rendering.view_input import ViewInput
 from . import shapes, table_scene
 from .page import ROOT
 from .sheet import Panel, display, save, sheet
-from .solid import MADE_FIELDS, curve_through, points_on_surface, view
+from .solid import MADE_FIELDS, TONES, VALUES, curve_through, points_on_surface, view
 
 PAGES: dict[str, Any] = tomllib.loads(
     Path(__file__).with_name("pictures.toml").read_text(encoding="utf-8")
@@ -70,32 +71,53 @@ def draw_panel(*specs: dict[str, Any]) -> Panel:
     Keys of later tables replace those of earlier ones.
     """
     spec = {key: value for part in specs for key, value in part.items()}
+    view_input = described(*specs)
+    look, camera = view_input.look, view_input.camera
+    if spec.get("finished"):
+        rgba = draw_picture(view_input).rgba
+    else:
+        gbuffer = project(view_input.instances, camera.scaled(look.supersampling), look.display)
+        rgba = compose(gbuffer, look, view_input.lights).rgba
+    picture = display(rgba)
+    if "crop" in spec:
+        left, top, width, height = spec["crop"]
+        enlarged = np.ones((spec.get("enlarge", 1),) * 2 + (1,), np.uint8)
+        picture = np.kron(picture[top : top + height, left : left + width], enlarged)
+    for stroke in spec.get("strokes", ()):
+        picture = with_line(picture, curve_through(*stroke), 8, PAPER)
+        picture = with_line(picture, curve_through(*stroke), 4, INK)
+    return Panel(picture, spec.get("label", ""))
+
+
+def described(*specs: dict[str, Any]) -> ViewInput:
+    """Return the meshes, the camera, the look and the lights that tables of `pictures.toml` describe."""
+    spec = {key: value for part in specs for key, value in part.items()}
     look = load_preset(spec["preset"]).look if "preset" in spec else Look()
     for part in specs:
         look = look.with_settings(part.get("look", {}))
     if spec.get("turn"):
         look = replace(look, guiding_angle=float(np.radians(spec["turn"])))
-    samples = 1 if spec.get("finished") else look.supersampling
     if spec["mesh"] == "table":
         instances = table_scene.instances(spec.get("tone", ""))
     else:
-        surface = _surface(spec["mesh"])
-        field = _field(surface, spec)
-        instances = [MeshInstance(surface, np.eye(4), field)]
-    camera = _camera(spec, instances[0].surface, samples)
-    if spec.get("finished"):
-        rgba = draw_picture(ViewInput(tuple(instances), camera, look)).rgba
-    else:
-        lights = [_sun(camera, spec["sun"])] if "sun" in spec else ()
-        rgba = compose(project(instances, camera, look.display), look, lights).rgba
-    picture = display(rgba)
-    if "crop" in spec:
-        left, top, width, height = spec["crop"]
-        picture = picture[top : top + height, left : left + width]
-    for stroke in spec.get("strokes", ()):
-        picture = with_line(picture, curve_through(*stroke), 8, PAPER)
-        picture = with_line(picture, curve_through(*stroke), 4, INK)
-    return Panel(picture, spec["label"])
+        instances = [_instance(spec)]
+    camera = _camera(spec, instances[0].surface)
+    lights = (_sun(camera, spec["sun"]),) if "sun" in spec else ()
+    return ViewInput(tuple(instances), camera, look, lights)
+
+
+def _instance(spec: dict[str, Any]) -> MeshInstance:
+    """Return the mesh that a table describes, with its field, and its numbers and tone if it has any."""
+    surface = _surface(spec["mesh"])
+    field = _field(surface, spec)
+    if "families" in spec:
+        field = replace(field, family_count=spec["families"])
+    values, tone = (
+        made[spec[key]](surface).astype(np.float32) if key in spec else None
+        for key, made in (("values", VALUES), ("tone", TONES))
+    )
+    tone = None if tone is None else SurfaceTone(tone[:, None])
+    return MeshInstance(surface, np.eye(4), field, color_values=values, tone=tone)
 
 
 @lru_cache
@@ -108,22 +130,23 @@ def _field(surface: Surface, spec: dict[str, Any]) -> RosyField:
     kind, degree = spec["field"].split()
     if kind in MADE_FIELDS:
         return MADE_FIELDS[kind](surface, int(degree))
-    options = dict(spec.get("options", {}))
+    options: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value
+        for name, value in spec.get("options", {}).items()
+    }
     if "strokes" in spec:
-        camera = _camera(spec, surface, 2)
+        camera = _camera(spec, surface).scaled(2)
         curves = [curve_through(*stroke) for stroke in spec["strokes"]]
         options["strokes"] = [points_on_surface(surface, camera, curve) for curve in curves]
     return generate(surface, GeneratorSettings(kind, **options), int(degree))
 
 
-def _camera(spec: dict[str, Any], surface: Surface, samples: int) -> Camera:
-    width, height = spec["size"]
+def _camera(spec: dict[str, Any], surface: Surface) -> Camera:
     if "eye" not in spec:
-        return view(surface, tuple(spec["view"]), (width, height), samples)
+        is_perspective = spec.get("perspective", True)
+        return view(surface, tuple(spec["view"]), tuple(spec["size"]), 1, is_perspective)
     matrix = look_at(spec["eye"], spec.get("target", (0, 0, 0)))
-    return perspective_camera(
-        matrix, width * samples, height * samples, fov=np.radians(spec["angle"])
-    )
+    return perspective_camera(matrix, *spec["size"], fov=np.radians(spec["angle"]))
 
 
 def _sun(camera: Camera, direction: Sequence[float]) -> Light:

@@ -10,13 +10,13 @@ from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.picture import Picture
 from rosy_addon.core.color import from_hex, to_linear
+from rosy_addon.field.analysis import angle_errors
 from rosy_addon.field.corner_fans import corner_angles, corner_rotations, smooth_face_values
 from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.directional_field import field_from_directions, tensor_field
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, axis_field, generate
 from rosy_addon.field.representation import (
-    face_frames,
     face_representation,
     from_representation,
     power,
@@ -24,7 +24,7 @@ from rosy_addon.field.representation import (
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface
 from rosy_addon.projection.camera import Camera, orbit_camera
-from rosy_addon.projection.gbuffer import GBuffer, MeshInstance
+from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 from tests.harness.planar import DegreeLayer, degree_layers
 
@@ -36,7 +36,7 @@ def harmonic_field(surface: Surface, degree: int, axes: np.ndarray) -> RosyField
     On the sphere, the three axes of a cube and N = 4 give a field with singularities at the eight corners of
     the cube. The six axes of an icosahedron and N = 6 give a field with twelve singularities.
     """
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     z = power((x + 1j * y) @ axes.T, degree).sum(axis=1)
     return RosyField(degree, from_representation(z, x, y, degree))
 
@@ -60,8 +60,8 @@ def smoothed(surface: Surface, field: RosyField, rounds: int) -> RosyField:
 
     Pairs of singularities of opposite signs vanish.
     """
-    x, y = face_frames(surface)
-    rotations = corner_rotations(surface.face_normal, x, surface.corner_face, surface.corner_normal)
+    x, y = surface.face_frames
+    rotations = corner_rotations(surface, surface.corner_normal)
     weights, z = corner_angles(surface), face_representation(surface, field)
     for _ in range(rounds):
         z = smooth_face_values(surface, z, rotations, field.degree, weights)
@@ -79,9 +79,9 @@ def even_curvature(surface: Surface, degree: int) -> RosyField:
     return smoothed_a_little(surface, curvature_field(surface, degree))
 
 
-def ring_curvature(rings: Surface) -> RosyField:
-    """Return a smooth 4-RoSy field along the principal curvature directions of the triple torus."""
-    return smoothed(rings, curvature_field(rings, 4), 200)
+def ring_curvature(rings: Surface, degree: int = 4) -> RosyField:
+    """Return a smooth field along the principal curvature directions of the triple torus."""
+    return smoothed(rings, curvature_field(rings, degree), 200)
 
 
 def pairs_of_directions(ball: Surface, degree: int) -> RosyField:
@@ -128,10 +128,60 @@ def ring_of_singularities(
     return generate(ball, settings, degree)
 
 
+def planar_field(
+    square: Surface, degree: int, z_of: Callable[[np.ndarray], np.ndarray]
+) -> RosyField:
+    """Return a field in the plane z = 0, given a member as a function of points, as complex numbers."""
+    z = z_of(square.face_center[:, 0] + 1j * square.face_center[:, 1])
+    return RosyField(degree, np.stack([z.real, z.imag, np.zeros(len(z))], axis=1))
+
+
+def vortices(p: np.ndarray) -> np.ndarray:
+    """Return a member of a cross field with one positive and one negative singularity."""
+    z = (p + 0.35) * (p - 0.35).conj()
+    return (z / np.abs(z) * np.exp(0.6j)) ** (1 / 4)
+
+
+def wind(p: np.ndarray) -> np.ndarray:
+    """Return a vector field with a vortex and a saddle."""
+    z = 1j * (p + 0.4) * (p - 0.6).conj()
+    return z / np.abs(z)
+
+
+def height(surface: Surface) -> np.ndarray:
+    """Return the (C,) z coordinates of the corners of a surface."""
+    return surface.vertices[surface.corner_vertex, 2]
+
+
+def height_on_the_left(surface: Surface) -> np.ndarray:
+    """Return the (C,) z coordinates of corners on the left side of a surface, NaN on the right side."""
+    is_left = surface.vertices[surface.corner_vertex, 0] < 0.2
+    return np.where(is_left, height(surface), np.nan)
+
+
+def angle_to_curvature(surface: Surface) -> np.ndarray:
+    """Return the (C,) angles, in degrees, between the fields of the generators form and curvature."""
+    errors = angle_errors(surface, generate(surface, "form", 4), curvature_field(surface, 4))
+    return np.degrees(errors)[surface.corner_face]
+
+
+#: Numbers for the color map, by name: functions of a surface that return a number for each corner.
+VALUES = {"height": height, "left": height_on_the_left, "angle": angle_to_curvature}
+
+#: Tones of surfaces, by name: functions of a surface that return a tone for each corner.
+TONES = {"waves": lambda surface: 0.55 + 0.4 * np.sin(9 * height(surface))}
+
 #: Fields that no generator of RoSy makes, by name: functions of a surface and a degree.
 MADE_FIELDS: dict[str, Callable[[Surface, int], RosyField]] = {
     "around": around_field,
+    "icosahedral": lambda ball, degree: harmonic_field(ball, degree, icosahedron_axes()),
+    "ring-curvature": ring_curvature,
     "even-curvature": even_curvature,
+    "vortices": lambda plane, degree: planar_field(plane, degree, vortices),
+    "wind": lambda plane, degree: planar_field(plane, degree, wind),
+    "gusts": lambda plane, degree: planar_field(
+        plane, degree, lambda p: wind(p) * (p.real + 1.1) / 2.1
+    ),
     "pairs": pairs_of_directions,
     "force": stress_of_force,
     "two-in-front": lambda ball, degree: ring_of_singularities(ball, 2, 1.7, degree),
@@ -199,7 +249,9 @@ def points_on_surface(surface: Surface, camera: Camera, curve: np.ndarray) -> np
 
     Fractions at which the camera does not see the surface are left out.
     """
-    buffer = _visible_pixels(surface, camera)
+    # A G-buffer needs some field.
+    field = RosyField(1, np.broadcast_to([1.0, 0.0, 0.0], (surface.face_count, 3)))
+    buffer = project([MeshInstance(surface, np.eye(4), field)], camera)
     position = np.full((camera.height * camera.width, 3), np.nan)
     position[buffer.pixel] = (
         buffer.position @ camera.view[:3, :3] - camera.view[:3, 3] @ camera.view[:3, :3]
@@ -207,29 +259,6 @@ def points_on_surface(surface: Surface, camera: Camera, curve: np.ndarray) -> np
     column, row = (curve * (camera.width, camera.height)).astype(int).T
     points = position.reshape(camera.height, camera.width, 3)[camera.height - 1 - row, column]
     return points[np.isfinite(points).all(axis=1)]
-
-
-def visible_points(
-    points: np.ndarray, normals: np.ndarray, camera: Camera, supersampling: int
-) -> list[tuple[float, float]]:
-    """Return (x, y) of those points of a convex surface that are visible, in pixels from the upper left.
-
-    `supersampling` is the number of camera pixels per picture pixel.
-    """
-    camera_points = points @ camera.view[:3, :3].T + camera.view[:3, 3]
-    facing = np.sum(camera_points * (normals @ camera.view[:3, :3].T), axis=1) < 0
-    clip = (
-        np.append(camera_points[facing], np.ones((facing.sum(), 1)), axis=1) @ camera.projection.T
-    )
-    across, upward = (clip[:, :2] / clip[:, 3:] / 2 + 0.5).T
-    width, height = camera.width / supersampling, camera.height / supersampling
-    return [(x * width, (1 - y) * height) for x, y in zip(across, upward, strict=True)]
-
-
-def _visible_pixels(surface: Surface, camera: Camera) -> GBuffer:
-    """Return the G-buffer of a surface. It has some field, as a G-buffer needs one."""
-    field = RosyField(1, np.broadcast_to([1.0, 0.0, 0.0], (surface.face_count, 3)))
-    return project([MeshInstance(surface, np.eye(4), field)], camera)
 
 
 def frame_of(values: np.ndarray, pixel: np.ndarray, shape: Sequence[int]) -> np.ndarray:

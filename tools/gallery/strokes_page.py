@@ -35,9 +35,7 @@ def write() -> None:
     """Draw and save the pictures."""
     surface = suzanne()
     instance = MeshInstance(
-        surface,
-        np.eye(4),
-        generate(surface, GeneratorSettings("curvature", reach=0.1), 4),
+        surface, np.eye(4), generate(surface, GeneratorSettings("curvature", reach=0.1), 4)
     )
     camera = orbit_camera(surface.vertices, -26.0, 8.0, SIDE, SIDE, margin=0.03)
     panels = []

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
+from scipy import ndimage
+from skimage.measure import block_reduce
 
 from rosy_addon.compositor.ink_from_thresholds import ink_of_thresholds
 from rosy_addon.compositor.look import Look
@@ -59,7 +61,12 @@ def write() -> None:
         Panel(view(instance, FRONT, by_chart), "the charts of the UV map"),
         Panel(view(instance, FRONT, textured), "the texture"),
         Panel(view(instance, BACK, textured), "from behind"),
-        Panel(display(_reduced(texture, SIDE)), "the file"),
+        Panel(
+            display(
+                block_reduce(texture, (TEXTURE_SIDE // SIDE,) * 2 + (1,), np.mean)[:SIDE, :SIDE]
+            ),
+            "the file",
+        ),
     ]
     save(sheet([panels[:2], panels[2:]]), IMAGES / "textures.png")
     # The forehead, from near.
@@ -213,19 +220,9 @@ def view(
 def texture_at(texture: np.ndarray, corner_uv: np.ndarray, gbuffer: GBuffer) -> np.ndarray:
     """Return the (P, 4) values of a texture at the pixels of a G-buffer, bilinearly interpolated."""
     place = np.einsum("nk,nki->ni", gbuffer.barycentric, corner_uv[gbuffer.triangle])
-    height, width = texture.shape[:2]
-    x, y = place[:, 0] * width - 0.5, place[:, 1] * height - 0.5
-    column, row = np.floor(x).astype(int), np.floor(y).astype(int)
-    x, y = (x - column)[:, None], (y - row)[:, None]
-
-    def at(dx: int, dy: int) -> np.ndarray:
-        return texture[(row + dy) % height, (column + dx) % width]
-
-    return (at(0, 0) * (1 - x) + at(1, 0) * x) * (1 - y) + (at(0, 1) * (1 - x) + at(1, 1) * x) * y
-
-
-def _reduced(texture: np.ndarray, side: int) -> np.ndarray:
-    """Reduce a texture to `side` x `side` pixels. Each is the mean of a square of texels."""
-    factor = len(texture) // side
-    used = texture[: side * factor, : side * factor]
-    return used.reshape(side, factor, side, factor, 4).mean(axis=(1, 3))
+    row_and_column = (place * texture.shape[1::-1] - 0.5)[:, ::-1].T
+    options = {"order": 1, "mode": "grid-wrap"}
+    channels = [
+        ndimage.map_coordinates(texture[..., k], row_and_column, **options) for k in range(4)
+    ]
+    return np.stack(channels, axis=1)

@@ -17,7 +17,6 @@ import itertools
 import os
 import re
 import shlex
-import shutil
 import sys
 import time
 import tomllib
@@ -75,8 +74,6 @@ def _expanded(pattern: str, code: str) -> list[tuple[str, str]]:
         PRESETS if words == "preset" else words.split(",")
         for words in re.findall(r"\{(.*?)\}", pattern)
     ]
-    if not all(choices):
-        sys.exit("compare_outputs: there are no presets")
     expanded = []
     for chosen in itertools.product(*choices):
         name, case_code = re.sub(r"\{.*?\}", "{}", pattern).format(*chosen), code
@@ -84,16 +81,6 @@ def _expanded(pattern: str, code: str) -> list[tuple[str, str]]:
             case_code = case_code.replace(f"{{{number}}}", word)
         expanded.append((name, case_code))
     return expanded
-
-
-def older_words(text: str) -> list[str]:
-    """Return a text, then the text with the words of ever older revisions, which `cases.toml` lists."""
-    texts = [text]
-    for change in TABLES["older"]:
-        for words, older in change.items():
-            text = re.sub(rf"(?<![\w-]){words}(?![\w-])", older, text)
-        texts.append(text)
-    return list(dict.fromkeys(texts))
 
 
 def run_child(tree: Path, outputs: Path, lane: str, names: list[str]) -> None:
@@ -104,23 +91,18 @@ def run_child(tree: Path, outputs: Path, lane: str, names: list[str]) -> None:
     parser = importlib.import_module(f"{'rosy.' * (extension is not None)}rosy_addon.cli.parser")
     assert Path(parser.__file__).is_relative_to(tree)
     for name in names:
-        case, log, start = cases[name], "", time.process_time()
-        for code in older_words(case.code):
-            folder = outputs / name
-            shutil.rmtree(folder, ignore_errors=True)
-            folder.mkdir(parents=True)
-            os.chdir(folder)
-            printed = io.StringIO()
-            with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
-                try:
-                    status = str(run_case(case, code, parser.main))
-                except BaseException:
-                    status = "error"
-                    traceback.print_exc()
-            log += printed.getvalue()
-            if status == str(case.status):
-                break
-        (folder / LOG).write_text(f"{log}\n{time.process_time() - start:.2f} s of processor time\n")
+        case, folder, start = cases[name], outputs / name, time.process_time()
+        folder.mkdir(parents=True)
+        os.chdir(folder)
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
+            try:
+                status = str(run_case(case, parser.main))
+            except BaseException:
+                status = "error"
+                traceback.print_exc()
+        seconds = time.process_time() - start
+        (folder / LOG).write_text(f"{printed.getvalue()}\n{seconds:.2f} s of processor time\n")
         (folder / "scene.blend").unlink(missing_ok=True)
         (folder / STATUS).write_text(status)
     if extension is not None:
@@ -140,8 +122,8 @@ def load_extension(tree: Path) -> Any:
     return module
 
 
-def run_case(case: Case, code: str, main: Callable[..., int]) -> int:
-    """Run code in the current folder, with the variables of its lane. Return the largest exit status."""
+def run_case(case: Case, main: Callable[..., int]) -> int:
+    """Run a case in the current folder, with the variables of its lane. Return the largest exit status."""
     statuses = [0]
 
     def cli(line: str) -> None:
@@ -168,7 +150,7 @@ def run_case(case: Case, code: str, main: Callable[..., int]) -> int:
         import blender_scene
 
         names |= blender_scene.names_of_case(case.name)
-    exec(re.sub(INPUT, rf"../../{INPUTS}/\1", code), names)
+    exec(re.sub(INPUT, rf"../../{INPUTS}/\1", case.code), names)
     return max(statuses)
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import posixpath
 import re
-import struct
+
+from PIL import Image, UnidentifiedImageError
 
 _IMAGE = re.compile(
     r'(?P<link><a\b[^>]*>\s*)?<img (?P<attributes>[^>]*?src="(?P<source>[^"]+)"[^>]*?) ?/?>'
@@ -31,11 +34,7 @@ def on_page_content(html: str, *, page, config, files) -> str:
 
 
 def picture_size(content: bytes) -> tuple[int, int] | None:
-    """Return the width and height in pixels of a .png, .gif or lossy .webp file; None for other files."""
-    if content.startswith(b"\x89PNG"):
-        return struct.unpack(">II", content[16:24])
-    if content.startswith(b"GIF8"):
-        return struct.unpack("<HH", content[6:10])
-    if content[8:16] == b"WEBPVP8 ":
-        return struct.unpack("<HH", content[26:30])
+    """Return the width and height in pixels of a picture file; None for other files, such as .svg."""
+    with contextlib.suppress(UnidentifiedImageError), Image.open(io.BytesIO(content)) as picture:
+        return picture.size
     return None

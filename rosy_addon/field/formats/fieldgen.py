@@ -10,7 +10,6 @@ https://github.com/GeometryCollective/fieldgen.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
@@ -22,10 +21,9 @@ from ..corner_fans import corner_angles, corner_rotations
 from ..frames import tangent_frame
 from ..representation import (
     complex_bincount,
-    face_frames,
+    face_representation,
     from_representation,
     power,
-    to_representation,
     unit_complex,
 )
 from ..rosy_field import RosyField, check_degree
@@ -92,15 +90,13 @@ def fieldgen_text(surface: Surface, field: RosyField) -> str:
     angle = corner_angles(surface)
     face, vertex = surface.corner_face, surface.corner_vertex
     normal = vertex_normals(surface)
-    face_x, face_y = face_frames(surface)
-    z = to_representation(field.vectors, face_x, face_y, field.degree)
-    rotation = power(
-        corner_rotations(surface.face_normal, face_x, face, normal[vertex]),
-        field.degree,
-    )
+    z = face_representation(surface, field)
+    rotation = power(corner_rotations(surface, normal[vertex]), field.degree)
     mean = complex_bincount(vertex, z[face] * rotation * angle, count)
     member = from_representation(unit_complex(mean), *tangent_frame(normal), field.degree)
-    face_lines = (" ".join(f"{v}//{v}" for v in corners) for corners in _faces(surface))
+    corners, starts = (vertex + 1).tolist(), surface.face_start.tolist()
+    faces = (corners[start:stop] for start, stop in pairwise(starts))
+    face_lines = (" ".join(f"{v}//{v}" for v in vertices) for vertices in faces)
     field_lines = enumerate(format_rows(member), 1)
     return "".join(
         [
@@ -111,9 +107,3 @@ def fieldgen_text(surface: Surface, field: RosyField) -> str:
             *(f"# field {number} {line}\n" for number, line in field_lines),
         ]
     )
-
-
-def _faces(surface: Surface) -> Iterator[list[int]]:
-    """Yield the list of the vertices of each face, counted from 1."""
-    vertices, starts = (surface.corner_vertex + 1).tolist(), surface.face_start.tolist()
-    return (vertices[start:stop] for start, stop in pairwise(starts))

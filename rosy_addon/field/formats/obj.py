@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ...core.errors import counted
 from .polygons import Polygons, offsets_from_sizes
 from .text_rows import ROWS_PER_BLOCK, TextRows, read_rows
 
@@ -31,19 +30,10 @@ def read_obj(path: Path) -> Polygons:
     is_vertex, is_face = _is_kind(rows, b"v"), _is_kind(rows, b"f")
     vertices = rows.select(is_vertex, slice(1, 4)).points("vertex")
     corners = rows.select(is_face, slice(1, None))
-    for row, words in enumerate(corners.words):
-        if len(words) < 3:
-            raise corners.error(
-                row, f"a face has {counted(len(words), 'corner')}, expected 3 or more"
-            )
-    positions = _position_indices(corners)
-    corner_vertex = _resolved(
-        positions,
-        "vertex of a face",
-        np.cumsum(is_vertex)[is_face],
-        len(vertices),
-        "a face refers to vertex {}, but the vertices",
-    )
+    corners.check_lengths(3, "a face", "corner", "3 or more")
+    rows, defined_above = _position_indices(corners), np.cumsum(is_vertex)[is_face]
+    message = "a face refers to vertex {}, but the vertices"
+    corner_vertex = _resolved(rows, "vertex of a face", defined_above, len(vertices), message)
     return Polygons(vertices, corner_vertex, offsets_from_sizes(list(map(len, corners.words))))
 
 
@@ -92,7 +82,7 @@ def _position_indices(corners: TextRows) -> TextRows:
             lines = re.sub(rb"(?<=\d)/[-\d/]*(?=\s|$)", b"", joined).split(b"\n")
             words = [tuple(line.split()) for line in lines]
         rows += words
-    return TextRows(corners.path, rows, corners.line_numbers)
+    return corners.with_words(rows)
 
 
 def read_uv(path: Path) -> np.ndarray | None:
@@ -113,22 +103,13 @@ def read_uv(path: Path) -> np.ndarray | None:
     if not is_uv.any():
         return None
     table = rows.select(is_uv, slice(1, 3))
-    for row, words in enumerate(table.words):
-        if len(words) < 2:
-            raise table.error(row, "a texture coordinate has fewer than 2 numbers")
+    table.check_lengths(2, "a texture coordinate", "number", "2")
     uv = table.floats("texture coordinate").reshape(-1, 2)
     corners = rows.select(is_face, slice(1, None))
-    words = [[word.split(b"/")[1:2] for word in line] for line in corners.words]
+    words = [[(word + b"/").split(b"/")[1] for word in line] for line in corners.words]
     for row, line in enumerate(words):
-        if not all(word and word[0] for word in line):
+        if not all(line):
             raise corners.error(row, "a corner has no texture coordinate")
-    uv_rows = TextRows(path, [[word[0] for word in line] for line in words], corners.line_numbers)
-    return uv[
-        _resolved(
-            uv_rows,
-            "texture coordinate of a corner",
-            np.cumsum(is_uv)[is_face],
-            len(uv),
-            "a corner refers to texture coordinate {}, but they",
-        )
-    ]
+    rows, defined_above = corners.with_words(words), np.cumsum(is_uv)[is_face]
+    message = "a corner refers to texture coordinate {}, but they"
+    return uv[_resolved(rows, "texture coordinate of a corner", defined_above, len(uv), message)]

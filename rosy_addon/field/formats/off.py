@@ -39,12 +39,10 @@ def read_off(path: Path) -> Polygons:
     if len(body) < vertex_count + face_count:
         raise RosyError(
             f"{path}: declares {counted(vertex_count, 'vertex', 'vertices')} and "
-            f"{counted(face_count, 'face')}, but ends after "
-            f"{counted(len(body), 'row')}"
+            f"{counted(face_count, 'face')}, but ends after {counted(len(body), 'row')}"
         )
     vertices = body[:vertex_count].points("vertex")
-    face_rows = body[vertex_count : vertex_count + face_count]
-    return Polygons(vertices, *_faces(face_rows, vertex_count))
+    return Polygons(vertices, *_faces(body[vertex_count : vertex_count + face_count], vertex_count))
 
 
 def _after_keyword(rows: TextRows) -> TextRows:
@@ -59,13 +57,14 @@ def _after_keyword(rows: TextRows) -> TextRows:
         raise rows.error(0, f"expected OFF, found {abbreviate(keyword)}")
     if rest and rest[0].upper() == b"BINARY":
         raise rows.error(0, "binary .off files are not supported")
-    return TextRows(rows.path, [rest, *rows.words[1:]], rows.line_numbers) if rest else rows[1:]
+    return rows.with_words([rest, *rows.words[1:]]) if rest else rows[1:]
 
 
 def _faces(rows: TextRows, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return `corner_vertex` and `face_start` of `Polygons`, given one row of text for each face."""
-    first_words = TextRows(rows.path, [words[:1] for words in rows.words], rows.line_numbers)
+    first_words = rows.with_words([words[:1] for words in rows.words])
     sizes = first_words.ints("number of corners of a face")
+    corner_words = []
     for row, (size, words) in enumerate(zip(sizes.tolist(), rows.words, strict=True)):
         if not 3 <= size < len(words):
             message = (
@@ -74,11 +73,8 @@ def _faces(rows: TextRows, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
                 else f"declares {size} corners, but lists {len(words) - 1}"
             )
             raise rows.error(row, f"face {row} {message}")
-    corners = TextRows(
-        rows.path,
-        [words[1 : size + 1] for size, words in zip(sizes.tolist(), rows.words, strict=True)],
-        rows.line_numbers,
-    )
+        corner_words.append(words[1 : size + 1])
+    corners = rows.with_words(corner_words)
     corner_vertex = corners.ints("vertex of a face")
     out_of_range = (corner_vertex < 0) | (corner_vertex >= vertex_count)
     if out_of_range.any():

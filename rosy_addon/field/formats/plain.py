@@ -39,8 +39,7 @@ def read_text(path: Path) -> RawField:
     RosyError
         If the file cannot be read or holds no numbers, or if its rows differ in length.
     """
-    data = read_bytes(path, reject_binary=True).replace(b",", b" ")
-    rows = read_rows(path, data=data)
+    rows = read_rows(path, data=read_bytes(path, reject_binary=True).replace(b",", b" "))
     if not len(rows):
         raise RosyError(f"{path}: contains no numbers")
     columns = len(rows.words[0])
@@ -50,8 +49,7 @@ def read_text(path: Path) -> RawField:
             raise rows.error(
                 row, f"the row has {counted(len(words), 'number')}, the rows above have {columns}"
             )
-    values = rows.floats("part of a vector")
-    return _raw_field(values.reshape(-1, columns))
+    return _raw_field(rows.floats("part of a vector").reshape(-1, columns))
 
 
 def _check_npy_size(data: bytes) -> None:

@@ -10,6 +10,7 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from struct import Struct
+from typing import Any
 
 import numpy as np
 
@@ -84,8 +85,7 @@ def read_ply(path: Path) -> Polygons:
             f"{path}: face {face_index} refers to vertex {corner_vertex[corner]:.10g}, "
             f"but the vertices are numbered 0 to {len(vertices) - 1}"
         )
-    vertices = as_float64(vertices)
-    return Polygons(vertices, corner_vertex.astype(np.int64), face_start)
+    return Polygons(as_float64(vertices), corner_vertex.astype(np.int64), face_start)
 
 
 def _is_index(values: np.ndarray, count: int) -> np.ndarray:
@@ -136,23 +136,21 @@ def _header(path: Path, data: bytes) -> tuple[str, list[_Element], int]:
     if end is None:
         raise RosyError(f"{path}: the header has no line 'end_header'")
     byte_order, elements = None, []
-    for line_number, line in enumerate(
-        data[: end.start()].decode("ascii", "replace").split("\n"), 1
-    ):
+    lines = data[: end.start()].decode("ascii", "replace").split("\n")
+    for line_number, line in enumerate(lines, 1):
+        place = f"{path}:{line_number}"
         try:
             match line.split():
                 case ["format", name, _]:
                     byte_order = _BYTE_ORDERS[name]
                 case ["element", name, count] if int(count) >= 0:
-                    _check_unique(path, line_number, "element", name, elements)
-                    elements.append(_Element(name, int(count)))
+                    _declare(place, "element", elements, _Element(name, int(count)))
                 case ["property", "list", count_type, kind, name]:
-                    _check_unique(path, line_number, "property", name, elements[-1].properties)
-                    list_property = _Property(name, _DTYPES[kind], _DTYPES[count_type])
-                    elements[-1].properties.append(list_property)
+                    column = _Property(name, _DTYPES[kind], _DTYPES[count_type])
+                    _declare(place, "property", elements[-1].properties, column)
                 case ["property", kind, name]:
-                    _check_unique(path, line_number, "property", name, elements[-1].properties)
-                    elements[-1].properties.append(_Property(name, _DTYPES[kind]))
+                    column = _Property(name, _DTYPES[kind])
+                    _declare(place, "property", elements[-1].properties, column)
                 case [] | ["ply"] | ["comment", *_] | ["obj_info", *_]:
                     pass
                 case _:
@@ -161,20 +159,17 @@ def _header(path: Path, data: bytes) -> tuple[str, list[_Element], int]:
             raise
         except (KeyError, IndexError, ValueError):
             found = abbreviate(line.strip().encode())
-            raise RosyError(
-                f"{path}:{line_number}: expected a line of the header, found {found}"
-            ) from None
+            raise RosyError(f"{place}: expected a line of the header, found {found}") from None
     if byte_order is None:
         raise RosyError(f"{path}: the header has no line 'format'")
     return byte_order, elements, end.end()
 
 
-def _check_unique(
-    path: Path, line_number: int, kind: str, name: str, earlier: list[_Element] | list[_Property]
-) -> None:
-    """Raise a `RosyError` if one of the earlier elements or properties has the same name."""
-    if any(item.name == name for item in earlier):
-        raise RosyError(f"{path}:{line_number}: {kind} '{name}' is declared twice")
+def _declare(place: str, kind: str, earlier: list[Any], new: _Element | _Property) -> None:
+    """Append an element or a property. Raise a `RosyError` if an earlier one has the same name."""
+    if any(item.name == new.name for item in earlier):
+        raise RosyError(f"{place}: {kind} '{new.name}' is declared twice")
+    earlier.append(new)
 
 
 def _text_elements(path: Path, data: bytes, elements: list[_Element]) -> dict[str, _Columns]:
@@ -194,7 +189,7 @@ def _text_elements(path: Path, data: bytes, elements: list[_Element]) -> dict[st
 
 def _text_columns(rows: TextRows, element: _Element) -> _Columns:
     """Return the values of one element of a text file by property, given its rows."""
-    starts = offsets_from_sizes([len(words) for words in rows.words])
+    starts = offsets_from_sizes(list(map(len, rows.words)))
     values = rows.floats(f"value of a {element.name}")
     position = starts[:-1]
     columns: _Columns = {}
@@ -212,9 +207,8 @@ def _text_columns(rows: TextRows, element: _Element) -> _Columns:
         _check_row_lengths(rows, element, position + count, starts)
         list_starts = offsets_from_sizes(count)
         index = np.arange(list_starts[-1]) + np.repeat(position - list_starts[:-1], count)
-        columns[prop.name] = (
-            values[index] if prop.count_type is None else (values[index], list_starts)
-        )
+        part = values[index]
+        columns[prop.name] = part if prop.count_type is None else (part, list_starts)
         position = position + count
     return columns
 
@@ -298,8 +292,10 @@ def _read_rows(
             if count is not None:
                 if offset + count.size > len(data):
                     raise _truncated(path, element, row)
-                length = _list_length(path, element, row, count.unpack_from(data, offset)[0])
-                offset += count.size
+                length = count.unpack_from(data, offset)[0]
+                if not (0 <= length < np.inf and length == int(length)):
+                    raise RosyError(f"{path}: {element.name} {row} has a list of length {length}")
+                length, offset = int(length), offset + count.size
             end = offset + length * kind.itemsize
             if end > len(data):
                 raise _truncated(path, element, row)
@@ -312,13 +308,6 @@ def _read_rows(
         is_list = prop.count_type is not None
         columns[prop.name] = (values, offsets_from_sizes(sizes[column])) if is_list else values
     return columns, offset
-
-
-def _list_length(path: Path, element: _Element, row: int, length) -> int:
-    """Return the length of a list as an int; raise a `RosyError` if it is negative or not a whole number."""
-    if not (0 <= length < np.inf and length == int(length)):
-        raise RosyError(f"{path}: {element.name} {row} has a list of length {length}")
-    return int(length)
 
 
 def _truncated(path: Path, element: _Element, row_count: int) -> RosyError:

@@ -68,7 +68,7 @@ class RawField:
 
 
 def offsets_from_sizes(sizes: np.ndarray | list[int]) -> np.ndarray:
-    """Return the (n + 1,) int64 start offsets of n consecutive ranges of these sizes, and the total size.
+    """Return (n + 1,) int64: where n consecutive ranges of these sizes start, and where the last one ends.
 
     Examples
     --------

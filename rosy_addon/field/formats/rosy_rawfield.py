@@ -42,8 +42,7 @@ def read_rawfield(path: Path) -> RawField:
     rows = read_rows(path, comment=None)
     degree, count = _read_header(rows, "degree", "count")
     degree = _validated_degree(rows, 0, degree)
-    table = _vector_table(rows, 3 * degree, count)
-    return RawField(table.reshape(-1, degree, 3), degree, count)
+    return RawField(_vector_table(rows, 3 * degree, count).reshape(-1, degree, 3), degree, count)
 
 
 def rosy_text(field: RosyField) -> str:
@@ -95,5 +94,4 @@ def _vector_table(rows: TextRows, columns: int, count: int) -> np.ndarray:
             f"{rows.path}: declares {counted(count, 'row')} of {columns} numbers, but contains {row_count} and "
             "part of another"
         )
-    values = rows.floats("part of a vector")
-    return values[2:].reshape(row_count, columns)
+    return rows.floats("part of a vector")[2:].reshape(row_count, columns)

@@ -28,17 +28,12 @@ def read_stl(path: Path) -> Polygons:
     data = read_bytes(path)
     count = int.from_bytes(data[80:_HEADER_BYTES], "little")
     # Some binary files also begin with "solid" like text files. They are recognized by their size.
-    is_binary = len(data) == _HEADER_BYTES + count * _TRIANGLE_DTYPE.itemsize
-    if (
-        not is_binary
-        and data.lstrip()[:5].lower() == b"solid"
-        and b"\0" not in data[:_HEADER_BYTES]
-    ):
+    is_text = data.lstrip()[:5].lower() == b"solid" and b"\0" not in data[:_HEADER_BYTES]
+    if is_text and len(data) != _HEADER_BYTES + count * _TRIANGLE_DTYPE.itemsize:
         points = _text_points(path, data)
     else:
         points = _binary_points(path, data, count)
-    points = as_float64(points)
-    vertices, corner_vertex = weld(points)
+    vertices, corner_vertex = weld(as_float64(points))
     return Polygons(vertices, corner_vertex, np.arange(0, len(points) + 1, 3))
 
 
@@ -61,13 +56,10 @@ def weld(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     is_new = np.ones(len(points), dtype=bool)
     is_new[1:] = (points[order[1:]] != points[order[:-1]]).any(axis=1)
     # The sort is stable, so each run of equal points begins with the first occurrence.
-    first = order[is_new]
-    rank = np.empty(len(first), dtype=np.int64)
-    by_occurrence = np.argsort(first)
-    rank[by_occurrence] = np.arange(len(first))
-    index = np.empty(len(points), dtype=np.int64)
-    index[order] = rank[np.cumsum(is_new) - 1]
-    return points[first[by_occurrence]], index
+    first = np.empty_like(order)
+    first[order] = order[is_new][np.cumsum(is_new) - 1]
+    kept, index = np.unique(first, return_inverse=True)
+    return points[kept], index
 
 
 def _binary_points(path: Path, data: bytes, count: int) -> np.ndarray:

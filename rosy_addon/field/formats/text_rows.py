@@ -43,11 +43,19 @@ class TextRows:
     def select(self, is_selected: np.ndarray, words: slice) -> TextRows:
         """Return the rows for which the (rows,) bool array is True, each reduced to a slice of its words."""
         rows = np.flatnonzero(is_selected).tolist()
-        return TextRows(
-            self.path,
-            [self.words[row][words] for row in rows],
-            [self.line_numbers[row] for row in rows],
-        )
+        line_numbers = [self.line_numbers[row] for row in rows]
+        return TextRows(self.path, [self.words[row][words] for row in rows], line_numbers)
+
+    def with_words(self, words: list[Sequence[bytes]]) -> TextRows:
+        """Return the rows with other words."""
+        return TextRows(self.path, words, self.line_numbers)
+
+    def check_lengths(self, least: int, subject: str, noun: str, expected: str) -> None:
+        """Raise a `RosyError` if a row has fewer than `least` words; `noun` is the name of a word."""
+        for row, words in enumerate(self.words):
+            if len(words) < least:
+                found = counted(len(words), noun)
+                raise self.error(row, f"{subject} has {found}, expected {expected}")
 
     def error(self, row: int, message: str) -> RosyError:
         """Return the error to raise for a row. It names the file and, if the row exists, its line."""
@@ -75,13 +83,8 @@ class TextRows:
         RosyError
             If a row has fewer than three words, or a coordinate is not a finite number.
         """
-        for row, words in enumerate(self.words):
-            if len(words) < 3:
-                raise self.error(
-                    row, f"{label} has {counted(len(words), 'coordinate')}, expected 3"
-                )
-        coordinates = TextRows(self.path, [words[:3] for words in self.words], self.line_numbers)
-        points = coordinates.floats(label).reshape(-1, 3)
+        self.check_lengths(3, label, "coordinate", "3")
+        points = self.with_words([words[:3] for words in self.words]).floats(label).reshape(-1, 3)
         finite = np.isfinite(points).all(axis=1)
         if not finite.all():
             row = int(np.argmin(finite))

@@ -30,7 +30,7 @@ def series(surface, count, degrees=1.0, degree=4):
 
 
 def views_of(fields, look=LOOK, **options):
-    film = Film(fields, look, (0.0, 90.0), (48, 48), **options)
+    film = Film(fields, look, (0.0, 90.0, 48, 48), **options)
     views = list(film.views())
     assert len(views) == film.picture_count
     return views
@@ -96,7 +96,7 @@ def test_fast_turns_are_noted(square, tmp_path):
     with pytest.warns(rf.RosyWarning, match=r"turns by up to 10\.0 degrees .*: 23 pictures"):
         rf.film(fields, tmp_path / "a.gif", **options)
     for between in (23, None):
-        film = Film(fields, Look(), (0.0, 90.0), (32, 32), between=between)
+        film = Film(fields, Look(), (0.0, 90.0, 32, 32), between=between)
         assert film.picture_count == 25
         next(film.views())
         assert not film.advice

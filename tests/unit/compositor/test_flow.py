@@ -47,10 +47,10 @@ def best_shift(first, second, direction, expected, reach=3.0):
 @pytest.mark.parametrize("kernel", KERNELS)
 @pytest.mark.parametrize("is_short", [False, True])
 def test_averages_are_those_of_kernels_moved_upstream(kernel, is_short):
-    user_look = Look(flow=1.0, length=12, **KERNELS[kernel])
+    user_look = Look(flow=1.0, length=12, magnitude_length=is_short, **KERNELS[kernel])
     look = pixel_look(user_look, drift=drift_at(user_look, 4.3))
     shifts = channel_shifts(look.flow_phase, look.flow_distance)
-    moving = MovingKernel(look, levels=13 if is_short else 1)
+    moving = MovingKernel(look)
     steps, count = 40, 5
     reach = look.streamline_reach()
     rng = np.random.default_rng(1)

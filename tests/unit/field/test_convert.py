@@ -21,7 +21,6 @@ from rosy_addon.field.directional_field import field_from_directions, field_matc
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.representation import (
-    face_frames,
     face_representation,
     from_representation,
     power,
@@ -98,7 +97,7 @@ def test_diffusion_of_a_wave(waves):
     """An implicit step divides cos(k x), which has no flow over the borders, by 1 + t k^2."""
     surface, time = plane(60, 60), 0.05
     k = np.pi * waves / 2
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     wave = np.cos(k * (surface.face_center[:, 0] + 1)) + 0j
     field = RosyField(3, from_representation(wave, x, y, 3))
     z = face_representation(surface, diffuse_field(surface, field, time))
@@ -140,7 +139,7 @@ def test_magnitudes_keep_directions_and_undefined_faces():
 def test_free_directions_are_not_converted(error_of):
     surface = plane(3, 3)
     turn = np.exp(1j * np.array([0.0, 0.5, 3.0]))[None, :, None]
-    x, y = (axis[:, None] for axis in face_frames(surface))
+    x, y = (axis[:, None] for axis in surface.face_frames)
     free = field_from_directions(surface, turn.real * x + turn.imag * y)
     assert "are not a RoSy" in error_of(change_degree, surface, free, 6)
     assert "are not a RoSy" in error_of(diffuse_field, surface, free, 1.0)

@@ -23,7 +23,6 @@ from rosy_addon.field.directional_field import (
     tensor_field,
 )
 from rosy_addon.field.frames import normalize
-from rosy_addon.field.representation import face_frames
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.validate import validated_directions
 from rosy_addon.projection.camera import orthographic_camera
@@ -39,7 +38,7 @@ def rotate(vectors, normal, angle):
 
 def directions_at_angles(surface, angles, lengths):
     """(F, N, 3) directions with the same angles from the first edge on each face."""
-    x, _ = face_frames(surface)
+    x, _ = surface.face_frames
     turned = [rotate(x, surface.face_normal, angle) for angle in angles]
     return np.stack(turned, axis=1) * np.array(lengths, dtype=float)[:, None]
 
@@ -145,7 +144,7 @@ def test_eigenvectors_of_a_tensor():
     matrix = matrix + matrix.T
     field = tensor_field(surface, np.tile(matrix, (surface.face_count, 1, 1)))
     assert (field.degree, field.family_count) == (4, 2)
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     for face in range(0, surface.face_count, 37):
         frame = np.stack([x[face], y[face]])
         values, vectors = np.linalg.eigh(frame @ matrix @ frame.T)

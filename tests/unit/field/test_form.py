@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from shapes import cube, cylinder, icosphere, plane, rebuilt, torus
 
 from rosy_addon.field.connection import build_connection, laplacian
-from rosy_addon.field.connectivity import build_edges
 from rosy_addon.field.creases import filtered_normals, salient_edges
 from rosy_addon.field.feature_curvature import noise_sample
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import generate
-from rosy_addon.field.representation import face_frames
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.surface import Surface
@@ -58,9 +58,7 @@ def cross_errors(surface: Surface, field: RosyField, expected: np.ndarray) -> np
 
 
 def salient(surface: Surface) -> np.ndarray:
-    edges = build_edges(surface.corner_vertex, surface.face_start)
-    filtered = filtered_normals(surface, edges)
-    return salient_edges(surface, edges, *filtered)
+    return salient_edges(surface, *filtered_normals(surface))
 
 
 @pytest.mark.slow
@@ -88,9 +86,8 @@ def test_lines_run_around_a_torus_tube():
 def test_noise_is_measured():
     for surface, share in ((torus(200, 100), 0.002), (ellipsoid(), 0.0005)):
         noisy = with_noise(surface, share)
-        edges = build_edges(noisy.corner_vertex, noisy.face_start)
-        _, angle = filtered_normals(noisy, edges)
-        sample = noise_sample(noisy, edges, angle)
+        _, angle = filtered_normals(noisy)
+        sample = noise_sample(noisy, angle)
         expected = share * np.linalg.norm(np.ptp(surface.vertices, axis=0))
         assert np.sqrt(dot(sample, sample).mean()) == pytest.approx(expected, rel=0.2)
 
@@ -154,9 +151,9 @@ def test_averages_of_numbers_below_all_normal_ones():
     """They are 0, without an overflow of their inverse."""
     surface = icosphere(1)
     connection = build_connection(surface)
-    averages = SurfaceAverages(surface, connection, *face_frames(surface))
+    averages = SurfaceAverages(surface, connection, *surface.face_frames)
     matrix = laplacian(connection, 0)
-    matrix = matrix.with_values(matrix.data.real.astype(np.float32))
+    matrix = replace(matrix, data=matrix.data.real.astype(np.float32))
     sums = averages.node_sums(np.full(surface.face_count, 1e-320), 0)
     assert sums.any()
     assert not averages.smooth(matrix, 0.1, sums).any()
@@ -166,10 +163,10 @@ def test_averages_with_an_indefinite_matrix():
     """Obtuse triangles have negative weights: conjugate gradients end at their last good step."""
     surface = icosphere(0)
     connection = build_connection(surface)
-    averages = SurfaceAverages(surface, connection, *face_frames(surface))
+    averages = SurfaceAverages(surface, connection, *surface.face_frames)
     # With unit masses, five neighbors and 4 on the diagonal, the sum of every row is 0.
     matrix = laplacian(connection, 0)
-    matrix = matrix.with_values(np.where(matrix.data.real > 0, 4.0, -1.0).astype(np.float32))
+    matrix = replace(matrix, data=np.where(matrix.data.real > 0, 4.0, -1.0).astype(np.float32))
     sums = np.ones(connection.node_count)
     area = float(averages.mass.mean())
     assert not averages.smooth(matrix, area, sums).any()

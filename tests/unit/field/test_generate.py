@@ -16,7 +16,6 @@ from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.frames import dot, normalize, tangent_frame, transport, view_frame
 from rosy_addon.field.generate import GeneratorSettings, axis_field, generate
 from rosy_addon.field.representation import (
-    face_frames,
     face_representation,
     from_representation,
     to_representation,
@@ -74,9 +73,9 @@ def test_all_members_have_one_representation(angle, rho, degree, k):
 
 def test_corner_rotations_match_transport():
     surface = torus(12, 8)
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     face = surface.corner_face
-    rotation = corner_rotations(surface.face_normal, x, face, surface.corner_normal)
+    rotation = corner_rotations(surface, surface.corner_normal)
     member = normalize(0.3 * x + 0.8 * y)
     moved = transport(member[face], surface.face_normal[face], surface.corner_normal)
     cx, cy = tangent_frame(surface.corner_normal)

@@ -15,7 +15,7 @@ from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.guided_system import guided_field
 from rosy_addon.field.guides import feature_edges, guides_from_edges
-from rosy_addon.field.representation import face_frames, to_representation
+from rosy_addon.field.representation import to_representation
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.smoothest import smoothest_field
 from rosy_addon.field.surface_averages import SurfaceAverages
@@ -46,7 +46,7 @@ def test_hard_guides_are_met_exactly(degree):
 def test_soft_guides_match_a_direct_solver():
     degree, surface = 4, bumpy(icosphere(4))
     guides, weight = random_guides(surface, 30), 40.0
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     connection = build_connection(surface)
     frame_angle = SurfaceAverages(surface, connection, x, y).frame_angle
     # One row for each corner of a face with a guide, one column for each node.

@@ -11,7 +11,7 @@ from rosy_addon.field.closest_point import closest_triangles
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.guides import guides_from_axes, guides_from_strokes, guides_from_uv
-from rosy_addon.field.representation import face_frames, face_representation, to_representation
+from rosy_addon.field.representation import face_representation, to_representation
 from rosy_addon.field.surface import count_inconsistent_edges, orientation_warning
 
 BALL = icosphere(4)
@@ -33,7 +33,7 @@ def stroke_error(surface, field, stroke):
     """The angle between a stroke and the mean field along it, degrees."""
     midpoint, direction = (stroke[1:] + stroke[:-1]) / 2, np.diff(stroke, axis=0)
     face = surface.triangle_face[closest_triangles(surface, midpoint)[0]]
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     target = to_representation(normalize(direction), x[face], y[face], field.degree)
     z = to_representation(field.vectors[face], x[face], y[face], field.degree)
     return abs(np.degrees(np.angle((z * target.conj()).sum())) / field.degree)
@@ -125,7 +125,7 @@ def test_maps_without_area_are_undefined():
 def test_guides_of_several_kinds_are_combined(error_of):
     surface = torus(48, 24)
     vectors = np.zeros((surface.face_count, 3))
-    vectors[5] = 3 * face_frames(surface)[0][5]
+    vectors[5] = 3 * surface.face_frames[0][5]
     edges = np.stack([surface.corner_vertex, surface.corner_vertex[surface.next_corner]], axis=1)
     generator_settings = GeneratorSettings("guided", vectors=vectors, edges=edges[800:801])
     field = generate(surface, generator_settings, 4)

@@ -14,7 +14,7 @@ from rosy_addon.field.carry import vectors_on_rest_shape
 from rosy_addon.field.convert import rotate_field
 from rosy_addon.field.directional_field import field_directions, tensor_field
 from rosy_addon.field.interpolation import interpolate_fields
-from rosy_addon.field.representation import face_frames, face_representation, from_representation
+from rosy_addon.field.representation import face_representation, from_representation
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import have_same_polygons
 from rosy_addon.projection.face_values import face_values
@@ -51,7 +51,7 @@ def test_undefined_faces_fade(surface):
 def test_moving_singularities_move():
     """If magnitudes vanish at a singularity, it is on the way from one place to the other."""
     mesh = plane(16, 16)
-    x, y = face_frames(mesh)
+    x, y = mesh.face_frames
     center = mesh.face_center[:, 0] + 1j * mesh.face_center[:, 1]
     turn = (x[:, 0] + 1j * x[:, 1]).conj() ** 4
 
@@ -68,7 +68,7 @@ def test_moving_singularities_move():
 
 def test_families_of_tensors_stay(surface):
     """The major directions stay major, although another of the four is nearer."""
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
 
     def tensors(angle):
         major = np.cos(angle) * x + np.sin(angle) * y

@@ -13,7 +13,7 @@ from rosy_addon.field import prescribed, turning_angles
 from rosy_addon.field.face_graph import face_graph, spanning_forest, triangle_graph
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.prescribed import prescribed_field
-from rosy_addon.field.representation import face_frames, matching_angles, to_representation
+from rosy_addon.field.representation import face_representation, matching_angles
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.surface import Surface, build_surface
 
@@ -61,7 +61,7 @@ def spread_vertices(surface: Surface, count: int, seed: int) -> np.ndarray:
 
 
 def graph_of(surface):
-    return face_graph(surface, *face_frames(surface))
+    return face_graph(surface)
 
 
 @pytest.mark.parametrize("degree", [1, 2, 4, 6])
@@ -197,15 +197,13 @@ def least_squares(system: np.ndarray, sums: np.ndarray) -> np.ndarray:
 def test_the_energy_is_that_of_a_dense_solver(surface, degree, vertex, index):
     """Which tries all multiples of a turn around the loops."""
     faces = graph_of(surface)
-    triangles = triangle_graph(surface, faces)
+    triangles = triangle_graph(faces)
     graph = triangles.graph
     edge = np.arange(len(graph.source))
     sums = np.zeros((graph.node_count, len(edge)))
     sums[graph.head, edge] += 1
     sums[graph.tail, edge] -= 1
-    node_index = prescribed.index_at_nodes(
-        surface, faces, np.array(vertex, dtype=int), np.array(index, dtype=int)
-    )
+    node_index = prescribed.index_at_nodes(faces, np.array(vertex, int), np.array(index, int))
     turn = 2 * np.pi / degree
     required = turn * node_index - faces.defect
     loops = turning_angles._loops(
@@ -227,15 +225,13 @@ def test_the_energy_is_that_of_a_dense_solver(surface, degree, vertex, index):
         energies.append(solution @ solution)
         to_center = triangles.turns_to_centers(solution / root)
         angles.append(triangles.on_faces(root * solution, to_center))
-    angle, _ = turning_angles.turning_angles(surface, faces, degree, required)
+    angle, _ = turning_angles.turning_angles(faces, degree, required)
     nearest = int(np.argmin([np.abs(other - angle).max() for other in angles]))
     np.testing.assert_allclose(angle, angles[nearest], atol=1e-6)
     assert energies[nearest] == pytest.approx(min(energies), rel=1e-6, abs=1e-9)
     # The field turns by these angles at all edges, also at those that close the loops.
     field = prescribed_field(surface, degree, vertex, index)
-    x, y = face_frames(surface)
-    z = to_representation(field.vectors, x, y, degree)
-    turned = matching_angles(surface, x, y, z, degree, *faces.halfedges.T)
+    turned = matching_angles(surface, face_representation(surface, field), degree)
     np.testing.assert_allclose(turned, angle, atol=1e-9)
 
 

@@ -11,7 +11,7 @@ from rosy_addon.field.convert import Conversion, convert
 from rosy_addon.field.frames import dot
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.prescribed import change_singularities, prescribed_field
-from rosy_addon.field.representation import face_frames, face_representation
+from rosy_addon.field.representation import face_representation
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.singularity_changes import OUTSIDE, move_index, opposite_pairs
@@ -153,7 +153,7 @@ def test_a_field_bends_by_several_members(degree):
     surface = cylinder(48, 48)
     height = surface.face_center[:, 2]
     angle = 2 * np.pi * (height - height.min()) / np.ptp(height)
-    x, y = face_frames(surface)
+    x, y = surface.face_frames
     start = np.arctan2(y[:, 2], x[:, 2])
     guides = np.cos(start + angle)[:, None] * x + np.sin(start + angle)[:, None] * y
     field = prescribed_field(surface, degree, [], [], guides, 0.05 * np.ptp(height))

@@ -152,7 +152,7 @@ def test_kinds_agree_with_the_pixel_field_of_numpy(name):
     pixel_field = surface_pixel_field(gbuffer, field.degree, 0.7)
     (kind,) = field_kinds([field]).values()
     assert kind.line_count == pixel_field.line_count
-    assert kind.sheets_per_turn == pixel_field.symmetry.sheets_per_turn
+    assert kind.symmetry.sheets_per_turn == pixel_field.symmetry.sheets_per_turn
     assert set(pixel_field.channels) == set(field_channels(field)) <= set(kind.channels)
     orders = kind.harmonic_orders
     assert not orders or orders == list(range(orders[0], orders[-1] + 1))

@@ -133,7 +133,7 @@ def test_what_is_too_large_is_refused(device, error_of, monkeypatch):
 def test_nothing_is_compiled_or_sent_after_the_preparation(device):
     card = GpuRenderer(device)
     run(card.prepare_steps([ball()], "smooth"))
-    prepared = {shader for shader in passes.all_passes() if not shader.switches}
+    prepared = {shader for shader in passes.all_passes() if not shader.declared.switches}
     assert set(device._shaders) >= prepared and kept_kinds(card) == ["mesh"]
     card_rgba(card, [ball()])
     shaders = dict(device._shaders)  # now with the switches of this look

@@ -42,8 +42,8 @@ def test_methods_that_the_processor_draws_instead(method, error_of):
 def test_pictures_are_a_part_of_a_job(monkeypatch):
     """The processor draws in one call; the card in steps, with calls of its own."""
     view = ViewInput((), None, Look())
-    (call,) = part(select.picture_steps(view, "cpu", workers=3), 0.2, 0.6)
-    assert call == Call(bake_picture, (view, True, 3), 0.2, 0.6)
+    (call,) = part(select.picture_steps(view, "cpu"), 0.2, 0.6)
+    assert call == Call(bake_picture, (view,), 0.2, 0.6)
 
     class Card:
         def __init__(self, device):

@@ -53,7 +53,10 @@ def names_in(code):
 def names_of(shader):
     """Return the uniforms of a pass, and its textures and images with the mark of arrays."""
     images = shader.images if isinstance(shader, passes.ComputePass) else ()
-    return {name for name, _ in shader.uniforms}, {*shader.textures, *(name for name, _ in images)}
+    return {name for name, _ in shader.uniforms}, {
+        *shader.declared.textures,
+        *(name for name, _ in images),
+    }
 
 
 def listed_names(shader):
@@ -67,7 +70,7 @@ def test_sources_use_all_names_of_their_pass_and_no_others(shader):
     code, listed = code_of(shader), listed_names(shader)
     own = {"vertex_data"}  # the attribute of vertices
     if isinstance(shader, passes.RasterPass):
-        results = {shader.output, *(name for name, _ in shader.varyings)}
+        results = {name for name, _ in shader.vertex.outputs + shader.fragment.outputs}
         assert results <= names_in(code)
         own |= results
     assert listed <= names_in(code), f"not used: {sorted(listed - names_in(code))}"
@@ -94,7 +97,7 @@ def test_declarations_and_members(shader):
 def test_common_code_uses_no_uniforms():
     """The common code is part of every pass: it gets uniforms only as parameters of functions."""
     known = {name for shader in PASSES for name, _ in shader.uniforms}
-    known |= {name.removesuffix("[]") for shader in PASSES for name in shader.textures}
+    known |= {name.removesuffix("[]") for shader in PASSES for name in shader.declared.textures}
     assert not names_in(code_of_files("common.glsl")) & known
 
 

@@ -273,7 +273,7 @@ def test_ink_coverage_follows_a_ramp_of_tone():
     surface = plane(40, 40)
     width = 0.025
     tone = 0.85 * (surface.vertices[:, 0] + 1) / 2
-    spacing = spacing_by_tone(width, tone, max_ratio=1 / 0.15)
+    spacing = width * spacing_by_tone(tone, max_ratio=1 / 0.15)
     instance = MeshInstance(surface, IDENTITY, axis_field(surface, 2, (0, 1, 0)))
     start, end, _ = segments_of(trace_strokes(instance, spacing))
     length = np.linalg.norm(end - start, axis=1)
@@ -290,7 +290,7 @@ def test_strokes_are_denser_where_the_surface_is_more_curved():
     """On an ellipsoid, the length of strokes per area is one over the required spacing."""
     sphere = icosphere(4)
     surface = rebuilt(sphere, sphere.vertices * (1, 1, 3))
-    spacing = spacing_by_curvature(surface, 0.06, 1.0)
+    spacing = 0.06 * spacing_by_curvature(surface, 1.0)
     assert np.ptp(spacing) > 0.01
     instance = MeshInstance(surface, IDENTITY, axis_field(surface, 2, (0, 0, 1)))
     mesh = build_tangent_mesh(instance)

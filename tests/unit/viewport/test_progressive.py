@@ -15,7 +15,7 @@ from rosy_addon.core.errors import RosyError
 from rosy_addon.projection.camera import orthographic_camera
 from rosy_addon.rendering.view_input import ViewInput
 from rosy_addon.viewport import progressive as progressive_module
-from rosy_addon.viewport.progressive import ProgressiveRenderer
+from rosy_addon.viewport.progressive import ProgressiveRenderer, Request
 from rosy_addon.worker.helper import Helper, HelperLostError
 from rosy_addon.worker.job import Call, Step
 
@@ -81,7 +81,7 @@ def progressive():
 def test_each_step_of_the_first_picture_is_named_before_it_begins(progressive, view_input):
     done = progressive.renderer.done
     for _ in range(20):
-        view = progressive.update(POINTERS, "key", view_input)
+        view = progressive.update(POINTERS, Request("key", "key", view_input))
         if view.texture is not None:
             break
         assert view.progress.label not in done or view.progress.label == done[-1]
@@ -92,7 +92,8 @@ def test_each_step_of_the_first_picture_is_named_before_it_begins(progressive, v
 
 def test_the_first_picture_is_completed_while_the_view_changes(progressive, view_input):
     for step in range(20):
-        if progressive.update(POINTERS, f"key {step}", view_input).texture is not None:
+        request = Request(f"key {step}", f"key {step}", view_input)
+        if progressive.update(POINTERS, request).texture is not None:
             return
     raise AssertionError("it was never completed")
 
@@ -103,15 +104,16 @@ def test_a_picture_that_fails_is_not_tried_again(progressive, view_input, failin
     renderer.failing.add(failing)
     with pytest.raises(MemoryError):
         for _ in range(20):
-            progressive.update(POINTERS, "key", view_input)
+            progressive.update(POINTERS, Request("key", "key", view_input))
     done_count = len(renderer.done)
     for _ in range(3):
         with pytest.raises(RosyError, match="not enough memory"):
-            progressive.update(POINTERS, "key", view_input)
+            progressive.update(POINTERS, Request("key", "key", view_input))
     assert len(renderer.done) == done_count
     renderer.failing.clear()
     for _ in range(20):
-        if progressive.update(POINTERS, "another key", view_input).texture is not None:
+        request = Request("another key", "another key", view_input)
+        if progressive.update(POINTERS, request).texture is not None:
             return
     raise AssertionError("it was not tried again")
 
@@ -139,7 +141,7 @@ def slow(monkeypatch, view_input):
     monkeypatch.setattr(progressive_module, "time", clock)
     monkeypatch.setattr(progressive_module, "FRAME_BUDGET_SECONDS", 0.0)
     slow = progressive_of(SlowRenderer())
-    while slow.update(POINTERS, ("view", 0), view_input, "view").texture is None:
+    while slow.update(POINTERS, Request(("view", 0), "view", view_input)).texture is None:
         pass
     return slow
 
@@ -148,7 +150,7 @@ def test_streaks_that_drift_have_no_previews(slow, view_input):
     """Pictures are rendered to the end while the streaks drift on, in an image that is not shown."""
     shown = []
     for frame in range(1, 60):
-        view = slow.update(POINTERS, ("view", frame), view_input, "view")
+        view = slow.update(POINTERS, Request(("view", frame), "view", view_input))
         assert view.downscale == 1
         if view.texture not in shown:
             shown.append(view.texture)
@@ -160,19 +162,19 @@ def test_streaks_that_drift_have_no_previews(slow, view_input):
 
 def test_a_view_that_turns_while_streaks_drift_has_previews(slow, view_input):
     for frame in range(1, 4):
-        slow.update(POINTERS, ("view", frame), view_input, "view")
-    view = slow.update(POINTERS, ("turned", 4), view_input, "turned")
+        slow.update(POINTERS, Request(("view", frame), "view", view_input))
+    view = slow.update(POINTERS, Request(("turned", 4), "turned", view_input))
     assert view.downscale == 2 and view.texture_key == ("turned", 4)
     preview = view.texture
-    view = slow.update(POINTERS, ("turned", 5), view_input, "turned")
+    view = slow.update(POINTERS, Request(("turned", 5), "turned", view_input))
     assert view.texture == preview, "previews do not drift"
 
 
 def test_views_with_streaks_that_drift_take_turns(slow, view_input):
-    slow.update((1, 3), ("view", 0), view_input, "view")
+    slow.update((1, 3), Request(("view", 0), "view", view_input))
     for frame in range(1, 100):
         for pointers in (POINTERS, (1, 3)):
-            slow.update(pointers, ("view", frame), view_input, "view")
+            slow.update(pointers, Request(("view", frame), "view", view_input))
     views = slow.views.values()
     assert all(view.texture_key[1] > 80 for view in views), [view.texture_key for view in views]
 
@@ -199,7 +201,7 @@ def updated(progressive, key, view_input, until=lambda view: view.picture is Non
     """Update a view as Blender redraws, until something is so, and return it."""
     for _ in range(500):
         start = time.process_time()
-        view = progressive.update(POINTERS, key, view_input)
+        view = progressive.update(POINTERS, Request(key, key, view_input))
         assert time.process_time() - start < 0.1
         if until(view):
             return view
@@ -224,7 +226,7 @@ def test_previews_are_finished_and_final_pictures_abandoned(helper, view_input, 
     monkeypatch.setattr(progressive_module, "FRAME_BUDGET_SECONDS", 0.0)
     progressive = progressive_of(HelpedRenderer(), helper)
     updated(progressive, "first", view_input)
-    progressive.update(POINTERS, "second", view_input)
+    progressive.update(POINTERS, Request("second", "second", view_input))
     view = updated(progressive, "third", view_input, lambda view: view.texture_key == "second")
     assert view.texture == ((), 16), "a preview is shown, though the view has changed again"
     view = updated(progressive, "third", view_input, lambda view: view.texture_key == "third")
@@ -248,7 +250,7 @@ def test_meshes_that_change_faster_than_they_are_prepared_are_shown(helper, view
         mesh = f"mesh {frame}"
         renderer.long_meshes = {mesh}
         moving = ViewInput((mesh,), view_input.camera, Look())
-        view = progressive.update(POINTERS, mesh, moving)
+        view = progressive.update(POINTERS, Request(mesh, mesh, moving))
         if view.texture not in shown:
             shown.append(view.texture)
         progressive.poll()
@@ -259,7 +261,10 @@ def test_meshes_that_change_faster_than_they_are_prepared_are_shown(helper, view
 def test_two_views_share_the_helper(helper, view_input):
     progressive = progressive_of(HelpedRenderer(), helper)
     for _ in range(500):
-        views = [progressive.update(pointers, "key", view_input) for pointers in (POINTERS, (1, 3))]
+        views = [
+            progressive.update(pointers, Request("key", "key", view_input))
+            for pointers in (POINTERS, (1, 3))
+        ]
         if all(view.texture == ((), 32) for view in views):
             break
         progressive.poll()

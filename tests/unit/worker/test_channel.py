@@ -18,8 +18,8 @@ from rosy_addon.worker.start import PACKAGE
 def ends():
     first, second = (Channel(connection, PACKAGE) for connection in Pipe())
     yield first, second
-    first.close()
-    second.close()
+    first.connection.close()
+    second.connection.close()
 
 
 def passed(ends, message):
@@ -78,7 +78,7 @@ def test_what_cannot_be_pickled_leaves_the_channel_usable(ends):
 
 
 def test_the_end_is_noticed(ends):
-    ends[0].close()
-    assert ends[1].poll()
+    ends[0].connection.close()
+    assert ends[1].connection.poll()
     with pytest.raises(EOFError):
         ends[1].receive()

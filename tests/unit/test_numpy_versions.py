@@ -45,7 +45,7 @@ def draw() -> dict[str, np.ndarray]:
         "magnitude": (icosphere(3), "axis", 3, Look(hue="magnitude", magnitude_length=True)),
     }
     for name, (surface, kind, degree, shape_look) in shapes.items():
-        size = 160 * shape_look.supersampling
+        size = 112 * shape_look.supersampling
         camera = orbit_camera(surface.vertices, -25, 30, size, size)
         instance = MeshInstance(surface, np.eye(4), generate(surface, kind, degree))
         pictures[name] = compose(project([instance], camera), shape_look, drift=Drift(0.3))

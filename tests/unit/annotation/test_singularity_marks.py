@@ -148,7 +148,7 @@ def test_processes_and_supersampling_draw_the_same_dots():
 @pytest.mark.slow
 def test_drawings_have_the_same_dots_as_pictures():
     instances = [instance_of(torus(48, 24), 4), instance_of(icosphere(3), 4)]
-    style = StrokeStyle(spacing=40.0, singularity_dots="all_indices")
+    style = StrokeStyle(spacing=80.0, singularity_dots="all_indices")
     drawing = draw_instances(instances, CAMERA, style)
     text = svg_text(drawing.strokes, CAMERA, None, drawing.marks)
     circles = re.findall(r'<circle cx="([\d.]+)" cy="([\d.]+)" r="([\d.]+)" fill="(#\w+)"', text)

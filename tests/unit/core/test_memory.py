@@ -173,7 +173,7 @@ def test_strokes_are_refused_by_their_spacing(monkeypatch, error_of):
     limit_memory(monkeypatch, 50e6)
     message = error_of(draw_instances, [ball], camera, StrokeStyle(spacing=4.0))
     assert "a drawing of strokes with this spacing needs about" in message
-    draw_instances([ball], camera, StrokeStyle(spacing=30.0))
+    draw_instances([ball], camera, StrokeStyle(spacing=60.0))
 
 
 def test_lack_of_memory_is_one_line(monkeypatch, capsys, tmp_path):

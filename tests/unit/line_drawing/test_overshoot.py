@@ -121,7 +121,7 @@ def test_extensions_lie_on_occluders_in_front():
 
 @pytest.mark.slow
 def test_extensions_into_the_light_follow_the_surface():
-    plain, extended = draw_both([SPHERE], FRONT_CAMERA, spacing=6.0, light="lamp")
+    plain, extended = draw_both([SPHERE], FRONT_CAMERA, spacing=9.0, light="lamp")
     # Where the sphere is visible, points are on it, within about half a pixel.
     pixels, _ = project_to_pixels(extended.points, FRONT_CAMERA)
     column, row = pixels.astype(int).T

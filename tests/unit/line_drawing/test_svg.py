@@ -68,7 +68,7 @@ def test_svg_has_one_layer_per_family_and_one_path_per_stroke():
 @pytest.mark.parametrize("plotter", [False, True])
 def test_closed_strokes_are_closed_paths(plotter):
     """Without their last point, which is the first one. Strokes that are cut are open."""
-    instance = latitudes(icosphere(4))
+    instance = latitudes(icosphere(3))
     camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 300, 200, scale=3.3)
     strokes = visible_strokes(trace_strokes(instance, 0.15), [instance], camera)
     cut = strokes.runs_where(strokes.points[:, 0] > 0)

@@ -91,7 +91,7 @@ MINE = Preset("My Ink", "Long lines", Look(ink="hatch", length=90, ink_color="#1
 
 
 @pytest.mark.slow
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(name=NAMES, description=LINES.map(lambda line: line[:MAX_DESCRIPTION_LENGTH]), look=LOOKS)
 def test_a_preset_is_read_as_it_was_written(tmp_path, name, description, look):
     path = tmp_path / "a.json"

@@ -1,17 +1,16 @@
 """Hatching: thresholds turn LIC images into lines of ink on paper that reproduce a tone.
 
-Ink is drawn where the streaks of an LIC image exceed a threshold. The fraction of the paper above
-any threshold is known from the statistics of streaks (`streak_statistics`), so the threshold
-follows from the coverage that the tone requires, and no image has to be analyzed.
+Ink is drawn where the streaks of an LIC image exceed a threshold. The fraction of the paper above any
+threshold is known from the statistics of streaks (`streak_statistics`), so the threshold follows from the
+coverage that the tone requires, and no image has to be analyzed.
 
 A *line* here is a pair of opposite directions of the field, and all ink along it. M lines cross at a pixel.
-Each line with the coverage a transmits 1 - a of the light. To reach the tone T together,
-each line transmits 1 - a = T^s, with shares s that sum to 1. In light tones one line has the
-share 1. Further lines join in darker tones, in order of their angle to the guiding angle (their *rank*).
+Each line with the coverage a transmits 1 - a of the light. To reach the tone T together, each line transmits
+1 - a = T^s, with shares s that sum to 1. In light tones one line has the share 1. Further lines join in
+darker tones, in order of their angle to the guiding angle (their *rank*).
 
-Effects that make lines uneven are added to the streaks before the threshold: shorter streaks, which
-break lines or vary their width, and the grain of the paper. The statistics include them, so
-they do not change the tone.
+Effects that make lines uneven are added to the streaks before the threshold: shorter streaks, which break
+lines or vary their width, and the grain of the paper. The statistics include them: the tone stays the same.
 """
 
 from __future__ import annotations

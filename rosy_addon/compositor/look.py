@@ -129,8 +129,8 @@ class Look:
         "sheets",
         "How the N directions become one picture",
         {
-            "sheets": "Trace each streamline of the covering surface once: fast, without breaking "
-            "points",
+            "sheets": "Trace each streamline of all directions once: fast, and without lines at which "
+            "streaks break",
             "members": "Decompose the field into member vector fields with an image of each, as in "
             "the paper",
             "brute": "Follow the best of the N directions at every step: slow, for reference",
@@ -144,7 +144,7 @@ class Look:
         "cosine",
         "How the method Members blends its two sets of images to hide the breaking points",
         {
-            "cosine": "Smoothly, by the squared cosine and sine of N t / 2",
+            "cosine": "Smoothly, by the distance of the directions from the breaking points",
             "binary": "Take each pixel from one of the two sets",
             "none": "Use only the first set, which shows the breaking points",
         },
@@ -201,8 +201,8 @@ class Look:
     arrows: float = _pixel_length(
         0.0,
         65536.0,
-        "Least distance in pixels between arrowheads over the lines, which show which way they point. They "
-        "are a quarter as long. For fields of odd degree. 0: none",
+        "Least distance in pixels between the arrowheads that show which way lines point. An arrowhead is a "
+        "quarter of this distance long. For fields of odd degree. 0: none",
         label="Arrowheads",
         **_shading("streaks"),
     )
@@ -297,7 +297,7 @@ class Look:
         0.0,
         -3.1416,
         3.1416,
-        "Angle in the picture to which the first member is nearest",
+        "Angle in the picture of the first family of lines: at each pixel, the direction nearest to it",
         unit="angle",
         panel="ink",
         panel_before="layers",
@@ -307,7 +307,7 @@ class Look:
         0.0,
         3.1416,
         "Minimum angle between the normals on both sides of a sharp crease, where streaks end and outlines are "
-        "drawn. 180 degrees: no creases",
+        "drawn. 180 degrees (3.1416): no creases",
         unit="angle",
         panel="streaks",
     )
@@ -320,8 +320,8 @@ class Look:
     )
     color_range: tuple[float, float] = numbers(
         (0.0, 0.0),
-        "Magnitudes or numbers at the bottom and at the top of the color map, and of streaks without and "
-        "with full length. If the bottom value is above the top value, the map is inverted. Both 0: from 0 to "
+        "Magnitudes or numbers at the bottom and at the top of the color map; streaks whose length shows the "
+        "magnitude have no length at the first and full length at the second. If the bottom value is above the top value, the map is inverted. Both 0: from 0 to "
         "the largest visible magnitude, or the range of the numbers",
         {"Bottom Value": (-1e30, 1e30), "Top Value": (-1e30, 1e30)},
         **_shading("color", lambda look: uses_magnitude(look) or colors_values(look)),

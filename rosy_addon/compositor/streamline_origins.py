@@ -104,7 +104,7 @@ class Sheets:
     Attributes
     ----------
     cells : (P,) int32 ndarray
-        The cell of each pixel.
+        The cell of each pixel: its number in the bounding rectangle of the pixels, row by row.
     cell_count, count : int
         C, the number of cells, and the number of sheets that are needed.
     covering_sheet : list of int

@@ -154,14 +154,21 @@ class TracedLanes:
     def _step_cells(
         self, mask: np.ndarray, column: np.ndarray, row: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Step to the neighbors at -1 to 1 columns and rows; to `SINK_CELL` where no neighbor is linked.
+        """Move each streamline to a neighbor cell, or to `SINK_CELL` where the neighbor is not linked.
+
+        Parameters
+        ----------
+        mask : (n,) uint32 ndarray
+            Which neighbors of the cell of each streamline are linked, as bits.
+        column, row : (n,) ndarray
+            The step: -1, 0 or 1 columns and rows.
 
         Returns
         -------
-        ended, crossing : (n,) intp ndarray
-            Indices of the streamlines that end, and of those that cross a seam.
-        seam : (n,) intp ndarray
-            Index of each of these steps in `SeamSteps`.
+        ended : (e,) intp ndarray
+            Indices of the streamlines that end.
+        crossing, seam : (s,) intp ndarray
+            Indices of the streamlines that cross a seam, and the indices of their steps in `SeamSteps`.
         """
         covering, cell = self._covering, self._cell
         crossing = seam = np.empty(0, dtype=np.intp)

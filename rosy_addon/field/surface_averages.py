@@ -80,7 +80,7 @@ class SurfaceAverages:
     def node_sums(
         self, values: np.ndarray, degree: int, corner: np.ndarray | slice = slice(None)
     ) -> np.ndarray:
-        """Sum face values at the nodes, weighted by a third of the area of each triangle around the node.
+        """Sum face values at the nodes (vertices), weighted by a third of the area of each triangle around them.
 
         Parameters
         ----------
@@ -89,12 +89,12 @@ class SurfaceAverages:
         degree : int
             N of the representations; 0 for real numbers.
         corner : (m,) int ndarray or slice
-            Corners of triangles that are included in the sums; all by default.
+            Corners of triangles that are included in the sums, as indices 3 t + k; all by default.
 
         Returns
         -------
         (n,) ndarray
-            Sums in the polar maps of the nodes; complex if the degree is not 0.
+            Sums in the tangent frames of the nodes (see `Connection`); complex if the degree is not 0.
         """
         terms = self.corner_area[corner] * values[self.corner_face[corner]]
         node, count = self.connection.corner_node[corner], self.connection.node_count

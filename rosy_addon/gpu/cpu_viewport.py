@@ -17,7 +17,7 @@ from ..worker.job import Call, Steps
 from .background import draw_texture
 from .device import Device
 from .passes import RasterPass
-from .preparation import compile_steps
+from .preparation import prepare_steps
 from .uniforms import NO_CLIP_PLANES, matrix_rows
 
 
@@ -47,7 +47,7 @@ class CpuViewportRenderer(ViewportRenderer):
 
     def prepare_steps(self, instances: Sequence[MeshInstance], display: str) -> Steps[Any]:
         """Compile the two shaders that draw into views."""
-        return compile_steps(self.device, [RasterPass("composite"), RasterPass("background")])
+        return prepare_steps((), self.device, [RasterPass("composite"), RasterPass("background")])
 
     def texture_steps(
         self, items: Sequence[MeshInstance], view: ViewInput, target_key: Hashable = None

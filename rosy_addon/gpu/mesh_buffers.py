@@ -332,7 +332,7 @@ def mip_atlas(mip_map: MipMap, max_side: int) -> tuple[np.ndarray, tuple[int, in
     ----------
     mip_map : MipMap
     max_side : int
-        Levels with a longer side are left out. Level 0 of the image is the first level that is not.
+        Levels with a side of more pixels are left out. The largest of the others becomes level 0 of the image.
 
     Returns
     -------
@@ -341,6 +341,7 @@ def mip_atlas(mip_map: MipMap, max_side: int) -> tuple[np.ndarray, tuple[int, in
     size : (int, int)
         Width and height of level 0.
     max_level : int
+        Number of the smallest level in the image, counted from its level 0.
     """
     levels = [level for level in mip_map.levels if max(level.shape) <= max_side]
     height, width = levels[0].shape

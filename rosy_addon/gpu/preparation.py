@@ -31,13 +31,21 @@ class Preparation(NamedTuple):
     send: Callable[[Any], Any]
 
 
-def prepare_steps(lookups: Iterable[Callable[[], Any]]) -> Steps[list[Any]]:
+def prepare_steps(
+    lookups: Iterable[Callable[[], Any]],
+    device: Device | None = None,
+    shaders: Sequence[ComputePass | RasterPass] = (),
+) -> Steps[list[Any]]:
     """Look up handles of data on the device, and prepare the data that is not there yet.
 
     Parameters
     ----------
     lookups : iterable of callable
         Functions without arguments. Each returns a handle, or a `Preparation` if the data is not there.
+    device : Device, optional
+        The device on which the shaders are compiled.
+    shaders : sequence of ComputePass or RasterPass
+        Shaders to compile before, unless they are compiled already.
 
     Yields
     ------
@@ -50,6 +58,10 @@ def prepare_steps(lookups: Iterable[Callable[[], Any]]) -> Steps[list[Any]]:
     list
         The handles, in the order of `lookups`.
     """
+    for index, shader in enumerate(shaders):
+        if not device.is_compiled(shader):
+            yield Step(index / len(shaders), "compiling shaders")
+            device.compile(shader)
     handles = []
     for look_up in lookups:
         found = look_up()
@@ -63,11 +75,3 @@ def prepare_steps(lookups: Iterable[Callable[[], Any]]) -> Steps[list[Any]]:
             found = found.send(answer)
         handles.append(found)
     return handles
-
-
-def compile_steps(device: Device, shaders: Sequence[ComputePass | RasterPass]) -> Steps[None]:
-    """Compile the shaders that are not compiled yet, step by step."""
-    for index, shader in enumerate(shaders):
-        if not device.is_compiled(shader):
-            yield Step(index / len(shaders), "compiling shaders")
-            device.compile(shader)

@@ -35,7 +35,7 @@ from .lic_stage import even_line_lookups, largest_magnitude, render_even_lines, 
 from .noise_stage import feature_lookups, render_noise
 from .outline_stage import outline_lookups, render_outline
 from .passes import ComputePass, all_passes
-from .preparation import compile_steps, prepare_steps
+from .preparation import prepare_steps
 from .resources import DrawItem, GpuResources
 from .tone_stage import render_target_tones
 from .uniforms import clip_uniforms
@@ -106,8 +106,7 @@ class GpuRenderer(ViewportRenderer):
         """Compile the shaders without switches, and send the meshes to the device."""
         # Shaders with switches are compiled when the values of the switches are known.
         shaders = [shader for shader in all_passes() if not shader.declared.switches]
-        yield from compile_steps(self.device, shaders)
-        yield from prepare_steps(self.resources.mesh_lookups(instances, display))
+        return prepare_steps(self.resources.mesh_lookups(instances, display), self.device, shaders)
 
     def upload(self, instances: Sequence[MeshInstance], display: str) -> list[DrawItem]:
         """Return a draw item for each mesh instance. Meshes that are on the device are not sent again."""

@@ -222,9 +222,10 @@ def _leaf_directions(
 
 
 def _rotations_to_planes(corner_field: CornerField) -> list[np.ndarray]:
-    """Return 3 (T,) complex128 rotations of corner values into tangent frames of the flat triangles.
+    """Return 3 (T,) complex128 rotations of directions, from corners of triangles to the flat triangles.
 
-    Each rotation also undoes the transport of the values of `corner_field` to corner 0.
+    `corner_field` has the values of all corners in the frame of corner 0. Rotation k turns a direction from
+    there back into the frame of corner k, and then into the frame of the plane of the triangle.
     """
     plane_frame = tangent_frame_components(corner_field.geometric_normal)
     first_normal = corner_field.corner_normals[0]

@@ -221,7 +221,7 @@ class _Scene:
     def pairs(
         self, triangle: np.ndarray, ndc: np.ndarray
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Yield pairs of a triangle and a point in its bounding box on screen.
+        """Return pairs of a triangle and a point in its bounding box on screen.
 
         Parameters
         ----------
@@ -230,10 +230,10 @@ class _Scene:
         ndc : (n, 2) float64 ndarray
             Positions of the points on screen, from -1 to 1.
 
-        Yields
-        ------
-        triangle, point : (m,) intp ndarray
-            Indices of triangles and of points, block by block.
+        Returns
+        -------
+        iterator of (triangle, point)
+            Indices of triangles and of points, (m,) intp ndarrays, block by block.
         """
         row_count = max(int(len(ndc) ** 0.5), 1)
         point_row = _grid_rows(ndc[:, 1], row_count)
@@ -257,9 +257,14 @@ class _Scene:
         first = np.searchsorted(key, 4.0 * row + low[box, 0])
         count = np.searchsorted(key, 4.0 * row + high[box, 0], side="right") - first
         box, first, count = (array[count > 0] for array in (box, first, count))
-        for part in blocks_by_count(count, PAIRS_PER_BLOCK):
-            point = order[concatenated_ranges(first[part], count[part])]
-            yield triangle[kept[np.repeat(box[part], count[part])]], point
+        triangle = triangle[kept]
+        return (
+            (
+                triangle[np.repeat(box[part], count[part])],
+                order[concatenated_ranges(first[part], count[part])],
+            )
+            for part in blocks_by_count(count, PAIRS_PER_BLOCK)
+        )
 
     def hides(self, triangle: np.ndarray, ndc: np.ndarray, distance: np.ndarray) -> np.ndarray:
         """Return (n,) bool: whether each triangle hides its point. The point must not be on the triangle.

@@ -409,7 +409,7 @@ def remove_bakes(scene: bpy.types.Scene) -> RemovalCounts:
 
 
 def _clean_unused_meshes() -> None:
-    """Remove applied pictures from meshes that no object uses, as the meshes would keep the materials."""
+    """Remove pictures from meshes without objects: meshes to which RoSy's modifier was applied keep its material."""
     used_data = {obj.data for obj in bpy.data.objects}
     for mesh in bpy.data.meshes:
         if mesh not in used_data:

@@ -57,13 +57,17 @@ def rendered_instances(
 
 
 def shown_instances(depsgraph: bpy.types.Depsgraph, *, include_occluders: bool) -> Instances:
-    """Yield the instances of meshes that are visible in 3D views: all, or only meshes with a field."""
-    for instance in depsgraph.object_instances:
-        obj = instance.object
-        if obj.type == "MESH" and instance.show_self:
-            draws_field = _draws_field(obj.original)
-            if draws_field or (include_occluders and not obj.original.get(OWNED_TAG)):
-                yield instance, draws_field
+    """Return the instances of meshes that are visible in 3D views: all, or only meshes with a field."""
+    meshes = (
+        (instance, _draws_field(instance.object.original))
+        for instance in depsgraph.object_instances
+        if instance.object.type == "MESH" and instance.show_self
+    )
+    return (
+        (instance, draws_field)
+        for instance, draws_field in meshes
+        if draws_field or (include_occluders and not instance.object.original.get(OWNED_TAG))
+    )
 
 
 def _is_rendered(

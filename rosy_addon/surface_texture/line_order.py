@@ -274,7 +274,10 @@ def _aligned(
     degree: int,
     lengths: Sequence[float],
 ) -> LineOrder:
-    """Align a guiding direction with a field by threshold dynamics: choose and average in turns.
+    """Align a guiding direction with a field: replace it by the nearest member, average, and repeat.
+
+    This is threshold dynamics (diffusion-generated motion): the averages remove short boundaries between parts
+    in which another member is the nearest one.
 
     Parameters
     ----------

@@ -388,6 +388,7 @@ def test_tones_of_corners_and_of_vertices_draw_the_same_picture():
     by_vertex = rf.render(surface, tone_values=tones, **options)
     by_corner = rf.render(surface, tone_values=tones[surface.faces.ravel()], **options)
     np.testing.assert_array_equal(by_vertex, by_corner)
+    assert not np.array_equal(by_vertex, rf.render(surface, **options))
 
 
 def test_other_numbers_of_tones_are_refused(error_of):

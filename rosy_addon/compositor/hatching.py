@@ -78,8 +78,7 @@ class HatchedLines(NamedTuple):
     outline : (P,) float32 ndarray or None
         Coverage of each pixel by lines along silhouettes and creases, 0 to 1.
     undirected : (P,) float32 ndarray or None
-        Undirected texture where the field is undefined, and NaN elsewhere; see
-        `undirected_texture`.
+        Undirected texture where the field is undefined, NaN elsewhere; see `undirected_texture`.
     even_lines : EvenLines or None
         Evenly spaced lines, if they are drawn instead of the streaks of LIC images.
     """
@@ -334,7 +333,8 @@ def line_images(
     Returns
     -------
     images, break_images : LicImages or None
-        See `HatchedLines`.
+        Images of the lines; None if lines are even. Images of shorter streamlines, which tell where lines
+        break; None if lines do not break.
     """
     looks = [] if is_even(look) else [look]
     if has_breaks(look):

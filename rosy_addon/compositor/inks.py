@@ -171,7 +171,8 @@ def inks_of(look: Look, families: int = 1) -> Inks:
     ----------
     look : Look
     families : int
-        Number of inks (see `ink_count`).
+        Number of families of lines that have an ink of their own; 1 if all have the same ink. It is the
+        result of `ink_count`.
     """
     paper = to_linear(from_hex(look.paper_color))
     dark = light = _ink_series(look.ink_color, families)

@@ -245,7 +245,8 @@ class _Edges:
 
         Parts are connected components of the mesh. A line is drawn where two of them intersect if their
         normals differ by the crease angle. The bit `PART_BORDER` is set at pixels next to another part.
-        `origin` is the cell of the lower left pixel of the frame.
+        `origin` is the number that the cell of the lower left pixel of the frame would have; the pixel may be
+        outside of the rectangle of the cells.
         """
         gbuffer, look, defined = self._gbuffer, self._look, self._defined
         instance = gbuffer.instances[instance_id]
@@ -308,10 +309,10 @@ class _Edges:
     def _find_steps(self) -> None:
         """Set the width of lines at the nearer pixel of steps in the depth of a surface.
 
-        On a surface that is seen nearly edge-on, any difference in depth between neighbors is plausible, so
-        the neighbor masks link pixels across a silhouette. At a step between two pixels of a row or a column,
-        the depth changes much more than it does from each of them to its other neighbor in that row or
-        column.
+        `pixel_neighbors` tells by depth which neighbor pixels show the same piece of surface. On a surface that
+        is seen nearly edge-on it may miss a silhouette, as any difference in depth is plausible there. Here it
+        is found: between two pixels of a row or a column, the depth changes much more than it does from each
+        of them to its other neighbor in that row or column.
         """
         depth, tolerance, defined = self._depth, self._tolerance, self._defined
         for block in reported_blocks(self._count, STEP_LABEL):

@@ -83,7 +83,10 @@ def camera_uniforms(camera: Camera) -> dict[str, Any]:
 
 
 def camera_to_pixels(camera: Camera) -> tuple[float, ...]:
-    """Return the (2, 2) matrix from x and y of camera space to pixels, as in `pixel_neighbors`; 4 floats."""
+    """Return the (2, 2) matrix from displacements in the view plane to displacements on the screen, row by row.
+
+    Both are in the same unit: a square pixel at depth 1, as in `pixel_neighbors.screen_jacobians`.
+    """
     scaled = camera.projection[:2, :2] * [[camera.width], [camera.height]]
     return tuple((scaled / (2 * camera.pixels_per_unit)).ravel())
 

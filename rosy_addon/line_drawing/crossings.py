@@ -184,10 +184,17 @@ def _strip_keys(strokes: Strokes, segment_end: np.ndarray) -> tuple[np.ndarray, 
 def _intersect_segments(
     points: np.ndarray, stroke: np.ndarray, first: np.ndarray, second: np.ndarray
 ) -> tuple[np.ndarray, ...]:
-    """Return the pairs of segments that cross, and where.
+    """Return those of the given pairs of segments that cross, and where they cross.
 
     A segment is given by the index of the point at which it ends. It begins at the point before it. `stroke`
     is the stroke of each point. Pairs of segments of the same stroke are left out.
+
+    Parameters
+    ----------
+    points : (n, 3) float64 ndarray
+    stroke : (n,) int ndarray
+    first, second : (k,) int64 ndarray
+        The pairs to test, row by row.
 
     Returns
     -------

@@ -92,9 +92,10 @@ def values_in_triangles(
 
 
 def feature_curvatures(gbuffer: GBuffer, cache: Cache) -> np.ndarray:
-    """Interpolate the curvature of surfaces between sharp edges at the pixels of a G-buffer.
+    """Return the curvature of the surfaces at the pixels of a G-buffer, interpolated between vertices.
 
-    It is the larger absolute principal curvature, without noise; see `field.feature_curvature`.
+    It is the larger absolute principal curvature. The curvature that noise of the vertices causes is
+    subtracted, and the bend at sharp edges does not count; see `field.feature_curvature`.
 
     Parameters
     ----------

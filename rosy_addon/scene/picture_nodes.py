@@ -184,7 +184,10 @@ def new_group(
 def _add_projection(
     group: bpy.types.NodeTree, material: bpy.types.Material, matrix: np.ndarray | None
 ) -> None:
-    """Store a picture and the matrix of its projection in a node group; see `projections_of_group`."""
+    """Store a picture, given by its material, and its projection matrix in a node group.
+
+    The matrix is (4, 4), from object space to clip space, or None; see `projections_of_group`.
+    """
     projection = group.rosy.projections.add()
     projection.material = material
     projection.matrix = (np.zeros(16) if matrix is None else matrix.ravel()).tolist()

@@ -193,8 +193,10 @@ def combed_directions(mesh: TangentMesh, guiding_angle: float) -> CombedDirectio
 
     Parameters
     ----------
-    mesh, guiding_angle
-        Tangent mesh with the field, and angle that the directions are near to, as in `line_order`.
+    mesh : TangentMesh
+        Tangent mesh with the field.
+    guiding_angle : float
+        Angle on the surface, in radians from the horizontal direction, near which the chosen line lies.
 
     Returns
     -------

@@ -126,12 +126,7 @@ def draw_pair(
     supersampling = look.supersampling
     width, height = camera.width // supersampling, camera.height // supersampling
     view = rosy.ViewInput(
-        tuple(instances),
-        camera.resized(width, height),
-        look,
-        tuple(lights),
-        reference,
-        drift=drift,
+        tuple(instances), camera.resized(width, height), look, tuple(lights), reference, drift=drift
     )
     items = card.upload(instances, look.display)
     texture = rosy.run(card.texture_steps(items, view))

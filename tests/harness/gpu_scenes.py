@@ -6,14 +6,13 @@ from functools import lru_cache
 
 import numpy as np
 from lenses import shifted
-from shapes import cube, icosphere
+from shapes import cube, icosphere, joined, placed, rebuilt
 
 from rosy_addon.compositor.flow import NO_DRIFT
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.directional_field import field_from_directions, tensor_field
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.rosy_field import RosyField
-from rosy_addon.field.surface import build_surface
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.rendering.draw import draw_picture
@@ -46,22 +45,11 @@ def rotation(x, y, z):
     return result
 
 
-def placed(linear=1.0, shift=(0, 0, 0)):
-    """Return the (4, 4) matrix with a linear part, or a scale, and a translation."""
-    matrix = np.eye(4)
-    matrix[:3, :3] = linear * np.eye(3) if np.ndim(linear) == 0 else linear
-    matrix[:3, 3] = shift
-    return matrix
-
-
 def boxes():
     """A plate, and a block that intersects it, as one mesh with sharp edges."""
-    box = cube()
-    block = (box.vertices - (0.5, 0.5, 0.0)) * (0.5, 0.3, 0.8)
-    plate = (box.vertices - 0.5) * (2.0, 2.0, 0.2)
-    corners = np.concatenate([box.corner_vertex, box.corner_vertex + 8])
-    start = np.arange(0, len(corners) + 1, 4)
-    return build_surface(np.concatenate([plate, block]), corners, start, sharp_angle=0.5)
+    plate = rebuilt(cube(), (cube().vertices - 0.5) * (2.0, 2.0, 0.2))
+    block = rebuilt(cube(), (cube().vertices - (0.5, 0.5, 0.0)) * (0.5, 0.3, 0.8))
+    return joined(plate, block, sharp_angle=0.5)
 
 
 # --- fields --------------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 
 def spacing_ratios(lines: Any, spacing: float) -> tuple[np.ndarray, np.ndarray]:
@@ -45,13 +46,7 @@ def share_within(lines: Any, spacing: float, tolerance: float, distance: float) 
     ratio, area = spacing_ratios(lines, spacing)
     center = lines.tree.vertices[lines.tree.leaf_vertex].mean(axis=1)
     ends = center[(lines.pattern.index != 0).any(axis=1)]
-    is_far = np.ones(len(center), dtype=bool)
-    for start in range(0, len(center), 2000):
-        block = slice(start, start + 2000)
-        if len(ends):
-            offset = center[block, None] - ends[None]
-            nearest = np.sqrt(np.einsum("abi,abi->ab", offset, offset)).min(axis=1)
-            is_far[block] = nearest > distance * spacing
+    is_far = cKDTree(ends.reshape(-1, 3)).query(center)[0] > distance * spacing
     assert area[is_far].sum() > 0.4 * area.sum()
     is_even = np.abs(ratio[is_far] - 1) <= tolerance
     return float((is_even * area[is_far, None]).sum(axis=0).min() / area[is_far].sum())

@@ -19,17 +19,8 @@ import numpy as np
 
 #: The modules of `compositor` that are used here.
 MODULES = (
-    *(
-        "per_pixel_lic",
-        "lic",
-        "covering",
-        "flow",
-        "contrast",
-        "filter_kernel",
-        "hatching",
-        "lic_images",
-    ),
-    *("image_noise", "pixel_field"),
+    *("per_pixel_lic", "lic", "covering", "flow", "contrast", "filter_kernel", "hatching"),
+    *("lic_images", "image_noise", "pixel_field"),
 )
 
 #: Weights of the channels at positions of a streamline: from a position and the share of the kernel that drifts
@@ -40,21 +31,17 @@ Weights = Callable[[int, np.ndarray], np.ndarray]
 @contextmanager
 def one_streamline_per_pixel(package: str = "rosy_addon") -> Iterator[None]:
     """Let the method "sheets" follow the best of the N directions from each pixel, as "brute" does."""
-    rosy = SimpleNamespace(
-        **{name: importlib.import_module(f"{package}.compositor.{name}") for name in MODULES}
-    )
-    rosy.interpolated_contrast = importlib.import_module(
-        f"{package}.gpu.lic_stage"
-    ).INTERPOLATED_CONTRAST
+    modules = {name: importlib.import_module(f"{package}.compositor.{name}") for name in MODULES}
+    lic_stage = importlib.import_module(f"{package}.gpu.lic_stage")
+    rosy = SimpleNamespace(**modules, interpolated_contrast=lic_stage.INTERPOLATED_CONTRAST)
 
     def draw_lengths(field, looks, noise, _strip):
         results = []
         for look in looks:
             images = rosy.per_pixel_lic.brute_force(field, look, noise)
             if look.is_antialiased and rosy.hatching.is_hatched(look):
-                images = _smoothed(
-                    rosy, rosy.covering.build_covering(field, look, noise), field, images
-                )
+                covering = rosy.covering.build_covering(field, look, noise)
+                images = _smoothed(rosy, covering, field, images)
             results.append(images)
         return results
 
@@ -108,14 +95,11 @@ def _members(
     count = len(field.pixel)
     limit = rosy.lic_images.magnitude_step_limits(field, look)
     length = np.full(count, look.length) if limit is None else limit
-    kind = look.kernel
     reach = look.streamline_reach()
     centered = noise.astype(np.float64) - rosy.image_noise.NOISE_MEAN
     sample = _sampler(centered, neighbors, look.is_antialiased)
-    weights = _drifting_weights(rosy, look, length) if look.flow else None
-    full_samples = rosy.filter_kernel.kernel_weights(
-        *[length.astype(float)] * 3, kind
-    ).effective_samples
+    weights = _weights(rosy, look, length)
+    whole = rosy.filter_kernel.kernel_weights(*[length.astype(float)] * 3, look.kernel)
     channels = 1 if look.flow else noise.shape[1]
     members = np.empty((len(tracers), count, channels), dtype=np.float32)
     samples = np.empty((len(tracers), count))
@@ -125,30 +109,21 @@ def _members(
         if field.symmetry.has_opposites:
             cosine = (directions[member] * np.exp(-1j * look.guiding_angle)).real
             forward = rosy.flow.forward_share(cosine).astype(np.float64)
-
-        def weights_at(position: int, forward: np.ndarray = forward) -> np.ndarray:
-            if weights is not None:
-                return weights(position, forward)
-            return rosy.filter_kernel.sample_weights(np.full(count, position), length, kind)[
-                :, None
-            ]
-
-        start = weights_at(0)
+        start = weights(0, forward)
         total, weight_sum = start * centered, start.sum(axis=1)
         available, full = (start**2).sum(axis=1), (start**2).sum(axis=1)
         for side in (1, -1):
-            direction_at = tracer(slice(0, count))
-            step_length = side
-            for step, entry, offset in _traced(neighbors, direction_at, count, reach, step_length):
-                weight = weights_at(side * step)
+            steps = _traced(neighbors, tracer(slice(0, count)), count, reach, side)
+            for step, entry, offset in steps:
+                weight = weights(side * step, forward)
                 energy = (weight**2).sum(axis=1)
                 total += weight * sample(entry, offset)
                 available += np.where(entry == count, 0, energy)
                 weight_sum += np.where(entry == count, 0, weight.sum(axis=1))
                 full += energy
         if look.flow:
-            samples[member] = np.maximum(full_samples * available / full, 1e-3)
-            scale = np.sqrt(full_samples / full) / samples[member]
+            samples[member] = np.maximum(whole.effective_samples * available / full, 1e-3)
+            scale = np.sqrt(whole.effective_samples / full) / samples[member]
             mean = (total.sum(axis=1) * scale)[:, None]
         else:
             samples[member] = weight_sum**2 / available
@@ -183,9 +158,14 @@ def _sampler(
     )
 
 
-def _drifting_weights(rosy: SimpleNamespace, look: Any, length: np.ndarray) -> Weights:
-    """Return the weights of a kernel that moves."""
+def _weights(rosy: SimpleNamespace, look: Any, length: np.ndarray) -> Weights:
+    """Return the weights of a kernel that moves, or is at rest without flow."""
     kind, share = look.kernel, length / look.length
+    sample_weights = rosy.filter_kernel.sample_weights
+    if not look.flow:
+        return lambda position, _: sample_weights(np.full(len(length), position), length, kind)[
+            :, None
+        ]
     shifts = rosy.flow.channel_shifts(look.flow_phase, look.flow_distance)
     channel_weights = rosy.flow.channel_weights(look.flow_phase)
 
@@ -196,7 +176,7 @@ def _drifting_weights(rosy: SimpleNamespace, look: Any, length: np.ndarray) -> W
                 place = direction * position + share * shift
                 low = np.floor(place)
                 for step, amount in ((low, 1 - place + low), (low + 1, place - low)):
-                    of_kernel = rosy.filter_kernel.sample_weights(step, length, kind)
+                    of_kernel = sample_weights(step, length, kind)
                     result[:, channel] += weight * part * amount * of_kernel
         return result
 

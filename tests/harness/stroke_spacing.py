@@ -78,9 +78,8 @@ def lateral_gaps(mesh: TangentMesh, strokes: Strokes, max_points: int = 20_000) 
     for start in range(0, len(sample), 1 << 12):
         batch = slice(start, start + (1 << 12))
         gap[batch], nearest_distance[batch] = _measure(mesh, samples, tangent, grid, sample[batch])
-    return LateralGaps(
-        point, gap, _sides_with_room(mesh, samples, tangent, sample), nearest_distance
-    )
+    has_room = _sides_with_room(mesh, samples, tangent, sample)
+    return LateralGaps(point, gap, has_room, nearest_distance)
 
 
 def _arc_distance(strokes: Strokes, point_a: np.ndarray, point_b: np.ndarray) -> np.ndarray:
@@ -111,19 +110,12 @@ def _measure(
     height = dot(delta, normal)
     same_family = np.abs(height) < 0.5 * np.sqrt(dot(delta, delta))
     sample_a, sample_b = sample[same_family], other[same_family]
+
+    def member_at(at: np.ndarray) -> np.ndarray:
+        return transport(samples.member[at], mesh.normal[samples.triangle[at]], samples.normal[at])
+
     same_family[same_family] = mesh.is_same_family(
-        transport(
-            samples.member[sample_a],
-            mesh.normal[samples.triangle[sample_a]],
-            samples.normal[sample_a],
-        ),
-        samples.normal[sample_a],
-        transport(
-            samples.member[sample_b],
-            mesh.normal[samples.triangle[sample_b]],
-            samples.normal[sample_b],
-        ),
-        samples.normal[sample_b],
+        member_at(sample_a), samples.normal[sample_a], member_at(sample_b), samples.normal[sample_b]
     )
     query, other, sample, normal, delta, height = (
         values[same_family] for values in (query, other, sample, normal, delta, height)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rosy_addon.field.generate import axis_field
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.line_drawing.families import label_families
 from rosy_addon.line_drawing.lateral_neighbors import SeparationRules
@@ -56,6 +57,12 @@ def turned(surface, degree, angle=0.0):
     return MeshInstance(
         surface, np.eye(4), RosyField(degree, np.cos(angle) * x + np.sin(angle) * y)
     )
+
+
+def latitudes(surface):
+    """Return an instance with lines that run around the z axis."""
+    around = np.cross(surface.face_normal, axis_field(surface, 2).vectors)
+    return MeshInstance(surface, np.eye(4), RosyField(2, around))
 
 
 def planar_strokes(points, directions, spacing):

@@ -8,28 +8,20 @@ import pytest
 from hypothesis import settings
 
 from rosy_addon.core.errors import RosyError
+from rosy_addon.worker.helper import Helper
 
 #: Machines may be busy, so hypothesis has no deadline for an example.
-settings.register_profile("patient", deadline=None)
+settings.register_profile("patient", deadline=None, max_examples=50)
 settings.load_profile("patient")
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def long(*cases):
-    """Parameters of a test that only `make test LONG=1` runs. A tuple holds several arguments."""
-    return [
-        pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=pytest.mark.long)
-        for case in cases
-    ]
-
-
 def mainly(common, cases):
     """Parameters of all cases; `make test` runs the common ones, `make test LONG=1` all."""
-    common, cases = set(common), list(cases)
     return [
-        *(case for case in cases if case in common),
-        *long(*(c for c in cases if c not in common)),
+        case if case in set(common) else pytest.param(case, marks=pytest.mark.long)
+        for case in cases
     ]
 
 
@@ -47,6 +39,14 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip("no ../shared/data")
     return folder
+
+
+@pytest.fixture
+def helper():
+    """A helper process that has not been started."""
+    helper = Helper()
+    yield helper
+    helper.close()
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import numpy as np
 from awkward import AWKWARD
 from scipy import sparse
 from scipy.spatial.transform import Rotation
-from shapes import from_triangles
+from shapes import from_triangles, rebuilt
 
 from rosy_addon.field.convert import rotate_field
 from rosy_addon.field.field_io import load_field
@@ -24,8 +24,7 @@ def bumpy(surface, amount=0.15, stretch=(1.0, 1.2, 1.5)):
     """A surface without symmetry, so that the smallest eigenvalue is simple."""
     x, y, z = surface.vertices.T
     out = 1 + amount * np.sin(3 * x + 1) * np.cos(2 * y) + 0.5 * amount * np.sin(4 * z + x)
-    points = surface.vertices * out[:, None] * stretch
-    return build_surface(points, surface.corner_vertex, surface.face_start)
+    return rebuilt(surface, surface.vertices * out[:, None] * stretch)
 
 
 def angle_differences(surface, first, second, degree):
@@ -67,6 +66,16 @@ def with_random_members(surface, field, seed=0):
     """The same RoSys, with a random member of each stored."""
     member_index = np.random.default_rng(seed).integers(0, field.degree, surface.face_count)
     return rotate_field(surface, field, 2 * np.pi * member_index / field.degree)
+
+
+def write_off(path, surface):
+    """Write a mesh as an .off file, and return its path."""
+    rows = ["OFF", f"{len(surface.vertices)} {surface.face_count} 0"]
+    rows += [" ".join(map(repr, point)) for point in surface.vertices.tolist()]
+    faces = np.split(surface.corner_vertex, surface.face_start[1:-1])
+    rows += [" ".join(map(str, [len(face), *face])) for face in faces]
+    path.write_text("\n".join(rows) + "\n")
+    return path
 
 
 def read_field(*arguments, **settings):

@@ -7,19 +7,19 @@ from functools import lru_cache
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
-from shapes import cylinder, from_quads, icosphere
+from shapes import cylinder, from_quads, icosphere, rebuilt
 
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.inks import inks_of
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import diffuse
 from rosy_addon.field.generate import axis_field
-from rosy_addon.field.surface import Surface, build_surface
+from rosy_addon.field.surface import Surface
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 
-SIZE = 384
+SIZE = 256
 
 INK = Look(
     fade="ends",
@@ -38,13 +38,8 @@ BALL = icosphere(5)
 def tube(bend=0.0):
     """A tube along z with radius 0.5; its rest shape is straight if it is bent."""
     straight = cylinder(160, 120, 0.5, 3.0)
-    return build_surface(
-        bent(straight.vertices, bend),
-        straight.corner_vertex,
-        straight.face_start,
-        name="tube",
-        rest_vertices=straight.vertices,
-    )
+    points = bent(straight.vertices, bend)
+    return rebuilt(straight, points, name="tube", rest_vertices=straight.vertices)
 
 
 def bent(points, angle):
@@ -60,12 +55,12 @@ def make_instance(surface: Surface, degree=4, matrix=None):
     return MeshInstance(surface, np.eye(4) if matrix is None else matrix, field)
 
 
-def make_wall(angle=0.0, half=9.0, **more):
+def make_wall(angle=0.0, half=9.0, matrix=None):
     """A square in the plane y = 0 with lines at an angle to x."""
     points = half * np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]])
     wall = from_quads(points, np.array([[0, 1, 2, 3]]), name="wall")
     field = axis_field(wall, 2, (np.cos(angle), 0, np.sin(angle)))
-    return MeshInstance(wall, np.eye(4), field, **more)
+    return MeshInstance(wall, np.eye(4) if matrix is None else matrix, field)
 
 
 def make_camera(azimuth=0.0, zoom=1.0, distance=4.0):

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+#: Settings that choose a kernel.
+KERNELS = {"box": {}, "taper": {"fade": "ends"}, "ramp": {"fade": "tail"}}
+
 
 def pixel_centers(size: int) -> tuple[np.ndarray, np.ndarray]:
     """(size, size) x and y of pixel centers, rows from the bottom."""

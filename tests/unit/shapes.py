@@ -1,4 +1,4 @@
-"""Surfaces in closed form, instances with fields, and a translation matrix, for tests."""
+"""Surfaces in closed form, instances with fields, and matrices, for tests."""
 
 from __future__ import annotations
 
@@ -29,10 +29,25 @@ def from_quads(vertices: np.ndarray, quads: np.ndarray, **settings) -> Surface:
 
 def from_triangles(vertices: ArrayLike, triangles: ArrayLike, **settings) -> Surface:
     """A surface of triangles."""
-    triangles = np.asarray(triangles)
-    return build_surface(
-        vertices, triangles.ravel(), np.arange(0, triangles.size + 1, 3), **settings
-    )
+    starts = np.arange(0, np.size(triangles) + 1, 3)
+    return build_surface(vertices, np.ravel(triangles), starts, **settings)
+
+
+def rebuilt(surface: Surface, vertices: ArrayLike | None = None, **settings) -> Surface:
+    """The same polygons with normals computed anew, at other positions or with other settings."""
+    vertices = surface.vertices if vertices is None else vertices
+    return build_surface(vertices, surface.corner_vertex, surface.face_start, **settings)
+
+
+def joined(*surfaces: Surface, **settings) -> Surface:
+    """The polygons of several surfaces as one mesh."""
+    points, corners, sizes = [], [], [[0]]
+    for surface in surfaces:
+        corners.append(surface.corner_vertex + sum(map(len, points)))
+        points.append(surface.vertices)
+        sizes.append(np.diff(surface.face_start))
+    starts = np.cumsum(np.concatenate(sizes))
+    return build_surface(np.concatenate(points), np.concatenate(corners), starts, **settings)
 
 
 def globe(rows: int = 24, columns: int = 48) -> Surface:
@@ -119,11 +134,17 @@ def icosphere(subdivisions: int = 3, radius: float = 1.0) -> Surface:
     return from_triangles(vertices, triangles, name="sphere")
 
 
+def placed(linear: ArrayLike = 1.0, shift: ArrayLike = (0, 0, 0)) -> np.ndarray:
+    """The (4, 4) matrix with a linear part, or a scale, and a translation."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = linear * np.eye(3) if np.ndim(linear) == 0 else linear
+    matrix[:3, 3] = shift
+    return matrix
+
+
 def moved(x=0.0, y=0.0, z=0.0) -> np.ndarray:
     """The (4, 4) matrix of a translation."""
-    matrix = np.eye(4)
-    matrix[:3, 3] = x, y, z
-    return matrix
+    return placed(shift=(x, y, z))
 
 
 def cube() -> Surface:
@@ -134,10 +155,7 @@ def cube() -> Surface:
 
 def sharp_cube() -> Surface:
     """A unit cube whose twelve edges are sharp."""
-    smooth = cube()
-    return build_surface(
-        smooth.vertices, smooth.corner_vertex, smooth.face_start, name="cube", sharp_angle=0.5
-    )
+    return rebuilt(cube(), name="cube", sharp_angle=0.5)
 
 
 def instance_of(surface: Surface, degree: int, kind: str = "smoothest") -> MeshInstance:

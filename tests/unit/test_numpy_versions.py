@@ -42,15 +42,10 @@ def draw() -> dict[str, np.ndarray]:
         "drift": (torus(), "curvature", 4, Look(method="ibfv", flow=1.0)),
         "engraving": (torus(), "curvature", 4, load_preset("engraving").look),
         "charcoal": (torus(40, 20), "curvature", 4, load_preset("charcoal").look),
-        "magnitude": (
-            icosphere(3),
-            "axis",
-            3,
-            Look(hue="magnitude", magnitude_length=True, supersampling=2),
-        ),
+        "magnitude": (icosphere(3), "axis", 3, Look(hue="magnitude", magnitude_length=True)),
     }
     for name, (surface, kind, degree, shape_look) in shapes.items():
-        size = 160 * shape_look.supersampling
+        size = 112 * shape_look.supersampling
         camera = orbit_camera(surface.vertices, -25, 30, size, size)
         instance = MeshInstance(surface, np.eye(4), generate(surface, kind, degree))
         pictures[name] = compose(project([instance], camera), shape_look, drift=Drift(0.3))
@@ -64,13 +59,10 @@ if __name__ == "__main__":
 
 @pytest.mark.slow
 def test_another_numpy_version_draws_the_same(tmp_path):
-    """And this one draws the same twice."""
-    pictures, again = draw(), draw()
-    assert all(np.array_equal(again[name], picture) for name, picture in pictures.items())
     other = os.environ.get("ROSY_OTHER_PYTHON")
     if not other:
         pytest.skip("ROSY_OTHER_PYTHON names no other interpreter")
-    file = tmp_path / "pictures.npz"
+    pictures, file = draw(), tmp_path / "pictures.npz"
     subprocess.run([other, __file__, file], check=True)
     code = "import numpy; print(numpy.__version__, end='')"
     assert subprocess.check_output([other, "-c", code], text=True) != np.__version__

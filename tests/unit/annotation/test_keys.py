@@ -7,7 +7,6 @@ from itertools import product
 
 import numpy as np
 import pytest
-from conftest import long
 from shapes import icosphere, moved
 
 from rosy_addon.annotation.draw_key import DARK_PLATES, LIGHT_PLATES, draw_key, triangle_coverage
@@ -51,11 +50,8 @@ def text_width(text):
 def text_triangles(text):
     """Blocks in place of letters."""
     left = 0.55 * np.array([i for i, letter in enumerate(text) if letter != " "])
-    low, high = np.stack([left, 0 * left], 1), np.stack([left + 0.45, 0 * left + 0.7], 1)
-    corner = np.stack([low[:, 0], high[:, 1]], 1), np.stack([high[:, 0], low[:, 1]], 1)
-    return np.concatenate(
-        [np.stack([low, corner[1], high], 1), np.stack([low, high, corner[0]], 1)]
-    )
+    steps = np.array([[(0, 0), (0.45, 0), (0.45, 0.7)], [(0, 0), (0.45, 0.7), (0, 0.7)]])
+    return (steps[:, None] + np.stack([left, 0 * left], 1)[:, None]).reshape(-1, 3, 2)
 
 
 # --- coverage ------------------------------------------------------------------------------------
@@ -72,14 +68,11 @@ def test_coverage_of_triangles_sums_to_their_area():
     for corners in rng.uniform(2, 38, (40, 3, 2)):
         a, b = corners[1] - corners[0], corners[2] - corners[0]
         area = abs(a[0] * b[1] - a[1] * b[0]) / 2
-        total = triangle_coverage(corners[None], 40, 40).sum()
-        assert total == pytest.approx(area, abs=0.15 + 0.005 * area)
-        for order in ((1, 0, 2), (2, 1, 0)):
-            np.testing.assert_allclose(
-                triangle_coverage(corners[list(order)][None], 40, 40),
-                triangle_coverage(corners[None], 40, 40),
-                atol=1e-6,
-            )
+        coverage = triangle_coverage(corners[None], 40, 40)
+        assert coverage.sum() == pytest.approx(area, abs=0.15 + 0.005 * area)
+        for order in ([1, 0, 2], [2, 1, 0]):
+            again = triangle_coverage(corners[order][None], 40, 40)
+            np.testing.assert_allclose(again, coverage, atol=1e-6)
 
 
 def test_coverage_is_cut_at_the_window():
@@ -132,7 +125,7 @@ def test_numbers_as_text(value, text):
 
 # --- layout --------------------------------------------------------------------------------------
 
-SIDES = (320, 240), (512, 512), (960, 540), (1920, 1080), (3840, 2160), (4096, 400)
+SIDES = (320, 240), (512, 512), (1920, 1080), (4096, 400)
 
 
 def pair_count(boxes):
@@ -149,9 +142,8 @@ def test_nothing_overlaps(size):
     for caption, indices, scale, bar, dot, text_size in product(
         captions, ((), INDICES), (None, 0.2 * width), (None, SCALE), (9.0, 30.0), (0.0, 40.0)
     ):
-        parts = KeyParts(
-            bar, indices, dot, True, None if scale is None else (scale, "50 cm"), caption
-        )
+        ruler = None if scale is None else (scale, "50 cm")
+        parts = KeyParts(bar, indices, dot, True, ruler, caption)
         layout = lay_out_key(parts, size, text_width, text_size)
         count = bool(caption) + bool(indices) + (scale is not None) + (bar is not None)
         assert len(layout.plates) == count
@@ -169,15 +161,13 @@ def test_nothing_overlaps(size):
 
 
 def test_a_key_scales_with_the_frame():
-    small = lay_out_key(replace(PARTS, caption="", scale=None), (960, 540), text_width)
-    large = lay_out_key(
-        replace(PARTS, caption="", scale=None, dot_size=36.0), (3840, 2160), text_width
-    )
+    parts = replace(PARTS, caption="", scale=None)
+    small = lay_out_key(parts, (960, 540), text_width)
+    large = lay_out_key(replace(parts, dot_size=36.0), (3840, 2160), text_width)
     assert large.text_size == pytest.approx(4 * small.text_size)
     np.testing.assert_allclose(np.array(large.plates), 4 * np.array(small.plates), atol=8)
-    assert [dot.radius for dot in large.dots] == pytest.approx(
-        [4 * dot.radius for dot in small.dots]
-    )
+    radii = ([dot.radius for dot in layout.dots] for layout in (large, small))
+    np.testing.assert_allclose(next(radii), 4 * np.array(next(radii)))
 
 
 def test_dots_of_the_legend_are_as_large_as_drawn():
@@ -208,9 +198,8 @@ def test_the_bar_has_the_colors_of_its_map(drawn):
     left, bottom, right, top = (int(value) for value in layout.color_bar)
     bar = rgba[bottom:top, left:right]
     expected = map_colors((np.arange(top - bottom) + 0.5) / (top - bottom), "magma")
-    np.testing.assert_allclose(
-        to_display(bar[..., :3]), expected[:, None] + 0 * bar[..., :3], atol=0.5 / 255
-    )
+    expected = expected[:, None] + 0 * bar[..., :3]
+    np.testing.assert_allclose(to_display(bar[..., :3]), expected, atol=0.5 / 255)
     assert (bar[..., 3] == 1).all()
 
 
@@ -275,14 +264,6 @@ def test_the_range_is_the_largest_visible_magnitude():
     assert scale == ColorScale("Magnitude", look.color_map, 0.0, high)
 
 
-@pytest.mark.parametrize("supersampling", [1, 2, 3])
-def test_the_range_does_not_reach_beyond_the_field(supersampling):
-    """Where pixels with several samples see the edge of a face, they do not extend it."""
-    picture = draw_picture(view(Look(hue="magnitude", supersampling=supersampling)))
-    largest = view(Look()).instances[0].field.magnitude.max()
-    assert 0.9 * largest < picture.color_range[1] <= largest * (1 + 1e-4)
-
-
 def test_fields_with_ranges_of_their_own_have_no_common_one():
     first = view(Look()).instances[0]
     other = MeshInstance(first.surface, moved(x=1.5), RosyField(2, 0.5 * first.field.vectors))
@@ -308,7 +289,7 @@ def test_the_legend_has_the_visible_singularities():
     assert picture_key(Look(), draw_picture(view(Look()))) == PictureKey()
 
 
-@pytest.mark.parametrize("ends", [(0.0, 0.0), (5.0, 2.0), *long(((2.0, 5.0),))])
+@pytest.mark.parametrize("ends", [(0.0, 0.0), (5.0, 2.0)])
 def test_the_range_of_numbers_as_colors(ends):
     """That of the look, or else of all numbers, visible or not; also of pictures in bands."""
     instance = view(Look()).instances[0]

@@ -1,13 +1,11 @@
-"""Pictures that are shaded once per pixel, against pictures that are shaded at 4 x 4 samples."""
+"""Pictures that are shaded once per pixel, against pictures that are shaded at many samples."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
-from conftest import mainly
 from harness.streaks import correlation
 from shapes import icosphere, torus
 
@@ -26,13 +24,13 @@ from rosy_addon.rendering.view_input import ViewInput
 
 SIZE = 160
 CAMERA = perspective_camera(look_at((0.3, -3.2, 1.4), (0, 0, 0)), SIZE, SIZE, fov=0.8)
+
+#: Looks by their names and the degrees of the fields.
 LOOKS = {
-    "default": Look(),
-    "color noise": Look(hue="noise"),
-    "on the surface": Look(fade="ends", anchor="surface", line_width=2.5),
-    "short": Look(length=12),
-    "cross-hatch": load_preset("cross-hatch").look,
-    "engraving": load_preset("engraving").look,
+    ("default", 4): Look(),
+    ("on the surface", 3): Look(fade="ends", anchor="surface", line_width=2.5),
+    ("cross-hatch", 4): load_preset("cross-hatch").look,
+    ("engraving", 4): load_preset("engraving").look,
 }
 
 
@@ -42,7 +40,7 @@ def torus_instance(degree=4):
 
 
 def rendered(instance, look):
-    return (draw_picture(ViewInput((instance,), CAMERA, look))).rgba
+    return draw_picture(ViewInput((instance,), CAMERA, look)).rgba
 
 
 def sampled(instance, look, samples):
@@ -56,18 +54,12 @@ def luminance(rgba, where):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("degree", "name"),
-    mainly(
-        [(4, "default"), (3, "on the surface"), (4, "cross-hatch"), (4, "engraving")],
-        product([3, 4], LOOKS),
-    ),
-)
+@pytest.mark.parametrize(("name", "degree"), LOOKS)
 def test_streaks_are_those_of_many_samples(name, degree):
     """Nearer to them than without samples, of the same tone and contrast, and with the same silhouettes."""
-    instance, look = torus_instance(degree), LOOKS[name]
+    instance, look = torus_instance(degree), LOOKS[name, degree]
     actual, single = (rendered(instance, replace(look, supersampling=s)) for s in (2, 1))
-    expected = sampled(instance, look, 4)
+    expected = sampled(instance, look, 3)
     inside = (actual[..., 3] == 1) & (single[..., 3] == 1) & (expected[..., 3] == 1)
     target, value, other = (luminance(rgba, inside) for rgba in (expected, actual, single))
     assert correlation(value, target) > correlation(other, target)

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
-from conftest import long, mainly
 from scipy.ndimage import gaussian_filter
 from shapes import plane
 
@@ -19,11 +17,9 @@ from rosy_addon.compositor.even_lines import (
     look_width_table,
     uneven_width,
 )
-from rosy_addon.compositor.hatching import HatchedLines
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import instance_line_spacing, pixel_look
 from rosy_addon.compositor.pixel_field import all_members, surface_pixel_field
-from rosy_addon.core.cache import Cache
 from rosy_addon.core.color import from_hex, to_linear
 from rosy_addon.core.settings import Choice, Number, Numbers, Switch, settings_of
 from rosy_addon.field.generate import axis_field
@@ -54,6 +50,13 @@ def wall_instance(degree=2, angle=0.0, size=20.0):
     )
 
 
+def partly_undefined(degree):
+    surface = plane(8, 8, 20.0)
+    vectors = axis_field(surface, degree, (1, 0.3, 0)).vectors.copy()
+    vectors[24:40] = 0
+    return MeshInstance(surface, np.eye(4), RosyField(degree, vectors))
+
+
 def camera_above(scale=8.0, size=SIZE, eye=(0, 0, 5)):
     view = look_at(eye, (0, 0, 0), (0, 1, 0))
     return orthographic_camera(view, size, size, scale=scale)
@@ -65,10 +68,10 @@ def picture(instance, camera, look=LOOK):
     return compose(project([instance], camera), look).rgba
 
 
-def lines_at_pixels(instance, camera, look=LOOK, cache=None):
+def lines_at_pixels(instance, camera, look=LOOK):
     gbuffer = project([instance], camera)
     field = surface_pixel_field(gbuffer, instance.field.degree, look.crease_angle)
-    return even_lines(gbuffer, field, pixel_look(look, camera, [instance]), cache=cache), gbuffer
+    return even_lines(gbuffer, field, pixel_look(look, camera, [instance])), gbuffer
 
 
 def distance_of_lines(rgba):
@@ -82,9 +85,7 @@ def distance_of_lines(rgba):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("supersampling", "distance"), mainly([(1, 4.0), (2, 16.0)], product([1, 2], [4.0, 7.0, 16.0]))
-)
+@pytest.mark.parametrize(("supersampling", "distance"), [(1, 4.0), (2, 16.0)])
 def test_the_distance_between_lines(distance, supersampling):
     """Distances in pixels are rounded to steps of 1 / 8 octave."""
     look = replace(LOOK, line_distance=distance, supersampling=supersampling)
@@ -147,11 +148,7 @@ def test_members_get_the_lines_along_them(degree, side):
 
 
 def test_undefined_pixels_have_the_mean_tone():
-    surface = plane(8, 8, 20.0)
-    vectors = axis_field(surface, 2, (1, 0, 0)).vectors.copy()
-    vectors[24:40] = 0
-    instance = MeshInstance(surface, np.eye(4), RosyField(2, vectors))
-    lines, gbuffer = lines_at_pixels(instance, camera_above(20.0))
+    lines, gbuffer = lines_at_pixels(partly_undefined(2), camera_above(20.0))
     undefined = gbuffer.representation == 0
     assert undefined.any() and not lines.period[:, undefined].any()
     width = np.full(len(gbuffer.pixel), 0.3, dtype=np.float32)
@@ -159,23 +156,15 @@ def test_undefined_pixels_have_the_mean_tone():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "effect", ["plain", *long("paper_grain", "overshoot"), "breaks", *long("wobble")]
-)
-def test_settings_that_do_not_apply_do_not_change_the_picture(effect):
+@pytest.mark.parametrize("breaks", [0.0, 0.5])
+def test_settings_that_do_not_apply_do_not_change_the_picture(breaks):
     """Pictures are up to date when only such settings change. Some faces have no direction."""
-    surface = plane(8, 8, 20.0)
-    vectors = axis_field(surface, 4, (1, 0.3, 0)).vectors.copy()
-    vectors[24:40] = 0
-    instance = MeshInstance(surface, np.eye(4), RosyField(4, vectors))
-    camera = camera_above(20.0, size=96)
-    look = replace(LOOK, crispness=0.8, layers=2)
-    if effect != "plain":
-        look = replace(look, **{effect: 6.0 if effect == "overshoot" else 0.5})
+    instance, camera = partly_undefined(4), camera_above(20.0, size=96)
+    look = replace(LOOK, crispness=0.8, layers=2, breaks=breaks)
     expected = picture(instance, camera, look)
     others = {"length": 7, "fade": "ends"}
     applied = {name for name in others if settings_of(Look)[name].applies(look)}
-    assert applied == (set(others) if effect in ("breaks", "wobble") else set())
+    assert applied == (set(others) if breaks else set())
     for name, setting in settings_of(Look).items():
         if setting.applies(look):
             continue
@@ -199,13 +188,6 @@ def _other_value(setting):
     if isinstance(setting, Numbers):
         return tuple(low + 0.3 * min(high - low, 8.0) for low, high in setting.parts.values())
     return "#3366aa"
-
-
-def test_cameras_share_the_phase():
-    instance, cache = wall_instance(), Cache()
-    lines_at_pixels(instance, camera_above(), cache=cache)
-    lines_at_pixels(instance, camera_above(eye=(1, 0, 5)), cache=cache)
-    assert len(cache) == 1
 
 
 # --- tone ------------------------------------------------------------------------------------------
@@ -242,14 +224,10 @@ def test_uneven_lines_have_the_mean_width(breaks, paper_grain):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("degree", "shading"),
-    mainly([(4, 0.1), (4, 0.95), (6, 0.5), (6, 0.8)], product([4, 6], [0.1, 0.3, 0.5, 0.8, 0.95])),
-)
+@pytest.mark.parametrize(("degree", "shading"), [(4, 0.1), (6, 0.5), (6, 0.95)])
 def test_flat_tones(shading, degree):
-    look = replace(
-        load_preset("engraving").look, light="scene", shading=shading, paper_color="#ffffff"
-    )
+    look = load_preset("engraving").look
+    look = replace(look, light="scene", shading=shading, paper_color="#ffffff")
     rgba = picture(wall_instance(degree, 0.4), camera_above(), look)
     ink = to_linear(from_hex(look.ink_color))[0]
     tone = (rgba[..., 0] - ink) / (1 - ink)
@@ -278,12 +256,5 @@ def test_lines_grow_between_lines_that_are_too_far_apart():
     assert lines.period[0, near].min() > 3.6 and lines.period[0, near].max() < 8.4
     coverage = lines.coverage(0, np.full(len(depth), 0.4, np.float32), look)
     assert coverage[near].mean() == pytest.approx(0.4, abs=0.05)
-    world = replace(look, unit_size=0.02)
+    world = replace(look, unit_size=0.2)
     assert lines_at_pixels(instance, camera, world)[0].growth is None
-
-
-def test_parts_have_the_lines_of_their_pixels():
-    lines = EvenLines(np.arange(6.0).reshape(2, 3), np.ones((2, 3)), np.arange(3.0))
-    part = HatchedLines(pixel_look(LOOK), even_lines=lines).part(slice(1, 3))
-    assert part.even_lines.streaks.tolist() == [[1, 2], [4, 5]]
-    assert part.even_lines.growth.tolist() == [1, 2]

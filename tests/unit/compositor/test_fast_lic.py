@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
-from conftest import long
 from harness.planar import planar_pixel_field
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from planar_fields import pair_angle, pixel_centers
+from planar_fields import KERNELS, pair_angle, pixel_centers
 
 from rosy_addon.compositor import fast_lic
 from rosy_addon.compositor.covering import build_covering
 from rosy_addon.compositor.filter_kernel import kernel_weights
-from rosy_addon.compositor.image_noise import image_noise
+from rosy_addon.compositor.lic import look_noise
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import pixel_look
 from rosy_addon.compositor.per_pixel_lic import brute_force
@@ -24,20 +22,9 @@ from rosy_addon.compositor.per_pixel_lic import brute_force
 SIZE = 256
 LOOK = Look(method="sheets", gain=1.0, density=0.5, high_pass=0.0)
 
-#: Settings that choose a kernel.
-KERNELS = {"box": {}, "taper": {"fade": "ends"}, "ramp": {"fade": "tail"}}
 
-
-def make_noise(field, look=LOOK, channels=1):
-    return image_noise(
-        field.pixel,
-        field.width,
-        look.line_width,
-        look.seed,
-        channels,
-        density=look.density,
-        high_pass=look.high_pass,
-    )
+def make_noise(field):
+    return look_noise(field, pixel_look(LOOK))
 
 
 def fast_images(field, look=LOOK, noise=None):
@@ -83,9 +70,8 @@ def test_averages_match_brute_force_if_noise_is_constant_across_streamlines(kern
 @settings(max_examples=200)
 def test_the_sheet_of_the_next_pixel_is_the_best_match(degree, first_angle, second_angle, guide):
     field = planar_pixel_field(np.array([[first_angle, second_angle]]), degree)
-    covering = build_covering(
-        field, pixel_look(replace(LOOK, guiding_angle=guide)), np.ones((2, 1), dtype=np.float32)
-    )
+    look = pixel_look(replace(LOOK, guiding_angle=guide))
+    covering = build_covering(field, look, np.ones((2, 1), dtype=np.float32))
     first, second = covering.cell_of_pixel
     directions = covering.state_table.reshape(2 * covering.line_count, -1, 4)[..., :2] / 32767.0
     match = directions[:, first] @ directions[:, second].T
@@ -96,16 +82,11 @@ def test_the_sheet_of_the_next_pixel_is_the_best_match(degree, first_angle, seco
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("kernel", "degree"),
-    [("box", 4), ("taper", 3), ("ramp", 3), *long(*product(("box", "taper"), (2, 3, 4, 6)))],
-)
+@pytest.mark.parametrize(("kernel", "degree"), [("box", 4), ("taper", 3), ("ramp", 3)])
 def test_pictures_of_singular_fields_resemble_brute_force(kernel, degree):
     field, look = singular_field(degree), replace(LOOK, **KERNELS[kernel])
-    actual, expected = (
-        fast_images(field, look).blend[:, 0],
-        brute_force_images(field, look).blend[:, 0],
-    )
+    draw = fast_images, brute_force_images
+    actual, expected = (images(field, look).blend[:, 0] for images in draw)
     # They are not equal, because each streak is shifted by up to half a pixel.
     assert np.corrcoef(actual, expected)[0, 1] > 0.85
     assert actual.std() == pytest.approx(expected.std(), rel=0.03)
@@ -135,21 +116,10 @@ def test_magnitude_determines_the_samples_of_a_pixel(kernel):
     )
     samples = fast_images(field, look).effective_samples.reshape(SIZE, SIZE)[:, 40:-40]
     reach = np.rint(30 * x / SIZE)[:, 40:-40]
-    np.testing.assert_allclose(
-        samples, kernel_weights(reach, reach, reach, kernel).effective_samples, rtol=1e-5
-    )
+    expected = kernel_weights(reach, reach, reach, kernel).effective_samples
+    np.testing.assert_allclose(samples, expected, rtol=1e-5)
     expected = brute_force_images(field, look).effective_samples.reshape(SIZE, SIZE)[:, 40:-40]
     np.testing.assert_allclose(samples, expected, rtol=1e-5)
-
-
-@pytest.mark.slow
-def test_three_channels_are_three_pictures():
-    field = singular_field(3)
-    noise = make_noise(field, channels=3)
-    together = fast_images(field, noise=noise).members
-    for channel in range(3):
-        alone = fast_images(field, noise=noise[:, channel : channel + 1]).members
-        np.testing.assert_allclose(together[..., channel], alone[..., 0], atol=2e-4)
 
 
 def test_long_streamlines_end_when_they_have_closed_a_loop():

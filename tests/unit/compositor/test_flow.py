@@ -5,17 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from harness.planar import compose_planar
+from planar_fields import KERNELS
 from scipy import ndimage
 
 from rosy_addon.compositor.drifting_averages import DriftingAverages, MovingKernel
 from rosy_addon.compositor.filter_kernel import sample_weights
-from rosy_addon.compositor.flow import (
-    NO_DRIFT,
-    Drift,
-    channel_shifts,
-    channel_weights,
-    drift_at,
-)
+from rosy_addon.compositor.flow import NO_DRIFT, Drift, channel_shifts, channel_weights, drift_at
 from rosy_addon.compositor.look import Look, has_flow
 from rosy_addon.compositor.look_units import pixel_look
 
@@ -23,8 +18,6 @@ SIZE = 320
 
 #: Pixels at the border that are not compared: streamlines end there.
 MARGIN = 64
-
-KERNELS = {"box": {}, "taper": {"fade": "ends"}, "ramp": {"fade": "tail"}}
 
 
 def member(angle, degree, look, drift=NO_DRIFT):

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import long, mainly
+from conftest import mainly
 from harness.planar import planar_pixel_field
 from hatched import (
     BALL,
@@ -20,6 +20,7 @@ from hatched import (
     render,
 )
 from scipy.ndimage import gaussian_filter
+from shapes import plane
 
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.even_lines import EvenLines
@@ -29,9 +30,7 @@ from rosy_addon.compositor.inks import LUMINANCE_WEIGHTS, inks_of
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import pixel_look
 from rosy_addon.core.color import from_hex, to_display, to_linear
-from rosy_addon.field.generate import axis_field
 from rosy_addon.field.rosy_field import RosyField
-from rosy_addon.field.surface import build_surface
 from rosy_addon.preset_files.store import load_preset, preset_keys
 from rosy_addon.projection.camera import look_at, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
@@ -88,7 +87,7 @@ def test_detail_shows_the_tone_of_small_features():
     """A ball of 20 pixels is drawn better, and a large one stays the same."""
     fine = replace(INK, detail=0.6)
     assert ramp_error(fine, zoom=0.12, sigma=2) < ramp_error(INK, zoom=0.12, sigma=2)
-    instance, camera = make_instance(BALL), make_camera(zoom=12)
+    instance, camera = make_instance(BALL), make_camera(zoom=12).resized(160, 160)
     np.testing.assert_array_equal(render(instance, camera, fine), render(instance, camera, INK))
 
 
@@ -120,9 +119,8 @@ def test_crowded_even_lines_are_drawn_last():
     look = Look(ink="even", line_distance=5.0, layers=2, layering=0.5)
     period = np.array([[5.0, 1.5, 1.5], [5.0, 5.0, 1.5]], dtype=np.float32)
     lines = EvenLines(np.zeros((2, 3), dtype=np.float32), period, None)
-    first, second = line_shares(
-        field, pixel_look(look), np.full((1, 3), 0.9, dtype=np.float32), lines
-    )
+    tone = np.full((1, 3), 0.9, dtype=np.float32)
+    first, second = line_shares(field, pixel_look(look), tone, lines)
     np.testing.assert_allclose(first + second, 1, atol=1e-6)
     assert first[0] > 0.95 and second[1] > 0.95
     assert abs(first[2] - first[0]) < 1e-6
@@ -140,10 +138,8 @@ def test_lines_run_along_the_field():
 
 def test_lone_pixels_of_undefined_faces_have_ink_or_not():
     """A face of one pixel has no neighbors to average, whatever its tone."""
-    camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 40, 40, scale=40.0)
-    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
-    speck = build_surface(square, np.arange(4), np.array([0, 4]))
-    instance = MeshInstance(speck, np.eye(4), RosyField(4, np.zeros((1, 3))))
+    camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 41, 41, scale=41.0)
+    instance = MeshInstance(plane(1, 1, 1.0), np.eye(4), RosyField(4, np.zeros((1, 3))))
     gbuffer = project([instance], camera)
     assert len(gbuffer.pixel) == 1
     with np.errstate(all="raise"):
@@ -193,11 +189,9 @@ def test_inks_swap_ranks_without_a_seam(degree):
     look = replace(INK, hue="families", guiding_angle=0.3)
     ink_indices = np.sort(np.array(line_ink_indices(field, pixel_look(look))), axis=0)
     assert np.abs(np.diff(ink_indices, axis=1)).max() < 0.03
-    assert (
-        np.abs(ink_indices - np.arange(field.line_count)[:, None]).max(axis=1) <= 0.5 + 1e-3
-    ).all()
-    assert line_ink_indices(field, pixel_look(replace(look, hue="one"))) is None
-    assert line_ink_indices(field, pixel_look(replace(look, hue="magnitude"))) is None
+    assert np.abs(ink_indices - np.arange(field.line_count)[:, None]).max() <= 0.5 + 1e-3
+    for hue in ("one", "magnitude"):
+        assert line_ink_indices(field, pixel_look(replace(look, hue=hue))) is None
 
 
 def test_families_keep_their_inks_at_any_guiding_angle():
@@ -206,29 +200,24 @@ def test_families_keep_their_inks_at_any_guiding_angle():
     field = replace(field, channels={("family", 2): np.exp(2j * np.linspace(-1, 1, 101))})
     for guide in (0.0, 0.6, -1.2):
         look = replace(INK, hue="families", guiding_angle=guide)
-        actual, families = (
-            line_ink_indices(field, pixel_look(look)),
-            line_families(field, pixel_look(look)),
-        )
-        np.testing.assert_array_equal(actual, families)
+        actual = line_ink_indices(field, pixel_look(look))
+        np.testing.assert_array_equal(actual, line_families(field, pixel_look(look)))
         assert {0, 1} == set(np.unique(actual))
 
 
 def test_clear_paper_shows_only_ink():
-    look = replace(INK, paper_color="#ffffff00", ink_color="#204060")
-    clear, full = (
-        render(make_instance(BALL), make_camera(), look),
-        render(make_instance(BALL), make_camera(), replace(look, paper_color="#ffffff")),
-    )
-    inked = clear[..., 3] > 0
-    np.testing.assert_allclose(
-        clear[inked][:, :3], np.tile(to_linear(from_hex("#204060")), (inked.sum(), 1)), rtol=1e-3
-    )
+    instance, camera = make_instance(BALL), make_camera().resized(160, 160)
+
+    def on_paper(alpha):
+        look = replace(INK, paper_color="#ffffff" + alpha, ink_color="#204060")
+        return render(instance, camera, look)
+
+    clear, full = on_paper("00"), on_paper("")
+    inked = clear[clear[..., 3] > 0][:, :3]
+    np.testing.assert_allclose(inked, to_linear(from_hex("#204060")) + 0 * inked, rtol=1e-3)
     whole = full[..., 3] == 1
     for alpha in ("40", "c0"):
-        part = render(
-            make_instance(BALL), make_camera(), replace(look, paper_color="#ffffff" + alpha)
-        )
+        part = on_paper(alpha)
         opacity = int(alpha, 16) / 255
         alpha_of_all = 1 - (1 - clear[..., 3]) * (1 - opacity)
         np.testing.assert_allclose(part[whole][:, 3], alpha_of_all[whole], atol=1e-5)
@@ -245,27 +234,23 @@ def test_clear_paper_shows_only_ink():
 HALF = 4.0
 
 
-def render_half_dark_wall(method, overshoot):
+def render_half_dark_wall(overshoot):
     """(H, W - 1) lightness of a wall of horizontal lines, the left half dark, the right white."""
-    points = HALF * np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]])
-    wall = build_surface(points, [0, 1, 2, 3], [0, 4], name="wall")
+    wall = make_wall(half=HALF)
+    points = wall.surface.vertices[wall.surface.corner_vertex]
     image = np.repeat([[0.3, 1.0]], 2, axis=0).repeat(256, axis=1).astype(np.float32)
-    uv = (wall.vertices[wall.corner_vertex][:, [0, 2]] / (2 * HALF) + 0.5).astype(np.float32)
-    field = axis_field(wall, 2, (1.0, 0, 0))
-    instance = MeshInstance(wall, np.eye(4), field, SurfaceTone(uv, image))
+    uv = (points[:, [0, 2]] / (2 * HALF) + 0.5).astype(np.float32)
+    instance = replace(wall, tone=SurfaceTone(uv, image))
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), SIZE, SIZE, scale=2 * HALF)
-    look = replace(
-        INK, tone="image", overshoot=overshoot, method=method, seed=5, ink_color="#000000"
-    )
+    look = replace(INK, tone="image", overshoot=overshoot, seed=5, ink_color="#000000")
     # The image of tones repeats, so the last column is dark and is left out.
     return render(instance, camera, look)[..., :-1, 0]
 
 
-@pytest.mark.parametrize("method", ["sheets", *long("members", "brute")])
-def test_lines_overshoot_the_border_of_a_tone(method):
+def test_lines_overshoot_the_border_of_a_tone():
     """The mean of a column is a ramp across the border, twice as wide as the overshoot."""
     overshoot = 24.0
-    light = render_half_dark_wall(method, overshoot)
+    light = render_half_dark_wall(overshoot)
     from_border = np.arange(SIZE - 1) + 0.5 - SIZE / 2
     expected = 0.3 + 0.7 * np.clip(0.5 + from_border / (2 * overshoot), 0, 1)
     error = np.abs(gaussian_filter(light.mean(axis=0), 3) - expected)
@@ -282,6 +267,6 @@ def test_lines_overshoot_the_border_of_a_tone(method):
 
 
 def test_without_overshoot_lines_end_with_the_tone():
-    light = render_half_dark_wall("sheets", 0.0)
+    light = render_half_dark_wall(0.0)
     assert (light[:, SIZE // 2 + 2 :] > 0.999).all()
     assert abs(light[:, 20 : SIZE // 2 - 2].mean() - 0.3) < 0.04

@@ -25,10 +25,7 @@ LOOK = Look(method="ibfv")
 
 
 def draw(
-    field: PixelField,
-    look: Look = LOOK,
-    noise: np.ndarray | None = None,
-    drift: Drift = NO_DRIFT,
+    field: PixelField, look: Look = LOOK, noise: np.ndarray | None = None, drift: Drift = NO_DRIFT
 ) -> LicImages:
     return lic(field, look, noise, drift)
 
@@ -124,9 +121,7 @@ def test_streaks_drift_by_the_flow(degree, backward):
         frames.append((image[32, ::-1] if backward else image[32]) - 0.5)
     decay = float(decay_of_samples(np.array(full_sample_count(FLOW.length, "box")), False))
     source = 200 - 101 if backward else 100
-    before, after = (
-        row[source + 3 + shift :][:40] for row, shift in zip(frames, (0, 3), strict=True)
-    )
+    before, after = frames[0][source + 3 :][:40], frames[1][source + 6 :][:40]
     np.testing.assert_allclose(after, before * decay**3, atol=0.003 * np.abs(before).max())
     assert np.abs(frames[0][: source - 2]).max() < 1e-6
     assert np.std(before / decay ** np.arange(40)) > 0.1 * np.abs(before).max()
@@ -137,10 +132,8 @@ def test_lines_across_the_guiding_angle_drift_both_ways():
     noise[32, 100] += (1.0, -0.5, 0.3)
     field = planar_pixel_field(np.zeros((64, 200)), 2)
     look = replace(FLOW, guiding_angle=np.pi / 2)
-    row = (
-        frame(draw(field, look, noise.reshape(-1, 3), Drift(0.3, CYCLE)).members[0], field)[32]
-        - 0.5
-    )
+    image = draw(field, look, noise.reshape(-1, 3), Drift(0.3, CYCLE)).members[0]
+    row = frame(image, field)[32] - 0.5
     np.testing.assert_allclose(row[101:180], row[99:20:-1], atol=1e-4)
     assert np.abs(row[110]) > 0.1 * np.abs(row).max()
 
@@ -165,15 +158,10 @@ def test_frames_in_sequence_are_those_drawn_alone(monkeypatch):
     carry = stages.streak_waves
     monkeypatch.setattr(stages, "streak_waves", lambda *args: calls.append(1) or carry(*args))
     cache = Cache()
-    sequence = [
-        compose(gbuffer, FLOW, cache=cache, drift=drift_of(number)).rgba for number in range(4)
-    ]
+    drifts = [drift_of(number) for number in range(4)]
+    sequence = [compose(gbuffer, FLOW, cache=cache, drift=drift).rgba for drift in drifts]
     assert len(calls) == 1
     for number in (3, 1):
-        np.testing.assert_array_equal(
-            compose(gbuffer, FLOW, drift=drift_of(number)).rgba, sequence[number]
-        )
+        alone = compose(gbuffer, FLOW, drift=drifts[number]).rgba
+        np.testing.assert_array_equal(alone, sequence[number])
     assert np.abs(sequence[3] - sequence[0]).mean() > 0.01
-
-
-# --- fields and looks of all kinds ----------------------------------------------------------------

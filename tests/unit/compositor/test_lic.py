@@ -6,10 +6,9 @@ from itertools import product
 
 import numpy as np
 import pytest
-from conftest import long, mainly
 from harness.planar import compose_planar, lic, planar_pixel_field
 from harness.streaks import correlation, orientation_spectrum, peaks, persistence
-from planar_fields import pair_angle, pixel_centers, swirl_angle
+from planar_fields import KERNELS, pair_angle, pixel_centers, swirl_angle
 
 from rosy_addon.compositor.contrast import blend_gain, expected_std
 from rosy_addon.compositor.image_noise import image_noise
@@ -21,9 +20,8 @@ pytestmark = pytest.mark.slow
 
 SIZE = 256
 METHODS = "sheets", "members", "brute", "ibfv"
-PLAIN = Look(
-    gain=1.0, density=0.5, high_pass=0.0
-)  # the paper's noise, and the contrast of one member
+#: The paper's noise, and the contrast of one member.
+PLAIN = Look(gain=1.0, density=0.5, high_pass=0.0)
 
 
 def plain(**settings):
@@ -39,10 +37,6 @@ def tone(angles, degree, look=PLAIN, **more):
 
 def make_noise(size, line_width=1.5, seed=0):
     return image_noise(np.arange(size * size, dtype=np.int32), size, line_width, seed, 1)[:, 0]
-
-
-#: Settings that choose a kernel.
-KERNELS = {"box": {}, "taper": {"fade": "ends"}, "ramp": {"fade": "tail"}}
 
 
 def kernel_window(length, kernel):
@@ -90,11 +84,11 @@ def crop_margin(image, margin=50):
 
 @pytest.mark.parametrize("kernel", KERNELS)
 def test_one_direction_agrees_with_a_runge_kutta_integrator(kernel):
-    x, y = pixel_centers(SIZE)
-    noise = make_noise(SIZE).reshape(SIZE, SIZE).astype(np.float64)
-    expected = runge_kutta_lic(swirl_angle, noise, SIZE, PLAIN.length, kernel)
+    size = 192
+    noise = make_noise(size).reshape(size, size).astype(np.float64)
+    expected = runge_kutta_lic(swirl_angle, noise, size, PLAIN.length, kernel)
     look = plain(method="members", **KERNELS[kernel])
-    actual = tone(swirl_angle(x, y, SIZE), 1, look, noise=noise)
+    actual = tone(swirl_angle(*pixel_centers(size), size), 1, look, noise=noise)
     assert correlation(crop_margin(actual), crop_margin(expected)) > 0.99
 
 
@@ -104,30 +98,16 @@ def test_one_direction_resembles_another_library(kernel):
     x, y = pixel_centers(SIZE)
     angles = swirl_angle(x, y, SIZE)
     noise = make_noise(SIZE).reshape(SIZE, SIZE).astype(np.float64)
-    length = PLAIN.length
-    expected = rlic.convolve(
-        noise, np.cos(angles), np.sin(angles), kernel=kernel_window(length, kernel), iterations=1
-    )
+    window = kernel_window(PLAIN.length, kernel)
+    expected = rlic.convolve(noise, np.cos(angles), np.sin(angles), kernel=window, iterations=1)
     actual = tone(angles, 1, plain(**KERNELS[kernel]), noise=noise)
     assert correlation(crop_margin(actual), crop_margin(expected)) > 0.7
 
 
-#: Settings of the noise, and of kernels.
-NOISES = ({}, {"fade": "tail"}, {"high_pass": 16.0, "density": 0.1}, {"fade": "ends"})
-
-
-@pytest.mark.parametrize(
-    ("method", "degree", "noise"),
-    [
-        ("members", 7, {}),
-        ("sheets", 7, {"fade": "tail"}),
-        *long(*product(["members", "sheets"], [2, 3, 4, 5, 6, 7], NOISES)),
-    ],
-)
-def test_corrected_contrast_is_that_of_one_member(method, degree, noise):
-    size = 512
-    angles = np.full((size, size), 0.2)
-    layers = compose_planar(angles, degree, plain(method=method, **noise)).layer
+@pytest.mark.parametrize(("method", "settings"), [("members", {}), ("sheets", {"fade": "tail"})])
+def test_corrected_contrast_is_that_of_one_member(method, settings):
+    size = 320
+    layers = compose_planar(np.full((size, size), 0.2), 7, plain(method=method, **settings)).layer
     inner = crop_margin(np.arange(size * size).reshape(size, size)).ravel()
     member_std = np.mean([member[inner].std() for member in layers.images.members])
     assert layers.tone[inner].std() == pytest.approx(member_std, rel=0.03)
@@ -142,23 +122,17 @@ def test_the_blend_gain_of_seven_lines_includes_correlations():
 
 @pytest.mark.parametrize(
     ("kernel", "line_width", "length", "high_pass"),
-    mainly(
-        [  # each pair of values of two settings occurs
-            ("box", 1.0, 20, 0.0),
-            ("taper", 1.0, 80, 8.0),
-            ("box", 1.0, 20, 24.0),
-            ("taper", 1.5, 80, 0.0),
-            ("ramp", 1.5, 20, 8.0),
-            ("ramp", 1.5, 80, 24.0),
-            ("taper", 3.0, 20, 0.0),
-            ("box", 3.0, 80, 8.0),
-            ("box", 3.0, 80, 24.0),
-        ],
-        product(["box", "taper", "ramp"], [1.0, 1.5, 3.0], [20, 80], [0.0, 8.0, 24.0]),
-    ),
+    [
+        ("box", 1.0, 20, 0.0),
+        ("taper", 1.0, 80, 8.0),
+        ("ramp", 1.5, 20, 24.0),
+        ("taper", 1.5, 80, 0.0),
+        ("ramp", 3.0, 20, 8.0),
+        ("box", 3.0, 80, 24.0),
+    ],
 )
 def test_the_standard_deviation_of_one_member_matches_theory(kernel, line_width, length, high_pass):
-    size = 512
+    size = 2 * length + 310
     look = plain(line_width=line_width, length=length, high_pass=high_pass, **KERNELS[kernel])
     stds = []
     for angle in (0.1, 0.9, 1.7, 2.6):
@@ -171,13 +145,11 @@ def test_the_standard_deviation_of_one_member_matches_theory(kernel, line_width,
     "settings",
     [
         {"method": "members", "weights": "cosine"},
-        {"method": "members", "weights": "binary"},
         {"method": "sheets"},
     ],
 )
-@pytest.mark.parametrize("degree", [4, *long(2, 3, 6)])
-def test_breaking_points_are_not_visible(degree, settings):
-    size, guides = 384, 4
+def test_breaking_points_are_not_visible(settings):
+    size, degree, guides = 384, 4, 4
     x, _ = pixel_centers(size)
     # The field rotates evenly from left to right, so breaking points form evenly spaced columns.
     angles = 3 * 2 * np.pi / degree * x / size
@@ -188,9 +160,8 @@ def test_breaking_points_are_not_visible(degree, settings):
         angle_offset = np.abs(np.angle(np.exp(1j * degree * (angles - guide))))
         inner = np.zeros_like(x, dtype=bool)
         inner[50:-50, 50:-50] = True
-        for group, chosen in enumerate(
-            (inner & (angle_offset > 2.7), inner & (angle_offset < 2.2))
-        ):
+        for group, chosen in enumerate((angle_offset > 2.7, angle_offset < 2.2)):
+            chosen = inner & chosen
             stds[group] += image[chosen].std()
             similarity[group] += persistence(image, np.exp(1j * angles), chosen, 4)[4]
     assert stds[0] == pytest.approx(stds[1], rel=0.05)
@@ -218,12 +189,9 @@ def test_streamlines_end_at_undefined_pixels(method):
     noise = make_noise(64).reshape(64, 64)
     other = noise.copy()
     other[:, 32:] = 1 - other[:, 32:]
-    assert np.array_equal(
-        tone(angles, 1, look, noise=noise)[:, :32], tone(angles, 1, look, noise=other)[:, :32]
-    )
-    assert not np.array_equal(
-        tone(changed, 1, look, noise=noise)[:, :32], tone(changed, 1, look, noise=other)[:, :32]
-    )
+    for ends, shown in ((True, angles), (False, changed)):
+        halves = [tone(shown, 1, look, noise=each)[:, :32] for each in (noise, other)]
+        assert np.array_equal(*halves) == ends
 
 
 @pytest.mark.parametrize(
@@ -231,7 +199,7 @@ def test_streamlines_end_at_undefined_pixels(method):
 )
 def test_the_spectrum_peaks_at_the_members(method, degree):
     """To 1 degree, with no other direction."""
-    image = tone(np.full((512, 512), 0.3), degree, plain(method=method))
+    image = tone(np.full((320, 320), 0.3), degree, plain(method=method))
     spectrum = orientation_spectrum(image)
     members = np.degrees(0.3 + 2 * np.pi * np.arange(degree) / degree) % 180
     expected = sorted(set(np.round(members, 6)))

@@ -11,7 +11,7 @@ from shapes import torus
 from rosy_addon.compositor.flow import Drift
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import pixel_look
-from rosy_addon.core.settings import pixel_lengths, settings_of
+from rosy_addon.core.settings import pixel_lengths
 from rosy_addon.field.generate import generate
 from rosy_addon.projection.camera import look_at, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
@@ -51,11 +51,3 @@ def test_keys_of_lic_images_know_the_magnitudes_that_set_lengths():
     colored = replace(look, magnitude_length=False, hue="magnitude", color_range=(0.0, 1.0))
     assert pixel_look(colored).lic_key() == pixel_look(Look()).lic_key()
     assert pixel_look(Look(hue="noise")).lic_key() != pixel_look(Look()).lic_key()
-
-
-def test_other_settings_are_those_of_the_look():
-    drawn = pixel_look(Look(crispness=0.2, layers=5))
-    assert (drawn.crispness, drawn.layers) == (0.2, 5)
-    assert drawn.settings().keys() == settings_of(Look).keys()
-    with pytest.raises(AttributeError, match="brightness"):
-        _ = drawn.brightness

@@ -8,8 +8,20 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from harness.outline_marks import covered_share, mark_lengths, to_image, visible_silhouettes
+from hatched import make_wall
 from scipy.ndimage import maximum_filter
-from shapes import cube, cylinder, from_triangles, icosphere, torus
+from shapes import (
+    cube,
+    cylinder,
+    from_triangles,
+    icosphere,
+    joined,
+    moved,
+    plane,
+    rebuilt,
+    sharp_cube,
+    torus,
+)
 
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import pixel_look
@@ -21,7 +33,7 @@ from rosy_addon.compositor.outline import (
 )
 from rosy_addon.field.frames import normalize
 from rosy_addon.field.generate import axis_field
-from rosy_addon.field.surface import Surface, build_surface
+from rosy_addon.field.surface import Surface
 from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.outline_mesh import outline_mesh
@@ -34,9 +46,8 @@ WIDTH, SIZE = 1.3, 320
 MIN_LENGTH = 6
 
 
-def instance_of(surface: Surface, matrix=None) -> MeshInstance:
-    matrix = np.eye(4) if matrix is None else matrix
-    return MeshInstance(surface, matrix, axis_field(surface, 4, (0.3, 0.2, 1.0)))
+def instance_of(surface: Surface) -> MeshInstance:
+    return MeshInstance(surface, np.eye(4), axis_field(surface, 4, (0.3, 0.2, 1.0)))
 
 
 def outline_of(instance, camera, **settings):
@@ -55,25 +66,15 @@ def noisy(name: str, flat: bool) -> Surface:
     normal = np.zeros_like(surface.vertices)
     np.add.at(normal, surface.corner_vertex, surface.corner_normal)
     noise = np.random.default_rng(5).standard_normal((len(normal), 1))
-    return build_surface(
-        surface.vertices + 0.25 * edge * noise * normalize(normal),
-        surface.corner_vertex,
-        surface.face_start,
-        flat_faces=np.full(surface.face_count, flat),
-    )
+    points = surface.vertices + 0.25 * edge * noise * normalize(normal)
+    return rebuilt(surface, points, flat_faces=np.full(surface.face_count, flat))
 
 
 def combined(*parts: tuple[np.ndarray, np.ndarray]) -> Surface:
     """Boxes as one mesh, with sharp edges: each is given by its center and its half sides."""
-    box = cube()
-    points, corners, count = [], [], 0
-    for center, half_sides in parts:
-        points.append((box.vertices - 0.5) * 2 * np.asarray(half_sides) + center)
-        corners.append(box.corner_vertex + count)
-        count += len(box.vertices)
-    corners = np.concatenate(corners)
-    start = np.arange(0, len(corners) + 1, 4)
-    return build_surface(np.concatenate(points), corners, start, sharp_angle=0.5)
+    corners = 2 * cube().vertices - 1
+    boxes = (rebuilt(cube(), corners * half_sides + center) for center, half_sides in parts)
+    return joined(*boxes, sharp_angle=0.5)
 
 
 # --- closed forms --------------------------------------------------------------------------------
@@ -99,13 +100,7 @@ def test_the_width_of_outlines(width):
 
 def test_outlines_are_drawn_on_the_nearer_surface():
     """Two walls, one in front of the other: the far one has no line where it is occluded."""
-    points = np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], dtype=float)
-    walls = []
-    for index, (left, distance) in enumerate(((0.0, 0.0), (0.7, 1.0))):
-        wall = build_surface(points, [0, 1, 2, 3], [0, 4], name=f"wall {index}")
-        matrix = np.eye(4)
-        matrix[:3, 3] = left, distance, 0.3 * index
-        walls.append(MeshInstance(wall, matrix, axis_field(wall, 4, (1.0, 0, 0.2))))
+    walls = [make_wall(half=1.0), make_wall(half=1.0, matrix=moved(0.7, 1.0, 0.3))]
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), 240, 240, scale=4.0)
     gbuffer = project(walls, camera)
     covered = outline_coverage(gbuffer, pixel_look(Look(outline=3.0)))
@@ -134,21 +129,18 @@ def test_lengths_of_marks_are_in_pixels_of_the_finished_picture(supersampling):
     instance = instance_of(noisy("torus", False))
     side = 200 * supersampling
     camera = orbit_camera(instance.face_points(), 30.0, 35.0, side, side)
-    coverage = outline_of(
-        instance, camera, outline=WIDTH * supersampling, supersampling=supersampling
-    )
+    samples = {"outline": WIDTH * supersampling, "supersampling": supersampling}
+    coverage = outline_of(instance, camera, **samples)
     blocks = coverage.reshape(200, supersampling, 200, supersampling).max(axis=(1, 3))
     assert (mark_lengths(blocks) >= MIN_LENGTH).all()
 
 
 def hills() -> Surface:
     """A landscape with slopes that many views see edge-on, behind other slopes."""
-    x, y = np.meshgrid(np.linspace(-3, 3, 160), np.linspace(-3, 3, 160))
+    flat = plane(159, 159, 6.0)
+    x, y, _ = flat.vertices.T
     z = 0.35 * np.sin(2.2 * x) * np.cos(2 * y) + 0.15 * np.sin(3 * y + x)
-    corner = np.arange(x.size).reshape(x.shape)
-    quads = np.stack([corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]], axis=-1)
-    start = np.arange(0, quads.size + 1, 4)
-    return build_surface(np.stack([x, y, z], axis=-1).reshape(-1, 3), quads.ravel(), start)
+    return rebuilt(flat, np.stack([x, y, z], axis=1))
 
 
 @pytest.mark.slow
@@ -197,14 +189,11 @@ def line_is_covered(coverage, camera, start, end, least=0.6) -> bool:
 @pytest.mark.parametrize("sharp", [False, True])
 def test_all_edges_of_a_cube_are_drawn(sharp, side):
     """Without gaps, at any size, also if the normals are interpolated across its edges."""
-    box = cube()
-    options = {"sharp_angle": 1.0} if sharp else {}
-    box = build_surface(box.vertices, box.corner_vertex, box.face_start, **options)
+    box = sharp_cube() if sharp else cube()
     instance = instance_of(box)
     camera = orbit_camera(instance.face_points(), 35.0, 25.0, side, side)
     coverage = outline_of(instance, camera)
-    eye = -camera.view[:3, :3].T @ camera.view[:3, 3]
-    corner = box.vertices[np.argmin(np.linalg.norm(box.vertices - eye, axis=1))]
+    corner = box.vertices[np.argmin(np.linalg.norm(box.vertices - camera.eye, axis=1))]
     for axis in range(3):
         end = corner.copy()
         end[axis] = 1 - end[axis]
@@ -214,18 +203,10 @@ def test_all_edges_of_a_cube_are_drawn(sharp, side):
 @pytest.mark.slow
 def test_creases_of_dense_meshes_have_no_gaps():
     """A ridge whose triangles are smaller than a pixel."""
-    axis = np.linspace(-1, 1, 301)
-    x, y = np.meshgrid(axis, axis, indexing="ij")
-    corner = np.arange(300 * 301).reshape(300, 301)[:, :-1].ravel()
-    above = corner + 301
-    triangles = np.concatenate(
-        [
-            np.stack([corner, above, above + 1], axis=1),
-            np.stack([corner, above + 1, corner + 1], axis=1),
-        ]
-    )
-    points = np.stack([x, y, -0.6 * np.abs(y - 1e-3)], axis=-1).reshape(-1, 3)
-    instance = instance_of(from_triangles(points, triangles))
+    flat = plane(300, 300)
+    x, y, _ = flat.vertices.T
+    points = np.stack([x, y, -0.6 * np.abs(y - 1e-3)], axis=1)
+    instance = instance_of(from_triangles(points, flat.triangle_vertex))
     camera = orbit_camera(instance.face_points(), 20.0, 50.0, 200, 200)
     coverage = outline_of(instance, camera)
     top = points[np.argmax(points[:301, 2])]
@@ -244,8 +225,7 @@ def test_parts_that_intersect_have_a_line_between_them():
     boxes = combined(((0, 0, 0), (1, 1, 0.1)), ((0, 0, 0.3), (0.4, 0.4, 0.4)))
     camera = orbit_camera(boxes.vertices, 30.0, 40.0, SIZE, SIZE)
     coverage = outline_of(instance_of(boxes), camera)
-    eye = -camera.view[:3, :3].T @ camera.view[:3, 3]
-    near = 0.4 * np.sign(eye[:2])
+    near = 0.4 * np.sign(camera.eye[:2])
     for end in ((-near[0], near[1]), (near[0], -near[1])):
         assert line_is_covered(coverage, camera, (*near, 0.1), (*end, 0.1))
     crossing = outline_of(instance_of(boxes), camera, crease_angle=np.pi)
@@ -276,11 +256,7 @@ def test_marks_grow_without_a_jump(block_side):
 
 def test_deformed_meshes_keep_their_creases():
     """Creases are those of the rest shape, so that none appears or vanishes in an animation."""
-    box = cube()
-    box = build_surface(box.vertices, box.corner_vertex, box.face_start, sharp_angle=1.0)
-    sheared = box.vertices.copy()
-    sheared[:, 0] += 2.0 * box.vertices[:, 2]
-    deformed = build_surface(
-        sheared, box.corner_vertex, box.face_start, sharp_angle=0.1, rest_vertices=box.vertices
-    )
+    points = cube().vertices
+    sheared = points + 2.0 * points[:, [2]] * (1, 0, 0)
+    deformed = rebuilt(cube(), sheared, sharp_angle=0.1, rest_vertices=points)
     assert len(outline_mesh(deformed, np.eye(3), 1.4).crease_ends) == 12

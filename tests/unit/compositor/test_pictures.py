@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import long
+from field_helpers import with_random_members
 from harness.planar import degree_layers
 from harness.streaks import correlation, orientation_spectrum, peaks
-from shapes import icosphere, plane, torus
+from shapes import icosphere, moved, plane, torus
 
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
@@ -39,18 +39,9 @@ def project_surface(
     return project([MeshInstance(surface, np.eye(4), field)], camera, display)
 
 
-def with_other_members(surface, field, seed):
-    """The same field with another member stored on each face."""
-    member_index = np.random.default_rng(seed).integers(0, field.degree, surface.face_count)
-    angle = (2 * np.pi / field.degree * member_index)[:, None]
-    perpendicular = np.cross(surface.face_normal, field.vectors)
-    return RosyField(field.degree, np.cos(angle) * field.vectors + np.sin(angle) * perpendicular)
-
-
-@pytest.mark.parametrize("degree", [4, *long(2, 3, 5, 6)])
-def test_decomposition_agrees_with_brute_force_on_a_sphere(degree):
+def test_decomposition_agrees_with_brute_force_on_a_sphere():
     sphere = icosphere(5)
-    gbuffer = project_surface(sphere, axis_field(sphere, degree, (0.3, 0.9, 0.1)), 384)
+    gbuffer = project_surface(sphere, axis_field(sphere, 4, (0.3, 0.9, 0.1)), 384)
     members, brute = (
         degree_layers(gbuffer, plain(method=method))[0].tone for method in ("members", "brute")
     )
@@ -62,22 +53,18 @@ def test_decomposition_agrees_with_brute_force_on_a_sphere(degree):
 def test_pictures_do_not_depend_on_the_stored_member(degree, method):
     surface, look = torus(48, 24), plain(method=method)
     field = axis_field(surface, degree, (0.2, 0.3, 1.0))
-    (first,) = degree_layers(project_surface(surface, field, 96, (2, 1, 4), 3.2), look)
-    (second,) = degree_layers(
-        project_surface(surface, with_other_members(surface, field, 1), 96, (2, 1, 4), 3.2), look
-    )
-    difference = np.abs(first.tone - second.tone)
-    assert np.mean(difference > 1e-5) < 0.005
+    fields = field, with_random_members(surface, field, 1)
+    gbuffers = (project_surface(surface, each, 96, (2, 1, 4), 3.2) for each in fields)
+    (first,), (second,) = (degree_layers(gbuffer, look) for gbuffer in gbuffers)
+    assert np.mean(np.abs(first.tone - second.tone) > 1e-5) < 0.005
 
 
 def test_two_degrees_in_one_picture():
     left, right = torus(32, 16, 0.5, 0.2), icosphere(3, 0.5)
-    moved = np.eye(4)
-    moved[0, 3] = 1.2
     camera = orthographic_camera(look_at((0.6, 0, 4), (0.6, 0, 0), (0, 1, 0)), 200, 150, scale=3.0)
     instances = [
         MeshInstance(left, np.eye(4), axis_field(left, 4)),
-        MeshInstance(right, moved, axis_field(right, 3, (0, 1, 0))),
+        MeshInstance(right, moved(x=1.2), axis_field(right, 3, (0, 1, 0))),
     ]
     gbuffer = project(instances, camera)
     picture, layers = compose(gbuffer, PLAIN), degree_layers(gbuffer, PLAIN)
@@ -109,12 +96,11 @@ def test_breaking_points_are_visible_on_a_tilted_surface_without_the_view_plane(
     eye = (0, -4 * np.sin(tilt), 4 * np.cos(tilt))
     gbuffer = project_surface(surface, field, 300, eye, 1.5, (0, 0, 1))
     brute = degree_layers(gbuffer, plain(method="brute"))[0].tone
-    error = [
-        1
-        - correlation(degree_layers(gbuffer, plain(method="members", view_plane=on))[0].tone, brute)
+    with_it, without = (
+        degree_layers(gbuffer, plain(method="members", view_plane=on))[0].tone
         for on in (True, False)
-    ]
-    assert error[0] < error[1]
+    )
+    assert correlation(with_it, brute) > correlation(without, brute)
 
 
 def test_headlight_is_lamberts_law():
@@ -162,7 +148,7 @@ def test_magnitude_is_colored(ends):
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
     "ends",
-    [(0.0, 0.0), *((0.0, top) for top in (1e-30, 5e-324, 1e9, 1e30)), (7.0, 7.0), (1e30, -1e30)],
+    [(0.0, 0.0), (0.0, 5e-324), (0.0, 1e30), (7.0, 7.0), (1e30, -1e30)],
 )
 def test_magnitudes_of_any_scale(ends):
     surface = plane(4, 4)

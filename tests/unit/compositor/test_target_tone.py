@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import mainly
-from shapes import icosphere, plane
+from shapes import icosphere, placed, plane
 
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import Light, diffuse
@@ -25,12 +24,6 @@ pytestmark = pytest.mark.slow
 
 SIZE = 384
 BALL = icosphere(5)
-
-
-def moved_and_scaled(x, y, z, scale=1.0):
-    matrix = np.diag([scale, scale, scale, 1.0])
-    matrix[:3, 3] = x, y, z
-    return matrix
 
 
 def make_instance(surface, matrix=None, tone=None):
@@ -60,10 +53,9 @@ def test_attributes_are_interpolated_over_triangles():
     """An attribute that is linear in space is linear at the pixels, under perspective too."""
     surface = plane(3, 3, 4.0)
     linear = 0.3 * surface.vertices[:, 0] - 0.2 * surface.vertices[:, 1] + 0.5
-    matrix = moved_and_scaled(0.3, 0.2, -0.4, 1.5)
-    gbuffer = project(
-        [make_instance(surface, matrix, tone_from_vertices(surface, linear))], make_camera(fov=0.9)
-    )
+    matrix = placed(1.5, (0.3, 0.2, -0.4))
+    instance = make_instance(surface, matrix, tone_from_vertices(surface, linear))
+    gbuffer = project([instance], make_camera(fov=0.9))
     x, y, _ = ((world_positions(gbuffer) - matrix[:3, 3]) / 1.5).T
     np.testing.assert_allclose(surface_tones(gbuffer), 0.3 * x - 0.2 * y + 0.5, atol=2e-5)
 
@@ -71,31 +63,26 @@ def test_attributes_are_interpolated_over_triangles():
 def test_corner_values_may_differ_between_faces():
     surface = plane(2, 1, 2.0)
     values = np.repeat([0.2, 0.9], 4)[:, None].astype(np.float32)
-    gbuffer = project(
-        [make_instance(surface, tone=SurfaceTone(values))], make_camera(position=(0, -0.5, 5))
-    )
+    instance = make_instance(surface, tone=SurfaceTone(values))
+    gbuffer = project([instance], make_camera(position=(0, -0.5, 5)))
     tones = surface_tones(gbuffer)
     np.testing.assert_allclose(tones, np.where(gbuffer.face == 0, 0.2, 0.9), atol=1e-6)
 
 
 def test_instances_without_a_tone_use_the_light():
-    other = make_instance(BALL, moved_and_scaled(1.2, 0, 0, 0.5))
-    painted = make_instance(
-        BALL,
-        moved_and_scaled(-1.2, 0, 0, 0.5),
-        tone_from_vertices(BALL, np.full(len(BALL.vertices), 0.7)),
-    )
+    other = make_instance(BALL, placed(0.5, (1.2, 0, 0)))
+    tone = tone_from_vertices(BALL, np.full(len(BALL.vertices), 0.7))
+    painted = make_instance(BALL, placed(0.5, (-1.2, 0, 0)), tone)
     gbuffer = project([painted, other], make_camera(fov=1.2))
     look = Look(tone="attribute", light="lamp")
     tone = target_tone(gbuffer, look)
     light = diffuse(gbuffer, look)
-    np.testing.assert_allclose(tone[gbuffer.instance_id == 0], 0.7, atol=1e-6)
-    np.testing.assert_array_equal(tone[gbuffer.instance_id == 1], light[gbuffer.instance_id == 1])
+    is_painted = gbuffer.instance_id == 0
+    np.testing.assert_allclose(tone[is_painted], 0.7, atol=1e-6)
+    np.testing.assert_array_equal(tone[~is_painted], light[~is_painted])
     lit = target_tone(gbuffer, replace(look, tone_lit=True))
-    np.testing.assert_allclose(
-        lit[gbuffer.instance_id == 0], 0.7 * light[gbuffer.instance_id == 0], rtol=1e-5
-    )
-    np.testing.assert_array_equal(lit[gbuffer.instance_id == 1], light[gbuffer.instance_id == 1])
+    np.testing.assert_allclose(lit[is_painted], 0.7 * light[is_painted], rtol=1e-5)
+    np.testing.assert_array_equal(lit[~is_painted], light[~is_painted])
 
 
 @pytest.mark.parametrize("tone", ["attribute", "image", "picture"])
@@ -141,12 +128,14 @@ def camera_above(size, scale=2.0):
     return orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), size, size, scale=scale)
 
 
-def test_images_follow_the_uv_map():
+@pytest.mark.parametrize("repeat", [1, 2])
+def test_images_follow_the_uv_map_and_repeat(repeat):
     """An image with pixels of the size of the picture's is reproduced, rows from the bottom."""
-    image = np.random.default_rng(1).random((32, 32))
-    gbuffer = project([mapped_plane(image)], camera_above(32))
-    assert len(gbuffer.pixel) == 32 * 32
-    np.testing.assert_allclose(surface_tones(gbuffer).reshape(32, 32), image, atol=2e-4)
+    image = np.random.default_rng(1).random((16, 16))
+    size = 16 * repeat
+    gbuffer = project([mapped_plane(image, repeat)], camera_above(size))
+    tones = surface_tones(gbuffer).reshape(size, size)
+    np.testing.assert_allclose(tones, np.tile(image, (repeat, repeat)), atol=2e-4)
 
 
 def test_images_are_interpolated():
@@ -165,14 +154,6 @@ def test_images_finer_than_the_picture_are_averaged():
     odd = np.random.default_rng(2).random((255, 131))
     tones = surface_tones(project([mapped_plane(odd, repeat=3.0)], camera_above(8)))
     np.testing.assert_allclose(tones, odd.mean(), atol=0.05)
-
-
-def test_images_repeat():
-    image = np.random.default_rng(3).random((16, 16))
-    tones = surface_tones(project([mapped_plane(image, repeat=2.0)], camera_above(32))).reshape(
-        32, 32
-    )
-    np.testing.assert_allclose(tones, np.tile(image, (2, 2)), atol=2e-4)
 
 
 # --- pictures ---------------------------------------------------------------------------------------
@@ -209,59 +190,54 @@ def test_reference_renders_are_reprojected():
 
 
 def test_reference_renders_of_another_aspect_ratio_are_refused(error_of):
-    message = error_of(
-        ReferenceRender, np.zeros((90, 160), dtype=np.float32), make_camera(64), "shot.png"
-    )
+    luminance = np.zeros((90, 160), dtype=np.float32)
+    message = error_of(ReferenceRender, luminance, make_camera(64), "shot.png")
     assert "shot.png" in message and "160 x 90" in message and "64 x 64" in message
 
 
 # --- shadows ------------------------------------------------------------------------------------------
 
 
-def point_light(camera, position, strength=1.0):
-    """A point light at a position in world space, in the space of a camera."""
-    vector = camera.view[:3, :3] @ np.asarray(position, dtype=float) + camera.view[:3, 3]
-    return Light("point", vector, np.ones(3), strength)
+def light_at(camera, kind, where):
+    """A point light at a position in world space, or a sun in a direction, in the space of a camera."""
+    if kind == "sun":
+        vector = camera.view[:3, :3] @ np.divide(where, np.linalg.norm(where))
+    else:
+        vector = camera.view[:3, :3] @ where + camera.view[:3, 3]
+    return Light(kind, vector, np.ones(3), 1.0)
 
 
-def sun_light(camera, direction, strength=1.0):
-    direction = np.asarray(direction, dtype=float)
-    direction = camera.view[:3, :3] @ (direction / np.linalg.norm(direction))
-    return Light("sun", direction, np.ones(3), strength)
+def visibility_of(gbuffer, light):
+    cameras = light_cameras(gbuffer.instances, gbuffer.camera, light.kind, light.vector)
+    return shadow_visibility(gbuffer, cameras)
 
 
 def clearance_from_ball(points, toward, center, radius, max_distance=np.inf):
     """(n,) distances of rays from a ball, negative if they hit it; `toward` are unit directions."""
     to_center = center - points
     along = np.einsum("pi,pi->p", to_center, toward)
-    clearance = (
-        np.sqrt(np.maximum(np.einsum("pi,pi->p", to_center, to_center) - along**2, 0)) - radius
-    )
+    squared = (to_center**2).sum(axis=1) - along**2
+    clearance = np.sqrt(np.maximum(squared, 0)) - radius
     return np.where((along > 0) & (along < max_distance), clearance, np.inf)
 
 
 LIGHTS = {
-    "sun": ("sun", (-0.6, -0.4, 0.8)),
     "low sun": ("sun", (-0.9, 0.1, 0.3)),
     "lamp outside": ("point", (-5.0, -4.0, 6.0)),
     "lamp among them": ("point", (-1.6, -1.0, 1.4)),
 }
 
 
-@pytest.mark.parametrize("name", mainly(["low sun", "lamp among them"], LIGHTS))
+@pytest.mark.parametrize("name", ["low sun", "lamp among them"])
 def test_the_shadow_of_a_ball_on_a_plane(name):
     """The shadow is known in closed form. It may differ only close to its border."""
     kind, where = LIGHTS[name]
-    ground, ball = (
-        make_instance(plane(8, 8, 8.0)),
-        make_instance(icosphere(6), moved_and_scaled(0, 0, 1.0, 0.8)),
-    )
+    ground = make_instance(plane(8, 8, 8.0))
+    ball = make_instance(icosphere(5), placed(0.8, (0, 0, 1.0)))
     camera = make_camera(256, position=(3, -6, 4), target=(0, 0, 0.6), fov=0.7)
-    light = (sun_light if kind == "sun" else point_light)(camera, where)
+    light = light_at(camera, kind, where)
     gbuffer = project([ground, ball], camera)
-    visibility = shadow_visibility(
-        gbuffer, light_cameras(gbuffer.instances, camera, kind, light.vector)
-    )
+    visibility = visibility_of(gbuffer, light)
     on_ground = gbuffer.instance_id == 0
     point = world_positions(gbuffer)[on_ground].astype(float)
     if kind == "sun":
@@ -279,35 +255,28 @@ def test_the_shadow_of_a_ball_on_a_plane(name):
     assert ((visibility > 0.1) & (visibility < 0.9)).any()
 
 
-@pytest.mark.parametrize("name", mainly(["low sun", "lamp outside"], LIGHTS))
+@pytest.mark.parametrize("name", ["low sun", "lamp outside"])
 def test_surfaces_that_face_the_light_do_not_shadow_themselves(name):
     kind, where = LIGHTS[name]
     for surface in (icosphere(3), BALL, plane(3, 3, 2.0)):
         camera = make_camera(256, position=(1.0, -4, 1.8))
         gbuffer = project([make_instance(surface)], camera)
-        light = (sun_light if kind == "sun" else point_light)(camera, where)
-        visibility = shadow_visibility(
-            gbuffer, light_cameras(gbuffer.instances, camera, kind, light.vector)
-        )
+        light = light_at(camera, kind, where)
+        visibility = visibility_of(gbuffer, light)
         to_light = light.vector - gbuffer.position if kind == "point" else light.vector
         to_light = to_light / np.linalg.norm(to_light, axis=-1, keepdims=True)
         # Normals of triangles, because smooth normals may face the light where triangles do not.
-        facing = np.einsum(
-            "pi,pi->p", gbuffer.geometric_normal, np.broadcast_to(to_light, gbuffer.normal.shape)
-        )
+        facing = (gbuffer.geometric_normal * to_light).sum(axis=1)
         assert (visibility[facing > 0.05] == 1).mean() > 0.999
         if surface is BALL:
             assert visibility[facing < -0.3].max() < 1e-6
 
 
 def test_instances_without_a_field_cast_shadows():
-    ground, ball = (
-        make_instance(plane(2, 2, 4.0)),
-        MeshInstance(BALL, moved_and_scaled(0, 0, 2.0, 0.5)),
-    )
+    ground, ball = make_instance(plane(2, 2, 4.0)), MeshInstance(BALL, placed(0.5, (0, 0, 2.0)))
     camera = perspective_camera(look_at((0, -5, 5), (0, 0, 0)), 128, 128, fov=0.9)
     look = Look(light="scene", shading=1.0)
-    sun = sun_light(camera, (0, 0.01, 1))
+    sun = light_at(camera, "sun", (0, 0.01, 1))
     bare, both = project([ground], camera), project([ground, ball], camera)
     shadows = replace(look, shadows=True)
     assert diffuse(bare, shadows, [sun]).min() > 0.9
@@ -318,6 +287,5 @@ def test_instances_without_a_field_cast_shadows():
 
 def test_the_headlight_casts_no_shadows():
     gbuffer = project([make_instance(BALL)], make_camera(64))
-    np.testing.assert_array_equal(
-        diffuse(gbuffer, Look(shadows=True)), diffuse(gbuffer, Look(shadows=False))
-    )
+    tones = (diffuse(gbuffer, Look(shadows=shadows)) for shadows in (True, False))
+    np.testing.assert_array_equal(*tones)

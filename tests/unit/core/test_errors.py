@@ -2,7 +2,7 @@
 
 import pytest
 
-from rosy_addon.core.errors import RosyError, as_sentence, counted
+from rosy_addon.core.errors import as_sentence, counted
 
 
 @pytest.mark.parametrize(
@@ -10,17 +10,13 @@ from rosy_addon.core.errors import RosyError, as_sentence, counted
     [
         ("no visible object has a RoSy field", "No visible object has a RoSy field"),
         ("object 'a/b': the mesh has no faces", "Object 'a/b': the mesh has no faces"),
-        ("frame 3: the look was changed", "Frame 3: the look was changed"),
         ("an .mp4 needs ffmpeg", "An .mp4 needs ffmpeg"),
         ("'plaid' is not one of your presets", "'plaid' is not one of your presets"),
         ("/tmp/ink.json: is damaged", "/tmp/ink.json: is damaged"),
-        ("my fields/ink.json: is damaged", "my fields/ink.json: is damaged"),
         ("fields\\ink.json: is damaged", "fields\\ink.json: is damaged"),
         ("ink.json: is damaged", "ink.json: is damaged"),
         ("min_length must be less than max_length", "min_length must be less than max_length"),
         ("dir0 is missing", "dir0 is missing"),
-        ("3 frames", "3 frames"),
-        ("Already a sentence", "Already a sentence"),
         ("", ""),
     ],
 )
@@ -28,13 +24,6 @@ def test_only_words_get_a_capital(message, shown):
     assert as_sentence(message) == shown
 
 
-def test_errors_stay_as_they_are_for_the_command_line():
-    assert str(RosyError("no field")) == "no field"
-
-
 def test_one_is_singular():
-    assert [counted(count, "picture") for count in (0, 1, 2)] == [
-        "0 pictures",
-        "1 picture",
-        "2 pictures",
-    ]
+    texts = [counted(count, "picture") for count in (0, 1, 2)]
+    assert texts == ["0 pictures", "1 picture", "2 pictures"]

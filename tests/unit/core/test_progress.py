@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from listeners import CancelledError, cancel_at, reported
-from shapes import plane, torus
+from shapes import torus
 from uv_maps import torus_uv
 
 from rosy_addon.compositor.look import Look
@@ -25,7 +25,6 @@ from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.ambient_occlusion import ambient_occlusion
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.projection.project import project
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 from rosy_addon.surface_texture.draw import draw_texture
@@ -33,7 +32,6 @@ from rosy_addon.surface_texture.draw import draw_texture
 SURFACE = torus(48, 24)
 FIELD = generate(SURFACE, "smoothest", 4)
 INSTANCE = MeshInstance(SURFACE, np.eye(4), FIELD)
-SQUARE = plane(2, 20)
 SUN = Light("sun", np.array([0.3, 0.5, 0.8]), np.ones(3), 1.0)
 CAMERA = orbit_camera(INSTANCE.face_points(), 20, 40, 200, 200)
 
@@ -119,26 +117,20 @@ CONVERSION = Conversion(2, rotation=0.1, smoothing_length=0.05, pair_distance=0.
 LONG = {
     "smoothest": (generate, (SURFACE, "smoothest", 4), 0.9),
     "form": (generate, (SURFACE, "form", 4), 0.8),
-    "curvature": (generate, (SURFACE, "curvature", 4), 0.9),
-    "features": (generate, (SQUARE, "features", 4), 0.7),
     "prescribed": (prescribed_field, (SURFACE, 4, np.array([5, 200]), np.array([1, -1])), 0.8),
     "convert": (convert, (SURFACE, FIELD, replace(CONVERSION, magnitude="curvature")), 0.9),
-    "project": (project, ([INSTANCE] * 2, CAMERA), 0.9),
     "occlusion": (ambient_occlusion, ([INSTANCE], 0, 16), 0.9),
     "picture": (picture, (Look(),), 0.9),
     "strokes": (
         draw_instances,
-        ([INSTANCE], CAMERA, StrokeStyle(spacing=20.0, arrows=30.0, overshoot=4.0, outline=True)),
+        ([INSTANCE], CAMERA, StrokeStyle(spacing=40.0, arrows=30.0, overshoot=4.0, outline=True)),
         0.9,
     ),
     "texture": (texture, (Look(length=20),), 0.9),
 }
 
 
-STROKES = pytest.param("strokes", marks=pytest.mark.slow)
-
-
-@pytest.mark.parametrize("name", [name if name != "strokes" else STROKES for name in LONG])
+@pytest.mark.parametrize("name", LONG)
 def test_progress_never_goes_back(name):
     function, arguments, last = LONG[name]
     fractions = [fraction for fraction, _ in reported(function, *arguments)]
@@ -147,7 +139,7 @@ def test_progress_never_goes_back(name):
     assert 0 <= fractions[0] < 0.1 and last <= fractions[-1] <= 1 + 1e-9
 
 
-@pytest.mark.parametrize("name", ["form", "picture", STROKES])
+@pytest.mark.parametrize("name", ["form", "picture"])
 def test_a_listener_ends_the_work(name):
     """And what is left does not change what is done next."""
     function, arguments, _ = LONG[name]

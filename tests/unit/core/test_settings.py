@@ -22,20 +22,14 @@ def test_settings_are_shown_above_those_that_they_name():
             assert not before or names.index(name) < names.index(before)
 
 
-def test_the_advanced_panel_has_only_details_of_a_method():
-    assert panel_settings(Look, "") == ("weights", "view_plane")
-
-
 @pytest.mark.parametrize(
     ("settings", "expected"),
     [
         ({"color_range": (1.0, 2.0, 3.0)}, "2 numbers: bottom value, top value"),
-        ({"color_range": 1.0}, "2 numbers"),
         ({"length": 0}, "a number from 1"),
         ({"method": "magic"}, "one of"),
         ({"gain": "much"}, "a number"),
         ({"view_plane": 1}, "true or"),
-        ({"color_range": (True, 1.0)}, "2 numbers"),
         ({"color_range": (0.0, float("nan"))}, "top value from -1e\\+30 to 1e\\+30"),
         ({"tone_levels": [0.0, 1.0, 0.0]}, "gamma from 0.05 to 20.0"),
         ({"paper_color": "#1234567"}, "a color like #08080d or #08080d80"),

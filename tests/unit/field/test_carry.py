@@ -17,7 +17,7 @@ def vectors_of(surface):
 
 
 @pytest.mark.parametrize("surface", [icosphere(2), torus(), plane(4, 3)])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_rotations_translations_and_scales_are_followed(surface, seed):
     random = np.random.default_rng(seed)
     rotation = Rotation.random(random_state=seed)

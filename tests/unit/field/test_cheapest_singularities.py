@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import long
 from shapes import cylinder, globe, icosphere, torus
 
 from rosy_addon.core.errors import RosyError
@@ -16,10 +15,6 @@ from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.smoothest import smoothest_field
 
 
-def completed(surface, degree, vertex, index):
-    return cheapest_singularities(surface, degree, vertex, index)
-
-
 def energy_of(surface, degree, vertex, index):
     return dirichlet_energy(surface, prescribed_field(surface, degree, vertex, index))
 
@@ -27,36 +22,34 @@ def energy_of(surface, degree, vertex, index):
 def test_what_is_missing_costs_as_much_as_at_the_opposite_point():
     """With one singularity of index 1 on a sphere, the other one belongs there."""
     ball = icosphere(4)
-    vertex, index = completed(ball, 1, [7], [1])
+    vertex, index = cheapest_singularities(ball, 1, [7], [1])
     assert vertex[0] == 7 and index.tolist() == [1, 1]
     opposite = int((ball.vertices @ ball.vertices[7]).argmin())
     assert energy_of(ball, 1, vertex, index) < 1.03 * energy_of(ball, 1, [7, opposite], [1, 1])
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("degree", [4, *long(2, 6)])
-def test_given_ones_stay_and_the_sum_is_right(degree):
+def test_given_ones_stay_and_the_sum_is_right():
     """Also where the smoothest field wants one of the others at the vertex of a given one."""
-    random = np.random.default_rng(degree)
+    random = np.random.default_rng(4)
     for surface, characteristic in ((torus(24, 12), 0), (icosphere(3), 2)):
         for count in (1, 2, 4, 4):
             given = random.choice(len(surface.vertices), count, replace=False)
             sign = random.choice([-1, 1], count)
-            vertex, index = completed(surface, degree, given, sign)
+            vertex, index = cheapest_singularities(surface, 4, given, sign)
             assert vertex[:count].tolist() == given.tolist()
             assert index[:count].tolist() == sign.tolist()
             assert len(set(vertex.tolist())) == len(vertex)
-            assert index.sum() == degree * characteristic
+            assert index.sum() == 4 * characteristic
 
 
-@pytest.mark.parametrize("degree, count", [(4, 8), *long((6, 12))])
-def test_one_given_costs_no_more_than_the_smoothest_field(degree, count):
+def test_one_given_costs_no_more_than_the_smoothest_field():
     """The sphere can be turned so that one of its singularities is there."""
     ball = icosphere(4)
-    vertex, index = completed(ball, degree, [7], [1])
-    assert index.tolist() == [1] * count
-    energy = energy_of(ball, degree, vertex, index)
-    assert energy < dirichlet_energy(ball, smoothest_field(ball, degree))
+    vertex, index = cheapest_singularities(ball, 4, [7], [1])
+    assert index.tolist() == [1] * 8
+    energy = energy_of(ball, 4, vertex, index)
+    assert energy < dirichlet_energy(ball, smoothest_field(ball, 4))
 
 
 def test_a_field_with_a_border_needs_no_more():
@@ -70,4 +63,4 @@ def test_a_field_with_a_border_needs_no_more():
 
 def test_bad_vertices_are_named():
     with pytest.raises(RosyError, match="has no vertex 5000"):
-        completed(globe(8, 16), 4, [5000], [1])
+        cheapest_singularities(globe(8, 16), 4, [5000], [1])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapes import from_triangles, icosphere, torus
+from shapes import from_triangles, icosphere, joined, torus
 
 from rosy_addon.field.closest_point import closest_triangles, point_triangle_distances
 
@@ -48,12 +48,8 @@ def test_a_maximum_distance_changes_only_the_points_beyond_it():
 
 def test_large_triangles_among_small_ones():
     ball = icosphere(3, 0.1)
-    floor = np.array([(-9.0, -9.0, -1.0), (9.0, -9.0, -1.0), (0.0, 9.0, -1.0)])
-    count = len(ball.vertices)
-    surface = from_triangles(
-        np.concatenate([ball.vertices, floor]),
-        np.concatenate([ball.triangle_vertex, [(count, count + 1, count + 2)]]),
-    )
+    floor = from_triangles([(-9, -9, -1), (9, -9, -1), (0, 9, -1)], [[0, 1, 2]])
+    surface = joined(ball, floor)
     triangle, distance = closest_triangles(surface, np.array([(3.0, -4.0, -0.9), (0.0, 0.0, 0.2)]))
     assert triangle[0] == len(ball.triangles) and np.isclose(distance[0], 0.1)
     assert triangle[1] < len(ball.triangles) and np.isclose(distance[1], 0.1, atol=0.002)

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from shapes import cube, cylinder, from_triangles, icosphere
+from shapes import cube, cylinder, from_triangles, icosphere, plane, rebuilt
 
 from rosy_addon.field.creases import find_creases
 from rosy_addon.field.surface import build_surface
 
 
-def creases(surface, angle=0.7):
-    return find_creases(surface, angle)
+def creases(surface, angle=0.7, **settings):
+    return find_creases(rebuilt(surface, **settings), angle)
 
 
 def ridge(height, cells=48, noise=0.0):
@@ -17,34 +17,22 @@ def ridge(height, cells=48, noise=0.0):
 
     `noise` is the standard deviation of the heights, relative to the length of an edge.
     """
-    axis = np.linspace(-1, 1, cells + 1)
-    x, y = np.meshgrid(axis, axis, indexing="ij")
-    z = -height * np.abs(y) + noise * (2 / cells) * np.random.default_rng(3).standard_normal(
-        x.shape
-    )
-    corner = np.arange(cells * (cells + 1)).reshape(cells, cells + 1)[:, :-1].ravel()
-    above = corner + cells + 1
-    faces = [[corner, above, above + 1], [corner, above + 1, corner + 1]]
-    triangles = np.concatenate([np.stack(face, axis=1) for face in faces])
-    return from_triangles(np.stack([x, y, z], axis=-1).reshape(-1, 3), triangles)
+    flat = plane(cells, cells)
+    x, y, _ = flat.vertices.T
+    z = noise * (2 / cells) * np.random.default_rng(3).standard_normal(x.shape)
+    return from_triangles(np.stack([x, y, z - height * np.abs(y)], axis=1), flat.triangle_vertex)
 
 
 def test_all_edges_of_a_cube_are_one_chain():
     for sharp in (None, 1.0):
-        box = cube()
-        box = build_surface(box.vertices, box.corner_vertex, box.face_start, sharp_angle=sharp)
-        found = creases(box)
+        found = creases(cube(), sharp_angle=sharp)
         assert len(found.ends) == 12 and set(found.chain) == {0}
 
 
 @pytest.mark.parametrize("flat", [False, True])
 def test_smooth_surfaces_have_no_creases(flat):
     for surface in (icosphere(2), icosphere(1)):
-        faces = np.full(surface.face_count, flat)
-        surface = build_surface(
-            surface.vertices, surface.corner_vertex, surface.face_start, flat_faces=faces
-        )
-        assert not len(creases(surface).ends)
+        assert not len(creases(surface, flat_faces=np.full(surface.face_count, flat)).ends)
 
 
 def test_the_rims_of_a_cylinder_are_two_chains():
@@ -60,11 +48,7 @@ def test_the_rims_of_a_cylinder_are_two_chains():
 @pytest.mark.parametrize("flat", [False, True])
 def test_noise_has_no_creases(noise, flat):
     surface = ridge(0.0, noise=noise)
-    faces = np.full(surface.face_count, flat)
-    surface = build_surface(
-        surface.vertices, surface.corner_vertex, surface.face_start, flat_faces=faces
-    )
-    assert not len(creases(surface).ends)
+    assert not len(creases(surface, flat_faces=np.full(surface.face_count, flat)).ends)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.05, 0.1])
@@ -82,15 +66,11 @@ def test_a_chain_continues_where_it_is_weaker():
     flat = ridge(0.0)
     x, y, _ = flat.vertices.T
     angle = 0.05 + 0.45 * (x + 1)
-    fading = build_surface(
-        np.stack([x, y, -np.tan(angle / 2) * np.abs(y)], axis=1),
-        flat.corner_vertex,
-        flat.face_start,
-        sharp_angle=0.1,
-    )
-    found = creases(fading, 0.7)
+    points = np.stack([x, y, -np.tan(angle / 2) * np.abs(y)], axis=1)
+    fading = rebuilt(flat, points)
+    found = creases(fading, 0.7, sharp_angle=0.1)
     on_ridge = np.abs(fading.vertices[found.ends, 1]).max(axis=1) < 1e-9
     lowest = angle[found.ends].min()
     assert on_ridge.all() and set(found.chain) == {0}
     assert lowest == pytest.approx(0.35, abs=0.03)
-    assert not len(creases(fading, 0.9).ends)
+    assert not len(creases(fading, 0.9, sharp_angle=0.1).ends)

@@ -39,13 +39,8 @@ def rotate(vectors, normal, angle):
 def directions_at_angles(surface, angles, lengths):
     """(F, N, 3) directions with the same angles from the first edge on each face."""
     x, _ = surface.face_frames
-    return np.stack(
-        [
-            length * rotate(x, surface.face_normal, angle)
-            for angle, length in zip(angles, lengths, strict=True)
-        ],
-        axis=1,
-    )
+    turned = [rotate(x, surface.face_normal, angle) for angle in angles]
+    return np.stack(turned, axis=1) * np.array(lengths, dtype=float)[:, None]
 
 
 # --- the algebra ---------------------------------------------------------------------------------
@@ -136,7 +131,6 @@ def test_matching_follows_the_stored_members():
     surface = plane(5, 5)
     random = np.random.default_rng(3)
     member_index = random.integers(0, 4, surface.face_count)
-    vectors = rotate(np.tile((1.0, 0, 0), (25, 1)), surface.face_normal, 0.0)
     angle = member_index * np.pi / 2
     vectors = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     faces, matching = field_matching(surface, RosyField(4, vectors))
@@ -172,9 +166,9 @@ def test_families_need_a_consistent_order_of_directions():
 # --- drawing -------------------------------------------------------------------------------------
 
 
-def project_from_above(surface, field, size, display="smooth"):
+def project_from_above(surface, field, size):
     camera = orthographic_camera(np.eye(4), size, size, scale=2.0, clip=(-10, 10))
-    return project([MeshInstance(surface, np.eye(4), field)], camera, display)
+    return project([MeshInstance(surface, np.eye(4), field)], camera)
 
 
 @pytest.mark.slow
@@ -192,9 +186,8 @@ def test_streaks_run_along_free_directions(method, angles):
     for face in range(surface.face_count):  # the order must not matter
         directions[face] = np.roll(directions[face], face, axis=0)
     field = field_from_directions(surface, directions)
-    (layer,) = degree_layers(
-        project_from_above(surface, field, 256), WEAVE.with_settings({"method": method})
-    )
+    gbuffer = project_from_above(surface, field, 256)
+    (layer,) = degree_layers(gbuffer, WEAVE.with_settings({"method": method}))
     tone = layer.tone.reshape(256, 256)[32:-32, 32:-32]
     # From -5 to 175 degrees: no direction is near the ends.
     actual = np.sort((np.array(peaks(orientation_spectrum(tone))) + 5) % 180 - 5)
@@ -207,10 +200,9 @@ def test_hues_of_families_tell_their_directions():
     """The major direction runs along x: its streaks are orange, and those along y blue."""
     surface = plane(7, 7, 2.2)
     field = tensor_field(surface, np.tile(np.diag([3.0, -1.0, 0.0]), (surface.face_count, 1, 1)))
-    colored = compose(
-        project_from_above(surface, field, 256), WEAVE.with_settings({"hue": "families"})
-    )
-    orange_minus_blue = (colored.rgba[..., 0] - colored.rgba[..., 2]).astype(float)
+    gbuffer = project_from_above(surface, field, 256)
+    colored = compose(gbuffer, WEAVE.with_settings({"hue": "families"})).rgba
+    orange_minus_blue = (colored[..., 0] - colored[..., 2]).astype(float)
     for sign, expected in ((1, 0), (-1, 90)):
         image = np.clip(sign * orange_minus_blue, 0, None)
         actual = np.array(peaks(orientation_spectrum(image - image.mean()), 4.0))

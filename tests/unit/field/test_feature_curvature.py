@@ -6,17 +6,15 @@ import numpy as np
 import pytest
 from awkward import AWKWARD
 from field_helpers import awkward_surface
-from shapes import cube, cylinder, icosphere, plane, torus
+from shapes import cube, cylinder, icosphere, plane, rebuilt, torus
 
 from rosy_addon.field.feature_curvature import feature_curvature
-from rosy_addon.field.surface import build_surface
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
 def test_spheres(scale):
     ball = icosphere(4)
-    ball = build_surface(scale * ball.vertices, ball.corner_vertex, ball.face_start)
-    curvature = feature_curvature(ball)
+    curvature = feature_curvature(rebuilt(ball, scale * ball.vertices))
     assert curvature.shape == (len(ball.triangles), 3) and curvature.dtype == np.float32
     np.testing.assert_allclose(curvature, 1 / scale, rtol=0.02)
 
@@ -36,12 +34,7 @@ def test_sharp_edges_have_none(make):
 
 def test_a_deformation_changes_nothing():
     ball = icosphere(3)
-    bent = build_surface(
-        ball.vertices * (1, 1, 3),
-        ball.corner_vertex,
-        ball.face_start,
-        rest_vertices=ball.vertices,
-    )
+    bent = rebuilt(ball, ball.vertices * (1, 1, 3), rest_vertices=ball.vertices)
     np.testing.assert_array_equal(feature_curvature(bent), feature_curvature(ball))
 
 

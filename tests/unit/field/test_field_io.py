@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import tracemalloc
 
@@ -30,6 +31,15 @@ def rosy_text(rows, count=None, degree=4, form="{count}\n{degree}\n"):
     return head + "".join(" ".join(map(str, row)) + "\n" for row in rows)
 
 
+def npy_that_claims(count):
+    """An array of 6 rows whose header claims more."""
+    file = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        file, {"descr": "<f8", "fortran_order": False, "shape": (count, 3)}
+    )
+    return file.getvalue() + WEST.tobytes()
+
+
 # --- reading and writing ---------------------------------------------------------------------
 
 
@@ -49,9 +59,8 @@ def test_a_vertex_count_is_accepted_above_face_rows(tmp_path, error_of):
     (tmp_path / "a.rosy").write_text(rosy_text(WEST, count=12))
     assert np.array_equal(read_field(tmp_path / "a.rosy", SQUARES).vectors, WEST)
     (tmp_path / "b.rosy").write_text(rosy_text(np.tile(WEST, (2, 1)), count=6))
-    assert "declares 6 rows of 3 numbers, but contains 12" in error_of(
-        read_field, tmp_path / "b.rosy", SQUARES
-    )
+    message = error_of(read_field, tmp_path / "b.rosy", SQUARES)
+    assert "declares 6 rows of 3 numbers, but contains 12" in message
 
 
 def test_rows_for_vertices_are_averaged_onto_faces(tmp_path):
@@ -129,7 +138,6 @@ def test_tolerances_of_a_rosy(angle, longer, rosy, tmp_path):
 
 DAMAGED = {
     "empty.rosy": (b"", "ends before the count"),
-    "count.rosy": (b"6\n", "ends before the degree"),
     "truncated.rosy": (rosy_text(WEST)[:32].encode(), "declares 6 rows of 3 numbers, but contains 2"),
     "torn.rosy": (rosy_text(WEST)[:-5].encode(), "but contains 5 and part of another"),
     "claims.rosy": (b"178956970 4\n1 0 0\n", "declares 178,956,970 rows of 3 numbers, but contains 1"),
@@ -139,17 +147,13 @@ DAMAGED = {
     "word.rosy": (rosy_text(WEST).replace("-2.0", "two", 2).replace("two", "-2.0", 1).encode(),
                   "word.rosy:4: expected a number (part of a vector), found 'two'"),
     "zero.rosy": (rosy_text(WEST, degree=0).encode(), "zero.rosy:2: degree 0 is not"),
-    "minus.rosy": (rosy_text(WEST, degree=-1).encode(), "minus.rosy:2: degree -1 is not"),
-    "thousand.rosy": (rosy_text(WEST, degree=1000).encode(), "thousand.rosy:2: degree 1000 is not"),
     "half.rosy": (rosy_text(WEST, degree=2.5).encode(), "half.rosy:2: expected the degree, a whole number, found '2.5'"),
-    "zero.rawfield": (b"0 6\n", "zero.rawfield:1: degree 0 is not a whole number from 1 to 12"),
     "negative.rosy": (b"-6 4\n", "declares -6 rows"),
     "many.rosy": (rosy_text(np.ones((7, 3))).encode(), "contains 7 rows, but plane has 6 faces and 12 v"),
     "nan.rosy": (rosy_text(np.where(np.arange(6)[:, None] == 4, np.nan, WEST)).encode(),
                  "1 of 6 vectors are not finite, the first on face 4"),
-    "inf.rawfield": (rosy_text(np.tile((np.inf, 0, 0), (6, 1)), degree=1, form="{degree} {count}\n").encode(),
-                     "6 of 6 vectors are not finite, the first on face 0"),
     "upright.rosy": (rosy_text(np.tile((0, 0, 1), (6, 1))).encode(), "face 0 by 90.0 degrees"),
+    "claims.npy": (npy_that_claims(10**11), "which is more than it contains"),
     "a.vtk": (b"", "is not a field file"),
 }  # fmt: skip
 
@@ -180,10 +184,8 @@ def test_unwritable_output_is_an_error_and_keeps_the_old_file(tmp_path, error_of
     assert "does not exist" in error_of(write_field, tmp_path / "no" / "a.rosy", field, SQUARES)
     (tmp_path / "b.rosy").mkdir()
     assert "is a folder" in error_of(write_field, tmp_path / "b.rosy", field, SQUARES)
-    assert "cannot be written as a field" in error_of(
-        write_field, tmp_path / "a.vtk", field, SQUARES
-    )
-
+    message = error_of(write_field, tmp_path / "a.vtk", field, SQUARES)
+    assert "cannot be written as a field" in message
     (tmp_path / "c.rosy").write_text("old")
 
     def full(*_):
@@ -210,11 +212,10 @@ def test_vectors_off_the_surface_are_refused(error_of):
     vectors = field.vectors + surface.face_normal * 0.05 * field.magnitude[:, None]
     few = np.array([7, 100, 2000])
     vectors[few] += 0.3 * surface.face_normal[few] * field.magnitude[few, None]
-    assert np.allclose(
-        face_representation(surface, validated_field(surface, vectors, 4, "here"))
-        / face_representation(surface, field),
-        np.where(np.isin(np.arange(surface.face_count), few), np.hypot(1, 0.35), np.hypot(1, 0.05)),
-    )
+    z = face_representation(surface, validated_field(surface, vectors, 4, "here"))
+    is_far = np.isin(np.arange(surface.face_count), few)
+    length = np.hypot(1, np.where(is_far, 0.35, 0.05))
+    assert np.allclose(z, length * face_representation(surface, field))
     many = np.arange(0, surface.face_count, 50)
     vectors[many] += 0.3 * surface.face_normal[many] * field.magnitude[many, None]
     vectors[500] += 2 * surface.face_normal[500] * field.magnitude[500, None]
@@ -254,9 +255,8 @@ def test_the_domain_decides_if_both_counts_agree(error_of):
 def test_a_field_belongs_to_the_rest_shape():
     tube = cylinder(24, 4)
     field = axis_field(tube, 4)
-    bent = tube.with_parts(
-        vertices=tube.vertices[:, [2, 1, 0]] * (1, 1, -1.0), rest_vertices=tube.vertices
-    )
+    turned = tube.vertices[:, [2, 1, 0]] * (1, 1, -1.0)
+    bent = tube.with_parts(vertices=turned, rest_vertices=tube.vertices)
     again = validated_field(bent, field.vectors, 4, "here")
     assert np.array_equal(again.vectors, field.vectors)
 
@@ -264,9 +264,8 @@ def test_a_field_belongs_to_the_rest_shape():
 def test_vectors_beyond_the_range_of_single_precision(error_of):
     vectors = np.tile([[1.0, 0.0, 0.0]], (6, 1))
     vectors[2] *= 1e160
-    assert "1 of 6 vectors are 1e+30 or larger" in error_of(
-        validated_field, SQUARES, vectors, 4, "a"
-    )
+    message = error_of(validated_field, SQUARES, vectors, 4, "a")
+    assert "1 of 6 vectors are 1e+30 or larger" in message
     vectors[2] = 5e-324, 0.0, 0.0
     field = validated_field(SQUARES, vectors, 4, "a")
     assert not field.vectors[2].any() and field.vectors[3].any()

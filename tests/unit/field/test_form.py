@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from shapes import cube, cylinder, icosphere, plane, torus
+from shapes import cube, cylinder, icosphere, plane, rebuilt, torus
 
 from rosy_addon.field.connection import build_connection, laplacian
 from rosy_addon.field.creases import filtered_normals, salient_edges
@@ -15,19 +15,14 @@ from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
-from rosy_addon.field.surface import Surface, build_surface
+from rosy_addon.field.surface import Surface
 from rosy_addon.field.surface_averages import SurfaceAverages
 
 AXES = np.array([1.0, 0.8, 0.6])
 
 
 def ellipsoid() -> Surface:
-    ball = icosphere(5)
-    return with_vertices(ball, ball.vertices * AXES)
-
-
-def with_vertices(surface: Surface, vertices: np.ndarray) -> Surface:
-    return build_surface(vertices, surface.corner_vertex, surface.face_start)
+    return rebuilt(icosphere(5), icosphere(5).vertices * AXES)
 
 
 def with_noise(surface: Surface, share: float) -> Surface:
@@ -36,7 +31,7 @@ def with_noise(surface: Surface, share: float) -> Surface:
     np.add.at(normal, surface.corner_vertex, surface.corner_normal)
     amplitude = share * np.linalg.norm(np.ptp(surface.vertices, axis=0))
     noise = np.random.default_rng(3).standard_normal((len(normal), 1))
-    return with_vertices(surface, surface.vertices + amplitude * noise * normalize(normal))
+    return rebuilt(surface, surface.vertices + amplitude * noise * normalize(normal))
 
 
 def direction_on_torus(center: np.ndarray) -> np.ndarray:
@@ -145,7 +140,7 @@ def test_rotated_and_scaled_meshes_have_the_same_field():
     surface = with_noise(torus(60, 30), 0.001)
     turn, _ = np.linalg.qr(np.random.default_rng(1).standard_normal((3, 3)))
     turn *= np.sign(np.linalg.det(turn))
-    turned = with_vertices(surface, 1e3 * surface.vertices @ turn.T + 7.0)
+    turned = rebuilt(surface, 1e3 * surface.vertices @ turn.T + 7.0)
     expected = generate(surface, "form", 4).vectors @ turn.T
     errors = cross_errors(turned, generate(turned, "form", 4), expected)
     # The extent is that of the bounding box, which is not that of the rotated mesh.

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.sparse as sparse
-from conftest import long
 from field_helpers import angle_differences, as_scipy, bumpy, copies_of
 from scipy.sparse.linalg import spsolve
-from shapes import cube, from_quads, from_triangles, icosphere, plane, torus
+from shapes import cube, from_quads, icosphere, joined, plane, rebuilt, torus
 
 from rosy_addon.core.errors import RosyError
 from rosy_addon.field.connection import build_connection, laplacian
@@ -44,9 +43,8 @@ def test_hard_guides_are_met_exactly(degree):
         assert find_singularities(surface, field)[1].sum() == degree * surface.euler_characteristic
 
 
-@pytest.mark.parametrize("degree", [4, *long(1)])
-def test_soft_guides_match_a_direct_solver(degree):
-    surface = bumpy(icosphere(4))
+def test_soft_guides_match_a_direct_solver():
+    degree, surface = 4, bumpy(icosphere(4))
     guides, weight = random_guides(surface, 30), 40.0
     x, y = surface.face_frames
     connection = build_connection(surface)
@@ -82,9 +80,7 @@ def test_the_field_does_not_depend_on_numbering_or_position(degree, hard):
 
 def test_a_component_without_guides_has_the_smoothest_field():
     ball = icosphere(2)
-    points = np.concatenate([ball.vertices, ball.vertices + 5])
-    triangles = ball.corner_vertex.reshape(-1, 3)
-    both = from_triangles(points, np.concatenate([triangles, triangles + len(ball.vertices)]))
+    both = joined(ball, rebuilt(ball, ball.vertices + 5))
     guides = np.zeros((both.face_count, 3))
     guides[0] = normalize(np.cross(both.face_normal[0], [0.0, 0.0, 1.0])[None])[0]
     field = guided_field(both, 4, guides, 1.0)
@@ -153,8 +149,7 @@ def test_curvature_spreads_into_flat_regions():
 @pytest.mark.parametrize("degree", [1, 4, 6])
 def test_features_of_a_cube(degree):
     box = icosphere(3)
-    points = box.vertices / np.abs(box.vertices).max(axis=1)[:, None]
-    cubic = from_triangles(points, box.corner_vertex.reshape(-1, 3))
+    cubic = rebuilt(box, box.vertices / np.abs(box.vertices).max(axis=1)[:, None])
     field = generate(cubic, GeneratorSettings("features", sharp_angle=0.9), degree)
     # The corners are triangles, on which the field is singular by symmetry.
     assert (field.magnitude < 0.5).sum() in (0, 8)

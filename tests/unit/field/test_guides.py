@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import long
 from field_helpers import awkward_surface
-from shapes import from_triangles, icosphere, plane, torus
+from shapes import from_triangles, icosphere, joined, plane, rebuilt, torus
 
 from rosy_addon.field.closest_point import closest_triangles
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.guides import guides_from_axes, guides_from_strokes, guides_from_uv
 from rosy_addon.field.representation import face_representation, to_representation
-from rosy_addon.field.surface import build_surface, count_inconsistent_edges, orientation_warning
+from rosy_addon.field.surface import count_inconsistent_edges, orientation_warning
 
 BALL = icosphere(4)
 
@@ -41,7 +40,7 @@ def stroke_error(surface, field, stroke):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("degree", [1, 4, *long(2, 6)])
+@pytest.mark.parametrize("degree", [1, 4])
 def test_strokes_on_a_sphere_are_followed(degree):
     strokes = great_circles(5)
     field = generate(BALL, GeneratorSettings("guided", strokes=strokes), degree)
@@ -62,10 +61,8 @@ def test_strokes_far_from_the_surface_are_refused(error_of):
 
 def test_strokes_between_tiny_parts_have_few_samples():
     """The edges of tiny parts that are far apart do not make samples of strokes ever denser."""
-    part = icosphere(1)
-    points = np.concatenate([1e-7 * part.vertices, 1e-7 * part.vertices + (2, 0, 0)])
-    triangles = np.concatenate([part.triangle_vertex, part.triangle_vertex + len(part.vertices)])
-    surface = from_triangles(points, triangles)
+    part = icosphere(1, 1e-7)
+    surface = joined(part, rebuilt(part, part.vertices + (2, 0, 0)))
     guides = guides_from_strokes(surface, [np.array([(0.0, 0, 0), (2, 0, 0)])], 4)
     assert (dot(guides, guides) > 0).any()
 
@@ -98,9 +95,8 @@ def uv_of(surface, matrix):
 @pytest.mark.parametrize("degree", [1, 2, 4, 6, 8])
 def test_a_uv_map_is_followed(degree, mirrored):
     surface = plane(4, 3)
-    rotation = np.array(
-        [(np.cos(0.4), np.sin(0.4)), (-np.sin(0.4), np.cos(0.4))]
-    )  # u at 0.4 radians
+    # u is at 0.4 radians.
+    rotation = np.array([(np.cos(0.4), np.sin(0.4)), (-np.sin(0.4), np.cos(0.4))])
     matrix = np.diag((5.0, -0.3 if mirrored else 0.3)) @ rotation
     guides = guides_from_uv(surface, uv_of(surface, matrix), degree)
     np.testing.assert_allclose(np.linalg.norm(guides, axis=1), 1)
@@ -111,12 +107,10 @@ def test_a_uv_map_is_followed(degree, mirrored):
 def test_a_skewed_map_is_followed_equally_along_both_axes():
     surface = plane(3, 3)
     # dP/du = (1, 0) and dP/dv = (1, 1): the closest cross halves the error of 45 degrees.
-    guides = guides_from_uv(surface, uv_of(surface, np.linalg.inv([(1.0, 1.0), (0.0, 1.0)])), 4)
-    angle = np.degrees(np.arctan2(guides[:, 1], guides[:, 0])) % 90
-    np.testing.assert_allclose(np.minimum(angle, 90 - angle), 22.5, atol=1e-6)
-    assert np.allclose(angle, 67.5)
-    along_u = guides_from_uv(surface, uv_of(surface, np.linalg.inv([(1.0, 1.0), (0.0, 1.0)])), 2)
-    np.testing.assert_allclose(np.abs(along_u[:, 0]), 1, atol=1e-9)
+    uv = uv_of(surface, np.linalg.inv([(1.0, 1.0), (0.0, 1.0)]))
+    guides = guides_from_uv(surface, uv, 4)
+    assert np.allclose(np.degrees(np.arctan2(guides[:, 1], guides[:, 0])) % 90, 67.5)
+    np.testing.assert_allclose(np.abs(guides_from_uv(surface, uv, 2)[:, 0]), 1, atol=1e-9)
 
 
 def test_maps_without_area_are_undefined():
@@ -154,8 +148,8 @@ def test_a_moebius_strip_is_named():
 
 
 def test_flipped_faces_are_counted():
-    corners = BALL.corner_vertex.reshape(-1, 3).copy()
-    corners[7] = corners[7][::-1]
-    surface = build_surface(BALL.vertices, corners, BALL.face_start)
+    triangles = BALL.corner_vertex.reshape(-1, 3).copy()
+    triangles[7] = triangles[7][::-1]
+    surface = from_triangles(BALL.vertices, triangles)
     assert count_inconsistent_edges(surface) == 3
     assert np.isfinite(face_representation(surface, generate(surface, "smoothest", 4))).all()

@@ -42,9 +42,8 @@ def test_undefined_faces_fade(surface):
     field = random_field(surface, 4)
     none = replace(field, vectors=np.zeros_like(field.vectors))
     between = interpolate_fields((surface, field), (surface, none), 0.75, surface)
-    assert face_representation(surface, between) == pytest.approx(
-        0.25 * face_representation(surface, field)
-    )
+    z, whole = (face_representation(surface, each) for each in (between, field))
+    assert z == pytest.approx(0.25 * whole)
     both = interpolate_fields((surface, none), (surface, none), 0.5, surface)
     assert not both.vectors.any()
 
@@ -73,11 +72,8 @@ def test_families_of_tensors_stay(surface):
 
     def tensors(angle):
         major = np.cos(angle) * x + np.sin(angle) * y
-        return (
-            3 * major[:, :, None] * major[:, None]
-            + np.cross(surface.face_normal, major)[:, :, None]
-            * np.cross(surface.face_normal, major)[:, None]
-        )
+        minor = np.cross(surface.face_normal, major)
+        return 3 * major[:, :, None] * major[:, None] + minor[:, :, None] * minor[:, None]
 
     first, second = (tensor_field(surface, tensors(angle)) for angle in (0.0, np.radians(80)))
     between = interpolate_fields((surface, first), (surface, second), 0.5, surface)
@@ -89,10 +85,9 @@ def test_families_of_tensors_stay(surface):
 
 
 def test_degrees_must_agree(surface):
+    four, two = ((surface, random_field(surface, degree)) for degree in (4, 2))
     with pytest.raises(RosyError, match="has degree 2, but the one before it 4"):
-        interpolate_fields(
-            (surface, random_field(surface, 4)), (surface, random_field(surface, 2)), 0.5, surface
-        )
+        interpolate_fields(four, two, 0.5, surface)
     assert have_same_polygons(surface, torus())
     assert not have_same_polygons(surface, icosphere(1))
 

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from rosy_addon.core.errors import RosyError
 from rosy_addon.field.formats.stl import weld
 from rosy_addon.field.surface import MIN_EXTENT, Surface
 
@@ -164,38 +165,30 @@ def test_edges_sharper_than_60_degrees_are_sharp(tmp_path):
         "4 0 2 3 1\n4 2 4 5 3\n4 4 6 7 5\n"
     )
     surface = Surface(tmp_path / "bent.off")
-    fans = [
-        len(set(surface.corner_fan[surface.corner_vertex == vertex].tolist())) for vertex in (2, 4)
-    ]
-    assert fans == [2, 1]
+    fans = (set(surface.corner_fan[surface.corner_vertex == vertex]) for vertex in (2, 4))
+    assert [len(each) for each in fans] == [2, 1]
 
 
 DAMAGED = {
     "empty.obj": (b"", "no faces"),
-    "points.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no faces"),
     "word.obj": (b"v 0 0 0\nv 1 zero 0\n", "word.obj:2: expected a number (vertex), found 'zero'"),
     "short.obj": (b"v 0 0\n", "short.obj:1: vertex has 2 coordinates"),
     "edge.obj": (b"v 0 0 0\nv 1 0 0\nf 1 2\n", "edge.obj:3: a face has 2 corners"),
     "far.obj": (OBJ.encode() + b"f 1 2 9\n", "far.obj:14: a face refers to vertex 9, but"),
-    "zero.obj": (OBJ.encode() + b"f 0 1 2\n", "zero.obj:14: a face refers to vertex 0"),
     "back.obj": (OBJ.encode() + b"f 1 2 -6\n", "back.obj:14: a face refers to vertex -6"),
     "huge.obj": (OBJ.encode() + b"f 1 2 99999999999999999999\n", "huge.obj:14:"),
     "nan.obj": (b"v 0 0 0\nv 1 nan 0\n", "nan.obj:2: vertex 1 has a coordinate that is not finite"),
     "binary.obj": (b"v 0 0 0\n\0\1\2", "binary data"),
-    "latin.obj": (b"v 0 0 \xff\n", "latin.obj:1: expected"),
     "truncated.off": (OFF[:60].encode(), "declares 5 vertices and 2 faces, but ends after"),
     "torn.off": (OFF.encode()[:-3], "torn.off:10: face 1 declares 3 corners, but lists 2"),
     "claims.off": (b"OFF 90000000 180000000 0\n0 0 0\n", "declares 90,000,000 vertices"),
     "far.off": (OFF.replace("3 2 1 4", "3 2 1 5").encode(), "far.off:10: a face refers to vertex 5"),
     "pair.off": (OFF.replace("3 2 1 4", "2 2 1").encode(), "pair.off:10: face 1 has 2 corners"),
     "other.off": (b"MESH 1 2 3\n", "other.off:1: expected OFF, found 'MESH'"),
-    "only.off": (b"OFF\n", "ends before the numbers"),
     "minus.off": (b"OFF -1 2 0\n", "minus.off:1: expected the numbers"),
-    "inf.off": (OFF.replace("1e-3", "inf").encode(), "inf.off:8: vertex 4"),
     "large.obj": (OBJ.replace("1e-3", "1e100").encode(), "vertex 4 has a coordinate above 1e+12"),
     "small.off": (b"OFF 3 1 0\n0 0 0\n1e-40 0 0\n0 1e-40 0\n3 0 1 2\n", "is smaller than 1e-12"),
     "truncated.ply": (binary_ply("<")[:-20], "declares 2 rows of element 'face', but ends after 1"),
-    "cut.ply": (binary_ply(">")[:-80], "declares 5 rows of element 'vertex', but ends after"),
     "text.ply": (FILES["a.ply"][:-9], "text.ply:22: face 1 has 4 values, expected 5"),
     "ascii.ply": (FILES["a.ply"][:-20], "declares 2 rows of element 'face', but ends after 1"),
     "header.ply": (FILES["a.ply"][:100], "the header has no line 'end_header'"),
@@ -203,21 +196,16 @@ DAMAGED = {
     "noz.ply": (FILES["a.ply"].replace(b"float z", b"float w"), "the vertices have no property 'z'"),
     "far.ply": (FILES["a.ply"].replace(b"3 2 1 4", b"3 2 1 7"), "face 1 refers to vertex 7"),
     "claims.ply": (binary_ply("<").replace(b"vertex 5", b"vertex 190000000"), "declares 190,000,000 rows"),
-    "faces.ply": (binary_ply("<").replace(b"face 2", b"face 500000000"), "declares 500,000,000 rows"),
     "nan.ply": (ply_with_float_count(np.nan), "face 0 has a list of length nan"),
-    "inf.ply": (ply_with_float_count(np.inf), "face 0 has a list of length inf"),
     "huge.ply": (ply_with_float_count(1e30), "declares 2 rows of element 'face', but ends after 0"),
     "twice.ply": (FILES["a.ply"].replace(b"float y", b"float x"), "twice.ply:6: property 'x' is declared twice"),
     "again.ply": (FILES["a.ply"].replace(b"edge 1", b"face 1"), "again.ply:12: element 'face' is declared"),
     "many.ply": (FILES["a.ply"].replace(b"3 2 1 4", b"nan 2 1 4"), "the length of a list, found nan"),
-    "half.ply": (FILES["a.ply"].replace(b"3 2 1 4", b"2.5 2 1 4"), "the length of a list, found 2.5"),
-    "most.ply": (FILES["a.ply"].replace(b"3 2 1 4", b"1e300 2 1 4"), "the length of a list, found 1e+300"),
     "void.ply": (binary_ply("<").replace(b"element edge", b"element none 99999999999999\nelement edge")[:-1],
                  "declares 1 row of element 'edge', but ends after 0"),
     "nomesh.ply": (PLY_HEADER.format(format="ascii").split("element face")[0].encode()
                    + b"end_header\n" + PLY_BODY[:50].encode(), "no faces"),
     "signal.ply": (binary_ply(">").replace(struct.pack(">f", 0.001), b"\x7f\x81\0\0"), "vertex 4 has"),
-    "signal.stl": (binary_stl().replace(struct.pack("<f", 0.001), b"\0\0\x81\x7f"), "not finite"),
     "not.ply": (b"solid\n", "expected 'ply', found 'sol'"),
     "truncated.stl": (binary_stl()[:-30], "declares 3 triangles, but ends after 2"),
     "claims.stl": (binary_stl(40_000_000), "declares 40,000,000 triangles, but ends after 3"),
@@ -250,8 +238,6 @@ def test_missing_files_and_folders(tmp_path, error_of):
 @pytest.mark.slow
 @given(st.binary(max_size=300), st.sampled_from(sorted(FILES)), st.integers(0, 400))
 def test_random_damage_raises_only_rosy_errors(tmp_path_factory, garbage, name, offset):
-    from rosy_addon.core.errors import RosyError
-
     path = tmp_path_factory.getbasetemp() / f"damaged-{name}"
     data = FILES[name]
     path.write_bytes(data[:offset] + garbage + data[offset + len(garbage) :])

@@ -11,6 +11,7 @@ from shapes import cylinder, from_quads, globe, icosphere, torus
 from rosy_addon.core.errors import RosyError
 from rosy_addon.field import prescribed, turning_angles
 from rosy_addon.field.face_graph import face_graph, spanning_forest, triangle_graph
+from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.prescribed import prescribed_field
 from rosy_addon.field.representation import face_representation, matching_angles
 from rosy_addon.field.singularities import find_singularities
@@ -35,10 +36,8 @@ def block(holes: int, missing: int = 0) -> Surface:
     vertices, quads = vertices.astype(float), quads.reshape(-1, 4)
     sides = np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)])
     for _ in range(8):
-        mean = np.stack(
-            [np.bincount(sides[:, 0], column[sides[:, 1]]) for column in vertices.T], axis=1
-        )
-        vertices = (vertices + mean / np.bincount(sides[:, 0])[:, None]) / 2
+        sums = [np.bincount(sides[:, 0], column[sides[:, 1]]) for column in vertices.T]
+        vertices = (vertices + np.transpose(sums / np.bincount(sides[:, 0]))) / 2
     random = np.random.default_rng(missing)
     center = vertices[quads].mean(axis=1)
     for patch in center[random.integers(len(quads), size=missing)]:
@@ -73,22 +72,23 @@ def test_poles_give_the_meridians(degree):
     field = prescribed_field(surface, degree, [0, last], [degree, degree])
     vertex, index = find_singularities(surface, field)
     assert vertex.tolist() == [0, last] and index.tolist() == [degree, degree]
-    east = np.cross((0, 0, 1), surface.face_center)
-    east /= np.linalg.norm(east, axis=1)[:, None]
-    north = np.cross(surface.face_normal, east)
-    angle = np.arctan2((field.vectors * north).sum(axis=1), (field.vectors * east).sum(axis=1))
-    relative = np.exp(1j * degree * (angle - angle[100]))
-    assert np.degrees(np.abs(np.angle(relative)) / degree).max() < 1e-4
+    east = normalize(np.cross((0, 0, 1), surface.face_center))
+    assert errors(field, east, np.cross(surface.face_normal, east), 0).max() < 1e-4
 
 
 def test_a_torus_without_singularities_has_parallel_lines():
     surface = torus(48, 24)
     field = prescribed_field(surface, 4, [], [])
     assert not len(find_singularities(surface, field)[0])
-    along = np.cross((0, 0, 1), surface.face_center)
-    along /= np.linalg.norm(along, axis=1)[:, None]
-    cosine = np.abs((field.vectors * along).sum(axis=1))
+    along = normalize(np.cross((0, 0, 1), surface.face_center))
+    cosine = np.abs(dot(field.vectors, along))
     assert np.minimum(cosine, np.sqrt(np.maximum(1 - cosine**2, 0))).max() < 1e-6
+
+
+def on_cone(azimuth: np.ndarray, slope: float) -> np.ndarray:
+    """(n, 3) unit vectors from the apex of a cone that opens downward."""
+    height = np.full(len(azimuth), -np.sqrt(1 - slope**2))
+    return np.stack([slope * np.cos(azimuth), slope * np.sin(azimuth), height], axis=1)
 
 
 def rings(
@@ -102,14 +102,7 @@ def rings(
     turn = shear * np.arange(count)[:, None] + np.arange(segments)
     azimuth = turn.ravel() * 2 * np.pi / segments
     slope = total / (2 * np.pi)
-    points = np.stack(
-        [
-            slope * radius * np.cos(azimuth),
-            slope * radius * np.sin(azimuth),
-            -np.sqrt(1 - slope**2) * radius,
-        ],
-        axis=1,
-    )
+    points = radius[:, None] * on_cone(azimuth, slope)
     inner = 1 + np.arange(segments)
     following = np.roll(inner, -1)
     fan = np.stack([np.zeros_like(inner), inner, following], axis=1)
@@ -127,9 +120,7 @@ def rings(
 
 def errors(field, first_axis, second_axis, angle) -> np.ndarray:
     """(F,) degrees from a field to angles in frames, which it may differ from by a constant."""
-    own = np.arctan2(
-        (field.vectors * second_axis).sum(axis=1), (field.vectors * first_axis).sum(axis=1)
-    )
+    own = np.arctan2(dot(field.vectors, second_axis), dot(field.vectors, first_axis))
     relative = np.exp(1j * field.degree * (own - angle))
     return np.degrees(np.abs(np.angle(relative * relative.mean().conj()))) / field.degree
 
@@ -142,11 +133,9 @@ def test_a_pair_in_a_disc_turns_as_its_closed_form(degree, shear, quads):
     points = surface.vertices @ (1, 1j, 0)
     pair = [int(np.abs(points - place).argmin()) for place in (0.4 + 0.1j, -0.3 - 0.35j)]
     field = prescribed_field(surface, degree, pair, [1, -1])
-    center = surface.face_center @ (1, 1j, 0)
-    phase = [
-        np.angle(center - place) - np.angle(1 - place.conj() * center) for place in points[pair]
-    ]
-    error = errors(field, (1, 0, 0), (0, 1, 0), (phase[0] - phase[1]) / degree)
+    center = (surface.face_center @ (1, 1j, 0))[:, None]
+    phase = np.angle(center - points[pair]) - np.angle(1 - points[pair].conj() * center)
+    error = errors(field, (1, 0, 0), (0, 1, 0), (phase[:, 0] - phase[:, 1]) / degree)
     # Sheared triangles are obtuse, and much longer in one direction than in the other.
     assert np.percentile(error, 90) < (0.4 if shear else 0.1) / degree
     assert np.median(error) < (0.12 if shear else 0.03) / degree
@@ -157,15 +146,7 @@ def test_a_cone_turns_evenly_around_its_apex(degree, index):
     surface = rings(30, 120, np.radians(240))
     field = prescribed_field(surface, degree, [0][:index], [1][:index])
     azimuth = np.arctan2(surface.face_center[:, 1], surface.face_center[:, 0])
-    slope = 240 / 360
-    outward = np.stack(
-        [
-            slope * np.cos(azimuth),
-            slope * np.sin(azimuth),
-            np.full(len(azimuth), -np.sqrt(1 - slope**2)),
-        ],
-        axis=1,
-    )
+    outward = on_cone(azimuth, 240 / 360)
     around = np.cross(surface.face_normal, outward)
     assert errors(field, outward, around, (index / degree - 1) * azimuth).max() < 0.1
 
@@ -182,7 +163,7 @@ def test_guides_turn_the_whole_field():
     assert find_singularities(surface, field)[0].tolist() == [0, last]
 
 
-@pytest.mark.parametrize("degree", [1, 2, 4, 6])
+@pytest.mark.parametrize("degree", [1, 4])
 @pytest.mark.parametrize("holes, missing", [(0, 0), (1, 0), (3, 0), (0, 1), (0, 3), (1, 2)])
 def test_all_singularities_are_found_again(holes, missing, degree):
     surface = block(holes, missing)

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import long
-from shapes import cylinder, globe, icosphere, plane, torus
+from shapes import cylinder, globe, icosphere, plane, rebuilt, torus
 
 from rosy_addon.core.errors import RosyError
 from rosy_addon.field.convert import Conversion, convert
+from rosy_addon.field.frames import dot
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.prescribed import change_singularities, prescribed_field
 from rosy_addon.field.representation import face_representation
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.singularity_changes import OUTSIDE, move_index, opposite_pairs
-from rosy_addon.field.surface import build_surface
 
 #: Many faces meet at its poles, so that they can have large indices.
 BALL = globe(32, 64)
@@ -40,17 +39,16 @@ def pole_field(degree, pairs):
     return prescribed_field(BALL, degree, vertex, index), poles
 
 
-@pytest.mark.parametrize("degree", [4, *long(2, 6)])
-def test_near_pairs_are_cancelled_and_nothing_else(degree):
+def test_near_pairs_are_cancelled_and_nothing_else():
     pairs = [((1, 0, 0), (1, 0.2, 0)), ((0, 1, 0.3), (0, 1, -0.3)), ((0, -1, 0), (-1, 0, 0))]
-    field, poles = pole_field(degree, pairs)
+    field, poles = pole_field(4, pairs)
     assert len(find_singularities(BALL, field)[0]) == 8
     for reach, left in ((0.05, 8), (0.15, 6), (0.4, 4), (1.0, 2)):
         clean = convert(BALL, field, Conversion(pair_distance=reach))
         vertex, _ = find_singularities(BALL, clean)
         assert len(vertex) == left
         assert set(poles) <= set(vertex)
-    assert indices(BALL, clean) == dict.fromkeys(poles, degree)
+    assert indices(BALL, clean) == dict.fromkeys(poles, 4)
 
 
 def test_far_from_a_pair_nothing_turns():
@@ -84,10 +82,8 @@ def test_curvature_is_cleaned(degree, subdivisions, noise):
     """
     surface = icosphere(subdivisions)
     random = np.random.default_rng(degree)
-    rough = surface.vertices * (1, 1.3, 0.7) + noise * random.standard_normal(
-        (len(surface.vertices), 3)
-    )
-    surface = build_surface(rough, surface.corner_vertex, surface.face_start)
+    noise = noise * random.standard_normal((len(surface.vertices), 3))
+    surface = rebuilt(surface, surface.vertices * (1, 1.3, 0.7) + noise)
     field = generate(surface, GeneratorSettings("curvature"), degree)
     clean = convert(surface, field, Conversion(pair_distance=0.4 / subdivisions))
     before, left = indices(surface, field), indices(surface, clean)
@@ -117,28 +113,16 @@ def test_changes_that_a_closed_surface_cannot_have_are_refused():
 
 def test_pairs_are_the_nearest_along_edges():
     """On a grid, the length of a path is the sum of its steps."""
-    surface = plane(20, 20)
-    x, y = np.rint((surface.vertices[:, :2] - surface.vertices[:, :2].min(axis=0)).T * 1e6) / 1e6
-    step = np.unique(x)[1]
-    column, row = np.rint(x / step).astype(int), np.rint(y / step).astype(int)
-    place = {(c, r): v for v, (c, r) in enumerate(zip(column.tolist(), row.tolist(), strict=True))}
-    points = [(2, 2), (2, 5), (4, 5), (10, 10), (15, 12), (15, 15)]
-    vertex = np.array([place[point] for point in points])
-    index = np.array([1, -1, 1, 1, -1, 1])
-
-    def pairs(steps):
-        return {
-            tuple(pair)
-            for pair in opposite_pairs(surface, vertex, index, (steps + 0.01) * step).tolist()
-        }
-
-    assert pairs(1.9) == set()
-    assert pairs(2) == {(1, 2)}
-    assert pairs(3) == {(1, 2), (4, 5)}
-    assert pairs(30) == {(1, 2), (4, 5)}
+    surface, step = plane(20, 20), 0.1
+    points = np.array([(2, 2), (2, 5), (4, 5), (10, 10), (15, 12), (15, 15)])
+    vertex, index = points @ (21, 1), np.array([1, -1, 1, 1, -1, 1])
+    near, far = [1, 2], [4, 5]
+    for steps, expected in ((1.9, []), (2, [near]), (3, [near, far]), (30, [near, far])):
+        pairs = opposite_pairs(surface, vertex, index, (steps + 0.01) * step)
+        assert sorted(pairs.tolist()) == expected
 
 
-@pytest.mark.parametrize("degree", [1, 4, *long(2)])
+@pytest.mark.parametrize("degree", [1, 4])
 def test_guides_bend_a_field_with_the_same_singularities(degree):
     """Near the guides the field follows them, and no singularity comes or goes."""
     last = pole_field(degree, [])[1]
@@ -148,20 +132,19 @@ def test_guides_bend_a_field_with_the_same_singularities(degree):
         ((-1, 0.3, 0), (0, 1, 0.2)),
         ((0, 1, 0), (1, 0, 0)),
     ):
-        near = (
-            np.linalg.norm(BALL.face_center - np.array(center) / np.linalg.norm(center), axis=1)
-            < 0.15
+        distance = np.linalg.norm(
+            BALL.face_center - np.divide(center, np.linalg.norm(center)), axis=1
         )
-        guides[near] = direction
+        guides[distance < 0.15] = direction
     whole = prescribed_field(BALL, degree, last, [degree, degree], guides)
     bent = prescribed_field(BALL, degree, last, [degree, degree], guides, 0.02)
     assert indices(BALL, bent) == dict.fromkeys(last, degree)
-    normal = BALL.face_normal
-    tangential = guides - (guides * normal).sum(axis=1, keepdims=True) * normal
+    tangential = guides - dot(guides, BALL.face_normal)[:, None] * BALL.face_normal
     is_guided = guides.any(axis=1)
-    error = turned_by(BALL, RosyField(degree, tangential), bent)[is_guided]
-    assert np.median(error) < 3 and error.max() < 10
-    assert turned_by(BALL, RosyField(degree, tangential), whole)[is_guided].max() > 15
+    error, error_of_whole = (
+        turned_by(BALL, RosyField(degree, tangential), field)[is_guided] for field in (bent, whole)
+    )
+    assert np.median(error) < 3 and error.max() < 10 and error_of_whole.max() > 15
 
 
 @pytest.mark.parametrize("degree", [1, 2, 4])
@@ -171,8 +154,7 @@ def test_a_field_bends_by_several_members(degree):
     height = surface.face_center[:, 2]
     angle = 2 * np.pi * (height - height.min()) / np.ptp(height)
     x, y = surface.face_frames
-    along = np.array([0.0, 0.0, 1.0]) - surface.face_normal * surface.face_normal[:, 2:]
-    start = np.arctan2((along * y).sum(axis=1), (along * x).sum(axis=1))
+    start = np.arctan2(y[:, 2], x[:, 2])
     guides = np.cos(start + angle)[:, None] * x + np.sin(start + angle)[:, None] * y
     field = prescribed_field(surface, degree, [], [], guides, 0.05 * np.ptp(height))
     assert not len(find_singularities(surface, field)[0])

@@ -3,7 +3,7 @@
 import pytest
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def device():
     """A plain OpenGL context."""
     pytest.importorskip("moderngl", reason="no moderngl")
@@ -15,7 +15,7 @@ def device():
         pytest.skip(f"no OpenGL context through EGL: {error}")
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def card(device):
     """The renderer on this context."""
     from rosy_addon.gpu.renderer import GpuRenderer

@@ -11,14 +11,13 @@ from harness.gpu_scenes import (
     ROSY,
     SHEAR,
     perturbed_field,
-    placed,
     rotation,
     shown,
     smooth_field,
 )
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from shapes import from_triangles, icosphere
+from shapes import from_triangles, icosphere, placed
 
 from rosy_addon.compositor.pixel_field import surface_pixel_field
 from rosy_addon.field.generate import axis_field
@@ -141,10 +140,7 @@ def test_only_meshes_with_a_field_have_records_and_a_limit(error_of, monkeypatch
     assert "sphere" in message and "80" in message
 
 
-FIELDS = {
-    **{f"RoSy {n}": lambda surface, n=n: axis_field(surface, n) for n in range(1, 7)},
-    **FREE,
-}
+FIELDS = {**{f"RoSy {n}": lambda surface, n=n: axis_field(surface, n) for n in range(1, 7)}, **FREE}
 
 
 @pytest.mark.parametrize("name", FIELDS)

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from awkward import moebius
-from conftest import long
 from harness.gpu_scenes import (
     AXIS,
     BALL,
@@ -30,13 +29,12 @@ from harness.gpu_scenes import (
     smooth_field,
     view,
 )
-from shapes import cube, cylinder, from_triangles, icosphere, plane, torus
+from shapes import cylinder, from_triangles, icosphere, plane, rebuilt, sharp_cube, torus
 
 from rosy_addon.compositor.flow import Drift
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.rosy_field import RosyField
-from rosy_addon.field.surface import build_surface
 from rosy_addon.projection.camera import Camera, look_at, perspective_camera
 
 FAMILIES = replace(LOOK, hue="families")
@@ -85,9 +83,8 @@ def moved_back():
 
 
 def wide_plane():
-    """Two triangles that reach behind the camera and far away."""
-    corners = 500.0 * np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)])
-    return with_axis_field(from_triangles(corners, [(0, 1, 2), (0, 2, 3)]), 4, (1, 0.3, 0))
+    """A square that reaches behind the camera and far away."""
+    return with_axis_field(plane(1, 1, 1000.0), 4, (1, 0.3, 0))
 
 
 def with_degenerate_triangles():
@@ -172,15 +169,14 @@ LINEAR_PARTS = {
 
 
 @pytest.mark.parametrize("name", LINEAR_PARTS)
-@pytest.mark.parametrize("degree", [3, 4])
-def test_matrices(card, name, degree):
+def test_matrices(card, name):
     linear = LINEAR_PARTS[name]
     scale = np.cbrt(abs(np.linalg.det(linear)))
     eye = 4.5 * scale * np.array([0.4, -0.9, 0.5])
-    assert_parity(card, [ball(degree, linear)], camera_from(eye, fov=0.75, scale=scale))
+    assert_parity(card, [ball(3, linear)], camera_from(eye, fov=0.75, scale=scale))
 
 
-@pytest.mark.parametrize("degree", [1, 3, 4])
+@pytest.mark.parametrize("degree", [3, 4])
 @pytest.mark.parametrize("distortion", [np.eye(3), MIRROR])
 def test_the_back_of_an_open_surface(card, degree, distortion):
     sheet = with_axis_field(plane(8, 8), degree, (1.0, 0.4, 0.0), distortion)
@@ -190,11 +186,10 @@ def test_the_back_of_an_open_surface(card, degree, distortion):
     assert_parity(card, [tube], camera_from((0.5, -2.0, 3.0), fov=0.8))
 
 
-@pytest.mark.parametrize("degree", [1, 3, 4])
 @pytest.mark.parametrize("turn", range(4))
-def test_normals_with_zeros_of_either_sign(card, degree, turn):
+def test_normals_with_zeros_of_either_sign(card, turn):
     """The frame of a normal depends on the sign of its z, also if z is 0."""
-    axis = (0.4, 0.5, 0.6)
+    degree, axis = 3, (0.4, 0.5, 0.6)
     tube = with_axis_field(cylinder(24, 8), degree, axis, rotation(0, 0, turn * np.pi / 2))
     assert_parity(card, [tube], view(distance=6.0, perspective=False))
     corners = np.array([(-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1)]) * (1.0, -0.0, 1.0)
@@ -207,17 +202,14 @@ def test_normals_with_zeros_of_either_sign(card, degree, turn):
 
 
 @pytest.mark.parametrize(
-    ("crossing", "degree"), [(True, 4), (False, 3), (False, 4), *long((False, 1), (False, 2))]
+    ("crossing", "degree", "perspective"), [(True, 4, True), (False, 3, True), (False, 4, False)]
 )
 @pytest.mark.parametrize("display", ["smooth", "flat"])
-@pytest.mark.parametrize("perspective", [True, False])
 def test_creases_of_a_cube(card, crossing, degree, display, perspective):
     """Axis-aligned walls. Low degrees are not tested across creases: the directions on one wall lie
     between the directions on the next.
     """
-    box = cube()
-    surface = build_surface(box.vertices, box.corner_vertex, box.face_start, sharp_angle=1.0)
-    instance = with_axis_field(surface, degree, (0.9, 0.4, 0.1), 2.0, (-1, -1, -1))
+    instance = with_axis_field(sharp_cube(), degree, (0.9, 0.4, 0.1), 2.0, (-1, -1, -1))
     look = replace(LOOK, crease_angle=np.pi if crossing else 0.7, display=display)
     for shown_look in (look, replace(look, ink="hatch", outline=3.0)):
         assert_parity(card, [instance], view(perspective=perspective, distance=8.0), shown_look)
@@ -227,7 +219,7 @@ def noisy_ball():
     """A dense ball with bumps, which hide each other at grazing angles."""
     surface = icosphere(4)
     noise = 1 + 0.012 * np.random.default_rng(2).standard_normal((len(surface.vertices), 1))
-    return build_surface(surface.vertices * noise, surface.corner_vertex, surface.face_start)
+    return rebuilt(surface, surface.vertices * noise)
 
 
 OUTLINED = {
@@ -241,9 +233,7 @@ OUTLINED = {
 }
 
 
-@pytest.mark.parametrize(
-    ("samples", "perspective"), [(1, True), (2, False), *long((1, False), (3, True))]
-)
+@pytest.mark.parametrize(("samples", "perspective"), [(1, True), (2, False)])
 @pytest.mark.parametrize("name", OUTLINED)
 def test_outlines_alone(card, name, samples, perspective):
     """Creases, parts and short marks on white paper: nearly all pixels of the lines agree."""
@@ -259,14 +249,12 @@ def test_outlines_alone(card, name, samples, perspective):
 # --- free directions and families ----------------------------------------------------------------
 
 
-@pytest.mark.parametrize("hue", ["families", *long("one")])
 @pytest.mark.parametrize("name", FREE)
-def test_free_directions(card, name, hue):
+def test_free_directions(card, name):
     field = FREE[name](BALL)
     assert field.direction_ratios is not None and field.family_count > 1
-    look = replace(LOOK, hue=hue)
-    assert_parity(card, [shown(BALL, field)], look=look)
-    guided = replace(look, guiding_angle=1.1)
+    assert_parity(card, [shown(BALL, field)], look=FAMILIES)
+    guided = replace(FAMILIES, guiding_angle=1.1)
     assert_parity(card, [shown(BALL, field)], view(azimuth=2.0), guided)
 
 
@@ -279,21 +267,17 @@ FREE_LOOKS = {
 
 
 @pytest.mark.parametrize("look", FREE_LOOKS)
-@pytest.mark.parametrize("name", ["three", "two lines", *long("two", "tensors")])
+@pytest.mark.parametrize("name", ["three", "two lines"])
 def test_looks_of_free_directions(card, name, look):
     instance = shown(BALL, FREE[name](BALL))
     assert_parity(card, [instance], look=FREE_LOOKS[look], drift=Drift(0.2))
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.9])
-@pytest.mark.parametrize("degree", [3, 4, *long(2, 5, 6)])
+@pytest.mark.parametrize("degree", [3, 4])
 def test_families_of_rosys(card, degree, angle):
     field = smooth_field(BALL, degree, degree if degree % 2 else degree // 2)
-    # Where streamlines diverge near a singularity, pixels differ in hue as well as in brightness.
-    # Degree 5 has the most singularities in view: its pictures correlate by 0.9785.
-    likeness = 0.975 if degree == 5 else 0.98
-    look = replace(FAMILIES, guiding_angle=angle)
-    assert_parity(card, [shown(BALL, field)], look=look, likeness=likeness)
+    assert_parity(card, [shown(BALL, field)], look=replace(FAMILIES, guiding_angle=angle))
 
 
 MIXED = {
@@ -307,10 +291,9 @@ MIXED = {
 }
 
 
-@pytest.mark.parametrize("hue", ["families", *long("one")])
 @pytest.mark.parametrize("name", MIXED)
-def test_fields_of_two_kinds_are_independent(card, name, hue):
-    assert_parity(card, pair_of(*MIXED[name]()), look=replace(LOOK, hue=hue, length=15))
+def test_fields_of_two_kinds_are_independent(card, name):
+    assert_parity(card, pair_of(*MIXED[name]()), look=replace(FAMILIES, length=15))
 
 
 # --- even lines ----------------------------------------------------------------------------------

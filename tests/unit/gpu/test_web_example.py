@@ -65,6 +65,7 @@ def test_the_material_draws_the_ink_of_thresholds(device, settings):
         "paper": tuple(inks.paper),
     }
     context = device.context
+    context.enable_only(context.NOTHING)
     program = context.program(VERTEX, fragment_shader=fragment_shader())
     context.texture((256, 1), 4, pixels.tobytes(), dtype="f4").use(0)
     target = context.framebuffer([context.texture((256, 1), 4, dtype="f4")])

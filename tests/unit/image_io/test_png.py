@@ -21,9 +21,8 @@ def chunks_of(data: bytes) -> dict[bytes, bytes]:
     while offset < len(data):
         (size,) = struct.unpack(">I", data[offset : offset + 4])
         name, body = data[offset + 4 : offset + 8], data[offset + 8 : offset + 8 + size]
-        assert struct.unpack(">I", data[offset + 8 + size : offset + 12 + size])[0] == zlib.crc32(
-            name + body
-        )
+        (checksum,) = struct.unpack(">I", data[offset + 8 + size : offset + 12 + size])
+        assert checksum == zlib.crc32(name + body)
         chunks[name] = body
         offset += 12 + size
     first, *_, last = chunks
@@ -80,24 +79,18 @@ def filtered(rows: np.ndarray, bytes_per_pixel: int, filters: list[int]) -> byte
     return out
 
 
-def write_filtered(
-    path, values: np.ndarray, kind: int, *, filters=None, extra_chunks=b"", interlaced=0
-):
+def write_filtered(path, values: np.ndarray, kind: int, extra_chunks=b"", interlaced=0):
     """Write a .png file of (H, W, K) uint8 or uint16 values, rows from the top."""
     height, width, channels = values.shape
     depth = values.dtype.itemsize
     rows = values.astype(values.dtype.newbyteorder(">")).reshape(height, -1).view(np.uint8)
-    filters = [row % 5 for row in range(height)] if filters is None else filters
+    filters = [row % 5 for row in range(height)]
     data = zlib.compress(filtered(rows, channels * depth, filters))
     header = struct.pack(">IIBBBBB", width, height, 8 * depth, kind, 0, 0, interlaced)
     half = len(data) // 2
-    parts = (
-        chunk(b"IHDR", header)
-        + extra_chunks
-        + chunk(b"IDAT", data[:half])
-        + chunk(b"IDAT", data[half:])
-    )
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + parts + chunk(b"IEND", b""))
+    parts = [chunk(b"IHDR", header), extra_chunks]
+    parts += [chunk(b"IDAT", data[:half]), chunk(b"IDAT", data[half:]), chunk(b"IEND", b"")]
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(parts))
     return path
 
 
@@ -124,15 +117,6 @@ def test_files_with_a_palette_are_read(tmp_path):
     rgba = read_png(write_filtered(tmp_path / "a.png", values, 3, extra_chunks=extra_chunks))
     np.testing.assert_allclose(rgba[..., :3], to_linear(colors[[[2, 1], [0, 1]]] / 255), atol=1e-6)
     np.testing.assert_allclose(rgba[..., 3] * 255, [[255, 64], [255, 64]], atol=1e-4)
-
-
-def test_written_files_are_read(tmp_path):
-    rgba = np.random.default_rng(1).random((9, 13, 4), dtype=np.float32)
-    write_png(tmp_path / "a.png", rgba)
-    read_back = read_png(tmp_path / "a.png")
-    assert (
-        np.abs(to_display(read_back[..., :3]) - to_display(rgba[..., :3])).max() <= 0.5 / 255 + 1e-6
-    )
 
 
 def test_errors_of_damaged_files(tmp_path, error_of):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from shapes import icosphere, plane
 
-from rosy_addon.field.generate import axis_field, generate
+from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.line_drawing.mesh_in_view import MARGIN_PIXELS, MARGIN_RATIO, mesh_in_view
 from rosy_addon.line_drawing.surface_particles import SurfaceParticles, trace_geodesics
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
@@ -30,9 +30,8 @@ SCENES = {
 
 def mesh_and_part(name):
     surface, camera = SCENES[name]
-    field = (
-        axis_field(surface, 4, (1, 0.3, 0)) if name == "ground" else generate(surface, "form", 4)
-    )
+    settings = GeneratorSettings("axis", (1, 0.3, 0)) if name == "ground" else "form"
+    field = generate(surface, settings, 4)
     mesh = build_tangent_mesh(MeshInstance(surface, np.eye(4), field))
     return mesh, mesh_in_view(mesh, camera), camera
 
@@ -46,9 +45,8 @@ def random_weights(count, rng):
 def test_part_is_what_is_in_the_frame(name):
     mesh, part, camera = mesh_and_part(name)
     points = part.mesh.points.reshape(-1, 3)
-    assert np.allclose(
-        points, np.einsum("tkj,tji->tki", part.weights, mesh.points[part.triangle]).reshape(-1, 3)
-    )
+    expected = np.einsum("tkj,tji->tki", part.weights, mesh.points[part.triangle])
+    assert np.allclose(part.mesh.points, expected)
     pixels, _ = project_to_pixels(points + 1e-7 * (points.mean(axis=0) - points), camera)
     size = np.array([camera.width, camera.height])
     limit = size / 2 + np.minimum(MARGIN_PIXELS, MARGIN_RATIO * size)

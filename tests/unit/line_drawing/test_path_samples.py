@@ -51,11 +51,8 @@ def test_samples_of_a_straight_path():
     lengths = np.bincount(cut.particle, cut.length)
     np.testing.assert_allclose(lengths, 0.37 * path.length, atol=1e-9)
     end = np.flatnonzero(np.diff(cut.particle, append=-1))
-    np.testing.assert_allclose(
-        mesh.points_at(cut.triangle[end], cut.end_weights[end])[:, 0],
-        x + 0.37 * path.length,
-        atol=1e-9,
-    )
+    reached = mesh.points_at(cut.triangle[end], cut.end_weights[end])[:, 0]
+    np.testing.assert_allclose(reached, x + 0.37 * path.length, atol=1e-9)
 
     # Paths that are much shorter than a step, and begin with a segment without length.
     first = np.unique(path.path.particle, return_index=True)[1]
@@ -80,9 +77,8 @@ def test_samples_are_accepted_one_after_the_other(monkeypatch):
     spacing = CornerSpacing(np.full((len(mesh.points), 3), 0.1))
     reached = []
     for sample_counts in ((6,), (1,) * 6):
-        placer = placement.StreamlinePlacer(
-            mesh, spacing, SeparationRules(min_length=0.0, max_gap=np.inf)
-        )
+        rules = SeparationRules(min_length=0.0, max_gap=np.inf)
+        placer = placement.StreamlinePlacer(mesh, spacing, rules)
         seeds = candidate_seeds(mesh, spacing.values)
         placer.add_seeds(thinned_seeds(mesh, seeds, 0.2, np.ones(len(seeds))))
         for count in sample_counts:

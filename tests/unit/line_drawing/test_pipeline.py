@@ -9,13 +9,12 @@ import pytest
 from harness.stroke_tracing import trace_strokes
 from listeners import cancel_at
 from scipy.spatial import cKDTree
-from shapes import from_triangles, icosphere, instance_of, moved, plane
+from shapes import from_triangles, icosphere, instance_of, moved, plane, rebuilt
 
 from rosy_addon.compositor.shading import Light
 from rosy_addon.core.progress import listening
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, generate
-from rosy_addon.field.surface import build_surface
 from rosy_addon.line_drawing import lateral_neighbors, seeding, separation, visibility
 from rosy_addon.line_drawing.drawing_outputs import offset_toward_camera, stroke_geometry
 from rosy_addon.line_drawing.outline import OUTLINE_KINDS
@@ -43,9 +42,8 @@ ORTHOGRAPHIC = orthographic_camera(look_at((0.5, -4, 1), (0, 0, 0)), 240, 200, s
 def test_families_of_several_instances_are_merged_by_name():
     degree_6 = MeshInstance(icosphere(3), moved(x=0.9), generate(icosphere(3), "smoothest", 6))
     occluder = MeshInstance(plane(), moved(z=-1.0))
-    drawing = draw_instances(
-        [occluder, SPHERE, degree_6], CAMERA, StrokeStyle(spacing=12, outline=True)
-    )
+    style = StrokeStyle(spacing=16, outline=True)
+    drawing = draw_instances([occluder, SPHERE, degree_6], CAMERA, style)
     strokes = drawing.strokes
     assert strokes.names == ("family 1", "family 2", "family 3", *OUTLINE_KINDS)
     for instance, expected in ((1, {0, 1}), (2, {0, 1, 2})):
@@ -74,9 +72,8 @@ def test_a_floor_that_continues_behind_the_camera_is_drawn():
 def test_spacings_in_world_units_do_not_depend_on_the_camera(distance):
     square = MeshInstance(plane(8, 8), IDENTITY, generate(plane(8, 8), ALONG_X, 2))
     camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 300, 300, scale=3.0)
-    drawing = draw_instances(
-        [square], camera, StrokeStyle(unit="world", distance=distance, hidden=True)
-    )
+    style = StrokeStyle(unit="world", distance=distance, hidden=True)
+    drawing = draw_instances([square], camera, style)
     # The total length is the area, 2 by 2, divided by the distance.
     assert np.isclose(drawing.strokes.length.sum(), 4 / distance, rtol=0.12)
 
@@ -104,7 +101,7 @@ def test_light_is_that_of_lambert():
 @pytest.mark.slow
 @pytest.mark.parametrize("camera", [CAMERA, ORTHOGRAPHIC], ids=["perspective", "orthographic"])
 def test_offset_toward_the_camera_keeps_the_picture_and_clears_the_surface(camera):
-    strokes = draw_instances([SPHERE], camera, StrokeStyle(spacing=12)).strokes
+    strokes = draw_instances([SPHERE], camera, StrokeStyle(spacing=16)).strokes
     points = offset_toward_camera(strokes, camera, 2.0)
     pixels, depth = project_to_pixels(strokes.points, camera)
     offset_pixels, offset_depth = project_to_pixels(points, camera)
@@ -121,15 +118,14 @@ def test_offset_toward_the_camera_keeps_the_picture_and_clears_the_surface(camer
 
 @pytest.mark.slow
 def test_stroke_geometry_has_the_width_and_colors_of_the_pen():
-    drawing = draw_instances([SPHERE], CAMERA, StrokeStyle(spacing=12, taper=0.0))
+    drawing = draw_instances([SPHERE], CAMERA, StrokeStyle(spacing=20, taper=0.0))
     geometry = stroke_geometry(drawing, CAMERA, Pen(width=3.0, colors=["#112233", "#445566"]))
     np.testing.assert_allclose(2 * geometry.radius / pixel_size(geometry.points, CAMERA), 3.0)
     assert geometry.colors == ["#112233", "#445566"]
-    hidden = draw_instances([SPHERE], CAMERA, StrokeStyle(spacing=12, hidden=True))
+    hidden = draw_instances([SPHERE], CAMERA, StrokeStyle(spacing=20, hidden=True))
     offset_points = stroke_geometry(hidden, CAMERA, Pen(width=3.0)).points
-    assert np.linalg.norm(offset_points, axis=1).min() > 1 and len(hidden.strokes) > len(
-        drawing.strokes
-    )
+    assert np.linalg.norm(offset_points, axis=1).min() > 1
+    assert len(hidden.strokes) > len(drawing.strokes)
 
 
 @pytest.mark.parametrize("tilt", [0.8, 1.4, 2.8])
@@ -137,12 +133,8 @@ def test_seeding_ends_where_shading_normals_are_steep(tilt):
     """As on polygons that are not flat: strokes beside each other still find each other."""
     flat = plane(2, 2)
     normal = np.tile((0.0, np.sin(tilt), np.cos(tilt)), (len(flat.corner_vertex), 1))
-    surface = build_surface(
-        flat.vertices, flat.corner_vertex, flat.face_start, corner_normal=normal
-    )
-    instance = MeshInstance(
-        surface, IDENTITY, generate(surface, GeneratorSettings("axis", (1, 0, 0)), 2)
-    )
+    surface = rebuilt(flat, corner_normal=normal)
+    instance = MeshInstance(surface, IDENTITY, generate(surface, ALONG_X, 2))
     with listening(cancel_at(300)):
         strokes = trace_strokes(instance, 0.1)
     assert 30 < strokes.length.sum() < 50
@@ -150,7 +142,7 @@ def test_seeding_ends_where_shading_normals_are_steep(tilt):
 
 @pytest.mark.slow
 def test_blocks_do_not_change_strokes(monkeypatch):
-    style = StrokeStyle(spacing=10, outline=True)
+    style = StrokeStyle(spacing=16, outline=True)
     expected = draw_instances([SPHERE], CAMERA, style).strokes
     for module, name in (
         (separation, "BLOCK_POINTS"),
@@ -167,14 +159,10 @@ def test_blocks_do_not_change_strokes(monkeypatch):
 
 def test_seeding_ends_where_all_strokes_are_short():
     """Short strokes seeded each other in turn for ever on faces of a few spacings."""
-    surface = from_triangles(
-        [(1, 1, 1), (-1, -1, 1), (-1, 1, -1), (1, -1, -1)],
-        [(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)],
-    )
-    surface = build_surface(
-        surface.vertices, surface.corner_vertex, surface.face_start, sharp_angle=0.5
-    )
-    instance = MeshInstance(surface, IDENTITY, generate(surface, "smoothest", 6))
+    points = [(1, 1, 1), (-1, -1, 1), (-1, 1, -1), (1, -1, -1)]
+    triangles = [(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)]
+    surface = from_triangles(points, triangles, sharp_angle=0.5)
+    instance = instance_of(surface, 6)
     camera = orbit_camera(surface.vertices, 45, 20, 150, 100)
     with listening(cancel_at(300)):
         draw_instances([instance], camera, StrokeStyle(curvature=0.5, hidden=True))
@@ -208,11 +196,10 @@ def test_errors(error_of):
 @pytest.mark.slow
 def test_swelling_strokes_are_evenly_spaced():
     """They are where strokes without a tone are, and their width is the darkness."""
-    style = StrokeStyle(spacing=9, taper=0.0, hidden=True)
+    style = StrokeStyle(spacing=16, taper=0.0, hidden=True)
     even = draw_instances([SPHERE], CAMERA, style).strokes
-    swelling = draw_instances(
-        [SPHERE], CAMERA, replace(style, light="headlight", swell=1.0)
-    ).strokes
+    swelling_style = replace(style, light="headlight", swell=1.0)
+    swelling = draw_instances([SPHERE], CAMERA, swelling_style).strokes
     denser = draw_instances([SPHERE], CAMERA, replace(style, light="headlight")).strokes
     share, share_of_denser = (
         np.mean(cKDTree(even.points).query(strokes.points)[0] < 1e-6)

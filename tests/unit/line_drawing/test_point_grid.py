@@ -19,19 +19,17 @@ def spread_points(count, octaves):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("octaves", [0, 4, 16])
+@pytest.mark.parametrize("octaves", [0, 16])
 def test_all_pairs_are_found(octaves):
-    points, radius = spread_points(3000, octaves)
+    points, radius = spread_points(1500, octaves)
     grid = PointGrid(float(np.median(radius)), len(points))
     grid.add(points[:1000], radius[:1000])
     grid.add(points[1000:], radius[1000:])
-    grid.remove(np.arange(0, 3000, 7))
+    grid.remove(np.arange(0, 1500, 7))
     query, other = grid.pairs_within(points, radius)
     actual = np.unique(np.stack([query, other], axis=1), axis=0)
     neighbors = cKDTree(points).query_ball_point(points, radius)
-    expected = np.stack(
-        [np.repeat(np.arange(len(points)), list(map(len, neighbors))), np.concatenate(neighbors)],
-        axis=1,
-    )
+    own = np.repeat(np.arange(len(points)), list(map(len, neighbors)))
+    expected = np.stack([own, np.concatenate(neighbors)], axis=1)
     expected = expected[expected[:, 1] % 7 != 0]
     np.testing.assert_array_equal(actual, np.unique(expected, axis=0))

@@ -35,13 +35,10 @@ def test_every_triangle_that_is_not_hidden_is_seen(camera):
     instances = [ring, ball]
     found = seen(instances, 1, camera)
     corners = ball.world_points()[ball.surface.triangle_vertex]
-    occluders = np.concatenate(
-        [other.world_points()[other.surface.triangle_vertex] for other in instances]
-    )
-    rng = np.random.default_rng(3)
-    weights = rng.dirichlet(np.ones(3), size=len(corners))
+    occluders = [other.world_points()[other.surface.triangle_vertex] for other in instances]
+    weights = np.random.default_rng(3).dirichlet(np.ones(3), size=len(corners))
     points = np.einsum("tk,tki->ti", weights, corners)
-    is_seen = ~meets_another(points, camera.view_directions(points), occluders)
+    is_seen = ~meets_another(points, camera.view_directions(points), np.concatenate(occluders))
     assert is_seen.sum() > 50
     assert found[is_seen].mean() > 0.98
     pixels, _ = project_to_pixels(corners.reshape(-1, 3), camera)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import pytest
 from harness.stroke_tracing import planar_strokes, trace_strokes, turned
@@ -23,21 +25,12 @@ def test_taper_and_closed_strokes():
 def test_ends_that_meet_head_on_are_not_tapered():
     """Stroke 1 continues stroke 0 at half a spacing, 2 is beside 0, and 3 is perpendicular to it."""
     along = np.linspace(0, 1, 11)[:, None] * np.array([1.0, 0, 0])
-    points = [
-        along,
-        along + (1.05, 0.05, 0),
-        along + (0, 0.1, 0),
-        along[:, [1, 0, 2]] + (1.02, 0, 0),
-    ]
+    points = [along, along + (1.05, 0.05, 0), along + (0, 0.1, 0)]
+    points.append(along[:, [1, 0, 2]] + (1.02, 0, 0))
     directions = np.repeat([[1.0, 0, 0], [1.0, 0, 0], [1.0, 0, 0], [0, 1.0, 0]], 11, axis=0)
     strokes = planar_strokes(np.array(points), directions, 0.1)
     # The last end of stroke 2 is beside that of stroke 0, and also meets stroke 1.
-    assert head_on_ends(strokes).tolist() == [
-        [False, True],
-        [True, False],
-        [False, True],
-        [False, False],
-    ]
+    assert head_on_ends(strokes).tolist() == [[0, 1], [1, 0], [0, 1], [0, 0]]
     tapered = strokes.tapered(2.0, 0.2, ~head_on_ends(strokes))
     first, last = tapered.start[:-1], tapered.start[1:] - 1
     end_width = np.stack([tapered.width[first], tapered.width[last]], axis=1)
@@ -67,20 +60,21 @@ def test_gaps_at_crossings(columns):
     assert not len(find_crossings(gapped).stroke)
     removed_length = strokes.length.sum() - gapped.length.sum()
     assert np.isclose(removed_length, len(crossings.stroke) * 0.3 * 0.2, rtol=0.1)
-    for family in (
-        0,
-        1,
-    ):  # strokes pass over and under in turn, so each family has half of the gaps
+    for family in (0, 1):  # strokes pass over and under in turn: each family has half of the gaps
         cut = strokes.length[strokes.family == family].sum()
         cut -= gapped.length[gapped.family == family].sum()
         assert np.isclose(cut, removed_length / 2, rtol=0.1)
 
 
-@pytest.mark.slow
-@settings(max_examples=30, deadline=None)
+@lru_cache(maxsize=1)
+def lines():
+    return trace_strokes(instance_of(plane(3, 3), 2), 0.2)
+
+
+@settings(max_examples=30)
 @given(st.floats(0.01, 1.9), st.floats(0.01, 0.5))
 def test_cut_intervals_remove_their_length(low, size):
-    strokes = trace_strokes(instance_of(plane(3, 3), 2), 0.2)
+    strokes = lines()
     remaining = cut_intervals(strokes, np.array([0]), np.array([low]), np.array([low + size]))
     total = strokes.length[0]
     assume(low + size < total - 1e-6 or low + size > total + 1e-6)

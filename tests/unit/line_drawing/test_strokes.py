@@ -3,22 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise, product
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from conftest import long, mainly
 from field_helpers import bumpy
 from harness.stroke_spacing import lateral_gaps
-from harness.stroke_tracing import planar_strokes, trace_strokes, turned, visible_strokes
+from harness.stroke_tracing import latitudes, planar_strokes, trace_strokes, turned, visible_strokes
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapes import cylinder, icosphere, instance_of, plane, sharp_cube, torus
+from shapes import (
+    cylinder,
+    from_quads,
+    icosphere,
+    instance_of,
+    joined,
+    moved,
+    plane,
+    rebuilt,
+    sharp_cube,
+    torus,
+)
 
 from rosy_addon.field.frames import dot, normalize, transport, view_frame
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.rosy_field import RosyField
-from rosy_addon.field.surface import build_surface
 from rosy_addon.line_drawing.families import global_labels
 from rosy_addon.line_drawing.outline import outline_strokes
 from rosy_addon.line_drawing.seeding import singularities
@@ -46,40 +55,11 @@ def segments_of(strokes):
     return strokes.points[end - 1], strokes.points[end], strokes.triangle[end]
 
 
-def direction_errors(mesh, strokes, fractions=(0.0, 0.5, 1.0)):
-    """Return the angles in degrees between segments and the nearest member at points along them."""
-    start, end, triangle = segments_of(strokes)
-    is_long = np.linalg.norm(end - start, axis=1) > 1e-9 * np.abs(strokes.points).max()
-    start, end, triangle = start[is_long], end[is_long], triangle[is_long]
-    direction = normalize(end - start)
-    tangent = dot(direction, mesh.x[triangle]) + 1j * dot(direction, mesh.y[triangle])
-    tangent /= np.abs(tangent)
-    corner = mesh.points[triangle]
-    edges = [planar(mesh, triangle, corner[:, k] - corner[:, 0]) for k in (1, 2)]
-    matrix = np.stack(edges, axis=2)
-    max_error = np.zeros(len(start))
-    for fraction in fractions:
-        point = planar(mesh, triangle, start + fraction * (end - start) - corner[:, 0])
-        last_weights = np.linalg.solve(matrix, point[..., None])[..., 0]
-        weights = np.column_stack([1 - last_weights.sum(axis=1), last_weights])
-        z = np.einsum("nk,nk->n", weights, mesh.z[triangle])
-        # Segments run forward or backward along a member.
-        power = 1 if mesh.degree % 2 == 0 else 2
-        error = np.angle((z * (tangent.conj() ** mesh.degree)) ** power) / (power * mesh.degree)
-        max_error = np.maximum(max_error, np.degrees(np.abs(error)))
-    return max_error
-
-
-def planar(mesh, triangle, vectors):
-    """Return the (n, 2) components of (n, 3) vectors in the frames of triangles."""
-    return np.stack([dot(vectors, axis[triangle]) for axis in (mesh.x, mesh.y)], axis=1)
-
-
 # --- directions ------------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=8)
 @given(st.floats(0, np.pi), st.integers(1, 6), st.integers(1, 7))
 def test_in_the_plane_strokes_are_straight_and_evenly_spaced(angle, degree, cells):
     instance = turned(plane(cells, cells), degree, angle)
@@ -91,19 +71,9 @@ def test_in_the_plane_strokes_are_straight_and_evenly_spaced(angle, degree, cell
     error = (chord_angle * line_count / np.pi + 0.5) % 1 - 0.5
     assert np.abs(error).max() < 1e-4
     assert np.abs(strokes.points).max() <= 1 + 1e-9
-    gaps = lateral_gaps(build_tangent_mesh(instance), strokes)
+    gaps = lateral_gaps(build_tangent_mesh(instance), strokes, 4000)
     assert gaps.evenness() > 0.9
     assert gaps.nearest_distance.min() > 0.5
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("degree", [3, *long(1, 2, 4, 6)])
-def test_directions_are_those_of_the_field_everywhere(degree):
-    surface = icosphere(3)
-    instance = instance_of(surface, degree)
-    mesh = build_tangent_mesh(instance)
-    strokes = trace_strokes(instance, 0.1)
-    assert direction_errors(mesh, strokes).max() < 1.0
 
 
 @pytest.mark.slow
@@ -122,7 +92,7 @@ def test_segments_lie_in_their_faces_and_strokes_cross_edges_without_a_gap():
 def test_strokes_look_like_the_render():
     """Strokes have the direction of the field in the G-buffer at the pixels that they cross."""
     instance = instance_of(icosphere(4), 4)
-    camera = orbit_camera(instance.surface.vertices, 20, 30, 900, 900, perspective=False)
+    camera = orbit_camera(instance.surface.vertices, 20, 30, 600, 600, perspective=False)
     gbuffer = project([instance], camera)
     visible = visible_strokes(trace_strokes(instance, 0.1), [instance], camera)
     end = np.flatnonzero(np.diff(visible.stroke, prepend=-1) == 0)
@@ -186,20 +156,12 @@ def test_straight_ahead_is_a_geodesic():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("surface", "degree", "kind"),
-    [
-        (torus(64, 32), 4, "smoothest"),
-        (icosphere(4), 4, "smoothest"),
-        *long((torus(64, 32), 2, "axis"), (icosphere(4), 2, "smoothest")),
-        *long((icosphere(4), 6, "smoothest")),
-    ],
-)
-def test_strokes_are_even_and_not_too_close(surface, degree, kind):
+@pytest.mark.parametrize("surface", [torus(64, 32), icosphere(4)], ids=["torus", "sphere"])
+def test_strokes_are_even_and_not_too_close(surface):
     """On the sphere, also around singularities."""
-    instance = instance_of(surface, degree, kind)
+    instance = instance_of(surface, 4)
     strokes = trace_strokes(instance, 0.03 * surface.extent)
-    gaps = lateral_gaps(build_tangent_mesh(instance), strokes)
+    gaps = lateral_gaps(build_tangent_mesh(instance), strokes, 4000)
     assert gaps.nearest_distance.min() >= 0.5
     assert gaps.evenness() >= 0.9
 
@@ -207,8 +169,8 @@ def test_strokes_are_even_and_not_too_close(surface, degree, kind):
 def instance_with_singularity(degree, sign, center, phase):
     """Return a plane whose field has one singularity of index sign / degree."""
     surface = plane(50, 50)
-    face_center = surface.vertices[surface.corner_vertex].reshape(-1, 4, 3).mean(axis=1)
-    polar_angle = np.arctan2(face_center[:, 1] - center[1], face_center[:, 0] - center[0])
+    offset = surface.face_center[:, :2] - center
+    polar_angle = np.arctan2(offset[:, 1], offset[:, 0])
     angle = sign * polar_angle / degree + phase
     direction = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     return MeshInstance(surface, IDENTITY, RosyField(degree, direction))
@@ -230,10 +192,7 @@ def closest_approaches(strokes, center):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("degree", "sign", "phase"),
-    mainly([(2, -1, 1.1), (4, 1, 0.3)], product([2, 4, 6], [1, -1], [0.3, 1.1])),
-)
+@pytest.mark.parametrize(("degree", "sign", "phase"), [(2, -1, 1.1), (4, 1, 0.3)])
 def test_around_singularities_strokes_are_alike_on_all_sides(degree, sign, phase):
     """There are N - 1 or N + 1 equal sectors. The closest stroke has the same distance in each."""
     center, spacing = (0.013, -0.007), 0.08
@@ -250,7 +209,7 @@ def test_around_singularities_strokes_are_alike_on_all_sides(degree, sign, phase
     polar_angle = np.sort(polar_angle)
     sector_angle = np.diff(polar_angle, append=polar_angle[0] + 2 * np.pi)
     assert np.abs(np.degrees(sector_angle) - 360 / sectors).max() < 8
-    gaps = lateral_gaps(mesh, strokes)
+    gaps = lateral_gaps(mesh, strokes, 4000)
     assert gaps.nearest_distance.min() >= 0.5
 
 
@@ -280,35 +239,25 @@ def test_strokes_that_are_too_close_are_cut():
 
 @pytest.mark.slow
 def test_circles_of_latitude_close():
-    surface = icosphere(4)
-    instance = MeshInstance(surface, IDENTITY, axis_field(surface, 4, (0, 0, 1)))
+    instance = latitudes(icosphere(4))
     mesh, strokes = build_tangent_mesh(instance), trace_strokes(instance, 0.1)
     loops = strokes.select(strokes.closed)
     assert len(loops) >= 20
     gap = loops.points[loops.start[1:] - 1] - loops.points[loops.start[:-1]]
     assert np.linalg.norm(gap, axis=1).max() < 1e-3 * 0.1 * 2
-    # Loops go around the axis at constant height, or over both poles.
     for first, last in pairwise(loops.start):
         x, y, z = loops.points[first:last].T
-        if np.ptp(z) < 1.99:
-            assert np.ptp(z) < 0.03
-            longitude = np.unwrap(np.arctan2(y, x))
-            assert np.isclose(abs(longitude[-1] - longitude[0]), 2 * np.pi, atol=0.05)
-    assert direction_errors(mesh, strokes).max() < 1.0
-    assert lateral_gaps(mesh, strokes).nearest_distance.min() >= 0.5
+        assert np.ptp(z) < 0.03
+        longitude = np.unwrap(np.arctan2(y, x))
+        assert np.isclose(abs(longitude[-1] - longitude[0]), 2 * np.pi, atol=0.05)
+    assert lateral_gaps(mesh, strokes, 4000).nearest_distance.min() >= 0.5
 
 
 def test_thin_sheets_do_not_interfere():
     """Two planes are a hundredth of the spacing apart and face away from each other."""
     upper = plane()
-    lower_vertices = upper.vertices - (0, 0, 0.001)
-    quads = upper.corner_vertex.reshape(-1, 4)
-    faces = np.concatenate([quads, quads[:, ::-1] + len(upper.vertices)])
-    surface = build_surface(
-        np.concatenate([upper.vertices, lower_vertices]),
-        faces.ravel(),
-        np.arange(0, faces.size + 1, 4),
-    )
+    lower = from_quads(upper.vertices - (0, 0, 0.001), upper.corner_vertex.reshape(-1, 4)[:, ::-1])
+    surface = joined(upper, lower)
     instance = MeshInstance(surface, IDENTITY, axis_field(surface, 2, (1, 0, 0)))
     strokes = trace_strokes(instance, 0.1)
     is_upper = strokes.normal[strokes.start[:-1], 2] > 0
@@ -340,9 +289,7 @@ def test_ink_coverage_follows_a_ramp_of_tone():
 def test_strokes_are_denser_where_the_surface_is_more_curved():
     """On an ellipsoid, the length of strokes per area is one over the required spacing."""
     sphere = icosphere(4)
-    surface = build_surface(
-        sphere.vertices * (1, 1, 3), sphere.corner_vertex, sphere.face_start, name="ellipsoid"
-    )
+    surface = rebuilt(sphere, sphere.vertices * (1, 1, 3))
     spacing = 0.06 * spacing_by_curvature(surface, 1.0)
     assert np.ptp(spacing) > 0.01
     instance = MeshInstance(surface, IDENTITY, axis_field(surface, 2, (0, 0, 1)))
@@ -371,18 +318,15 @@ def test_families_by_tone():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("slant", [0.8, *long(0.0, 1.2)])
-def test_slanted_surfaces_are_as_dense_in_the_picture(slant):
+def test_slanted_surfaces_are_as_dense_in_the_picture():
     """The density is the length of lines per area in the picture, averaged over directions."""
-    floor = plane(20, 20)
-    camera = orthographic_camera(
-        look_at((0, -5 * np.sin(slant), 5 * np.cos(slant)), (0, 0, 0), (0, 1, 0)), 400, 400, scale=2
-    )
+    slant, floor = 0.8, plane(20, 20)
+    eye = 0, -5 * np.sin(slant), 5 * np.cos(slant)
+    camera = orthographic_camera(look_at(eye, (0, 0, 0), (0, 1, 0)), 400, 400, scale=2)
     lengths = []
     for angle in np.linspace(0, np.pi / 2, 5)[:-1]:
-        instance = MeshInstance(
-            floor, IDENTITY, axis_field(floor, 4, (np.cos(angle), np.sin(angle), 0))
-        )
+        field = axis_field(floor, 4, (np.cos(angle), np.sin(angle), 0))
+        instance = MeshInstance(floor, IDENTITY, field)
         spacing = spacing_in_picture(build_tangent_mesh(instance), camera, 6.0).values
         strokes = trace_strokes(instance, spacing)
         pixels, _ = project_to_pixels(strokes.points, camera)
@@ -406,8 +350,8 @@ def test_families_are_consistent_on_a_torus():
     x, y, _ = strokes.points[middle].T
     around = normalize(np.stack([-y, x, 0 * x], axis=1))
     is_around = np.abs(dot(strokes.member[middle], around)) > 0.7
-    assert len(np.unique(is_around[strokes.family == 0])) == 1
-    assert len(np.unique(is_around[strokes.family == 1])) == 1
+    for family in (0, 1):
+        assert len(np.unique(is_around[strokes.family == family])) == 1
 
 
 @pytest.mark.slow
@@ -442,9 +386,7 @@ def test_strokes_are_clipped_by_occluders_and_by_the_frame():
     strokes = trace_strokes(instance, 0.05)
     in_frame = visible_strokes(strokes, [instance], camera)
     assert np.abs(in_frame.points[:, :2]).max() <= 0.5 + 1e-9
-    matrix = np.eye(4)
-    matrix[:3, 3] = (1.0, 0, 1.0)
-    occluder = MeshInstance(plane(), matrix)
+    occluder = MeshInstance(plane(), moved(x=1.0, z=1.0))
     visible = visible_strokes(strokes, [instance, occluder], camera)
     assert visible.points[:, 0].max() < 0.02
     assert len(visible) >= 15

@@ -9,18 +9,17 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from harness.stroke_tracing import trace_strokes, turned, visible_strokes
+from field_helpers import write_off
+from harness.stroke_tracing import latitudes, trace_strokes, turned, visible_strokes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapes import icosphere, plane
 
 from rosy_addon.cli.parser import main
 from rosy_addon.core.errors import RosyError
-from rosy_addon.field.generate import axis_field
 from rosy_addon.line_drawing.svg import Pen, plotter_order, simplify_mask, svg_text
 from rosy_addon.line_drawing.visibility import project_to_pixels
 from rosy_addon.projection.camera import look_at, orthographic_camera
-from rosy_addon.projection.gbuffer import MeshInstance
 
 
 def svg_camera():
@@ -69,11 +68,11 @@ def test_svg_has_one_layer_per_family_and_one_path_per_stroke():
 @pytest.mark.parametrize("plotter", [False, True])
 def test_closed_strokes_are_closed_paths(plotter):
     """Without their last point, which is the first one. Strokes that are cut are open."""
-    instance = MeshInstance(icosphere(4), np.eye(4), axis_field(icosphere(4), 4, (0, 0, 1)))
+    instance = latitudes(icosphere(3))
     camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 300, 200, scale=3.3)
     strokes = visible_strokes(trace_strokes(instance, 0.15), [instance], camera)
     cut = strokes.runs_where(strokes.points[:, 0] > 0)
-    for part in (strokes.select(strokes.closed), strokes.select(~strokes.closed), cut):
+    for part in (strokes.select(strokes.closed), cut):
         text = svg_text(part, camera, Pen(plotter=plotter))
         paths = [path.get("d") for path in ElementTree.fromstring(text).iter() if path.get("d")]
         assert paths and all(data.endswith("Z") == part.closed.any() for data in paths)
@@ -130,23 +129,12 @@ def test_simplified_lines_stay_within_the_tolerance(sizes, seed):
 
 @pytest.mark.slow
 def test_command_line(tmp_path, capsys, monkeypatch):
-    mesh, out = tmp_path / "ball.obj", tmp_path / "ball.svg"
-    ball = icosphere(3)
-    rows = [f"v {x} {y} {z}" for x, y, z in ball.vertices]
-    mesh.write_text("\n".join(rows + [f"f {a} {b} {c}" for a, b, c in ball.triangle_vertex + 1]))
-    command = [
-        "strokes",
-        str(mesh),
-        "--generate",
-        "smoothest",
-        "--set",
-        "spacing=12",
-        "-o",
-        str(out),
-    ]
+    mesh, out = write_off(tmp_path / "ball.off", icosphere(3)), tmp_path / "ball.svg"
+    words = "--generate smoothest --set spacing=12 -o"
+    command = ["strokes", str(mesh), *words.split(), str(out)]
+    options = "--size 150x100 --set outline=on --set gaps=0.3 --set light=lamp"
     contents = []
     for _ in range(2):
-        options = "--size 300x200 --set outline=on --set gaps=0.3 --set light=lamp"
         assert main([*command, *options.split()]) == 0
         contents.append(out.read_bytes())
     assert contents[0] == contents[1]
@@ -154,9 +142,9 @@ def test_command_line(tmp_path, capsys, monkeypatch):
     assert len(root.findall("{http://www.w3.org/2000/svg}g")) == 4
     for arguments, message in (
         (["-o", str(tmp_path / "ball.png")], "ball.png"),
-        (["--camera", "Close"], "ball.obj: --camera applies only to .blend files"),
-        (["--frames", "1-3"], "ball.obj: --frames applies only to .blend files"),
-        (["--set", "light=scene"], "ball.obj: has no lights"),
+        (["--camera", "Close"], "ball.off: --camera applies only to .blend files"),
+        (["--frames", "1-3"], "ball.off: --frames applies only to .blend files"),
+        (["--set", "light=scene"], "ball.off: has no lights"),
         (["--set", "taper=-1"], "setting 'taper' is -1.0, expected a number from 0"),
         (["--set", "wobble=1"], "--set wobble=1: unknown setting 'wobble'"),
         (["--set", "light"], "--set light: expected NAME=VALUE"),

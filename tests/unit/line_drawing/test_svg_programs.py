@@ -8,7 +8,6 @@ import subprocess
 
 import numpy as np
 import pytest
-from conftest import long
 from harness.stroke_tracing import trace_strokes, visible_strokes, write_svg
 from PIL import Image
 from scipy.ndimage import gaussian_filter
@@ -73,10 +72,7 @@ def inkscape(svg, png, *options):
     run(INKSCAPE, svg, "--export-type=png", f"--export-filename={png}", *options)
 
 
-PROGRAMS = [
-    pytest.param(browser, marks=needs_browser),
-    pytest.param(inkscape, marks=needs_inkscape),
-]
+PROGRAMS = pytest.param(browser, marks=needs_browser), pytest.param(inkscape, marks=needs_inkscape)
 
 
 def ink_of(png):
@@ -135,23 +131,17 @@ def strokes(scene):
     """Tapered strokes along and across the axis, and silhouettes."""
     instance, camera = scene
     crossed = MeshInstance(instance.surface, instance.matrix, generate(instance.surface, "axis", 4))
-    lines = trace_strokes(crossed, 9.0 * pixel_size(crossed.world_points(), camera)).tapered(
-        0.8, 0.15
-    )
-    return visible_strokes(
-        Strokes.concatenate(lines, outline_strokes(instance, camera)), [instance], camera
-    )
+    lines = trace_strokes(crossed, 9.0 * pixel_size(crossed.world_points(), camera))
+    lines = Strokes.concatenate(lines.tapered(0.8, 0.15), outline_strokes(instance, camera))
+    return visible_strokes(lines, [instance], camera)
 
 
-@pytest.mark.parametrize("width", [PEN_WIDTH, *long(5.0)])
 @pytest.mark.parametrize("program", PROGRAMS)
-def test_programs_draw_the_strokes_where_the_camera_sees_them(
-    program, width, strokes, scene, tmp_path
-):
-    write_svg(tmp_path / "a.svg", strokes, scene[1], Pen(width=width))
+def test_programs_draw_the_strokes_where_the_camera_sees_them(program, strokes, scene, tmp_path):
+    write_svg(tmp_path / "a.svg", strokes, scene[1], Pen(width=PEN_WIDTH))
     program(tmp_path / "a.svg", tmp_path / "a.png")
     found = ink_of(tmp_path / "a.png")
-    expected = raster(strokes, scene[1], width)
+    expected = raster(strokes, scene[1], PEN_WIDTH)
     assert found.shape == expected.shape
     assert correlation(found, expected) > 0.98
     assert correlation(found, expected, 3.0) > 0.998
@@ -165,9 +155,8 @@ def test_inkscape_finds_one_layer_per_family(strokes, scene, tmp_path):
     found = [line.split()[0] for line in run(INKSCAPE, LAYERS, svg).splitlines()]
     families = np.unique(strokes.family)
     assert found == ["paper", *(f"layer{family + 1}" for family in families)]
-    inkscape(
-        svg, tmp_path / "a.png", "--export-id=layer2", "--export-id-only", "--export-area-page"
-    )
+    options = "--export-id=layer2", "--export-id-only", "--export-area-page"
+    inkscape(svg, tmp_path / "a.png", *options)
     expected = raster(strokes.select(strokes.family == 1), scene[1], PEN_WIDTH)
     assert correlation(ink_of(tmp_path / "a.png"), expected) > 0.98
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import long
-from shapes import from_quads, grid_of_quads, icosphere, plane
+from shapes import from_quads, grid_of_quads, icosphere, moved, plane
 
 from rosy_addon.projection.ambient_occlusion import ambient_occlusion, fibonacci_sphere
 from rosy_addon.projection.gbuffer import MeshInstance
@@ -14,10 +13,8 @@ from rosy_addon.projection.gbuffer import MeshInstance
 pytestmark = pytest.mark.slow
 
 
-def instance_at(surface, *translation):
-    matrix = np.eye(4)
-    matrix[:3, 3] = translation or (0, 0, 0)
-    return MeshInstance(surface, matrix)
+def instance_at(surface, x=0.0, y=0.0, z=0.0):
+    return MeshInstance(surface, moved(x, y, z))
 
 
 def values_at_vertices(surface, values):
@@ -27,7 +24,7 @@ def values_at_vertices(surface, values):
     return actual
 
 
-def trough(cells=24, size=4.0, sharp=True, angle=np.pi / 2):
+def trough(cells=8, size=4.0, sharp=True, angle=np.pi / 2):
     """A floor (z = 0, y > 0) and a wall at an angle, long in x; (V,) distances from the edge."""
     x = np.linspace(-3 * size, 3 * size, 3 * cells + 1)
     edge_distance = np.linspace(0, size, cells + 1)
@@ -49,7 +46,7 @@ def test_directions_are_evenly_spread():
     np.testing.assert_allclose(actual.T @ actual / 256, np.eye(3) / 3, atol=5e-3)
 
 
-@pytest.mark.parametrize("scale", [0.01, 1.0, 300.0])
+@pytest.mark.parametrize("scale", [0.01, 300.0])
 def test_a_sphere_is_fully_open(scale):
     instance = MeshInstance(icosphere(3), np.diag([scale, scale, scale, 1.0]))
     np.testing.assert_allclose(ambient_occlusion([instance], 0, 64), 1, atol=0.005)
@@ -67,10 +64,9 @@ def test_a_floor_beside_a_wall():
         assert actual[selected].std() < 0.01
 
 
-@pytest.mark.parametrize("degrees", [60, *long(90, 135, 150)])
-def test_the_edge_of_two_planes(degrees):
+def test_the_edge_of_two_planes():
     """At the edge, 1/2 - cos(angle)/2 is open for both planes."""
-    angle = np.radians(degrees)
+    angle = np.radians(60)
     surface, edge_distance = trough(2, angle=angle)
     actual = ambient_occlusion([instance_at(surface)], 0)
     edge = (np.abs(surface.vertices[:, 0]) < 5) & (edge_distance == 0)
@@ -80,7 +76,7 @@ def test_the_edge_of_two_planes(degrees):
 
 def test_the_smooth_edge_of_two_planes():
     """The normal bisects the open wedge of 90 degrees, whose visibility is sin 45."""
-    surface, edge_distance = trough(sharp=False)
+    surface, edge_distance = trough(24, sharp=False)
     actual = values_at_vertices(surface, ambient_occlusion([instance_at(surface)], 0))
     selected = (np.abs(surface.vertices[:, 0]) < 1) & (edge_distance == 0)
     assert actual[selected].mean() == pytest.approx(np.sqrt(0.5), abs=0.02)
@@ -88,7 +84,7 @@ def test_the_smooth_edge_of_two_planes():
 
 def test_a_plane_below_a_sphere():
     """A ball of radius r hides cos(a) (r / l)^2, at distance l and angle a (Nusselt)."""
-    ground, ball = plane(20, 20, 6.0), icosphere(4)
+    ground, ball = plane(10, 10, 6.0), icosphere(4)
     instances = [instance_at(ground), instance_at(ball, 0, 0, 1.6)]
     actual = values_at_vertices(ground, ambient_occlusion(instances, 0, 300))
     distance = np.sqrt(ground.vertices[:, 0] ** 2 + ground.vertices[:, 1] ** 2 + 1.6**2)
@@ -96,15 +92,6 @@ def test_a_plane_below_a_sphere():
     assert expected.min() < 0.65
     assert np.abs(actual - expected).mean() < 0.006
     assert np.abs(actual - expected).max() < 0.05
-
-
-@pytest.mark.long
-def test_occlusion_does_not_depend_on_rotation_and_translation():
-    surface, _ = trough(8)
-    matrix = np.array([[0, 0, 1.0, 5], [1, 0, 0, -3], [0, 1, 0, 9], [0, 0, 0, 1]])
-    original = ambient_occlusion([instance_at(surface)], 0, 512)
-    moved = ambient_occlusion([MeshInstance(surface, matrix)], 0, 512)
-    assert np.abs(original - moved).mean() < 0.01
 
 
 def test_zero_directions_are_refused(error_of):

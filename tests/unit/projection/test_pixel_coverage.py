@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shapes import from_quads, icosphere, torus
+from shapes import cube, icosphere, placed, rebuilt, torus
 
 from rosy_addon.field.generate import axis_field
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
@@ -14,21 +14,12 @@ from rosy_addon.projection.project import project
 pytestmark = pytest.mark.filterwarnings("error")
 
 SIZE = 60
-CUBE = from_quads(
-    np.array([(x, y, z) for x in (-1.0, 1) for y in (-1.0, 1) for z in (-1.0, 1)]),
-    np.array([(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]),
-)
+CUBE = rebuilt(cube(), 2 * cube().vertices - 1)
 
 
-def instance(surface, matrix=None, has_field=True):
+def instance(surface, scale=1.0, shift=(0, 0, 0), has_field=True):
     field = axis_field(surface, 4, (0.2, 0.3, 1)) if has_field else None
-    return MeshInstance(surface, np.eye(4) if matrix is None else np.array(matrix), field)
-
-
-def moved(x, y, z, scale=1.0):
-    matrix = scale * np.eye(4)
-    matrix[:, 3] = x, y, z, 1
-    return matrix
+    return MeshInstance(surface, placed(scale, shift), field)
 
 
 SCENES = {
@@ -36,10 +27,10 @@ SCENES = {
     "cube": [instance(CUBE)],
     "torus behind a sphere": [
         instance(torus(60, 30)),
-        instance(icosphere(3), moved(0, -1.5, 0, 0.4)),
+        instance(icosphere(3), 0.4, (0, -1.5, 0)),
     ],
-    "behind an occluder": [instance(icosphere(3)), instance(CUBE, moved(0.6, -2, 0.2, 0.3), False)],
-    "specks": [instance(icosphere(1), moved(0.013 * k, -k / 2, 0.1 * k, 0.02)) for k in range(4)],
+    "behind an occluder": [instance(icosphere(3)), instance(CUBE, 0.3, (0.6, -2, 0.2), False)],
+    "specks": [instance(icosphere(1), 0.02, (0.013 * k, -k / 2, 0.1 * k)) for k in range(4)],
 }
 CAMERAS = {
     "perspective": perspective_camera(look_at((0.8, -4, 1.1), (0, 0, 0)), SIZE, SIZE - 7, fov=0.8),
@@ -49,7 +40,7 @@ CAMERAS = {
 }
 
 
-def shares(gbuffer, keys, samples):
+def shares(gbuffer, keys):
     """The share of each pixel by key of its entries: an array for each key."""
     frame = gbuffer.camera.width * gbuffer.camera.height
     coverage = gbuffer.coverage
@@ -75,13 +66,13 @@ def test_shares_of_pixels_are_those_of_their_samples(name, view, samples):
     instances, camera = SCENES[name], CAMERAS[view]
     gbuffer = project(instances, camera, samples=samples)
     fine = project(instances, camera.scaled(samples))
-    covered = sum(shares(gbuffer, np.zeros(len(gbuffer.pixel)), samples))
+    covered = sum(shares(gbuffer, np.zeros(len(gbuffer.pixel))))
     expected = sum(sampled_shares(fine, np.zeros(len(fine.pixel)), camera, samples))
     np.testing.assert_allclose(covered, expected, atol=1e-6)
     assert (np.diff(gbuffer.pixel) > 0).all() and (np.diff(gbuffer.coverage.pixel) >= 0).all()
     if name == "specks":
         return  # parts that are thinner than a sample are shown by what is beside them
-    actual = np.array(shares(gbuffer, gbuffer.instance_id, samples))
+    actual = np.array(shares(gbuffer, gbuffer.instance_id))
     expected = np.array(sampled_shares(fine, fine.instance_id, camera, samples))
     assert np.abs(actual - expected).sum() <= 0.002 * expected.sum()
 
@@ -90,14 +81,10 @@ def test_shares_of_pixels_are_those_of_their_samples(name, view, samples):
 def test_the_sides_of_a_crease_have_their_shares(view):
     """Pixels at an edge of a cube show both faces, as much as their samples do."""
     camera = CAMERAS[view]
-    gbuffer, fine = (
-        project([instance(CUBE)], camera, samples=4),
-        project([instance(CUBE)], camera.scaled(4)),
-    )
-    actual, expected = (
-        np.array(values)
-        for values in (shares(gbuffer, gbuffer.face, 4), sampled_shares(fine, fine.face, camera, 4))
-    )
+    gbuffer = project([instance(CUBE)], camera, samples=4)
+    fine = project([instance(CUBE)], camera.scaled(4))
+    actual = np.array(shares(gbuffer, gbuffer.face))
+    expected = np.array(sampled_shares(fine, fine.face, camera, 4))
     mixed = (expected > 0).sum(axis=0) > 1
     assert mixed.sum() > 30
     assert np.abs(actual - expected)[:, mixed].mean() < 0.02

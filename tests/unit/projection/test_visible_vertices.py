@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shapes import cube, icosphere, plane, torus
+from shapes import cube, icosphere, joined, placed, plane, rebuilt, torus
 
 from rosy_addon.field.surface import build_surface
 from rosy_addon.projection import visible_vertices
@@ -26,21 +26,13 @@ def project(instances, camera, **options):
 
 
 def moved(surface, offset=(0, 0, 0), scale=1.0) -> MeshInstance:
-    matrix = np.diag([scale, scale, scale, 1.0])
-    matrix[:3, 3] = offset
-    return MeshInstance(surface, matrix)
+    return MeshInstance(surface, placed(scale, offset))
 
 
 def rays_reach_the_eye(instances, camera, planes=None):
     """(V,) bool: no triangle of another vertex is between a vertex and the near plane (Möller-Trumbore)."""
-    world = np.concatenate([instance.world_points() for instance in instances])
-    first = np.cumsum([0, *(len(instance.surface.vertices) for instance in instances)])
-    triangles = np.concatenate(
-        [
-            entry.surface.triangle_vertex + start
-            for entry, start in zip(instances, first, strict=False)
-        ]
-    )
+    whole = joined(*(rebuilt(each.surface, each.world_points()) for each in instances))
+    world, triangles = whole.vertices, whole.triangle_vertex
     a, b, c = np.moveaxis(world[triangles], 1, 0)
     free = np.ones(len(world), dtype=bool)
     for vertex, point in enumerate(world):

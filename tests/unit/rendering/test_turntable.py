@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from listeners import CancelledError
 from PIL import Image
-from shapes import icosphere, torus
+from shapes import icosphere, placed, torus
 
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import Light
@@ -69,9 +70,8 @@ def test_the_table_of_codes_is_reset_when_full(tmp_path):
 
 
 def test_dithered_colors_are_right_on_average():
-    ramp = np.zeros((64, 64, 3), dtype=np.uint8)
-    ramp[...] = (200, 90, 30)
-    _, (actual,) = decode_frames(gif_bytes([ramp], 10))
+    color = np.full((64, 64, 3), (200, 90, 30), dtype=np.uint8)
+    _, (actual,) = decode_frames(gif_bytes([color], 10))
     assert np.abs(actual.mean(axis=(0, 1)) - (200, 90, 30)).max() < 3
     assert BAYER_MATRIX.shape == (4, 4) and np.prod(PALETTE_LEVELS) <= 256
 
@@ -84,17 +84,14 @@ def test_rate_and_repetition():
 
 def test_the_object_stays_in_the_frame_in_all_views():
     surface = torus(48, 24)
-    matrix = np.diag((1.0, 2.0, 1.5, 1.0))
-    matrix[:3, 3] = (5.0, -2.0, 1.0)
+    matrix = placed(np.diag((1.0, 2.0, 1.5)), (5.0, -2.0, 1.0))
     instance = MeshInstance(surface, matrix, axis_field(surface, 2))
     covered = []
     for view in turntable_views(instance, QUICK, 5, (80, 60), (10.0, 25.0)):
         rgba = draw_picture(view).rgba
         assert rgba.shape == (60, 80, 4)
         visible = rgba[..., 3] > 0
-        assert not (
-            visible[0].any() or visible[-1].any() or visible[:, 0].any() or visible[:, -1].any()
-        )
+        assert visible.sum() == visible[1:-1, 1:-1].sum()
         covered.append(visible.mean())
     assert min(covered) > 0.1
 
@@ -111,8 +108,7 @@ def test_a_video_has_all_frames(tmp_path):
 
 
 def test_streaks_drift_before_a_still_camera_in_whole_cycles():
-    surface = icosphere(2)
-    instance = MeshInstance(surface, np.eye(4), axis_field(surface, 1))
+    instance = MeshInstance(BALL.surface, np.eye(4), axis_field(BALL.surface, 1))
     look = Look(length=8, flow=1.5)
     cache = Cache()
     views = turntable_views(instance, look, 12, (64, 64), (0.0, 0.0), still=True)
@@ -126,19 +122,13 @@ def test_streaks_drift_before_a_still_camera_in_whole_cycles():
 
 def test_lights_stay_fixed_while_the_camera_orbits():
     """A sun from +y lights the far side in the first view and the near side in the second."""
-    surface = icosphere(3)
-    instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2))
     look = Look(length=8, shading=1.0, light="scene")
     sun = Light("sun", np.array([0.0, 1.0, 0.0]), np.ones(3), 1.0)
     dark, lit = (
         draw_picture(view).rgba[20:44, 20:44, :3].mean()
-        for view in turntable_views(instance, look, 2, (64, 64), (0.0, 0.0), lights=[sun])
+        for view in turntable_views(BALL, look, 2, (64, 64), (0.0, 0.0), lights=[sun])
     )
     assert dark < 0.05 < 0.2 < lit
-
-
-class CancelledError(Exception):
-    """Raised by listeners."""
 
 
 def test_the_encoder_is_killed_when_the_video_is_cancelled(tmp_path):
@@ -147,10 +137,8 @@ def test_the_encoder_is_killed_when_the_video_is_cancelled(tmp_path):
     pid_file = tmp_path / "pid"
 
     def encode(*_):
-        code = (
-            f"import os, time; open({str(pid_file)!r}, 'w').write(str(os.getpid())); time.sleep(60)"
-        )
-        run_program([sys.executable, "-c", code], "encoding")
+        code = f"import os, time; open({str(pid_file)!r}, 'w').write(str(os.getpid()))"
+        run_program([sys.executable, "-c", code + "; time.sleep(60)"], "encoding")
 
     def cancel(fraction, label):
         if label == "encoding the video" and pid_file.exists() and pid_file.read_text():

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import mainly
 from scipy.spatial.transform import Rotation
-from shapes import cube, cylinder, icosphere, torus
+from shapes import cube, cylinder, icosphere, placed, torus
 
 from rosy_addon.field.generate import generate
 from rosy_addon.line_drawing.tangent_mesh import TangentMesh, build_tangent_mesh, nearest_member
@@ -40,14 +39,11 @@ def share_of(mesh: TangentMesh, is_so: np.ndarray) -> float:
     return float(mesh.area[is_so].sum() / mesh.area.sum())
 
 
-@pytest.mark.parametrize("degree", mainly([4], [2, 4, 8]))
-def test_the_first_line_is_horizontal_on_a_cylinder(degree):
+def test_the_first_line_is_horizontal_on_a_cylinder():
     """At an angle of 90 degrees, it is vertical; nowhere do two lines swap."""
-    mesh = mesh_of(cylinder(), "curvature", degree)
+    mesh = mesh_of(cylinder(), "curvature", 4)
     is_side = np.abs(mesh.normal[:, 2]) < 0.1
     for angle, steepness in ((0.0, 0.0), (np.pi / 2, 1.0)):
-        if degree == 2 and angle:
-            continue
         line, share = first_lines(mesh, angle)
         np.testing.assert_allclose(np.abs(line[is_side, 2]), steepness, atol=0.02)
         np.testing.assert_allclose(share[is_side], 1, atol=0.01)
@@ -59,10 +55,8 @@ def test_lines_continue_where_the_field_turns():
 
     In some places, the other line is nearer to the horizontal direction.
     """
-    matrix = np.eye(4)
-    matrix[:3, :3] = Rotation.from_euler("x", 30, degrees=True).as_matrix()
-    surface = torus()
-    mesh = mesh_of(surface, "curvature", 4, matrix)
+    matrix = placed(Rotation.from_euler("x", 30, degrees=True).as_matrix())
+    mesh = mesh_of(torus(), "curvature", 4, matrix)
     line, share = first_lines(mesh)
     assert share_of(mesh, share > 0.99) > 0.999
     axis = matrix[:3, 2]
@@ -75,10 +69,9 @@ def test_lines_continue_where_the_field_turns():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("degree", mainly([4], [3, 4, 6]))
-def test_lines_swap_only_between_singularities(degree):
+def test_lines_swap_only_between_singularities():
     """On a sphere they must, but on a small part of it."""
-    mesh = mesh_of(icosphere(4), "smoothest", degree)
+    mesh = mesh_of(icosphere(4), "smoothest", 4)
     _, share = first_lines(mesh)
     assert share_of(mesh, share < 0.9) < 0.12
     assert share.min() < 0.9
@@ -87,9 +80,8 @@ def test_lines_swap_only_between_singularities(degree):
 @pytest.mark.slow
 def test_the_order_does_not_depend_on_the_size_of_triangles_or_of_the_mesh():
     """A cube of twelve triangles has one first line on each face, at any scale."""
-    for scale in (1e-6, 1.0, 1e6):
-        matrix = np.diag([scale, scale, scale, 1.0])
-        mesh = mesh_of(cube(), "axis", 4, matrix)
+    for scale in (1e-6, 1e6):
+        mesh = mesh_of(cube(), "axis", 4, placed(scale))
         line, share = first_lines(mesh, blend=0.02 * scale)
         is_side = np.abs(mesh.normal[:, 2]) < 0.1
         assert share[is_side].min() > 0.99

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import mainly
 from shapes import instance_of, torus
 from uv_maps import patches_uv
 
@@ -23,7 +22,7 @@ from rosy_addon.surface_texture.texels import TexelSurface, rasterize_charts, te
 STEPS = 40
 
 
-@pytest.mark.parametrize("degree", mainly([2, 3], [1, 2, 3, 4, 6]))
+@pytest.mark.parametrize("degree", [2, 3])
 def test_streamlines_cross_seams_as_on_the_mesh(degree):
     """After 40 steps, streamlines are where particles on the mesh are, to less than a texel.
 
@@ -53,13 +52,10 @@ def test_streamlines_cross_seams_as_on_the_mesh(degree):
     triangle, weights = texels.triangle, texels.barycentric.astype(np.float64)
     z = np.einsum("nk,nk->n", weights[start], mesh.z[triangle[start]])
     frame = frames_at(charts, triangle[start], weights[start])
-    particles = SurfaceParticles(
-        triangle[start], weights[start], nearest_member(frame, z, degree), np.ones(len(start))
-    )
-    length = np.full(len(start), STEPS * step)
-    end, walked, *_ = advance(
-        mesh, particles, length, max_segment_length=np.full(len(start), step), max_segments=400
-    )
+    ones, member = np.ones(len(start)), nearest_member(frame, z, degree)
+    particles = SurfaceParticles(triangle[start], weights[start], member, ones)
+    length, limits = STEPS * step * ones, {"max_segment_length": step * ones, "max_segments": 400}
+    end, walked, *_ = advance(mesh, particles, length, **limits)
     arrived = walked > 0.999 * length
     assert (cell[arrived] != 0).mean() > 0.99
     both = np.flatnonzero(arrived & (cell != 0))

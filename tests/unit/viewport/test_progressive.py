@@ -197,13 +197,6 @@ class HelpedRenderer(NotingRenderer):
         return view.instances, view.camera.width
 
 
-@pytest.fixture
-def helper():
-    helper = Helper()
-    yield helper
-    helper.close()
-
-
 def updated(progressive, key, view_input, until=lambda view: view.picture is None):
     """Update a view as Blender redraws, until something is so, and return it."""
     for _ in range(500):

@@ -59,7 +59,7 @@ def test_each_process_that_fails_is_named():
 def test_ranges():
     assert parse_frames("7") == range(7, 8)
     assert parse_frames("1-5") == range(1, 6)
-    assert list(parse_frames("-2-4:3")) == [-2, 1, 4]
+    assert list(parse_frames("-2-4:3")) == [-2, 1, 4] and list(parse_frames("3,5,6")) == [3, 5, 6]
     for text in ("5-1", "a", "1-5:0", "", "1-", "1-1048575", "9" * 5000, "1_0", "\u0663"):
         with pytest.raises(RosyError, match="expected") as caught:
             parse_frames(text)

@@ -108,8 +108,9 @@ def test_processes_that_cannot_be_started_are_lost(program, monkeypatch):
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="reads the list of processes")
-@pytest.mark.parametrize("is_busy", [True, False])
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize(
+    ("number", "is_busy"), [(signal.SIGKILL, True), (signal.SIGKILL, False), (signal.SIGTERM, True)]
+)
 def test_no_helper_outlives_the_process_that_started_it(number, is_busy):
     program = f"""
 import sys, time
@@ -142,11 +143,9 @@ code = "import os, time; print(os.getpid(), flush=True); time.sleep(100)"
 for line in run_local([sys.executable, "-c", code], range(2), 2):
     print(line, flush=True)
 """
-    with subprocess.Popen(
-        [sys.executable, "-c", program],
-        stdout=subprocess.PIPE,
-        env=os.environ | {"TMPDIR": str(tmp_path)},
-    ) as process:
+    environment = os.environ | {"TMPDIR": str(tmp_path)}
+    command = [sys.executable, "-c", program]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, env=environment) as process:
         pids = [int(process.stdout.readline()) for _ in range(2)]
         process.kill()
         process.wait()

@@ -11,7 +11,6 @@ import pytest
 
 from rosy_addon.core.errors import RosyError
 from rosy_addon.core.progress import listening
-from rosy_addon.worker.helper import Helper
 from rosy_addon.worker.job import Call, Step, job, part, run
 from rosy_addon.worker.program import run_program
 from rosy_addon.worker.step_runner import StepRunner
@@ -36,11 +35,8 @@ def test_a_part_gives_the_same_result_with_scaled_progress():
 
     assert run(whole()) == halves(6) == 9
     steps = list_steps(whole())
-    assert [step[-3:] for step in steps if isinstance(step, Call)] == [
-        (0.2, 0.4, "dividing"),
-        (0.4, 0.6, None),
-    ]
-    assert [step for step in steps if isinstance(step, Step)] == [(0.4, "thinking")]
+    found = [step[-3:] if isinstance(step, Call) else step for step in steps]
+    assert found == [(0.2, 0.4, "dividing"), (0.4, "thinking"), (0.4, 0.6, None)]
     assert {step.label for step in list_steps(part(halves.begin(6), 0, 1, "all"))} == {"all"}
 
 
@@ -85,19 +81,12 @@ def test_programs():
 
 def test_a_cancelled_job_kills_its_program(tmp_path):
     path = tmp_path / "late"
-    code = f"import time; time.sleep(1); open({str(path)!r}, 'w')"
+    code = f"import time; time.sleep(0.5); open({str(path)!r}, 'w')"
     steps = run_program.begin([sys.executable, "-c", code], "working")
     next(steps)
     steps.close()
-    time.sleep(1.2)
+    time.sleep(0.7)
     assert not path.exists()
-
-
-@pytest.fixture
-def helper():
-    helper = Helper()
-    yield helper
-    helper.close()
 
 
 def finished(runner, helper):

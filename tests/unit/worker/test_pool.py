@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import ROOT, long
 from shapes import torus
 
 from rosy_addon.compositor.look import Look
@@ -31,7 +28,7 @@ sys.path.append(str(Path(__file__).parent))
 from test_helper import has_ended
 
 #: Fields with many lines need many strips.
-DEGREE, WIDTH, HEIGHT = 11, 320, 1216
+DEGREE, WIDTH, HEIGHT = 11, 160, 1216
 
 
 def view_from(eye, **look) -> ViewInput:
@@ -60,11 +57,10 @@ def _no_helpers_stay():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [3, *long(2, 8)])
-def test_the_number_of_processes_changes_nothing(count, expected):
-    assert len(picture_groups(VIEW, count)) == count
-    assert drawn(VIEW, count) == expected
-    assert len(POOL.helpers) == count - 1
+def test_the_number_of_processes_changes_nothing(expected):
+    assert len(picture_groups(VIEW, 3)) == 3
+    assert drawn(VIEW, 3) == expected
+    assert len(POOL.helpers) == 2
 
 
 @pytest.mark.slow
@@ -102,9 +98,8 @@ def test_what_a_killed_helper_has_not_drawn_is_drawn_here(killed_at, expected):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("program", ["/no/such/program", "/bin/false"])
-def test_without_helpers_all_is_drawn_here(program, expected, monkeypatch):
-    monkeypatch.setattr(start.sys, "executable", program)
+def test_without_helpers_all_is_drawn_here(expected, monkeypatch):
+    monkeypatch.setattr(start.sys, "executable", "/bin/false")
     assert drawn(VIEW, 2) == expected
 
 
@@ -132,24 +127,3 @@ def test_a_picture_with_nothing_in_view_is_refused():
 def test_small_pictures_start_no_process():
     drawn(replace(VIEW, camera=VIEW.camera.resized(100, 100)), 8)
     assert not POOL.helpers
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform != "linux", reason="reads the list of processes")
-def test_helpers_end_if_the_process_that_draws_is_killed():
-    program = """
-import sys
-sys.path[:0] = ["tests/unit", "tests/unit/worker"]
-import test_pool as t
-while True:
-    t.drawn(t.VIEW, 3)
-    print(*(helper.pid for helper in t.POOL.helpers), flush=True)
-"""
-    with subprocess.Popen(
-        [sys.executable, "-c", program], cwd=ROOT, stdout=subprocess.PIPE
-    ) as process:
-        pids = [int(pid) for pid in process.stdout.readline().split()]
-        time.sleep(0.3)
-        process.kill()
-        process.wait()
-        assert len(pids) == 2 and all(has_ended(pid, 2.0) for pid in pids)

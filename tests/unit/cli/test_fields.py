@@ -1,0 +1,135 @@
+"""Fields that the command line makes, converts, describes and compares."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from command_helpers import assert_refused, facts_of, rosy
+
+from rosy_addon.extras.command_line import main
+
+
+@pytest.mark.slow
+def test_field_makes_converts_and_info_reads(sphere, tmp_path):
+    raw, rosy_file, again = (tmp_path / name for name in ("a.rawfield", "a.rosy", "b.rawfield"))
+    assert rosy("field", sphere, "-o", raw, "--degree", 6).returncode == 0
+    assert rosy("field", sphere, raw, "-o", rosy_file).returncode == 0
+    assert rosy("field", sphere, rosy_file, "-o", again).returncode == 0
+    assert raw.read_bytes() == again.read_bytes()
+    facts = facts_of(sphere, rosy_file)
+    assert (facts["degree"], facts["faces"], facts["vertices"]) == (6, 1280, 642)
+    assert facts["euler_characteristic"] == 2
+    assert sum(index for _, index in facts["singularities"]) == 6 * 2
+    assert all(isinstance(part, int) for pair in facts["singularities"] for part in pair)
+    words = rosy("info", sphere, rosy_file)
+    assert words.returncode == 0
+    assert "degree 6" in words.stdout and "1,280 faces" in words.stdout
+
+
+@pytest.mark.slow
+def test_the_torus_has_no_singularities_in_sum(ring):
+    facts = facts_of(ring, "--degree", 4, "--generate", "axis")
+    assert facts["euler_characteristic"] == 0
+    assert sum(index for _, index in facts["singularities"]) == 0
+
+
+def test_the_default_generator_follows_the_form(ring, tmp_path):
+    default, chosen = tmp_path / "a.rosy", tmp_path / "b.rosy"
+    common = ["field", str(ring), "--degree", "4", "-o"]
+    assert main([*common, str(default)]) == 0
+    assert main([*common, str(chosen), "--generate", "form"]) == 0
+    assert default.read_bytes() == chosen.read_bytes()
+
+
+def test_a_kind_without_directions_is_noted(tmp_path, capsys):
+    """A flat mesh has no direction of curvature. Other fields have one everywhere."""
+    mesh = tmp_path / "flat.obj"
+    mesh.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n")
+    command = ["field", str(mesh), "-o", str(tmp_path / "a.rosy")]
+    assert main([*command, "--generate", "curvature"]) == 0
+    assert "curvature gives no direction on any face" in capsys.readouterr().err
+    assert main(command) == 0
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.slow
+def test_conflicting_degrees(sphere, tmp_path):
+    assert main(["field", str(sphere), "-o", str(tmp_path / "a.rosy"), "--degree", "6"]) == 0
+    done = rosy("info", sphere, tmp_path / "a.rosy", "--degree", 4)
+    assert_refused(done, "a.rosy: the field has degree 6, but degree 4 was requested")
+
+
+@pytest.mark.slow
+def test_undefined_vectors_on_request(sphere, tmp_path):
+    path = tmp_path / "a.rosy"
+    assert main(["field", str(sphere), "-o", str(path)]) == 0
+    lines = path.read_text().splitlines()
+    lines[2 + 7] = "nan nan nan"
+    path.write_text("\n".join(lines))
+    assert_refused(rosy("info", sphere, path), "1 of 1280 vectors are not finite", "face 7")
+    assert facts_of(sphere, path, "--undefined")["undefined_faces"] >= 1
+    for option in ("--guides", "--against"):  # in every field file
+        assert rosy("info", sphere, option, path, "--undefined").returncode == 0
+
+
+@pytest.mark.slow
+def test_field_converts(sphere, tmp_path):
+    made = tmp_path / "a.rosy"
+    assert rosy("field", sphere, "-o", made, "--generate", "smoothest").returncode == 0
+    converted = tmp_path / "b.npy"
+    done = rosy("field", sphere, made, "-o", converted, "--to-degree", 8, "--turn", 10,
+                "--smooth", 0.05, "--magnitude", "unit")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    facts = facts_of(sphere, converted)
+    assert facts["degree"] == 8 and np.allclose(facts["magnitude"], 1)
+    done = rosy("field", sphere, made, "-o", converted, "--to-degree", 3)
+    assert_refused(done, "neither a multiple")
+
+
+@pytest.mark.slow
+def test_info_compares(sphere, tmp_path):
+    made, turned, sings = (tmp_path / name for name in ("a.rosy", "b.rawfield", "a.sings"))
+    assert rosy("field", sphere, "-o", made, "--generate", "smoothest").returncode == 0
+    assert rosy("field", sphere, made, "-o", turned, "--turn", 5).returncode == 0
+    assert rosy("field", sphere, made, "-o", sings).returncode == 0
+    facts = facts_of(sphere, made, "--against", turned)
+    assert np.isclose(facts["against"]["mean"], 5) and np.isclose(facts["against"]["max"], 5)
+    assert facts["is_rosy"] and facts["energy"] > 4 * np.pi * 4
+    facts = facts_of(sphere, turned, "--against", sings)
+    assert facts["against"] == {"same": 8, "only_here": [], "only_there": []}
+    done = rosy("info", sphere, made, "--against", turned)
+    assert "off by 5 degrees on average" in done.stdout
+
+
+@pytest.mark.slow
+def test_strokes_and_guides(sphere, tmp_path):
+    angle = np.linspace(0, 1.0, 30)
+    arc = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    rows = "\n".join(" ".join(map(str, point)) for point in arc)
+    (tmp_path / "strokes.txt").write_text(f"# one\n{rows}\n\n{rows}\n")
+    out = tmp_path / "a.rosy"
+    done = rosy("field", sphere, "-o", out, "--strokes", tmp_path / "strokes.txt", "--degree", 2)
+    assert done.returncode == 0, done.stderr
+    again = tmp_path / "b.rosy"
+    done = rosy("field", sphere, "-o", again, "--guides", out, "--degree", 2, "--reach", 0.01)
+    assert done.returncode == 0, done.stderr
+    assert facts_of(sphere, again, "--against", out)["against"]["mean"] < 3
+    firm = rosy("field", sphere, "-o", again, "--guides", out, "--degree", 2, "--firmness")
+    assert firm.returncode == 0, firm.stderr
+    (tmp_path / "none.txt").write_text("1 2 3\n\n4 5 6\n")
+    done = rosy("field", sphere, "-o", out, "--strokes", tmp_path / "none.txt")
+    assert_refused(done, "contains no stroke")
+    assert_refused(rosy("field", sphere, "-o", out, "--generate", "uv"), "has no UV map")
+
+
+@pytest.mark.slow
+def test_the_uv_map_of_a_file(shared_data, tmp_path):
+    mesh = shared_data / "meshes" / "spot.obj"
+    out = tmp_path / "a.rosy"
+    assert rosy("field", mesh, "-o", out, "--generate", "uv").returncode == 0
+    assert facts_of(mesh, out)["undefined_faces"] == 0
+    smooth = tmp_path / "b.rosy"
+    done = rosy("field", mesh, "-o", smooth, "--generate", "guided", "--uv", "--reach", "0.02")
+    assert done.returncode == 0, done.stderr
+    facts, rough = facts_of(mesh, smooth, "--against", out), facts_of(mesh, out)
+    assert facts["energy"] < rough["energy"] and facts["against"]["mean"] < 15

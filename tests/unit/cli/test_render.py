@@ -1,0 +1,204 @@
+"""Pictures of mesh files by the command line."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from command_helpers import assert_refused, pixels_of, rosy, write_cube
+from field_helpers import write_off
+from shapes import icosphere, torus
+
+import rosy_addon as rf
+from rosy_addon.extras.command_line import main
+from rosy_addon.field.surface import Surface
+from rosy_addon.image_io.png import write_png
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "words",
+    [
+        [],
+        ["--degree", "3", "--generate", "axis", "--axis", "-1,0.5,0"],
+        ["--preset", "plaid", "--set", "supersampling=2", "--set", "view_plane=off"],
+        ["--view", "-120,-30", "--ortho", "--set", "display=flat"],
+    ],
+    ids=["plain", "axis", "look", "view"],
+)
+def test_render_writes_a_picture(words, ring, tmp_path):
+    done = rosy("render", ring, "-o", tmp_path / "a.png", "--size", "96x64", *words)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    pixels = pixels_of(tmp_path / "a.png")
+    assert pixels.shape == (64, 96, 4)
+    covered = pixels[..., 3] == 255
+    assert 0.1 < covered.mean() < 0.9
+
+
+def test_same_command_same_bytes(ring, tmp_path):
+    for name in ("a.png", "b.png"):
+        assert main(["render", str(ring), "-o", str(tmp_path / name), "--size", "80x80"]) == 0
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def test_the_default_preset_is_no_preset(ring, tmp_path):
+    common = ["render", str(ring), "--size", "40x40", "-o"]
+    assert main([*common, str(tmp_path / "a.png")]) == 0
+    assert main([*common, str(tmp_path / "b.png"), "--preset", "default"]) == 0
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    alpha = pixels_of(tmp_path / "a.png")[..., 3]
+    assert ((alpha > 0) & (alpha < alpha.max())).any()
+
+
+def test_y_is_up_in_off_files_by_default(tmp_path):
+    tall = torus(24, 12)
+    path = write_off(tmp_path / "a.off", tall)  # around z
+    covered = {}
+    for up in ("y", "z"):
+        picture = tmp_path / f"{up}.png"
+        options = ["--size", "64x64", "--up", up, "--view", "0,0", "--ortho"]
+        assert main(["render", str(path), "-o", str(picture), *options]) == 0
+        covered[up] = pixels_of(picture)[..., 3] > 0
+    # From the front, a ring around the upward axis is seen edge on. A ring around y shows its hole.
+    assert covered["z"].any(axis=1).mean() < 0.5
+    assert covered["y"].any(axis=1).mean() > 0.8 and not covered["y"][32, 32]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["vase-7", "cheburashka"])
+def test_render_fields_of_others(name, shared_data, tmp_path):
+    mesh = shared_data / "meshes" / f"{name.partition('-')[0]}.off"
+    field = shared_data / "fields" / f"{name}.rawfield"
+    done = rosy("render", mesh, field, "-o", tmp_path / "a.png", "--size", "128x128")
+    assert done.returncode == 0, done.stderr
+    ink = pixels_of(tmp_path / "a.png")
+    assert ink[ink[..., 3] == 255][:, :3].std() > 15
+
+
+@pytest.mark.slow
+def test_fields_that_are_no_rosy_are_drawn_but_not_written_as_one(shared_data, tmp_path):
+    mesh = shared_data / "meshes" / "cheburashka.off"
+    field = shared_data / "fields" / "cheburashka-cf.rawfield"
+    done = rosy("render", mesh, field, "-o", tmp_path / "a.png", "--size", "64x64")
+    assert done.returncode == 0, done.stderr
+    done = rosy("field", mesh, field, "-o", tmp_path / "a.rosy")
+    assert_refused(done, "a.rosy", "do not form a RoSy")
+    assert not (tmp_path / "a.rosy").exists()
+
+
+@pytest.mark.slow
+def test_a_transferred_field_is_reported(sphere, tmp_path):
+    made = tmp_path / "sphere.rosy"
+    assert rosy("field", sphere, "-o", made).returncode == 0
+    cut = write_off(tmp_path / "cut.off", icosphere(4))
+    done = rosy("render", cut, made, "-o", tmp_path / "a.png", "--size", "64x64",
+                "--field-mesh", sphere)  # fmt: skip
+    assert done.returncode == 0
+    assert "transferred by position from sphere.off" in done.stderr
+
+
+@pytest.mark.slow
+def test_unused_vertices_change_nothing(tmp_path):
+    """Neither the frame nor what is relative to the size of the mesh."""
+    (tmp_path / "stray").mkdir()
+    obj = write_cube(tmp_path / "cube.obj").read_text()
+    (tmp_path / "stray" / "cube.obj").write_text(obj + "v 1e6 0 0\n")
+    for verb, suffix, *words in (
+        ("render", "png", "--generate", "curvature", "--size", "48x48"),
+        ("strokes", "svg", "--generate", "smoothest", "--size", "200x200"),
+        ("turntable", "gif", "--generate", "axis", "--size", "32x32", "--pictures", "2"),
+    ):
+        outputs = [folder / f"out.{suffix}" for folder in (tmp_path, tmp_path / "stray")]
+        for out in outputs:
+            words = ["--degree", "4", *words]
+            assert main([verb, str(out.with_name("cube.obj")), "-o", str(out), *words]) == 0
+        assert outputs[0].read_bytes() == outputs[1].read_bytes(), verb
+
+
+# --- tones ----------------------------------------------------------------------------------------
+
+
+def write_ply(path, surface: Surface, **columns):
+    """Write a .ply file with further columns of vertices, integers as bytes and others as floats."""
+    kinds = {
+        name: "uchar" if values.dtype.kind in "iu" else "float" for name, values in columns.items()
+    }
+    head = ["ply", "format ascii 1.0", f"element vertex {len(surface.vertices)}"]
+    head += [f"property float {axis}" for axis in "xyz"]
+    head += [f"property {kind} {name}" for name, kind in kinds.items()]
+    head += [f"element face {surface.face_count}", "property list uchar int vertex_indices"]
+    head.append("end_header")
+    rows = zip(surface.vertices.tolist(), *(v.tolist() for v in columns.values()), strict=True)
+    lines = [" ".join(map(repr, [*position, *values])) for position, *values in rows]
+    faces = np.split(surface.corner_vertex, surface.face_start[1:-1])
+    lines += [" ".join(map(str, [len(face), *face])) for face in faces]
+    path.write_text("\n".join(head + lines) + "\n")
+    return path
+
+
+@pytest.fixture(scope="module")
+def painted(tmp_path_factory):
+    """A ball that is dark on the left and light on the right, in its colors and in a number."""
+    ball = icosphere(4)
+    right = ball.vertices[:, 0] > 0
+    gray = np.where(right, 230, 60)
+    colors = dict.fromkeys(("red", "green", "blue"), gray)
+    path = tmp_path_factory.mktemp("painted") / "ball.ply"
+    return write_ply(path, ball, **colors, cavity=np.where(right, 0.8, 0.1))
+
+
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        ("--preset cross-hatch --tone-attribute cavity", "tone_values"),
+        ("--preset cross-hatch --tone-picture shot.png", "tone_picture"),
+        ("--preset cross-hatch --tone-image shot.png", "tone_image"),
+        ("--set color_map=gray --color-values cavity", "color_values"),
+    ],
+)
+def test_sources_of_tones_and_colors(words, name, painted, tmp_path, monkeypatch):
+    """The command draws what the function does, which is another picture than without the source."""
+    monkeypatch.chdir(tmp_path)
+    write_png("shot.png", np.linspace(0.2, 0.9, 64 * 64 * 4, dtype=np.float32).reshape(64, 64, 4))
+    mesh = painted
+    if name == "tone_image":
+        mesh = tmp_path / "square.obj"
+        corners = "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+        mesh.write_text(corners + "f 1/1 2/2 3/3 4/4\n")
+    view = "--generate smoothest --size 64x64 --view 0,0 --up z --ortho"
+    plain, out = [
+        [*["render", "-o", "a.png"], str(mesh), *view.split(), *options.split()]
+        for options in (words.rsplit(" ", 2)[0], words)
+    ]
+    assert main(plain) == 0
+    before = pixels_of(tmp_path / "a.png")
+    assert main(out) == 0
+    drawn = pixels_of(tmp_path / "a.png")
+    _, look, _, source = words.split()
+    keywords = {"preset": look} if "=" not in look else dict([look.split("=")])
+    surface = rf.Surface(mesh, up="z")
+    frame = {"size": (64, 64), "view": (0, 0), "orthographic": True}
+    expected = rf.render(surface, rf.smoothest(surface), **frame, **keywords, **{name: source})
+    assert np.array_equal(drawn, np.asarray(expected)) and not np.array_equal(drawn, before)
+
+
+@pytest.mark.slow
+def test_tones_that_are_not_there(painted, sphere, tmp_path):
+    write_png(tmp_path / "wide.png", np.ones((16, 64, 4), dtype=np.float32))
+    out = ("-o", tmp_path / "a.png", "--size", "64x64")
+    for mesh, words, expected in (
+        (painted, ("--tone-attribute", "ink"), ("'ink'", "'cavity'", "ball.ply")),
+        (painted, ("--color-values", "Cavity"), ("'Cavity'", "'cavity'", "ball.ply")),
+        (sphere, ("--tone-attribute", "ink"), ("sphere.off", ".ply")),
+        (sphere, ("--tone-image", "x.png"), ("sphere.off", "UV map")),
+        (sphere, ("--tone-picture", tmp_path / "none.png"), ("none.png", "no such file")),
+        (sphere, ("--tone-picture", tmp_path / "wide.png"), ("wide.png", "64 x 16")),
+        (sphere, ("--set", "tone=picture"), ("picture", "none is given")),
+        (
+            painted,
+            ("--tone-attribute", "red", "--tone-image", "x.png"),
+            ("choose one source of the tone, attribute or image",),
+        ),
+    ):
+        assert_refused(rosy("render", mesh, *out, *words), *expected)
+        assert not (tmp_path / "a.png").exists()

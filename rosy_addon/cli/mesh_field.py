@@ -15,12 +15,19 @@ from ..field.mesh_arrays import SIMULATION_READERS
 from ..field.mesh_io import READERS
 from .options import CommandParser, Options, int_between
 
+#: Help of the option --join.
+JOIN_TEXT = (
+    "join vertices on borders that coincide, as at the seam of a grid; by default only of .stl files and files of "
+    "simulations"
+)
+
 
 def add_mesh_options(parser: CommandParser) -> None:
     """Add the arguments MESH and FIELD, and the options that generate a field."""
     *suffixes, last = READERS
     text = f"{', '.join(suffixes)} or {last}"
     parser.add_argument("mesh", type=Path, metavar="MESH", help=text)
+    parser.add_toggle("--join", JOIN_TEXT)
     add_field_options(parser)
 
 
@@ -109,7 +116,10 @@ def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
             )
     if options.array is not None and has_source:
         raise RosyError(f"{options.mesh}: give either --array, or a field file or --generate")
-    surface = api.Surface(options.mesh, up=getattr(options, "up", None), step=options.step)
+    up = getattr(options, "up", None)
+    surface = api.Surface(
+        options.mesh, up=up, step=options.step, join=getattr(options, "join", None)
+    )
     if options.field is not None:
         field = read_field(options, options.field, surface, options.degree)
     elif is_simulation and not has_source:

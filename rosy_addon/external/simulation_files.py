@@ -279,6 +279,20 @@ def _read_dataset(path: Path, index: int | None) -> Any:
         return pyvista.wrap(reader.GetOutputDataObject(0))
 
 
+def _name_components(dataset: Any, path: Path) -> None:
+    """Give the arrays of a .med file the names of their components, which meshio does not keep."""
+    import h5py
+
+    with h5py.File(path) as file:
+        fields = file.get("CHA", {})
+        names = {name: field.attrs.get("NOM", b"").split() for name, field in fields.items()}
+    for attributes in (dataset.point_data, dataset.cell_data):
+        for key in attributes:
+            # meshio appends the step to the name of a field.
+            for k, name in enumerate(names.get(key.partition("[")[0], ())):
+                attributes.VTKObject.GetAbstractArray(key).SetComponentName(k, name.decode())
+
+
 @contextlib.contextmanager
 def _reporting(path: Path) -> Iterator[None]:
     """Context manager: raise errors of the libraries as a `RosyError` of one line. Discard all other output.

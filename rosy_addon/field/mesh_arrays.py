@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..core.errors import RosyError, RosyWarning
+from ..core.errors import RosyError, RosyWarning, counted
 from .formats.polygons import Polygons, offsets_from_sizes
+from .joining import with_joined_borders
 from .mesh_io import READERS, read_polygons
 
 #: Number of corners of each type of surface cell in meshio. Cells of second order have further points, which
@@ -76,10 +77,12 @@ def mesh_arrays(
     name: str,
     uv: ArrayLike | None = None,
     step: int | None = None,
+    join: bool | None = None,
 ) -> MeshArrays:
     """Return the arrays of a mesh that is given by arrays, by a file or by a mesh object of another library.
 
     In the result, `vertices` are (V, 3), and `uv` is (C, 2) or None. For the parameters, see `Surface`.
+    A `RosyWarning` says how many vertices have been joined.
 
     Raises
     ------
@@ -105,7 +108,15 @@ def mesh_arrays(
     uv = arrays.uv if uv is None else uv
     if uv is not None:
         uv = _corner_uv(uv, len(points), arrays.corner_vertex, name)
-    return replace(arrays, vertices=points, uv=uv)
+    arrays = replace(arrays, vertices=points, uv=uv)
+    is_grid = suffix in SIMULATION_READERS or (faces is None and not is_path)
+    if join or (join is None and (is_grid or suffix == ".stl")):
+        arrays, count = with_joined_borders(arrays)
+        if count and suffix != ".stl":
+            text = f"{name}: {counted(count, 'vertex', 'vertices')} on borders coincided with others and "
+            text += "were joined (join=False or --no-join keeps them apart)"
+            warnings.warn(text, RosyWarning, stacklevel=3)
+    return arrays
 
 
 def _corner_uv(

@@ -78,6 +78,10 @@ class Surface:
     step : int, optional
         Number of the time step to read if the file of a simulation has several, counted from 1. By default
         the last step.
+    join : bool, optional
+        Whether to join vertices on borders that are at the same position (within 1e-6 of the longest side) and
+        have the same data, such as at the seam and the poles of a grid of longitudes and latitudes. By default
+        only for files of simulations, objects of other libraries and .stl files.
 
     Attributes
     ----------
@@ -152,13 +156,14 @@ class Surface:
         sharp_angle: float | None = None,
         sharp_edges: ArrayLike | None = None,
         step: int | None = None,
+        join: bool | None = None,
     ) -> None:
         is_path = faces is None and isinstance(vertices, (str, os.PathLike))
         name = name or (str(vertices) if is_path else "surface")
         up = up or (UP_AXIS_BY_SUFFIX.get(Path(vertices).suffix.lower(), "z") if is_path else "z")
         if up not in UP_AXIS_MATRIX:
             raise RosyError(f"{name}: up is {up!r}: choose 'y' or 'z'")
-        arrays = mesh_arrays(vertices, faces, name, uv, step)
+        arrays = mesh_arrays(vertices, faces, name, uv, step, join)
         built = build_surface(
             *arrays.polygons,
             name=name,

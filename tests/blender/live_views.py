@@ -43,6 +43,8 @@ def bare_view():
     space.show_region_header = space.show_region_tool_header = False
     space.show_region_toolbar = space.show_region_ui = False
     space.shading.type = "SOLID"
+    # Blender's own antialiasing continues over many redraws, and its result varies.
+    bpy.context.preferences.system.viewport_aa = "OFF"
     return space
 
 
@@ -179,6 +181,11 @@ def load_at_rest():
     start = time.process_time()
     yield REST_SECONDS
     return (time.process_time() - start) / REST_SECONDS
+
+
+def visible_owners():
+    """Return the objects that the live view draws now."""
+    return [entry.owner for entry in visible_instances()]
 
 
 def is_live():

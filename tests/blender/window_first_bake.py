@@ -16,6 +16,7 @@ from mathutils import Euler, Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
 import window_steps
+from live_views import is_live
 from window_steps import (
     MANY,
     capture,
@@ -95,10 +96,6 @@ def save_picture(name):
     _, area, region, _ = view()
     capture(f"window-{name}", region)
     save_part(f"window-{name}", name, area.x, area.y, area.width, area.height)
-
-
-def is_live():
-    return rosy("rosy_addon.viewport.session").is_live(view()[1].spaces.active)
 
 
 def wait_for_live_view():

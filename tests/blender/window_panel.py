@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from conftest import add_camera, contents
+from conftest import add_camera, contents, pixels
 from window_steps import (
     SHOTS,
     capture,
@@ -39,12 +39,6 @@ LASTING_HANDLERS = (".ui.live_views", ".scene.staleness")
 def make_field():
     with in_view():
         bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="curvature", degree=4)
-
-
-def pixels(image):
-    values = np.empty(len(image.pixels), dtype=np.float32)
-    image.pixels.foreach_get(values)
-    return values.reshape(image.size[1], image.size[0], 4)
 
 
 def start_job(operator, **settings):

@@ -68,16 +68,7 @@ def show_faces(scene, obj):
     scene.rosy.look.display = "flat"
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        move_vertex,
-        turn_field,
-        subdivide,
-        move_camera,
-        show_faces,
-    ],
-)
+@pytest.mark.parametrize("change", [move_vertex, turn_field, subdivide, move_camera, show_faces])
 def test_a_change_runs_all_stages(scene, camera, monkey, run_stages, change):
     before = draw(scene)
     change(scene, monkey)

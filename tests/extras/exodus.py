@@ -9,11 +9,7 @@ import numpy as np
 
 
 def write_exodus(
-    path: Path,
-    points: np.ndarray,
-    tetrahedra: np.ndarray,
-    times: list[float],
-    velocity: np.ndarray,
+    path: Path, points: np.ndarray, tetrahedra: np.ndarray, times: list[float], velocity: np.ndarray
 ) -> None:
     """Write one block of tetrahedra, with (times, n, 3) velocities at the n points."""
     with netCDF4.Dataset(path, "w", format="NETCDF3_64BIT_OFFSET") as file:

@@ -16,10 +16,7 @@ from rosy_addon import api as rf
 from rosy_addon.api.films import Film
 from rosy_addon.cli.parser import main as cli_main
 from rosy_addon.compositor.look import Look
-from rosy_addon.external.simulation_files import (
-    list_steps,
-    read_simulation,
-)
+from rosy_addon.external.simulation_files import list_steps, read_simulation
 from rosy_addon.extras.film import SimulationFields
 from rosy_addon.field.array_field import SurfaceArrays, array_field
 from rosy_addon.field.mesh_arrays import SIMULATION_READERS, MeshArrays
@@ -90,7 +87,7 @@ def test_tone_from_an_array(rosy, files):
         (("b.vtp", "rotation.npy", "--array", "rotation"), "give either --array, or a field file"),
         (("a.ply", "--array", "rotation"), "a.ply: --array applies only to files of simulations"),
         (("a.vtp", "--step", 2), "a.vtp: has no step 2, only 1 step"),
-        (("none.vtu",), "none.vtu: cannot be read: no such file"),
+        (("none.vtu",), "none.vtu: cannot be read: no such file")
     ],
 )  # fmt: skip
 def test_errors(rosy, files, words, message, monkeypatch):

@@ -43,14 +43,18 @@ def add_camera(name, location, rotation):
     return camera
 
 
+def add_suzanne(levels):
+    """Add Suzanne with a subdivision modifier, active and selected."""
+    bpy.ops.mesh.primitive_monkey_add()
+    modifier = bpy.context.object.modifiers.new("Subdivision", "SUBSURF")
+    modifier.levels = modifier.render_levels = levels
+    return bpy.context.object
+
+
 @pytest.fixture
 def suzanne(scene):
     """Suzanne with a subdivision modifier, active and selected."""
-    bpy.ops.mesh.primitive_monkey_add()
-    monkey = bpy.context.object
-    modifier = monkey.modifiers.new("Subdivision", "SUBSURF")
-    modifier.levels = modifier.render_levels = 1
-    return monkey
+    return add_suzanne(1)
 
 
 @pytest.fixture

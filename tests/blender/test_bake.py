@@ -1,4 +1,4 @@
-"""The main job in Blender: bake, render what was baked, undo, remove."""
+"""The main job in Blender: bake, render what was baked, remove."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import subprocess
 
 import bpy
 import numpy as np
-from conftest import contents, pixels
+from conftest import pixels
 
 
 def baked_images():
@@ -98,27 +98,6 @@ def test_a_relit_picture_is_the_picture_of_any_tone(scene, tmp_path):
             assert np.corrcoef(drawn.ravel(), expected.ravel())[0, 1] > 0.92, (preset, white)
     assert bpy.ops.rosy.remove() == {"FINISHED"}
     assert not bpy.data.node_groups and not bpy.data.materials and not baked_images()
-
-
-def test_undo(baked):
-    """Undo restores the file as it was before the bake, with all pixels; redo restores the bake."""
-    before = contents()
-    first = [pixels(image) for image in baked_images()]
-    bpy.ops.ed.undo_push(message="before")
-    bpy.context.scene.rosy.look.seed = 2
-    bpy.ops.rosy.bake()
-    after = contents()
-    second = [pixels(image) for image in baked_images()]
-    bpy.ops.ed.undo_push(message="after")
-    bpy.ops.ed.undo()
-    assert contents() == before
-    assert len(baked_images()) == len(first)
-    for image, picture in zip(baked_images(), first, strict=True):
-        np.testing.assert_array_equal(pixels(image), picture)
-    bpy.ops.ed.redo()
-    assert contents() == after
-    for image, picture in zip(baked_images(), second, strict=True):
-        np.testing.assert_array_equal(pixels(image), picture)
 
 
 def test_bake_animation(with_field, scene, tmp_path):

@@ -19,12 +19,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 from conftest import contents, pixels
+from run import is_running
 from window_steps import (
     RESULTS,
     descendants,
     fresh_scene,
     in_view,
-    is_running,
     preferences,
     press,
     rosy,

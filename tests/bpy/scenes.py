@@ -79,6 +79,25 @@ def add_plane(name="Plane", size=1.0, cuts=1):
     return add_mesh(name, vertices, faces)
 
 
+def add_nodes(obj, *node_types):
+    """Add a modifier that passes a mesh through a chain of geometry nodes."""
+    group = bpy.data.node_groups.new("Chain", "GeometryNodeTree")
+    for direction in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Mesh", in_out=direction, socket_type="NodeSocketGeometry")
+    source, target = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
+    last = source.outputs[0]
+    for node_type in node_types:
+        node = group.nodes.new(node_type)
+        geometry = next((socket for socket in node.inputs if socket.type == "GEOMETRY"), None)
+        if geometry is not None:
+            group.links.new(last, geometry)
+        last = node.outputs[0]
+    group.links.new(last, target.inputs[0])
+    modifier = obj.modifiers.new("Nodes", "NODES")
+    modifier.node_group = group
+    return group
+
+
 def add_field(obj, kind="curvature", degree=4, axis=(0.0, 0.0, 1.0)):
     field = generate(mesh_surface(obj.data), GeneratorSettings(kind, axis), degree)
     write_mesh_field(obj.data, field)

@@ -108,15 +108,11 @@ BAKE_ERRORS = [
 ]
 
 STROKE_ERRORS = [
-    (["--camera", "None"], "there is no camera 'None' in scene 'Scene', only 'Camera', 'Side'"),
-    (["--object", "Nobody"], "there is no object 'Nobody'"),
     (["field.rosy"], "suzanne.blend: FIELD applies only to mesh files"),
     (["--field-mesh", "a.obj"], "suzanne.blend: --field-mesh applies only to mesh files"),
     (["--view", "0,90"], "suzanne.blend: --view applies only to mesh files"),
     (["--frames", "1-3"], "out.svg: several frames need #"),
     (["--frames", "9", "--set", "spacing=9999", "--set", "outline=off"], "frame 9: no stroke fits"),
-    (["-o", "a.png"], "a.png: the name of the file must end in .svg"),
-    (["-o", "/nowhere/a.svg"], "the folder /nowhere does not exist"),
 ]
 
 

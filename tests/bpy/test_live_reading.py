@@ -9,6 +9,7 @@ from rosy.rosy_addon.scene import scene_reader
 from rosy.rosy_addon.scene.scene_reader import SceneReader
 from scenes import (
     add_field,
+    add_nodes,
     add_plane,
     contents,
     depsgraph,
@@ -32,25 +33,6 @@ def read(reader):
 
 def names_with_field(entries):
     return [entry.owner.name for entry in entries if entry.instance.field is not None]
-
-
-def add_nodes(obj, *node_types):
-    """Add a modifier that passes a mesh through a chain of geometry nodes."""
-    group = bpy.data.node_groups.new("Chain", "GeometryNodeTree")
-    for direction in ("INPUT", "OUTPUT"):
-        group.interface.new_socket("Mesh", in_out=direction, socket_type="NodeSocketGeometry")
-    source, target = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
-    last = source.outputs[0]
-    for node_type in node_types:
-        node = group.nodes.new(node_type)
-        geometry = next((socket for socket in node.inputs if socket.type == "GEOMETRY"), None)
-        if geometry is not None:
-            group.links.new(last, geometry)
-        last = node.outputs[0]
-    group.links.new(last, target.inputs[0])
-    modifier = obj.modifiers.new("Nodes", "NODES")
-    modifier.node_group = group
-    return group
 
 
 def remesh(obj):

@@ -19,7 +19,7 @@ from rosy.rosy_addon.scene.scene_reader import read_scene
 from rosy.rosy_addon.scene.stroke_data import has_grease_pencil_drawings
 from rosy.rosy_addon.scene.stroke_objects import edited_strokes, remove_strokes, stroke_objects
 from rosy.rosy_addon.worker.job import Step
-from scenes import add_field, add_plane, contents, depsgraph, each_step, render
+from scenes import add_field, add_nodes, add_plane, contents, depsgraph, each_step, render
 
 PLAIN = StrokeStyle(spacing=12, outline=True)
 BLACK = Pen(width=1.5)
@@ -236,28 +236,17 @@ def test_chosen_objects_are_drawn_and_others_occlude(monkey, camera, scene):
     assert len(draw_strokes(scene, kind="CURVES", style=style).drawing.strokes) > len(behind)
 
 
-def test_meshes_from_strokes_do_not_occlude(monkey, camera, scene):
+def test_meshes_from_strokes_do_not_occlude(wall, camera, scene):
     """Geometry Nodes may turn stroke objects into meshes; these are not read as occluders."""
     first = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=20))
-    thicken(first.obj, 0.3)
+    group = add_nodes(first.obj, "GeometryNodeCurveToMesh")
+    circle = group.nodes.new("GeometryNodeCurvePrimitiveCircle")
+    circle.inputs["Radius"].default_value = 0.3
+    profile = group.nodes["Curve to Mesh"].inputs["Profile Curve"]
+    group.links.new(circle.outputs["Curve"], profile)
+    bpy.context.view_layer.update()
     again = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=20))
     np.testing.assert_array_equal(again.drawing.strokes.points, first.drawing.strokes.points)
-
-
-def thicken(obj, radius):
-    """Add a tube around each curve, by Geometry Nodes."""
-    group = bpy.data.node_groups.new("Tubes", "GeometryNodeTree")
-    for direction in ("INPUT", "OUTPUT"):
-        group.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
-    names = "NodeGroupInput", "GeometryNodeCurveToMesh", "GeometryNodeCurvePrimitiveCircle"
-    group_input, tube, circle = (group.nodes.new(name) for name in names)
-    group_output = group.nodes.new("NodeGroupOutput")
-    circle.inputs["Radius"].default_value = radius
-    group.links.new(group_input.outputs[0], tube.inputs["Curve"])
-    group.links.new(circle.outputs["Curve"], tube.inputs["Profile Curve"])
-    group.links.new(tube.outputs["Mesh"], group_output.inputs[0])
-    obj.modifiers.new("Tubes", "NODES").node_group = group
-    bpy.context.view_layer.update()
 
 
 def test_settings_of_the_scene_are_those_of_the_function(wall, camera, scene, tmp_path):

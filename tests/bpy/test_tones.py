@@ -29,7 +29,8 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 def add_attribute(mesh, name, domain, kind, values):
     attribute = mesh.attributes.new(name, kind, domain)
     key = "color" if "COLOR" in kind else "value"
-    attribute.data.foreach_set(key, np.asarray(values, dtype=np.float32).ravel())
+    data_type = np.int32 if kind == "INT" else np.float32
+    attribute.data.foreach_set(key, np.asarray(values, dtype=data_type).ravel())
     mesh.update()
 
 
@@ -63,14 +64,13 @@ def tone_of(tone_request, name="Plane"):
 
 
 @pytest.mark.parametrize("domain", ["POINT", "FACE", "CORNER"])
-@pytest.mark.parametrize("kind", ["FLOAT", "FLOAT_COLOR", "BYTE_COLOR"])
+@pytest.mark.parametrize("kind", ["FLOAT", "INT", "FLOAT_COLOR", "BYTE_COLOR"])
 def test_attributes_of_all_domains(wall, domain, kind):
     mesh = wall.data
     count = {"POINT": len(mesh.vertices), "FACE": 4, "CORNER": len(mesh.loops)}[domain]
-    numbers = (np.arange(count) + 0.5) / count
-    if kind == "FLOAT":
-        values, expected = numbers, numbers
-    else:
+    numbers = np.arange(count) if kind == "INT" else (np.arange(count) + 0.5) / count
+    values = expected = numbers
+    if "COLOR" in kind:
         values = np.stack([numbers, 1 - numbers, 0.3 + 0 * numbers, 1 + 0 * numbers], axis=1)
         expected = values[:, :3] @ LUMINANCE
     add_attribute(mesh, "Ink", domain, kind, values)

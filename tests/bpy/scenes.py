@@ -98,6 +98,14 @@ def add_nodes(obj, *node_types):
     return group
 
 
+def add_uv(mesh):
+    """Add a UV map from 0 to 1 over the square of `add_plane`."""
+    layer = mesh.uv_layers.new(name="Map")
+    for loop, corner in zip(mesh.loops, layer.uv, strict=True):
+        position = mesh.vertices[loop.vertex_index].co
+        corner.vector = position.x / 2 + 0.5, position.z / 2 + 0.5
+
+
 def add_field(obj, kind="curvature", degree=4, axis=(0.0, 0.0, 1.0)):
     field = generate(mesh_surface(obj.data), GeneratorSettings(kind, axis), degree)
     write_mesh_field(obj.data, field)

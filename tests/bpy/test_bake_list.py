@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import bpy
-from rosy.rosy_addon.core.cache import BAKE_CACHE
 from rosy.rosy_addon.jobs.animation import bake_animation
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.scene import staleness
@@ -52,7 +51,6 @@ def test_a_renamed_camera_keeps_its_picture(tmp_path):
 
 def test_a_change_during_a_bake_counts(tmp_path):
     scene = build(tmp_path)
-    BAKE_CACHE.clear()
     stepping = each_step(bake.begin(scene))
     assert isinstance(next(stepping), Call)
     obj("Plain").location.x = 0.7

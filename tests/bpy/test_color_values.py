@@ -12,7 +12,7 @@ from rosy.rosy_addon.scene.bake_records import list_bakes
 from rosy.rosy_addon.scene.look_inputs import ReadRequest
 from rosy.rosy_addon.scene.read_view import read_turntable
 from rosy.rosy_addon.scene.scene_reader import read_scene
-from scenes import depsgraph
+from scenes import add_uv, depsgraph
 
 
 def set_values(mesh, values, name="Angle"):
@@ -59,12 +59,7 @@ def test_turntables_have_the_numbers(scene, colored):
 
 
 def test_textures(scene, colored):
-    mesh = colored.data
-    layer = mesh.uv_layers.new(name="UVMap")
-    corners = [mesh.vertices[loop.vertex_index].co for loop in mesh.loops]
-    layer.uv.foreach_set(
-        "vector", np.array([((co.x + 1) / 2, (co.z + 1) / 2) for co in corners]).ravel()
-    )
+    add_uv(colored.data)
     scene.rosy.texture_size, scene.rosy.texture_margin = 64, 0
     bake_texture(scene, [colored])
     (info,) = list_bakes(scene)

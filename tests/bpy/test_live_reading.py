@@ -42,7 +42,9 @@ def remesh(obj):
 
 def removed_attribute(obj):
     group = add_nodes(obj, "GeometryNodeRemoveAttribute")
-    group.nodes["Remove Named Attribute"].inputs["Name"].default_value = "rosy"
+    name = group.nodes["Remove Named Attribute"].inputs["Name"]
+    name.default_value = "rosy"
+    return name
 
 
 def points_only(obj):
@@ -82,12 +84,10 @@ def test_a_field_lost_in_modifiers_is_named_once(monkey, loss, monkeypatch):
 def test_an_attribute_that_is_kept_again(monkey):
     """The modifiers keep the faces, but no longer lose the attribute."""
     monkey.modifiers.new("Subdivision", "SUBSURF")
-    removed_attribute(monkey)
+    name = removed_attribute(monkey)
     reader = SceneReader()
     assert read(reader) == []
-    bpy.data.node_groups["Chain"].nodes["Remove Named Attribute"].inputs[
-        "Name"
-    ].default_value = "other"
+    name.default_value = "other"
     reader.invalidate({"Suzanne"}, topology_changed=False)
     assert read(reader) == ["Suzanne"]
 

@@ -11,13 +11,6 @@ from rosy.rosy_addon.projection import project as projection
 from scenes import add_camera, add_field
 
 
-@pytest.fixture(autouse=True)
-def empty_cache():
-    BAKE_CACHE.clear()
-    yield
-    BAKE_CACHE.clear()
-
-
 @pytest.fixture
 def run_stages(monkeypatch):
     """The names of the slow steps that were run, in their order."""

@@ -21,7 +21,7 @@ from rosy.rosy_addon.scene.look_inputs import (
 )
 from rosy.rosy_addon.scene.pictures import read_output_settings
 from rosy.rosy_addon.scene.scene_reader import SceneReader, read_scene
-from scenes import add_field, add_mesh, depsgraph, read_live
+from scenes import add_field, add_mesh, add_uv, depsgraph, read_live
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
@@ -74,8 +74,7 @@ def test_attributes_of_all_domains(wall, domain, kind):
         values = np.stack([numbers, 1 - numbers, 0.3 + 0 * numbers, 1 + 0 * numbers], axis=1)
         expected = values[:, :3] @ LUMINANCE
     add_attribute(mesh, "Ink", domain, kind, values)
-    corner = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", corner)
+    corner = np.array([loop.vertex_index for loop in mesh.loops])
     face = np.repeat(np.arange(4), 4)
     element = {"POINT": corner, "FACE": face, "CORNER": np.arange(len(corner))}[domain]
     tone = tone_of(ToneRequest("attribute", "Ink")).values
@@ -129,17 +128,6 @@ def test_luminance_of_images():
     clear = bpy.data.images.new("clear", 2, 2, alpha=True)
     clear.pixels.foreach_set(np.zeros(16, dtype=np.float32))
     np.testing.assert_allclose(image_luminance(clear), 1)
-
-
-def add_uv(mesh):
-    """Add a UV map from 0 to 1 over the square."""
-    layer = mesh.uv_layers.new(name="Map")
-    corner = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", corner)
-    positions = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-    mesh.vertices.foreach_get("co", positions)
-    uv = positions.reshape(-1, 3)[corner][:, [0, 2]] * 0.5 + 0.5
-    layer.uv.foreach_set("vector", uv.ravel())
 
 
 def test_missing_images_and_uv_maps(wall):

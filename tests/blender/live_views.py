@@ -45,8 +45,6 @@ def bare_view():
     space.show_region_header = space.show_region_tool_header = False
     space.show_region_toolbar = space.show_region_ui = False
     space.shading.type = "SOLID"
-    # Blender's own antialiasing continues over many redraws, and its result varies.
-    bpy.context.preferences.system.viewport_aa = "OFF"
     return space
 
 
@@ -159,15 +157,16 @@ def check_nothing_is_left():
     assert session_module()._session is None and not handlers()
 
 
-def visible_instances():
-    """Return the instances that the live view draws now."""
-    session = session_module()._session
-    (layer,) = session.layers._layers.values()
+def visible_owners():
+    """Return the objects that the live view draws now."""
+    (layer,) = session_module()._session.layers._layers.values()
     space = view()[1].spaces.active
     depsgraph = bpy.context.evaluated_depsgraph_get()
     is_visible = rosy("rosy_addon.viewport.view3d").is_visible
     return [
-        entry for entry in layer.instances if is_visible(entry.visibility_object, depsgraph, space)
+        entry.owner
+        for entry in layer.instances
+        if is_visible(entry.visibility_object, depsgraph, space)
     ]
 
 
@@ -177,11 +176,6 @@ def load_at_rest():
     start = time.process_time()
     yield REST_SECONDS
     return (time.process_time() - start) / REST_SECONDS
-
-
-def visible_owners():
-    """Return the objects that the live view draws now."""
-    return [entry.owner for entry in visible_instances()]
 
 
 def is_live():

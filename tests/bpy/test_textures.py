@@ -134,7 +134,7 @@ def test_remove_leaves_nothing(scene, torus):
 
 
 def test_tiles_are_pictures_of_their_own(scene, textured, tmp_path):
-    """Packed, in a folder, and read again from a saved file."""
+    """Packed, in a folder, and read again from a saved file. They are lit like any material."""
     layer = textured.data.uv_layers.active
     uv = np.empty(2 * len(layer.uv), dtype=np.float32)
     layer.uv.foreach_get("vector", uv)
@@ -155,13 +155,17 @@ def test_tiles_are_pictures_of_their_own(scene, textured, tmp_path):
     (image,) = (image for image in bpy.data.images if image.source == "TILED")
     assert all(file.filepath.startswith("//RoSy ") for file in image.packed_files)
     packed = render(scene, tmp_path / "packed.exr", samples=1)
-    assert packed[packed[..., 3] == 1][:, 0].std() > 0.05
+    covered = packed[..., 3] == 1
+    assert packed[covered][:, 0].std() > 0.05
     scene.rosy.store, scene.rosy.directory = "SAVED", str(tmp_path / "tiles")
     (result,) = bake_texture(scene, [scene.objects[name]])
     assert not result.image.packed_files
     files = sorted(file.name for file in (tmp_path / "tiles").iterdir())
     assert files == [f"RoSy_{name}_texture.{number}.png" for number in numbers]
     np.testing.assert_array_equal(render(scene, tmp_path / "files.exr", samples=1), packed)
+    bpy.data.objects["Sun"].rotation_euler.x += np.pi
+    dark = render(scene, tmp_path / "dark.exr", samples=1)
+    assert dark[covered][:, 0].mean() < 0.5 * packed[covered][:, 0].mean()
     assert remove_bakes(scene).images == 1
 
 

@@ -63,7 +63,7 @@ def strokes(run_with, where, scene, monkey):
 def difference(run_with, where, scene, monkey):
     set_vectors(monkey.data, member_vectors(monkey.data), "other")
     add_field(monkey, kind="axis")
-    return run_with(where, store_difference.begin(monkey.data, "other"))[2].statistics
+    return run_with(where, store_difference.begin(monkey.data, "other"))[2].difference.angle
 
 
 def combed_field(run_with, where, scene, monkey):

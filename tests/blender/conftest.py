@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib.util
 import math
 import os
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -13,6 +15,9 @@ if "ROSY_BLENDER_LANE" not in os.environ or importlib.util.find_spec("bpy") is N
     collect_ignore_glob = ["test_*.py"]
 else:
     import bpy
+
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+    from harness.blender_data import contents, member_vectors, pixels  # noqa: F401
 
 EXTENSION = "bl_ext.user_default.rosy"
 
@@ -38,14 +43,18 @@ def add_camera(name, location, rotation):
     return camera
 
 
+def add_suzanne(levels):
+    """Add Suzanne with a subdivision modifier, active and selected."""
+    bpy.ops.mesh.primitive_monkey_add()
+    modifier = bpy.context.object.modifiers.new("Subdivision", "SUBSURF")
+    modifier.levels = modifier.render_levels = levels
+    return bpy.context.object
+
+
 @pytest.fixture
 def suzanne(scene):
     """Suzanne with a subdivision modifier, active and selected."""
-    bpy.ops.mesh.primitive_monkey_add()
-    monkey = bpy.context.object
-    modifier = monkey.modifiers.new("Subdivision", "SUBSURF")
-    modifier.levels = modifier.render_levels = 1
-    return monkey
+    return add_suzanne(1)
 
 
 @pytest.fixture
@@ -60,26 +69,6 @@ def baked(with_field):
     """Suzanne with a field, baked from the scene's camera."""
     assert bpy.ops.rosy.bake() == {"FINISHED"}
     return with_field
-
-
-def contents():
-    """Return the names of all datablocks by kind, and what each object and mesh holds."""
-    names = {}
-    for prop in bpy.data.bl_rna.properties:
-        if prop.type == "COLLECTION":
-            names[prop.identifier] = sorted(obj.name for obj in getattr(bpy.data, prop.identifier))
-    for obj in bpy.data.objects:
-        names["object " + obj.name] = [
-            [modifier.name for modifier in obj.modifiers],
-            [slot.name for slot in obj.material_slots],
-            sorted(set(obj.keys()) - {"rosy"}),
-        ]
-    for mesh in bpy.data.meshes:
-        names["mesh " + mesh.name] = [
-            sorted(attribute.name for attribute in mesh.attributes),
-            [material and material.name for material in mesh.materials],
-        ]
-    return names
 
 
 def error_of(operator, *arguments, **settings):

@@ -17,14 +17,7 @@ from random import Random
 from typing import Any
 
 import bpy
-from monkey_checks import (
-    CheckError,
-    allowed_changes,
-    changes,
-    check_message,
-    fingerprint,
-    is_owned,
-)
+from monkey_checks import CheckError, allowed_changes, changes, check_message, fingerprint, is_owned
 
 #: Names that a user, or a script, can give, and names of data that RoSy or the monkey makes.
 NAMES = (
@@ -170,14 +163,11 @@ class Monkey:
             "pictures",
             "pictures",
             "a.svg",
-            "field.rosy",
-            "field.txt",
-            "turn.gif",
+            *("field.rosy", "field.txt", "turn.gif"),
             "preset.json",
         )
-        return self.pick(
-            [*(str(self.folder / name) for name in names), "//rosy/", "/proc/none", ""]
-        )
+        paths = [str(self.folder / name) for name in names]
+        return self.pick([*paths, "//rosy/", "/proc/none", ""])
 
 
 # --- choices --------------------------------------------------------------------------------------
@@ -300,13 +290,8 @@ def _stroke(monkey: Monkey) -> Iterator[dict]:
     vertices = list(obj.data.vertices) if obj is not None and obj.type == "MESH" else []
     for _ in range(monkey.random.randrange(6)):
         location = tuple(monkey.pick(vertices).co) if vertices else (0.0, 0.0, 0.0)
-        start = monkey.pick([False, False, True])
-        yield {
-            "name": "",
-            "location": location,
-            "pressure": monkey.random.random(),
-            "is_start": start,
-        }
+        point = {"location": location, "is_start": monkey.pick([False, False, True])}
+        yield {"name": "", "pressure": monkey.random.random(), **point}
 
 
 @action(6)

@@ -99,13 +99,8 @@ def transform(monkey: Monkey) -> None:
 
 @action(2)
 def rename_or_hide(monkey: Monkey) -> None:
-    kinds = (
-        bpy.data.objects,
-        bpy.data.meshes,
-        bpy.data.cameras,
-        bpy.data.scenes,
-        bpy.data.materials,
-    )
+    names = ("objects", "meshes", "cameras", "scenes", "materials")
+    kinds = (getattr(bpy.data, name) for name in names)
     block, obj = monkey.pick(block for kind in kinds for block in kind), monkey.pick(objects())
     if monkey.chance(0.5) and block is not None and block.library is None:
         block.name = monkey.pick(NAMES)
@@ -117,14 +112,8 @@ def rename_or_hide(monkey: Monkey) -> None:
 @action(0.5)
 def delete_data(monkey: Monkey) -> None:
     """Delete a datablock of any kind behind everyone's back."""
-    kinds = (
-        bpy.data.meshes,
-        bpy.data.cameras,
-        bpy.data.images,
-        bpy.data.materials,
-        bpy.data.objects,
-    )
-    kind = monkey.pick(kinds)
+    name = monkey.pick(["meshes", "cameras", "images", "materials", "objects"])
+    kind = getattr(bpy.data, name)
     # Blender 5.2 hangs if a node group of its own assets, which are linked, is deleted.
     block = monkey.pick(block for block in kind if block.library is None)
     if block is not None and to_object_mode(monkey):

@@ -230,12 +230,8 @@ def add_junit(counts: dict[str, int], results: Path) -> None:
     counts["failed"] += suite_counts["failures"]
     counts["errors"] += suite_counts["errors"]
     counts["skipped"] += suite_counts["skipped"]
-    counts["passed"] += (
-        suite_counts["tests"]
-        - suite_counts["failures"]
-        - suite_counts["errors"]
-        - suite_counts["skipped"]
-    )
+    tests = suite_counts.pop("tests")
+    counts["passed"] += tests - sum(suite_counts.values())
 
 
 def add_window(counts: dict[str, int], results: Path) -> None:

@@ -138,16 +138,3 @@ def test_the_state_of_blender_is_restored(rosy, card, surface_of):
     finally:
         state.depth_test_set("NONE")
         state.blend_set("NONE")
-
-
-def test_a_rejected_shader_is_an_error_of_one_line(rosy, card, capfd):
-    passes = module_of(PACKAGE, "gpu.passes")
-    errors = module_of(PACKAGE, "core.errors")
-
-    class Broken(passes.ComputePass):
-        source = "void main() { nonsense }"
-
-    image = card.device.texture((8, 8), "RGBA32F")
-    with pytest.raises(errors.RosyError, match="'clear'"):
-        card.device.compute(Broken("clear"), (8, 8, 1), {"cleared": image}, {"box_origin": (0, 0)})
-    capfd.readouterr()

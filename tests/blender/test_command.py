@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 
 import bpy
@@ -30,9 +29,8 @@ def saved(with_field, tmp_path):
 
 
 def test_bake_and_save(saved, tmp_path):
-    status, output = command(
-        "bake", "--size", "96x64", "--out", tmp_path / "out", "--save", scene=saved
-    )
+    options = ("--size", "96x64", "--out", tmp_path / "out", "--save")
+    status, output = command("bake", *options, scene=saved)
     assert status == 0, output
     assert list((tmp_path / "out").glob("*.png"))
     bpy.ops.wm.open_mainfile(filepath=str(saved))
@@ -53,30 +51,16 @@ def test_strokes_of_the_file(saved, tmp_path):
     bpy.context.scene.rosy.strokes.spacing = 9.0
     bpy.ops.wm.save_mainfile()
     bpy.ops.rosy.strokes(kind="FILE", filepath=str(tmp_path / "button.svg"))
-    for arguments, scene in (([], saved), ([saved], None)):
-        out = tmp_path / "out.svg"
-        status, output = command("strokes", *arguments, "-o", out, scene=scene)
-        assert status == 0, output
-        assert out.read_bytes() == (tmp_path / "button.svg").read_bytes()
-        out.unlink()
+    status, output = command("strokes", "-o", tmp_path / "out.svg", scene=saved)
+    assert status == 0, output
+    assert (tmp_path / "out.svg").read_bytes() == (tmp_path / "button.svg").read_bytes()
 
 
-def test_an_unknown_verb_is_refused():
-    status, output = command("paint")
-    assert status == 2
-    assert "paint" in output and "Traceback" not in output
-
-
-def test_render_and_info(with_field, tmp_path):
+def test_render(with_field, tmp_path):
     mesh = tmp_path / "suzanne.obj"
     bpy.ops.wm.obj_export(filepath=str(mesh), export_materials=False)
     picture = tmp_path / "suzanne.png"
-    status, output = command(
-        "render", mesh, "-o", picture, "--degree", 4, "--generate", "curvature", "--size", "64x64"
-    )
+    options = ("--degree", 4, "--generate", "curvature", "--size", "64x64")
+    status, output = command("render", mesh, "-o", picture, *options)
     assert status == 0, output
     assert picture.read_bytes().startswith(b"\x89PNG")
-    status, output = command("info", mesh, "--degree", 4, "--generate", "curvature", "--json")
-    assert status == 0, output
-    info = next(json.loads(line) for line in output.splitlines() if line.startswith("{"))
-    assert info["degree"] == 4

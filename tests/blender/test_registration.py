@@ -7,36 +7,29 @@ from conftest import EXTENSION
 
 #: Words that are small in titles, and property groups whose properties are controls.
 SMALL_WORDS = {
-    "a",
-    "an",
-    "and",
-    "as",
-    "at",
-    "by",
-    "for",
-    "from",
-    "in",
-    "of",
-    "on",
-    "or",
-    "the",
-    "to",
-    "with",
+    *(
+        "a",
+        "an",
+        "and",
+        "as",
+        "at",
+        "by",
+        "for",
+        "from",
+        "in",
+        "of",
+        "on",
+        "or",
+        "the",
+        "to",
+        "with",
+    )
 }
 VISIBLE_GROUPS = {"RosyLook", "RosyStrokes", "RosyScene", "RosyMesh", "RosyObject"}
 
 ID_TYPES = (
-    *(
-        "Scene",
-        "Mesh",
-        "Object",
-        "NodeTree",
-        "WindowManager",
-        "World",
-        "Material",
-        "Image",
-        "Camera",
-    ),
+    *("Scene", "Mesh", "Object", "NodeTree", "WindowManager", "World", "Material", "Image"),
+    "Camera",
 )
 
 
@@ -70,10 +63,8 @@ def snapshot():
 
 
 def switch(on):
-    if on:
-        bpy.ops.preferences.addon_enable(module=EXTENSION)
-    else:
-        bpy.ops.preferences.addon_disable(module=EXTENSION)
+    operators = bpy.ops.preferences
+    (operators.addon_enable if on else operators.addon_disable)(module=EXTENSION)
 
 
 def test_off_and_on_and_off_leaves_nothing():
@@ -114,6 +105,12 @@ def test_nothing_outside_bpy_is_touched():
     assert not [name for name in sys.modules if name.startswith(("rosy_addon", "operators"))]
 
 
+def is_title(text):
+    """Return whether a label is in title case, as Blender's are."""
+    words = [word for word in text.replace("-", " ").split() if word not in SMALL_WORDS]
+    return bool(words) and not any(word.islower() for word in words)
+
+
 def controls():
     """Yield the description of each operator, and all properties that a user sees, by their owner."""
     for cls in sys.modules[f"{EXTENSION}.operators.registration"].CLASSES:
@@ -138,9 +135,7 @@ def test_every_control_has_a_label_and_a_tooltip():
             if item.type == "ENUM":
                 labels += [option.name for option in item.enum_items]
                 texts += [option.description for option in item.enum_items]
-            for label in labels:
-                words = [word for word in label.split() if word not in SMALL_WORDS]
-                assert words and not any(word.islower() for word in words), (owner, label)
+            assert all(map(is_title, labels)), (owner, labels)
         for text in texts:
             assert text and text == text.strip() and not text.endswith("."), (owner, text)
             assert not text[0].islower(), (owner, text)
@@ -151,6 +146,5 @@ def test_names_of_presets_are_in_title_case():
     shipped = [entry.preset for entry in library.entries().values() if not entry.is_user]
     assert len(shipped) > 5
     for preset in shipped:
-        words = [word for word in preset.name.replace("-", " ").split() if word not in SMALL_WORDS]
-        assert not any(word.islower() for word in words), preset.name
+        assert is_title(preset.name), preset.name
         assert not preset.description.endswith(".")

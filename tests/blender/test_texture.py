@@ -4,42 +4,16 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from conftest import contents, error_of
-from test_bake import baked_images, material_of, pixels, render
-
-
-def test_texture_is_lit_like_any_material(with_field, scene, tmp_path):
-    """Seen from both sides, dark where no light falls, and the same in a file that was saved."""
-    scene.rosy.texture_size = 256
-    assert bpy.ops.rosy.bake_texture() == {"FINISHED"}
-    nodes = material_of(with_field).node_tree.nodes
-    assert "Principled BSDF" in nodes and nodes["UV Map"].uv_map == "UVMap"
-    bpy.ops.object.light_add(type="SUN", rotation=(1.2, 0.0, 0.0))
-    front = render(scene, tmp_path)
-    scene.camera.location.y, scene.camera.rotation_euler.z = 6.0, np.pi
-    back = render(scene, tmp_path)
-    covered = front[..., 3] > 0.9
-    assert front[covered][:, 0].std() > 0.05
-    assert back[back[..., 3] > 0.9][:, 0].mean() < 0.5 * front[covered][:, 0].mean()
-
-
-def hatching_node(obj):
-    """The node of the group RoSy Hatching in the material of an object."""
-    nodes = material_of(obj).node_tree.nodes
-    return next(node for node in nodes if node.bl_idname == "ShaderNodeGroup")
+from conftest import contents, error_of, pixels
+from test_bake import baked_images, hatching_node, material_of, plane_in_frame, render
 
 
 def test_hatching_follows_the_tone(scene, tmp_path):
     """The paper and the ink of a texture have the mean that the tone asks, without a new texture."""
     from bl_ext.user_default.rosy.rosy_addon.core.color import to_linear
 
-    bpy.ops.mesh.primitive_plane_add(size=8.0, rotation=(np.pi / 2, 0.0, 0.0))
-    plane = bpy.context.object
-    bpy.ops.rosy.field_generate(kind="axis", degree=4, axis=(1.0, 0.0, 0.3))
+    plane = plane_in_frame(scene)
     scene.rosy.texture_size = 1024
-    scene.view_settings.view_transform = "Standard"
-    scene.camera.data.type, scene.camera.data.ortho_scale = "ORTHO", 8.0
-    scene.camera.location, scene.camera.rotation_euler = (0.0, -5.0, 0.0), (np.pi / 2, 0.0, 0.0)
     for preset, light_ink in (("cross-hatch", False), ("white-on-black", True)):
         bpy.ops.rosy.preset_apply(preset=preset)
         scene.rosy.look.shading = 1.0

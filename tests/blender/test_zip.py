@@ -38,11 +38,11 @@ REFUSED_MODULES = {
 #: only the connections are used: it neither starts nor finds processes.
 QUESTIONED_MODULES = {
     "subprocess": {
-        *("worker/frame_workers.py", "worker/start.py", "worker/helper.py", "worker/program.py"),
+        *("worker/frame_workers.py", "worker/start.py", "worker/helper.py", "worker/program.py")
     },
     "pickle": {"worker/channel.py", "worker/__main__.py"},
     "multiprocessing": {
-        *("worker/start.py", "worker/helper.py", "worker/channel.py", "worker/pool.py"),
+        *("worker/start.py", "worker/helper.py", "worker/channel.py", "worker/pool.py")
     },
     "ctypes": {"core/memory.py"},
 }

@@ -16,6 +16,8 @@ from mathutils import Euler, Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
 import window_steps
+from conftest import add_suzanne
+from live_views import is_live
 from window_steps import (
     MANY,
     capture,
@@ -95,10 +97,6 @@ def save_picture(name):
     _, area, region, _ = view()
     capture(f"window-{name}", region)
     save_part(f"window-{name}", name, area.x, area.y, area.width, area.height)
-
-
-def is_live():
-    return rosy("rosy_addon.viewport.session").is_live(view()[1].spaces.active)
 
 
 def wait_for_live_view():
@@ -191,9 +189,7 @@ def live_suzanne():
     space = view()[1].spaces.active
     yield from window_steps.open_tab()
     with in_view():
-        bpy.ops.mesh.primitive_monkey_add()
-        modifier = bpy.context.object.modifiers.new("Subdivision", "SUBSURF")
-        modifier.levels = modifier.render_levels = 2
+        add_suzanne(2)
         bpy.ops.object.shade_smooth()
         bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="smoothest", degree=4)
         bpy.ops.object.select_all(action="DESELECT")

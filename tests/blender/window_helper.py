@@ -18,13 +18,13 @@ import bpy
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from conftest import contents
+from conftest import contents, pixels
+from run import is_running
 from window_steps import (
     RESULTS,
     descendants,
     fresh_scene,
     in_view,
-    is_running,
     preferences,
     press,
     rosy,
@@ -75,9 +75,7 @@ def start_long_bake():
 def baked_pixels():
     """Return the pixels of the only baked picture."""
     (image,) = [image for image in bpy.data.images if image.name.startswith("RoSy")]
-    values = np.empty(len(image.pixels), dtype=np.float32)
-    image.pixels.foreach_get(values)
-    return values
+    return pixels(image)
 
 
 def wait_for_job():
@@ -142,7 +140,7 @@ def a_helper_that_is_killed():
     first = helper_id()
     os.kill(first, signal.SIGKILL)
     yield from wait_for_job()
-    assert helper_id() not in (None, first) and len(baked_pixels()) == 4 * 800 * 600
+    assert helper_id() not in (None, first) and baked_pixels().shape == (600, 800, 4)
     yield from suzanne((1600, 1200))
     before = contents()
     yield from start_long_bake()
@@ -172,7 +170,7 @@ def without_a_helper():
         for _ in range(2):
             start_bake()
             yield from wait_for_job()
-            assert len(baked_pixels()) == 4 * 320 * 240
+            assert baked_pixels().shape == (240, 320, 4)
     finally:
         helper.start_module = start_process
     assert_reported("Blender waits while RoSy computes")

@@ -12,6 +12,7 @@ import bpy
 from mathutils import Euler, Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
+from conftest import add_suzanne
 from window_steps import (
     SHOTS,
     capture,
@@ -59,9 +60,7 @@ def live():
         bpy.ops.screen.screen_full_area()
     yield 1.0
     with in_view():
-        bpy.ops.mesh.primitive_monkey_add()
-        modifier = bpy.context.object.modifiers.new("Subdivision", "SUBSURF")
-        modifier.levels = modifier.render_levels = 3
+        add_suzanne(3)
         bpy.ops.object.shade_smooth()
     yield from open_tab()
     with in_view():

@@ -29,7 +29,7 @@ from live_views import (
     messages,
     session_module,
     switch,
-    visible_instances,
+    visible_owners,
     wait_for_final_pictures,
 )
 from window_steps import (
@@ -474,11 +474,6 @@ def nothing_is_left():
         assert not (held._kept or held._lookup_textures), ending
         check_nothing_is_left()
     os.remove(path)
-
-
-def visible_owners():
-    """Return the objects that the live view draws now."""
-    return [entry.owner for entry in visible_instances()]
 
 
 run_steps(

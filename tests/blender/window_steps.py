@@ -21,7 +21,7 @@ import bpy
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from conftest import add_camera
+from conftest import add_camera, add_suzanne
 
 SHOTS = Path(os.environ["ROSY_SHOTS"])
 RESULTS = Path(os.environ["ROSY_RESULTS"])
@@ -133,9 +133,7 @@ def fresh_scene(size=(320, 240)):
     with in_view():
         bpy.ops.object.light_add(type="SUN", rotation=(0.6, 0.3, 0.2))
         scene.camera = add_camera("Camera", (0.0, -4.5, 1.0), (math.radians(78), 0.0, 0.0))
-        bpy.ops.mesh.primitive_monkey_add()
-        modifier = bpy.context.object.modifiers.new("Subdivision", "SUBSURF")
-        modifier.levels = modifier.render_levels = 2
+        add_suzanne(2)
         bpy.ops.ed.undo_push(message="fresh scene")
 
 
@@ -159,15 +157,6 @@ def wait_until(condition, seconds=TIMEOUT_SECONDS):
         if time.monotonic() > deadline:
             raise AssertionError("timed out")
         yield
-
-
-def is_running(process):
-    """Return whether a process runs, given its number."""
-    try:
-        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
-    except OSError:
-        return False
-    return state != "Z"
 
 
 def descendants():

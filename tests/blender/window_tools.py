@@ -33,17 +33,12 @@ def annotations_guide_a_field():
     region = view()[2]
     region_3d = view()[1].spaces.active.region_3d
     ends = np.linspace((0.0, -1.0, -0.5), (1.0, -1.0, 0.5), 30)
+    at_rest = {"name": "", "location": (0.0, 0.0, 0.0), "mouse_event": (0.0, 0.0), "pressure": 1.0}
+    at_rest |= {"size": 1.0, "pen_flip": False, "x_tilt": 0.0, "y_tilt": 0.0}
     points = [
         {
-            "name": "",
-            "location": (0.0, 0.0, 0.0),
+            **at_rest,
             "mouse": location_3d_to_region_2d(region, region_3d, point),
-            "mouse_event": (0.0, 0.0),
-            "pressure": 1.0,
-            "size": 1.0,
-            "pen_flip": False,
-            "x_tilt": 0.0,
-            "y_tilt": 0.0,
             "time": 0.1 * index,
             "is_start": index == 0,
         }

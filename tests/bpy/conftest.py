@@ -31,6 +31,12 @@ else:
     importlib.import_module("rosy.rosy_addon.ui.properties").ensure_registered()
 
 
+@pytest.fixture(autouse=True)
+def empty_cache():
+    """Each test computes all results anew, and no one looks through those of earlier tests."""
+    importlib.import_module("rosy.rosy_addon.core.cache").BAKE_CACHE.clear()
+
+
 @pytest.fixture
 def scene():
     """An empty scene, 128 x 128 pixels, view transform Standard."""

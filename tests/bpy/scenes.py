@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+from harness.blender_data import contents, member_vectors, pixels  # noqa: F401
 from mathutils import Vector
 from rosy.rosy_addon.field.generate import GeneratorSettings, generate
 from rosy.rosy_addon.scene.look_inputs import FIELDS_ONLY
@@ -78,16 +79,37 @@ def add_plane(name="Plane", size=1.0, cuts=1):
     return add_mesh(name, vertices, faces)
 
 
+def add_nodes(obj, *node_types):
+    """Add a modifier that passes a mesh through a chain of geometry nodes."""
+    group = bpy.data.node_groups.new("Chain", "GeometryNodeTree")
+    for direction in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Mesh", in_out=direction, socket_type="NodeSocketGeometry")
+    source, target = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
+    last = source.outputs[0]
+    for node_type in node_types:
+        node = group.nodes.new(node_type)
+        geometry = next((socket for socket in node.inputs if socket.type == "GEOMETRY"), None)
+        if geometry is not None:
+            group.links.new(last, geometry)
+        last = node.outputs[0]
+    group.links.new(last, target.inputs[0])
+    modifier = obj.modifiers.new("Nodes", "NODES")
+    modifier.node_group = group
+    return group
+
+
+def add_uv(mesh):
+    """Add a UV map from 0 to 1 over the square of `add_plane`."""
+    layer = mesh.uv_layers.new(name="Map")
+    for loop, corner in zip(mesh.loops, layer.uv, strict=True):
+        position = mesh.vertices[loop.vertex_index].co
+        corner.vector = position.x / 2 + 0.5, position.z / 2 + 0.5
+
+
 def add_field(obj, kind="curvature", degree=4, axis=(0.0, 0.0, 1.0)):
     field = generate(mesh_surface(obj.data), GeneratorSettings(kind, axis), degree)
     write_mesh_field(obj.data, field)
     return obj
-
-
-def member_vectors(mesh, name="rosy"):
-    values = np.empty(3 * len(mesh.attributes[name].data), dtype=np.float32)
-    mesh.attributes[name].data.foreach_get("vector", values)
-    return values.reshape(-1, 3)
 
 
 def set_vectors(mesh, vectors, name="rosy", domain="FACE", kind="FLOAT_VECTOR"):
@@ -99,13 +121,6 @@ def set_vectors(mesh, vectors, name="rosy", domain="FACE", kind="FLOAT_VECTOR"):
     key = "vector" if kind == "FLOAT_VECTOR" else "value"
     attribute.data.foreach_set(key, np.asarray(vectors, dtype=np.float32).ravel())
     mesh.update()
-
-
-def pixels(image):
-    """Return the (H, W, 4) values of an image, rows from the bottom."""
-    values = np.empty(len(image.pixels), dtype=np.float32)
-    image.pixels.foreach_get(values)
-    return values.reshape(image.size[1], image.size[0], 4)
 
 
 def render(scene, path, *, samples=16, box=True, engine="CYCLES"):
@@ -128,43 +143,6 @@ def render(scene, path, *, samples=16, box=True, engine="CYCLES"):
     alpha = values[..., 3:]
     np.divide(values[..., :3], alpha, out=values[..., :3], where=alpha > 0)
     return values
-
-
-def contents():
-    """Return the contents of the file: all datablocks, and what objects and meshes hold."""
-    bpy.context.view_layer.update()
-    result = {
-        prop.identifier: sorted(obj.name for obj in getattr(bpy.data, prop.identifier))
-        for prop in bpy.data.bl_rna.properties
-        if prop.type == "COLLECTION"
-    }
-    for obj in bpy.data.objects:
-        result["object " + obj.name] = [
-            [modifier.name for modifier in obj.modifiers],
-            [slot.material and slot.material.name for slot in obj.material_slots],
-            sorted(key for key, _ in obj.items() if key != "rosy"),
-            obj.type == "MESH" and obj.add_rest_position_attribute,
-            np.round(obj.matrix_world, 6).tolist(),
-        ]
-    for mesh in bpy.data.meshes:
-        result["mesh " + mesh.name] = [
-            sorted(
-                (attribute.name, attribute.domain, attribute.data_type)
-                for attribute in mesh.attributes
-                if not attribute.name.startswith(".")
-            ),
-            [material and material.name for material in mesh.materials],
-            len(mesh.vertices),
-            len(mesh.polygons),
-        ]
-    for scene in bpy.data.scenes:
-        result["scene " + scene.name] = [
-            len(scene.rosy.bakes),
-            scene.view_settings.view_transform,
-            bool(scene.render.use_compositing),
-            scene.render.engine,
-        ]
-    return result
 
 
 def read_instances(depsgraph):

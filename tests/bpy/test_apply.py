@@ -180,20 +180,6 @@ def test_warnings(scene, camera, monkey):
     assert scene.view_settings.view_transform == "Filmic"
 
 
-def test_undo_restores_the_previous_picture(scene, camera, monkey):
-    bake(scene)
-    first = pixels(bpy.data.images["RoSy Camera"])
-    bpy.ops.ed.undo_push(message="first")
-    bake(scene, look=Look(seed=3))
-    second = pixels(bpy.data.images["RoSy Camera"])
-    assert np.abs(first - second).max() > 0.1
-    bpy.ops.ed.undo_push(message="second")
-    bpy.ops.ed.undo()
-    np.testing.assert_array_equal(pixels(bpy.data.images["RoSy Camera"]), first)
-    bpy.ops.ed.redo()
-    np.testing.assert_array_equal(pixels(bpy.data.images["RoSy Camera"]), second)
-
-
 def test_a_look_argument_does_not_make_a_bake_stale(scene, camera, monkey):
     bake(scene, look=Look(seed=3))
     assert list_bakes(scene)[0].stale_reason == ""

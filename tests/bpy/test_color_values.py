@@ -12,11 +12,11 @@ from rosy.rosy_addon.scene.bake_records import list_bakes
 from rosy.rosy_addon.scene.look_inputs import ReadRequest
 from rosy.rosy_addon.scene.read_view import read_turntable
 from rosy.rosy_addon.scene.scene_reader import read_scene
-from scenes import depsgraph
+from scenes import add_uv, depsgraph
 
 
-def set_values(mesh, values, domain="POINT", kind="FLOAT", name="Angle"):
-    attribute = mesh.attributes.get(name) or mesh.attributes.new(name, kind, domain)
+def set_values(mesh, values, name="Angle"):
+    attribute = mesh.attributes.get(name) or mesh.attributes.new(name, "FLOAT", "FACE")
     attribute.data.foreach_set("value", values)
     mesh.update()
 
@@ -26,25 +26,15 @@ def values_of(name, obj):
     return scene_data.instances[scene_data.objects.index(obj)].color_values
 
 
-@pytest.mark.parametrize("kind", ["FLOAT", "INT"])
-@pytest.mark.parametrize(("domain", "count"), [("POINT", 9), ("FACE", 4), ("CORNER", 16)])
-def test_attributes_of_all_domains(wall, domain, count, kind):
-    mesh, numbers = wall.data, np.arange(count)
-    set_values(mesh, numbers, domain, kind)
-    corner_vertex = [loop.vertex_index for loop in mesh.loops]
-    element = {"POINT": corner_vertex, "FACE": np.repeat(range(4), 4), "CORNER": range(16)}[domain]
-    np.testing.assert_array_equal(values_of("Angle", wall), numbers[element])
-
-
 def test_numbers_that_are_not_finite_are_none(wall, monkey):
-    set_values(wall.data, [np.nan, np.inf, 2.0, 3.0], "FACE")
+    set_values(wall.data, [np.nan, np.inf, 2.0, 3.0])
     expected = np.repeat([np.nan, np.nan, 2.0, 3.0], 4)
     np.testing.assert_array_equal(values_of("Angle", wall), expected)
     assert values_of("Angle", monkey) is None
 
 
 def test_mistakes_are_one_line_that_lists_the_attributes(wall):
-    set_values(wall.data, np.zeros(4), "FACE", name="Error")
+    set_values(wall.data, np.zeros(4), name="Error")
     only = "'Error'$"
     with pytest.raises(RosyError, match=f"^'Plane': there is no attribute 'Angel' .*only {only}"):
         read_scene(depsgraph(), None, ReadRequest(color_attribute="Angel"))
@@ -57,7 +47,7 @@ def test_mistakes_are_one_line_that_lists_the_attributes(wall):
 @pytest.fixture
 def colored(scene, wall):
     """The wall with a number on each face, drawn in flat colors."""
-    set_values(wall.data, [0.0, 1.0, 2.0, np.nan], "FACE")
+    set_values(wall.data, [0.0, 1.0, 2.0, np.nan])
     look = scene.rosy.look
     look.hue, look.gain, look.shading, scene.rosy.color_attribute = "values", 0.0, 0.0, "Angle"
     return wall
@@ -69,17 +59,12 @@ def test_turntables_have_the_numbers(scene, colored):
 
 
 def test_textures(scene, colored):
-    mesh = colored.data
-    layer = mesh.uv_layers.new(name="UVMap")
-    corners = [mesh.vertices[loop.vertex_index].co for loop in mesh.loops]
-    layer.uv.foreach_set(
-        "vector", np.array([((co.x + 1) / 2, (co.z + 1) / 2) for co in corners]).ravel()
-    )
+    add_uv(colored.data)
     scene.rosy.texture_size, scene.rosy.texture_margin = 64, 0
     bake_texture(scene, [colored])
     (info,) = list_bakes(scene)
     assert info.stale_reason == ""
-    set_values(colored.data, [0.0, 1.5, 2.0, 0.0], "FACE")
+    set_values(colored.data, [0.0, 1.5, 2.0, 0.0])
     (info,) = list_bakes(scene)
     assert "'Plane' was changed" in info.stale_reason
     bake_texture(scene, [colored])

@@ -59,11 +59,11 @@ def apply_modifiers(obj):
 
 
 @pytest.mark.parametrize("form", ["VECTOR", "DIRECTIONS", "ANGLE"])
-@pytest.mark.parametrize("scale", [(1.0, 1.0, 1.0), (0.7, 0.7, 0.7)])
-def test_applied_transforms(scene, camera, monkey, form, scale):
+def test_applied_transforms(scene, camera, monkey, form):
     write_mesh_field(monkey.data, read_mesh_field(monkey.data), "field", form)
     monkey.data.attributes.remove(monkey.data.attributes["rosy"])
-    monkey.rotation_euler, monkey.scale, monkey.location = ANGLES, scale, (0.2, 0.0, -0.1)
+    monkey.rotation_euler, monkey.scale = ANGLES, (0.7, 0.7, 0.7)
+    monkey.location = (0.2, 0.0, -0.1)
     before = projected(camera)
     apply_transform(monkey)
     after = projected(camera)
@@ -82,9 +82,7 @@ def test_joined_objects(scene, camera, monkey):
     assert_same_directions(before, projected(camera), degrees=0.1)
 
 
-@pytest.mark.parametrize(
-    "modifiers", [["SUBSURF"], ["MIRROR"], ["MIRROR", "SUBSURF"], ["SIMPLE_DEFORM"], ["ARRAY"]]
-)
+@pytest.mark.parametrize("modifiers", [["MIRROR", "SUBSURF"], ["SIMPLE_DEFORM"], ["ARRAY"]])
 def test_applied_modifiers(scene, camera, monkey, modifiers):
     for kind in modifiers:
         modifier = monkey.modifiers.new(kind, kind)

@@ -17,7 +17,7 @@ from rosy.rosy_addon.scene.pictures import OutputSettings
 from rosy.rosy_addon.worker.helper import Helper
 from rosy.rosy_addon.worker.job import run
 from rosy.rosy_addon.worker.step_runner import StepRunner
-from scenes import add_field, pixels
+from scenes import add_field, member_vectors, pixels, set_vectors
 
 
 @pytest.fixture(scope="module")
@@ -61,12 +61,9 @@ def strokes(run_with, where, scene, monkey):
 
 
 def difference(run_with, where, scene, monkey):
-    attribute = monkey.data.attributes.new("other", "FLOAT_VECTOR", "FACE")
-    values = np.empty(3 * len(attribute.data), dtype=np.float32)
-    monkey.data.attributes["rosy"].data.foreach_get("vector", values)
-    attribute.data.foreach_set("vector", values)
+    set_vectors(monkey.data, member_vectors(monkey.data), "other")
     add_field(monkey, kind="axis")
-    return run_with(where, store_difference.begin(monkey.data, "other"))[2].statistics
+    return run_with(where, store_difference.begin(monkey.data, "other"))[2].difference.angle
 
 
 def combed_field(run_with, where, scene, monkey):

@@ -9,6 +9,7 @@ from rosy.rosy_addon.scene import scene_reader
 from rosy.rosy_addon.scene.scene_reader import SceneReader
 from scenes import (
     add_field,
+    add_nodes,
     add_plane,
     contents,
     depsgraph,
@@ -34,25 +35,6 @@ def names_with_field(entries):
     return [entry.owner.name for entry in entries if entry.instance.field is not None]
 
 
-def add_nodes(obj, *node_types):
-    """Add a modifier that passes a mesh through a chain of geometry nodes."""
-    group = bpy.data.node_groups.new("Chain", "GeometryNodeTree")
-    for direction in ("INPUT", "OUTPUT"):
-        group.interface.new_socket("Mesh", in_out=direction, socket_type="NodeSocketGeometry")
-    source, target = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
-    last = source.outputs[0]
-    for node_type in node_types:
-        node = group.nodes.new(node_type)
-        geometry = next((socket for socket in node.inputs if socket.type == "GEOMETRY"), None)
-        if geometry is not None:
-            group.links.new(last, geometry)
-        last = node.outputs[0]
-    group.links.new(last, target.inputs[0])
-    modifier = obj.modifiers.new("Nodes", "NODES")
-    modifier.node_group = group
-    return group
-
-
 def remesh(obj):
     modifier = obj.modifiers.new("Rebuild", "REMESH")
     modifier.mode, modifier.voxel_size = "VOXEL", 0.2
@@ -60,7 +42,9 @@ def remesh(obj):
 
 def removed_attribute(obj):
     group = add_nodes(obj, "GeometryNodeRemoveAttribute")
-    group.nodes["Remove Named Attribute"].inputs["Name"].default_value = "rosy"
+    name = group.nodes["Remove Named Attribute"].inputs["Name"]
+    name.default_value = "rosy"
+    return name
 
 
 def points_only(obj):
@@ -100,12 +84,10 @@ def test_a_field_lost_in_modifiers_is_named_once(monkey, loss, monkeypatch):
 def test_an_attribute_that_is_kept_again(monkey):
     """The modifiers keep the faces, but no longer lose the attribute."""
     monkey.modifiers.new("Subdivision", "SUBSURF")
-    removed_attribute(monkey)
+    name = removed_attribute(monkey)
     reader = SceneReader()
     assert read(reader) == []
-    bpy.data.node_groups["Chain"].nodes["Remove Named Attribute"].inputs[
-        "Name"
-    ].default_value = "other"
+    name.default_value = "other"
     reader.invalidate({"Suzanne"}, topology_changed=False)
     assert read(reader) == ["Suzanne"]
 

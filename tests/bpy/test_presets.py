@@ -43,7 +43,7 @@ def test_rounding_by_blender_is_no_change(scene, user_folder):
     assert preset_library.is_changed(scene.rosy)
 
 
-def test_the_library_follows_the_files(scene, user_folder):
+def test_the_library_follows_the_files(scene, user_folder, monkeypatch):
     assert preset_library.user_preset_keys() == []
     save_preset(Preset("Mine", "First", LOOK), user_folder)
     assert preset_library.user_preset_keys() == ["mine"]
@@ -52,10 +52,13 @@ def test_the_library_follows_the_files(scene, user_folder):
     save_preset(Preset("Mine", "Second", changed), user_folder, replace=True)
     assert preset_library.active_entry(scene.rosy).preset.description == "Second"
     assert preset_library.is_changed(scene.rosy)
-    (user_folder / "mine.json").unlink()
-    assert (
-        preset_library.user_preset_keys() == [] and preset_library.active_entry(scene.rosy) is None
-    )
+    path = user_folder / "mine.json"
+    path.write_text(path.read_text().replace("Second", "Edited"))  # in place
+    monkeypatch.setattr(preset_library, "REFRESH_SECONDS", 0.0)
+    assert preset_library.active_entry(scene.rosy).preset.description == "Edited"
+    path.unlink()
+    assert preset_library.user_preset_keys() == []
+    assert preset_library.active_entry(scene.rosy) is None
 
 
 def test_a_missing_preset(scene, user_folder):
@@ -92,12 +95,3 @@ def test_presets_are_applied_by_name_and_by_path(scene, user_folder, tmp_path):
     (user_folder / "my-ink.json").rename(elsewhere)
     preset_library.apply_preset(scene.rosy, str(elsewhere))
     assert scene.rosy.preset_name == str(elsewhere) == scene.rosy.preset
-
-
-def test_edited_files_are_read_again(scene, user_folder, monkeypatch):
-    save_preset(Preset("Mine", "First", LOOK), user_folder)
-    assert preset_library.entries()["mine"].preset.description == "First"
-    path = user_folder / "mine.json"
-    path.write_text(path.read_text().replace("First", "Edited"))  # in place
-    monkeypatch.setattr(preset_library, "REFRESH_SECONDS", 0.0)
-    assert preset_library.entries()["mine"].preset.description == "Edited"

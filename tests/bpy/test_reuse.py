@@ -11,13 +11,6 @@ from rosy.rosy_addon.projection import project as projection
 from scenes import add_camera, add_field
 
 
-@pytest.fixture(autouse=True)
-def empty_cache():
-    BAKE_CACHE.clear()
-    yield
-    BAKE_CACHE.clear()
-
-
 @pytest.fixture
 def run_stages(monkeypatch):
     """The names of the slow steps that were run, in their order."""
@@ -68,16 +61,7 @@ def show_faces(scene, obj):
     scene.rosy.look.display = "flat"
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        move_vertex,
-        turn_field,
-        subdivide,
-        move_camera,
-        show_faces,
-    ],
-)
+@pytest.mark.parametrize("change", [move_vertex, turn_field, subdivide, move_camera, show_faces])
 def test_a_change_runs_all_stages(scene, camera, monkey, run_stages, change):
     before = draw(scene)
     change(scene, monkey)

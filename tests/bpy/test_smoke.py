@@ -8,10 +8,13 @@ import sys
 import typing
 
 import numpy as np
+from rosy.rosy_addon.compositor.look import Look
+from rosy.rosy_addon.core.settings import settings_of
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.jobs.draw_strokes import draw_strokes
 from rosy.rosy_addon.scene.bake_records import remove_bakes
 from rosy.rosy_addon.scene.stroke_objects import remove_strokes
+from rosy.rosy_addon.ui.look_panels import LOOK_PANELS
 from scenes import contents, member_vectors, pixels
 
 
@@ -35,6 +38,10 @@ def test_blender_can_read_the_properties_of_every_operator():
         # Blender does the same when it registers a class. It prints errors and goes on.
         assert set(inspect.get_annotations(cls)) <= set(typing.get_type_hints(cls))
     assert classes
+
+
+def test_every_setting_of_a_look_is_in_a_panel():
+    assert {setting.panel for setting in settings_of(Look).values()} == {*LOOK_PANELS, ""}
 
 
 def test_callbacks_of_properties_see_the_names_of_their_module():

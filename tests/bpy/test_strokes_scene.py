@@ -19,7 +19,7 @@ from rosy.rosy_addon.scene.scene_reader import read_scene
 from rosy.rosy_addon.scene.stroke_data import has_grease_pencil_drawings
 from rosy.rosy_addon.scene.stroke_objects import edited_strokes, remove_strokes, stroke_objects
 from rosy.rosy_addon.worker.job import Step
-from scenes import add_field, add_plane, contents, depsgraph, each_step, render
+from scenes import add_field, add_nodes, add_plane, contents, depsgraph, each_step, render
 
 PLAIN = StrokeStyle(spacing=12, outline=True)
 BLACK = Pen(width=1.5)
@@ -158,7 +158,7 @@ def pencil_modifiers(obj):
 
 
 @pytest.mark.parametrize("kind", ["PENCIL", "CURVES"])
-def test_strokes_are_replaced_and_removed(monkey, camera, scene, kind):
+def test_strokes_are_replaced_and_removed(wall, camera, scene, kind):
     before = contents()
     first = draw_strokes(scene, kind=kind, style=PLAIN).obj
     drawn_once = contents()
@@ -180,7 +180,7 @@ def test_strokes_are_replaced_and_removed(monkey, camera, scene, kind):
     assert remove_strokes(scene) == 0
 
 
-def test_copies_belong_to_the_user(monkey, camera, scene):
+def test_copies_belong_to_the_user(wall, camera, scene):
     first = draw_strokes(scene, kind="CURVES", style=PLAIN).obj
     copy = first.copy()
     copy.data = first.data.copy()
@@ -195,7 +195,7 @@ def test_copies_belong_to_the_user(monkey, camera, scene):
     assert {copy.name, linked.name} <= set(scene.objects.keys())
 
 
-def test_a_deleted_object_is_created_again(monkey, camera, scene):
+def test_a_deleted_object_is_created_again(wall, camera, scene):
     first = draw_strokes(scene, kind="PENCIL", style=PLAIN).obj
     bpy.data.objects.remove(first)
     assert not stroke_objects(scene)
@@ -207,13 +207,13 @@ def test_a_deleted_object_is_created_again(monkey, camera, scene):
     assert [obj.name for obj in bpy.data.objects if obj.type == PENCIL] == [second.name]
 
 
-def test_strokes_of_one_mesh_move_with_it(monkey, camera, scene):
-    monkey.location, monkey.scale = (0.2, 0.0, 0.1), (1.2, 1.0, 0.9)
+def test_strokes_of_one_mesh_move_with_it(wall, camera, scene):
+    wall.location, wall.scale = (0.2, 0.0, 0.1), (1.2, 1.0, 0.9)
     bpy.context.view_layer.update()
     obj = draw_strokes(scene, kind="CURVES", style=PLAIN).obj
     bpy.context.view_layer.update()
     assert np.allclose(obj.matrix_world, np.eye(4), atol=1e-6)
-    monkey.location.x += 1.0
+    wall.location.x += 1.0
     bpy.context.view_layer.update()
     assert np.allclose(obj.matrix_world.translation, (1, 0, 0), atol=1e-6)
     add_field(add_plane("Other", cuts=4), "axis")
@@ -236,31 +236,20 @@ def test_chosen_objects_are_drawn_and_others_occlude(monkey, camera, scene):
     assert len(draw_strokes(scene, kind="CURVES", style=style).drawing.strokes) > len(behind)
 
 
-def test_meshes_from_strokes_do_not_occlude(monkey, camera, scene):
+def test_meshes_from_strokes_do_not_occlude(wall, camera, scene):
     """Geometry Nodes may turn stroke objects into meshes; these are not read as occluders."""
     first = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=20))
-    thicken(first.obj, 0.3)
+    group = add_nodes(first.obj, "GeometryNodeCurveToMesh")
+    circle = group.nodes.new("GeometryNodeCurvePrimitiveCircle")
+    circle.inputs["Radius"].default_value = 0.3
+    profile = group.nodes["Curve to Mesh"].inputs["Profile Curve"]
+    group.links.new(circle.outputs["Curve"], profile)
+    bpy.context.view_layer.update()
     again = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=20))
     np.testing.assert_array_equal(again.drawing.strokes.points, first.drawing.strokes.points)
 
 
-def thicken(obj, radius):
-    """Add a tube around each curve, by Geometry Nodes."""
-    group = bpy.data.node_groups.new("Tubes", "GeometryNodeTree")
-    for direction in ("INPUT", "OUTPUT"):
-        group.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
-    names = "NodeGroupInput", "GeometryNodeCurveToMesh", "GeometryNodeCurvePrimitiveCircle"
-    group_input, tube, circle = (group.nodes.new(name) for name in names)
-    group_output = group.nodes.new("NodeGroupOutput")
-    circle.inputs["Radius"].default_value = radius
-    group.links.new(group_input.outputs[0], tube.inputs["Curve"])
-    group.links.new(circle.outputs["Curve"], tube.inputs["Profile Curve"])
-    group.links.new(tube.outputs["Mesh"], group_output.inputs[0])
-    obj.modifiers.new("Tubes", "NODES").node_group = group
-    bpy.context.view_layer.update()
-
-
-def test_settings_of_the_scene_are_those_of_the_function(monkey, camera, scene, tmp_path):
+def test_settings_of_the_scene_are_those_of_the_function(wall, camera, scene, tmp_path):
     settings = scene.rosy.strokes
     settings.kind, settings.filepath = "FILE", str(tmp_path / "a.svg")
     settings.spacing, settings.taper, settings.width = 9.3, 0.4, 0.7
@@ -298,7 +287,7 @@ def test_polylines_lie_on_the_object_when_they_are_imported(
     assert np.isclose(np.sort(points[degree == 1], axis=0)[-1], np.sort(ends, axis=0)[-1]).any()
 
 
-def test_cancelling_leaves_nothing(monkey, camera, scene):
+def test_cancelling_leaves_nothing(wall, camera, scene):
     before = contents()
     stepping = each_step(draw_strokes.begin(scene, kind="PENCIL", style=PLAIN))
     labels = []
@@ -364,7 +353,7 @@ def recolor(data):
 
 @pytest.mark.parametrize("edit", [move_a_point, recolor])
 @pytest.mark.parametrize("kind", ["PENCIL", "CURVES"])
-def test_edited_strokes_are_recognized(monkey, camera, scene, tmp_path, kind, edit):
+def test_edited_strokes_are_recognized(wall, camera, scene, tmp_path, kind, edit):
     name = draw_strokes(scene, kind=kind, style=StrokeStyle(spacing=20)).obj.name
     assert edited_strokes(scene, kind, "Camera") is None
     path = str(tmp_path / "strokes.blend")
@@ -381,7 +370,7 @@ def test_edited_strokes_are_recognized(monkey, camera, scene, tmp_path, kind, ed
     assert edited_strokes(scene, kind, "Camera") is None
 
 
-def test_new_strokes_are_put_into_a_collection(monkey, camera, scene):
+def test_new_strokes_are_put_into_a_collection(wall, camera, scene):
     """Strokes that are drawn again stay where they are."""
     first, second = (bpy.data.collections.new(name) for name in ("First", "Second"))
     for collection in (first, second):

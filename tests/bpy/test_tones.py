@@ -21,7 +21,7 @@ from rosy.rosy_addon.scene.look_inputs import (
 )
 from rosy.rosy_addon.scene.pictures import read_output_settings
 from rosy.rosy_addon.scene.scene_reader import SceneReader, read_scene
-from scenes import add_field, add_mesh, depsgraph, read_live
+from scenes import add_field, add_mesh, add_uv, depsgraph, read_live
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
@@ -29,7 +29,8 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 def add_attribute(mesh, name, domain, kind, values):
     attribute = mesh.attributes.new(name, kind, domain)
     key = "color" if "COLOR" in kind else "value"
-    attribute.data.foreach_set(key, np.asarray(values, dtype=np.float32).ravel())
+    data_type = np.int32 if kind == "INT" else np.float32
+    attribute.data.foreach_set(key, np.asarray(values, dtype=data_type).ravel())
     mesh.update()
 
 
@@ -63,19 +64,17 @@ def tone_of(tone_request, name="Plane"):
 
 
 @pytest.mark.parametrize("domain", ["POINT", "FACE", "CORNER"])
-@pytest.mark.parametrize("kind", ["FLOAT", "FLOAT_COLOR", "BYTE_COLOR"])
+@pytest.mark.parametrize("kind", ["FLOAT", "INT", "FLOAT_COLOR", "BYTE_COLOR"])
 def test_attributes_of_all_domains(wall, domain, kind):
     mesh = wall.data
     count = {"POINT": len(mesh.vertices), "FACE": 4, "CORNER": len(mesh.loops)}[domain]
-    numbers = (np.arange(count) + 0.5) / count
-    if kind == "FLOAT":
-        values, expected = numbers, numbers
-    else:
+    numbers = np.arange(count) if kind == "INT" else (np.arange(count) + 0.5) / count
+    values = expected = numbers
+    if "COLOR" in kind:
         values = np.stack([numbers, 1 - numbers, 0.3 + 0 * numbers, 1 + 0 * numbers], axis=1)
         expected = values[:, :3] @ LUMINANCE
     add_attribute(mesh, "Ink", domain, kind, values)
-    corner = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", corner)
+    corner = np.array([loop.vertex_index for loop in mesh.loops])
     face = np.repeat(np.arange(4), 4)
     element = {"POINT": corner, "FACE": face, "CORNER": np.arange(len(corner))}[domain]
     tone = tone_of(ToneRequest("attribute", "Ink")).values
@@ -101,13 +100,8 @@ def test_missing_attributes(wall, monkey):
     add_attribute(wall.data, "Paint", "POINT", "FLOAT", np.zeros(9))
     with pytest.raises(RosyError) as caught:
         read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("attribute", "Pain")))
-    message = str(caught.value)
-    assert (
-        "'Pain'" in message
-        and "'Paint'" in message
-        and "'Plane'" in message
-        and "'Suzanne'" in message
-    )
+    for name in ("'Pain'", "'Paint'", "'Plane'", "'Suzanne'"):
+        assert name in str(caught.value)
     with pytest.raises(RosyError, match="no color attribute"):
         read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("attribute")))
 
@@ -134,17 +128,6 @@ def test_luminance_of_images():
     clear = bpy.data.images.new("clear", 2, 2, alpha=True)
     clear.pixels.foreach_set(np.zeros(16, dtype=np.float32))
     np.testing.assert_allclose(image_luminance(clear), 1)
-
-
-def add_uv(mesh):
-    """Add a UV map from 0 to 1 over the square."""
-    layer = mesh.uv_layers.new(name="Map")
-    corner = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", corner)
-    positions = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-    mesh.vertices.foreach_get("co", positions)
-    uv = positions.reshape(-1, 3)[corner][:, [0, 2]] * 0.5 + 0.5
-    layer.uv.foreach_set("vector", uv.ravel())
 
 
 def test_missing_images_and_uv_maps(wall):
@@ -255,7 +238,7 @@ def test_occlusion_is_stored_and_drawn(scene, wall):
     floor = add_mesh("Floor", [(-9, 0, -1), (9, 0, -1), (9, -9, -1), (-9, -9, -1)], [(3, 2, 1, 0)])
     add_field(floor, "axis", 2, (1.0, 0.0, 0.0))
     bpy.context.view_layer.update()
-    store_occlusion(depsgraph(), [wall], direction_count=128)
+    store_occlusion(depsgraph(), [wall], direction_count=64)
     attribute = wall.data.attributes[OCCLUSION_ATTRIBUTE]
     assert (attribute.domain, attribute.data_type) == ("CORNER", "FLOAT")
     assert OCCLUSION_ATTRIBUTE not in floor.data.attributes

@@ -9,29 +9,15 @@ import numpy as np
 
 
 def write_exodus(
-    path: Path,
-    points: np.ndarray,
-    tetrahedra: np.ndarray,
-    times: list[float],
-    velocity: np.ndarray,
+    path: Path, points: np.ndarray, tetrahedra: np.ndarray, times: list[float], velocity: np.ndarray
 ) -> None:
     """Write one block of tetrahedra, with (times, n, 3) velocities at the n points."""
     with netCDF4.Dataset(path, "w", format="NETCDF3_64BIT_OFFSET") as file:
         file.api_version = file.version = np.float32(5.1)
         file.floating_point_word_size, file.file_size, file.title = 8, 1, "velocity"
-        sizes = {
-            "len_string": 33,
-            "len_line": 81,
-            "four": 4,
-            "num_dim": 3,
-            "time_step": None,
-            "num_nodes": len(points),
-            "num_elem": len(tetrahedra),
-            "num_el_blk": 1,
-            "num_el_in_blk1": len(tetrahedra),
-            "num_nod_per_el1": 4,
-            "num_nod_var": 3,
-        }
+        sizes = {"len_string": 33, "len_line": 81, "four": 4, "num_dim": 3, "time_step": None}
+        sizes |= {"num_nodes": len(points), "num_elem": len(tetrahedra), "num_el_blk": 1}
+        sizes |= {"num_el_in_blk1": len(tetrahedra), "num_nod_per_el1": 4, "num_nod_var": 3}
         for name, size in sizes.items():
             file.createDimension(name, size)
         file.createVariable("time_whole", "f8", ("time_step",))[:] = times

@@ -16,10 +16,7 @@ from rosy_addon import api as rf
 from rosy_addon.api.films import Film
 from rosy_addon.cli.parser import main as cli_main
 from rosy_addon.compositor.look import Look
-from rosy_addon.external.simulation_files import (
-    list_steps,
-    read_simulation,
-)
+from rosy_addon.external.simulation_files import list_steps, read_simulation
 from rosy_addon.extras.film import FieldSeries, StepReader
 from rosy_addon.field.array_field import SurfaceArrays, array_field
 from rosy_addon.field.mesh_arrays import SIMULATION_READERS, MeshArrays
@@ -92,7 +89,7 @@ def test_tone_from_an_array(rosy, files):
         (("b.vtp", "rotation.npy", "--array", "rotation"), "give either --array, or a field file"),
         (("a.ply", "--array", "rotation"), "a.ply: --array applies only to files of simulations"),
         (("a.vtp", "--step", 2), "a.vtp: has no step 2, only 1 step"),
-        (("none.vtu",), "none.vtu: cannot be read: no such file"),
+        (("none.vtu",), "none.vtu: cannot be read: no such file")
     ],
 )  # fmt: skip
 def test_errors(rosy, files, words, message, monkeypatch):
@@ -246,21 +243,15 @@ def test_film_of_fields_errors(rosy, turning, monkeypatch):
     Path("short.rosy").write_text("3 1\n1 0 0\n1 0 0\n1 0 0\n", encoding="utf-8")
     rosy("field", "square.obj", "--generate", "axis", "--axis", "1,0,0", "-o", "cross.rosy")
     for files, message in (
-        (("square.obj", "field1.rosy"), "square.obj: a film needs 2 or more field files after"),
+        ("square.obj field1.rosy", "square.obj: a film needs 2 or more field files after"),
+        ("square.obj field1.rosy short.rosy", "short.rosy: contains 3 rows, but square.obj"),
+        ("square.obj field1.rosy cross.rosy", "field 2 of 2 has degree 4, but the one before it 1"),
+        ("square.obj field1.rosy none.rosy", "none.rosy: cannot be read: no such file"),
+        ("field1.rosy field2.rosy", "field1.rosy: is not a mesh file: name the mesh first"),
         (
-            ("square.obj", "field1.rosy", "short.rosy"),
-            "short.rosy: contains 3 rows, but square.obj",
-        ),
-        (
-            ("square.obj", "field1.rosy", "cross.rosy"),
-            "square.obj: field 2 of 2 has degree 4, but the one before it 1",
-        ),
-        (("square.obj", "field1.rosy", "none.rosy"), "none.rosy: cannot be read: no such file"),
-        (("field1.rosy", "field2.rosy"), "field1.rosy: is not a mesh file: name the mesh first"),
-        (
-            ("square.obj", "field1.rosy", "field2.rosy", "--array", "U"),
-            "square.obj: --array applies only to files of simulations",
+            "square.obj field1.rosy field2.rosy --array U",
+            "--array applies only to files of simulations",
         ),
     ):
-        status, output, errors = rosy("film", *files, "-o", "a.gif")
+        status, output, errors = rosy("film", *files.split(), "-o", "a.gif")
         assert (status, output) == (2, "") and message in errors and errors.count("\n") == 1

@@ -101,16 +101,6 @@ def test_exodus_series(tmp_path, box):
         assert mesh.vertex_data["velocity_"] == pytest.approx(expected, abs=1e-5)
 
 
-def test_one_step_of_a_series(tmp_path, sphere, error_of):
-    """The last one, unless a number is given."""
-    (path,) = write_pvd(tmp_path, sphere)
-    mesh = read_simulation(path)
-    assert mesh.note == f"{path}: the last of 3 steps was read, time 10"
-    mesh = read_simulation(path, 1)
-    assert not mesh.note
-    assert "has no step 4, only 3 steps" in error_of(read_simulation, path, 4)
-
-
 def test_steps_in_parts(tmp_path, sphere):
     """Files of a .pvd file with the same time are one step."""
     halves = [sphere.clip("z", invert=invert) for invert in (True, False)]

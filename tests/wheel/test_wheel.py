@@ -57,14 +57,8 @@ def test_examples(name, tmp_path, monkeypatch):
     """Every public name has an example, except errors and what other names return."""
     monkeypatch.chdir(tmp_path)
     write_torus(tmp_path / "torus.obj")
-    exceptions = (
-        "RosyError",
-        "RosyWarning",
-        "Singularities",
-        "Difference",
-        "from_array",
-        "save_figures",
-    )
+    errors_and_results = ("RosyError", "RosyWarning", "Singularities", "Difference")
+    exceptions = (*errors_and_results, "from_array", "save_figures")
     assert examples_of(name) or name in exceptions
     runner = doctest.DocTestRunner()
     for test in doctest.DocTestFinder().find(getattr(rosyfields, name), name, globs={}):
@@ -105,8 +99,8 @@ def test_every_public_name():
 
 
 def test_star_import():
-    code = "from rosyfields import *\nimport rosyfields\nprint(*(rosyfields.__all__ - globals().keys()))"
-    code = code.replace("rosyfields.__all__ -", "set(rosyfields.__all__) -")
+    code = "from rosyfields import *\nimport rosyfields\n"
+    code += "print(*(set(rosyfields.__all__) - globals().keys()))"
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == ""
 
 
@@ -160,23 +154,11 @@ def test_statuses(arguments, status, stream, text, tmp_path):
 
 def test_command_draws_the_same_bytes_as_the_tree(torus, tmp_path):
     options = ["--size", "200x160", "--preset", "engraving", "--generate", "smoothest"]
-    assert_same_picture(torus, tmp_path, *options)
-
-
-def test_command_draws_spot_as_the_tree(tmp_path):
-    spot = TREE.parent / "shared" / "data" / "meshes" / "spot.obj"
-    if not spot.is_file():
-        pytest.skip("no ../shared/data/meshes/spot.obj")
-    assert_same_picture(spot, tmp_path, "--size", "256x256")
-
-
-def assert_same_picture(mesh: Path, folder: Path, *options: str) -> None:
-    """Draw a mesh with the installed command and with the tree, and compare the files."""
-    arguments = ["render", mesh, *options, "-o"]
-    installed = run("rosyfields", *arguments, "wheel.png", folder=folder)
+    arguments = ["render", torus, *options, "-o"]
+    installed = run("rosyfields", *arguments, "wheel.png", folder=tmp_path)
     assert installed.returncode == 0, installed.stderr
     in_tree = ENVIRONMENT | {"PYTHONPATH": str(TREE)}
     module = [sys.executable, "-m", "rosy_addon"]
-    assert run(*module, *arguments, "tree.png", folder=folder, env=in_tree).returncode == 0
-    picture = (folder / "wheel.png").read_bytes()
-    assert picture.startswith(b"\x89PNG") and picture == (folder / "tree.png").read_bytes()
+    assert run(*module, *arguments, "tree.png", folder=tmp_path, env=in_tree).returncode == 0
+    picture = (tmp_path / "wheel.png").read_bytes()
+    assert picture.startswith(b"\x89PNG") and picture == (tmp_path / "tree.png").read_bytes()

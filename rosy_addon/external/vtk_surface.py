@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-import re
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +10,7 @@ from ..core.cache import content_hash
 from ..core.errors import RosyError, counted
 from ..field.formats.polygons import Polygons, offsets_from_sizes
 from ..field.frames import dot
-from ..field.mesh_arrays import MeshArrays
+from ..field.mesh_arrays import MeshArrays, as_matrices, component_names
 from ..field.polygon_arrays import face_area_vectors, mean_per_face
 
 #: VTK's types of surface cells, with the number of their corners. None: all points of the cell are corners.
@@ -118,7 +115,7 @@ def _without_copies(blocks: list[Any]) -> list[Any]:
 def _arrays(attributes: Any, index: np.ndarray) -> dict[str, np.ndarray]:
     """Return the numeric arrays of points or cells, by name, with the rows that `index` selects.
 
-    Arrays whose components have the names of a symmetric tensor become matrices; see `tensor_entries`.
+    Arrays whose components have the names of a symmetric tensor become matrices; see `mesh_arrays.as_matrices`.
     """
     normals, uv = attributes.active_normals_name, attributes.active_texture_coordinates_name
     skipped = {*_INTERNAL_ARRAYS, normals, uv}
@@ -127,42 +124,8 @@ def _arrays(attributes: Any, index: np.ndarray) -> dict[str, np.ndarray]:
         rows = np.asarray(values)
         if name in skipped or rows.dtype.kind not in "fiu":
             continue
-        vtk_array = attributes.VTKObject.GetAbstractArray(name)
-        count = vtk_array.GetNumberOfComponents()
-        entries = tensor_entries([vtk_array.GetComponentName(k) or "" for k in range(count)])
-        rows = rows[index]
-        if entries is not None:
-            rows = np.pad(rows, ((0, 0), (0, 1)))[:, entries]
-        found[name] = rows
+        found[name] = as_matrices(rows[index], component_names(attributes, name))
     return found
-
-
-def tensor_entries(names: Sequence[str]) -> list[int] | None:
-    """Return which component is each of the 9 elements of a symmetric 3 x 3 matrix, in row order.
-
-    Names of components end in two axes, such as ``XY`` or ``SIXY``, or in two digits, such as ``S12``. Three
-    or four components are a tensor in the plane of x and y. Its other elements, which are 0, have the index -1.
-
-    Parameters
-    ----------
-    names : sequence of str
-
-    Returns
-    -------
-    list of 9 ints or None
-        None if the names are not those of the components of a tensor.
-    """
-    digits = str.maketrans("123", "XYZ")
-    pairs = [tuple(re.findall("[XYZ]", name.upper().translate(digits))[-2:]) for name in names]
-    axes = {3: "XY", 4: "XY", 6: "XYZ", 9: "XYZ"}.get(len(names), "")
-    entries = []
-    for pair in itertools.product("XYZ", repeat=2):
-        found = [k for k, named in enumerate(pairs) if named in (pair, pair[::-1])]
-        exact = [k for k in found if pairs[k] == pair]
-        if not found and set(pair) <= set(axes):
-            return None
-        entries.append((exact or found or [-1])[0])
-    return entries if axes and set(entries) - {-1} == set(range(len(names))) else None
 
 
 def _surface_polygons(grid: Any, name: str) -> tuple[Polygons, np.ndarray, np.ndarray]:

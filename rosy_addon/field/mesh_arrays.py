@@ -5,7 +5,9 @@ Such libraries are meshio, PyVista, trimesh and Open3D. None of them is imported
 
 from __future__ import annotations
 
+import itertools
 import os
+import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -268,9 +270,55 @@ def _from_pyvista(mesh: Any, name: str) -> MeshArrays:
         np.asarray(cells.cell_connectivity)[np.repeat(is_face, sizes)],
         offsets_from_sizes(sizes[is_face]),
         None if uv is None or uv.shape[1] != 2 else np.asarray(uv),
-        {key: np.asarray(values) for key, values in surface.point_data.items()},
-        {key: np.asarray(values)[is_face] for key, values in surface.cell_data.items()},
+        _arrays_of_pyvista(surface.point_data),
+        {key: rows[is_face] for key, rows in _arrays_of_pyvista(surface.cell_data).items()},
     )
+
+
+def _arrays_of_pyvista(attributes: Any) -> dict[str, NDArray[Any]]:
+    """Return the arrays of PyVista's points or cells by name; tensors are matrices (see `as_matrices`)."""
+    return {
+        key: as_matrices(np.asarray(values), component_names(attributes, key))
+        for key, values in attributes.items()
+    }
+
+
+def component_names(attributes: Any, name: str) -> list[str]:
+    """Return the names of the components of one of PyVista's arrays; empty strings if they have none."""
+    array = attributes.VTKObject.GetAbstractArray(name)
+    return [array.GetComponentName(k) or "" for k in range(array.GetNumberOfComponents())]
+
+
+def as_matrices(rows: NDArray[Any], names: Sequence[str]) -> NDArray[Any]:
+    """Return rows of the components of symmetric tensors as 3 x 3 matrices, row by row, if their names tell.
+
+    Names of components end in two axes, such as ``XY`` or ``SIXY``, or in two digits, such as ``S12``. Three
+    or four components are a tensor in the plane of x and y; its other elements are 0.
+
+    Parameters
+    ----------
+    rows : (n, ...) ndarray
+    names : sequence of str
+        The name of each component.
+
+    Returns
+    -------
+    (n, 9) ndarray
+        `rows` itself if the names are not those of the components of a tensor.
+    """
+    digits = str.maketrans("123", "XYZ")
+    pairs = [tuple(re.findall("[XYZ]", name.upper().translate(digits))[-2:]) for name in names]
+    axes = {3: "XY", 4: "XY", 6: "XYZ", 9: "XYZ"}.get(len(names), "")
+    entries = []
+    for pair in itertools.product("XYZ", repeat=2):
+        found = [k for k, named in enumerate(pairs) if named in (pair, pair[::-1])]
+        exact = [k for k in found if pairs[k] == pair]
+        if not found and set(pair) <= set(axes):
+            return rows
+        entries.append((exact or found or [-1])[0])
+    if not axes or set(entries) - {-1} != set(range(len(names))):
+        return rows
+    return np.pad(rows, ((0, 0), (0, 1)))[:, entries]
 
 
 def _extracted_surface(mesh: Any) -> Any:

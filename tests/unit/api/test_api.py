@@ -381,6 +381,16 @@ def test_outer_faces_see_the_sky_and_inner_ones_do_not():
     np.testing.assert_allclose(rf.ambient_occlusion(inside, 32), 0, atol=0.02)
 
 
+def test_indices_are_fractions_or_units(error_of):
+    surface = rf.Surface(*CUBE)
+    units = rf.prescribed(surface, dict.fromkeys(range(8), 1), 4)
+    fractions = rf.prescribed(surface, dict.fromkeys(range(8), 0.25), 4)
+    assert np.array_equal(units.vectors, fractions.vectors)
+    assert (fractions.singularities.index == 1).all()
+    message = error_of(rf.prescribed, surface, {0: 0.3, 1: 1.7}, 4)
+    assert "0.3 at vertex 0 is not a multiple of 1/4" in message
+
+
 def test_tones_of_corners_and_of_vertices_draw_the_same_picture():
     surface = rf.Surface(*CUBE)
     tones = np.linspace(0, 1, 8)

@@ -42,12 +42,12 @@ def free_directions(degree, seed=0):
 def test_free_directions_round_trip_exactly(ending, degree, tmp_path):
     stored = free_directions(degree)
     np.save(tmp_path / "first.npy", stored)
-    field = read_field(tmp_path / "first.npy", BALL)
+    field = read_field(tmp_path / "first.npy", BALL, degree)
     assert field.degree == degree and field.direction_ratios is not None
     write_field(tmp_path / f"a{ending}", field, BALL)
     with pytest.raises(RosyError, match="the directions of this field do not form a RoSy"):
         write_field(tmp_path / "a.rosy", field, BALL)
-    again = read_field(tmp_path / f"a{ending}", BALL)
+    again = read_field(tmp_path / f"a{ending}", BALL, degree)
     assert np.array_equal(again.source_directions, stored)
     assert np.array_equal(again.vectors, field.vectors)
     assert np.array_equal(again.direction_ratios, field.direction_ratios)
@@ -102,11 +102,48 @@ def test_faces_that_are_not_finite_are_written_as_zero(degree, rosy, tmp_path):
     stored[3, 1, 2] = np.nan
     stored[5] = -np.inf
     np.save(tmp_path / "first.npy", stored)
-    field = read_field(tmp_path / "first.npy", BALL, None, "zero")
+    field = read_field(tmp_path / "first.npy", BALL, degree, "zero")
     write_field(tmp_path / "a.rawfield", field, BALL)
     again = read_field(tmp_path / "a.rawfield", BALL)
     stored[[3, 5]] = 0
     assert np.array_equal(again.source_directions, stored)
+
+
+@pytest.mark.parametrize("kind", ["plain", "numbered", "counted", "headed", "centered"])
+@pytest.mark.parametrize("ending", [".txt", ".vec"])
+def test_two_directions_that_are_nowhere_opposite_are_a_cross(kind, ending, tmp_path):
+    """Rows as programs for quad meshes write them: one direction for each line of the cross."""
+    cross = field_directions(BALL, axis_field(BALL, 4, (0.3, -0.2, 1.0)))
+    rows = cross[:, :2].reshape(-1, 6)
+    if kind == "numbered":
+        rows = np.column_stack([np.arange(len(rows)), rows])
+    elif kind == "centered":
+        rows = np.column_stack([BALL.face_center, rows, -rows])
+    header = {"counted": f"{len(rows)}", "headed": "ax,ay,az,bx,by,bz"}.get(kind, "")
+    path = tmp_path / f"a{ending}"
+    np.savetxt(path, rows, header=header, comments="", delimiter=",")
+    loaded = load_field(path, BALL)
+    assert np.allclose(field_directions(BALL, loaded.field)[:, 0], cross[:, 0])
+    assert loaded.field.degree == 4 and loaded.field.direction_ratios is None
+    assert ("nowhere opposite" in loaded.note) == (kind != "centered")
+    assert load_field(path, BALL, 4).note == ""
+    if kind != "centered":
+        assert load_field(path, BALL, 2).field.degree == 2
+
+
+def test_opposite_directions_are_a_field_of_degree_2(tmp_path):
+    vectors = axis_field(BALL, 2, (0.3, -0.2, 1.0)).vectors
+    np.save(tmp_path / "a.npy", np.stack([vectors, -vectors], axis=1))
+    assert read_field(tmp_path / "a.npy", BALL).degree == 2
+
+
+@pytest.mark.parametrize("degree", [None, 6])
+def test_rosy_files_without_a_degree(degree, tmp_path):
+    vectors = axis_field(BALL, 4, (0.3, -0.2, 1.0)).vectors
+    np.savetxt(tmp_path / "a.rosy", vectors, header=str(len(vectors)), comments="")
+    loaded = load_field(tmp_path / "a.rosy", BALL, degree)
+    assert loaded.field.degree == (degree or 4) and np.allclose(loaded.field.vectors, vectors)
+    assert ("no degree is stated" in loaded.note) == (degree is None)
 
 
 def test_tensors_are_distinguished_from_three_directions(tmp_path):

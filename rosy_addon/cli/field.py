@@ -15,7 +15,9 @@ from ..core.errors import RosyError, counted
 from ..field.convert import Conversion, convert
 from ..field.curvature import MAGNITUDES
 from ..field.field_io import DEFAULT_DEGREE, READ_SUFFIXES, WRITE_SUFFIXES
+from ..field.formats.polygons import Polygons
 from ..field.formats.sings import SINGULARITY_SUFFIXES, read_sings
+from ..field.joining import coinciding_borders
 from ..field.mesh_arrays import SIMULATION_READERS
 from ..field.mesh_io import READERS
 from .mesh_field import add_field_file_options, add_mesh_options, load_mesh_and_field, read_field
@@ -80,6 +82,7 @@ def run_info(options: Options) -> None:
         "faces": surface.face_count,
         "euler_characteristic": surface.euler_characteristic,
         "magnitude": [float(magnitude.min()), float(magnitude.max())],
+        "coinciding_vertices": _coinciding_vertices(surface),
         "undefined_faces": int(np.count_nonzero(magnitude == 0)),
         "is_rosy": field.is_rosy,
         "energy": field.energy,
@@ -88,6 +91,13 @@ def run_info(options: Options) -> None:
     if options.against is not None:
         facts["against"] = _compare(options, field)
     print_line(json.dumps(facts) if options.json else _format_info(facts))
+
+
+def _coinciding_vertices(surface: api.Surface) -> int:
+    """Return how many vertices on borders are at the position of others, and could be joined to them."""
+    polygons = Polygons(surface.vertices, surface.corner_vertex, surface.face_start)
+    target = coinciding_borders(polygons, surface.vertex_data)
+    return int(np.count_nonzero(target != np.arange(len(target))))
 
 
 def _compare(options: Options, field: api.Field) -> dict[str, Any]:
@@ -129,6 +139,9 @@ def _format_info(facts: dict[str, Any]) -> str:
         f"magnitude {low:.4g} to {high:.4g}, undefined on {undefined}",
         f"energy {facts['energy']:.6g}",
     ]
+    if facts["coinciding_vertices"]:
+        coinciding = counted(facts["coinciding_vertices"], "vertex", "vertices")
+        lines.insert(2, f"{coinciding} on borders coincide with others: --join joins them")
     if not facts["is_rosy"]:
         lines.append("directions at free angles, not a RoSy")
     if "against" in facts:

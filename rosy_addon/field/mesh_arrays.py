@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..core.errors import RosyError, RosyWarning, counted
 from .formats.polygons import Polygons, offsets_from_sizes
-from .joining import with_joined_borders
+from .joining import coinciding_borders, without_repeats
 from .mesh_io import READERS, read_polygons
 
 #: Number of corners of each type of surface cell in meshio. Cells of second order have further points, which
@@ -113,12 +113,57 @@ def mesh_arrays(
     arrays = replace(arrays, vertices=points, uv=uv)
     is_grid = suffix in SIMULATION_READERS or (faces is None and not is_path)
     if join or (join is None and (is_grid or suffix == ".stl")):
-        arrays, count = with_joined_borders(arrays)
+        arrays, count = _with_joined_borders(arrays)
         if count and suffix != ".stl":
             text = f"{name}: {counted(count, 'vertex', 'vertices')} on borders coincided with others and "
             text += "were joined (join=False or --no-join keeps them apart)"
             warnings.warn(text, RosyWarning, stacklevel=3)
     return arrays
+
+
+def _with_joined_borders(arrays: MeshArrays) -> tuple[MeshArrays, int]:
+    """Join the vertices that `coinciding_borders` finds.
+
+    Parameters
+    ----------
+    arrays : MeshArrays
+        With (V, 3) vertices, and texture coordinates of the corners, if any.
+
+    Returns
+    -------
+    joined : MeshArrays
+        Without the vertices that have been joined to others. A joined vertex has the data of the first one.
+    count : int
+        Number of vertices that have been joined to others.
+    """
+    target = coinciding_borders(arrays.polygons, arrays.vertex_data)
+    kept = np.flatnonzero(target == np.arange(len(target)))
+    count = len(target) - len(kept)
+    if not count:
+        return arrays, 0
+    corner_vertex, face_start, corner, face = without_repeats(target, arrays.polygons)
+    number = np.cumsum(target == np.arange(len(target))) - 1
+    data = [
+        None
+        if rows is None
+        else {name: np.asarray(v)[index] if len(v) == total else v for name, v in rows.items()}
+        for rows, index, total in (
+            (arrays.vertex_data, kept, len(target)),
+            (arrays.face_data, face, len(arrays.face_start) - 1),
+        )
+    ]
+    uv = None if arrays.uv is None else arrays.uv[corner]
+    vertices = arrays.vertices[kept]
+    joined = replace(
+        arrays,
+        vertices=vertices,
+        corner_vertex=number[corner_vertex],
+        face_start=face_start,
+        uv=uv,
+        vertex_data=data[0],
+        face_data=data[1],
+    )
+    return joined, count
 
 
 def _corner_uv(

@@ -133,3 +133,21 @@ def test_the_uv_map_of_a_file(shared_data, tmp_path):
     assert done.returncode == 0, done.stderr
     facts, rough = facts_of(mesh, smooth, "--against", out), facts_of(mesh, out)
     assert facts["energy"] < rough["energy"] and facts["against"]["mean"] < 15
+
+
+def test_info_says_that_borders_coincide(tmp_path, capsys):
+    """A tube of quads whose first and last column are two rows of vertices at the same positions."""
+    angle, height = np.meshgrid(np.linspace(0, 2 * np.pi, 9), [0.0, 1.0, 2.0], indexing="ij")
+    points = np.stack([np.cos(angle), np.sin(angle), height], axis=-1).reshape(-1, 3)
+    quads = [
+        (3 * i + j, 3 * i + j + 1, 3 * i + j + 4, 3 * i + j + 3) for i in range(8) for j in (0, 1)
+    ]
+    lines = [f"v {x} {y} {z}" for x, y, z in points]
+    lines += ["f " + " ".join(str(corner + 1) for corner in quad) for quad in quads]
+    (tmp_path / "tube.obj").write_text("\n".join([*lines, ""]))
+    assert main(["info", str(tmp_path / "tube.obj"), "--generate", "axis"]) == 0
+    printed = capsys.readouterr().out
+    assert "Euler characteristic 1\n3 vertices on borders coincide" in printed
+    assert main(["info", str(tmp_path / "tube.obj"), "--generate", "axis", "--join"]) == 0
+    printed = capsys.readouterr()
+    assert "Euler characteristic 0\nmagnitude" in printed.out and "were joined" in printed.err

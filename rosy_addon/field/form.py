@@ -12,14 +12,16 @@ import numpy as np
 from ..core.progress import progress, report
 from .creases import weighted_median
 from .feature_curvature import NoisyCurvature, noisy_curvature, of_unit_extent
+from .frames import dot, normalize
 from .guided_system import guided_field
 from .guides import guides_from_edges
 from .representation import from_representation, unit_complex
 from .rosy_field import RosyField, check_degree
 from .smoothest import smoothest_field
 from .surface import Surface
+from .unfolding import unfolded
 
-#: Distances over which curvature may be averaged, relative to `Surface.extent`.
+#: Distances over which curvature may be averaged, relative to `principal_extent`.
 SCALES = (0.01, 0.02, 0.04, 0.08)
 
 #: The smallest of these distances is used at which noise rotates half of the directions by less than this
@@ -32,10 +34,10 @@ CLEAR_RATIO = 3.0
 #: Confidence below which directions are ignored, as on spheres.
 MIN_CONFIDENCE = 0.05
 
-#: Curvature below which a surface counts as flat, relative to the inverse of `Surface.extent`.
+#: Curvature below which a surface counts as flat, relative to the inverse of `principal_extent`.
 FLAT_CURVATURE = 0.05
 
-#: Distance over which the influence of directions with confidence 1 falls off, relative to `Surface.extent`.
+#: Distance over which the influence of directions with confidence 1 falls off, relative to `principal_extent`.
 REACH = 0.04
 
 #: Relative norm of the residual at which the solver for the field stops. The directions that the field
@@ -76,7 +78,8 @@ def form(surface: Surface, degree: int) -> RosyField:
     follows_curvature = degree == 2 or degree % 4 == 0
     if not follows_curvature or not surface.face_normal.any():
         return smoothest_field(surface, degree)
-    original, surface = surface, of_unit_extent(surface)
+    original, flat = surface, unfolded(surface)
+    surface = of_unit_extent(flat)
     with progress(0.0, 0.2):
         measured = noisy_curvature(surface)
     with progress(0.2, 0.5):
@@ -90,7 +93,12 @@ def form(surface: Surface, degree: int) -> RosyField:
         with progress(0.5, 1.0):
             return smoothest_field(original, degree)
     with progress(0.5, 1.0):
-        return guided_field(surface, degree, guides, weight, at_edge, FIELD_TOLERANCE)
+        field = guided_field(surface, degree, guides, weight, at_edge, FIELD_TOLERANCE)
+    if flat is original:
+        return field
+    normal = original.face_normal
+    vectors = field.vectors - dot(field.vectors, normal)[:, None] * normal
+    return RosyField(degree, normalize(vectors) * normal.any(axis=1)[:, None])
 
 
 def _curvature_guides(measured: NoisyCurvature, degree: int) -> tuple[np.ndarray, np.ndarray]:

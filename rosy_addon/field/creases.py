@@ -55,6 +55,9 @@ NOISY_EDGE_LENGTH = 0.02
 #: Number of rings of faces around sharp edges in which normals are filtered.
 FILTER_RINGS = 4
 
+#: Added to angles, so that edges of exactly `SHARP_ANGLE` are sharp wherever the mesh is.
+ROUNDING_ANGLE = 1e-6
+
 #: Smallest crease angle in radians. Smaller angles between normals may be rounding errors.
 MIN_CREASE_ANGLE = 1e-3
 
@@ -157,11 +160,15 @@ def salient_edges(surface: Surface, normals: np.ndarray, noise_angle: float) -> 
     edges = surface.edges
     face_a, face_b = surface.corner_face[edges.halfedges].T
     # Faces without area have no normal, so no angle is computed at their edges.
-    interior = angle_between(normals[face_a], normals[face_b])
-    others = _largest_of_others(surface, interior)
+    filtered = angle_between(normals[face_a], normals[face_b]) + ROUNDING_ANGLE
+    unfiltered = angle_between(surface.face_normal[face_a], surface.face_normal[face_b])
+    unfiltered += ROUNDING_ANGLE
     noise = NOISE_MULTIPLE * noise_angle
-    is_sharp = interior >= max(SHARP_ANGLE, noise)
-    is_sharp |= (interior >= max(MIN_ANGLE, noise)) & (interior >= MIN_RATIO * others)
+    # The filter removes noise, and also some sharp edges of coarse meshes.
+    is_sharp = (np.maximum(filtered, unfiltered) >= SHARP_ANGLE) & (filtered >= noise)
+    for angle in (filtered, unfiltered):
+        is_clear = angle >= MIN_RATIO * _largest_of_others(surface, angle)
+        is_sharp |= (angle >= max(MIN_ANGLE, noise)) & is_clear
     is_salient = np.ones(len(edges.ends), dtype=bool)
     is_salient[edges.interior] = is_sharp
     ends = edges.ends[is_salient]

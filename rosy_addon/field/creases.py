@@ -55,8 +55,9 @@ NOISY_EDGE_LENGTH = 0.02
 #: Number of rings of faces around sharp edges in which normals are filtered.
 FILTER_RINGS = 4
 
-#: Added to angles, so that edges of exactly `SHARP_ANGLE` are sharp wherever the mesh is.
-ROUNDING_ANGLE = 1e-6
+#: Rounding error of angles in radians, for coordinates in single precision and edges of a thousandth of the size
+#: of the mesh. Edges at exactly a threshold are judged in the same way wherever they are.
+ROUNDING_ANGLE = 1e-4
 
 #: Smallest crease angle in radians. Smaller angles between normals may be rounding errors.
 MIN_CREASE_ANGLE = 1e-3
@@ -160,15 +161,15 @@ def salient_edges(surface: Surface, normals: np.ndarray, noise_angle: float) -> 
     edges = surface.edges
     face_a, face_b = surface.corner_face[edges.halfedges].T
     # Faces without area have no normal, so no angle is computed at their edges.
-    filtered = angle_between(normals[face_a], normals[face_b]) + ROUNDING_ANGLE
+    filtered = angle_between(normals[face_a], normals[face_b])
     unfiltered = angle_between(surface.face_normal[face_a], surface.face_normal[face_b])
-    unfiltered += ROUNDING_ANGLE
     noise = NOISE_MULTIPLE * noise_angle
     # The filter removes noise, and also some sharp edges of coarse meshes.
-    is_sharp = (np.maximum(filtered, unfiltered) >= SHARP_ANGLE) & (filtered >= noise)
+    is_sharp = np.maximum(filtered, unfiltered) >= SHARP_ANGLE - ROUNDING_ANGLE
+    is_sharp &= filtered >= noise
     for angle in (filtered, unfiltered):
-        is_clear = angle >= MIN_RATIO * _largest_of_others(surface, angle)
-        is_sharp |= (angle >= max(MIN_ANGLE, noise)) & is_clear
+        is_clear = angle >= MIN_RATIO * _largest_of_others(surface, angle) + ROUNDING_ANGLE
+        is_sharp |= (angle >= max(MIN_ANGLE - ROUNDING_ANGLE, noise)) & is_clear
     is_salient = np.ones(len(edges.ends), dtype=bool)
     is_salient[edges.interior] = is_sharp
     ends = edges.ends[is_salient]

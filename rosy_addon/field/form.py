@@ -98,13 +98,14 @@ def form(surface: Surface, degree: int) -> RosyField:
     edge_guides = guides_from_edges(surface, measured.salient_ends, degree)
     at_edge = edge_guides.any(axis=1)
     if at_edge.any():
-        confidence *= _agreement(measured, degree, guides, edge_guides)
+        with progress(0.5, 0.55):
+            confidence *= _agreement(measured, degree, guides, edge_guides)
     guides = np.where(at_edge[:, None], edge_guides, guides)
     weight = np.where(at_edge, 0.0, (confidence / REACH) ** 2)
     if not guides.any():
-        with progress(0.5, 1.0):
+        with progress(0.55, 1.0):
             return smoothest_field(original, degree)
-    with progress(0.5, 1.0):
+    with progress(0.55, 1.0):
         field = guided_field(surface, degree, guides, weight, at_edge, FIELD_TOLERANCE)
     if flat is original:
         return field

@@ -40,7 +40,7 @@ def folded_faces(surface: Surface) -> np.ndarray:
 
 
 def unfolded(surface: Surface) -> Surface:
-    """Return the surface without folded faces, and and oriented consistently; itself if it is so already.
+    """Return the surface without folded faces, and oriented consistently; itself if it is so already.
 
     In each part that can be oriented, the orientation of most faces counts, and the others are reversed. The
     vertices of folded faces move to the mean of their neighbors. Faces keep their numbers, but the corners of

@@ -31,7 +31,7 @@ MIN_RATIO = 2.0
 #: Both angles are raised to at least this multiple of the median angle by which noise rotates the normals.
 NOISE_MULTIPLE = 5.0
 
-#: Shortest chain of salient edges, relative to `Surface.extent`.
+#: Shortest chain of salient edges, relative to `principal_extent`.
 MIN_LINE_LENGTH = 0.05
 
 
@@ -54,6 +54,10 @@ NOISY_EDGE_LENGTH = 0.02
 
 #: Number of rings of faces around sharp edges in which normals are filtered.
 FILTER_RINGS = 4
+
+#: Rounding error of angles in radians, for coordinates in single precision and edges of a thousandth of the size
+#: of the mesh. Edges at exactly a threshold are judged in the same way wherever they are.
+ROUNDING_ANGLE = 1e-4
 
 #: Smallest crease angle in radians. Smaller angles between normals may be rounding errors.
 MIN_CREASE_ANGLE = 1e-3
@@ -116,6 +120,27 @@ def filtered_normals(
     return result, noise_angle
 
 
+def principal_extent(surface: Surface) -> float:
+    """Return the length of a thin straight bar whose area has the largest variance of the surface's area.
+
+    It is the diameter of a sphere and the side of a flat square. Unlike `Surface.extent`, it does not change
+    when the surface is rotated. Surfaces without area use `Surface.extent`.
+    """
+    points = surface.vertices[surface.triangle_vertex] - surface.vertices[surface.used_vertices[0]]
+    cross = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
+    area = np.sqrt(dot(cross, cross))
+    if not area.any():
+        return surface.extent
+    area /= area.sum()
+    points -= area @ points.mean(axis=1)
+    # The mean over a triangle of a product of coordinates is (sum over its corners + product of sums) / 12.
+    # A bar of length 1 has the variance 1 / 12.
+    samples = np.concatenate([points, points.sum(axis=1)[:, None]], axis=1)
+    samples *= np.sqrt(area)[:, None, None]
+    samples = samples.reshape(-1, 3)
+    return float(np.sqrt(np.linalg.eigvalsh(samples.T @ samples)[-1]))
+
+
 def salient_edges(surface: Surface, normals: np.ndarray, noise_angle: float) -> np.ndarray:
     """Find the salient edges: border edges, and edges that are clearly sharper than the edges around them.
 
@@ -136,11 +161,15 @@ def salient_edges(surface: Surface, normals: np.ndarray, noise_angle: float) -> 
     edges = surface.edges
     face_a, face_b = surface.corner_face[edges.halfedges].T
     # Faces without area have no normal, so no angle is computed at their edges.
-    interior = angle_between(normals[face_a], normals[face_b])
-    others = _largest_of_others(surface, interior)
+    filtered = angle_between(normals[face_a], normals[face_b])
+    unfiltered = angle_between(surface.face_normal[face_a], surface.face_normal[face_b])
     noise = NOISE_MULTIPLE * noise_angle
-    is_sharp = interior >= max(SHARP_ANGLE, noise)
-    is_sharp |= (interior >= max(MIN_ANGLE, noise)) & (interior >= MIN_RATIO * others)
+    # The filter removes noise, and also some sharp edges of coarse meshes.
+    is_sharp = np.maximum(filtered, unfiltered) >= SHARP_ANGLE - ROUNDING_ANGLE
+    is_sharp &= filtered >= noise
+    for angle in (filtered, unfiltered):
+        is_clear = angle >= MIN_RATIO * _largest_of_others(surface, angle) + ROUNDING_ANGLE
+        is_sharp |= (angle >= max(MIN_ANGLE - ROUNDING_ANGLE, noise)) & is_clear
     is_salient = np.ones(len(edges.ends), dtype=bool)
     is_salient[edges.interior] = is_sharp
     ends = edges.ends[is_salient]
@@ -149,7 +178,7 @@ def salient_edges(surface: Surface, normals: np.ndarray, noise_angle: float) -> 
     line = connected_components(len(surface.vertices), ends)[ends[:, 0]]
     edge = surface.vertices[ends[:, 0]] - surface.vertices[ends[:, 1]]
     length = np.bincount(line, np.sqrt(dot(edge, edge)))[line]
-    return ends[length >= MIN_LINE_LENGTH * surface.extent]
+    return ends[length >= MIN_LINE_LENGTH * principal_extent(surface)]
 
 
 def _largest_of_others(surface: Surface, angle: np.ndarray) -> np.ndarray:

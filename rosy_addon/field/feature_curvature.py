@@ -9,14 +9,14 @@ import numpy as np
 from .blocks import bincount_rows
 from .connection import build_connection
 from .connectivity import smooth_fans
-from .creases import filtered_normals, salient_edges, weighted_median
+from .creases import filtered_normals, principal_extent, salient_edges, weighted_median
 from .curvature import face_curvature, with_smooth_normals
 from .frames import angle_between, dot, normalize
 from .polygon_arrays import face_area_vectors
 from .surface import Surface
 from .surface_averages import SurfaceAverages
 
-#: Distance over which curvature is averaged, relative to `Surface.extent`.
+#: Distance over which curvature is averaged, relative to `principal_extent`.
 SCALE = 0.01
 
 #: Ratio of curvature to the curvature of noise below which a part of the surface has no feature.
@@ -61,14 +61,14 @@ class NoisyCurvature:
 
 
 def of_unit_extent(surface: Surface) -> Surface:
-    """Return the surface, scaled to the extent 1 and centered at the origin.
+    """Return the surface, scaled to the principal extent 1 and centered at the origin.
 
     This avoids very large and very small numbers.
     """
     used = surface.used_vertices
     vertices = np.zeros_like(surface.vertices)
     low, high = surface.vertices[used].min(axis=0), surface.vertices[used].max(axis=0)
-    vertices[used] = (surface.vertices[used] - 0.5 * (low + high)) / surface.extent
+    vertices[used] = (surface.vertices[used] - 0.5 * (low + high)) / principal_extent(surface)
     return surface.with_vertices(vertices)
 
 
@@ -163,7 +163,7 @@ def feature_curvature(surface: Surface) -> np.ndarray:
     """Compute the curvature of the features of a surface at the corners of its triangles.
 
     It is the larger absolute principal curvature, averaged over the distance `SCALE`, a fraction of
-    `Surface.extent`. The curvature of noise is subtracted, and the bend at sharp edges does not count. The
+    `principal_extent`. The curvature of noise is subtracted, and the bend at sharp edges does not count. The
     rest shape is used if there is one, so that a deformation does not change the result.
 
     Parameters
@@ -179,7 +179,7 @@ def feature_curvature(surface: Surface) -> np.ndarray:
         surface = with_smooth_normals(surface.in_rest_shape())
     if not surface.face_normal.any():
         return np.zeros((len(surface.triangles), 3), dtype=np.float32)
-    extent, surface = surface.extent, of_unit_extent(surface)
+    extent, surface = principal_extent(surface), of_unit_extent(surface)
     measured = noisy_curvature(surface)
     averages = measured.averages
     scalar, line = averages.laplacian(0), averages.laplacian(2)

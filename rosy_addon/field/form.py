@@ -7,19 +7,26 @@ field is smooth.
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from ..core.progress import progress, report
+from .conjugate_gradient import conjugate_gradient
+from .connection import laplacian
 from .creases import weighted_median
 from .feature_curvature import NoisyCurvature, noisy_curvature, of_unit_extent
-from .guided_system import guided_field
+from .frames import dot, normalize
+from .guided_system import GuidedSystem, guided_field
 from .guides import guides_from_edges
 from .representation import from_representation, unit_complex
 from .rosy_field import RosyField, check_degree
 from .smoothest import smoothest_field
 from .surface import Surface
+from .surface_averages import AVERAGE_TOLERANCE
+from .unfolding import unfolded
 
-#: Distances over which curvature may be averaged, relative to `Surface.extent`.
+#: Distances over which curvature may be averaged, relative to `principal_extent`.
 SCALES = (0.01, 0.02, 0.04, 0.08)
 
 #: The smallest of these distances is used at which noise rotates half of the directions by less than this
@@ -32,11 +39,16 @@ CLEAR_RATIO = 3.0
 #: Confidence below which directions are ignored, as on spheres.
 MIN_CONFIDENCE = 0.05
 
-#: Curvature below which a surface counts as flat, relative to the inverse of `Surface.extent`.
+#: Curvature below which a surface counts as flat, relative to the inverse of `principal_extent`.
 FLAT_CURVATURE = 0.05
 
-#: Distance over which the influence of directions with confidence 1 falls off, relative to `Surface.extent`.
+#: Distance over which the influence of directions with confidence 1 falls off, relative to `principal_extent`.
 REACH = 0.04
+
+#: Distance over which salient edges decide against principal directions that contradict them, relative to
+#: `principal_extent`. Where three cylinders intersect, the field has 8 singularities with values from 0.2 to 1, for
+#: all meshes that were tried, and up to 100 with 0.05.
+EDGE_REACH = 0.2
 
 #: Relative norm of the residual at which the solver for the field stops. The directions that the field
 #: follows are not more exact than that.
@@ -76,7 +88,8 @@ def form(surface: Surface, degree: int) -> RosyField:
     follows_curvature = degree == 2 or degree % 4 == 0
     if not follows_curvature or not surface.face_normal.any():
         return smoothest_field(surface, degree)
-    original, surface = surface, of_unit_extent(surface)
+    original, flat = surface, unfolded(surface)
+    surface = of_unit_extent(flat)
     with progress(0.0, 0.2):
         measured = noisy_curvature(surface)
     with progress(0.2, 0.5):
@@ -84,13 +97,21 @@ def form(surface: Surface, degree: int) -> RosyField:
     report(0.5, "finding guides")
     edge_guides = guides_from_edges(surface, measured.salient_ends, degree)
     at_edge = edge_guides.any(axis=1)
+    if at_edge.any():
+        with progress(0.5, 0.55):
+            confidence *= _agreement(measured, degree, guides, edge_guides)
     guides = np.where(at_edge[:, None], edge_guides, guides)
     weight = np.where(at_edge, 0.0, (confidence / REACH) ** 2)
     if not guides.any():
-        with progress(0.5, 1.0):
+        with progress(0.55, 1.0):
             return smoothest_field(original, degree)
-    with progress(0.5, 1.0):
-        return guided_field(surface, degree, guides, weight, at_edge, FIELD_TOLERANCE)
+    with progress(0.55, 1.0):
+        field = guided_field(surface, degree, guides, weight, at_edge, FIELD_TOLERANCE)
+    if flat is original:
+        return field
+    normal = original.face_normal
+    vectors = field.vectors - dot(field.vectors, normal)[:, None] * normal
+    return RosyField(degree, normalize(vectors) * normal.any(axis=1)[:, None])
 
 
 def _curvature_guides(measured: NoisyCurvature, degree: int) -> tuple[np.ndarray, np.ndarray]:
@@ -131,3 +152,39 @@ def _curvature_guides(measured: NoisyCurvature, degree: int) -> tuple[np.ndarray
     face_z = averages.face_means(confidence * unit_complex(z), 2)
     z = unit_complex(face_z) ** (degree // 2)
     return from_representation(z, averages.x, averages.y, degree), np.abs(face_z)
+
+
+def _agreement(
+    measured: NoisyCurvature, degree: int, guides: np.ndarray, edge_guides: np.ndarray
+) -> np.ndarray:
+    """Return (F,) float64: how far guides agree with salient edges near them, from 0 to 1.
+
+    The direction of the edges is continued smoothly over the surface, with a modulus that falls off over the
+    distance `EDGE_REACH`. Guides that contradict it are ignored. Otherwise the field would have to rotate between
+    the edge and the guides, and both ways around are equally good halfway between two members.
+
+    Parameters
+    ----------
+    measured : NoisyCurvature
+    degree : int
+        N.
+    guides, edge_guides : (F, 3) float64 ndarray
+        Guides along principal directions, and along salient edges.
+    """
+    averages = measured.averages
+    matrix = laplacian(averages.connection, degree, EDGE_REACH**-2)
+    system = GuidedSystem(averages.surface, degree, averages, matrix)
+    at_edge = system.to_representation(edge_guides)
+    nodes = system.node_guides(at_edge, np.zeros(len(at_edge)), at_edge != 0)
+    z = conjugate_gradient(
+        matrix,
+        nodes.rhs,
+        AVERAGE_TOLERANCE,
+        partial(np.multiply, 1 / matrix.diagonal),
+        "continuing salient edges",
+        nodes.fixed,
+        nodes.is_fixed,
+    )
+    edge = averages.face_means(z, degree)
+    cosine = (system.to_representation(guides) * edge.conj()).real
+    return np.clip(1 - np.abs(edge) + cosine, 0, 1)

@@ -271,6 +271,12 @@ class Surface:
         return content_hash(rest, self.corner_vertex, self.face_start, self.triangles)
 
     @cached_property
+    def content_key(self) -> bytes:
+        """A hash of the vertices, the rest shape and the faces: the same for equal meshes."""
+        mesh = self.vertices, self.corner_vertex, self.face_start
+        return content_hash(*mesh, *([] if self.rest_vertices is None else [self.rest_vertices]))
+
+    @cached_property
     def extent(self) -> float:
         """Length of the longest side of the bounding box in object space; see `box_corners`."""
         return float(np.ptp(self.box_corners, axis=0).max())
@@ -480,6 +486,11 @@ def _check_polygons(
     points = vertices if len(used) == len(vertices) else vertices[used]
     if 0 < np.ptp(points, axis=0).max() < MIN_EXTENT:
         raise RosyError(f"{name}: is smaller than {MIN_EXTENT:g}: scale the mesh")
+
+
+def is_same_surface(first: Surface, second: Surface) -> bool:
+    """Return whether two surfaces have the same vertices and faces, such as a file that is read twice."""
+    return first is second or first.content_key == second.content_key
 
 
 def have_same_polygons(first: Surface, second: Surface) -> bool:

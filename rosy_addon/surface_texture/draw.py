@@ -38,7 +38,7 @@ from .charts import UvCharts, uv_charts
 from .hatching import lit_ink, thresholds
 from .line_order import direction_map
 from .texel_field import texel_field, texel_noise
-from .texels import Texels, TexelSurface, TextureFrame, fill_margin, rasterize_charts, texture_frame
+from .texels import FIRST_TILE, Texels, TexelSurface, TextureFrame, fill_margin, rasterize_charts, texture_frame
 
 #: Lengths of a look in pixels are converted to lengths on the surface: this number of pixels is the side of a
 #: square with the area of the surface. Lines are then about as wide as in a picture of 1000 pixels that the
@@ -119,10 +119,11 @@ class Texture:
         )
 
     def tiles(self) -> dict[int, np.ndarray]:
-        """Return the (size, size, 4) picture of each tile, by its UDIM number."""
-        # If the texture is not UDIM, all tiles show the picture of the first one.
-        pictures = np.split(self.rgba, len(self.rgba) // self.frame.size)
-        return dict(zip(self.frame.tile_names(), pictures, strict=False))
+        """Return the (size, size, 4) picture of each tile, by its UDIM number; 1001 without UDIM tiles."""
+        if not self.frame.is_udim:  # all tiles show the same picture
+            return {FIRST_TILE: self.rgba}
+        pictures = np.split(self.rgba, len(self.frame.tiles))
+        return dict(zip(self.frame.tile_names(), pictures, strict=True))
 
 
 def draw_texture(

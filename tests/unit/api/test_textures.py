@@ -68,6 +68,12 @@ def test_tiles_have_files_of_their_own(tmp_path, error_of):
     assert "no <UDIM>" in error_of(texture.save, tmp_path / "square.png")
 
 
+def test_a_texture_without_tiles_is_tile_1001():
+    """Wherever its charts are."""
+    square = rf.Surface(*SQUARE, name="square", uv=UV - (2.0, 1.0))
+    assert list(rf.texture(square, rf.along_uv(square, 2), size=32).tiles) == [1001]
+
+
 def test_overlaps_are_a_warning():
     square = rf.Surface(*SQUARE, name="square", uv=UV * [2, 1])
     with pytest.warns(rf.RosyWarning, match="square: 4.% of its UV map lies under other charts"):

@@ -38,7 +38,15 @@ from .charts import UvCharts, uv_charts
 from .hatching import lit_ink, thresholds
 from .line_order import direction_map
 from .texel_field import texel_field, texel_noise
-from .texels import FIRST_TILE, Texels, TexelSurface, TextureFrame, fill_margin, rasterize_charts, texture_frame
+from .texels import (
+    FIRST_TILE,
+    Texels,
+    TexelSurface,
+    TextureFrame,
+    fill_margin,
+    rasterize_charts,
+    texture_frame,
+)
 
 #: Lengths of a look in pixels are converted to lengths on the surface: this number of pixels is the side of a
 #: square with the area of the surface. Lines are then about as wide as in a picture of 1000 pixels that the

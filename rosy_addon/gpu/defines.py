@@ -79,7 +79,7 @@ SHARED_NAMES: dict[ModuleType, tuple[str, ...]] = {
     pixel_neighbors: ("MAX_SLOPE", "DEPTH_TOLERANCE", "SLOPE_TOLERANCE"),
     shadow_maps: ("PCF_WIDTH",),
     surface_sampling: ("MIN_FACING_COSINE",),
-    mesh_buffers: ("ROW_BITS", "POSITION_TEXEL", "NORMAL_TEXEL", "VALUE_TEXEL"),
+    mesh_buffers: ("ROW_BITS", "POSITION_TEXEL", "NORMAL_TEXEL", "MAGNITUDE_TEXEL", "VALUE_TEXEL"),
     surface_records: ("MAX_TREE_DEPTH",),
 }
 

@@ -33,7 +33,7 @@ def _channel_pixels(gbuffer: GBuffer, channel: FieldChannel) -> np.ndarray:
 def fill_pixels(
     gbuffer: GBuffer, pixels: slice | np.ndarray, triangle: np.ndarray, corner_field: CornerField
 ) -> None:
-    """Write the normals, the representation and the channels at some pixels of one instance.
+    """Write the normals, the representation, the magnitude and the channels at some pixels of one instance.
 
     `triangle` holds the visible triangle of each of these pixels. `corner_field` must be in camera
     space.
@@ -63,6 +63,8 @@ def fill_pixels(
             np.conjugate(z, out=z, where=~front_facing)
         z *= signed_power(rotation, order)
         _channel_pixels(gbuffer, channel)[pixels] = z
+    lengths = [corner.take(triangle) for corner in corner_field.magnitude]
+    gbuffer.magnitude[pixels] = sum(map(np.multiply, weights, lengths))
     gbuffer.normal[pixels] = normal.T
     gbuffer.geometric_normal[pixels] = geometric_normal.T
 

@@ -90,12 +90,14 @@ def texel_field(on: TexelSurface, crease_angle: float | None) -> PixelField:
     if mesh.family_z is not None:
         sources["family", mesh.family_count] = mesh.family_z
     channels = {channel: np.empty(count, dtype=np.complex64) for channel in sources}
+    magnitude = np.empty(count, dtype=np.float32)
     to_texels = texels.frame.size * on.step
     for block in reported_blocks(count, "finding directions", 0.0, 0.3):
         triangle, weights = texels.triangle[block], texels.barycentric[block]
         frame = frames_at(charts, triangle, weights)
         for axis, tangent in enumerate((frame, 1j * frame)):
             jacobian[block, axis] = to_texels * charts.to_uv(triangle, tangent)
+        magnitude[block] = _interpolated(weights, mesh.magnitude, triangle)
         for channel, source in sources.items():
             turn = signed_power(frame.conj(), rotation_order(channel, degree))
             z = _interpolated(weights, source, triangle) if source.ndim == 2 else source[triangle]
@@ -114,6 +116,7 @@ def texel_field(on: TexelSurface, crease_angle: float | None) -> PixelField:
         height=texels.frame.height,
         pixel=texels.index,
         representation=z,
+        magnitude=magnitude,
         screen_jacobian=jacobian,
         neighbor_mask=mask,
         channels=channels,

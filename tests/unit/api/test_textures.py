@@ -6,6 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
+from shapes import icosphere
 
 import rosy_addon.api as rf
 from rosy_addon.cli.parser import main
@@ -72,6 +73,24 @@ def test_a_texture_without_tiles_is_tile_1001():
     """Wherever its charts are."""
     square = rf.Surface(*SQUARE, name="square", uv=UV - (2.0, 1.0))
     assert list(rf.texture(square, rf.along_uv(square, 2), size=32).tiles) == [1001]
+
+
+@pytest.mark.parametrize("draw", [rf.render, rf.texture])
+def test_a_constant_magnitude_has_one_color(draw):
+    """Also around singularities, where directions cancel."""
+    surface = icosphere(2)
+    angle = np.arctan2(*surface.vertices[surface.corner_vertex][:, 1::-1].T) / (2 * np.pi) + 0.5
+    height = surface.vertices[surface.corner_vertex][:, 2] / 3 + 0.5
+    ball = rf.Surface(surface.vertices, surface.faces, uv=np.stack([angle, height], axis=1))
+    field = rf.smoothest(ball)
+    assert len(field.singularities.index) == 8
+    flat = {"hue": "magnitude", "gain": 0.0, "shading": 0.0}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", rf.RosyWarning)
+        drawn = draw(ball, field, size=(160, 160) if draw is rf.render else 64, **flat)
+    picture = np.asarray(drawn if draw is rf.render else drawn.tiles[1001])
+    color = picture[picture[..., 3] == 255][:, :3]
+    assert len(color) > 1000 and np.ptp(color.astype(int), axis=0).max() <= 1
 
 
 def test_overlaps_are_a_warning():

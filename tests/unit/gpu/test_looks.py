@@ -30,6 +30,7 @@ from shapes import plane
 from rosy_addon.compositor.flow import NO_DRIFT, Drift
 from rosy_addon.compositor.shading import Light
 from rosy_addon.compositor.target_tone import ReferenceRender
+from rosy_addon.field.frames import normalize
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.surface_tone import SurfaceTone
@@ -118,6 +119,15 @@ def look_of(look_settings):
 def test_looks(card, name):
     look, degree, drift = look_of(LOOKS[name])
     assert_parity(card, [ball(degree)], look=look, drift=drift)
+
+
+def test_a_constant_magnitude_has_one_color(card):
+    """Also around singularities, where directions cancel."""
+    field = RosyField(4, normalize(smooth_field(BALL, 4).vectors))
+    look = replace(LOOK, hue="magnitude", gain=0.0)
+    rgba = card_rgba(card, [shown(BALL, field)], look)
+    color = rgba[rgba[..., 3] == 1][:, :3]
+    assert len(color) > 1000 and np.ptp(color, axis=0).max() < 0.005
 
 
 UNDEFINED_LOOKS = {

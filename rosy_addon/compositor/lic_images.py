@@ -74,7 +74,7 @@ def magnitude_step_limits(field: PixelField, look: PixelLook) -> np.ndarray | No
 def relative_magnitude(field: PixelField, ends: tuple[float, float]) -> np.ndarray:
     """Return the (P,) float32 positions of the magnitudes between `magnitude_ends`, 0 to 1."""
     low, high = np.float32(ends)
-    clipped = np.clip(field.magnitude, min(low, high), max(low, high))
+    clipped = np.clip(np.abs(field.representation), min(low, high), max(low, high))
     return (clipped - low) / (high - low)
 
 
@@ -85,7 +85,7 @@ def magnitude_ends(look: PixelLook, field: PixelField) -> tuple[float, float]:
     """
     ends = magnitude_range(look)
     if ends is None:
-        ends = 0.0, float(field.magnitude.max(initial=0.0)) or 1.0
+        ends = 0.0, float(np.abs(field.representation).max(initial=0.0)) or 1.0
     return distinct_ends(*ends)
 
 

@@ -72,11 +72,9 @@ class PixelField:
     pixel : (P,) int32 ndarray
         Flat indices into the frame, ascending, from the lower left.
     representation : (P,) complex64 ndarray
-        z = rho exp(i N t), where rho is at most the magnitude and t is the angle of a member in the view plane:
+        z = rho exp(i N t), where rho is the magnitude and t is the angle of a member in the view plane:
         the plane perpendicular to the ray from the eye. See `GBuffer.representation`. It is 0 where the
         field is undefined.
-    magnitude : (P,) float32 ndarray
-        See `GBuffer.magnitude`.
     screen_jacobian : (P, 2) complex64 ndarray
         For each axis of the view plane: the displacement on screen, x + i y in pixels, of a step on the
         surface along that axis. A step that is parallel to the picture is one pixel long. For textures, see
@@ -103,7 +101,6 @@ class PixelField:
     height: int
     pixel: np.ndarray
     representation: np.ndarray
-    magnitude: np.ndarray
     screen_jacobian: np.ndarray
     neighbor_mask: np.ndarray
     channels: dict[FieldChannel, np.ndarray] = dataclass_field(default_factory=dict)
@@ -238,7 +235,6 @@ def surface_pixel_field(gbuffer: GBuffer, degree: int, crease_angle: float | Non
         height=camera.height,
         pixel=pixel,
         representation=z,
-        magnitude=gbuffer.magnitude[selected],
         screen_jacobian=jacobians[selected],
         neighbor_mask=mask,
         channels=_channels_of_degree(channels),

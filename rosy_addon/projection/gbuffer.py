@@ -155,8 +155,6 @@ class GBuffer:
         z = rho exp(i N t), where t is the angle of a member that is transported into the view plane
         (perpendicular to `view_direction`), in the frame `field.frames.view_frame` of that plane.
         Zero where the field is undefined.
-    magnitude : (P,) float32 ndarray
-        Length of the members. The modulus of `representation`, which is interpolated, is at most this.
     geometric_normal : (P, 3) float32 ndarray
         Unit normal of the visible triangle, without smooth shading. It points to the side that the
         camera sees.
@@ -184,7 +182,6 @@ class GBuffer:
     normal: np.ndarray
     view_direction: np.ndarray
     representation: np.ndarray
-    magnitude: np.ndarray
     geometric_normal: np.ndarray
     front_facing: np.ndarray
     channels: dict[FieldChannel, np.ndarray]

@@ -33,7 +33,7 @@ def _channel_pixels(gbuffer: GBuffer, channel: FieldChannel) -> np.ndarray:
 def fill_pixels(
     gbuffer: GBuffer, pixels: slice | np.ndarray, triangle: np.ndarray, corner_field: CornerField
 ) -> None:
-    """Write the normals, the representation, the magnitude and the channels at some pixels of one instance.
+    """Write the normals, the representation and the channels at some pixels of one instance.
 
     `triangle` holds the visible triangle of each of these pixels. `corner_field` must be in camera
     space.
@@ -62,9 +62,9 @@ def fill_pixels(
             # Members keep their direction in space. Seen from behind, angles have the other sign.
             np.conjugate(z, out=z, where=~front_facing)
         z *= signed_power(rotation, order)
+        if channel == REPRESENTATION:
+            z *= _scale_to_magnitude(corner_field, triangle, weights, z)
         _channel_pixels(gbuffer, channel)[pixels] = z
-    lengths = [corner.take(triangle) for corner in corner_field.magnitude]
-    gbuffer.magnitude[pixels] = sum(map(np.multiply, weights, lengths))
     gbuffer.normal[pixels] = normal.T
     gbuffer.geometric_normal[pixels] = geometric_normal.T
 
@@ -152,6 +152,21 @@ def _interpolated_values(
     z0 += z1
     z0 += z2
     return z0
+
+
+def _scale_to_magnitude(
+    corner_field: CornerField, triangle: np.ndarray, weights: np.ndarray, z: np.ndarray
+) -> np.ndarray:
+    """Return the (P,) float32 factors that give z the modulus of the interpolated magnitude.
+
+    The modulus of the interpolated z is smaller where directions differ, as around singularities.
+    """
+    magnitude = sum(
+        weight * corner.take(triangle)
+        for weight, corner in zip(weights, corner_field.magnitude, strict=True)
+    )
+    modulus = np.abs(z)
+    return np.divide(magnitude, modulus, out=np.zeros_like(modulus), where=modulus > 0)
 
 
 def _squared_phase(half: np.ndarray) -> np.ndarray:

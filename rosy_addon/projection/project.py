@@ -404,7 +404,6 @@ def _new_gbuffer(instances: MeshInstances, camera: Camera, fragments: Fragments)
         normal=_empty_vectors(count),
         view_direction=view_direction,
         representation=np.empty(count, dtype=np.complex64),
-        magnitude=np.empty(count, dtype=np.float32),
         geometric_normal=_empty_vectors(count),
         front_facing=fragments.front_facing,
         channels={},

@@ -100,7 +100,6 @@ def planar_pixel_field(
         height=height,
         pixel=pixel,
         representation=z,
-        magnitude=np.abs(z),
         screen_jacobian=np.tile(np.array([1, 1j], dtype=np.complex64), (len(pixel), 1)),
         neighbor_mask=mask_undefined(all_neighbors, pixel, width, height, z != 0),
     )

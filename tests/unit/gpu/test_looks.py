@@ -135,6 +135,14 @@ UNDEFINED_LOOKS = {
     "hatched": HATCH,
     "hatched, all effects": LOOKS["hatched, all effects"],
     "drifting, hatched": DRIFTING | HATCH | {"fade": "ends"},
+    "magnitude, left out": {"hue": "magnitude"},
+    "families, left out": {"hue": "families", "undefined": "hidden"},
+    "paper": {"undefined": "paper"},
+    "magnitude, paper": {"hue": "magnitude", "undefined": "paper"},
+    "magnitude, texture": {"hue": "magnitude", "undefined": "texture"},
+    "hatched, left out": HATCH | {"undefined": "hidden"},
+    "hatched, paper": HATCH | {"undefined": "paper"},
+    "even, paper": EVEN | UNEVEN | {"undefined": "paper"},
 }
 
 
@@ -148,7 +156,9 @@ def test_where_the_field_is_undefined(card, name):
     assert_parity(card, [shown(BALL, field)], look=look, drift=drift)
 
 
-@pytest.mark.parametrize("look_settings", [{}, BOTH, {"hue": "families"}], ids=str)
+@pytest.mark.parametrize(
+    "look_settings", [{}, BOTH | {"undefined": "paper"}, {"hue": "families"}], ids=str
+)
 def test_a_field_that_is_undefined_everywhere(card, look_settings):
     field = RosyField(4, np.zeros((BALL.face_count, 3)))
     rgba = card_rgba(card, [shown(BALL, field)], replace(LOOK, **look_settings))

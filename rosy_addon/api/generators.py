@@ -14,7 +14,8 @@ from ..core.errors import RosyError, counted
 from ..field.field import Field, check_same_surface
 from ..field.formats.sings import read_sings
 from ..field.generate import GeneratorSettings, generate
-from ..field.surface import Surface, orientation_warning
+from ..field.mesh_checks import orientation_warning
+from ..field.surface import Surface
 from .field import warn
 
 

@@ -11,8 +11,8 @@ from rosy_addon.field.closest_point import closest_triangles
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.guides import guides_from_axes, guides_from_strokes, guides_from_uv
+from rosy_addon.field.mesh_checks import count_inconsistent_edges, orientation_warning
 from rosy_addon.field.representation import face_representation, to_representation
-from rosy_addon.field.surface import count_inconsistent_edges, orientation_warning
 
 BALL = icosphere(4)
 

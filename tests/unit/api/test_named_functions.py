@@ -10,7 +10,11 @@ from conftest import ROOT
 
 import rosy_addon as rf
 
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+PAGES = [
+    ROOT / "README.md",
+    *sorted((ROOT / "docs").rglob("*.md")),
+    *sorted((ROOT / "docs").rglob("*.ipynb")),
+]
 
 
 def names_in(module: str) -> set[str]:

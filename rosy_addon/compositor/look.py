@@ -348,7 +348,7 @@ class Look:
         "What is drawn where the field is undefined, such as regions without data",
         {
             "auto": "Nothing where the color shows the magnitude, otherwise the texture",
-            "hidden": "Nothing: the picture is transparent there",
+            "hidden": "Nothing: the picture is transparent there, and a material that shows it is gray",
             "paper": "The surface without lines",
             "texture": "Noise or spots without a direction",
         },

@@ -130,27 +130,6 @@ def mesh_arrays(
     return arrays
 
 
-def _without_copied_faces(arrays: MeshArrays) -> tuple[MeshArrays, int]:
-    """Remove `copied_faces`. Return the other faces, with their data, and the number of removed ones."""
-    is_kept = ~copied_faces(*arrays.polygons)
-    size, count = np.diff(arrays.face_start), len(is_kept)
-    corner = np.repeat(is_kept, size)
-    face_data = arrays.face_data
-    if face_data is not None:
-        face_data = {
-            name: np.asarray(values)[is_kept] if len(values) == count else values
-            for name, values in face_data.items()
-        }
-    kept = replace(
-        arrays,
-        corner_vertex=arrays.corner_vertex[corner],
-        face_start=offsets_from_sizes(size[is_kept]),
-        uv=None if arrays.uv is None else arrays.uv[corner],
-        face_data=face_data,
-    )
-    return kept, int(count - is_kept.sum())
-
-
 def _corner_uv(
     uv: ArrayLike, vertex_count: int, corner_vertex: NDArray[Any], name: str
 ) -> NDArray[np.float64]:
@@ -357,3 +336,24 @@ def _extracted_surface(mesh: Any) -> Any:
         return mesh.extract_surface(algorithm="dataset_surface")
     except TypeError:  # before PyVista 0.47, there was no other algorithm
         return mesh.extract_surface()
+
+
+def _without_copied_faces(arrays: MeshArrays) -> tuple[MeshArrays, int]:
+    """Remove `copied_faces`. Return the other faces, with their data, and the number of removed ones."""
+    is_kept = ~copied_faces(*arrays.polygons)
+    size, count = np.diff(arrays.face_start), len(is_kept)
+    corner = np.repeat(is_kept, size)
+    face_data = arrays.face_data
+    if face_data is not None:
+        face_data = {
+            name: np.asarray(values)[is_kept] if len(values) == count else values
+            for name, values in face_data.items()
+        }
+    kept = replace(
+        arrays,
+        corner_vertex=arrays.corner_vertex[corner],
+        face_start=offsets_from_sizes(size[is_kept]),
+        uv=None if arrays.uv is None else arrays.uv[corner],
+        face_data=face_data,
+    )
+    return kept, int(count - is_kept.sum())

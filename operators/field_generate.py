@@ -12,9 +12,10 @@ import numpy as np
 from ..rosy_addon.core.errors import NoFeaturesError, RosyError, counted
 from ..rosy_addon.field.generate import GeneratorSettings, generate
 from ..rosy_addon.field.guides import feature_edges
+from ..rosy_addon.field.mesh_checks import copies_warning, orientation_warning
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
 from ..rosy_addon.field.singularities import description
-from ..rosy_addon.field.surface import Surface, orientation_warning
+from ..rosy_addon.field.surface import Surface
 from ..rosy_addon.scene import guides
 from ..rosy_addon.scene.look_properties import read_settings
 from ..rosy_addon.scene.meshes import EDGE_MARKS, marked_edges, mesh_surface, read_uvs
@@ -147,9 +148,9 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
                 errors.append(RosyError(f"{surface.name}: {kind} {reason}"))
                 continue
             fields[mesh] = field
-            label = "checking orientations"
-            if note := (yield Call(orientation_warning, (surface,), stop, stop, label)):
-                self.report_warnings(note)
+            for warning in (orientation_warning, copies_warning):
+                if note := (yield Call(warning, (surface,), stop, stop, "checking the mesh")):
+                    self.report_warnings(note)
         if not fields:
             raise errors[0]
         self.report_warnings(*map(str, errors))

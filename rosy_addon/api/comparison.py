@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -10,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import RosyError
+from ..core.errors import RosyError, RosyWarning
 from ..field.analysis import DEFAULT_REACH, SingularityMatching, format_degrees, match_on_surface
 from ..field.field import Difference, Field
+from ..field.surface import is_same_surface
 
 #: Replacements for characters that LaTeX interprets.
 _LATEX = {
@@ -49,8 +51,8 @@ class Comparison:
     fields : dict of str to Field
         The fields, by title.
     differences : dict of str to Difference
-        Differences of the other fields from the first one, by title. A field of another degree or on another
-        surface than the first has no item.
+        Differences of the other fields from the first one, by title. A field of another degree, or on other
+        vertices or faces than the first, has no item.
     matchings : dict of str to SingularityMatching
         Pairs of singularities of the first field and of another field that match, by the title of the other.
 
@@ -185,7 +187,13 @@ def compare(
     reference = next(iter(titled.values()))
     comparison = Comparison(titled, {}, {})
     for title, field in list(titled.items())[1:]:
-        if field.degree != reference.degree or field.surface is not reference.surface:
+        if field.degree != reference.degree:
+            continue
+        if not is_same_surface(field.surface, reference.surface):
+            text = (
+                f"{title}: is on other vertices or faces than {next(iter(titled))}: no angles to it"
+            )
+            warnings.warn(text, RosyWarning, stacklevel=2)
             continue
         comparison.differences[title] = reference.difference(field)
         pair = reference.singularities, field.singularities

@@ -14,7 +14,8 @@ from ..core.errors import RosyError, counted
 from ..field.field import Field, check_same_surface
 from ..field.formats.sings import read_sings
 from ..field.generate import GeneratorSettings, generate
-from ..field.surface import Surface, orientation_warning
+from ..field.mesh_checks import orientation_warning
+from ..field.surface import Surface
 from .field import warn
 
 
@@ -340,6 +341,11 @@ def along_axis(surface: Surface, axis: Sequence[float] = (0.0, 0.0, 1.0), degree
 
 def along_uv(surface: Surface, degree: int = 4) -> Field:
     """Make a field along the axes of the UV map of the surface.
+
+    Members follow the direction in which u increases. If the degree N is a multiple of 4, the field is the one
+    that is nearest to both axes of the map: where the angle between them is not a multiple of 360/N degrees, it
+    deviates equally from both, by at most 90/N degrees. `from_directions` keeps axes that are not
+    perpendicular.
 
     Raises
     ------

@@ -45,7 +45,7 @@ def add_field_command(subparsers: Any) -> None:
         "the size of the mesh"
     )
     parser.add_value("--cancel-pairs", "SHARE", text, share, default=0.0)
-    text = "replace the lengths of the vectors"
+    text = "replace the lengths of the vectors; the curvature is in 1 / unit of the mesh"
     parser.add_argument("--magnitude", choices=list(MAGNITUDES), help=text)
 
 

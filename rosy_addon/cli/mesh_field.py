@@ -18,7 +18,7 @@ from .options import CommandParser, Options, int_between
 #: Help of the option --join.
 JOIN_TEXT = (
     "join vertices on borders that coincide, as at the seam of a grid; by default only of .stl files and files of "
-    "simulations"
+    "simulations. Also remove faces that have the same corners as others, as on a two-sided sheet"
 )
 
 

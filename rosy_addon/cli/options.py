@@ -33,8 +33,20 @@ Parse = Callable[[str], Any]
 class CommandParser(argparse.ArgumentParser):
     """A parser of a command, with methods that add the options that several commands share.
 
-    Control characters in its messages are escaped.
+    Control characters in its messages are escaped. Files may be named before, between and after options.
     """
+
+    _is_intermixed = False
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
+        """Parse arguments; see `argparse.ArgumentParser.parse_known_args`."""
+        if self._is_intermixed or self._subparsers is not None:
+            return super().parse_known_args(args, namespace)
+        self._is_intermixed = True  # parse_known_intermixed_args calls this method
+        try:
+            return self.parse_known_intermixed_args(args, namespace)
+        finally:
+            self._is_intermixed = False
 
     def _print_message(self, message: str, file: TextIO | None = None) -> None:
         print_line(message.removesuffix("\n"), sys.stderr if file is None else file)

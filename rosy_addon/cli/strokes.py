@@ -21,7 +21,7 @@ from ..line_drawing.svg import Pen
 from ..projection.camera import check_size
 from ..rendering.mesh_view import check_light
 from ..worker.frame_workers import parse_frames
-from .mesh_field import add_field_options, load_mesh_and_field
+from .mesh_field import JOIN_TEXT, add_field_options, load_mesh_and_field
 from .options import Options, add_subcommand, float_between
 from .scene import find_camera, open_scene, print_warnings, requested_objects
 from .streams import print_line
@@ -40,6 +40,7 @@ def add_strokes_command(subparsers: Any) -> None:
     text = f"{', '.join(READERS)} or .blend; in Blender, by default, the open file"
     parser.add_argument("mesh", nargs="?", type=Path, metavar="MESH|SCENE.blend", help=text)
     with parser.only_for(MESH_FILES):
+        parser.add_toggle("--join", JOIN_TEXT)
         add_field_options(parser)
         parser.add_direction_options()
     text = "file of strokes: a picture as .svg, or polylines in space as .ply, .obj or .csv"

@@ -32,7 +32,7 @@ from .image_noise import NOISE_MEAN
 from .ink_thresholds import picture_thresholds, sharp_look
 from .lic import lic_lengths
 from .lic_images import LicImages, magnitude_ends, relative_magnitude, with_magnitude_range
-from .look import Look, colors_magnitude, colors_values, is_even, is_hatched
+from .look import Look, colors_magnitude, colors_values, is_even, is_hatched, undefined_drawing
 from .look_units import PixelLook, pixel_look
 from .picture import Picture, common_color_range
 from .pixel_field import PixelField, entries_of_rows
@@ -339,6 +339,8 @@ def _draw_layer(stages: ComposeStages, canvas: _Canvas, layer: _Layer, strip: St
         else:
             color, alpha = render_hatching(part, part_lines, tone[block])
             canvas.color[entries], canvas.alpha[entries] = color, alpha
+        if undefined_drawing(look) == "hidden" and not canvas.draws_thresholds:
+            canvas.alpha[entries] *= part.representation != 0
 
 
 def _tone_along_lines(layer: _Layer, strip: Strip) -> np.ndarray:
@@ -383,7 +385,7 @@ def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: Pixel
     """Return the (P, 3) or (P, 1) linear colors of pixels.
 
     Pixels are gray, or colored by the magnitude, the family of lines or the color values, as the look says.
-    Pixels without a color value are gray. `tone`, (P, K), is from `streak_tone`.
+    Pixels without a color value are gray, and so are undefined ones without streaks. `tone`, (P, K), is from `streak_tone`.
     """
     hue, position = None, None
     if colors_magnitude(look):
@@ -394,9 +396,14 @@ def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: Pixel
         hue = map_colors(np.nan_to_num(position), look.color_map)
     elif look.hue == "families":
         hue = family_hues(field, images, look)
+    plain = undefined_drawing(look) != "texture"
+    undefined = np.flatnonzero(field.representation == 0) if plain else np.zeros(0, dtype=np.intp)
     if hue is None:
-        return to_linear(tone)
+        color = to_linear(tone)
+        color[undefined] = to_linear(np.float32(NOISE_MEAN))
+        return color
     color = to_linear(hue * (1 + COLOR_CONTRAST * (tone - NOISE_MEAN)))
+    color[undefined] = to_linear(np.float32(NOISE_MEAN))
     if position is not None:
         missing = np.isnan(position)
         color[missing] = to_linear(tone[missing])

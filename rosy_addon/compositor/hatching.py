@@ -26,12 +26,13 @@ from .family_hues import line_families
 from .image_noise import NOISE_MEAN
 from .inks import MAX_INKS, has_ink_per_line, ink_count, inks_of
 from .lic_images import LicImages, magnitude_ends, relative_magnitude
-from .look import colors_magnitude, is_even, is_hatched
+from .look import colors_magnitude, is_even, is_hatched, undefined_drawing
 from .look_units import PixelLook
 from .paper_grain import PAPER_GRAIN_STRENGTH
 from .pixel_field import PixelField, all_members
 from .streak_statistics import (
     COVERAGE_STEPS,
+    NO_INK,
     break_amount,
     break_steps,
     look_streak_statistics,
@@ -64,11 +65,9 @@ class HatchedLines(NamedTuple):
     ----------
     look : PixelLook
     images : LicImages or None
-        Member images in the order of `all_members(field, look.guiding_angle)`. None if they have not been
-        computed yet, or are not needed because there are even lines.
+        Member images in the order of `all_members(field, look.guiding_angle)`, once they are computed.
     break_images : LicImages or None
-        LIC images whose streaks are as long as the pieces of broken lines (`break_steps`). None if lines are
-        not broken.
+        LIC images whose streaks are as long as the pieces of broken lines (`break_steps`), if there are any.
     paper_grain : (M, P) float32 ndarray or None
         Height of the paper for each line, with mean 0 and standard deviation 1. Ink adheres better
         where it is larger.
@@ -119,11 +118,12 @@ class HatchedLines(NamedTuple):
     def spots(self, line: int) -> np.ndarray:
         """Return what is thresholded in place of a LIC image where the field is undefined.
 
-        It is the undirected texture with standard deviation 1, plus the paper grain of the line. The result
-        is (P,) float32, NaN where the field is defined.
+        It is the undirected texture with standard deviation 1, plus the paper grain of the line, and below all
+        thresholds if no spots are drawn. The result is (P,) float32, NaN where the field is defined.
         """
+        below = 0 if undefined_drawing(self.look) == "texture" else np.float32(NO_INK)
         std = np.float32(look_streak_statistics(self.look).disc_std)
-        return self.undirected / std + self.relief(line)
+        return self.undirected / std + self.relief(line) - below
 
     def target_tones(self, tone: np.ndarray) -> np.ndarray:
         """Return the target tones of lines: (M, P) `line_tones` if set, else the (P,) `tone` as (1, P)."""

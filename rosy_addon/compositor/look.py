@@ -45,6 +45,12 @@ def magnitude_range(look: Any) -> tuple[float, float] | None:
     return look.color_range if is_set else None
 
 
+def undefined_drawing(look: Any) -> str:
+    """Return what is drawn where the field is undefined: "hidden", "paper" or "texture"."""
+    automatic = "hidden" if colors_magnitude(look) else "texture"
+    return automatic if look.undefined == "auto" else look.undefined
+
+
 def crease_angle_of(look: Any) -> float | None:
     """Return the smallest angle between normals at a crease, in radians. None if edges are never creases."""
     return look.crease_angle if look.crease_angle < math.pi else None
@@ -336,6 +342,18 @@ class Look:
             "gray": "Black to white",
         },
         **_shading("color", lambda look: colors_magnitude(look) or colors_values(look)),
+    )
+    undefined: str = choice(
+        "auto",
+        "What is drawn where the field is undefined, such as regions without data",
+        {
+            "auto": "Nothing where the color shows the magnitude, otherwise the texture",
+            "hidden": "Nothing: the picture is transparent there, and a material that shows it is gray",
+            "paper": "The surface without lines",
+            "texture": "Noise or spots without a direction",
+        },
+        option_labels={"auto": "Automatic"},
+        **_shading("color"),
     )
     shading: float = fraction(
         0.7, "Strength of the diffuse shading in the picture", **_shading("light")

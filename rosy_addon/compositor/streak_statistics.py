@@ -24,6 +24,9 @@ from .undirected import disc_means
 #: crispness 0 and 1.
 MAX_SOFTNESS, MIN_SOFTNESS = 1.6, 0.2
 
+#: What is subtracted from streaks, of standard deviation 1, to be below the threshold of any coverage.
+NO_INK = 1e6
+
 #: `break_amount` that a wobble of 1 adds everywhere.
 WOBBLE_BREAKS = 0.5
 

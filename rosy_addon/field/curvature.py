@@ -21,7 +21,7 @@ TINY = float(np.finfo(np.float64).tiny)
 MAGNITUDES = {
     "unit": "1 on all faces",
     "confidence": "How well the principal directions are defined, from 0 to 1",
-    "curvature": "The larger principal curvature, multiplied by the size of the mesh",
+    "curvature": "The larger principal curvature, in 1 / unit of the mesh: 2 on a ball of radius 0.5",
 }
 
 #: Number of rounds of averaging over vertices, which reduces the effect of mesh noise on curvature fields.
@@ -32,7 +32,7 @@ def face_magnitude(surface: Surface, kind: str) -> np.ndarray:
     """Compute the magnitude for a field on each face; `kind` is a name in `MAGNITUDES`.
 
     "unit" is 1, "confidence" is the magnitude of `curvature_field`, and "curvature" is the larger absolute
-    principal curvature times `Surface.extent`, which has no unit.
+    principal curvature in 1 / unit of length in object space.
 
     Returns
     -------
@@ -52,7 +52,7 @@ def face_magnitude(surface: Surface, kind: str) -> np.ndarray:
     report(0.0, "computing curvature")
     smooth_surface = with_smooth_normals(surface)
     mean, deviator = face_curvature(smooth_surface, *smooth_surface.face_frames)
-    return (np.abs(mean) + np.abs(deviator)) * surface.extent
+    return np.abs(mean) + np.abs(deviator)
 
 
 def with_smooth_normals(surface: Surface, corner_fan: np.ndarray | None = None) -> Surface:

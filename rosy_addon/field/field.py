@@ -20,7 +20,7 @@ from .representation import face_representation, to_representation
 from .rosy_field import RosyField
 from .singularities import find_singularities
 from .singularity_changes import move_index
-from .surface import Surface
+from .surface import Surface, is_same_surface
 
 
 class Singularities(NamedTuple):
@@ -215,7 +215,8 @@ class Field(RosyField):
         Parameters
         ----------
         magnitude : {"unit", "confidence", "curvature"} or (F,) array_like
-            The magnitudes, or how to compute them; see `field.convert.Conversion`.
+            The magnitudes, or how to compute them: 1; how well the principal directions are defined, from 0
+            to 1; or the larger absolute principal curvature, in 1 / unit of length of the mesh.
         """
         if not isinstance(magnitude, str):
             values = np.asarray(magnitude, dtype=np.float64)
@@ -265,8 +266,8 @@ class Field(RosyField):
 
 
 def check_same_surface(surface: Surface, field: Field) -> None:
-    """Raise a `RosyError` if the surface of a field is not this `Surface` object."""
-    if field.surface is not surface:
+    """Raise a `RosyError` if the surface of a field has other vertices or faces than this `Surface`."""
+    if not is_same_surface(field.surface, surface):
         raise RosyError(
             f"{surface.name}: the field is on another surface, {field.surface.name}: make it on this one"
         )

@@ -1,7 +1,7 @@
 """Generate a field on a surface, by the name of a method.
 
 `GeneratorSettings` describes the options of all methods. A field is not continuous across edges whose faces
-have opposite orientations; see `surface.count_inconsistent_edges`.
+have opposite orientations; see `mesh_checks.count_inconsistent_edges`.
 """
 
 from __future__ import annotations

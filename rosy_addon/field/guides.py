@@ -26,6 +26,10 @@ MAX_STROKE_DISTANCE = 0.05
 #: edge length is less: on a mesh with a few large faces and many tiny ones.
 MIN_STROKE_SPACING = 2.0**-14
 
+#: Rounding changes the angles between the axes of a UV map by less, in radians. Where two directions are
+#: equally near to both axes, all faces take the clockwise one.
+TIE_ANGLE = 1e-6
+
 #: Largest number of samples of all strokes.
 MAX_STROKE_SAMPLES = 1_000_000
 
@@ -172,9 +176,9 @@ def guides_from_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:
     uv : (C, 2) float ndarray
         Texture coordinates of each corner.
     degree : int
-        N of the field. If it is a multiple of 4, members follow the u axis and the v axis. Where these two
-        axes are not perpendicular on the surface, members follow two perpendicular directions that deviate
-        equally from them. For other degrees, the guide is the direction of increasing u.
+        N of the field. If it is a multiple of 4, members follow the u axis and the v axis. Where the angle
+        between these axes is not a multiple of 360/N degrees, two members deviate equally from them, by half
+        of the rest: at most 90/N degrees. For other degrees, the guide is the direction of increasing u.
 
     Returns
     -------
@@ -193,10 +197,10 @@ def guides_from_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:
     degenerate = area <= 1e-12 * np.maximum(uu * vv, 1e-300)
     along_u, along_v = vv * up - uv_sum * vp, uu * vp - uv_sum * up
     if degree % 4 == 0:
-        # Reverse the v axis where the map is mirrored.
-        mirrored = (np.conj(along_u) * along_v).imag < 0
-        size = np.maximum(np.abs(along_u), 1e-300), np.maximum(np.abs(along_v), 1e-300)
-        along_u = along_u / size[0] - 1j * np.where(mirrored, -1, 1) * along_v / size[1]
+        # Turn from u by half of the angle between the axes, modulo 2 pi / N.
+        between = unit_complex(np.conj(along_u) * along_v) ** degree
+        angle = (np.angle(between * np.exp(1j * TIE_ANGLE)) - TIE_ANGLE) / (2 * degree)
+        along_u = along_u * np.exp(1j * angle)
     along_u = np.where(degenerate, 0, unit_complex(along_u))
     return along_u.real[:, None] * x + along_u.imag[:, None] * y
 

@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.errors import RosyError, RosyWarning, counted
+from .copied_faces import copied_faces
+from .formats.obj import read_uv
 from .formats.polygons import Polygons, offsets_from_sizes
 from .joining import coinciding_borders, without_repeats
 from .mesh_io import READERS, read_polygons
@@ -110,6 +112,8 @@ def mesh_arrays(
     uv = arrays.uv if uv is None else uv
     if uv is not None:
         uv = _corner_uv(uv, len(points), arrays.corner_vertex, name)
+    elif join and suffix == ".obj":
+        uv = read_uv(Path(vertices))  # for the faces as they are in the file
     arrays = replace(arrays, vertices=points, uv=uv)
     is_grid = suffix in SIMULATION_READERS or (faces is None and not is_path)
     if join or (join is None and (is_grid or suffix == ".stl")):
@@ -117,6 +121,11 @@ def mesh_arrays(
         if count and suffix != ".stl":
             text = f"{name}: {counted(count, 'vertex', 'vertices')} on borders coincided with others and "
             text += "were joined (join=False or --no-join keeps them apart)"
+            warnings.warn(text, RosyWarning, stacklevel=3)
+    if join:
+        arrays, count = _without_copied_faces(arrays)
+        if count:
+            text = f"{name}: {counted(count, 'face')} with the same corners as others were removed"
             warnings.warn(text, RosyWarning, stacklevel=3)
     return arrays
 
@@ -372,3 +381,24 @@ def _extracted_surface(mesh: Any) -> Any:
         return mesh.extract_surface(algorithm="dataset_surface")
     except TypeError:  # before PyVista 0.47, there was no other algorithm
         return mesh.extract_surface()
+
+
+def _without_copied_faces(arrays: MeshArrays) -> tuple[MeshArrays, int]:
+    """Remove `copied_faces`. Return the other faces, with their data, and the number of removed ones."""
+    is_kept = ~copied_faces(*arrays.polygons)
+    size, count = np.diff(arrays.face_start), len(is_kept)
+    corner = np.repeat(is_kept, size)
+    face_data = arrays.face_data
+    if face_data is not None:
+        face_data = {
+            name: np.asarray(values)[is_kept] if len(values) == count else values
+            for name, values in face_data.items()
+        }
+    kept = replace(
+        arrays,
+        corner_vertex=arrays.corner_vertex[corner],
+        face_start=offsets_from_sizes(size[is_kept]),
+        uv=None if arrays.uv is None else arrays.uv[corner],
+        face_data=face_data,
+    )
+    return kept, int(count - is_kept.sum())

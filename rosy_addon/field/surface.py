@@ -6,6 +6,7 @@ A *smooth fan* is a set of corners at a vertex that share a normal: no sharp edg
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -16,9 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.cache import content_hash
-from ..core.errors import RosyError, counted
+from ..core.errors import RosyError, RosyWarning, counted
 from .blocks import bincount_rows, mask, row_blocks
 from .connectivity import Edges, build_edges, smooth_fans
+from .copied_faces import copies_note
 from .formats.obj import read_uv
 from .formats.ply import read_vertex_values
 from .frames import dot, normalize
@@ -81,7 +83,9 @@ class Surface:
     join : bool, optional
         Whether to join vertices on borders that are at the same position (within 1e-6 of the longest side) and
         have the same data, such as at the seam and the poles of a grid of longitudes and latitudes. By default
-        only for files of simulations, objects of other libraries and .stl files.
+        only for files of simulations, objects of other libraries and .stl files. If it is True, faces that
+        have the same corners as others, as on a two-sided sheet, are removed; otherwise a `RosyWarning` says
+        that there are some.
 
     Attributes
     ----------
@@ -170,6 +174,9 @@ class Surface:
             sharp_angle=SHARP_ANGLE if sharp_angle is None else sharp_angle,
             sharp_edges=None if sharp_edges is None else np.asarray(sharp_edges),
         )
+        if note := copies_note(name, *arrays.polygons):
+            text = f"{note} (join=True or --join keeps one of each)"
+            warnings.warn(text, RosyWarning, stacklevel=2)
         own = vars(self)
         own.update(vars(built), up=up, _path=Path(vertices) if is_path else Path())
         given = {"uv": arrays.uv, "vertex_data": arrays.vertex_data, "face_data": arrays.face_data}
@@ -269,6 +276,12 @@ class Surface:
         """A hash of the rest shape and its triangles. It is the same for all deformations of a mesh."""
         rest = self.in_rest_shape().vertices
         return content_hash(rest, self.corner_vertex, self.face_start, self.triangles)
+
+    @cached_property
+    def content_key(self) -> bytes:
+        """A hash of the vertices, the rest shape and the faces: the same for equal meshes."""
+        mesh = self.vertices, self.corner_vertex, self.face_start
+        return content_hash(*mesh, *([] if self.rest_vertices is None else [self.rest_vertices]))
 
     @cached_property
     def extent(self) -> float:
@@ -425,32 +438,6 @@ def _used_vertices(corner_vertex: np.ndarray, vertex_count: int) -> np.ndarray:
     return np.flatnonzero(mask(vertex_count, corner_vertex))
 
 
-def count_inconsistent_edges(surface: Surface) -> int:
-    """Count the inconsistent edges: those between two faces that disagree on which side is outward.
-
-    Faces without area are ignored. A field is not continued across such an edge. Flipping faces removes
-    inconsistent edges, except on nonorientable surfaces such as a Möbius strip.
-    """
-    edges = surface.edges
-    degenerate = ~surface.face_normal.any(axis=1)[surface.corner_face]
-    inconsistent = edges.face_count == 2
-    inconsistent[edges.corner_edge[degenerate]] = False
-    inconsistent[edges.interior] = False
-    return int(np.count_nonzero(inconsistent))
-
-
-def orientation_warning(surface: Surface) -> str:
-    """Return the warning to show for inconsistently oriented faces; an empty string if there are none."""
-    count = count_inconsistent_edges(surface)
-    if not count:
-        return ""
-    return (
-        f"{surface.name}: the faces at {counted(count, 'edge')} are oriented inconsistently, so the "
-        "field is cut there: recalculate the normals (not possible for one-sided surfaces such as "
-        "a Möbius strip)"
-    )
-
-
 def _check_polygons(
     name: str, vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray
 ) -> None:
@@ -480,6 +467,11 @@ def _check_polygons(
     points = vertices if len(used) == len(vertices) else vertices[used]
     if 0 < np.ptp(points, axis=0).max() < MIN_EXTENT:
         raise RosyError(f"{name}: is smaller than {MIN_EXTENT:g}: scale the mesh")
+
+
+def is_same_surface(first: Surface, second: Surface) -> bool:
+    """Return whether two surfaces have the same vertices and faces, such as a file that is read twice."""
+    return first is second or first.content_key == second.content_key
 
 
 def have_same_polygons(first: Surface, second: Surface) -> bool:

@@ -47,6 +47,9 @@ FLOW_NONE, FLOW_ALONG, FLOW_TO_ANGLE = range(3)
 #: The numbers of the values of `Look.tone` in shaders.
 TONE_SOURCES = {"light": 0, "attribute": 1, "image": 2, "picture": 3}
 
+#: The numbers of the results of `look.undefined_drawing` in shaders.
+UNDEFINED_DRAWINGS = {"texture": 0, "paper": 1, "hidden": 2}
+
 #: The numbers of the types of lights in shaders.
 SUN_LIGHT, POINT_LIGHT, HEADLIGHT = range(3)
 
@@ -72,14 +75,14 @@ SHARED_NAMES: dict[ModuleType, tuple[str, ...]] = {
         *("DEPTH_JUMP", "MIN_STEP", "STEP_RATIO", "PART_BORDER", "EMPTY_BORDER"),
         *("MIN_MARK_LENGTH", "FULL_MARK_LENGTH"),
     ),
-    streak_statistics: ("WOBBLE_BREAKS",),
+    streak_statistics: ("NO_INK", "WOBBLE_BREAKS"),
     surface_noise: ("OCTAVES", "OCTAVE_OFFSET"),
     wobble: ("WAVE_COUNT",),
     crease_pixels: ("LINE_TOLERANCE", "MIN_RELATIVE_DEPTH"),
     pixel_neighbors: ("MAX_SLOPE", "DEPTH_TOLERANCE", "SLOPE_TOLERANCE"),
     shadow_maps: ("PCF_WIDTH",),
     surface_sampling: ("MIN_FACING_COSINE",),
-    mesh_buffers: ("ROW_BITS", "POSITION_TEXEL", "NORMAL_TEXEL", "VALUE_TEXEL"),
+    mesh_buffers: ("ROW_BITS", "POSITION_TEXEL", "NORMAL_TEXEL", "MAGNITUDE_TEXEL", "VALUE_TEXEL"),
     surface_records: ("MAX_TREE_DEPTH",),
 }
 
@@ -110,6 +113,8 @@ CONSTANTS: dict[str, float | int | Sequence[float]] = {
     "TONE_LIGHT": TONE_SOURCES["light"],
     "TONE_IMAGE": TONE_SOURCES["image"],
     "TONE_PICTURE": TONE_SOURCES["picture"],
+    "UNDEFINED_TEXTURE": UNDEFINED_DRAWINGS["texture"],
+    "UNDEFINED_HIDDEN": UNDEFINED_DRAWINGS["hidden"],
     "POINT_LIGHT": POINT_LIGHT,
     "HEADLIGHT": HEADLIGHT,
 }

@@ -32,10 +32,11 @@ RECORDS_PER_BLOCK = 1 << 17
 #: Maximum triangles of a mesh: shaders handle their ids in single precision.
 MAX_TRIANGLES = 1 << 24
 
-#: First texels of the positions, normals and representation in a record. A record has 3 texels of positions,
-#: 3 of normals, 2 of the representation, 2 for each further channel, 1 of the values for the color map if
-#: there are any, 2 of the tone if there is one, and a last one for z of the rest positions.
-POSITION_TEXEL, NORMAL_TEXEL, VALUE_TEXEL = 0, 3, 6
+#: First texels of the positions, normals, magnitudes and representation in a record. A record has 3 texels of
+#: positions, 3 of normals, 1 of magnitudes, 2 of the representation, 2 for each further channel, 1 of the
+#: values for the color map if there are any, 2 of the tone if there is one, and a last one for z of the rest
+#: positions.
+POSITION_TEXEL, NORMAL_TEXEL, MAGNITUDE_TEXEL, VALUE_TEXEL = 0, 3, 6, 7
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,10 +256,11 @@ def _write_records(
 ) -> None:
     """Fill the (T, texels, 4) float32 records, block by block of triangles.
 
-    Texels 0 to 2 are the positions of the corners, 3 to 5 the normals there. Texels 6 and 7 contain
-    `CornerField.representation`, and each channel has two further texels: six components are the real and
-    imaginary parts at the three corners, the seventh is the result of `field_channel.rotation_order`, and
-    the eighth is the layer of the channel (0 for the representation). `numbers`, the (T, 3) values for the
+    Texels 0 to 2 are the positions of the corners, 3 to 5 the normals there. Texel 6 has
+    `CornerField.magnitude`. Texels 7 and 8 contain `CornerField.representation`, and each channel has two
+    further texels: six components are the real and imaginary parts at the three corners, the seventh is the
+    result of `field_channel.rotation_order`, and the eighth is the layer of the channel (0 for the
+    representation). `numbers`, the (T, 3) values for the
     color map, have one texel. Its last component is 1 if all three values are finite. `tone`, the
     `SurfaceTone.values` at the corners, (T, 3, 1) or (T, 3, 2), has two texels: each corner has two
     components. Of the `rest_positions`, x is in the fourth components of the positions, y in the fourth
@@ -273,8 +275,9 @@ def _write_records(
         part[:, POSITION_TEXEL:NORMAL_TEXEL, :3] = corners[extent, :, :3]
         part[:, POSITION_TEXEL:NORMAL_TEXEL, 3] = rest_corners[..., 0]
         normals = corner_field.corner_normals[..., extent]
-        part[:, NORMAL_TEXEL:VALUE_TEXEL, :3] = normals.transpose(2, 0, 1)
-        part[:, NORMAL_TEXEL:VALUE_TEXEL, 3] = rest_corners[..., 1]
+        part[:, NORMAL_TEXEL:MAGNITUDE_TEXEL, :3] = normals.transpose(2, 0, 1)
+        part[:, NORMAL_TEXEL:MAGNITUDE_TEXEL, 3] = rest_corners[..., 1]
+        part[:, MAGNITUDE_TEXEL, :3] = corner_field.magnitude[:, extent].T
         part[:, -1, :3] = rest_corners[..., 2]
         _write_values(
             part, VALUE_TEXEL, corner_field.representation[:, extent], corner_field.degree, 0

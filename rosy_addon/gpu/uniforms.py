@@ -33,6 +33,7 @@ from ..compositor.look import (
     is_even,
     is_hatched,
     magnitude_range,
+    undefined_drawing,
 )
 from ..compositor.look_units import PixelLook, cell_size_args, instance_line_spacing
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, PAPER_GRAIN_STRENGTH, line_offset
@@ -117,6 +118,7 @@ def look_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
         "colors_magnitude": int(colors_magnitude(look)),
         "magnitude_ends": distinct_ends(*ends) if ends else (0.0, 0.0),
         "colors_values": int(colors_values(look)),
+        "undefined_drawing": defines.UNDEFINED_DRAWINGS[undefined_drawing(look)],
         "paper_color": (*inks.paper, inks.paper_alpha),
         "ink_count": len(inks.dark),
         "min_transmittance": inks.min_transmittance,

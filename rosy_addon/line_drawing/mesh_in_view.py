@@ -253,6 +253,7 @@ class _Pieces(Parts):
             part_of(mesh, self.triangle),
             corner_normal=normalize(self.corner_values(mesh.corner_normal)),
             z=self.corner_values(mesh.z),
+            magnitude=self.corner_values(mesh.magnitude),
             harmonics=tuple((j, self.corner_values(values)) for j, values in mesh.harmonics),
             neighbor=self.neighbor,
             neighbor_edge=self.neighbor_edge,

@@ -218,7 +218,7 @@ def spacing_by_curvature(surface: Surface, exponent: float) -> np.ndarray:
     (V,) float64 ndarray
         Factor at each vertex.
     """
-    curvature = face_magnitude(surface, "curvature")
+    curvature = face_magnitude(surface, "curvature") * surface.extent
     corner = surface.corner_vertex
     count = np.bincount(corner, minlength=len(surface.vertices))
     vertex_curvature = np.bincount(corner, curvature[surface.corner_face], len(surface.vertices))

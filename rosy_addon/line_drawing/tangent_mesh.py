@@ -69,6 +69,8 @@ class TangentMesh:
         Gradients of the barycentric coordinates, in the frame of the triangle.
     z : (T, 3) complex128 ndarray
         Representation (N-th power of a direction) of the field at the corners, in the frame of the triangle.
+    magnitude : (T, 3) float32 ndarray
+        Length of the members at the corners; see `CornerField.magnitude`.
     harmonics : tuple of (int, (T, 3) complex128 ndarray)
         For fields whose directions are not at equal angles: pairs of j and C_j (see
         `field.directional_field`). Empty for a RoSy field.
@@ -97,6 +99,7 @@ class TangentMesh:
     face: np.ndarray
     gradient: np.ndarray
     z: np.ndarray
+    magnitude: np.ndarray
     harmonics: tuple[tuple[int, np.ndarray], ...]
     family_z: np.ndarray | None
     neighbor: np.ndarray
@@ -327,6 +330,7 @@ def build_tangent_mesh(
         face=surface.triangle_face,
         gradient=_barycentric_gradients(points, x, y, area),
         z=z,
+        magnitude=corner_field.magnitude.T,
         harmonics=tuple(harmonics),
         family_z=family_z,
         neighbor=np.full((len(points), 3), -1, dtype=np.int32),

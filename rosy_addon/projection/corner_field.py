@@ -3,7 +3,8 @@
 A field is given on the faces of the rest shape. The stored member of each face is transported to
 the deformed face (`face_values`). From the faces, the field is transported to the corners and
 averaged over each smooth fan of corners. All steps but the first work on the representation
-z = rho exp(i N t), so that the result does not depend on which of the N members is stored.
+z = rho exp(i N t), so that the result does not depend on which of the N members is stored. Lengths are
+averaged on their own: the mean of z is shorter where directions differ, as around singularities.
 
 A field can have more values than z: harmonics for directions that are not evenly spaced, and a number
 for the family of the stored member, if the directions are labeled. These channels
@@ -64,6 +65,8 @@ class CornerField:
     channels : dict of FieldChannel to (3, T) complex64 ndarray
         z, and the other channels of the field, at each corner. The values at corners 1 and 2 are
         transported to corner 0, along the shortest arc between the normals.
+    magnitude : (3, T) float32 ndarray
+        Length of the members at each corner; 0 where the field is undefined.
     """
 
     corner_normals: np.ndarray
@@ -73,6 +76,7 @@ class CornerField:
     geometric_normal: np.ndarray
     degree: int
     channels: dict[FieldChannel, np.ndarray]
+    magnitude: np.ndarray
 
     @property
     def representation(self) -> np.ndarray:
@@ -132,6 +136,7 @@ def field_at_corners(
         geometric_normal=np.empty((3, count), dtype=np.float32),
         degree=field.degree,
         channels={channel: np.empty((3, count), dtype=np.complex64) for channel in faces.channels},
+        magnitude=np.empty((3, count), dtype=np.float32),
     )
     custom_normals = None
     if fans is not None and not surface.fans_share_normals:
@@ -180,7 +185,7 @@ def _fan_values(
     )
     frames = tangent_frame_components(normal)
     count, fan_count = len(surface.corner_vertex), normal.shape[1]
-    weight = np.empty(count)
+    weight, length = np.empty(count), np.empty(count)
     weighted = {channel: np.empty((2, count)) for channel in faces.channels}
     for block in pixel_blocks(count):
         face, fan = surface.corner_face[block], surface.corner_fan[block].astype(np.intp)
@@ -188,6 +193,7 @@ def _fan_values(
         phase = transport_phase(faces.normal.take(face, axis=1), normal.take(fan, axis=1), x, y)
         is_defined = faces.channels[REPRESENTATION].take(face) != 0
         np.multiply(angle[block], is_defined, out=weight[block])
+        np.multiply(weight[block], faces.magnitude.take(face), out=length[block])
         for channel, parts in weighted.items():
             z = faces.channels[channel].take(face)
             z *= signed_power(phase, rotation_order(channel, degree))
@@ -201,7 +207,8 @@ def _fan_values(
         z.real, z.imag = (
             np.bincount(surface.corner_fan, part, fan_count) / total for part in parts
         )
-    return TangentValues(normal, averages)
+    magnitude = np.bincount(surface.corner_fan, length, fan_count) / total
+    return TangentValues(normal, averages, magnitude.astype(np.float32))
 
 
 def transport_phase(
@@ -276,6 +283,8 @@ def _fill_triangles(
     defined = faces.channels[REPRESENTATION].take(face) != 0
     for corner, normal in enumerate(normals):
         corner_field.corner_normals[corner, :, block] = normal
+        magnitude = values.magnitude.take(index[corner])
+        np.multiply(magnitude, defined, out=corner_field.magnitude[corner, block])
         rotations = [] if phases is None else [phases[corner]]
         if corner and fans is not None:
             rotations.append(transport_phase(normal, normals[0], x, y))

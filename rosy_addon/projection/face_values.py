@@ -39,10 +39,14 @@ class TangentValues:
     channels : dict of FieldChannel to (n,) complex64 ndarray
         z, and the other channels of the field, in the tangent frame of the normal
         (`tangent_frame_components`). Zero for a face without area.
+    magnitude : (n,) float32 ndarray
+        Length of the members: on a fan, the mean of the lengths on its faces. Where directions differ, the
+        modulus of z is less.
     """
 
     normal: np.ndarray
     channels: dict[FieldChannel, np.ndarray]
+    magnitude: np.ndarray
 
 
 def face_values(
@@ -75,7 +79,8 @@ def face_values(
         relative_channels["family", field.family_count] = np.ones(count)
     names = REPRESENTATION, *relative_channels
     channels = {channel: np.empty(count, dtype=np.complex64) for channel in names}
-    faces = TangentValues(np.empty((3, count), dtype=np.float32), channels)
+    normals, magnitude = np.empty((3, count), dtype=np.float32), np.empty(count, dtype=np.float32)
+    faces = TangentValues(normals, channels, magnitude)
     corner_angle = np.empty(len(surface.corner_vertex), np.float32) if with_angles else None
     scale = similarity_scale(linear) if surface.rest_vertices is None else None
     rest = None if scale else np.ascontiguousarray(surface.in_rest_shape().vertices.T)
@@ -98,6 +103,7 @@ def face_values(
         rho = np.abs(member)
         member /= np.maximum(rho, np.finfo(np.float64).tiny)
         has_area = np.logical_or.reduce(normal)
+        magnitude[block] = rho * has_area
         for channel, out in faces.channels.items():
             rotation = signed_power(member, rotation_order(channel, field.degree))
             values = rho if channel == REPRESENTATION else relative_channels[channel][block]

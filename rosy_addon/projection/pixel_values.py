@@ -62,6 +62,8 @@ def fill_pixels(
             # Members keep their direction in space. Seen from behind, angles have the other sign.
             np.conjugate(z, out=z, where=~front_facing)
         z *= signed_power(rotation, order)
+        if channel == REPRESENTATION:
+            z *= _scale_to_magnitude(corner_field, triangle, weights, z)
         _channel_pixels(gbuffer, channel)[pixels] = z
     gbuffer.normal[pixels] = normal.T
     gbuffer.geometric_normal[pixels] = geometric_normal.T
@@ -150,6 +152,21 @@ def _interpolated_values(
     z0 += z1
     z0 += z2
     return z0
+
+
+def _scale_to_magnitude(
+    corner_field: CornerField, triangle: np.ndarray, weights: np.ndarray, z: np.ndarray
+) -> np.ndarray:
+    """Return the (P,) float32 factors that give z the modulus of the interpolated magnitude.
+
+    The modulus of the interpolated z is smaller where directions differ, as around singularities.
+    """
+    magnitude = sum(
+        weight * corner.take(triangle)
+        for weight, corner in zip(weights, corner_field.magnitude, strict=True)
+    )
+    modulus = np.abs(z)
+    return np.divide(magnitude, modulus, out=np.zeros_like(modulus), where=modulus > 0)
 
 
 def _squared_phase(half: np.ndarray) -> np.ndarray:

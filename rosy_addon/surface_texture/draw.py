@@ -14,7 +14,14 @@ from ..compositor.flow import NO_DRIFT, Drift, noise_channel_count
 from ..compositor.ink_thresholds import sharp_look
 from ..compositor.lic import lic_lengths, noise_args
 from ..compositor.lic_images import with_magnitude_range
-from ..compositor.look import Look, colors_magnitude, colors_values, crease_angle_of, is_hatched
+from ..compositor.look import (
+    Look,
+    colors_magnitude,
+    colors_values,
+    crease_angle_of,
+    is_hatched,
+    undefined_drawing,
+)
 from ..compositor.look_units import PixelLook, surface_pixel_look
 from ..compositor.pixel_field import PixelField
 from ..compositor.reported_blocks import reported_blocks
@@ -38,7 +45,15 @@ from .charts import UvCharts, uv_charts
 from .hatching import lit_ink, thresholds
 from .line_order import direction_map
 from .texel_field import texel_field, texel_noise
-from .texels import Texels, TexelSurface, TextureFrame, fill_margin, rasterize_charts, texture_frame
+from .texels import (
+    FIRST_TILE,
+    Texels,
+    TexelSurface,
+    TextureFrame,
+    fill_margin,
+    rasterize_charts,
+    texture_frame,
+)
 
 #: Lengths of a look in pixels are converted to lengths on the surface: this number of pixels is the side of a
 #: square with the area of the surface. Lines are then about as wide as in a picture of 1000 pixels that the
@@ -57,7 +72,7 @@ TEXTURE_SETTINGS = (
     *("ink", "display", "unit_size", "length", "fade", "flow"),
     *("line_width", "line_distance", "density"),
     *("high_pass", "hue", "seed", "gain", "crease_angle"),
-    *("magnitude_length", "color_range", "color_map"),
+    *("magnitude_length", "color_range", "color_map", "undefined"),
     *("breaks", "wobble", "paper_grain", "guiding_angle"),
 )
 
@@ -119,10 +134,11 @@ class Texture:
         )
 
     def tiles(self) -> dict[int, np.ndarray]:
-        """Return the (size, size, 4) picture of each tile, by its UDIM number."""
-        # If the texture is not UDIM, all tiles show the picture of the first one.
-        pictures = np.split(self.rgba, len(self.rgba) // self.frame.size)
-        return dict(zip(self.frame.tile_names(), pictures, strict=False))
+        """Return the (size, size, 4) picture of each tile, by its UDIM number; 1001 without UDIM tiles."""
+        if not self.frame.is_udim:  # all tiles show the same picture
+            return {FIRST_TILE: self.rgba}
+        pictures = np.split(self.rgba, len(self.frame.tiles))
+        return dict(zip(self.frame.tile_names(), pictures, strict=True))
 
 
 def draw_texture(
@@ -210,6 +226,8 @@ def draw_texture(
     if is_lit:
         with progress(0.9, 0.95):
             pixels = lit_ink(on, pixels, lights, look)
+            if undefined_drawing(look) == "hidden":
+                pixels[:, 3] *= field.representation != 0
     # Directions are relative to their chart.
     with progress(0.95, 1.0):
         rgba = fill_margin(frame, field, pixels, margin, not is_direction)
@@ -291,6 +309,8 @@ def _colors(on: TexelSurface, field: PixelField, look: PixelLook) -> np.ndarray:
     color = np.ones((len(field.pixel), 4), dtype=np.float32)
     for block in reported_blocks(len(color), "drawing the colors", 0.97, 1.0):
         color[block, :3] = colorize(field.part(block), images.part(block), tone[block], look)
+    if undefined_drawing(look) == "hidden":
+        color[:, 3] = field.representation != 0
     return color
 
 

@@ -20,7 +20,7 @@ from ..compositor.surface_noise import instance_hashes, solid_noise
 from ..core.progress import progress, report
 from ..field.blocks import row_blocks
 from ..field.frames import dot
-from ..field.representation import signed_power
+from ..field.representation import signed_power, unit_complex
 from ..line_drawing.surface_particles import SurfaceParticles, trace_geodesics
 from ..line_drawing.tangent_mesh import unit
 from ..projection.field_channel import REPRESENTATION, FieldChannel, rotation_order
@@ -99,6 +99,8 @@ def texel_field(on: TexelSurface, crease_angle: float | None) -> PixelField:
         for channel, source in sources.items():
             turn = signed_power(frame.conj(), rotation_order(channel, degree))
             z = _interpolated(weights, source, triangle) if source.ndim == 2 else source[triangle]
+            if channel == REPRESENTATION:  # its modulus is the magnitude, as in pictures
+                z = unit_complex(z) * _interpolated(weights, mesh.magnitude, triangle)
             channels[channel][block] = z * turn
     z = channels.pop(REPRESENTATION)
     # The texel at each flat index of the frame, or -1. The last element is for the index -1.

@@ -182,6 +182,9 @@ MADE_FIELDS: dict[str, Callable[[Surface, int], RosyField]] = {
     "gusts": lambda plane, degree: planar_field(
         plane, degree, lambda p: wind(p) * (p.real + 1.1) / 2.1
     ),
+    "gap": lambda plane, degree: planar_field(
+        plane, degree, lambda p: wind(p) * (p.real + 1.1) * (np.abs(p - 0.1) > 0.35)
+    ),
     "pairs": pairs_of_directions,
     "force": stress_of_force,
     "two-in-front": lambda ball, degree: ring_of_singularities(ball, 2, 1.7, degree),

@@ -16,7 +16,7 @@ uniform sampler2D field_values, outline_coverage;
 uniform sampler2DArray line_means;
 uniform float breaks, outline, min_transmittance, streak_std, break_std, disc_std;
 uniform float paper_grain_depth;
-uniform int colors_magnitude, flow_mode, colors_values, break_steps, overshoot_steps;
+uniform int colors_magnitude, flow_mode, colors_values, break_steps, overshoot_steps, undefined_drawing;
 uniform ivec2 box_origin;
 uniform vec4 flow_weights;
 layout(rgba32f) uniform writeonly image2D picture;
@@ -132,7 +132,7 @@ void main()
         slopes.x = mix(slopes.x, slopes.y, break_weight);
       }
       if (is_undirected) {
-        streak = gray(disc_noise) / disc_std;
+        streak = gray(disc_noise) / disc_std - (undefined_drawing == UNDEFINED_TEXTURE ? 0.0 : NO_INK);
       }
       float threshold = coverage_threshold(darkness, int(is_undirected));
       coverage = ink_above_threshold(streak + grain_offset, threshold, slopes.x);
@@ -154,6 +154,9 @@ void main()
     drawn_color = clamp(drawn_color, 0.0, 1.0);
   }
   float opacity = 1.0 - paper * (1.0 - paper_color.w);
+  if (is_undirected && undefined_drawing == UNDEFINED_HIDDEN) {
+    opacity = 0.0;
+  }
   float paper_share = paper * paper_color.w / max(opacity, MIN_COVERAGE);
   imageStore(picture, pixel, vec4(mix(drawn_color, paper_color.xyz, paper_share), opacity));
 }

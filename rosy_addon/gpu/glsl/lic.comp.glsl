@@ -12,7 +12,7 @@
 
 uniform sampler2D field_values, palette;
 uniform float crossing_correlation, gain, hue_sharpness;
-uniform int colors_magnitude, colors_values;
+uniform int colors_magnitude, colors_values, undefined_drawing;
 uniform ivec2 box_origin;
 layout(rgba32f) uniform writeonly image2D picture;
 #pragma constant(degree, line_count, sheet_count, kernel, flow_mode)
@@ -68,5 +68,8 @@ void main()
   else if (family_count > 1) {
     color = hue_sum / hue_weight * (1.0 + COLOR_CONTRAST * tone);
   }
-  imageStore(picture, pixel, vec4(to_linear(color) * light_and_position.xyz, 1.0));
+  bool is_plain = value.xy == vec2(0.0) && undefined_drawing != UNDEFINED_TEXTURE;
+  color = is_plain ? vec3(NOISE_MEAN) : color;
+  float alpha = is_plain && undefined_drawing == UNDEFINED_HIDDEN ? 0.0 : 1.0;
+  imageStore(picture, pixel, vec4(to_linear(color) * light_and_position.xyz, alpha));
 }

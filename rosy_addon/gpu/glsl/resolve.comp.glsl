@@ -104,6 +104,8 @@ void main()
     // Seen from the back, angles have the opposite sense.
     z = times(is_front ? z : conjugate(z), signed_power(frame_phase, order));
     if (channel == 0) {
+      // Its modulus is the magnitude, which is interpolated on its own.
+      z = unit_or_zero(z) * dot(weights.xyz, record_texel(triangle, MAGNITUDE_TEXEL).xyz);
       imageStore(field_values, pixel, vec4(z, float(order), instance_id + 1.0));
     }
     else {

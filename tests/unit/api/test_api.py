@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import io
+import pickle
 
 import numpy as np
 import pytest
@@ -193,8 +194,25 @@ def test_lengths_of_guides_may_be_their_firmness(sphere, field):
     assert angle[0] == pytest.approx(np.pi / 4, abs=1e-3) and angle[1] < 0.3
 
 
+def test_a_surface_is_its_content(sphere, field, error_of):
+    """A mesh that is read twice, or sent to another process and back, is the same surface."""
+    again = rf.Surface(sphere.vertices.copy(), sphere.faces, name="again")
+    for other in (again, pickle.loads(pickle.dumps(sphere))):
+        copied = rf.from_vectors(other, field.vectors, field.degree)
+        assert rf.compare([field, copied.rotated(0.2)]).rows[1]["mean"] == pytest.approx(
+            np.degrees(0.2)
+        )
+        assert copied.difference(field).max < 1e-12
+        size = {"size": (32, 32)}
+        assert np.array_equal(rf.render(sphere, copied, **size), rf.render(sphere, field, **size))
+    moved = rf.form(again.with_vertices(sphere.vertices + (0, 0, 1e-9)))
+    assert "another surface" in error_of(field.difference, moved)
+    with pytest.warns(rf.RosyWarning, match="field 2: is on other vertices or faces than field 1"):
+        assert not rf.compare([field, moved]).differences
+
+
 def test_a_field_of_another_surface_is_refused(sphere, field, error_of):
-    other = icosphere(2).with_parts(name="other")
+    other = icosphere(2, radius=2.0).with_parts(name="other")
     for function in (rf.render, rf.strokes):
         assert error_of(function, other, field).startswith("other: the field is on another surface")
 

@@ -6,6 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
+from shapes import icosphere
 
 import rosy_addon.api as rf
 from rosy_addon.cli.parser import main
@@ -66,6 +67,58 @@ def test_tiles_have_files_of_their_own(tmp_path, error_of):
         "square.1002.png",
     ]
     assert "no <UDIM>" in error_of(texture.save, tmp_path / "square.png")
+
+
+def test_a_texture_without_tiles_is_tile_1001():
+    """Wherever its charts are."""
+    square = rf.Surface(*SQUARE, name="square", uv=UV * (1, 0.7) - (2.0, 1.0))
+    assert list(rf.texture(square, rf.along_uv(square, 2), size=32).tiles) == [1001]
+
+
+@pytest.mark.parametrize("draw", [rf.render, rf.texture])
+def test_a_constant_magnitude_has_one_color(draw):
+    """Also around singularities, where directions cancel."""
+    surface = icosphere(2)
+    angle = np.arctan2(*surface.vertices[surface.corner_vertex][:, 1::-1].T) / (2 * np.pi) + 0.5
+    height = surface.vertices[surface.corner_vertex][:, 2] / 3 + 0.5
+    ball = rf.Surface(surface.vertices, surface.faces, uv=np.stack([angle, height], axis=1))
+    field = rf.smoothest(ball)
+    assert len(field.singularities.index) == 8
+    flat = {"hue": "magnitude", "gain": 0.0, "shading": 0.0}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", rf.RosyWarning)
+        drawn = draw(ball, field, size=(160, 160) if draw is rf.render else 64, **flat)
+    picture = np.asarray(drawn if draw is rf.render else drawn.tiles[1001])
+    color = picture[picture[..., 3] == 255][:, :3]
+    assert len(color) > 1000 and np.ptp(color.astype(int), axis=0).max() <= 1
+
+
+@pytest.mark.parametrize("draw", [rf.render, rf.texture])
+@pytest.mark.parametrize("ink", ["soft", "hatch", "even"])
+def test_regions_without_data_are_left_out(draw, ink):
+    """Two of four squares have no data: their halves of the picture are transparent, or without lines."""
+    points = [[x, y, 0] for x in range(3) for y in range(3)]
+    faces = [[i, i + 3, i + 4, i + 1] for i in (0, 1, 3, 4)]
+    surface = rf.Surface(points, faces, uv=np.array(points)[:, :2] / 2)
+    field = rf.from_vectors(surface, [[0, 1, 0]] * 2 + [[0, 0, 0]] * 2, 1)
+    shown = {"size": 64} if draw is rf.texture else {"size": (64, 64), "view": (0, 90)}
+    if draw is rf.texture and ink != "soft":
+        shown |= {"light_direction": (0, 1, 1)}
+
+    def picture(**look):
+        drawn = draw(surface, field, ink=ink, tone_levels=(0.0, 2.0, 1.0), **shown, **look)
+        pixels = np.asarray(drawn.tiles[1001] if draw is rf.texture else drawn).astype(int)
+        return pixels[6:-6, 6:28], pixels[6:-6, 36:-6]
+
+    for look in ({"hue": "magnitude"}, {"undefined": "hidden"}):
+        data, gap = picture(**look)
+        assert (data[..., 3] == 255).all() and not gap[..., 3].any()
+    data, gap = picture(undefined="paper")
+    assert (gap[..., 3] == 255).all() and np.ptp(gap, axis=(0, 1)).max() <= 2
+    if draw is rf.render:
+        assert np.ptp(data, axis=(0, 1)).max() > 50
+    data, gap = picture(hue="magnitude", undefined="texture")
+    assert (gap[..., 3] == 255).all()
 
 
 def test_overlaps_are_a_warning():

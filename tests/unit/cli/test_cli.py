@@ -108,6 +108,16 @@ def test_wrong_usage_is_status_2(words):
     assert "Traceback" not in done.stderr
 
 
+def test_files_may_be_named_after_options(sphere, tmp_path):
+    field = tmp_path / "f.npy"
+    assert rosy("field", "-o", field, "--generate", "axis", sphere, "--degree", 1).returncode == 0
+    first, second = tmp_path / "a.svg", tmp_path / "b.svg"
+    size = "--size", "100x100"
+    assert rosy("strokes", sphere, field, "-o", first, *size, "--degree", 1).returncode == 0
+    assert rosy("strokes", sphere, "-o", second, *size, "--degree", 1, field).returncode == 0
+    assert first.read_text() == second.read_text()
+
+
 def test_help_names_the_program_it_was_started_as(capsys):
     assert rosy("--help").stdout.startswith("usage: python -m rosy_addon [-h] VERB")
     assert parser.main(["--help"]) == 0

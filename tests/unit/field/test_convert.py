@@ -7,7 +7,7 @@ import pytest
 from field_helpers import with_random_members
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapes import icosphere, plane, torus
+from shapes import cylinder, icosphere, plane, torus
 
 from rosy_addon.field.convert import (
     Conversion,
@@ -17,6 +17,7 @@ from rosy_addon.field.convert import (
     rotate_field,
     with_magnitude,
 )
+from rosy_addon.field.curvature import face_magnitude
 from rosy_addon.field.directional_field import field_from_directions, field_matching
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import axis_field, generate
@@ -124,6 +125,13 @@ def test_the_diffusion_time_must_be_positive(error_of):
 
 
 # --- magnitudes ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scale", [1.0, 30.0])
+def test_curvature_is_one_over_the_radius(scale):
+    """In 1 / unit of the mesh, whatever its size."""
+    tube = cylinder(96, 24, radius=0.5 * scale, height=2 * scale)
+    assert np.allclose(face_magnitude(tube, "curvature"), 2 / scale, rtol=2e-3)
 
 
 def test_magnitudes_keep_directions_and_undefined_faces():

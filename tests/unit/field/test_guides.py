@@ -11,8 +11,8 @@ from rosy_addon.field.closest_point import closest_triangles
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.guides import guides_from_axes, guides_from_strokes, guides_from_uv
+from rosy_addon.field.mesh_checks import count_inconsistent_edges, orientation_warning
 from rosy_addon.field.representation import face_representation, to_representation
-from rosy_addon.field.surface import count_inconsistent_edges, orientation_warning
 
 BALL = icosphere(4)
 
@@ -111,6 +111,24 @@ def test_a_skewed_map_is_followed_equally_along_both_axes():
     guides = guides_from_uv(surface, uv, 4)
     assert np.allclose(np.degrees(np.arctan2(guides[:, 1], guides[:, 0])) % 90, 67.5)
     np.testing.assert_allclose(np.abs(guides_from_uv(surface, uv, 2)[:, 0]), 1, atol=1e-9)
+
+
+@pytest.mark.parametrize("degree", [4, 8])
+@pytest.mark.parametrize("between", [1, 10, 30, 44, 46, 80, 90, 100, 136, 179, -1, -50])
+def test_a_field_is_nearest_to_both_axes(degree, between):
+    """Of all directions in steps of 0.01 degrees, none has a smaller largest angle to the axes."""
+    surface = plane(3, 3)
+    v = np.radians(between)
+    uv = uv_of(surface, np.linalg.inv([(1.0, np.cos(v)), (0.0, np.sin(v))]))
+    guides = guides_from_uv(surface, uv, degree)
+    period = 360 / degree
+
+    def largest_angle(member):
+        apart = np.subtract.outer(member, [0, between]) % period
+        return np.minimum(apart, period - apart).max(axis=-1)
+
+    found = largest_angle(np.degrees(np.arctan2(guides[:, 1], guides[:, 0])))
+    assert np.allclose(found, largest_angle(np.arange(0, period, 0.01)).min(), atol=0.01)
 
 
 def test_maps_without_area_are_undefined():

@@ -88,8 +88,8 @@ def test_records_hold_the_values_of_numpy_at_the_corners(surface, degree, displa
     low, high = buffers.bounds.min(axis=0), buffers.bounds.max(axis=0)
     np.testing.assert_allclose(high, -low, atol=1e-9 * extent)
     assert np.abs(buffers.bounds).max() <= extent
-    records = records_of(buffers, 9)
-    rest = [records[:, 0:3, 3], records[:, 3:6, 3], records[:, 8, :3]]
+    records = records_of(buffers, 10)
+    rest = [records[:, 0:3, 3], records[:, 3:6, 3], records[:, 9, :3]]
     # Equal to the vertices, but for one translation of meshes that are far from the origin.
     offset = np.stack(rest, axis=2) - points
     if np.abs(points).max() < 900 * extent:
@@ -98,10 +98,11 @@ def test_records_hold_the_values_of_numpy_at_the_corners(surface, degree, displa
     np.testing.assert_array_equal(records[:, :3, :3], corners[..., :3])
     np.testing.assert_allclose(np.linalg.norm(records[:, 3:6, :3], axis=2), 1, atol=1e-5)
     if display == "flat":
-        z = records[:, 6:8].reshape(count, 4, 2)[:, :3]
+        z = records[:, 7:9].reshape(count, 4, 2)[:, :3]
         expected = field.magnitude[surface.triangle_face][:, None] + np.zeros(3)
         np.testing.assert_allclose(np.linalg.norm(z, axis=2), expected, atol=1e-5)
-    assert (records[:, 7, 2] == degree).all() and (records[:, 7, 3] == 0).all()
+        np.testing.assert_allclose(records[:, 6, :3], expected, atol=1e-5)
+    assert (records[:, 8, 2] == degree).all() and (records[:, 8, 3] == 0).all()
 
 
 def test_channels_are_in_their_layers():
@@ -111,15 +112,15 @@ def test_channels_are_in_their_layers():
     assert kind.channels == (("deviation", -1), ("deviation", 0), ("deviation", 1), ("family", 3))
     buffers = build_mesh_buffers(surface, np.eye(3), field, "smooth", kind.channels)
     assert buffers.channel_count == 4
-    records = records_of(buffers, 9 + 2 * 4)
-    np.testing.assert_array_equal(records[0, 7:16:2, 2], [3, 1, 0, -1, 1])
-    np.testing.assert_array_equal(records[0, 7:16:2, 3], [0, 0, 1, 2, 3])
+    records = records_of(buffers, 10 + 2 * 4)
+    np.testing.assert_array_equal(records[0, 8:17:2, 2], [3, 1, 0, -1, 1])
+    np.testing.assert_array_equal(records[0, 8:17:2, 3], [0, 0, 1, 2, 3])
     # A RoSy with the same channels has the constant harmonic 1, and no families.
     rosy = axis_field(surface, 3)
     records = records_of(
-        build_mesh_buffers(surface, np.eye(3), rosy, "smooth", kind.channels), 9 + 2 * 4
+        build_mesh_buffers(surface, np.eye(3), rosy, "smooth", kind.channels), 10 + 2 * 4
     )
-    for texel, value in ((8, 0), (10, 1), (14, 0)):
+    for texel, value in ((9, 0), (11, 1), (15, 0)):
         assert (records[:, texel] == [value, 0, value, 0]).all()
 
 

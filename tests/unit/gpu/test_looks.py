@@ -30,6 +30,7 @@ from shapes import plane
 from rosy_addon.compositor.flow import NO_DRIFT, Drift
 from rosy_addon.compositor.shading import Light
 from rosy_addon.compositor.target_tone import ReferenceRender
+from rosy_addon.field.frames import normalize
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.surface_tone import SurfaceTone
@@ -120,11 +121,28 @@ def test_looks(card, name):
     assert_parity(card, [ball(degree)], look=look, drift=drift)
 
 
+def test_a_constant_magnitude_has_one_color(card):
+    """Also around singularities, where directions cancel."""
+    field = RosyField(4, normalize(smooth_field(BALL, 4).vectors))
+    look = replace(LOOK, hue="magnitude", gain=0.0)
+    rgba = card_rgba(card, [shown(BALL, field)], look)
+    color = rgba[rgba[..., 3] == 1][:, :3]
+    assert len(color) > 1000 and np.ptp(color, axis=0).max() < 0.005
+
+
 UNDEFINED_LOOKS = {
     "soft": {},
     "hatched": HATCH,
     "hatched, all effects": LOOKS["hatched, all effects"],
     "drifting, hatched": DRIFTING | HATCH | {"fade": "ends"},
+    "magnitude, left out": {"hue": "magnitude"},
+    "families, left out": {"hue": "families", "undefined": "hidden"},
+    "paper": {"undefined": "paper"},
+    "magnitude, paper": {"hue": "magnitude", "undefined": "paper"},
+    "magnitude, texture": {"hue": "magnitude", "undefined": "texture"},
+    "hatched, left out": HATCH | {"undefined": "hidden"},
+    "hatched, paper": HATCH | {"undefined": "paper"},
+    "even, paper": EVEN | UNEVEN | {"undefined": "paper"},
 }
 
 
@@ -138,7 +156,9 @@ def test_where_the_field_is_undefined(card, name):
     assert_parity(card, [shown(BALL, field)], look=look, drift=drift)
 
 
-@pytest.mark.parametrize("look_settings", [{}, BOTH, {"hue": "families"}], ids=str)
+@pytest.mark.parametrize(
+    "look_settings", [{}, BOTH | {"undefined": "paper"}, {"hue": "families"}], ids=str
+)
 def test_a_field_that_is_undefined_everywhere(card, look_settings):
     field = RosyField(4, np.zeros((BALL.face_count, 3)))
     rgba = card_rgba(card, [shown(BALL, field)], replace(LOOK, **look_settings))

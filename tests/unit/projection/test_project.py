@@ -82,12 +82,14 @@ def explicit_values(surface, field, gbuffer, chosen, linear):
     previous_corner = np.argsort(surface.next_corner)
     to_next = normalize(points[surface.next_corner] - points)
     angle = np.arccos(dot(to_next, normalize(points[previous_corner] - points)))
-    at_corner = np.zeros((len(angle), 3))
+    at_corner, length = np.zeros((len(angle), 3)), np.zeros(len(angle))
     for corner in range(len(angle)):
         fan = np.flatnonzero(surface.corner_fan == surface.corner_fan[corner])
         faces_of_fan, normal = surface.corner_face[fan], corner_normal[corner]
         transported = [transport(vectors[f], faces[f], normal) for f in faces_of_fan]
         z = np.array([representation(vector, normal, degree) for vector in transported])
+        # Lengths have means of their own: directions that differ do not shorten them.
+        length[corner] = (field.magnitude[faces_of_fan] * angle[fan]).sum() / angle[fan].sum()
         at_corner[corner] = member((z * angle[fan]).sum() / angle[fan].sum(), normal, degree)
     values = []
     for pixel in chosen:
@@ -102,7 +104,7 @@ def explicit_values(surface, field, gbuffer, chosen, linear):
         member_in_view = transport(direction, side * normal, eye)
         x, y = view_frame(eye)
         angle_in_view = np.arctan2(dot(member_in_view, y), dot(member_in_view, x))
-        values.append(np.abs(z) * np.exp(1j * degree * angle_in_view))
+        values.append(weights @ length[corners] * np.exp(1j * degree * angle_in_view))
     return np.array(values)
 
 

@@ -1,0 +1,41 @@
+"""Find faces that lie on others, such as the second side of a two-sided sheet."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..core.errors import counted
+
+
+def copied_faces(
+    vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray
+) -> np.ndarray:
+    """Return (F,) bool: which faces have their corners at the same positions as an earlier face, in any order."""
+    # A 64-bit hash of each position: the same positions have the same one, and 0.0 equals -0.0.
+    bits = (np.asarray(vertices, dtype=np.float64) + 0.0).view(np.uint64)
+    key = np.zeros(len(bits), dtype=np.uint64)
+    for column in bits.T:
+        key = _mixed(key ^ column)
+    is_copy = np.ones(len(face_start) - 1, dtype=bool)
+    total = np.add.reduceat(key[corner_vertex], face_start[:-1])
+    is_copy[np.unique(total, return_index=True)[1]] = False
+    return is_copy
+
+
+def copies_note(name: str, *polygons: np.ndarray) -> str:
+    """Return a note about `copied_faces` of the mesh with this name; an empty string if there are none."""
+    is_copy = copied_faces(*polygons)
+    if not is_copy.any():
+        return ""
+    return (
+        f"{name}: {counted(int(is_copy.sum()), 'face')} of {len(is_copy):,} lie on others with the same corners, "
+        "so singularities there are false and lines are drawn twice"
+    )
+
+
+def _mixed(key: np.ndarray) -> np.ndarray:
+    """Return a hash of uint64 numbers: the finalizer of SplitMix64 (Steele et al., OOPSLA 2014)."""
+    key = key + np.uint64(0x9E3779B97F4A7C15)
+    key = (key ^ key >> np.uint64(30)) * np.uint64(0xBF58476D1CE4E5B9)
+    key = (key ^ key >> np.uint64(27)) * np.uint64(0x94D049BB133111EB)
+    return key ^ key >> np.uint64(31)

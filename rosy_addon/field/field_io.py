@@ -16,8 +16,10 @@ from ..core.progress import progress, report
 from .blocks import row_blocks
 from .closest_point import closest_triangles
 from .directional_field import field_directions, tensor_field, with_opposites
+from .formats.crosses import read_crossfield, read_vcg_frames
+from .formats.dmat import read_dmat
 from .formats.fieldgen import fieldgen_text, read_fieldgen
-from .formats.plain import npy_bytes, read_npy, read_text
+from .formats.plain import npy_bytes, read_npy, read_npz, read_text
 from .formats.polygons import RawField
 from .formats.rosy_rawfield import rawfield_text, read_rawfield, read_rosy, rosy_text
 from .formats.sings import SINGULARITY_SUFFIXES, sings_text
@@ -44,7 +46,13 @@ _READERS: dict[str, Callable[[Path], RawField]] = {
     ".obj": read_fieldgen,
     ".txt": read_text,
     ".vec": read_text,
+    ".csv": read_text,
     ".npy": read_npy,
+    ".npz": read_npz,
+    ".dmat": read_dmat,
+    ".crossfield": read_crossfield,
+    ".ffield": read_vcg_frames,
+    ".vfield": read_vcg_frames,
 }
 READ_SUFFIXES = tuple(_READERS)
 WRITE_SUFFIXES = (".rosy", ".rawfield", ".obj", ".txt", ".npy", *SINGULARITY_SUFFIXES)
@@ -78,15 +86,19 @@ def load_field(
 ) -> LoadedField:
     """Read a field from a file and fit it to a mesh.
 
-    ============  ==================================================================
+    ============= ==================================================================
     `.rosy`       row count, degree N (or none), then rows x y z with one member vector each
     `.rawfield`   N, row count, then rows of all N directions, which need not be a RoSy
     `.obj`        a mesh with the field in comments, as written by the program fieldgen
-    `.txt .vec`   rows of 3 numbers (one member vector), 3 N numbers (all N
-                  directions), 6 numbers (two directions that are nowhere opposite: the
+    `.txt` `.vec` rows of 3 numbers (one member vector), 3 N numbers (all N
+    `.csv`        directions), 6 numbers (two directions that are nowhere opposite: the
                   lines of a cross), or 9 numbers (a symmetric 3 x 3 tensor)
     `.npy`        the same data as an array: (n, 3), (n, 3 N), (n, N, 3) or (n, 3, 3)
-    ============  ==================================================================
+    `.npz`        the same as one of several arrays; see `formats.plain.read_npz`
+    `.dmat`       the same as a matrix of libigl
+    `.crossfield` crosses of libigl: a flag and two directions in each row
+    `.ffield`     frames of VCG on faces (`.vfield`: on vertices): two scales, two directions
+    ============= ==================================================================
 
     Numbers are separated by white space. There is a row for each face, or for each vertex. Values at
     vertices are averaged onto the faces. Tensors must be on faces.

@@ -246,9 +246,10 @@ def from_array(
     Parameters
     ----------
     surface : Surface
-        From a file of a simulation, from the mesh of another library, or from a ``.ply`` file.
+        From a file of a simulation, from the mesh of another library, or from a ``.ply`` file. There, three
+        properties such as ``wind_x``, ``wind_y`` and ``wind_z`` are the array of vectors "wind".
     name : str, optional
-        Name of the array. If the vertices and the faces both have an array NAME, "point:NAME" is the array
+        Name of the array; not needed for files that `Field.save` wrote. If the vertices and the faces both have an array NAME, "point:NAME" is the array
         of the vertices, and "cell:NAME" the array of the faces. By default, the only array that can be a
         field is used: floating-point numbers that are not normals.
     degree : int, optional
@@ -285,7 +286,8 @@ def read_field(
     Parameters
     ----------
     path : path-like
-        ``.rosy``, ``.rawfield``, ``.obj`` (of fieldgen), ``.txt`` or ``.npy``.
+        ``.rosy``, ``.rawfield``, ``.obj`` (of fieldgen), ``.txt``, ``.vec``, ``.csv``, ``.npy``, ``.npz``,
+        ``.dmat``, ``.crossfield``, ``.ffield`` or ``.vfield``.
     surface : Surface
     degree : int, optional
         The required degree. By default, any degree is accepted. A file that states no degree has degree 4.

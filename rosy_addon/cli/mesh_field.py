@@ -90,8 +90,8 @@ def _add_simulation_options(parser: CommandParser) -> None:
     suffixes = ", ".join(SIMULATION_READERS)
     parser.epilog = f"MESH may also be the file of a simulation: {suffixes}."
     text = (
-        "array of the file of a simulation that is the field; by default the only one of vectors or "
-        "tensors"
+        "array of the file of a simulation that is the field, by default the only one of vectors or "
+        "tensors; or the vectors NAME_x, NAME_y, NAME_z of a .ply file"
     )
     parser.add_value("--array", "NAME", text)
     text = "step of the file of a simulation, from 1; by default the last one"
@@ -109,11 +109,15 @@ def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
     is_simulation = options.mesh.suffix.lower() in SIMULATION_READERS
     names = ("field", "generate", "strokes", "guides", "singularities")
     has_source = options.uv or any(getattr(options, name) is not None for name in names)
-    for name in ("array", "step"):
-        if getattr(options, name) is not None and not is_simulation:
-            raise RosyError(
-                f"{options.mesh}: --{name} applies only to files of simulations, such as .vtu"
-            )
+    is_ply = options.mesh.suffix.lower() == ".ply"
+    if options.array is not None and not (is_simulation or is_ply):
+        raise RosyError(
+            f"{options.mesh}: --array applies only to .ply files and files of simulations"
+        )
+    if options.step is not None and not is_simulation:
+        raise RosyError(
+            f"{options.mesh}: --step applies only to files of simulations, such as .vtu"
+        )
     if options.array is not None and has_source:
         raise RosyError(f"{options.mesh}: give either --array, or a field file or --generate")
     up = getattr(options, "up", None)
@@ -122,7 +126,7 @@ def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
     )
     if options.field is not None:
         field = read_field(options, options.field, surface, options.degree)
-    elif is_simulation and not has_source:
+    elif (is_simulation and not has_source) or options.array is not None:
         field = api.from_array(surface, options.array, options.degree, nonfinite=options.nonfinite)
     else:
         field = _generate_field(options, surface)

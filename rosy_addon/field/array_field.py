@@ -13,6 +13,7 @@ from ..core.errors import RosyError, RosyWarning
 from ..core.progress import progress, report
 from .blocks import as_float64
 from .field_io import field_from_raw
+from .formats.mesh_with_field import DIRECTION
 from .formats.polygons import RawField
 from .frames import dot
 from .polygon_arrays import mean_per_face
@@ -174,7 +175,7 @@ def array_field(
     degree: int | None = None,
     nonfinite: str = "error",
 ) -> RosyField:
-    """Make a field from one of the arrays of a surface.
+    """Make a field from one of the arrays of a surface, or from the directions in a file that RoSy wrote.
 
     The number of values at each vertex or face determines what they mean:
 
@@ -197,7 +198,8 @@ def array_field(
     ----------
     arrays : SurfaceArrays
     name : str, optional
-        See `find_array`.
+        See `find_array`. If not given, and the faces have arrays direction_1 to direction_N, these are the N
+        directions.
     degree : int, optional
         The degree N. If not given, it is `VECTOR_DEGREE` for member vectors. Tensors have degree 4.
     nonfinite : {"error", "zero"}
@@ -216,6 +218,13 @@ def array_field(
         symmetric: use a symmetric tensor made from it, such as the rate of strain.
     """
     surface = arrays.surface
+    if name is None and (rows := _stored_directions(arrays)) is not None:
+        raw = RawField(rows, rows.shape[1], domain="face")
+        if degree not in (None, raw.degree):
+            raise RosyError(
+                f"{arrays.name}: stores a field of degree {raw.degree}, but degree {degree} was requested"
+            )
+        return field_from_raw(raw, surface, degree, arrays.name, nonfinite)
     found = find_array(arrays, name)
     source = f"{arrays.name}: array '{found.name}'"
     if not _can_be_field(arrays, found.columns):
@@ -249,6 +258,19 @@ def array_field(
             raw = replace(raw, values=tangential[:, None], domain="face")
     with progress(0.5, 1.0):
         return field_from_raw(raw, surface, degree, source, nonfinite)
+
+
+def _stored_directions(arrays: SurfaceArrays) -> np.ndarray | None:
+    """Return the (F, N, 3) directions of a file that RoSy wrote, whose arrays are called direction_1 ... N.
+
+    The result is None if there are no such arrays.
+    """
+    rows: list[np.ndarray] = []
+    while (values := arrays.face_data.get(f"{DIRECTION}{len(rows) + 1}")) is not None:
+        rows.append(as_float64(np.asarray(values)))
+        if rows[-1].shape != (arrays.surface.face_count, 3):
+            return None
+    return np.stack(rows, axis=1) if 0 < len(rows) <= MAX_DEGREE else None
 
 
 def _raw_field(array: FieldArray, source: str) -> RawField:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -10,15 +11,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.errors import RosyError, counted
+from ..core.errors import RosyError, RosyWarning, counted
 from ..core.file_io import check_parsing_memory, write_bytes
 from ..core.progress import progress, report
+from .analysis import angle_errors
 from .blocks import row_blocks
 from .closest_point import closest_triangles
-from .directional_field import field_directions, tensor_field, with_opposites
+from .directional_field import ANGLE_TOLERANCE_DEG, field_directions, tensor_field, with_opposites
 from .formats.crosses import read_crossfield, read_vcg_frames
 from .formats.dmat import read_dmat
-from .formats.fieldgen import fieldgen_text, read_fieldgen
+from .formats.fieldgen import fieldgen_text, read_fieldgen, vertex_members
+from .formats.mesh_with_field import npz_bytes, ply_bytes, vtk_bytes
 from .formats.plain import npy_bytes, read_npy, read_npz, read_text
 from .formats.polygons import RawField
 from .formats.rosy_rawfield import rawfield_text, read_rawfield, read_rosy, rosy_text
@@ -55,7 +58,10 @@ _READERS: dict[str, Callable[[Path], RawField]] = {
     ".vfield": read_vcg_frames,
 }
 READ_SUFFIXES = tuple(_READERS)
-WRITE_SUFFIXES = (".rosy", ".rawfield", ".obj", ".txt", ".npy", *SINGULARITY_SUFFIXES)
+WRITE_SUFFIXES = (
+    *(".rosy", ".rawfield", ".obj", ".txt", ".npy", ".npz", ".vtp", ".vtu", ".ply"),
+    *SINGULARITY_SUFFIXES,
+)
 
 #: Degree of fields from files that do not state a degree, if the caller gives none.
 DEFAULT_DEGREE = 4
@@ -260,12 +266,18 @@ def _source_surface(
 def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface) -> None:
     """Write a field to a file, with one row for each face.
 
-    `.obj` files contain the mesh and one row for each vertex. `.sings` and `.sing` files contain
-    only the singularities of the field.
+    `.obj` files contain the mesh and one row for each vertex. `.vtp`, `.vtu`, `.ply` and `.npz` files contain
+    the mesh, the directions and the numbers of the field. `.sings` and `.sing` files contain only the
+    singularities of the field.
 
     Numbers are written with all digits, so reading the file gives exactly the same float64 values. Only the
     field in an `.obj` file differs, because it is averaged onto the vertices. For a field made from
     directions, the `source_directions` are written if the format stores all directions.
+
+    Warns
+    -----
+    RosyWarning
+        If directions in an `.obj` file deviate from the field by more than `ANGLE_TOLERANCE_DEG`.
 
     Raises
     ------
@@ -278,6 +290,18 @@ def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface
     load_field : Description of the formats.
     """
     write_bytes(path, field_file(path, field, surface))
+    if Path(path).suffix.lower() == ".obj":
+        members = vertex_members(surface, field)
+        stored = validated_field(surface, members, field.degree, str(path), domain="vertex")
+        lost = angle_errors(surface, field, stored)
+        worst = np.degrees(np.nanmax(lost, initial=0.0))
+        if worst > ANGLE_TOLERANCE_DEG:
+            warnings.warn(
+                f"{path}: an .obj file has one direction for each vertex, so directions of faces are off by up "
+                f"to {worst:.0f} degrees, and lengths are 1: .rosy and .rawfield files keep them",
+                RosyWarning,
+                stacklevel=3,
+            )
 
 
 def field_file(path: str | os.PathLike[str], field: RosyField, surface: Surface) -> bytes:
@@ -299,6 +323,12 @@ def field_file(path: str | os.PathLike[str], field: RosyField, surface: Surface)
             "do not form a RoSy: write a .rawfield, .txt or .npy file"
         )
     report(0.0, "writing the file")
+    if suffix == ".npz":
+        return npz_bytes(surface, field)
+    if suffix == ".ply":
+        return ply_bytes(surface, field)
+    if suffix in (".vtp", ".vtu"):
+        return vtk_bytes(surface, field, suffix)
     if suffix == ".rosy":
         return rosy_text(field).encode("ascii")
     if suffix == ".obj":

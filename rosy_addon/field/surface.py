@@ -20,7 +20,7 @@ from ..core.errors import RosyError, counted
 from .blocks import bincount_rows, mask, row_blocks
 from .connectivity import Edges, build_edges, smooth_fans
 from .formats.obj import read_uv
-from .formats.ply import read_vertex_values
+from .formats.ply import read_values
 from .frames import dot, normalize
 from .mesh_arrays import mesh_arrays
 from .mesh_io import SHARP_ANGLE
@@ -210,15 +210,15 @@ class Surface:
         They come from a ``.ply`` file, from the file of a simulation, or from a mesh object of another
         library, such as PyVista.
         """
-        return read_vertex_values(self._path) if self._path.suffix.lower() == ".ply" else {}
+        return read_values(self._path) if self._path.suffix.lower() == ".ply" else {}
 
     @cached_property
     def face_data(self) -> Mapping[str, np.ndarray]:
         """Named arrays with a row for each face.
 
-        They come from the file of a simulation, or from a mesh object of another library, such as PyVista.
+        They come from the same sources as `vertex_data`.
         """
-        return {}
+        return read_values(self._path, "face") if self._path.suffix.lower() == ".ply" else {}
 
     @cached_property
     def edges(self) -> Edges:

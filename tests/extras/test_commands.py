@@ -87,7 +87,7 @@ def test_tone_from_an_array(rosy, files):
         (("b.vtp", "--array", "U"), "b.vtp: there is no array 'U', only '"),
         (("b.vtp", "--array", "height"), "b.vtp: array 'height' has scalars, a field needs vectors"),
         (("b.vtp", "rotation.npy", "--array", "rotation"), "give either --array, or a field file"),
-        (("a.ply", "--array", "rotation"), "a.ply: --array applies only to files of simulations"),
+        (("a.obj", "--array", "rotation"), "a.obj: --array applies only to .ply files and files"),
         (("a.vtp", "--step", 2), "a.vtp: has no step 2, only 1 step"),
         (("none.vtu",), "none.vtu: cannot be read: no such file")
     ],

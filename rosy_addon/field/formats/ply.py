@@ -94,12 +94,14 @@ def _is_index(values: np.ndarray, count: int) -> np.ndarray:
     return in_range & (np.where(in_range, values, 0) % 1 == 0)
 
 
-def read_vertex_values(path: Path) -> dict[str, np.ndarray]:
-    """Read the scalar vertex properties of a .ply file, such as colors, except the position.
+def read_values(path: Path, element: str = "vertex") -> dict[str, np.ndarray]:
+    """Read the scalar properties of the vertices or faces of a .ply file, except the position.
+
+    Three properties NAME_x, NAME_y and NAME_z of floating-point numbers are also a vector NAME.
 
     Returns
     -------
-    dict of str to (V,) float64 ndarray
+    dict of str to (n,) or (n, 3) float64 ndarray
         Values of each property, by its name. Integers are divided by the largest value of their type, so that
         colors range from 0 to 1.
 
@@ -110,12 +112,16 @@ def read_vertex_values(path: Path) -> dict[str, np.ndarray]:
     """
     columns, elements = _read_columns(path)
     values = {}
-    for prop in next((e.properties for e in elements if e.name == "vertex"), []):
+    for prop in next((e.properties for e in elements if e.name == element), []):
         if prop.name in "xyz" or prop.count_type is not None:
             continue
         dtype = np.dtype(prop.type)
         scale = np.iinfo(dtype).max if dtype.kind in "iu" else 1
-        values[prop.name] = columns["vertex"][prop.name].astype(np.float64) / scale
+        values[prop.name] = columns[element][prop.name].astype(np.float64) / scale
+    for name in [name.removesuffix("_x") for name in values if name.endswith("_x")]:
+        axes = [f"{name}_{axis}" for axis in "xyz"]
+        if name not in values and all(axis in values for axis in axes):
+            values[name] = np.stack([values[axis] for axis in axes], axis=1)
     return values
 
 

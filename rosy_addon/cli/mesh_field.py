@@ -127,7 +127,8 @@ def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
     if options.field is not None:
         field = read_field(options, options.field, surface, options.degree)
     elif (is_simulation and not has_source) or options.array is not None:
-        field = api.from_array(surface, options.array, options.degree, nonfinite=options.nonfinite)
+        policies = {"nonfinite": options.nonfinite, "off_surface": options.off_surface}
+        field = api.from_array(surface, options.array, options.degree, **policies)
     else:
         field = _generate_field(options, surface)
     return surface, field
@@ -135,8 +136,8 @@ def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
 
 def read_field(options: Options, path: Path, surface: api.Surface, degree: int | None) -> api.Field:
     """Read a field file, with the options that `add_field_file_options` adds."""
-    keywords = {"nonfinite": options.nonfinite, "mesh": options.field_mesh}
-    return api.read_field(path, surface, degree, **keywords)
+    policies = {"nonfinite": options.nonfinite, "off_surface": options.off_surface}
+    return api.read_field(path, surface, degree, **policies, mesh=options.field_mesh)
 
 
 def _generate_field(options: Options, surface: api.Surface) -> api.Field:

@@ -20,7 +20,14 @@ from .polygon_arrays import mean_per_face
 from .representation import from_representation, to_representation
 from .rosy_field import MAX_DEGREE, RosyField, check_degree
 from .surface import Surface
-from .validate import MAX_OUTLIER_FRACTION, TOLERANCE_DEG, apply_nonfinite_policy, tangent_normals
+from .validate import (
+    MAX_OUTLIER_FRACTION,
+    STRICT,
+    TOLERANCE_DEG,
+    VectorPolicy,
+    apply_nonfinite_policy,
+    tangent_normals,
+)
 
 #: Degree of the field made from an array of vectors, if the caller gives none.
 VECTOR_DEGREE = 1
@@ -173,7 +180,7 @@ def array_field(
     arrays: SurfaceArrays,
     name: str | None = None,
     degree: int | None = None,
-    nonfinite: str = "error",
+    policy: VectorPolicy = STRICT,
 ) -> RosyField:
     """Make a field from one of the arrays of a surface, or from the directions in a file that RoSy wrote.
 
@@ -202,9 +209,9 @@ def array_field(
         directions.
     degree : int, optional
         The degree N. If not given, it is `VECTOR_DEGREE` for member vectors. Tensors have degree 4.
-    nonfinite : {"error", "zero"}
-        What to do if a vector or tensor has a value that is not finite: raise an error, or treat it as
-        undefined.
+    policy : VectorPolicy
+        What to do about values that are not finite, and about vectors off the surface. With "error", member
+        vectors are replaced by their tangential components.
 
     Returns
     -------
@@ -224,7 +231,7 @@ def array_field(
             raise RosyError(
                 f"{arrays.name}: stores a field of degree {raw.degree}, but degree {degree} was requested"
             )
-        return field_from_raw(raw, surface, degree, arrays.name, nonfinite)
+        return field_from_raw(raw, surface, degree, arrays.name, policy)
     found = find_array(arrays, name)
     source = f"{arrays.name}: array '{found.name}'"
     if not _can_be_field(arrays, found.columns):
@@ -247,17 +254,19 @@ def array_field(
         )
     report(0.0, _LABEL)
     if raw.tensors and raw.domain == "vertex":
-        apply_nonfinite_policy(raw.values, source, "vertex", nonfinite)
+        apply_nonfinite_policy(raw.values, source, "vertex", policy.nonfinite)
         means = mean_per_face(raw.values.reshape(-1, 9)[surface.corner_vertex], surface.face_start)
         raw = replace(raw, values=means.reshape(-1, 3, 3), domain="face")
     elif not raw.tensors and raw.values.shape[1] == 1:
         vectors = raw.values[:, 0]
-        apply_nonfinite_policy(vectors, source, raw.domain, nonfinite)
-        tangential = _tangential_on_faces(surface, vectors, raw.domain, degree)
+        apply_nonfinite_policy(vectors, source, raw.domain, policy.nonfinite)
+        tangential = None
+        if policy.off_surface == "error":
+            tangential = _tangential_on_faces(surface, vectors, raw.domain, degree)
         if tangential is not None:
             raw = replace(raw, values=tangential[:, None], domain="face")
     with progress(0.5, 1.0):
-        return field_from_raw(raw, surface, degree, source, nonfinite)
+        return field_from_raw(raw, surface, degree, source, policy)
 
 
 def _stored_directions(arrays: SurfaceArrays) -> np.ndarray | None:

@@ -33,7 +33,14 @@ from .mesh_io import SHARP_ANGLE
 from .rosy_field import RosyField
 from .singularities import find_singularities
 from .surface import Surface, build_surface
-from .validate import apply_nonfinite_policy, checked_domain, validated_directions, validated_field
+from .validate import (
+    STRICT,
+    VectorPolicy,
+    apply_nonfinite_policy,
+    checked_domain,
+    validated_directions,
+    validated_field,
+)
 
 #: A face of the target mesh gets the field of the closest source face only within these limits: the distance
 #: relative to `Surface.extent` of the source, and the angle between the normals in radians.
@@ -87,7 +94,7 @@ def load_field(
     path: str | os.PathLike[str],
     surface: Surface,
     degree: int | None = None,
-    nonfinite: str = "error",
+    policy: VectorPolicy = STRICT,
     mesh: str | os.PathLike[str] | None = None,
 ) -> LoadedField:
     """Read a field from a file and fit it to a mesh.
@@ -117,8 +124,8 @@ def load_field(
     degree : int, optional
         The required degree N; by default any degree. Files with one member vector per row may not state a
         degree. Their field then has this degree, or `DEFAULT_DEGREE`.
-    nonfinite : {"error", "zero"}
-        What to do if a vector is not finite: raise an error, or treat it as undefined.
+    policy : VectorPolicy
+        What to do about vectors that are not finite, or off the surface.
     mesh : path-like, optional
         The mesh file to which the rows of the field belong, if its faces differ from the faces of `surface`,
         for example because one of the meshes was triangulated or reordered. The field is then transferred by
@@ -151,9 +158,9 @@ def load_field(
         source_surface = _source_surface(path, raw, surface, mesh)
     if source_surface is None:
         with progress(0.6, 1.0):
-            return LoadedField(field_from_raw(raw, surface, degree, str(path), nonfinite), note)
+            return LoadedField(field_from_raw(raw, surface, degree, str(path), policy), note)
     with progress(0.6, 0.7):
-        field = field_from_raw(raw, source_surface, degree, str(path), nonfinite)
+        field = field_from_raw(raw, source_surface, degree, str(path), policy)
     with progress(0.7, 1.0):
         field = transfer_field(source_surface, field, surface, str(path))
     transferred = (
@@ -188,7 +195,7 @@ def _with_degree(raw: RawField, path: Path, degree: int | None) -> tuple[RawFiel
 
 
 def field_from_raw(
-    raw: RawField, surface: Surface, degree: int | None, source: str, nonfinite: str
+    raw: RawField, surface: Surface, degree: int | None, source: str, policy: VectorPolicy
 ) -> RosyField:
     """Make a field from the unchecked rows of a file, on the surface to which the rows belong.
 
@@ -201,8 +208,8 @@ def field_from_raw(
         None.
     source : str
         Name of the file, for messages.
-    nonfinite : {"error", "zero"}
-        What to do if a vector is not finite: raise an error, or treat it as undefined.
+    policy : VectorPolicy
+        What to do about vectors that are not finite, or off the surface.
 
     Raises
     ------
@@ -216,12 +223,12 @@ def field_from_raw(
             raise RosyError(
                 f"{source}: contains tensors on vertices; only tensors on faces are supported"
             )
-        apply_nonfinite_policy(values, source, "face", nonfinite)
+        apply_nonfinite_policy(values, source, "face", policy.nonfinite)
         return tensor_field(surface, values)
     if raw.degree is None or values.shape[1] == 1:
         known_degree = raw.degree or degree or DEFAULT_DEGREE
-        return validated_field(surface, values[:, 0], known_degree, source, nonfinite, raw.domain)
-    return validated_directions(surface, values, source, nonfinite, raw.domain)
+        return validated_field(surface, values[:, 0], known_degree, source, policy, raw.domain)
+    return validated_directions(surface, values, source, policy, raw.domain)
 
 
 def _check_header(raw: RawField, surface: Surface, source: str) -> None:

@@ -77,6 +77,11 @@ def _add_generator_options(parser: CommandParser) -> None:
         "guides that are combed in Blender"
     )
     parser.add_switch("--firmness", text)
+    text = (
+        "edges that a field of --generate features or guided follows: a .sharp file of QuadWild, or a .feature "
+        "file of TriCrossField"
+    )
+    parser.add_value("--edges", "FILE", text, Path)
     text = "singular vertices and their indices, for --generate prescribed"
     parser.add_value("--singularities", "FILE.sings", text, Path)
     parser.add_switch("--uv", "make a guided field follow the UV map of an .obj file")
@@ -107,7 +112,7 @@ def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
     if options.field is not None and options.generate is not None:
         raise RosyError(f"{options.field}: give either a field file or --generate, not both")
     is_simulation = options.mesh.suffix.lower() in SIMULATION_READERS
-    names = ("field", "generate", "strokes", "guides", "singularities")
+    names = ("field", "generate", "strokes", "guides", "singularities", "edges")
     has_source = options.uv or any(getattr(options, name) is not None for name in names)
     is_ply = options.mesh.suffix.lower() == ".ply"
     if options.array is not None and not (is_simulation or is_ply):
@@ -144,6 +149,8 @@ def _generate_field(options: Options, surface: api.Surface) -> api.Field:
     """Generate a field of the kind that the options name."""
     has_guides = options.strokes is not None or options.guides is not None
     kind = options.generate or ("guided" if has_guides else "form")
+    if options.edges is not None and options.generate is None and not has_guides:
+        kind = "features"
     if options.singularities is not None and options.generate is None:
         kind = "prescribed"
     names = {"degree", *options_of(kind)}
@@ -154,6 +161,12 @@ def _generate_field(options: Options, surface: api.Surface) -> api.Field:
         if options.singularities is None:
             raise RosyError(f"{options.mesh}: give the singularities: --singularities FILE.sings")
         arguments["singularities"] = options.singularities
+    if options.edges is not None:
+        if kind not in ("features", "guided"):
+            raise RosyError(
+                f"{options.edges}: --edges applies only to --generate features and guided"
+            )
+        arguments["edges"] = options.edges
     if kind == "guided":
         arguments |= {"uv": options.uv, "vectors_have_firmness": options.firmness}
         if options.strokes is not None:

@@ -28,12 +28,14 @@ from .gmsh_file import is_gmsh_4, read_gmsh
 from .vtk_surface import surface_arrays
 
 #: Suffixes of files that VTK reads. Files of the second and third format may hold several time steps.
-VTK_SUFFIXES = (".vtk", ".vtu", ".vtp", ".vts", ".vtr", ".vti", ".vtm", ".pvtu", ".pvtp")
+VTK_SUFFIXES = (
+    ".vtk", ".vtu", ".vtp", ".vts", ".vtr", ".vti", ".vtm", ".pvtu", ".pvtp", ".glb", ".gltf"
+)  # fmt: skip
 XDMF_SUFFIXES = (".xdmf", ".xmf")
 EXODUS_SUFFIXES = (".exo", ".ex2", ".e", ".g")
 
 #: Suffixes of files that meshio reads. VTK also reads .inp files, but these have another format.
-MESHIO_SUFFIXES = (".msh", ".med", ".inp")
+MESHIO_SUFFIXES = (".msh", ".med", ".inp", ".mesh")
 
 #: Suffixes of files that list the files of a series.
 SERIES_SUFFIXES = (".pvd", ".series")
@@ -109,6 +111,8 @@ def read_simulation(path: str | os.PathLike[str], step: int | None = None) -> Me
     ``.msh``                            Gmsh
     ``.med``                            Salome
     ``.inp``                            Abaqus, the mesh only
+    ``.mesh``                           Medit
+    ``.glb .gltf``                      glTF, the meshes of all nodes
     ``.pvd .series``                    lists of files, one for each step
     ==================================  =======================================================
 

@@ -11,4 +11,4 @@ UP_AXIS_MATRIX = {
 }
 
 #: The upward axis of mesh files by file suffix. Blender's importers assume the same axes.
-UP_AXIS_BY_SUFFIX = {".obj": "y", ".off": "y", ".ply": "z", ".stl": "z"}
+UP_AXIS_BY_SUFFIX = {".obj": "y", ".off": "y", ".ply": "z", ".stl": "z", ".glb": "y", ".gltf": "y"}

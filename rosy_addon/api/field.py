@@ -314,7 +314,7 @@ def read_field(
     ----------
     path : path-like
         ``.rosy``, ``.rawfield``, ``.obj`` (of fieldgen), ``.txt``, ``.vec``, ``.csv``, ``.npy``, ``.npz``,
-        ``.dmat``, ``.crossfield``, ``.ffield`` or ``.vfield``.
+        ``.dmat``, ``.crossfield``, ``.ffield``, ``.vfield`` or ``.om``.
     surface : Surface
     degree : int, optional
         The required degree. By default, any degree is accepted. A file that states no degree has degree 4.

@@ -139,7 +139,7 @@ class CommandParser(argparse.ArgumentParser):
             "0,90 from above"
         )
         self.add_value("--view", "AZ,EL", text, float_tuple(2, "AZ,EL"), default=DEFAULT_VIEW)
-        text = "upward axis of the file; by default y for .obj and .off, otherwise z"
+        text = "upward axis of the file; by default y for .obj, .off, .om and glTF, otherwise z"
         self.add_argument("--up", choices=list(UP_AXIS_MATRIX), help=text)
         text = "orthographic projection, or with --no-ortho perspective"
         self.add_toggle("--ortho", text, dest="orthographic")

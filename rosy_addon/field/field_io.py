@@ -22,6 +22,7 @@ from .formats.crosses import read_crossfield, read_vcg_frames
 from .formats.dmat import read_dmat
 from .formats.fieldgen import fieldgen_text, read_fieldgen, vertex_members
 from .formats.mesh_with_field import npz_bytes, ply_bytes, vtk_bytes
+from .formats.openmesh import read_om
 from .formats.plain import npy_bytes, read_npy, read_npz, read_text
 from .formats.polygons import RawField
 from .formats.rosy_rawfield import rawfield_text, read_rawfield, read_rosy, rosy_text
@@ -63,6 +64,7 @@ _READERS: dict[str, Callable[[Path], RawField]] = {
     ".crossfield": read_crossfield,
     ".ffield": read_vcg_frames,
     ".vfield": read_vcg_frames,
+    ".om": read_om,
 }
 READ_SUFFIXES = tuple(_READERS)
 WRITE_SUFFIXES = (
@@ -111,6 +113,7 @@ def load_field(
     `.dmat`       the same as a matrix of libigl
     `.crossfield` crosses of libigl: a flag and two directions in each row
     `.ffield`     frames of VCG on faces (`.vfield`: on vertices): two scales, two directions
+    `.om`         a mesh of OpenMesh with vectors on its faces, such as dir_u and dir_v
     ============= ==================================================================
 
     Numbers are separated by white space. There is a row for each face, or for each vertex. Values at

@@ -57,7 +57,7 @@ class Surface:
     ----------
     vertices : (V, 3) array_like, path-like or mesh
         Positions of the vertices; (V, 2) for a flat mesh. If `faces` is not given: the path of a file
-        (``.obj``, ``.off``, ``.ply``, ``.stl``, or a file of a simulation, such as ``.vtu``), or a mesh
+        (``.obj``, ``.off``, ``.ply``, ``.stl``, ``.om``, or a file of a simulation, such as ``.vtu``), or a mesh
         object of meshio, PyVista, trimesh (or a scene of trimesh) or Open3D.
     faces : (F, k) array_like of int, or sequence of sequences of int, optional
         Vertices of each face, counter-clockwise about the outward normal.

@@ -106,7 +106,7 @@ def test_the_extension_has_none_of_it(files, capfd, monkeypatch):
     for words, message in (
         (("render", "a.ply", "--array", "x", "-o", "a.png"), "unrecognized arguments: --array"),
         (("film", "a.vtu", "-o", "a.gif"), "invalid choice: 'film'"),
-        (("render", "a.vtu", "-o", "a.png"), "must end in .obj, .off, .ply or .stl\n"),
+        (("render", "a.vtu", "-o", "a.png"), "must end in .obj, .off, .ply, .stl or .om\n"),
     ):
         assert cli_main([str(word) for word in words]) == 2
         assert message in capfd.readouterr().err

@@ -74,6 +74,9 @@ def read_ply(path: Path) -> Polygons:
         raise RosyError(f"{path}: the vertices have no property {missing}") from None
     face = columns.get("face", {})
     corner_list = next((face[name] for name in _CORNER_PROPERTIES if name in face), None)
+    strips = columns.get("tristrips", {}).get("vertex_indices")
+    if corner_list is None and isinstance(strips, tuple):
+        corner_list = _strip_triangles(*strips)
     if not isinstance(corner_list, tuple):
         raise RosyError(f"{path}: the mesh has no faces")
     corner_vertex, face_start = corner_list
@@ -86,6 +89,25 @@ def read_ply(path: Path) -> Polygons:
             f"but the vertices are numbered 0 to {len(vertices) - 1}"
         )
     return Polygons(as_float64(vertices), corner_vertex.astype(np.int64), face_start)
+
+
+def _strip_triangles(vertices: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the triangles of strips, as the vertices of their corners and the first corner of each.
+
+    A strip ends at the end of a list and at -1. Every other triangle is clockwise. Triangles that have a vertex
+    twice, which turn a strip, are left out.
+    """
+    vertices = np.insert(vertices.astype(np.float64), starts[1:-1], -1)
+    is_end = vertices == -1
+    rank = np.arange(len(vertices))
+    rank -= np.maximum.accumulate(np.where(is_end, rank + 1, 0))
+    count = max(len(vertices) - 2, 0)
+    triangles = np.stack([vertices[k : k + count] for k in range(3)], axis=1)
+    is_odd = rank[:count] % 2 == 1
+    triangles[is_odd] = triangles[is_odd][:, [1, 0, 2]]
+    a, b, c = triangles.T
+    triangles = triangles[(a != b) & (b != c) & (c != a) & (triangles != -1).all(axis=1)]
+    return triangles.ravel(), np.arange(len(triangles) + 1) * 3
 
 
 def _is_index(values: np.ndarray, count: int) -> np.ndarray:

@@ -13,38 +13,20 @@ import numpy as np
 from ..core.errors import RosyError
 from ..core.file_io import read_bytes
 
-#: For each of Gmsh's types of faces and volumes: the type of the linear cell of the same shape in VTK, the
-#: number of its corners, which are the first nodes, and the number of all nodes.
+#: The shapes of faces and volumes: the type of the linear cell in VTK, the number of its corners, which are the
+#: first nodes, and for each of Gmsh's types of this shape the number of all nodes.
+_SHAPES = (
+    (5, 3, {2: 3, 9: 6, 20: 9, 21: 10, 22: 12, 23: 15, 24: 15, 25: 21}),
+    (9, 4, {3: 4, 10: 9, 16: 8, 36: 16, 37: 25, 39: 12, 40: 16}),
+    (10, 4, {4: 4, 11: 10, 29: 20, 30: 35, 31: 56, 32: 22, 137: 16}),
+    (12, 8, {5: 8, 12: 27, 17: 20, 92: 64, 93: 125, 99: 32, 100: 44}),
+    (13, 6, {6: 6, 13: 18, 18: 15, 90: 40, 91: 75}),
+    (14, 5, {7: 5, 14: 14, 19: 13, 118: 30, 119: 55, 125: 21, 126: 29}),
+)
 _CELLS = {
-    2: (5, 3, 3),
-    9: (5, 3, 6),
-    20: (5, 3, 9),
-    21: (5, 3, 10),
-    22: (5, 3, 12),
-    23: (5, 3, 15),
-    24: (5, 3, 15),
-    25: (5, 3, 21),
-    3: (9, 4, 4),
-    10: (9, 4, 9),
-    16: (9, 4, 8),
-    36: (9, 4, 16),
-    37: (9, 4, 25),
-    4: (10, 4, 4),
-    11: (10, 4, 10),
-    29: (10, 4, 20),
-    30: (10, 4, 35),
-    31: (10, 4, 56),
-    5: (12, 8, 8),
-    12: (12, 8, 27),
-    17: (12, 8, 20),
-    92: (12, 8, 64),
-    93: (12, 8, 125),
-    6: (13, 6, 6),
-    13: (13, 6, 18),
-    18: (13, 6, 15),
-    7: (14, 5, 5),
-    14: (14, 5, 14),
-    19: (14, 5, 13),
+    kind: (cell_type, corners, nodes)
+    for cell_type, corners, kinds in _SHAPES
+    for kind, nodes in kinds.items()
 }
 
 #: Numbers of nodes of points and lines, which are left out.

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import rosy_addon as rf
+from rosy_addon.external.gmsh_file import _CELLS
 
 gmsh = pytest.importorskip("gmsh")
 
@@ -80,6 +81,22 @@ def test_numbers_of_some_nodes(binary, model, tmp_path):
     read = surface.vertex_data["wind"].ravel()
     assert np.count_nonzero(np.isfinite(read)) == 100
     assert np.nanmax(np.abs(read - surface.vertices[:, 2])) < 1e-12
+
+
+def test_shapes_of_elements(model):
+    """The table of numbers of nodes is Gmsh's own, for all shapes up to order 4."""
+    shapes = {"Triangle": 5, "Quadrilateral": 9, "Tetrahedron": 10}
+    shapes |= {"Hexahedron": 12, "Prism": 13, "Pyramid": 14}
+    found = 0
+    for kind in range(1, 141):
+        try:
+            name, dimension, order, nodes, _, corners = model.mesh.getElementProperties(kind)
+        except Exception:  # Gmsh has no such type
+            continue
+        if dimension >= 2 and 1 <= order <= 4 and nodes:
+            assert _CELLS[kind] == (shapes[name.split()[0]], corners, nodes)
+            found += 1
+    assert found > 30
 
 
 @pytest.mark.parametrize("binary", [0, 1])

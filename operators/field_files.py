@@ -108,7 +108,14 @@ FIELD_FORMATS = {
     ".rawfield": ("Raw Field", "One row per face with all directions, for Directional"),
     ".txt": ("Text", "One row per face with all directions, without a header"),
     ".npy": ("NumPy", "An array with one row per face with all directions"),
-    ".obj": ("Fieldgen OBJ", "The mesh, with one direction per vertex, as written by fieldgen"),
+    ".npz": ("NumPy Archive", "The mesh, all directions, magnitudes and singularities"),
+    ".vtp": ("VTK PolyData", "The mesh with all directions, magnitudes and indices, for ParaView"),
+    ".vtu": ("VTK Grid", "The same as an unstructured grid"),
+    ".ply": ("PLY", "The same as properties of faces and vertices"),
+    ".obj": (
+        "Fieldgen OBJ",
+        "The mesh, with one direction per vertex, as written by fieldgen; directions of faces are not kept exactly",
+    ),
     ".sings": ("Singularities", "Singular vertices and their indices, for Directional"),
 }
 

@@ -11,6 +11,7 @@ from shapes import from_triangles, icosphere
 
 import rosy_addon as rf
 from rosy_addon.core.errors import RosyWarning
+from rosy_addon.extras.command_line import main
 from rosy_addon.field.directional_field import field_directions
 from rosy_addon.field.field_io import write_field
 from rosy_addon.field.generate import axis_field
@@ -63,7 +64,7 @@ def test_the_numbers_in_an_archive(tmp_path):
         assert arrays["singular_indices"].sum() == 4
 
 
-def test_vectors_of_a_ply_file(tmp_path):
+def test_vectors_of_a_ply_file(tmp_path, capfd):
     """Three properties are a vector, of vertices too."""
     (tmp_path / "a.ply").write_text(
         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
@@ -73,6 +74,8 @@ def test_vectors_of_a_ply_file(tmp_path):
     )
     surface = rf.Surface(tmp_path / "a.ply")
     assert surface.face_data == {"u_x": [5]}
+    assert main(["info", str(tmp_path / "a.ply"), "--array", "wind", "--degree", "2"]) == 0
+    assert capfd.readouterr().out.startswith("degree 2\n")
     field = rf.from_array(surface, "wind")
     assert field.degree == 1 and field.vectors == pytest.approx(np.array([[1.0, 2.0, 0.0]]))
 

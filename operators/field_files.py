@@ -14,6 +14,7 @@ from ..rosy_addon.core.file_io import check_writable, write_bytes
 from ..rosy_addon.field.directional_field import field_directions
 from ..rosy_addon.field.field_io import READ_SUFFIXES, LoadedField, field_file, load_field
 from ..rosy_addon.field.rosy_field import MAX_DEGREE, RosyField
+from ..rosy_addon.field.validate import VectorPolicy
 from ..rosy_addon.scene.field_attributes import field_degree
 from ..rosy_addon.scene.guides import read_combed_guides
 from ..rosy_addon.scene.mesh_fields import read_mesh_field
@@ -70,7 +71,7 @@ class ROSY_OT_field_import(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Im
         surface = mesh_surface(mesh)
         mesh_file = bpy.path.abspath(self.mesh_file) if self.mesh_file else None
         path = bpy.path.abspath(self.filepath)
-        inputs = path, surface, self.degree or None, self.undefined
+        inputs = path, surface, self.degree or None, VectorPolicy(self.undefined)
         field, note = yield Call(partial(load_field, mesh=mesh_file), inputs, 0.0, 0.9)
         if field.direction_ratios is not None and field.source_directions is None:
             directions = yield Call(
@@ -107,7 +108,14 @@ FIELD_FORMATS = {
     ".rawfield": ("Raw Field", "One row per face with all directions, for Directional"),
     ".txt": ("Text", "One row per face with all directions, without a header"),
     ".npy": ("NumPy", "An array with one row per face with all directions"),
-    ".obj": ("Fieldgen OBJ", "The mesh, with one direction per vertex, as written by fieldgen"),
+    ".npz": ("NumPy Archive", "The mesh, all directions, magnitudes and singularities"),
+    ".vtp": ("VTK PolyData", "The mesh with all directions, magnitudes and indices, for ParaView"),
+    ".vtu": ("VTK Grid", "The same as an unstructured grid"),
+    ".ply": ("PLY", "The same as properties of faces and vertices"),
+    ".obj": (
+        "Fieldgen OBJ",
+        "The mesh, with one direction per vertex, as written by fieldgen; directions of faces are not kept exactly",
+    ),
     ".sings": ("Singularities", "Singular vertices and their indices, for Directional"),
 }
 

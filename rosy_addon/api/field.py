@@ -16,7 +16,12 @@ from ..field.field_io import HALF_CROSS_NOTE, load_field
 from ..field.mesh_arrays import SIMULATION_READERS
 from ..field.rosy_field import RosyField, check_degree
 from ..field.surface import Surface
-from ..field.validate import apply_nonfinite_policy, validated_directions, validated_field
+from ..field.validate import (
+    VectorPolicy,
+    apply_nonfinite_policy,
+    validated_directions,
+    validated_field,
+)
 
 try:
     from ..external.simulation_files import SUFFIXES, read_simulation
@@ -27,7 +32,12 @@ else:
 
 
 def from_vectors(
-    surface: Surface, vectors: ArrayLike, degree: int, *, nonfinite: str = "error"
+    surface: Surface,
+    vectors: ArrayLike,
+    degree: int,
+    *,
+    nonfinite: str = "error",
+    off_surface: str = "error",
 ) -> Field:
     """Make a field from one member vector for each face or vertex.
 
@@ -44,6 +54,9 @@ def from_vectors(
         N, from 1 to 12: 1 for a vector field, 2 for a line field, 4 for a cross field.
     nonfinite : {"error", "zero"}
         Raise an error if a vector is not finite, or treat it as undefined.
+    off_surface : {"error", "project", "undefined"}
+        What to do about vectors that are more than 5 degrees (at vertices, 20) off the surface: raise an error if
+        they are more than 1 percent, always rotate them into the surface, or treat them as undefined.
 
     Raises
     ------
@@ -59,9 +72,12 @@ def from_vectors(
     >>> wind.degree
     1
     """
-    array = np.asarray(vectors, dtype=np.float64)
+    array, policy = (
+        np.asarray(vectors, dtype=np.float64),
+        VectorPolicy(nonfinite, off_surface).checked(),
+    )
     source = f"{surface.name}: vectors"
-    return Field.of(surface, validated_field(surface, array, degree, source, nonfinite))
+    return Field.of(surface, validated_field(surface, array, degree, source, policy))
 
 
 def from_angles(
@@ -142,6 +158,7 @@ def from_directions(
     degree: int | None = None,
     *,
     nonfinite: str = "error",
+    off_surface: str = "error",
 ) -> Field:
     """Make a field from N directions for each face or vertex. They need not be at equal angles.
 
@@ -156,6 +173,8 @@ def from_directions(
         degree 4, and a `RosyWarning` says so.
     nonfinite : {"error", "zero"}
         Raise an error if a vector is not finite, or treat it as undefined.
+    off_surface : {"error", "project", "undefined"}
+        See `from_vectors`.
 
     Raises
     ------
@@ -176,12 +195,13 @@ def from_directions(
     source = f"{surface.name}: directions"
     if array.ndim != 3 or array.shape[2] != 3:
         raise RosyError(f"{source} must have the shape (F, N, 3), not {array.shape}")
+    policy = VectorPolicy(nonfinite, off_surface).checked()
     given, array = array.shape[1], with_opposites(array, degree)
     if degree is None and array.shape[1] > given:
         warnings.warn(f"{source}: {HALF_CROSS_NOTE}", RosyWarning, stacklevel=2)
     elif degree not in (None, array.shape[1]):
         raise RosyError(f"{source} are {given} for each row, not {degree}")
-    return Field.of(surface, validated_directions(surface, array, source, nonfinite))
+    return Field.of(surface, validated_directions(surface, array, source, policy))
 
 
 def from_tensors(surface: Surface, tensors: ArrayLike, *, nonfinite: str = "error") -> Field:
@@ -216,7 +236,8 @@ def from_tensors(surface: Surface, tensors: ArrayLike, *, nonfinite: str = "erro
     if array.shape != (surface.face_count, 3, 3):
         count = surface.face_count
         raise RosyError(f"{source} must have the shape ({count}, 3, 3), not {array.shape}")
-    apply_nonfinite_policy(array, source, "face", nonfinite)
+    policy = VectorPolicy(nonfinite).checked()
+    apply_nonfinite_policy(array, source, "face", policy.nonfinite)
     return Field.of(surface, tensor_field(surface, array))
 
 
@@ -226,6 +247,7 @@ def from_array(
     degree: int | None = None,
     *,
     nonfinite: str = "error",
+    off_surface: str = "error",
 ) -> Field:
     """Make a field from an array of `Surface.vertex_data` or `Surface.face_data`.
 
@@ -246,15 +268,18 @@ def from_array(
     Parameters
     ----------
     surface : Surface
-        From a file of a simulation, from the mesh of another library, or from a ``.ply`` file.
+        From a file of a simulation, from the mesh of another library, or from a ``.ply`` file. There, three
+        properties such as ``wind_x``, ``wind_y`` and ``wind_z`` are the array of vectors "wind".
     name : str, optional
-        Name of the array. If the vertices and the faces both have an array NAME, "point:NAME" is the array
+        Name of the array; not needed for files that `Field.save` wrote. If the vertices and the faces both have an array NAME, "point:NAME" is the array
         of the vertices, and "cell:NAME" the array of the faces. By default, the only array that can be a
         field is used: floating-point numbers that are not normals.
     degree : int, optional
         N, from 1 to 12; by default 1 for an array of vectors. Tensors have degree 4.
     nonfinite : {"error", "zero"}
         Raise an error if a number is not finite, or treat the vector or tensor as undefined.
+    off_surface : {"error", "project", "undefined"}
+        See `from_vectors`. With "error", arrays of 3 components are replaced by their tangential components.
 
     Raises
     ------
@@ -269,7 +294,9 @@ def from_array(
     >>> stress = rf.from_array(rf.Surface(pyvista.read("beam.vtu")), "stress")  # doctest: +SKIP
     """
     arrays = SurfaceArrays(surface.name, surface, surface.vertex_data, surface.face_data)
-    return Field.of(surface, array_field(arrays, name, degree, nonfinite))
+    return Field.of(
+        surface, array_field(arrays, name, degree, VectorPolicy(nonfinite, off_surface).checked())
+    )
 
 
 def read_field(
@@ -278,6 +305,7 @@ def read_field(
     degree: int | None = None,
     *,
     nonfinite: str = "error",
+    off_surface: str = "error",
     mesh: str | os.PathLike[str] | None = None,
 ) -> Field:
     """Read a field from a file.
@@ -285,12 +313,15 @@ def read_field(
     Parameters
     ----------
     path : path-like
-        ``.rosy``, ``.rawfield``, ``.obj`` (of fieldgen), ``.txt`` or ``.npy``.
+        ``.rosy``, ``.rawfield``, ``.obj`` (of fieldgen), ``.txt``, ``.vec``, ``.csv``, ``.npy``, ``.npz``,
+        ``.dmat``, ``.crossfield``, ``.ffield``, ``.vfield`` or ``.om``.
     surface : Surface
     degree : int, optional
         The required degree. By default, any degree is accepted. A file that states no degree has degree 4.
     nonfinite : {"error", "zero"}
         Raise an error if a vector is not finite, or treat it as undefined.
+    off_surface : {"error", "project", "undefined"}
+        See `from_vectors`.
     mesh : path-like, optional
         The mesh file of the field, if it is another mesh than `surface`. The field is then transferred
         by position.
@@ -313,7 +344,8 @@ def read_field(
     >>> rf.read_field("torus.rosy", torus).degree
     6
     """
-    loaded = load_field(path, surface, degree, nonfinite, mesh=mesh)
+    policy = VectorPolicy(nonfinite, off_surface).checked()
+    loaded = load_field(path, surface, degree, policy, mesh=mesh)
     warn(loaded.note)
     return Field.of(surface, loaded.field)
 

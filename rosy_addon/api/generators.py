@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..core.errors import RosyError, counted
 from ..field.field import Field, check_same_surface
+from ..field.formats.feature_edges import read_edges
 from ..field.formats.sings import read_sings
 from ..field.generate import GeneratorSettings, generate
 from ..field.mesh_checks import orientation_warning
@@ -112,7 +113,7 @@ def features(
     degree: int = 4,
     *,
     sharp_angle: float = np.pi / 6,
-    edges: ArrayLike | None = None,
+    edges: ArrayLike | str | os.PathLike[str] | None = None,
 ) -> Field:
     """Make a field along borders and sharp edges that is smooth between them.
 
@@ -123,8 +124,9 @@ def features(
         N, from 1 to 12.
     sharp_angle : float
         Smallest angle in radians between the normals of the two faces of a sharp edge.
-    edges : (E, 2) array_like of int, optional
-        Pairs of vertices: edges that the field follows instead of borders and sharp edges.
+    edges : (E, 2) array_like of int, or path-like, optional
+        Pairs of vertices: edges that the field follows instead of borders and sharp edges. Or a file of edges:
+        ``.sharp`` of QuadWild, or ``.feature`` of TriCrossField.
 
     Raises
     ------
@@ -139,7 +141,7 @@ def features(
     >>> rf.features(torus, edges=[[0, 1], [1, 2], [2, 3]]).degree
     4
     """
-    followed = None if edges is None else np.asarray(edges)
+    followed = _edge_ends(surface, edges)
     settings = GeneratorSettings("features", sharp_angle=float(sharp_angle), edges=followed)
     return generated(surface, settings, degree)
 
@@ -150,7 +152,7 @@ def guided(
     *,
     strokes: Sequence[ArrayLike] = (),
     vectors: ArrayLike | Field | None = None,
-    edges: ArrayLike | None = None,
+    edges: ArrayLike | str | os.PathLike[str] | None = None,
     uv: bool = False,
     reach: float = 0.0,
     vectors_have_firmness: bool = False,
@@ -168,8 +170,8 @@ def guided(
         Polylines on the surface.
     vectors : (F, 3) array_like or Field, optional
         One vector (a member of the field) for each face, zero where there is no guide.
-    edges : (E, 2) array_like of int, optional
-        Pairs of vertices: edges of the mesh to follow.
+    edges : (E, 2) array_like of int, or path-like, optional
+        Pairs of vertices: edges of the mesh to follow. Or a file of edges, as for `features`.
     uv : bool
         Whether the field also follows the axes of the UV map of the surface.
     reach : float
@@ -196,13 +198,22 @@ def guided(
     settings = GeneratorSettings(
         "guided",
         reach=float(reach),
-        edges=None if edges is None else np.asarray(edges),
+        edges=_edge_ends(surface, edges),
         strokes=[np.asarray(stroke, dtype=np.float64) for stroke in strokes],
         uv=uv_map(surface) if uv else None,
         vectors=_guide_vectors(surface, vectors, degree),
         vectors_have_firmness=vectors_have_firmness,
     )
     return generated(surface, settings, degree)
+
+
+def _edge_ends(
+    surface: Surface, edges: ArrayLike | str | os.PathLike[str] | None
+) -> np.ndarray | None:
+    """Return the argument `edges` of `features` as pairs of vertices, or None if it is None."""
+    if isinstance(edges, (str, os.PathLike)):
+        return read_edges(edges, surface)
+    return None if edges is None else np.asarray(edges)
 
 
 def _guide_vectors(

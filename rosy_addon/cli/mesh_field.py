@@ -77,6 +77,11 @@ def _add_generator_options(parser: CommandParser) -> None:
         "guides that are combed in Blender"
     )
     parser.add_switch("--firmness", text)
+    text = (
+        "edges that a field of --generate features or guided follows: a .sharp file of QuadWild, or a .feature "
+        "file of TriCrossField"
+    )
+    parser.add_value("--edges", "FILE", text, Path)
     text = "singular vertices and their indices, for --generate prescribed"
     parser.add_value("--singularities", "FILE.sings", text, Path)
     parser.add_switch("--uv", "make a guided field follow the UV map of an .obj file")
@@ -90,8 +95,8 @@ def _add_simulation_options(parser: CommandParser) -> None:
     suffixes = ", ".join(SIMULATION_READERS)
     parser.epilog = f"MESH may also be the file of a simulation: {suffixes}."
     text = (
-        "array of the file of a simulation that is the field; by default the only one of vectors or "
-        "tensors"
+        "array of the file of a simulation that is the field, by default the only one of vectors or "
+        "tensors; or the vectors NAME_x, NAME_y, NAME_z of a .ply file"
     )
     parser.add_value("--array", "NAME", text)
     text = "step of the file of a simulation, from 1; by default the last one"
@@ -107,13 +112,17 @@ def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
     if options.field is not None and options.generate is not None:
         raise RosyError(f"{options.field}: give either a field file or --generate, not both")
     is_simulation = options.mesh.suffix.lower() in SIMULATION_READERS
-    names = ("field", "generate", "strokes", "guides", "singularities")
+    names = ("field", "generate", "strokes", "guides", "singularities", "edges")
     has_source = options.uv or any(getattr(options, name) is not None for name in names)
-    for name in ("array", "step"):
-        if getattr(options, name) is not None and not is_simulation:
-            raise RosyError(
-                f"{options.mesh}: --{name} applies only to files of simulations, such as .vtu"
-            )
+    is_ply = options.mesh.suffix.lower() == ".ply"
+    if options.array is not None and not (is_simulation or is_ply):
+        raise RosyError(
+            f"{options.mesh}: --array applies only to .ply files and files of simulations"
+        )
+    if options.step is not None and not is_simulation:
+        raise RosyError(
+            f"{options.mesh}: --step applies only to files of simulations, such as .vtu"
+        )
     if options.array is not None and has_source:
         raise RosyError(f"{options.mesh}: give either --array, or a field file or --generate")
     up = getattr(options, "up", None)
@@ -122,8 +131,9 @@ def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
     )
     if options.field is not None:
         field = read_field(options, options.field, surface, options.degree)
-    elif is_simulation and not has_source:
-        field = api.from_array(surface, options.array, options.degree, nonfinite=options.nonfinite)
+    elif (is_simulation and not has_source) or options.array is not None:
+        policies = {"nonfinite": options.nonfinite, "off_surface": options.off_surface}
+        field = api.from_array(surface, options.array, options.degree, **policies)
     else:
         field = _generate_field(options, surface)
     return surface, field
@@ -131,14 +141,16 @@ def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
 
 def read_field(options: Options, path: Path, surface: api.Surface, degree: int | None) -> api.Field:
     """Read a field file, with the options that `add_field_file_options` adds."""
-    keywords = {"nonfinite": options.nonfinite, "mesh": options.field_mesh}
-    return api.read_field(path, surface, degree, **keywords)
+    policies = {"nonfinite": options.nonfinite, "off_surface": options.off_surface}
+    return api.read_field(path, surface, degree, **policies, mesh=options.field_mesh)
 
 
 def _generate_field(options: Options, surface: api.Surface) -> api.Field:
     """Generate a field of the kind that the options name."""
     has_guides = options.strokes is not None or options.guides is not None
     kind = options.generate or ("guided" if has_guides else "form")
+    if options.edges is not None and options.generate is None and not has_guides:
+        kind = "features"
     if options.singularities is not None and options.generate is None:
         kind = "prescribed"
     names = {"degree", *options_of(kind)}
@@ -149,6 +161,12 @@ def _generate_field(options: Options, surface: api.Surface) -> api.Field:
         if options.singularities is None:
             raise RosyError(f"{options.mesh}: give the singularities: --singularities FILE.sings")
         arguments["singularities"] = options.singularities
+    if options.edges is not None:
+        if kind not in ("features", "guided"):
+            raise RosyError(
+                f"{options.edges}: --edges applies only to --generate features and guided"
+            )
+        arguments["edges"] = options.edges
     if kind == "guided":
         arguments |= {"uv": options.uv, "vectors_have_firmness": options.firmness}
         if options.strokes is not None:

@@ -22,6 +22,7 @@ from ..core.file_io import check_writable
 from ..core.settings import Number, Numbers, Setting, Switch, settings_of
 from ..field.rosy_field import check_degree
 from ..field.up_axis import UP_AXIS_MATRIX
+from ..field.validate import OFF_SURFACE
 from ..preset_files.store import default_user_folder, find_preset_file, preset_keys, read_preset
 from ..projection.camera import check_size
 from .streams import print_line
@@ -150,7 +151,7 @@ class CommandParser(argparse.ArgumentParser):
             "0,90 from above"
         )
         self.add_value("--view", "AZ,EL", text, float_tuple(2, "AZ,EL"), default=DEFAULT_VIEW)
-        text = "upward axis of the file; by default y for .obj and .off, otherwise z"
+        text = "upward axis of the file; by default y for .obj, .off, .om and glTF, otherwise z"
         self.add_argument("--up", choices=list(UP_AXIS_MATRIX), help=text)
         text = "orthographic projection, or with --no-ortho perspective"
         self.add_toggle("--ortho", text, dest="orthographic")
@@ -169,10 +170,18 @@ class CommandParser(argparse.ArgumentParser):
         self.add_value("--degree", "N", text, int, action=_CheckedDegree)
 
     def add_undefined_option(self) -> None:
-        """Add the option --undefined, which sets the argument `nonfinite` of `api.read_field` to "zero"."""
+        """Add the options --undefined and --off-surface: arguments of `api.read_field`.
+
+        --undefined sets `nonfinite` to "zero".
+        """
         text = "treat NaN and infinite vectors as undefined"
         keywords = {"action": "store_const", "const": "zero", "default": "error"}
         self.add_argument("--undefined", dest="nonfinite", help=text, **keywords)
+        text = (
+            "what to do about vectors off the surface: report an error if they are more than 1 in 100, rotate "
+            "them into the surface, or treat them as undefined (%(default)s)"
+        )
+        self.add_argument("--off-surface", choices=OFF_SURFACE, default="error", help=text)
 
     def add_picture_options(self) -> None:
         """Add the options of a picture of a mesh: view, look, values for colors, source of the tone."""

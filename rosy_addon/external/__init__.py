@@ -5,6 +5,7 @@ If the library of a module is missing, a `RosyError` is raised: by the module, o
 
     ffmpeg             encodes .mp4 videos with ffmpeg
     matplotlib_figure  draws figures with matplotlib
+    gmsh_file          reads .msh files of Gmsh, with pyvista
     simulation_files   reads meshes with arrays from files of simulations, with pyvista and meshio
     vtk_surface        extracts the surface of VTK datasets, with pyvista
 """

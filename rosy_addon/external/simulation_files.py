@@ -24,15 +24,18 @@ import numpy as np
 from ..core.errors import RosyError, counted
 from ..core.file_io import check_readable, open_file, read_bytes
 from ..field.mesh_arrays import MeshArrays
+from .gmsh_file import is_gmsh_4, read_gmsh
 from .vtk_surface import surface_arrays
 
 #: Suffixes of files that VTK reads. Files of the second and third format may hold several time steps.
-VTK_SUFFIXES = (".vtk", ".vtu", ".vtp", ".vts", ".vtr", ".vti", ".vtm", ".pvtu", ".pvtp")
+VTK_SUFFIXES = (
+    ".vtk", ".vtu", ".vtp", ".vts", ".vtr", ".vti", ".vtm", ".pvtu", ".pvtp", ".glb", ".gltf"
+)  # fmt: skip
 XDMF_SUFFIXES = (".xdmf", ".xmf")
 EXODUS_SUFFIXES = (".exo", ".ex2", ".e", ".g")
 
 #: Suffixes of files that meshio reads. VTK also reads .inp files, but these have another format.
-MESHIO_SUFFIXES = (".msh", ".med", ".inp")
+MESHIO_SUFFIXES = (".msh", ".med", ".inp", ".mesh")
 
 #: Suffixes of files that list the files of a series.
 SERIES_SUFFIXES = (".pvd", ".series")
@@ -76,7 +79,24 @@ class Step:
         suffix = self.paths[0].suffix.lower()
         has_parts, repeats_blocks = suffix in PARTED_SUFFIXES, suffix in XDMF_SUFFIXES
         with _reporting(self.paths[0]):
-            return surface_arrays(datasets, self.name, has_parts, repeats_blocks)
+            arrays = surface_arrays(datasets, self.name, has_parts, repeats_blocks)
+        return _without_gaps(arrays, self.name) if suffix == ".msh" else arrays
+
+
+def _without_gaps(arrays: MeshArrays, name: str) -> MeshArrays:
+    """Return arrays of Gmsh with vectors 0, which are undefined, where it has no data, and a note on this."""
+    notes = []
+    for data in (arrays.vertex_data, arrays.face_data):
+        for key, values in data.items():
+            if values.ndim != 2 or values.shape[1] < 3 or values.dtype.kind != "f":
+                continue
+            missing = np.isnan(values).all(axis=1)
+            if missing.any():
+                data[key] = np.where(missing[:, None], 0.0, values)
+                notes.append(
+                    f"'{key}' has no data at {missing.sum():,} of {len(values):,} elements: undefined there"
+                )
+    return replace(arrays, note=f"{name}: {'; '.join(notes)}" if notes else arrays.note)
 
 
 def read_simulation(path: str | os.PathLike[str], step: int | None = None) -> MeshArrays:
@@ -91,6 +111,8 @@ def read_simulation(path: str | os.PathLike[str], step: int | None = None) -> Me
     ``.msh``                            Gmsh
     ``.med``                            Salome
     ``.inp``                            Abaqus, the mesh only
+    ``.mesh``                           Medit
+    ``.glb .gltf``                      glTF, the meshes of all nodes
     ``.pvd .series``                    lists of files, one for each step
     ==================================  =======================================================
 
@@ -264,6 +286,8 @@ def _read_dataset(path: Path, index: int | None) -> Any:
         if suffix in MESHIO_SUFFIXES:
             import meshio
 
+            if suffix == ".msh" and is_gmsh_4(path):
+                return read_gmsh(path)
             dataset = pyvista.from_meshio(meshio.read(path))
             if suffix == ".med":
                 _name_components(dataset, path)

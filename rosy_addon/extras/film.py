@@ -23,6 +23,7 @@ from ..field.field_io import READ_SUFFIXES
 from ..field.formats.polygons import Polygons
 from ..field.mesh_arrays import MeshArrays
 from ..field.mesh_io import READERS
+from ..field.validate import STRICT, VectorPolicy
 from ..rendering.turntable import check_video_path
 
 
@@ -106,7 +107,7 @@ def requested_fields(options: Options) -> FieldSeries:
         If there is only one step or field, or a file is missing or of another format.
     """
     name, *others = options.series
-    degree, nonfinite = options.degree, options.nonfinite
+    degree, policy = options.degree, VectorPolicy(options.nonfinite, options.off_surface)
     has_mesh = name.suffix.lower() in READERS
     if has_mesh or any(path.suffix.lower() in READ_SUFFIXES for path in others):
         if not has_mesh and name.suffix.lower() not in SUFFIXES:
@@ -122,12 +123,12 @@ def requested_fields(options: Options) -> FieldSeries:
         surface = api.Surface(name, up=options.up)
         for path in others:
             check_readable(path)
-        keywords = {"surface": surface, "degree": degree, "nonfinite": nonfinite}
+        keywords = {"surface": surface, "degree": degree, **policy._asdict()}
         return FieldSeries(in_order(others), partial(api.read_field, **keywords))
     steps = list_steps(options.series)
     if len(steps) < 2:
         raise RosyError(f"{name}: has one step only: draw it with the command render")
-    read = StepReader(options.array, degree, nonfinite, options.up or "z")
+    read = StepReader(options.array, degree, policy, options.up or "z")
     return FieldSeries(steps, read)
 
 
@@ -159,7 +160,7 @@ class StepReader:
 
     Parameters
     ----------
-    array, degree, nonfinite
+    array, degree, policy
         See `field.array_field.array_field`.
     up : {"y", "z"}
         The upward axis of the meshes.
@@ -167,7 +168,7 @@ class StepReader:
 
     array: str | None = None
     degree: int | None = None
-    nonfinite: str = "error"
+    policy: VectorPolicy = STRICT
     up: str = "z"
     _last: tuple[Polygons, api.Surface] | None = None
 
@@ -179,4 +180,4 @@ class StepReader:
             self._last = mesh.polygons, surface
         surface = self._last[1]
         arrays = SurfaceArrays(step.name, surface, mesh.vertex_data or {}, mesh.face_data or {})
-        return api.Field.of(surface, array_field(arrays, self.array, self.degree, self.nonfinite))
+        return api.Field.of(surface, array_field(arrays, self.array, self.degree, self.policy))

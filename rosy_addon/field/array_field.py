@@ -13,13 +13,21 @@ from ..core.errors import RosyError, RosyWarning
 from ..core.progress import progress, report
 from .blocks import as_float64
 from .field_io import field_from_raw
+from .formats.mesh_with_field import DIRECTION
 from .formats.polygons import RawField
 from .frames import dot
 from .polygon_arrays import mean_per_face
 from .representation import from_representation, to_representation
 from .rosy_field import MAX_DEGREE, RosyField, check_degree
 from .surface import Surface
-from .validate import MAX_OUTLIER_FRACTION, TOLERANCE_DEG, apply_nonfinite_policy, tangent_normals
+from .validate import (
+    MAX_OUTLIER_FRACTION,
+    STRICT,
+    TOLERANCE_DEG,
+    VectorPolicy,
+    apply_nonfinite_policy,
+    tangent_normals,
+)
 
 #: Degree of the field made from an array of vectors, if the caller gives none.
 VECTOR_DEGREE = 1
@@ -172,9 +180,9 @@ def array_field(
     arrays: SurfaceArrays,
     name: str | None = None,
     degree: int | None = None,
-    nonfinite: str = "error",
+    policy: VectorPolicy = STRICT,
 ) -> RosyField:
-    """Make a field from one of the arrays of a surface.
+    """Make a field from one of the arrays of a surface, or from the directions in a file that RoSy wrote.
 
     The number of values at each vertex or face determines what they mean:
 
@@ -197,12 +205,13 @@ def array_field(
     ----------
     arrays : SurfaceArrays
     name : str, optional
-        See `find_array`.
+        See `find_array`. If not given, and the faces have arrays direction_1 to direction_N, these are the N
+        directions.
     degree : int, optional
         The degree N. If not given, it is `VECTOR_DEGREE` for member vectors. Tensors have degree 4.
-    nonfinite : {"error", "zero"}
-        What to do if a vector or tensor has a value that is not finite: raise an error, or treat it as
-        undefined.
+    policy : VectorPolicy
+        What to do about values that are not finite, and about vectors off the surface. With "error", member
+        vectors are replaced by their tangential components.
 
     Returns
     -------
@@ -216,6 +225,13 @@ def array_field(
         symmetric: use a symmetric tensor made from it, such as the rate of strain.
     """
     surface = arrays.surface
+    if name is None and (rows := _stored_directions(arrays)) is not None:
+        raw = RawField(rows, rows.shape[1], domain="face")
+        if degree not in (None, raw.degree):
+            raise RosyError(
+                f"{arrays.name}: stores a field of degree {raw.degree}, but degree {degree} was requested"
+            )
+        return field_from_raw(raw, surface, degree, arrays.name, policy)
     found = find_array(arrays, name)
     source = f"{arrays.name}: array '{found.name}'"
     if not _can_be_field(arrays, found.columns):
@@ -238,17 +254,32 @@ def array_field(
         )
     report(0.0, _LABEL)
     if raw.tensors and raw.domain == "vertex":
-        apply_nonfinite_policy(raw.values, source, "vertex", nonfinite)
+        apply_nonfinite_policy(raw.values, source, "vertex", policy.nonfinite)
         means = mean_per_face(raw.values.reshape(-1, 9)[surface.corner_vertex], surface.face_start)
         raw = replace(raw, values=means.reshape(-1, 3, 3), domain="face")
     elif not raw.tensors and raw.values.shape[1] == 1:
         vectors = raw.values[:, 0]
-        apply_nonfinite_policy(vectors, source, raw.domain, nonfinite)
-        tangential = _tangential_on_faces(surface, vectors, raw.domain, degree)
+        apply_nonfinite_policy(vectors, source, raw.domain, policy.nonfinite)
+        tangential = None
+        if policy.off_surface == "error":
+            tangential = _tangential_on_faces(surface, vectors, raw.domain, degree)
         if tangential is not None:
             raw = replace(raw, values=tangential[:, None], domain="face")
     with progress(0.5, 1.0):
-        return field_from_raw(raw, surface, degree, source, nonfinite)
+        return field_from_raw(raw, surface, degree, source, policy)
+
+
+def _stored_directions(arrays: SurfaceArrays) -> np.ndarray | None:
+    """Return the (F, N, 3) directions of a file that RoSy wrote, whose arrays are called direction_1 ... N.
+
+    The result is None if there are no such arrays.
+    """
+    rows: list[np.ndarray] = []
+    while (values := arrays.face_data.get(f"{DIRECTION}{len(rows) + 1}")) is not None:
+        rows.append(as_float64(np.asarray(values)))
+        if rows[-1].shape != (arrays.surface.face_count, 3):
+            return None
+    return np.stack(rows, axis=1) if 0 < len(rows) <= MAX_DEGREE else None
 
 
 def _raw_field(array: FieldArray, source: str) -> RawField:

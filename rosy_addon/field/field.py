@@ -252,7 +252,13 @@ class Field(RosyField):
         ----------
         path : path-like
             The suffix selects the format: ``.rosy``, ``.rawfield``, ``.obj`` (in the format of the program
-            fieldgen), ``.txt`` or ``.npy``; or ``.sings`` for the singularities alone.
+            fieldgen), ``.txt`` or ``.npy``; ``.vtp``, ``.vtu``, ``.ply`` or ``.npz`` for the mesh with the
+            directions, magnitudes and singularities; or ``.sings`` for the singularities alone.
+
+        Warns
+        -----
+        RosyWarning
+            If directions in an ``.obj`` file, which has one for each vertex, are off.
 
         Raises
         ------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -10,14 +11,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.errors import RosyError, counted
+from ..core.errors import RosyError, RosyWarning, counted
 from ..core.file_io import check_parsing_memory, write_bytes
 from ..core.progress import progress, report
+from .analysis import angle_errors
 from .blocks import row_blocks
 from .closest_point import closest_triangles
-from .directional_field import field_directions, tensor_field, with_opposites
-from .formats.fieldgen import fieldgen_text, read_fieldgen
-from .formats.plain import npy_bytes, read_npy, read_text
+from .directional_field import ANGLE_TOLERANCE_DEG, field_directions, tensor_field, with_opposites
+from .formats.crosses import read_crossfield, read_vcg_frames
+from .formats.dmat import read_dmat
+from .formats.fieldgen import fieldgen_text, read_fieldgen, vertex_members
+from .formats.mesh_with_field import npz_bytes, ply_bytes, vtk_bytes
+from .formats.openmesh import read_om
+from .formats.plain import npy_bytes, read_npy, read_npz, read_text
 from .formats.polygons import RawField
 from .formats.rosy_rawfield import rawfield_text, read_rawfield, read_rosy, rosy_text
 from .formats.sings import SINGULARITY_SUFFIXES, sings_text
@@ -28,7 +34,14 @@ from .mesh_io import SHARP_ANGLE
 from .rosy_field import RosyField
 from .singularities import find_singularities
 from .surface import Surface, build_surface
-from .validate import apply_nonfinite_policy, checked_domain, validated_directions, validated_field
+from .validate import (
+    STRICT,
+    VectorPolicy,
+    apply_nonfinite_policy,
+    checked_domain,
+    validated_directions,
+    validated_field,
+)
 
 #: A face of the target mesh gets the field of the closest source face only within these limits: the distance
 #: relative to `Surface.extent` of the source, and the angle between the normals in radians.
@@ -44,10 +57,20 @@ _READERS: dict[str, Callable[[Path], RawField]] = {
     ".obj": read_fieldgen,
     ".txt": read_text,
     ".vec": read_text,
+    ".csv": read_text,
     ".npy": read_npy,
+    ".npz": read_npz,
+    ".dmat": read_dmat,
+    ".crossfield": read_crossfield,
+    ".ffield": read_vcg_frames,
+    ".vfield": read_vcg_frames,
+    ".om": read_om,
 }
 READ_SUFFIXES = tuple(_READERS)
-WRITE_SUFFIXES = (".rosy", ".rawfield", ".obj", ".txt", ".npy", *SINGULARITY_SUFFIXES)
+WRITE_SUFFIXES = (
+    *(".rosy", ".rawfield", ".obj", ".txt", ".npy", ".npz", ".vtp", ".vtu", ".ply"),
+    *SINGULARITY_SUFFIXES,
+)
 
 #: Degree of fields from files that do not state a degree, if the caller gives none.
 DEFAULT_DEGREE = 4
@@ -73,20 +96,25 @@ def load_field(
     path: str | os.PathLike[str],
     surface: Surface,
     degree: int | None = None,
-    nonfinite: str = "error",
+    policy: VectorPolicy = STRICT,
     mesh: str | os.PathLike[str] | None = None,
 ) -> LoadedField:
     """Read a field from a file and fit it to a mesh.
 
-    ============  ==================================================================
+    ============= ==================================================================
     `.rosy`       row count, degree N (or none), then rows x y z with one member vector each
     `.rawfield`   N, row count, then rows of all N directions, which need not be a RoSy
     `.obj`        a mesh with the field in comments, as written by the program fieldgen
-    `.txt .vec`   rows of 3 numbers (one member vector), 3 N numbers (all N
-                  directions), 6 numbers (two directions that are nowhere opposite: the
+    `.txt` `.vec` rows of 3 numbers (one member vector), 3 N numbers (all N
+    `.csv`        directions), 6 numbers (two directions that are nowhere opposite: the
                   lines of a cross), or 9 numbers (a symmetric 3 x 3 tensor)
     `.npy`        the same data as an array: (n, 3), (n, 3 N), (n, N, 3) or (n, 3, 3)
-    ============  ==================================================================
+    `.npz`        the same as one of several arrays; see `formats.plain.read_npz`
+    `.dmat`       the same as a matrix of libigl
+    `.crossfield` crosses of libigl: a flag and two directions in each row
+    `.ffield`     frames of VCG on faces (`.vfield`: on vertices): two scales, two directions
+    `.om`         a mesh of OpenMesh with vectors on its faces, such as dir_u and dir_v
+    ============= ==================================================================
 
     Numbers are separated by white space. There is a row for each face, or for each vertex. Values at
     vertices are averaged onto the faces. Tensors must be on faces.
@@ -99,8 +127,8 @@ def load_field(
     degree : int, optional
         The required degree N; by default any degree. Files with one member vector per row may not state a
         degree. Their field then has this degree, or `DEFAULT_DEGREE`.
-    nonfinite : {"error", "zero"}
-        What to do if a vector is not finite: raise an error, or treat it as undefined.
+    policy : VectorPolicy
+        What to do about vectors that are not finite, or off the surface.
     mesh : path-like, optional
         The mesh file to which the rows of the field belong, if its faces differ from the faces of `surface`,
         for example because one of the meshes was triangulated or reordered. The field is then transferred by
@@ -133,9 +161,9 @@ def load_field(
         source_surface = _source_surface(path, raw, surface, mesh)
     if source_surface is None:
         with progress(0.6, 1.0):
-            return LoadedField(field_from_raw(raw, surface, degree, str(path), nonfinite), note)
+            return LoadedField(field_from_raw(raw, surface, degree, str(path), policy), note)
     with progress(0.6, 0.7):
-        field = field_from_raw(raw, source_surface, degree, str(path), nonfinite)
+        field = field_from_raw(raw, source_surface, degree, str(path), policy)
     with progress(0.7, 1.0):
         field = transfer_field(source_surface, field, surface, str(path))
     transferred = (
@@ -170,7 +198,7 @@ def _with_degree(raw: RawField, path: Path, degree: int | None) -> tuple[RawFiel
 
 
 def field_from_raw(
-    raw: RawField, surface: Surface, degree: int | None, source: str, nonfinite: str
+    raw: RawField, surface: Surface, degree: int | None, source: str, policy: VectorPolicy
 ) -> RosyField:
     """Make a field from the unchecked rows of a file, on the surface to which the rows belong.
 
@@ -183,8 +211,8 @@ def field_from_raw(
         None.
     source : str
         Name of the file, for messages.
-    nonfinite : {"error", "zero"}
-        What to do if a vector is not finite: raise an error, or treat it as undefined.
+    policy : VectorPolicy
+        What to do about vectors that are not finite, or off the surface.
 
     Raises
     ------
@@ -198,12 +226,12 @@ def field_from_raw(
             raise RosyError(
                 f"{source}: contains tensors on vertices; only tensors on faces are supported"
             )
-        apply_nonfinite_policy(values, source, "face", nonfinite)
+        apply_nonfinite_policy(values, source, "face", policy.nonfinite)
         return tensor_field(surface, values)
     if raw.degree is None or values.shape[1] == 1:
         known_degree = raw.degree or degree or DEFAULT_DEGREE
-        return validated_field(surface, values[:, 0], known_degree, source, nonfinite, raw.domain)
-    return validated_directions(surface, values, source, nonfinite, raw.domain)
+        return validated_field(surface, values[:, 0], known_degree, source, policy, raw.domain)
+    return validated_directions(surface, values, source, policy, raw.domain)
 
 
 def _check_header(raw: RawField, surface: Surface, source: str) -> None:
@@ -248,12 +276,18 @@ def _source_surface(
 def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface) -> None:
     """Write a field to a file, with one row for each face.
 
-    `.obj` files contain the mesh and one row for each vertex. `.sings` and `.sing` files contain
-    only the singularities of the field.
+    `.obj` files contain the mesh and one row for each vertex. `.vtp`, `.vtu`, `.ply` and `.npz` files contain
+    the mesh, the directions and the numbers of the field. `.sings` and `.sing` files contain only the
+    singularities of the field.
 
     Numbers are written with all digits, so reading the file gives exactly the same float64 values. Only the
     field in an `.obj` file differs, because it is averaged onto the vertices. For a field made from
     directions, the `source_directions` are written if the format stores all directions.
+
+    Warns
+    -----
+    RosyWarning
+        If directions in an `.obj` file deviate from the field by more than `ANGLE_TOLERANCE_DEG`.
 
     Raises
     ------
@@ -266,6 +300,18 @@ def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface
     load_field : Description of the formats.
     """
     write_bytes(path, field_file(path, field, surface))
+    if Path(path).suffix.lower() == ".obj":
+        members = vertex_members(surface, field)
+        stored = validated_field(surface, members, field.degree, str(path), domain="vertex")
+        lost = angle_errors(surface, field, stored)
+        worst = np.degrees(np.nanmax(lost, initial=0.0))
+        if worst > ANGLE_TOLERANCE_DEG:
+            warnings.warn(
+                f"{path}: an .obj file has one direction for each vertex, so directions of faces are off by up "
+                f"to {worst:.0f} degrees, and lengths are 1: .rosy and .rawfield files keep them",
+                RosyWarning,
+                stacklevel=3,
+            )
 
 
 def field_file(path: str | os.PathLike[str], field: RosyField, surface: Surface) -> bytes:
@@ -287,6 +333,12 @@ def field_file(path: str | os.PathLike[str], field: RosyField, surface: Surface)
             "do not form a RoSy: write a .rawfield, .txt or .npy file"
         )
     report(0.0, "writing the file")
+    if suffix == ".npz":
+        return npz_bytes(surface, field)
+    if suffix == ".ply":
+        return ply_bytes(surface, field)
+    if suffix in (".vtp", ".vtu"):
+        return vtk_bytes(surface, field, suffix)
     if suffix == ".rosy":
         return rosy_text(field).encode("ascii")
     if suffix == ".obj":

@@ -1,4 +1,4 @@
-"""Read meshes from .obj, .off, .ply and .stl files."""
+"""Read meshes from .obj, .off, .ply, .stl and .om files."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from ..core.errors import RosyError
 from ..core.file_io import check_parsing_memory
 from .formats.obj import read_obj
 from .formats.off import read_off
+from .formats.openmesh import read_om_mesh
 from .formats.ply import read_ply
 from .formats.polygons import Polygons
 from .formats.stl import read_stl
@@ -22,10 +23,11 @@ READERS: dict[str, Callable[[Path], Polygons]] = {
     ".off": read_off,
     ".ply": read_ply,
     ".stl": read_stl,
+    ".om": read_om_mesh,
 }
 
 #: Peak memory in bytes per byte of a binary file, until its surface is built.
-BINARY_MEMORY = {".ply": 20, ".stl": 10}
+BINARY_MEMORY = {".ply": 20, ".stl": 10, ".om": 20}
 
 #: Angle between face normals in radians above which an edge counts as sharp. Mesh files do not mark sharp
 #: edges. In curved regions, angles rarely exceed 60 degrees, even in coarse meshes (45 in an octagonal
@@ -34,7 +36,7 @@ SHARP_ANGLE = np.radians(60)
 
 
 def read_polygons(path: str | os.PathLike[str], other_suffixes: Sequence[str] = ()) -> Polygons:
-    """Read the polygons of an .obj, .off, .ply or .stl file.
+    """Read the polygons of an .obj, .off, .ply, .stl or .om file.
 
     Vertices and faces keep the order of the file, because field files refer to them by number.
     Equal corners of an .stl file are merged into one vertex.

@@ -22,7 +22,7 @@ from .blocks import bincount_rows, mask, row_blocks
 from .connectivity import Edges, build_edges, smooth_fans
 from .copied_faces import copies_note
 from .formats.obj import read_uv
-from .formats.ply import read_vertex_values
+from .formats.ply import read_values
 from .frames import dot, normalize
 from .mesh_arrays import mesh_arrays
 from .mesh_io import SHARP_ANGLE
@@ -59,7 +59,7 @@ class Surface:
     ----------
     vertices : (V, 3) array_like, path-like or mesh
         Positions of the vertices; (V, 2) for a flat mesh. If `faces` is not given: the path of a file
-        (``.obj``, ``.off``, ``.ply``, ``.stl``, or a file of a simulation, such as ``.vtu``), or a mesh
+        (``.obj``, ``.off``, ``.ply``, ``.stl``, ``.om``, or a file of a simulation, such as ``.vtu``), or a mesh
         object of meshio, PyVista, trimesh (or a scene of trimesh) or Open3D.
     faces : (F, k) array_like of int, or sequence of sequences of int, optional
         Vertices of each face, counter-clockwise about the outward normal.
@@ -217,15 +217,15 @@ class Surface:
         They come from a ``.ply`` file, from the file of a simulation, or from a mesh object of another
         library, such as PyVista.
         """
-        return read_vertex_values(self._path) if self._path.suffix.lower() == ".ply" else {}
+        return read_values(self._path) if self._path.suffix.lower() == ".ply" else {}
 
     @cached_property
     def face_data(self) -> Mapping[str, np.ndarray]:
         """Named arrays with a row for each face.
 
-        They come from the file of a simulation, or from a mesh object of another library, such as PyVista.
+        They come from the same sources as `vertex_data`.
         """
-        return {}
+        return read_values(self._path, "face") if self._path.suffix.lower() == ".ply" else {}
 
     @cached_property
     def edges(self) -> Edges:

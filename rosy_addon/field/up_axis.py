@@ -11,4 +11,12 @@ UP_AXIS_MATRIX = {
 }
 
 #: The upward axis of mesh files by file suffix. Blender's importers assume the same axes.
-UP_AXIS_BY_SUFFIX = {".obj": "y", ".off": "y", ".ply": "z", ".stl": "z"}
+UP_AXIS_BY_SUFFIX = {
+    ".obj": "y",
+    ".off": "y",
+    ".ply": "z",
+    ".stl": "z",
+    ".om": "y",
+    ".glb": "y",
+    ".gltf": "y",
+}

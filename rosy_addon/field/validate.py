@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,6 +35,9 @@ TOLERANCE_DEG = {"face": 5.0, "vertex": 20.0}
 #: faces whose normals are inaccurate.
 MAX_OUTLIER_FRACTION = 0.01
 
+#: The values of `VectorPolicy.off_surface`.
+OFF_SURFACE = ("error", "project", "undefined")
+
 #: Values of at least this modulus count as infinite. Products of the lengths of longer vectors would
 #: overflow, and pictures are computed in single precision.
 MAX_COMPONENT = 1e30
@@ -47,12 +51,41 @@ MIN_COMPONENT = 1e-30
 ROUNDING_SINE = 3e-7
 
 
+class VectorPolicy(NamedTuple):
+    """What to do about vectors that cannot be used as they are.
+
+    Attributes
+    ----------
+    nonfinite : {"error", "zero"}
+        For vectors that are not finite: raise an error, or treat them as undefined.
+    off_surface : {"error", "project", "undefined"}
+        For vectors that are more than `TOLERANCE_DEG` off the tangent plane: raise an error if they are more than
+        `MAX_OUTLIER_FRACTION` of all, otherwise rotate them into the plane; always rotate them into the plane;
+        or treat them as undefined.
+    """
+
+    nonfinite: str = "error"
+    off_surface: str = "error"
+
+    def checked(self) -> VectorPolicy:
+        """Return the policy, or raise a `RosyError` if one of its values does not exist."""
+        choices = {"nonfinite": ("error", "zero"), "off_surface": OFF_SURFACE}
+        for name, value in self._asdict().items():
+            if value not in choices[name]:
+                raise RosyError(f"{name} is {value!r}: choose one of {', '.join(choices[name])}")
+        return self
+
+
+#: Raise errors about all such vectors.
+STRICT = VectorPolicy()
+
+
 def validated_field(
     surface: Surface,
     vectors: np.ndarray,
     degree: int,
     source: str,
-    nonfinite: str = "error",
+    policy: VectorPolicy = STRICT,
     domain: str | None = None,
 ) -> RosyField:
     """Check one member vector for each face or vertex, and make a field from them.
@@ -72,8 +105,8 @@ def validated_field(
         N.
     source : str
         Name of the file or attribute, for messages.
-    nonfinite : {"error", "zero"}
-        What to do if a vector is not finite: raise an error, or treat it as undefined.
+    policy : VectorPolicy
+        What to do about vectors that are not finite, or off the surface.
     domain : {"face", "vertex"}, optional
         The mesh elements to which the vectors belong. By default it is determined from the number of vectors,
         and is "face" if the mesh has as many faces as vertices.
@@ -91,9 +124,11 @@ def validated_field(
     degree = check_degree(degree)
     vectors = np.array(vectors, dtype=np.float64).reshape(-1, 3)
     domain = checked_domain(surface, len(vectors), domain, source)
-    apply_nonfinite_policy(vectors, source, domain, nonfinite)
+    apply_nonfinite_policy(vectors, source, domain, policy.nonfinite)
     normal = tangent_normals(surface, domain)
-    vectors = project_to_tangent(vectors, normal, TOLERANCE_DEG[domain], source, domain)
+    vectors = project_to_tangent(
+        vectors, normal, TOLERANCE_DEG[domain], source, domain, policy.off_surface
+    )
     if domain == "vertex":
         rest = surface.in_rest_shape()
         z = to_representation(vectors, *tangent_frame(normal), degree)
@@ -123,7 +158,7 @@ def validated_directions(
     surface: Surface,
     directions: np.ndarray,
     source: str,
-    nonfinite: str = "error",
+    policy: VectorPolicy = STRICT,
     domain: str | None = None,
 ) -> RosyField:
     """Check N directions for each face or vertex, and make a field from them.
@@ -136,7 +171,7 @@ def validated_directions(
         If it is deformed, the directions must be tangent to its rest shape.
     directions : (n, N, 3) array_like
         Vectors in object space, in any order. Where one of the N vectors is zero, the field is undefined.
-    source, nonfinite, domain
+    source, policy, domain
         See `validated_field`.
 
     Returns
@@ -156,7 +191,8 @@ def validated_directions(
     with np.errstate(invalid="ignore"):
         unusable = ~(np.abs(directions) < MAX_COMPONENT).all(axis=(1, 2))
     usable_directions = np.where(unusable[:, None, None], 0.0, directions)
-    source_directions = usable_directions if domain == "face" else None
+    are_kept = domain == "face" and policy.off_surface == "error"
+    source_directions = usable_directions if are_kept else None
     directions[unusable] = np.nan
     normal = tangent_normals(surface, domain)
 
@@ -166,12 +202,14 @@ def validated_directions(
     if all(map(are_rosys, row_blocks(count))):
         vectors = directions[:, 0].copy()
         vectors[~unusable & ~directions.any(axis=2).all(axis=1)] = 0
-        field = validated_field(surface, vectors, degree, source, nonfinite, domain)
+        field = validated_field(surface, vectors, degree, source, policy, domain)
         field = detect_families(surface.in_rest_shape(), field)
         return replace(field, source_directions=source_directions)
-    apply_nonfinite_policy(directions.reshape(count, -1), source, domain, nonfinite)
+    apply_nonfinite_policy(directions.reshape(count, -1), source, domain, policy.nonfinite)
     rows, normals = directions.reshape(-1, 3), np.repeat(normal, degree, axis=0)
-    rows = project_to_tangent(rows, normals, TOLERANCE_DEG[domain], source, domain)
+    rows = project_to_tangent(
+        rows, normals, TOLERANCE_DEG[domain], source, domain, policy.off_surface
+    )
     directions = rows.reshape(count, degree, 3)
     surface = surface.in_rest_shape()
     if domain == "face":
@@ -248,7 +286,12 @@ def vertex_normals(surface: Surface) -> np.ndarray:
 
 
 def project_to_tangent(
-    vectors: np.ndarray, normal: np.ndarray, tolerance_deg: float, source: str, domain: str
+    vectors: np.ndarray,
+    normal: np.ndarray,
+    tolerance_deg: float,
+    source: str,
+    domain: str,
+    off_surface: str = "error",
 ) -> np.ndarray:
     """Project vectors to tangent planes, and scale them to their original length.
 
@@ -260,6 +303,8 @@ def project_to_tangent(
         Largest angle between a vector and its plane, in degrees.
     source, domain : str
         Name of the file or attribute, and name of the mesh elements, for messages.
+    off_surface : {"error", "project", "undefined"}
+        What to do about vectors that exceed the tolerance; see `VectorPolicy`.
 
     Returns
     -------
@@ -269,16 +314,21 @@ def project_to_tangent(
     Raises
     ------
     RosyError
-        If more than `MAX_OUTLIER_FRACTION` of the vectors exceed the tolerance.
+        If `off_surface` is "error" and more than `MAX_OUTLIER_FRACTION` of the vectors exceed the tolerance.
     """
     tangent, angle, is_zero = by_rows(_project, vectors, normal)
     outlier = angle > tolerance_deg
-    if outlier.sum() > MAX_OUTLIER_FRACTION * np.count_nonzero(~is_zero):
+    if off_surface == "undefined":
+        tangent[outlier] = 0.0
+    elif off_surface == "error" and outlier.sum() > MAX_OUTLIER_FRACTION * np.count_nonzero(
+        ~is_zero
+    ):
         worst = int(np.argmax(angle))
         raise RosyError(
             f"{source}: {outlier.sum()} of {len(vectors)} vectors are not tangent to the surface: they "
             f"are more than {tolerance_deg:g} degrees off, {domain} {worst} by {angle[worst]:.1f} "
-            "degrees. It belongs to another mesh or another shape of it: make or import it again"
+            "degrees. It belongs to another mesh or another shape of it: make or import it again. If only a few "
+            "vectors are wrong, choose to project them or to leave them undefined (off_surface, --off-surface)"
         )
     return tangent
 

@@ -18,6 +18,7 @@ from ..field.representation import from_representation, to_representation
 from ..field.rosy_field import MAX_DEGREE, RosyField, check_degree
 from ..field.surface import Surface
 from ..field.validate import (
+    VectorPolicy,
     apply_nonfinite_policy,
     project_to_tangent,
     validated_directions,
@@ -115,7 +116,8 @@ def read_mesh_field(
             return _field_from_angles(surface, values, degree, source, nonfinite)
         if domain == "CORNER":
             return _field_from_corners(surface, values, degree, source, nonfinite)
-        return validated_field(surface, values, degree, source, nonfinite, ELEMENTS[domain])
+        policy = VectorPolicy(nonfinite)
+        return validated_field(surface, values, degree, source, policy, ELEMENTS[domain])
 
     key_parts = "attribute", domain, data_type, values, degree, source, nonfinite
     with progress(0.5, 1.0, "reading the field"):
@@ -149,10 +151,12 @@ def _field_from_directions(
     if domain == "FACE":
         directions = follow_mesh(mesh, "dir0", directions, surface)
     source = f"{label}, attributes dir0 to dir{degree - 1}"
-    arguments = directions, source, nonfinite, ELEMENTS[domain]
-    build = partial(validated_directions, surface, *arguments)
+    policy, element = VectorPolicy(nonfinite), ELEMENTS[domain]
+    build = partial(validated_directions, surface, directions, source, policy, element)
     with progress(0.0, 1.0, "reading the field"):
-        return cached_for_surface(cache, surface, build, "directions", *arguments)
+        return cached_for_surface(
+            cache, surface, build, "directions", directions, source, *policy, element
+        )
 
 
 def _field_from_angles(

@@ -87,7 +87,7 @@ def test_tone_from_an_array(rosy, files):
         (("b.vtp", "--array", "U"), "b.vtp: there is no array 'U', only '"),
         (("b.vtp", "--array", "height"), "b.vtp: array 'height' has scalars, a field needs vectors"),
         (("b.vtp", "rotation.npy", "--array", "rotation"), "give either --array, or a field file"),
-        (("a.ply", "--array", "rotation"), "a.ply: --array applies only to files of simulations"),
+        (("a.obj", "--array", "rotation"), "a.obj: --array applies only to .ply files and files"),
         (("a.vtp", "--step", 2), "a.vtp: has no step 2, only 1 step"),
         (("none.vtu",), "none.vtu: cannot be read: no such file")
     ],
@@ -106,7 +106,7 @@ def test_the_extension_has_none_of_it(files, capfd, monkeypatch):
     for words, message in (
         (("render", "a.ply", "--array", "x", "-o", "a.png"), "unrecognized arguments: --array"),
         (("film", "a.vtu", "-o", "a.gif"), "invalid choice: 'film'"),
-        (("render", "a.vtu", "-o", "a.png"), "must end in .obj, .off, .ply or .stl\n"),
+        (("render", "a.vtu", "-o", "a.png"), "must end in .obj, .off, .ply, .stl or .om\n"),
     ):
         assert cli_main([str(word) for word in words]) == 2
         assert message in capfd.readouterr().err

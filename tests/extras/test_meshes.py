@@ -8,6 +8,7 @@ import pytest
 import pyvista as pv
 from extras.rotations import rotation
 
+import rosy_addon as rf
 from rosy_addon.external.simulation_files import read_simulation
 from rosy_addon.field.polygon_arrays import face_area_vectors
 from rosy_addon.field.surface import Surface
@@ -207,3 +208,24 @@ def test_files_without_a_surface(tmp_path, error_of):
     assert "none of its 1 cell is a face or a volume" in message
     assert "no such file" in error_of(read_simulation, tmp_path / "none.vtu")
     assert "its name must end in .vtk, " in error_of(read_simulation, tmp_path / "a.txt")
+
+
+def test_gltf_with_two_nodes_and_a_uv_map(tmp_path):
+    """Nodes are where their matrices put them, and texture seams are no borders."""
+    trimesh = pytest.importorskip("trimesh")
+    ball = trimesh.creation.uv_sphere(count=[8, 16])
+    ball.unmerge_vertices()
+    uv = np.arctan2(ball.vertices[:, 1], ball.vertices[:, 0])[:, None] * [0.1, 0.2]
+    ball.visual = trimesh.visual.TextureVisuals(uv=uv)
+    scene = trimesh.Scene()
+    for x in (0.0, 5.0):
+        scene.add_geometry(ball, transform=trimesh.transformations.translation_matrix([x, 0, 0]))
+    scene.export(tmp_path / "a.glb")
+    surface = rf.Surface(tmp_path / "a.glb")
+    assert surface.up == "y" and surface.euler_characteristic == 4
+    assert np.ptp(surface.vertices, axis=0) == pytest.approx(ball.extents + [5, 0, 0])
+
+
+def test_medit(tmp_path, sphere):
+    write_meshio(tmp_path / "a.mesh", sphere)
+    assert rf.Surface(tmp_path / "a.mesh").vertices == pytest.approx(np.asarray(sphere.points))

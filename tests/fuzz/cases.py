@@ -67,7 +67,10 @@ def make_case(category: str, seed: int, folder: Path) -> Case:
 _OUTPUTS = {
     "render": (".png",),
     "strokes": (".svg", ".svg", ".ply", ".obj", ".csv"),
-    "field": (".rosy", ".rawfield", ".txt", ".npy", ".obj", ".sings"),
+    "field": (
+        *(".rosy", ".rawfield", ".txt", ".npy", ".obj", ".sings"),
+        *(".npz", ".vtp", ".vtu", ".ply"),
+    ),
     "turntable": (".gif",),
 }
 

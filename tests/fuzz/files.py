@@ -17,7 +17,10 @@ from rosy_addon.core.settings import settings_of
 from .meshes import Polygons
 from .options import setting_value
 
-FIELD_SUFFIXES = (".rosy", ".rawfield", ".txt", ".npy", ".sings")
+FIELD_SUFFIXES = (
+    *(".rosy", ".rawfield", ".txt", ".npy", ".sings"),
+    *(".npz", ".dmat", ".crossfield", ".ffield"),
+)
 
 
 def field_bytes(rng: Generator, suffix: str, mesh: Polygons) -> bytes:
@@ -35,6 +38,13 @@ def field_bytes(rng: Generator, suffix: str, mesh: Polygons) -> bytes:
         return _text([*head, *(row[:3] for row in rows)])
     if suffix == ".rawfield":
         return _text([(degree, count), *rows])
+    if suffix in (".crossfield", ".ffield"):
+        crosses = vectors[:, [0, degree // 4]].reshape(len(vectors), 6).tolist()
+        if suffix == ".crossfield":
+            return _text([(2, count), *([0, *row] for row in crosses)])
+        return b"# frame\ntarget frame\n" + _text(
+            [(count,), ("k1", "k2"), *([1, 1, *row] for row in crosses)]
+        )
     one_member = rng.random() < 0.5
     if suffix == ".txt":
         text = _text([row[:3] if one_member else row for row in rows])
@@ -44,6 +54,13 @@ def field_bytes(rng: Generator, suffix: str, mesh: Polygons) -> bytes:
     with np.errstate(all="ignore"):
         array = np.nan_to_num(array).astype(kind) if kind in ("i4", "?") else array.astype(kind)
     file = io.BytesIO()
+    if suffix == ".dmat":
+        matrix = np.nan_to_num(array.real).astype("<f8")
+        file.write(f"0 0\n{matrix.shape[1]} {count}\n".encode() + matrix.tobytes(order="F"))
+        return file.getvalue()
+    if suffix == ".npz":
+        np.savez(file, V=points, F=np.arange(6).reshape(2, 3), Q=array)
+        return file.getvalue()
     np.save(file, np.asfortranarray(array) if rng.random() < 0.1 else array)
     return file.getvalue()
 

@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image
 
 from rosy_addon.core.errors import UNSAFE, RosyError
-from rosy_addon.field.formats.ply import read_vertex_values
+from rosy_addon.field.formats.ply import read_values
 from rosy_addon.field.formats.text_rows import read_rows
 
 from .cases import Case
@@ -188,9 +188,7 @@ def _file_fault(path: Path) -> str:
                 if re.search(rb"[ ,]-?(nan|inf)\b", data):
                     return "a number is not finite"
             case ".ply":
-                if not all(
-                    np.isfinite(column).all() for column in read_vertex_values(path).values()
-                ):
+                if not all(np.isfinite(column).all() for column in read_values(path).values()):
                     return "a number is not finite"
     except (OSError, ValueError, SyntaxError, RosyError, ElementTree.ParseError) as error:
         return f"{type(error).__name__}: {error}"

@@ -80,20 +80,27 @@ def read_fieldgen(path: Path) -> RawField:
     return RawField(values, degree, domain="vertex", polygons=polygons)
 
 
+def vertex_members(surface: Surface, field: RosyField) -> np.ndarray:
+    """Return (V, 3) members of a field at the vertices, of length 1, or zero where their mean is zero.
+
+    The vector of a vertex is the mean of the field on the faces around it, in the RoSy representation,
+    weighted by corner angle.
+    """
+    angle, normal = corner_angles(surface), vertex_normals(surface)
+    face, vertex = surface.corner_face, surface.corner_vertex
+    rotation = power(corner_rotations(surface, normal[vertex]), field.degree)
+    values = face_representation(surface, field)[face] * rotation * angle
+    mean = unit_complex(complex_bincount(vertex, values, len(surface.vertices)))
+    return from_representation(mean, *tangent_frame(normal), field.degree)
+
+
 def fieldgen_text(surface: Surface, field: RosyField) -> str:
     """Return the text of a fieldgen file with a mesh and a field.
 
-    The vector of a vertex is the mean of the field on the faces around it, in the RoSy representation,
-    weighted by corner angle. It has length 1, or is zero where the mean is zero.
+    The vectors are those of `vertex_members`.
     """
-    count = len(surface.vertices)
-    angle = corner_angles(surface)
-    face, vertex = surface.corner_face, surface.corner_vertex
-    normal = vertex_normals(surface)
-    z = face_representation(surface, field)
-    rotation = power(corner_rotations(surface, normal[vertex]), field.degree)
-    mean = complex_bincount(vertex, z[face] * rotation * angle, count)
-    member = from_representation(unit_complex(mean), *tangent_frame(normal), field.degree)
+    vertex, normal = surface.corner_vertex, vertex_normals(surface)
+    member = vertex_members(surface, field)
     corners, starts = (vertex + 1).tolist(), surface.face_start.tolist()
     faces = (corners[start:stop] for start, stop in pairwise(starts))
     face_lines = (" ".join(f"{v}//{v}" for v in vertices) for vertices in faces)

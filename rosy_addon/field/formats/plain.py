@@ -1,4 +1,4 @@
-"""Read and write fields as plain tables of numbers: text and `.npy` files.
+"""Read and write fields as plain tables of numbers: text, `.npy` and `.npz` files.
 
 A row holds one of the N member vectors (3 numbers), all N directions (3 N numbers), one direction of each line
 of a cross (6 numbers; see `directional_field.with_opposites`) or a symmetric tensor (9 numbers).
@@ -8,16 +8,20 @@ from __future__ import annotations
 
 import io
 import math
+import zipfile
+import zlib
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ...core.errors import RosyError, counted
 from ...core.file_io import read_bytes
+from ...core.memory import check_memory
 from ..blocks import as_float64
-from ..rosy_field import MAX_DEGREE
-from .polygons import RawField
+from ..rosy_field import MAX_DEGREE, check_degree
+from .polygons import Polygons, RawField
 from .text_rows import is_number, read_rows
 
 #: Largest difference between a symmetric matrix and its transpose, relative to its largest entry.
@@ -28,6 +32,10 @@ _NPY_HEADERS = {
     (1, 0): np.lib.format.read_array_header_1_0,
     (2, 0): np.lib.format.read_array_header_2_0,
 }
+
+#: Names of the arrays of an `.npz` file that are the field, and of vertices and faces: those that RoSy writes,
+#: and those of other programs.
+_FIELD_NAMES, _MESH_NAMES = ("directions", "Q"), (("vertices", "faces"), ("V", "F"))
 
 
 def read_text(path: Path) -> RawField:
@@ -58,14 +66,35 @@ def read_text(path: Path) -> RawField:
                 row, f"the row has {counted(len(words), 'number')}, the rows above have {columns}"
             )
     values = rows.floats("part of a vector").reshape(-1, columns)
-    if columns % 3 == 1:
-        number = values[:, 0] - values[0, 0]
-        if values[0, 0] not in (0, 1) or (number != np.arange(len(values))).any():
-            _check_columns(str(path), columns)
-        values = values[:, 1:]
-    elif columns == 15 and not (values[:, 3:9] + values[:, 9:]).any():
+    if columns == 15 and not (values[:, 3:9] + values[:, 9:]).any():
         values = values[:, 3:]
-    return replace(_raw_field(values), header_count=header_count)
+    return replace(raw_field(without_numbers(values, str(path))), header_count=header_count)
+
+
+def without_numbers(values: np.ndarray, source: str, flags: bool = False) -> np.ndarray:
+    """Return rows of 3 N numbers, without a first column that numbers the rows from 0 or 1.
+
+    Parameters
+    ----------
+    values : (n, k) float64 ndarray
+        At least one row.
+    source : str
+        Name of the file, for messages.
+    flags : bool
+        Whether a first column of the numbers 0 and 1 is left out as well.
+
+    Raises
+    ------
+    RosyError
+        If the other columns are not 3 N numbers for a degree N from 1 to `MAX_DEGREE`.
+    """
+    if values.shape[1] % 3 == 1:
+        first = values[:, 0]
+        is_number = first[0] in (0, 1) and (first - first[0] == np.arange(len(first))).all()
+        if is_number or (flags and np.isin(first, (0, 1)).all()):
+            values = values[:, 1:]
+    _check_columns(source, values.shape[1])
+    return values
 
 
 def _check_npy_size(data: bytes) -> None:
@@ -86,24 +115,99 @@ def read_npy(path: Path) -> RawField:
     RosyError
         If the file cannot be read, or does not contain an array of real numbers with such a shape.
     """
-    data = read_bytes(path)
+    return _array_field(_load_npy(read_bytes(path), str(path)), str(path))
+
+
+def _load_npy(data: bytes, source: str) -> Any:
+    """Return the array of an `.npy` file, given its contents; `source` is its name in messages."""
     try:
         _check_npy_size(data)
-        values = np.load(io.BytesIO(data), allow_pickle=False)
+        return np.load(io.BytesIO(data), allow_pickle=False)
     except Exception as reason:  # numpy evaluates the header as Python, which can raise any error
         message_lines = str(reason).splitlines() or [type(reason).__name__]
         raise RosyError(
-            f"{path}: is not a valid .npy file of numbers: {message_lines[0]}"
+            f"{source}: is not a valid .npy file of numbers: {message_lines[0]}"
         ) from None
+
+
+def _array_field(values: Any, source: str) -> RawField:
+    """Return an array of shape (n, 3 N), (n, N, 3) or (n, 3, 3) as a `RawField`."""
     if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu":
-        raise RosyError(f"{path}: does not contain an array of real numbers")
+        raise RosyError(f"{source}: does not contain an array of real numbers")
     if values.ndim not in (2, 3) or not len(values) or (values.ndim == 3 and values.shape[2] != 3):
         raise RosyError(
-            f"{path}: expected an array of shape (n, 3 N) or (n, N, 3), found {values.shape}"
+            f"{source}: expected an array of shape (n, 3 N) or (n, N, 3), found {values.shape}"
         )
     values = as_float64(values.reshape(len(values), -1))
-    _check_columns(str(path), values.shape[1])
-    return _raw_field(values)
+    _check_columns(source, values.shape[1])
+    return raw_field(values)
+
+
+def read_npz(path: Path) -> RawField:
+    """Read an `.npz` archive of arrays: rows for a field, and the mesh if it has one.
+
+    The field is the array "directions" or "Q", or else the only one of shape (n, 3 N) or (n, N, 3) of
+    floating-point numbers. The mesh are the arrays "vertices" and "faces", or "V" and "F". A number "degree" is
+    the degree of an array of members.
+
+    Raises
+    ------
+    RosyError
+        If the file cannot be read, has no array for a field, or several.
+    """
+    try:
+        with zipfile.ZipFile(io.BytesIO(read_bytes(path))) as archive:
+            names = [name for name in archive.namelist() if name.endswith(".npy")]
+            size = sum(archive.getinfo(name).file_size for name in names)
+            check_memory(size, f"{path}", "choose a smaller file")
+            files = {name.removesuffix(".npy"): archive.read(name) for name in names}
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as reason:
+        raise RosyError(f"{path}: is not a valid .npz file: {reason}") from None
+    arrays = {name: _load_npy(data, f"{path}, {name}") for name, data in files.items()}
+    mesh = next((pair for pair in _MESH_NAMES if all(name in arrays for name in pair)), ())
+    rows = {
+        name: values
+        for name, values in arrays.items()
+        if name not in mesh and values.dtype.kind == "f" and _has_vectors(values.shape)
+    }
+    name = next((name for name in _FIELD_NAMES if name in rows), None)
+    if name is None:
+        if len(rows) != 1:
+            found = ", ".join(
+                f"'{name}' {values.shape}" for name, values in (rows or arrays).items()
+            )
+            fault = "several arrays can be the field" if rows else "no array can be the field"
+            raise RosyError(
+                f"{path}: {fault}; call it '{_FIELD_NAMES[0]}': {found or 'it is empty'}"
+            )
+        (name,) = rows
+    raw = _array_field(rows[name], f"{path}, {name}")
+    degree = arrays.get("degree", np.empty(0))
+    if degree.shape == () and degree.dtype.kind in "iu" and raw.values.shape[1] in (1, int(degree)):
+        raw = replace(raw, degree=check_degree(int(degree)))
+    polygons = _polygons(*(arrays[name] for name in mesh)) if mesh else None
+    return replace(raw, polygons=polygons)
+
+
+def _has_vectors(shape: tuple[int, ...]) -> bool:
+    """Return whether an array has rows of vectors: (n, 3 N) or (n, N, 3)."""
+    is_table = len(shape) == 2 and shape[1] % 3 == 0 and shape[1] > 0
+    return is_table or (len(shape) == 3 and shape[2] == 3 and shape[1] > 0)
+
+
+def _polygons(vertices: np.ndarray, faces: np.ndarray) -> Polygons | None:
+    """Return the mesh of two arrays; None if they are not (V, 3) points and (F, k) indices of vertices."""
+    if (
+        vertices.ndim != 2
+        or vertices.shape[1] != 3
+        or faces.ndim != 2
+        or faces.dtype.kind not in "iu"
+    ):
+        return None
+    if faces.shape[1] < 3 or not len(faces) or faces.min() < 0 or faces.max() >= len(vertices):
+        return None
+    face_start = np.arange(len(faces) + 1) * faces.shape[1]
+    return Polygons(as_float64(vertices), faces.ravel().astype(np.int64), face_start)
 
 
 def read_guide_strokes(path: Path) -> list[np.ndarray]:
@@ -149,7 +253,7 @@ def _check_columns(source: str, columns: int) -> None:
         )
 
 
-def _raw_field(values: np.ndarray) -> RawField:
+def raw_field(values: np.ndarray) -> RawField:
     """Return (n, k) values as a `RawField` of member vectors, directions or tensors.
 
     Rows of 9 values are tensors if all of them are symmetric 3 x 3 matrices, and 3 directions otherwise.

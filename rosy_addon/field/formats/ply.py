@@ -74,6 +74,9 @@ def read_ply(path: Path) -> Polygons:
         raise RosyError(f"{path}: the vertices have no property {missing}") from None
     face = columns.get("face", {})
     corner_list = next((face[name] for name in _CORNER_PROPERTIES if name in face), None)
+    strips = columns.get("tristrips", {}).get("vertex_indices")
+    if corner_list is None and isinstance(strips, tuple):
+        corner_list = _strip_triangles(*strips)
     if not isinstance(corner_list, tuple):
         raise RosyError(f"{path}: the mesh has no faces")
     corner_vertex, face_start = corner_list
@@ -88,18 +91,39 @@ def read_ply(path: Path) -> Polygons:
     return Polygons(as_float64(vertices), corner_vertex.astype(np.int64), face_start)
 
 
+def _strip_triangles(vertices: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the triangles of strips, as the vertices of their corners and the first corner of each.
+
+    A strip ends at the end of a list and at -1. Every other triangle is clockwise. Triangles that have a vertex
+    twice, which turn a strip, are left out.
+    """
+    vertices = np.insert(vertices.astype(np.float64), starts[1:-1], -1)
+    is_end = vertices == -1
+    rank = np.arange(len(vertices))
+    rank -= np.maximum.accumulate(np.where(is_end, rank + 1, 0))
+    count = max(len(vertices) - 2, 0)
+    triangles = np.stack([vertices[k : k + count] for k in range(3)], axis=1)
+    is_odd = rank[:count] % 2 == 1
+    triangles[is_odd] = triangles[is_odd][:, [1, 0, 2]]
+    a, b, c = triangles.T
+    triangles = triangles[(a != b) & (b != c) & (c != a) & (triangles != -1).all(axis=1)]
+    return triangles.ravel(), np.arange(len(triangles) + 1) * 3
+
+
 def _is_index(values: np.ndarray, count: int) -> np.ndarray:
     """Return (n,) bool: whether each value is a whole number from 0 to `count` - 1."""
     in_range = (values >= 0) & (values < count)
     return in_range & (np.where(in_range, values, 0) % 1 == 0)
 
 
-def read_vertex_values(path: Path) -> dict[str, np.ndarray]:
-    """Read the scalar vertex properties of a .ply file, such as colors, except the position.
+def read_values(path: Path, element: str = "vertex") -> dict[str, np.ndarray]:
+    """Read the scalar properties of the vertices or faces of a .ply file, except the position.
+
+    Three properties NAME_x, NAME_y and NAME_z of floating-point numbers are also a vector NAME.
 
     Returns
     -------
-    dict of str to (V,) float64 ndarray
+    dict of str to (n,) or (n, 3) float64 ndarray
         Values of each property, by its name. Integers are divided by the largest value of their type, so that
         colors range from 0 to 1.
 
@@ -110,12 +134,16 @@ def read_vertex_values(path: Path) -> dict[str, np.ndarray]:
     """
     columns, elements = _read_columns(path)
     values = {}
-    for prop in next((e.properties for e in elements if e.name == "vertex"), []):
+    for prop in next((e.properties for e in elements if e.name == element), []):
         if prop.name in "xyz" or prop.count_type is not None:
             continue
         dtype = np.dtype(prop.type)
         scale = np.iinfo(dtype).max if dtype.kind in "iu" else 1
-        values[prop.name] = columns["vertex"][prop.name].astype(np.float64) / scale
+        values[prop.name] = columns[element][prop.name].astype(np.float64) / scale
+    for name in [name.removesuffix("_x") for name in values if name.endswith("_x")]:
+        axes = [f"{name}_{axis}" for axis in "xyz"]
+        if name not in values and all(axis in values for axis in axes):
+            values[name] = np.stack([values[axis] for axis in axes], axis=1)
     return values
 
 

@@ -84,7 +84,7 @@ def test_texture_coordinates_of_vertices_and_corners():
         (
             ("a.xyz",),
             {},
-            "a.xyz: is not a mesh file: its name must end in .obj, .off, .ply, .stl, .vtk",
+            "a.xyz: is not a mesh file: its name must end in .obj, .off, .ply, .stl, .om",
         ),
         (("a.obj",), {"step": 1}, "a.obj: step applies only to files of simulations"),
         ((SQUARE, [[0, 1, 2]]), {"step": 1}, "step applies only to files of simulations"),
@@ -99,7 +99,9 @@ def test_the_extension_reads_no_simulations(error_of, monkeypatch):
     """The readers are not in it."""
     monkeypatch.setattr(mesh_arrays, "SIMULATION_READERS", {})
     message = error_of(rf.Surface, "a.vtu")
-    assert message == "a.vtu: is not a mesh file: its name must end in .obj, .off, .ply or .stl"
+    assert (
+        message == "a.vtu: is not a mesh file: its name must end in .obj, .off, .ply, .stl or .om"
+    )
 
 
 def test_angles_are_those_of_the_frames(sphere):

@@ -20,7 +20,7 @@ from rosy_addon.preset_files.store import preset_files
 REFUSED = {
     "no mesh": (["render", "none.off", "-o", "{out}"], "none.off: cannot be read"),
     "no field": (["render", "{mesh}", "none.rosy", "-o", "{out}"], "none.rosy: cannot be read"),
-    "kind of mesh": (["info", "a.gltf"], "a.gltf: is not a mesh file"),
+    "kind of mesh": (["info", "a.step"], "a.step: is not a mesh file"),
     "degree 0": (["render", "{mesh}", "-o", "{out}", "--degree", "0"], "degree 0 is not"),
     "curvature 3": (
         ["info", "{mesh}", "--degree", "3", "--generate", "curvature"],

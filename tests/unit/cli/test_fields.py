@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from command_helpers import assert_refused, facts_of, rosy
 
+import rosy_addon as rf
 from rosy_addon.extras.command_line import main
 
 
@@ -70,6 +71,19 @@ def test_undefined_vectors_on_request(sphere, tmp_path):
     assert facts_of(sphere, path, "--undefined")["undefined_faces"] >= 1
     for option in ("--guides", "--against"):  # in every field file
         assert rosy("info", sphere, option, path, "--undefined").returncode == 0
+
+
+@pytest.mark.slow
+def test_vectors_off_the_surface_on_request(sphere, tmp_path):
+    path = tmp_path / "a.npy"
+    assert main(["field", str(sphere), "-o", str(path), "--degree", "1"]) == 0
+    vectors = np.load(path)
+    vectors[::20] = rf.Surface(sphere).face_normal[::20] * 0.9 + vectors[::20] * 0.1
+    np.save(path, vectors)
+    words = sphere, path, "--degree", 1
+    assert_refused(rosy("info", *words), "64 of 1280 vectors are not tangent", "--off-surface")
+    assert facts_of(*words, "--off-surface", "undefined")["undefined_faces"] == 64
+    assert facts_of(*words, "--off-surface", "project")["undefined_faces"] == 0
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ from field_helpers import read_field
 from shapes import cube, icosphere, plane
 
 from rosy_addon.field.array_field import SurfaceArrays, array_field, find_array
-from rosy_addon.field.validate import vertex_normals
+from rosy_addon.field.validate import VectorPolicy, vertex_normals
 
 
 def arrays_of(surface, points=(), cells=()):
@@ -145,7 +145,7 @@ def test_values_that_are_not_finite(box, error_of):
     arrays = arrays_of(box, cells={"U": velocity})
     message = error_of(array_field, arrays)
     assert "flow.vtu: array 'U': 1 of 6 vectors are not finite" in message
-    field = array_field(arrays, nonfinite="zero")
+    field = array_field(arrays, policy=VectorPolicy("zero"))
     assert np.flatnonzero(~field.vectors.any(axis=1)).tolist() == [2]
     assert np.isnan(velocity[2]).all(), "the array stays as it is"
 

@@ -19,6 +19,7 @@ from rosy_addon.field.generate import axis_field
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.surface import Surface
+from rosy_addon.field.validate import VectorPolicy
 
 BALL = icosphere(2)
 
@@ -102,7 +103,7 @@ def test_faces_that_are_not_finite_are_written_as_zero(degree, rosy, tmp_path):
     stored[3, 1, 2] = np.nan
     stored[5] = -np.inf
     np.save(tmp_path / "first.npy", stored)
-    field = read_field(tmp_path / "first.npy", BALL, degree, "zero")
+    field = read_field(tmp_path / "first.npy", BALL, degree, VectorPolicy("zero"))
     write_field(tmp_path / "a.rawfield", field, BALL)
     again = read_field(tmp_path / "a.rawfield", BALL)
     stored[[3, 5]] = 0
@@ -157,7 +158,7 @@ def test_tensors_are_distinguished_from_three_directions(tmp_path):
     assert np.allclose(read_field(tmp_path / "a.txt", BALL).vectors, field.vectors)
     matrices[3] = np.inf
     np.save(tmp_path / "a.npy", matrices)
-    holed = read_field(tmp_path / "a.npy", BALL, nonfinite="zero")
+    holed = read_field(tmp_path / "a.npy", BALL, policy=VectorPolicy("zero"))
     assert holed.family_count == 2 and np.flatnonzero(holed.magnitude == 0).tolist() == [3]
     np.save(tmp_path / "b.npy", free_directions(3))
     assert read_field(tmp_path / "b.npy", BALL).degree == 3

@@ -11,16 +11,21 @@ import pytest
 from field_helpers import read_field
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from shapes import cylinder, from_quads, plane, torus
+from shapes import cylinder, from_quads, icosphere, plane, torus
 
 from rosy_addon.field.field_io import write_field
-from rosy_addon.field.frames import dot
+from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.representation import face_representation
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.surface import Surface
-from rosy_addon.field.validate import validated_field
+from rosy_addon.field.validate import (
+    VectorPolicy,
+    validated_directions,
+    validated_field,
+    vertex_normals,
+)
 
 SQUARES = plane(3, 2)  # 6 faces, 12 vertices, facing +z
 WEST = np.tile((-2.0, 0.0, 0.0), (6, 1))
@@ -225,10 +230,45 @@ def test_vectors_off_the_surface_are_refused(error_of):
     assert f"{np.degrees(np.arctan(2.35)):.1f} degrees" in message
 
 
+@pytest.mark.parametrize("stored", ["members", "directions"])
+@pytest.mark.parametrize("domain", ["face", "vertex"])
+def test_vectors_off_the_surface_are_projected_or_undefined_on_request(domain, stored, error_of):
+    """Vectors turned out of the plane by 60 degrees, on one face or vertex in 20."""
+    surface = icosphere(3)
+    normal = surface.face_normal if domain == "face" else vertex_normals(surface)
+    right = normalize(np.cross((0.0, 0.0, 1.0), normal))
+    is_off = np.arange(len(normal)) % 20 == 7
+    sine = np.where(is_off, np.sin(np.radians(60)), 0.0)[:, None]
+    given = np.sqrt(1 - sine**2) * right + sine * normal
+
+    def made(vectors, policy):
+        if stored == "members":
+            return validated_field(surface, vectors, 2, "a", policy, domain)
+        directions = np.stack([vectors, -vectors], axis=1)
+        return validated_directions(surface, directions, "a", policy, domain)
+
+    message = error_of(made, given, VectorPolicy())
+    assert "off_surface, --off-surface" in message
+    expected = made(right, VectorPolicy()).vectors
+    projected = made(given, VectorPolicy(off_surface="project"))
+    assert np.abs(projected.vectors - expected).max() < 1e-12
+    assert projected.source_directions is None
+    undefined = made(given, VectorPolicy(off_surface="undefined"))
+    if domain == "face":
+        assert np.array_equal(~undefined.vectors.any(axis=1), is_off)
+        assert np.array_equal(undefined.vectors[~is_off], expected[~is_off])
+    else:
+        # The other vertices of a face decide. The three corners of a face are never all off here.
+        assert undefined.vectors.any(axis=1).all()
+        is_near = is_off[surface.faces].any(axis=1)
+        assert np.abs(undefined.vectors - expected)[~is_near].max() < 1e-12
+        assert (undefined.magnitude < np.linalg.norm(expected, axis=1))[is_near].all()
+
+
 def test_nonfinite_vectors_are_undefined_on_request():
     vectors = WEST.copy()
     vectors[1, 2], vectors[4] = np.nan, np.inf
-    field = validated_field(SQUARES, vectors, 3, "here", nonfinite="zero")
+    field = validated_field(SQUARES, vectors, 3, "here", VectorPolicy("zero"))
     assert field.magnitude.tolist() == [2, 0, 2, 2, 0, 2]
 
 

@@ -139,6 +139,32 @@ def text_stl() -> bytes:
     return "\n".join([*lines, "endsolid thing", ""]).encode()
 
 
+@pytest.mark.parametrize("binary", [False, True])
+def test_strips_of_a_ply_file(binary, tmp_path):
+    """A tube of two strips in one list, with -1 between them, and a third list for its bottom."""
+    angle = np.arange(8) * np.pi / 4
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    points = np.concatenate([np.column_stack([ring, np.full(8, z)]) for z in (0.0, 1.0)])
+    around = [(k % 8 + 8 * upper) for k in range(9) for upper in (1, 0)]
+    strips = [[*around[:8], -1, *around[6:]], [0, 7, 1, 6, 2, 5, 3, 4]]
+    header = (
+        f"ply\nformat {'binary_little_endian' if binary else 'ascii'} 1.0\nelement vertex 16\n"
+        "property double x\nproperty double y\nproperty double z\nelement tristrips 2\n"
+        "property list int int vertex_indices\nend_header\n"
+    ).encode()
+    rows = [[len(strip), *strip] for strip in strips]
+    if binary:
+        body = points.tobytes() + b"".join(np.array(row, "<i4").tobytes() for row in rows)
+    else:
+        lines = [*points.tolist(), *rows]
+        body = "".join(" ".join(map(str, line)) + "\n" for line in lines).encode()
+    (tmp_path / "a.ply").write_bytes(header + body)
+    surface = Surface(tmp_path / "a.ply")
+    assert surface.face_count == 16 + 6 and surface.euler_characteristic == 1
+    outward = surface.face_center - (0.0, 0.0, 0.5)
+    assert ((surface.face_normal * outward).sum(axis=1) > 0.1).all()
+
+
 @pytest.mark.parametrize("data", [binary_stl(), text_stl()], ids=["binary", "text"])
 def test_stl_corners_at_the_same_position_are_one_vertex(data, tmp_path):
     (tmp_path / "a.stl").write_bytes(data)

@@ -1,0 +1,169 @@
+"""Read `.msh` files of Gmsh in the format 4.1, whose data refer to nodes and elements by their tags.
+
+meshio assumes that data are complete and in the order of the file, and refuses nodes with parameters.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..core.errors import RosyError
+from ..core.file_io import read_bytes
+
+#: The shapes of faces and volumes: the type of the linear cell in VTK, the number of its corners, which are the
+#: first nodes, and for each of Gmsh's types of this shape the number of all nodes.
+_SHAPES = (
+    (5, 3, {2: 3, 9: 6, 20: 9, 21: 10, 22: 12, 23: 15, 24: 15, 25: 21}),
+    (9, 4, {3: 4, 10: 9, 16: 8, 36: 16, 37: 25, 39: 12, 40: 16}),
+    (10, 4, {4: 4, 11: 10, 29: 20, 30: 35, 31: 56, 32: 22, 137: 16}),
+    (12, 8, {5: 8, 12: 27, 17: 20, 92: 64, 93: 125, 99: 32, 100: 44}),
+    (13, 6, {6: 6, 13: 18, 18: 15, 90: 40, 91: 75}),
+    (14, 5, {7: 5, 14: 14, 19: 13, 118: 30, 119: 55, 125: 21, 126: 29}),
+)
+_CELLS = {
+    kind: (cell_type, corners, nodes)
+    for cell_type, corners, kinds in _SHAPES
+    for kind, nodes in kinds.items()
+}
+
+#: Numbers of nodes of points and lines, which are left out.
+_LINES = {15: 1, 1: 2, 8: 3, 26: 4, 27: 5, 28: 6}
+
+
+class _Section:
+    """The numbers of a section, taken one after the other from text or binary data."""
+
+    def __init__(self, data: bytes, is_text: bool) -> None:
+        self._data, self._position = data, 0
+        self._words = np.array(data.split(), dtype=np.float64) if is_text else None
+
+    def take(self, dtype: str, count: int) -> np.ndarray:
+        """Return the next numbers; raise `ValueError` if there are too few."""
+        start = self._position
+        if self._words is not None:
+            self._position += count
+            values = self._words[start : start + count].astype(dtype)
+        else:
+            self._position += count * np.dtype(dtype).itemsize
+            values = np.frombuffer(self._data, dtype, count, start)
+        if count < 0 or len(values) != count:
+            raise ValueError("it ends too early")
+        return values
+
+
+def is_gmsh_4(path: Path) -> bool:
+    """Return whether a file begins as a `.msh` file of the format 4.1."""
+    with open(path, "rb") as file:
+        return file.read(200).split()[:2] == [b"$MeshFormat", b"4.1"]
+
+
+def read_gmsh(path: Path) -> Any:
+    """Read a file of the format 4.1.
+
+    Returns
+    -------
+    pyvista.UnstructuredGrid
+        The faces and volumes, with the arrays of the sections NodeData and ElementData. If a view has several
+        steps, the last one is read. Values are NaN at nodes and elements that have none.
+    """
+    import pyvista
+
+    sections, is_text = _sections(read_bytes(path))
+    named = dict(sections)
+    if not {b"Nodes", b"Elements"} <= set(named):
+        raise RosyError(f"{path}: cannot be read: it has no nodes, or no elements")
+    node_tags, points = _nodes(_Section(named[b"Nodes"], is_text))
+    tags, sizes, types, corner_tags = _elements(_Section(named[b"Elements"], is_text))
+    corner_point = _find(node_tags, corner_tags)
+    if (corner_point < 0).any():
+        raise RosyError(f"{path}: cannot be read: an element has a node that is missing")
+    starts = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64)
+    cells = np.insert(corner_point, starts, sizes)
+    grid = pyvista.UnstructuredGrid(cells, types, points)
+    for name, data in sections:
+        if name in (b"NodeData", b"ElementData"):
+            is_node = name == b"NodeData"
+            title, rows, values = _data(data, is_text)
+            array = np.full((grid.n_points if is_node else grid.n_cells, values.shape[1]), np.nan)
+            index = _find(node_tags if is_node else tags, rows)
+            array[index[index >= 0]] = values[index >= 0]
+            (grid.point_data if is_node else grid.cell_data)[title] = array
+    return grid
+
+
+def _sections(data: bytes) -> tuple[list[tuple[bytes, bytes]], bool]:
+    """Return the names and contents of the sections of a file, and whether it is text."""
+    sections, end = [], 0
+    while (start := data.find(b"$", end)) >= 0:
+        name, _, rest = data[start + 1 : start + 100].partition(b"\n")
+        name = name.strip()
+        first = start + 1 + len(data[start + 1 : start + 100]) - len(rest)
+        last = data.find(b"$End" + name, first)
+        if last < 0:
+            raise ValueError(f"the section {name.decode('ascii', 'replace')} has no end")
+        sections.append((name, data[first:last]))
+        end = last + len(name) + 4
+    return sections, dict(sections)[b"MeshFormat"].split()[1] == b"0"
+
+
+def _nodes(section: _Section) -> tuple[np.ndarray, np.ndarray]:
+    """Return the tags and the (n, 3) positions of the nodes."""
+    block_count = section.take("<u8", 4)[0]
+    tags, points = [np.empty(0, np.int64)], [np.empty((0, 3))]
+    for _ in range(int(block_count)):
+        dimension, _, is_parametric = section.take("<i4", 3)
+        count = int(section.take("<u8", 1)[0])
+        tags.append(section.take("<u8", count).astype(np.int64))
+        columns = 3 + int(dimension) * bool(is_parametric)
+        points.append(section.take("<f8", count * columns).reshape(count, columns)[:, :3])
+    return np.concatenate(tags), np.concatenate(points)
+
+
+def _elements(section: _Section) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the tags of faces and volumes, the numbers of their corners, VTK's types, and the tags of nodes."""
+    block_count = section.take("<u8", 4)[0]
+    tags, corner_tags = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+    sizes, types = [np.empty(0, np.int64)], [np.empty(0, np.uint8)]
+    for _ in range(int(block_count)):
+        kind = int(section.take("<i4", 3)[2])
+        count = int(section.take("<u8", 1)[0])
+        if kind not in _CELLS and kind not in _LINES:
+            raise ValueError(f"elements of type {kind} are not known")
+        cell_type, corners, nodes = _CELLS.get(kind, (0, 0, _LINES.get(kind, 0)))
+        rows = section.take("<u8", count * (1 + nodes)).reshape(count, 1 + nodes).astype(np.int64)
+        if kind in _CELLS:
+            tags.append(rows[:, 0])
+            corner_tags.append(rows[:, 1 : 1 + corners].ravel())
+            sizes.append(np.full(count, corners))
+            types.append(np.full(count, cell_type, np.uint8))
+    return tuple(np.concatenate(parts) for parts in (tags, sizes, types, corner_tags))
+
+
+def _data(data: bytes, is_text: bool) -> tuple[str, np.ndarray, np.ndarray]:
+    """Return the title of a data section, the tags of its rows, and its (n, components) values."""
+    header: list[list[bytes]] = []
+    for _ in range(3):  # titles, real numbers, whole numbers
+        line, _, data = data.partition(b"\n")
+        *lines, data = data.split(b"\n", int(line))
+        header.append(lines)
+    title = header[0][0].decode("utf-8", "replace").strip().strip('"')
+    components, count = int(header[2][1]), int(header[2][2])
+    if components not in (1, 3, 9):
+        raise ValueError(f"'{title}' has {components} numbers at each element, expected 1, 3 or 9")
+    if is_text:
+        rows = _Section(data, is_text).take("<f8", count * (1 + components))
+        rows = rows.reshape(count, 1 + components)
+        return title, rows[:, 0].astype(np.int64), rows[:, 1:]
+    table = np.frombuffer(data, [("tag", "<i4"), ("values", "<f8", (components,))], count)
+    return title, table["tag"].astype(np.int64), table["values"]
+
+
+def _find(tags: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Return the index of each wanted tag among `tags`; -1 where it is missing."""
+    order = np.argsort(tags, kind="stable")
+    index = np.searchsorted(tags[order], wanted)
+    found = order[np.minimum(index, len(tags) - 1)] if len(tags) else np.zeros(len(wanted), int)
+    return np.where(tags[found] == wanted, found, -1) if len(tags) else found - 1

@@ -1,0 +1,56 @@
+"""Read `.dmat` files, the matrices of libigl, as text or binary."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ...core.errors import RosyError
+from ...core.file_io import read_bytes
+from ..blocks import as_float64
+from .plain import raw_field, without_numbers
+from .polygons import RawField
+from .text_rows import read_rows
+
+
+def read_dmat(path: Path) -> RawField:
+    """Read a matrix of libigl with a row for each face or vertex, as in a text file (see `plain.read_text`).
+
+    A first column of numbers of rows, or of flags 0 and 1, is not read.
+
+    Raises
+    ------
+    RosyError
+        If the file cannot be read or is malformed, or if its rows are no vectors.
+    """
+    data = read_bytes(path)
+    header, _, rest = data.partition(b"\n")
+    if header.split() == [b"0", b"0"]:
+        header, _, rest = rest.partition(b"\n")
+        columns, count = _size(path, header)
+        if len(rest) < 8 * columns * count:
+            raise RosyError(
+                f"{path}: declares {columns * count} numbers, but contains {len(rest) // 8}"
+            )
+        values = np.frombuffer(rest, "<f8", columns * count)
+    else:
+        columns, count = _size(path, header)
+        rows = read_rows(path, comment=None, data=b"\n" + rest)
+        values = rows.floats("entry of the matrix")
+        if len(values) != columns * count:
+            raise RosyError(
+                f"{path}: declares {columns * count} numbers, but contains {len(values)}"
+            )
+    if not count:
+        raise RosyError(f"{path}: contains no numbers")
+    matrix = as_float64(values.reshape(columns, count).T)
+    return raw_field(without_numbers(matrix, str(path), flags=True))
+
+
+def _size(path: Path, header: bytes) -> tuple[int, int]:
+    """Return the numbers of columns and of rows that a header declares."""
+    words = header.split()
+    if len(words) != 2 or not all(word.isdigit() for word in words):
+        raise RosyError(f"{path}: expected the numbers of columns and of rows at its beginning")
+    return int(words[0]), int(words[1])

@@ -1,0 +1,84 @@
+"""Files of feature edges."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shapes import plane
+
+import rosy_addon as rf
+from rosy_addon.extras.command_line import main
+from rosy_addon.field.formats.feature_edges import read_edges
+
+SQUARES = plane(3, 2)
+FILES = {
+    "a.sharp": "2\n1,0,0\n0,4,2\n",
+    "a.feature": "2\n0,0\n4,2\n",
+    "b.feature": "2\n0 0\n4 2\n",
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_edges_of_faces(name, tmp_path):
+    (tmp_path / name).write_text(FILES[name])
+    first, second = SQUARES.faces[0], SQUARES.faces[4]
+    expected = [[first[0], first[1]], [second[2], second[3]]]
+    assert read_edges(tmp_path / name, SQUARES).tolist() == expected
+
+
+def diagonal():
+    """A square of 2 x 2 squares of 2 triangles, and the (face, edge) of its rising diagonals."""
+    x, y = np.meshgrid([0.0, 1.0, 2.0], [0.0, 1.0, 2.0])
+    points = np.stack([x.ravel(), y.ravel(), np.zeros(9)], axis=1)
+    faces, rows = [], []
+    for corner in (0, 1, 3, 4):
+        faces += [[corner, corner + 1, corner + 4], [corner, corner + 4, corner + 3]]
+        rows.append((len(faces) - 1, 0))
+    return rf.Surface(points, faces, name="square"), rows
+
+
+def test_features_follow_the_file(tmp_path):
+    surface, rows = diagonal()
+    lines = [f"1,{face},{edge}\n" for face, edge in rows]
+    (tmp_path / "a.sharp").write_text(f"{len(rows)}\n" + "".join(lines))
+    field = rf.features(surface, edges=tmp_path / "a.sharp")
+    angle = np.degrees(np.arctan2(field.vectors[:, 1], field.vectors[:, 0]))
+    assert angle % 90 == pytest.approx(45)
+    field = rf.guided(surface, 2, edges=tmp_path / "a.sharp")
+    angle = np.degrees(np.arctan2(field.vectors[:, 1], field.vectors[:, 0]))
+    assert angle % 180 == pytest.approx(45)
+
+
+def test_the_command_line(tmp_path, capfd):
+    surface, rows = diagonal()
+    points = "".join(f"v {x} {y} {z}\n" for x, y, z in surface.vertices)
+    faces = "".join("f " + " ".join(str(v + 1) for v in face) + "\n" for face in surface.faces)
+    mesh, edges, out = tmp_path / "a.obj", tmp_path / "a.feature", tmp_path / "a.npy"
+    mesh.write_text(points + faces)
+    edges.write_text(f"{len(rows)}\n" + "".join(f"{face},{edge}\n" for face, edge in rows))
+    words = ["field", str(mesh), "-o", str(out), "--edges", str(edges)]
+    assert main(words) == 0
+    vectors = np.load(out)[:, :3]
+    assert np.degrees(np.arctan2(vectors[:, 1], vectors[:, 0])) % 90 == pytest.approx(45)
+    assert main([*words, "--generate", "form"]) == 2
+    assert "--edges applies only to --generate features and guided" in capfd.readouterr().err
+
+
+DAMAGED = {
+    "a.sharp": ("", "expected the number of edges"),
+    "b.sharp": ("2\n0,0,0\n", "declares 2 edges, but contains 1"),
+    "c.sharp": ("1\n0,0\n", "c.sharp:2: a row has 2 numbers, expected 3"),
+    "d.sharp": ("1\n0,6,0\n", "d.sharp:2: the mesh has no edge 0 of face 6"),
+    "e.feature": ("1\n0,4\n", "has no edge 4 of face 0"),
+    "f.feature": ("1\n-1,0\n", "has no edge 0 of face -1"),
+    "g.feature": ("1\nx,0\n", "expected a whole number"),
+    "h.txt": ("1\n", "its name must end in .sharp or .feature"),
+}
+
+
+@pytest.mark.parametrize("name", DAMAGED)
+def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
+    text, expected = DAMAGED[name]
+    (tmp_path / name).write_text(text)
+    message = error_of(read_edges, tmp_path / name, SQUARES)
+    assert expected.replace("the mesh", SQUARES.name) in message and str(tmp_path / name) in message

@@ -1,0 +1,163 @@
+"""Field files of other programs: matrices, archives, and crosses of two directions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from field_helpers import read_field
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from shapes import icosphere
+
+from rosy_addon.core.errors import RosyError
+from rosy_addon.field.directional_field import field_directions
+from rosy_addon.field.field_io import load_field
+from rosy_addon.field.frames import normalize
+from rosy_addon.field.generate import axis_field
+
+BALL = icosphere(2)
+CROSS = normalize(field_directions(BALL, axis_field(BALL, 4, (0.3, -0.2, 1.0))))
+HALVES = CROSS[:, :2].reshape(-1, 6)
+TRIANGLES = BALL.triangle_vertex
+
+
+def dmat_bytes(matrix, binary=False):
+    """As igl::writeDMAT does: columns first."""
+    size = f"{matrix.shape[1]} {matrix.shape[0]}\n".encode()
+    if binary:
+        return b"0 0\n" + size + np.asarray(matrix, "<f8").tobytes(order="F")
+    return size + "".join(f"{value!r}\n" for value in matrix.T.ravel().tolist()).encode()
+
+
+def frames_bytes(rows):
+    """As ExporterFIELD of VCG writes them."""
+    head = "# frame generated with VCG \ntarget frame \n{}\nk1\t k2\t k1v_x\t k1v_y\t k1v_z\t k2v_x\t k2v_y\t k2v_z\n"
+    lines = ["1 1 " + " ".join(map(repr, row)) + "\n" for row in rows.tolist()]
+    return (head.format(len(rows)) + "".join(lines)).encode()
+
+
+def crossfield_bytes(rows):
+    lines = ["0 " + " ".join(map(repr, row)) + "\n" for row in rows.tolist()]
+    return (f"2 {len(rows)}\n" + "".join(lines)).encode()
+
+
+FLAGGED = np.column_stack([np.arange(len(HALVES)) % 2, HALVES])
+FILES = {
+    "text.dmat": dmat_bytes(HALVES),
+    "binary.dmat": dmat_bytes(HALVES, binary=True),
+    "flags.dmat": dmat_bytes(FLAGGED),
+    "numbers.dmat": dmat_bytes(np.column_stack([np.arange(len(HALVES)), HALVES])),
+    "a.crossfield": crossfield_bytes(HALVES),
+    "a.ffield": frames_bytes(HALVES),
+    "a.csv": "".join(",".join(map(repr, row)) + "\n" for row in HALVES.tolist()).encode(),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_crosses_of_two_directions(name, tmp_path):
+    (tmp_path / name).write_bytes(FILES[name])
+    loaded = load_field(tmp_path / name, BALL)
+    assert loaded.field.degree == 4 and loaded.field.direction_ratios is None
+    assert np.abs(field_directions(BALL, loaded.field) - CROSS).max() < 1e-12
+    # These two formats hold crosses only; in the others it is an assumption.
+    assert bool(loaded.note) == (not name.endswith(("crossfield", "ffield")))
+
+
+def test_frames_need_not_be_orthogonal(tmp_path):
+    skewed = np.concatenate([CROSS[:, 0], CROSS[:, 0] + 2 * CROSS[:, 1]], axis=1)
+    (tmp_path / "a.crossfield").write_bytes(crossfield_bytes(skewed))
+    field = read_field(tmp_path / "a.crossfield", BALL)
+    assert field.degree == 4 and field.direction_ratios is not None
+    assert np.abs(field.source_directions[:, :2].reshape(-1, 6) - skewed).max() < 1e-12
+
+
+def test_frames_on_vertices(tmp_path):
+    axis = np.cross(BALL.vertices, (0.0, 0.0, 1.0))
+    rows = np.concatenate([axis, np.cross(BALL.vertices, axis)], axis=1)
+    (tmp_path / "a.vfield").write_bytes(frames_bytes(rows))
+    field = read_field(tmp_path / "a.vfield", BALL)
+    assert field.degree == 4 and field.vectors.any(axis=1).all()
+    (tmp_path / "b.vfield").write_bytes(FILES["a.ffield"])
+    with pytest.raises(RosyError, match="contains 320 rows, but"):
+        read_field(tmp_path / "b.vfield", BALL)
+
+
+ARCHIVES = {
+    "miq": ({"V": BALL.vertices, "F": TRIANGLES, "Q": CROSS[:, 0]}, 4),
+    "one array": ({"anything": CROSS, "faces": TRIANGLES, "energy": np.float64(3)}, 4),
+    "degree": ({"directions": CROSS[:, 1], "degree": np.array(2)}, 2),
+    "halves": ({"field": HALVES}, 4),
+}
+
+
+@pytest.mark.parametrize("name", ARCHIVES)
+def test_archives(name, tmp_path):
+    arrays, degree = ARCHIVES[name]
+    for save in (np.savez, np.savez_compressed):
+        save(tmp_path / "a.npz", **arrays)
+        field = read_field(tmp_path / "a.npz", BALL)
+        assert field.degree == degree
+        cosine = np.einsum("fki,fi->fk", CROSS, field.vectors).max(axis=1)
+        assert np.abs(cosine - 1).max() < 1e-12
+
+
+def test_the_mesh_of_an_archive_tells_where_its_rows_are(tmp_path):
+    order = np.random.default_rng(1).permutation(len(TRIANGLES))[1:]
+    arrays = {"V": BALL.vertices, "F": TRIANGLES[order], "Q": CROSS[order, 0]}
+    np.savez(tmp_path / "a.npz", **arrays)
+    loaded = load_field(tmp_path / "a.npz", BALL)
+    assert "transferred by position" in loaded.note
+    assert np.abs(loaded.field.vectors - CROSS[:, 0])[order].max() < 1e-9
+
+
+def _archive(**arrays):
+    return lambda path: np.savez(path, **arrays)
+
+
+DAMAGED = {
+    "a.dmat": (b"6 x\n", "expected the numbers of columns and of rows"),
+    "b.dmat": (b"3 2\n1\n2\n", "declares 6 numbers, but contains 2"),
+    "c.dmat": (b"0 0\n3 2\n" + bytes(40), "declares 6 numbers, but contains 5"),
+    "d.dmat": (b"3 1\n1\nx\n2\n", "d.dmat:3: expected a number"),
+    "e.dmat": (b"2 1\n1\n2\n", "has 2 numbers per row"),
+    "f.dmat": (b"3 0\n", "contains no numbers"),
+    "a.crossfield": (b"3 1\n", "a.crossfield:1: expected '2' and the number of rows"),
+    "b.crossfield": (b"2 1\n0 1 2\n", "b.crossfield:2: expected 7 numbers, found 3 words"),
+    "c.crossfield": (b"2 1\n", "contains no rows of 7 numbers"),
+    "d.crossfield": (b"2 5\n0 1 0 0 0 1 0\n", "declares 5 rows"),
+    "a.ffield": (b"target frame\n", "expected the header of a frame field"),
+    "b.ffield": (b"", "expected the header of a frame field"),
+    "a.npz": (b"hello", "is not a valid .npz file"),
+    "b.npz": (_archive(a=CROSS, b=CROSS), "several arrays can be the field; call it 'directions'"),
+    "c.npz": (_archive(a=np.arange(3)), "no array can be the field"),
+    "d.npz": (_archive(), "no array can be the field"),
+    "e.npz": (_archive(Q=CROSS.astype(object)), "is not a valid .npy file"),
+}
+
+
+@pytest.mark.parametrize("name", DAMAGED)
+def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
+    content, expected = DAMAGED[name]
+    if callable(content):
+        content(tmp_path / name)
+    else:
+        (tmp_path / name).write_bytes(content)
+    message = error_of(read_field, tmp_path / name, BALL)
+    assert expected in message and str(tmp_path / name) in message and "\n" not in message
+
+
+@pytest.mark.slow
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.binary(max_size=60), st.integers(0, 300), st.sampled_from([*FILES, "a.npz"]))
+def test_random_damage_raises_only_rosy_errors(tmp_path, garbage, offset, name):
+    path = tmp_path / name
+    if name == "a.npz":
+        np.savez_compressed(path, Q=CROSS)
+        data = path.read_bytes()
+    else:
+        data = FILES[name]
+    path.write_bytes(data[:offset] + garbage + data[offset + len(garbage) :])
+    try:
+        read_field(path, BALL)
+    except RosyError as error:
+        assert "\n" not in str(error) and str(path) in str(error)

@@ -20,6 +20,7 @@ from .rosy_field import RosyField, check_degree
 from .sparse_multigrid import CSRMatrix, Level, hierarchy, w_cycle
 from .surface import Surface
 from .surface_averages import SurfaceAverages
+from .unit_descent import face_energy, least_unit_field
 
 #: The eigensolver stops when the eigenvector changes by less than this in an iteration (the sine of
 #: an angle). With `TOLERANCE`, the energy has about eight correct digits. Meshes of up to
@@ -70,7 +71,10 @@ def smoothest_field(surface: Surface, degree: int) -> RosyField:
     report(0.95, "averaging the field on the faces")
     x, y = surface.face_frames
     mean = SurfaceAverages(surface, connection, x, y).face_sums(z, degree)
-    return RosyField(degree, from_representation(unit_complex(mean), x, y, degree))
+    is_defined = (surface.face_area > 0) & x.any(axis=1)
+    z = np.where(is_defined, unit_complex(mean, otherwise=1), 0)
+    z = least_unit_field(face_energy(surface, degree, is_defined), z)
+    return RosyField(degree, from_representation(z, x, y, degree))
 
 
 def smallest_eigenvectors(connection: Connection, degree: int) -> tuple[np.ndarray, np.ndarray]:

@@ -20,7 +20,7 @@ from .rosy_field import RosyField, check_degree
 from .sparse_multigrid import CSRMatrix, Level, hierarchy, w_cycle
 from .surface import Surface
 from .surface_averages import SurfaceAverages
-from .unit_descent import face_energy, least_unit_field
+from .unit_descent import diffuse, face_energy, least_unit_field
 
 #: The eigensolver stops when the eigenvector changes by less than this in an iteration (the sine of
 #: an angle). With `TOLERANCE`, the energy has about eight correct digits. Meshes of up to
@@ -65,15 +65,20 @@ def smoothest_field(surface: Surface, degree: int) -> RosyField:
     connection = build_connection(surface)
     if not connection.mass.any():
         raise RosyError(f"{surface.name}: no face has an area")
-    with progress(0.1, 0.95):
-        z, _ = smallest_eigenvectors(connection, degree)
-    z = _align_to_edges(connection, z, degree)
-    report(0.95, "averaging the field on the faces")
+    mass, component = connection.positive_mass, connection.component
+    with progress(0.1, 0.2):
+        levels = hierarchy(laplacian(connection, degree, spectral_shift(mass)))
+    with progress(0.2, 0.6):
+        z, _ = _eigenvectors(levels, mass, component, TOLERANCE)
+    with progress(0.6, 0.7):
+        z = diffuse(levels, mass, np.bincount(component, mass)[component], z)
+    report(0.7, "averaging the field on the faces")
     x, y = surface.face_frames
     mean = SurfaceAverages(surface, connection, x, y).face_sums(z, degree)
     is_defined = (surface.face_area > 0) & x.any(axis=1)
     z = np.where(is_defined, unit_complex(mean, otherwise=1), 0)
-    z = least_unit_field(face_energy(surface, degree, is_defined), z)
+    with progress(0.7, 0.95):
+        z = least_unit_field(face_energy(surface, degree, is_defined), z)
     return RosyField(degree, from_representation(z, x, y, degree))
 
 
@@ -126,6 +131,15 @@ def eigenproblem(
     """
     with progress(0.0, 0.35):
         levels = hierarchy(matrix)
+    tolerance = TOLERANCE if len(matrix) > SMALL_MESH_NODES else SMALL_MESH_TOLERANCE
+    with progress(0.35, 1.0):
+        return _eigenvectors(levels, mass, component, tolerance)
+
+
+def _eigenvectors(
+    levels: list[Level], mass: np.ndarray, component: np.ndarray, tolerance: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the result of `eigenproblem`, given the multigrid levels of its matrix."""
     masses, components = [mass], [component]
     for level in levels[:-1]:
         p = level.prolongation
@@ -140,16 +154,22 @@ def eigenproblem(
     for index in reversed(range(len(levels))):
         is_between = 0 < index < len(levels) - 1
         max_iterations = COARSE_ITERATIONS if is_between else MAX_ITERATIONS
-        start = 0.5 - 0.1 * index / len(levels)
-        with progress(start, start + 0.1 / len(levels) if index else 1.0):
-            z, energy = _lobpcg(levels[index:], masses[index], components[index], z, max_iterations)
+        start = 0.3 - 0.3 * index / len(levels)
+        with progress(start, start + 0.3 / len(levels) if index else 1.0):
+            problem = levels[index:], masses[index], components[index]
+            z, energy = _lobpcg(*problem, z, tolerance, max_iterations)
         if index:
             z = levels[index - 1].prolongation @ z
     return z, energy
 
 
 def _lobpcg(
-    levels: list[Level], mass: np.ndarray, component: np.ndarray, z: np.ndarray, max_iterations: int
+    levels: list[Level],
+    mass: np.ndarray,
+    component: np.ndarray,
+    z: np.ndarray,
+    tolerance: float,
+    max_iterations: int,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Minimize the Rayleigh quotient on each connected component by LOBPCG (Knyazev 2001).
 
@@ -163,6 +183,8 @@ def _lobpcg(
         Connected component of each node.
     z : (n,) complex128 ndarray
         The initial vector.
+    tolerance : float
+        Change of the vector in an iteration, a sine of an angle, at which the iteration stops.
     max_iterations : int
 
     Returns
@@ -173,7 +195,6 @@ def _lobpcg(
         Its Rayleigh quotient on each component.
     """
     matrix, products = levels[0].matrix, _ComponentProducts(mass, component)
-    tolerance = TOLERANCE if len(matrix) > SMALL_MESH_NODES else SMALL_MESH_TOLERANCE
     # Each vector is stored as a pair with its image: the product of the matrix and the vector.
     current = products.normalize(np.stack([z, matrix @ z]))
     previous_step: list[np.ndarray] = []

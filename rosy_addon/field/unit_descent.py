@@ -18,7 +18,14 @@ from ..core.progress import progress, report
 from .analysis import edge_lengths
 from .conjugate_gradient import conjugate_gradient
 from .representation import edge_unfolding, power, unit_complex
-from .sparse_multigrid import CSRMatrix, Level, add_diagonal, from_edges, hierarchy, w_cycle
+from .sparse_multigrid import (
+    SINGULAR_SHIFT,
+    Level,
+    add_diagonal,
+    from_edges,
+    hierarchy,
+    w_cycle,
+)
 from .surface import Surface
 
 #: Diffusion times, relative to the area of the surface. Of schedules from 0.1 to 0.0003 these gave the least energy,
@@ -26,16 +33,19 @@ from .surface import Surface
 DIFFUSION_TIMES = (0.01, 0.003, 0.001, 0.0003)
 
 #: Iterations of the linear solver for each diffusion time.
-DIFFUSION_ITERATIONS = 3
+DIFFUSION_TOLERANCE, DIFFUSION_ITERATIONS = 1e-3, 3
 
 #: The descent stops when no angle of a representation changes by more than this in a step, in radians.
-ANGLE_TOLERANCE, MAX_STEPS = 1e-5, 200
+ANGLE_TOLERANCE, MAX_STEPS = 1e-3, 100
 
 #: Largest weight of an edge, relative to the median. Edges of slivers would make the matrix ill-conditioned.
 MAX_WEIGHT_RATIO = 1e4
 
 #: Smallest second derivative along the search direction, relative to that of a field that turns nowhere.
 MIN_CURVATURE_RATIO = 0.1
+
+#: Smallest gain that makes another minimum the better one, relative to the energy plus 1: no rounding error.
+MIN_GAIN = 1e-6
 
 #: With at most this number of faces, the search starts from several eigenvectors, of which this number is used.
 FEW_FACES, START_COUNT = 200, 12
@@ -67,7 +77,12 @@ class FaceEnergy:
 
     def products(self, z: np.ndarray) -> np.ndarray:
         """Return (I,) complex128: w times the rotation from the transported z of the source to the target's."""
-        return self.weight * z[self.target] * (z[self.source] * self.transport).conj()
+        products = z.take(self.source)
+        products *= self.transport
+        np.conjugate(products, out=products)
+        products *= z.take(self.target)
+        products *= self.weight
+        return products
 
     def of(self, z: np.ndarray) -> float:
         """Return the energy of (F,) representations of modulus 1."""
@@ -79,17 +94,17 @@ class FaceEnergy:
         return np.bincount(self.target, values, count) - np.bincount(self.source, values, count)
 
     @cached_property
-    def matrix(self) -> CSRMatrix:
-        """The (F, F) Hermitian matrix of the energy."""
+    def diagonal(self) -> np.ndarray:
+        """(F,) float64: the sum of the weights around each face; 1 where it is 0."""
         ends = np.concatenate([self.source, self.target])
-        diagonal = np.bincount(ends, np.tile(self.weight, 2), len(self.area))
-        diagonal[diagonal <= 0] = 1.0
-        return from_edges(self.target, self.source, -self.weight * self.transport, diagonal)
+        total = np.bincount(ends, np.tile(self.weight, 2), len(self.area))
+        return np.where(total > 0, total, 1.0)
 
     @cached_property
     def levels(self) -> list[Level]:
-        """Multigrid levels of the matrix, with a diagonal that the longest diffusion time leaves."""
-        return hierarchy(self.matrix.plus_diagonal(self.area / self.area.sum()))
+        """Multigrid levels for changes of the angles: of a real matrix, that of a field that turns nowhere."""
+        diagonal = self.diagonal * (1 + SINGULAR_SHIFT)
+        return hierarchy(from_edges(self.target, self.source, -self.weight, diagonal))
 
 
 def face_energy(surface: Surface, degree: int, is_defined: np.ndarray) -> FaceEnergy:
@@ -109,35 +124,49 @@ def face_energy(surface: Surface, degree: int, is_defined: np.ndarray) -> FaceEn
 def least_unit_field(energy: FaceEnergy, z: np.ndarray) -> np.ndarray:
     """Return representations of modulus 1 with less energy than the given ones, at a local minimum.
 
+    On meshes of few faces, the search also starts from the eigenvectors of the energy.
+
     Parameters
     ----------
     energy : FaceEnergy
     z : (F,) complex128 ndarray
         Representations of modulus 1; those that are 0 stay 0.
     """
-    with progress(0.0, 0.6, LABEL):
-        best = descend(energy, diffuse(energy, z))
+    best = descend(energy, z)
     if len(z) > FEW_FACES:
         return best
     least = energy.of(best)
-    for start in [z, *_eigenvectors(energy)]:
+    for start in _eigenvectors(energy):
         found = descend(energy, np.where(z == 0, 0, unit_complex(start, otherwise=1)))
         value = energy.of(found)
-        if value < least - 1e-6 * (1 + least):
+        if value < least - MIN_GAIN * (1 + least):
             best, least = found, value
     return best
 
 
-def diffuse(energy: FaceEnergy, z: np.ndarray) -> np.ndarray:
-    """Diffuse representations over shorter and shorter distances, with modulus 1 after each time."""
+def diffuse(levels: list[Level], mass: np.ndarray, area: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Diffuse representations over shorter and shorter distances, and normalize them after each time.
+
+    Parameters
+    ----------
+    levels : list of Level
+        Multigrid levels of the connection Laplacian.
+    mass, area : (n,) float64 ndarray
+        Mass of each node, and the sum of the masses on its connected component.
+    z : (n,) complex128 ndarray
+        Representations at the nodes.
+    """
+    z = unit_complex(z)
     for index, time in enumerate(DIFFUSION_TIMES):
-        with progress(index / len(DIFFUSION_TIMES), (index + 1) / len(DIFFUSION_TIMES), LABEL):
-            mass = energy.area / (time * energy.area.sum())
-            levels = add_diagonal(energy.levels, mass)
-            precondition = partial(w_cycle, levels)
+        with progress(index / len(DIFFUSION_TIMES), (index + 1) / len(DIFFUSION_TIMES)):
+            rate = mass / (time * area)
+            shifted = add_diagonal(levels, rate)
+            solve = partial(conjugate_gradient, shifted[0].matrix, rate * z, label=LABEL, start=z)
+            precondition = partial(w_cycle, shifted)
             z = unit_complex(
-                conjugate_gradient(
-                    levels[0].matrix, mass * z, 1e-3, precondition, LABEL, z,
+                solve(
+                    tolerance=DIFFUSION_TOLERANCE,
+                    precondition=precondition,
                     max_iterations=DIFFUSION_ITERATIONS,
                 )
             )
@@ -147,46 +176,48 @@ def diffuse(energy: FaceEnergy, z: np.ndarray) -> np.ndarray:
 def descend(energy: FaceEnergy, z: np.ndarray) -> np.ndarray:
     """Rotate each representation until the energy is at a local minimum (Polak and Ribière 1969).
 
-    The second derivative of a step is at most that of a field that turns nowhere. A step with this bound
-    reduces the energy surely; it is taken if the usual step does not.
+    The second derivative along a search direction is at most `bound`, that of a field that turns nowhere. A step of
+    this length reduces the energy surely; it is taken if the longer one does not.
     """
-    value, search, old_gradient, old_norm = energy.of(z), None, None, 1.0
+    search, old_gradient, old_norm = np.zeros(len(z)), np.zeros(len(z)), 1.0
+    products = energy.products(z)
     for step in range(MAX_STEPS):
         report(1 - 0.9**step, LABEL)
-        products = energy.products(z)
         gradient = energy.sums(products.imag)
-        # The matrix acts on representations; a change of the angle is a multiple of i z.
-        smooth = (w_cycle(energy.levels, 1j * z * gradient) * z.conj()).imag
-        norm = gradient @ smooth
-        beta = 0.0 if search is None else max(0.0, (norm - old_gradient @ smooth) / old_norm)
-        search = -smooth if beta == 0 else beta * search - smooth
+        smooth = w_cycle(energy.levels, gradient)
+        norm = float(gradient @ smooth)
+        search *= max(0.0, (norm - float(old_gradient @ smooth)) / old_norm)
+        search -= smooth
         if gradient @ search >= 0:
             search = -smooth
         old_gradient, old_norm = gradient, norm
-        change = (search[energy.target] - search[energy.source]) ** 2
-        bound = float(energy.weight @ change)
-        if not bound > 0 or not norm > 0:
+        change = search.take(energy.target) - search.take(energy.source)
+        change *= change
+        bound, slope = float(energy.weight @ change), -float(gradient @ search)
+        if not bound > 0 or not slope > 0:
             break
+        before = products.real.sum()
         curvature = max(float(products.real @ change), MIN_CURVATURE_RATIO * bound)
-        slope = -float(gradient @ search)
         for length in (slope / curvature, slope / bound):
-            turned = z * np.exp(1j * length * search)
-            new_value = energy.of(turned)
-            if new_value <= value:
+            angle = length * search
+            turned = z * (np.cos(angle) + 1j * np.sin(angle))
+            products = energy.products(turned)
+            if products.real.sum() >= before:
+                z = turned
                 break
-        if new_value > value:
+        else:
             break
-        z, value = turned, new_value
-        if np.abs(length * search).max() < ANGLE_TOLERANCE:
+        if np.abs(angle).max() < ANGLE_TOLERANCE:
             break
     return z
 
 
 def _eigenvectors(energy: FaceEnergy) -> np.ndarray:
     """Return up to `START_COUNT` eigenvectors of the energy with the least eigenvalues, as rows."""
-    count = len(energy.area)
-    dense = np.zeros((count, count), dtype=np.complex128)
-    np.add.at(dense, (energy.matrix.row_indices, energy.matrix.indices), energy.matrix.data)
+    dense = np.diag(energy.diagonal).astype(np.complex128)
+    product = energy.weight * energy.transport
+    np.subtract.at(dense, (energy.target, energy.source), product)
+    np.subtract.at(dense, (energy.source, energy.target), product.conj())
     root = np.sqrt(energy.area)
     _, vectors = np.linalg.eigh(dense / (root[:, None] * root))
     return (vectors[:, :START_COUNT] / root[:, None]).T

@@ -30,6 +30,11 @@ from .unit_descent import diffuse, face_energy, least_unit_field
 TOLERANCE, SMALL_MESH_TOLERANCE, SMALL_MESH_NODES = 1e-4, 1e-8, 30_000
 MAX_ITERATIONS = 60
 
+#: Tolerance of the eigenvector from which `smoothest_field` descends to the least energy of unit vectors. On meshes
+#: of more than `SMALL_MESH_NODES` nodes, the eigenvector is exact on the second level of multigrid, and this number
+#: of iterations on the finest level is enough for the same energy to 0.1 %, in half the time.
+START_TOLERANCE, START_ITERATIONS = 1e-4, 4
+
 #: Largest number of iterations on each intermediate multigrid level. They save iterations on the finest
 #: level.
 COARSE_ITERATIONS = 12
@@ -69,7 +74,14 @@ def smoothest_field(surface: Surface, degree: int) -> RosyField:
     with progress(0.1, 0.2):
         levels = hierarchy(laplacian(connection, degree, spectral_shift(mass)))
     with progress(0.2, 0.6):
-        z, _ = _eigenvectors(levels, mass, component, TOLERANCE)
+        is_large = len(mass) > SMALL_MESH_NODES
+        z, _ = _eigenvectors(
+            levels,
+            mass,
+            component,
+            START_TOLERANCE,
+            START_ITERATIONS if is_large else MAX_ITERATIONS,
+        )
     with progress(0.6, 0.7):
         z = diffuse(levels, mass, np.bincount(component, mass)[component], z)
     report(0.7, "averaging the field on the faces")
@@ -133,11 +145,15 @@ def eigenproblem(
         levels = hierarchy(matrix)
     tolerance = TOLERANCE if len(matrix) > SMALL_MESH_NODES else SMALL_MESH_TOLERANCE
     with progress(0.35, 1.0):
-        return _eigenvectors(levels, mass, component, tolerance)
+        return _eigenvectors(levels, mass, component, tolerance, MAX_ITERATIONS)
 
 
 def _eigenvectors(
-    levels: list[Level], mass: np.ndarray, component: np.ndarray, tolerance: float
+    levels: list[Level],
+    mass: np.ndarray,
+    component: np.ndarray,
+    tolerance: float,
+    finest_iterations: int,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the result of `eigenproblem`, given the multigrid levels of its matrix."""
     masses, components = [mass], [component]
@@ -154,6 +170,8 @@ def _eigenvectors(
     for index in reversed(range(len(levels))):
         is_between = 0 < index < len(levels) - 1
         max_iterations = COARSE_ITERATIONS if is_between else MAX_ITERATIONS
+        if not index:
+            max_iterations = finest_iterations
         start = 0.3 - 0.3 * index / len(levels)
         with progress(start, start + 0.3 / len(levels) if index else 1.0):
             problem = levels[index:], masses[index], components[index]

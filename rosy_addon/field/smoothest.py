@@ -15,6 +15,7 @@ from ..core.errors import RosyError
 from ..core.memory import raise_mmap_threshold
 from ..core.progress import progress, report
 from .connection import Connection, build_connection, laplacian
+from .free_rotation import freely_rotated
 from .representation import complex_bincount, from_representation, unit_complex
 from .rosy_field import RosyField, check_degree
 from .sparse_multigrid import CSRMatrix, Level, hierarchy, w_cycle
@@ -91,6 +92,8 @@ def smoothest_field(surface: Surface, degree: int) -> RosyField:
     z = np.where(is_defined, unit_complex(mean, otherwise=1), 0)
     with progress(0.7, 0.95):
         z = least_unit_field(face_energy(surface, degree, is_defined), z)
+    report(0.95, "rotating the field")
+    z = freely_rotated(surface, z, degree)
     return RosyField(degree, from_representation(z, x, y, degree))
 
 
@@ -330,16 +333,3 @@ def _component_sums(component: np.ndarray, values: np.ndarray, count: int) -> np
     if count == 1:
         return np.array([values.sum()], dtype=np.complex128)
     return complex_bincount(component, values, count)
-
-
-def _align_to_edges(connection: Connection, z: np.ndarray, degree: int) -> np.ndarray:
-    """Return z rotated by one angle on each component, so that the field best aligns with the edges.
-
-    Eigenvectors are unique only up to such a rotation. With this choice, the field depends on the mesh alone.
-    """
-    component = connection.component
-    count = int(component.max()) + 1
-    node = connection.corner_node
-    edge_z = np.exp(1j * degree * connection.edge_direction) * np.repeat(connection.area, 3)
-    total = _component_sums(component[node], edge_z * z[node].conj(), count)
-    return z * unit_complex(total, otherwise=1)[component]

@@ -1,9 +1,13 @@
 """Choose the rotation of a whole field, which does not change its energy.
 
-The rotation depends on the shape alone: mirror images, reversed faces, rigid motions and scales give the same
-field of lines. On each connected component, the first of these that prefers a rotation decides: the principal
-directions of curvature (even degrees), creases and borders, the directions away from the center, and the edges of the
-mesh, which depend on the triangulation.
+The rotation depends on the shape alone: mirror images, reversed faces, rigid motions and scales have the same field
+of lines. On each connected component, the first criterion that prefers a rotation decides:
+
+1. the principal directions of curvature (even degrees),
+2. creases and borders,
+3. the directions away from the center of the component,
+4. the principal directions, for twice an odd degree; then the field or its opposite, whichever is nearer to 3,
+5. the edges of the mesh, which depend on how it is divided into faces.
 """
 
 from __future__ import annotations
@@ -19,10 +23,13 @@ from .polygon_arrays import sum_per_face
 from .representation import complex_bincount, power, unit_complex
 from .surface import Surface
 
-#: A criterion decides if its sum over a component has at least this modulus, relative to the sum without
-#: cancellation and to the area. Smaller sums are noise of the mesh: it shifts those of symmetric shapes, which are
-#: 0, by up to 1e-3.
+#: A criterion decides if its sum over a component is at least this fraction of the sum of the moduli. By symmetry the
+#: sum is 0 on many shapes; there, the irregularity of a mesh makes it about 1e-3.
 LEAST_SHARE = 0.01
+
+#: The sum of the moduli has to be at least this fraction of the area: less is rounding, or a mesh that is nearly flat
+#: or round.
+LEAST_STRENGTH = 1e-3
 
 #: Curvature below which a surface counts as flat, relative to that of a sphere of the same area.
 FLAT_CURVATURE = 0.02
@@ -44,65 +51,80 @@ def freely_rotated(surface: Surface, z: np.ndarray, degree: int) -> np.ndarray:
     """
     faces = surface.corner_face[surface.edges.halfedges]
     component = connected_components(surface.face_count, faces)
-    count = int(component.max(initial=-1)) + 1
-    area = np.bincount(component, surface.face_area, count)
-    rotation = np.ones(count, dtype=np.complex128)
-    is_open = np.ones(count, dtype=bool)
+    area = np.bincount(component, surface.face_area)
+    rotation = np.zeros(len(area), dtype=np.complex128)
+
+    def sums(wanted: np.ndarray, present: np.ndarray) -> np.ndarray:
+        """Return (components,) sums of rotations to a criterion, 0 where it decides nothing."""
+        total = complex_bincount(component, wanted * present.conj(), len(area))
+        largest = np.bincount(component, np.abs(wanted), len(area))
+        decides = np.abs(total) > LEAST_SHARE * np.maximum(largest, LEAST_STRENGTH * area)
+        return np.where(decides, total, 0)
+
     for wanted in _criteria(surface, degree, component, area):
-        total = complex_bincount(component, wanted * z.conj(), count)
-        largest = np.bincount(component, np.abs(wanted) * np.abs(z), count)
-        decides = np.abs(total) > LEAST_SHARE * np.maximum(largest, LEAST_SHARE * area)
-        decides &= is_open
-        rotation[decides] = unit_complex(total[decides])
-        is_open &= ~decides
-        if not is_open.any():
-            break
+        found = unit_complex(sums(wanted, z))
+        rotation = np.where(rotation == 0, found, rotation)
+        if rotation.all():
+            return z * rotation[component]
+    if degree % 2:
+        root = np.sqrt(unit_complex(sums(_curvature(surface, 2 * degree, area[component]), z * z)))
+        away = complex_bincount(component, wanted * z.conj(), len(area)) * root.conj()
+        rotation = np.where(rotation == 0, np.where(away.real < 0, -root, root), rotation)
+    edges = complex_bincount(component, _along_edges(surface, degree) * z.conj(), len(area))
+    rotation = np.where(rotation == 0, unit_complex(edges, otherwise=1), rotation)
     return z * rotation[component]
 
 
 def _criteria(
     surface: Surface, degree: int, component: np.ndarray, area: np.ndarray
 ) -> Iterator[np.ndarray]:
-    """Yield (F,) representations that the field should be near to, times areas; see the module docstring.
+    """Yield (F,) representations of criteria 1 to 3, times areas.
 
     `component` is the connected component of each face, `area` that of each component.
     """
-    x, y = surface.face_frames
     if degree % 2 == 0:
-        smooth = with_smooth_normals(surface)
-        mean, deviator = face_curvature(smooth, *smooth.face_frames)
-        flat = FLAT_CURVATURE * np.sqrt(4 * np.pi / np.maximum(area, 1e-300))[component]
-        larger = np.maximum(np.abs(mean), np.abs(deviator)) + flat
-        confidence = np.abs(deviator) / larger
-        if degree % 4:
-            # Reversed faces change the sign of both: the direction of the larger modulus is the same.
-            confidence = confidence * mean / larger
-        yield surface.face_area * confidence * power(unit_complex(deviator), degree // 2)
-    face, next_corner = surface.corner_face, surface.next_corner
-    edge = surface.vertices[surface.corner_vertex]
-    edge = edge[next_corner] - edge
-    length = np.sqrt(dot(edge, edge))
-    # Odd degrees need a direction with a sign that reversed faces do not change: away from the face.
+        yield _curvature(surface, degree, area[component])
+    angle = np.full(len(surface.corner_vertex), np.pi / 2)
+    halfedges = surface.edges.halfedges
+    normals = surface.face_normal[surface.corner_face[halfedges]]
+    angle[halfedges] = angle_between(normals[:, 0], normals[:, 1])[:, None]
+    yield _along_edges(surface, degree, np.where(angle > CREASE_ANGLE, angle, 0))
+    scale = np.maximum(area, 1e-300)
+    moments = [np.bincount(component, surface.face_area * c) for c in surface.face_center.T]
+    offset = surface.face_center - (np.stack(moments, axis=1) / scale[:, None])[component]
+    x, y = surface.face_frames
+    away = dot(offset, x) + 1j * dot(offset, y)
+    distance = np.abs(away) / np.sqrt(scale)[component]
+    yield surface.face_area * distance * power(unit_complex(away), degree)
+
+
+def _curvature(surface: Surface, degree: int, area: np.ndarray) -> np.ndarray:
+    """Return (F,) representations of principal directions, times areas and confidences.
+
+    For degrees that are no multiple of 4, it is the direction of the curvature with the larger modulus: reversed
+    faces change the sign of curvatures. `area` is that of the component of each face.
+    """
+    smooth = with_smooth_normals(surface)
+    mean, deviator = face_curvature(smooth, *smooth.face_frames)
+    flat = FLAT_CURVATURE * np.sqrt(4 * np.pi / np.maximum(area, 1e-300))
+    larger = np.maximum(np.abs(mean), np.abs(deviator)) + flat
+    confidence = np.abs(deviator) / larger
+    if degree % 4:
+        confidence = confidence * mean / larger
+    return surface.face_area * confidence * power(unit_complex(deviator), degree // 2)
+
+
+def _along_edges(surface: Surface, degree: int, weight: np.ndarray | float = 1.0) -> np.ndarray:
+    """Return (F,) sums of representations of directions along edges, times squared lengths and weights.
+
+    Odd degrees need a direction with a sign that reversed faces do not change: away from the face, across the edge.
+    `weight` has a value for each corner, for the edge that starts there.
+    """
+    x, y = surface.face_frames
+    face, points = surface.corner_face, surface.vertices[surface.corner_vertex]
+    edge = points[surface.next_corner] - points
     along = dot(edge, x[face]) + 1j * dot(edge, y[face])
     direction = power(unit_complex(along * (-1j if degree % 2 else 1)), degree)
-    angle = np.full(len(face), np.pi / 2)
-    halfedges = surface.edges.halfedges
-    normals = surface.face_normal[face[halfedges]]
-    angle[halfedges] = angle_between(normals[:, 0], normals[:, 1])[:, None]
-    crease = np.where(angle > CREASE_ANGLE, angle, 0) * length**2
-    yield _face_sums(surface, crease * direction)
-    center = [
-        np.bincount(component, surface.face_area * column, len(area))
-        for column in surface.face_center.T
-    ]
-    center = np.stack(center, axis=1) / np.maximum(area, 1e-300)[:, None]
-    offset = surface.face_center - center[component]
-    away = (dot(offset, x) + 1j * dot(offset, y)) / np.sqrt(np.maximum(area, 1e-300))[component]
-    yield surface.face_area * np.abs(away) * power(unit_complex(away), degree)
-    yield surface.face_area[:] * _face_sums(surface, direction)
-
-
-def _face_sums(surface: Surface, values: np.ndarray) -> np.ndarray:
-    """Return (F,) complex128 sums of (C,) complex values at the corners of each face."""
+    values = weight * np.abs(along) ** 2 * direction
     start = surface.face_start
     return sum_per_face(values.real, start) + 1j * sum_per_face(values.imag, start)

@@ -34,7 +34,7 @@ MAX_ITERATIONS = 60
 #: Tolerance of the eigenvector from which `smoothest_field` descends to the least energy of unit vectors. On meshes
 #: of more than `SMALL_MESH_NODES` nodes, the eigenvector is exact on the second level of multigrid, and this number
 #: of iterations on the finest level is enough for the same energy to 0.1 %, in half the time.
-START_TOLERANCE, START_ITERATIONS = 1e-4, 4
+START_TOLERANCE, START_ITERATIONS = 1e-6, 4
 
 #: Largest number of iterations on each intermediate multigrid level. They save iterations on the finest
 #: level.

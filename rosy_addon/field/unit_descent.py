@@ -33,7 +33,7 @@ from .surface import Surface
 DIFFUSION_TIMES = (0.01, 0.003, 0.001, 0.0003)
 
 #: Iterations of the linear solver for each diffusion time.
-DIFFUSION_TOLERANCE, DIFFUSION_ITERATIONS = 1e-3, 3
+DIFFUSION_TOLERANCE, DIFFUSION_ITERATIONS = 1e-6, 30
 
 #: The descent stops when no angle of a representation changes by more than this in a step, in radians.
 ANGLE_TOLERANCE, MAX_STEPS = 1e-3, 100

@@ -32,11 +32,8 @@ from .surface import Surface
 #: or within 1 % of it, on the meshes of ../shared and on double tori.
 DIFFUSION_TIMES = (0.01, 0.003, 0.001, 0.0003)
 
-#: Iterations of the linear solver for each diffusion time.
-DIFFUSION_TOLERANCE, DIFFUSION_ITERATIONS = 1e-6, 30
-
-#: The descent stops when no angle of a representation changes by more than this in a step, in radians.
-ANGLE_TOLERANCE, MAX_STEPS = 1e-3, 100
+#: Largest number of iterations of the linear solver for each diffusion time, and of steps of the descent.
+DIFFUSION_ITERATIONS, MAX_STEPS = 60, 100
 
 #: Largest weight of an edge, relative to the median. Edges of slivers would make the matrix ill-conditioned.
 MAX_WEIGHT_RATIO = 1e4
@@ -121,7 +118,7 @@ def face_energy(surface: Surface, degree: int, is_defined: np.ndarray) -> FaceEn
     return FaceEnergy(surface.corner_face[a], surface.corner_face[b], weight, transport, area)
 
 
-def least_unit_field(energy: FaceEnergy, z: np.ndarray) -> np.ndarray:
+def least_unit_field(energy: FaceEnergy, z: np.ndarray, tolerance: float) -> np.ndarray:
     """Return representations of modulus 1 with less energy than the given ones, at a local minimum.
 
     On meshes of few faces, the search also starts from the eigenvectors of the energy.
@@ -131,20 +128,24 @@ def least_unit_field(energy: FaceEnergy, z: np.ndarray) -> np.ndarray:
     energy : FaceEnergy
     z : (F,) complex128 ndarray
         Representations of modulus 1; those that are 0 stay 0.
+    tolerance : float
+        The descent stops when no phase changes by more than this in a step, in radians.
     """
-    best = descend(energy, z)
+    best = descend(energy, z, tolerance)
     if len(z) > FEW_FACES:
         return best
     least = energy.of(best)
     for start in _eigenvectors(energy):
-        found = descend(energy, np.where(z == 0, 0, unit_complex(start, otherwise=1)))
+        found = descend(energy, np.where(z == 0, 0, unit_complex(start, otherwise=1)), tolerance)
         value = energy.of(found)
         if value < least - MIN_GAIN * (1 + least):
             best, least = found, value
     return best
 
 
-def diffuse(levels: list[Level], mass: np.ndarray, area: np.ndarray, z: np.ndarray) -> np.ndarray:
+def diffuse(
+    levels: list[Level], mass: np.ndarray, area: np.ndarray, z: np.ndarray, tolerance: float
+) -> np.ndarray:
     """Diffuse representations over shorter and shorter distances, and normalize them after each time.
 
     Parameters
@@ -155,6 +156,8 @@ def diffuse(levels: list[Level], mass: np.ndarray, area: np.ndarray, z: np.ndarr
         Mass of each node, and the sum of the masses on its connected component.
     z : (n,) complex128 ndarray
         Representations at the nodes.
+    tolerance : float
+        Residual norm at which the linear solver stops, relative to the norm of the right-hand side.
     """
     z = unit_complex(z)
     for index, time in enumerate(DIFFUSION_TIMES):
@@ -165,7 +168,7 @@ def diffuse(levels: list[Level], mass: np.ndarray, area: np.ndarray, z: np.ndarr
             precondition = partial(w_cycle, shifted)
             z = unit_complex(
                 solve(
-                    tolerance=DIFFUSION_TOLERANCE,
+                    tolerance=tolerance,
                     precondition=precondition,
                     max_iterations=DIFFUSION_ITERATIONS,
                 )
@@ -173,7 +176,7 @@ def diffuse(levels: list[Level], mass: np.ndarray, area: np.ndarray, z: np.ndarr
     return z
 
 
-def descend(energy: FaceEnergy, z: np.ndarray) -> np.ndarray:
+def descend(energy: FaceEnergy, z: np.ndarray, tolerance: float) -> np.ndarray:
     """Rotate each representation until the energy is at a local minimum (Polak and Ribière 1969).
 
     The second derivative along a search direction is at most `bound`, that of a field that turns nowhere. A step of
@@ -207,7 +210,7 @@ def descend(energy: FaceEnergy, z: np.ndarray) -> np.ndarray:
                 break
         else:
             break
-        if np.abs(angle).max() < ANGLE_TOLERANCE:
+        if np.abs(angle).max() < tolerance:
             break
     return z
 

@@ -34,7 +34,7 @@ MAX_ITERATIONS = 60
 #: Tolerances of `smoothest_field`: of the eigenvector from which it descends, of the diffusion and of the descent. With
 #: `EXACT`, for meshes of up to `EXACT_NODES` nodes, the field does not depend on the numbering up to 0.1 degrees, unless
 #: two minima are as good. `FAST` reaches the same energies to 2 %, in a third of the time.
-EXACT, FAST, EXACT_NODES = (1e-7, 1e-7, 1e-4), (1e-4, 1e-3, 1e-3), 5_000
+EXACT, FAST, EXACT_NODES = (1e-7, 1e-7, 1e-6), (1e-4, 1e-3, 1e-3), 5_000
 
 #: Iterations for the eigenvector on the finest level, on meshes of more than `SMALL_MESH_NODES` nodes.
 LARGE_MESH_ITERATIONS = 4

@@ -47,6 +47,9 @@ MIN_GAIN = 1e-6
 #: With at most this number of faces, the search starts from several eigenvectors, of which this number is used.
 FEW_FACES, START_COUNT = 400, 12
 
+#: Difference of gains, relative to them, that is a rounding error; tolerance of the angles after a move.
+EQUAL_GAIN, MOVE_TOLERANCE = 1e-3, 1e-3
+
 #: Number of edges across which singularities are moved, if this reduces the energy.
 MOVES_TRIED = 12
 
@@ -65,6 +68,8 @@ class FaceEnergy:
         w, as in `analysis.dirichlet_energy`, but limited.
     transport : (I,) complex128 ndarray
         r, of modulus 1.
+    ends : (I, 2) int32 ndarray
+        The vertices of each edge.
     area : (F,) float64 ndarray
         Areas of the faces, always positive.
     """
@@ -73,6 +78,7 @@ class FaceEnergy:
     target: np.ndarray
     weight: np.ndarray
     transport: np.ndarray
+    ends: np.ndarray
     area: np.ndarray
 
     def products(self, z: np.ndarray) -> np.ndarray:
@@ -118,10 +124,14 @@ def face_energy(surface: Surface, degree: int, is_defined: np.ndarray) -> FaceEn
     transport = power(edge_unfolding(surface, a, b), degree)
     area = surface.face_area
     area = np.maximum(area, 1e-12 * max(float(area.mean()), 1e-300))
-    return FaceEnergy(surface.corner_face[a], surface.corner_face[b], weight, transport, area)
+    ends = surface.corner_vertex[halfedges]
+    faces = surface.corner_face[halfedges]
+    return FaceEnergy(*faces.T, weight, transport, ends, area)
 
 
-def least_unit_field(energy: FaceEnergy, z: np.ndarray, tolerance: float) -> np.ndarray:
+def least_unit_field(
+    energy: FaceEnergy, z: np.ndarray, tolerance: float, rounds: int
+) -> np.ndarray:
     """Return representations of modulus 1 with less energy than the given ones, at a local minimum.
 
     On meshes of few faces, the search also starts from the eigenvectors of the energy.
@@ -133,20 +143,57 @@ def least_unit_field(energy: FaceEnergy, z: np.ndarray, tolerance: float) -> np.
         Representations of modulus 1; those that are 0 stay 0.
     tolerance : float
         The descent stops when no phase changes by more than this in a step, in radians.
+    rounds : int
+        How many times singularities are moved.
     """
     best = descend(energy, z, tolerance)
     if len(z) > FEW_FACES:
-        return best
+        return _with_moves(energy, best, tolerance, rounds)
     least = energy.of(best)
     for start in _eigenvectors(energy):
         found = descend(energy, np.where(z == 0, 0, unit_complex(start, otherwise=1)), tolerance)
         value = energy.of(found)
         if value < least - MIN_GAIN * (1 + least):
             best, least = found, value
-    return _with_moved_singularities(energy, best, tolerance)
+    return _with_moves_in_few_faces(energy, best, tolerance)
 
 
-def _with_moved_singularities(energy: FaceEnergy, z: np.ndarray, tolerance: float) -> np.ndarray:
+def _with_moves(energy: FaceEnergy, z: np.ndarray, tolerance: float, rounds: int) -> np.ndarray:
+    """Move singularities of a local minimum across edges, many at a time, while this reduces the energy.
+
+    See `_with_moves_in_few_faces`. Here, the resistance is an estimate: beside the edge, half the conductance of a
+    path over the other edges of both faces, which is exact for equilateral triangles.
+    """
+    weight, ends = energy.weight, energy.ends
+    beside = energy.diagonal[np.stack([energy.source, energy.target])] - weight
+    detour = 0.5 * beside.prod(axis=0) / np.maximum(beside.sum(axis=0), 1e-300)
+    barrier = np.pi * detour / np.maximum(weight + detour, 1e-300)
+    least, least_gain = energy.of(z), 0.0
+    for _ in range(rounds):
+        turn = np.angle(energy.products(z))
+        gain = weight * (np.abs(turn) - barrier)
+        # Take the best edge of both of its vertices; of equal ones none, so that symmetric fields stay symmetric.
+        best = np.zeros(int(ends.max(initial=0)) + 1)
+        np.maximum.at(best, ends.ravel(), np.repeat(gain, 2))
+        chosen = (gain > least_gain) & (gain >= (1 - EQUAL_GAIN) * best[ends].max(axis=1))
+        chosen &= (np.bincount(ends[chosen].ravel(), minlength=len(best))[ends] == 1).all(axis=1)
+        if not chosen.any():
+            break
+        jump = np.where(chosen, 2 * np.pi * np.sign(turn), 0)
+        matrix, precondition = energy.levels[0].matrix, partial(w_cycle, energy.levels)
+        change = conjugate_gradient(
+            matrix, energy.sums(weight * jump), MOVE_TOLERANCE, precondition, LABEL
+        )
+        found = descend(energy, z * np.exp(1j * change), tolerance)
+        value = energy.of(found)
+        if value < least - MIN_GAIN * (1 + least):
+            z, least = found, value
+        else:
+            least_gain = (1 + EQUAL_GAIN) * float(np.median(gain[chosen]))
+    return z
+
+
+def _with_moves_in_few_faces(energy: FaceEnergy, z: np.ndarray, tolerance: float) -> np.ndarray:
     """Move singularities of a local minimum across edges, one at a time, as long as this reduces the energy.
 
     A singularity crosses an edge if the phase there turns by 2 pi more or less. If the other angles adapt, this changes

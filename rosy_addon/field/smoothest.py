@@ -1,13 +1,14 @@
 """Compute the smoothest field of degree N (Knöppel, Crane, Pinkall and Schröder, SIGGRAPH 2013).
 
-The field is the eigenvector of the connection Laplacian of degree N that has the smallest eigenvalue. It is
-computed at the nodes, which are the vertices (see `field.connection`), and transported to the faces.
+The eigenvector of the connection Laplacian of degree N that has the smallest eigenvalue is computed at the nodes, which
+are the vertices (see `field.connection`), and transported to the faces. Then the energy of unit vectors is reduced.
 Disconnected components of a mesh are solved separately.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,14 +32,36 @@ from .unit_descent import diffuse, face_energy, least_unit_field
 TOLERANCE, SMALL_MESH_TOLERANCE, SMALL_MESH_NODES = 1e-4, 1e-8, 30_000
 MAX_ITERATIONS = 60
 
-#: Tolerances of `smoothest_field`: of the eigenvector from which it descends, of the diffusion and of the descent; and
-#: rounds of moves of singularities. With
-#: `EXACT`, for meshes of up to `EXACT_NODES` nodes, the field does not depend on the numbering up to 0.1 degrees, unless
-#: two minima are as good. `FAST` reaches the same energies to 2 %, in a third of the time.
-EXACT, FAST, EXACT_NODES = (1e-7, 1e-7, 1e-6, 8), (1e-4, 1e-3, 1e-3, 1), 5_000
 
-#: Iterations for the eigenvector on the finest level, on meshes of more than `SMALL_MESH_NODES` nodes.
-LARGE_MESH_ITERATIONS = 4
+class Effort(NamedTuple):
+    """How exactly `smoothest_field` computes, for meshes of up to a number of nodes.
+
+    Attributes
+    ----------
+    most_nodes : float
+    eigenvector, diffusion, descent : float
+        Tolerances of the eigenvector from which it starts, of the diffusion, and of the descent.
+    iterations : int
+        Largest number of iterations for the eigenvector on the finest level.
+    rounds : int
+        How many times singularities are moved.
+    """
+
+    most_nodes: float
+    eigenvector: float
+    diffusion: float
+    descent: float
+    iterations: int
+    rounds: int
+
+
+#: The first makes the field independent of the numbering, to 0.1 degrees, except where two minima are as good. The others
+#: reach its energy to 1 or 2 %, on meshes where it would take too long.
+EFFORTS = (
+    Effort(5_000, 1e-7, 1e-7, 1e-6, MAX_ITERATIONS, 8),
+    Effort(SMALL_MESH_NODES, 1e-4, 1e-3, 3e-3, MAX_ITERATIONS, 1),
+    Effort(np.inf, 1e-4, 1e-2, 1e-2, 4, 0),
+)
 
 #: Largest number of iterations on each intermediate multigrid level. They save iterations on the finest
 #: level.
@@ -49,9 +72,9 @@ SPECTRAL_SHIFT = 0.02
 
 
 def smoothest_field(surface: Surface, degree: int) -> RosyField:
-    """Compute the field with the least Dirichlet energy among all fields of the same L2 norm.
+    """Compute the field of unit vectors with the least Dirichlet energy that is found.
 
-    Its vectors are then normalized.
+    It starts from the field with the least energy among all fields of the same L2 norm; see `field.unit_descent`.
 
     Parameters
     ----------
@@ -63,7 +86,7 @@ def smoothest_field(surface: Surface, degree: int) -> RosyField:
     -------
     RosyField
         A field of magnitude 1; zero on faces without area. A rotation of the whole field does not change its
-        energy, so the field is finally rotated to align with the edges of the mesh.
+        energy; see `field.free_rotation`.
 
     Raises
     ------
@@ -76,22 +99,23 @@ def smoothest_field(surface: Surface, degree: int) -> RosyField:
     if not connection.mass.any():
         raise RosyError(f"{surface.name}: no face has an area")
     mass, component = connection.positive_mass, connection.component
-    tolerances = EXACT if len(mass) <= EXACT_NODES else FAST
+    effort = next(each for each in EFFORTS if len(mass) <= each.most_nodes)
     with progress(0.1, 0.2):
         levels = hierarchy(laplacian(connection, degree, spectral_shift(mass)))
     with progress(0.2, 0.6):
-        iterations = MAX_ITERATIONS if len(mass) <= SMALL_MESH_NODES else LARGE_MESH_ITERATIONS
-        z, _ = _eigenvectors(levels, mass, component, tolerances[0], iterations)
+        tolerance, iterations = effort.eigenvector, effort.iterations
+        z, _ = _eigenvectors(levels, mass, component, tolerance, iterations)
     with progress(0.6, 0.7):
         component_mass = np.bincount(component, mass)[component]
-        z = diffuse(levels, mass, component_mass, z, tolerances[1])
+        z = diffuse(levels, mass, component_mass, z, effort.diffusion)
     report(0.7, "averaging the field on the faces")
     x, y = surface.face_frames
     mean = SurfaceAverages(surface, connection, x, y).face_sums(z, degree)
     is_defined = (surface.face_area > 0) & x.any(axis=1)
     z = np.where(is_defined, unit_complex(mean, otherwise=1), 0)
     with progress(0.7, 0.95):
-        z = least_unit_field(face_energy(surface, degree, is_defined), z, *tolerances[2:])
+        energy = face_energy(surface, degree, is_defined)
+        z = least_unit_field(energy, z, effort.descent, effort.rounds)
     report(0.95, "rotating the field")
     z = freely_rotated(surface, z, degree)
     return RosyField(degree, from_representation(z, x, y, degree))

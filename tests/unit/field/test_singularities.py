@@ -11,7 +11,7 @@ from rosy_addon.cli.parser import main
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import count_ties, find_singularities
 
-SURFACE = plane(6)
+SURFACE = plane(6, 6)
 
 
 def turned_field(noise, seed=0):
@@ -25,7 +25,7 @@ def turned_field(noise, seed=0):
 
 
 def test_rounding_errors_change_no_singularity():
-    """Nine faces are turned, with four edges each; three of them are beside a border, with one edge less."""
+    """Nine of 36 faces are turned, with four edges each; five of them are at the border, where six edges end."""
     expected = [part.tolist() for part in find_singularities(SURFACE, turned_field(0))]
     ties = count_ties(SURFACE, turned_field(0))
     inside = SURFACE.edges.halfedges

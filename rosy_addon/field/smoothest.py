@@ -108,6 +108,7 @@ def smoothest_field(surface: Surface, degree: int) -> RosyField:
     with progress(0.6, 0.7):
         component_mass = np.bincount(component, mass)[component]
         z = diffuse(levels, mass, component_mass, z, effort.diffusion)
+    del levels
     report(0.7, "averaging the field on the faces")
     x, y = surface.face_frames
     mean = SurfaceAverages(surface, connection, x, y).face_sums(z, degree)
@@ -116,6 +117,7 @@ def smoothest_field(surface: Surface, degree: int) -> RosyField:
     with progress(0.7, 0.95):
         energy = face_energy(surface, degree, is_defined)
         z = least_unit_field(energy, z, effort.descent, effort.rounds)
+    del connection, energy  # they take as much memory as the rest needs
     report(0.95, "rotating the field")
     z = freely_rotated(surface, z, degree)
     return RosyField(degree, from_representation(z, x, y, degree))

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..core.progress import progress, report
 from .analysis import edge_lengths
+from .blocks import by_rows
 from .conjugate_gradient import conjugate_gradient
 from .representation import edge_unfolding, power, unit_complex
 from .sparse_multigrid import (
@@ -118,10 +119,10 @@ def face_energy(surface: Surface, degree: int, is_defined: np.ndarray) -> FaceEn
     halfedges = surface.edges.halfedges
     halfedges = halfedges[is_defined[surface.corner_face[halfedges]].all(axis=1)]
     a, b = halfedges.T
-    length, distance = edge_lengths(surface, a, b)
+    length, distance = by_rows(partial(edge_lengths, surface), a, b)
     weight = np.divide(length, distance, out=np.zeros_like(length), where=distance > 0)
     weight = np.minimum(weight, MAX_WEIGHT_RATIO * np.median(weight)) if len(a) else weight
-    transport = power(edge_unfolding(surface, a, b), degree)
+    transport = power(by_rows(partial(edge_unfolding, surface), a, b), degree)
     area = surface.face_area
     area = np.maximum(area, 1e-12 * max(float(area.mean()), 1e-300))
     ends = surface.corner_vertex[halfedges]

@@ -58,9 +58,9 @@ class Effort(NamedTuple):
 #: The first makes the field independent of the numbering, to 0.1 degrees, except where two minima are as good. The others
 #: reach its energy to 1 or 2 %, on meshes where it would take too long.
 EFFORTS = (
-    Effort(5_000, 1e-7, 1e-7, 1e-6, MAX_ITERATIONS, 8),
-    Effort(SMALL_MESH_NODES, 1e-4, 1e-3, 3e-3, MAX_ITERATIONS, 1),
-    Effort(np.inf, 1e-4, 1e-2, 1e-2, 4, 0),
+    Effort(5_000, 1e-7, 1e-7, 1e-13, MAX_ITERATIONS, 8),
+    Effort(SMALL_MESH_NODES, 1e-4, 1e-2, 1e-5, MAX_ITERATIONS, 1),
+    Effort(np.inf, 1e-4, 1e-2, 1e-4, 4, 0),
 )
 
 #: Largest number of iterations on each intermediate multigrid level. They save iterations on the finest

@@ -143,7 +143,7 @@ def least_unit_field(
     z : (F,) complex128 ndarray
         Representations of modulus 1; those that are 0 stay 0.
     tolerance : float
-        The descent stops when no phase changes by more than this in a step, in radians.
+        The descent stops when a step reduces the energy by less than this fraction of it.
     rounds : int
         How many times singularities are moved.
     """
@@ -266,7 +266,7 @@ def descend(energy: FaceEnergy, z: np.ndarray, tolerance: float) -> np.ndarray:
     this length reduces the energy surely; it is taken if the longer one does not.
     """
     search, old_gradient, old_norm = np.zeros(len(z)), np.zeros(len(z)), 1.0
-    products = energy.products(z)
+    products, total = energy.products(z), energy.weight.sum()
     for step in range(MAX_STEPS):
         report(1 - 0.9**step, LABEL)
         gradient = energy.sums(products.imag)
@@ -293,7 +293,8 @@ def descend(energy: FaceEnergy, z: np.ndarray, tolerance: float) -> np.ndarray:
                 break
         else:
             break
-        if np.abs(angle).max() < tolerance:
+        after = products.real.sum()
+        if after - before < tolerance * (total - after + 1e-6):
             break
     return z
 

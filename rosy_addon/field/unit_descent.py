@@ -29,8 +29,8 @@ from .sparse_multigrid import (
 )
 from .surface import Surface
 
-#: Diffusion times, relative to the area of the surface. Of schedules from 0.1 to 0.0003 these gave the least energy,
-#: or within 1 % of it, on the meshes of ../shared and on double tori.
+#: Diffusion times, relative to the area. Of nine schedules on six meshes, degrees 1 and 4, this one gave the least energy
+#: or up to 2 % more.
 DIFFUSION_TIMES = (0.01, 0.003, 0.001, 0.0003)
 
 #: Largest number of iterations of the linear solver for each diffusion time, and of steps of the descent.

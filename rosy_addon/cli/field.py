@@ -20,6 +20,7 @@ from ..field.formats.sings import SINGULARITY_SUFFIXES, read_sings
 from ..field.joining import coinciding_borders
 from ..field.mesh_arrays import SIMULATION_READERS
 from ..field.mesh_io import READERS
+from ..field.singularities import count_ties
 from .mesh_field import add_field_file_options, add_mesh_options, load_mesh_and_field, read_field
 from .options import CommandParser, Options, add_subcommand, float_between, int_between
 from .streams import print_line
@@ -86,6 +87,7 @@ def run_info(options: Options) -> None:
         "undefined_faces": int(np.count_nonzero(magnitude == 0)),
         "is_rosy": field.is_rosy,
         "energy": field.energy,
+        "ties": count_ties(surface, field),
         "singularities": np.stack(field.singularities, axis=1).tolist(),
     }
     if options.against is not None:
@@ -146,6 +148,12 @@ def _format_info(facts: dict[str, Any]) -> str:
         lines.append("directions at free angles, not a RoSy")
     if "against" in facts:
         lines.append(_format_comparison(facts["against"]))
+    if facts["ties"]:
+        edges = counted(facts["ties"], "edge")
+        lines.append(
+            f"{edges} where the field turns by {180 / degree:.4g} degrees, to either side: "
+            "singularities near them are arbitrary; smooth the field (--smooth)"
+        )
     lines.append(counted(len(singularities), "singularity", "singularities"))
     lines += [f"  vertex {vertex}: {index:+d}/{degree}" for vertex, index in singularities]
     return "\n".join(lines)

@@ -56,7 +56,7 @@ MIN_PROJECTION = 1e-12
 #: Peak memory in bytes per triangle, measured with the most expensive options of each kind of field. Kinds
 #: that are not listed need little memory.
 BYTES_PER_TRIANGLE = dict(
-    form=1200, smoothest=640, curvature=950, features=1000, guided=950, prescribed=1600
+    form=1200, smoothest=950, curvature=950, features=1000, guided=950, prescribed=1600
 )
 
 

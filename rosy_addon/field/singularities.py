@@ -11,7 +11,7 @@ from ..core.progress import report
 from .blocks import mask
 from .frames import dot
 from .polygon_arrays import face_blocks, next_corners
-from .representation import face_representation, matching_angles
+from .representation import face_representation, is_tie, matching_angles
 from .rosy_field import RosyField
 from .surface import Surface
 
@@ -57,6 +57,18 @@ def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, 
     has_index[corner_vertex[(z == 0)[surface.corner_face]]] = False
     vertex = np.flatnonzero(has_index & (index != 0)).astype(np.int32)
     return vertex, index[vertex]
+
+
+def count_ties(surface: Surface, field: RosyField) -> int:
+    """Return the number of edges at which the field turns by half the angle between its members.
+
+    There, two members of the second face match as well as each other. Which one is taken decides where singularities
+    are; see `representation.matching_angles`.
+    """
+    z = face_representation(surface, field)
+    angle = field.degree * matching_angles(surface, z, field.degree)
+    defined = (z != 0)[surface.corner_face[surface.edges.halfedges]].all(axis=1)
+    return int(np.count_nonzero(is_tie(angle) & defined))
 
 
 def format_index(index: int, degree: int) -> str:

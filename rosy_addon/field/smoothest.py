@@ -1,13 +1,14 @@
 """Compute the smoothest field of degree N (Knöppel, Crane, Pinkall and Schröder, SIGGRAPH 2013).
 
-The field is the eigenvector of the connection Laplacian of degree N that has the smallest eigenvalue. It is
-computed at the nodes, which are the vertices (see `field.connection`), and transported to the faces.
+The eigenvector of the connection Laplacian of degree N that has the smallest eigenvalue is computed at the nodes, which
+are the vertices (see `field.connection`), and transported to the faces. Then the energy of unit vectors is reduced.
 Disconnected components of a mesh are solved separately.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,11 +16,13 @@ from ..core.errors import RosyError
 from ..core.memory import raise_mmap_threshold
 from ..core.progress import progress, report
 from .connection import Connection, build_connection, laplacian
+from .free_rotation import freely_rotated
 from .representation import complex_bincount, from_representation, unit_complex
 from .rosy_field import RosyField, check_degree
 from .sparse_multigrid import CSRMatrix, Level, hierarchy, w_cycle
 from .surface import Surface
 from .surface_averages import SurfaceAverages
+from .unit_descent import diffuse, face_energy, least_unit_field
 
 #: The eigensolver stops when the eigenvector changes by less than this in an iteration (the sine of
 #: an angle). With `TOLERANCE`, the energy has about eight correct digits. Meshes of up to
@@ -28,6 +31,37 @@ from .surface_averages import SurfaceAverages
 #: seconds and make no visible difference.
 TOLERANCE, SMALL_MESH_TOLERANCE, SMALL_MESH_NODES = 1e-4, 1e-8, 30_000
 MAX_ITERATIONS = 60
+
+
+class Effort(NamedTuple):
+    """How exactly `smoothest_field` computes, for meshes of up to a number of nodes.
+
+    Attributes
+    ----------
+    most_nodes : float
+    eigenvector, diffusion, descent : float
+        Tolerances of the eigenvector from which it starts, of the diffusion, and of the descent.
+    iterations : int
+        Largest number of iterations for the eigenvector on the finest level.
+    rounds : int
+        How many times singularities are moved.
+    """
+
+    most_nodes: float
+    eigenvector: float
+    diffusion: float
+    descent: float
+    iterations: int
+    rounds: int
+
+
+#: The first makes the field independent of the numbering, to 0.1 degrees, except where two minima are as good. The others
+#: reach its energy to 1 or 2 %, on meshes where it would take too long.
+EFFORTS = (
+    Effort(5_000, 1e-7, 1e-7, 1e-13, MAX_ITERATIONS, 8),
+    Effort(SMALL_MESH_NODES, 1e-4, 1e-2, 1e-5, MAX_ITERATIONS, 1),
+    Effort(np.inf, 1e-4, 1e-2, 1e-4, 4, 0),
+)
 
 #: Largest number of iterations on each intermediate multigrid level. They save iterations on the finest
 #: level.
@@ -38,9 +72,9 @@ SPECTRAL_SHIFT = 0.02
 
 
 def smoothest_field(surface: Surface, degree: int) -> RosyField:
-    """Compute the field with the least Dirichlet energy among all fields of the same L2 norm.
+    """Compute the field of unit vectors with the least Dirichlet energy that is found.
 
-    Its vectors are then normalized.
+    It starts from the field with the least energy among all fields of the same L2 norm; see `field.unit_descent`.
 
     Parameters
     ----------
@@ -52,7 +86,7 @@ def smoothest_field(surface: Surface, degree: int) -> RosyField:
     -------
     RosyField
         A field of magnitude 1; zero on faces without area. A rotation of the whole field does not change its
-        energy, so the field is finally rotated to align with the edges of the mesh.
+        energy; see `field.free_rotation`.
 
     Raises
     ------
@@ -64,13 +98,29 @@ def smoothest_field(surface: Surface, degree: int) -> RosyField:
     connection = build_connection(surface)
     if not connection.mass.any():
         raise RosyError(f"{surface.name}: no face has an area")
-    with progress(0.1, 0.95):
-        z, _ = smallest_eigenvectors(connection, degree)
-    z = _align_to_edges(connection, z, degree)
-    report(0.95, "averaging the field on the faces")
+    mass, component = connection.positive_mass, connection.component
+    effort = next(each for each in EFFORTS if len(mass) <= each.most_nodes)
+    with progress(0.1, 0.2):
+        levels = hierarchy(laplacian(connection, degree, spectral_shift(mass)))
+    with progress(0.2, 0.6):
+        tolerance, iterations = effort.eigenvector, effort.iterations
+        z, _ = _eigenvectors(levels, mass, component, tolerance, iterations)
+    with progress(0.6, 0.7):
+        component_mass = np.bincount(component, mass)[component]
+        z = diffuse(levels, mass, component_mass, z, effort.diffusion)
+    del levels
+    report(0.7, "averaging the field on the faces")
     x, y = surface.face_frames
     mean = SurfaceAverages(surface, connection, x, y).face_sums(z, degree)
-    return RosyField(degree, from_representation(unit_complex(mean), x, y, degree))
+    is_defined = (surface.face_area > 0) & x.any(axis=1)
+    z = np.where(is_defined, unit_complex(mean, otherwise=1), 0)
+    with progress(0.7, 0.95):
+        energy = face_energy(surface, degree, is_defined)
+        z = least_unit_field(energy, z, effort.descent, effort.rounds)
+    del connection, energy  # they take as much memory as the rest needs
+    report(0.95, "rotating the field")
+    z = freely_rotated(surface, z, degree)
+    return RosyField(degree, from_representation(z, x, y, degree))
 
 
 def smallest_eigenvectors(connection: Connection, degree: int) -> tuple[np.ndarray, np.ndarray]:
@@ -122,6 +172,19 @@ def eigenproblem(
     """
     with progress(0.0, 0.35):
         levels = hierarchy(matrix)
+    tolerance = TOLERANCE if len(matrix) > SMALL_MESH_NODES else SMALL_MESH_TOLERANCE
+    with progress(0.35, 1.0):
+        return _eigenvectors(levels, mass, component, tolerance, MAX_ITERATIONS)
+
+
+def _eigenvectors(
+    levels: list[Level],
+    mass: np.ndarray,
+    component: np.ndarray,
+    tolerance: float,
+    finest_iterations: int,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the result of `eigenproblem`, given the multigrid levels of its matrix."""
     masses, components = [mass], [component]
     for level in levels[:-1]:
         p = level.prolongation
@@ -136,16 +199,24 @@ def eigenproblem(
     for index in reversed(range(len(levels))):
         is_between = 0 < index < len(levels) - 1
         max_iterations = COARSE_ITERATIONS if is_between else MAX_ITERATIONS
-        start = 0.5 - 0.1 * index / len(levels)
-        with progress(start, start + 0.1 / len(levels) if index else 1.0):
-            z, energy = _lobpcg(levels[index:], masses[index], components[index], z, max_iterations)
+        if not index:
+            max_iterations = finest_iterations
+        start = 0.3 - 0.3 * index / len(levels)
+        with progress(start, start + 0.3 / len(levels) if index else 1.0):
+            problem = levels[index:], masses[index], components[index]
+            z, energy = _lobpcg(*problem, z, tolerance, max_iterations)
         if index:
             z = levels[index - 1].prolongation @ z
     return z, energy
 
 
 def _lobpcg(
-    levels: list[Level], mass: np.ndarray, component: np.ndarray, z: np.ndarray, max_iterations: int
+    levels: list[Level],
+    mass: np.ndarray,
+    component: np.ndarray,
+    z: np.ndarray,
+    tolerance: float,
+    max_iterations: int,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Minimize the Rayleigh quotient on each connected component by LOBPCG (Knyazev 2001).
 
@@ -159,6 +230,8 @@ def _lobpcg(
         Connected component of each node.
     z : (n,) complex128 ndarray
         The initial vector.
+    tolerance : float
+        Change of the vector in an iteration, a sine of an angle, at which the iteration stops.
     max_iterations : int
 
     Returns
@@ -169,7 +242,6 @@ def _lobpcg(
         Its Rayleigh quotient on each component.
     """
     matrix, products = levels[0].matrix, _ComponentProducts(mass, component)
-    tolerance = TOLERANCE if len(matrix) > SMALL_MESH_NODES else SMALL_MESH_TOLERANCE
     # Each vector is stored as a pair with its image: the product of the matrix and the vector.
     current = products.normalize(np.stack([z, matrix @ z]))
     previous_step: list[np.ndarray] = []
@@ -287,16 +359,3 @@ def _component_sums(component: np.ndarray, values: np.ndarray, count: int) -> np
     if count == 1:
         return np.array([values.sum()], dtype=np.complex128)
     return complex_bincount(component, values, count)
-
-
-def _align_to_edges(connection: Connection, z: np.ndarray, degree: int) -> np.ndarray:
-    """Return z rotated by one angle on each component, so that the field best aligns with the edges.
-
-    Eigenvectors are unique only up to such a rotation. With this choice, the field depends on the mesh alone.
-    """
-    component = connection.component
-    count = int(component.max()) + 1
-    node = connection.corner_node
-    edge_z = np.exp(1j * degree * connection.edge_direction) * np.repeat(connection.area, 3)
-    total = _component_sums(component[node], edge_z * z[node].conj(), count)
-    return z * unit_complex(total, otherwise=1)[component]

@@ -1,0 +1,130 @@
+"""Choose the rotation of a whole field, which does not change its energy.
+
+The rotation depends on the shape alone: mirror images, reversed faces, rigid motions and scales have the same field
+of lines. On each connected component, the first criterion that prefers a rotation decides:
+
+1. the principal directions of curvature (even degrees),
+2. creases and borders,
+3. the directions away from the center of the component,
+4. the principal directions, for twice an odd degree; then the field or its opposite, whichever is nearer to 3,
+5. the edges of the mesh, which depend on how it is divided into faces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from .connectivity import connected_components
+from .curvature import face_curvature, with_smooth_normals
+from .frames import angle_between, dot
+from .polygon_arrays import sum_per_face
+from .representation import complex_bincount, power, unit_complex
+from .surface import Surface
+
+#: A criterion decides if its sum over a component is at least this fraction of the sum of the moduli. By symmetry the
+#: sum is 0 on many shapes. With 0.01, criterion 3 misses degree 3 on a head with one mirror plane.
+LEAST_SHARE = 0.003
+
+#: The sum of the moduli has to be at least this fraction of the area: less is rounding, or a mesh that is nearly flat
+#: or round.
+LEAST_STRENGTH = 1e-3
+
+#: Curvature below which a surface counts as flat, relative to that of a sphere of the same area.
+FLAT_CURVATURE = 0.02
+
+#: Smallest angle between the faces of a crease, in radians: the angle of sharp edges of *Features*.
+CREASE_ANGLE = np.pi / 6
+
+
+def freely_rotated(surface: Surface, z: np.ndarray, degree: int) -> np.ndarray:
+    """Return representations z of a field of degree N, rotated by one angle on each connected component.
+
+    Parameters
+    ----------
+    surface : Surface
+    z : (F,) complex128 ndarray
+        Representations in the frames of the faces, of modulus 1 or 0.
+    degree : int
+        N.
+    """
+    faces = surface.corner_face[surface.edges.halfedges]
+    component = connected_components(surface.face_count, faces)
+    area = np.bincount(component, surface.face_area)
+    rotation = np.zeros(len(area), dtype=np.complex128)
+
+    def sums(wanted: np.ndarray, present: np.ndarray) -> np.ndarray:
+        """Return (components,) sums of rotations to a criterion, 0 where it decides nothing."""
+        total = complex_bincount(component, wanted * present.conj(), len(area))
+        largest = np.bincount(component, np.abs(wanted), len(area))
+        decides = np.abs(total) > LEAST_SHARE * np.maximum(largest, LEAST_STRENGTH * area)
+        return np.where(decides, total, 0)
+
+    for wanted in _criteria(surface, degree, component, area):
+        found = unit_complex(sums(wanted, z))
+        rotation = np.where(rotation == 0, found, rotation)
+        if rotation.all():
+            return z * rotation[component]
+    if degree % 2:
+        root = np.sqrt(unit_complex(sums(_curvature(surface, 2 * degree, area[component]), z * z)))
+        away = complex_bincount(component, wanted * z.conj(), len(area)) * root.conj()
+        rotation = np.where(rotation == 0, np.where(away.real < 0, -root, root), rotation)
+    edges = complex_bincount(component, _along_edges(surface, degree) * z.conj(), len(area))
+    rotation = np.where(rotation == 0, unit_complex(edges, otherwise=1), rotation)
+    return z * rotation[component]
+
+
+def _criteria(
+    surface: Surface, degree: int, component: np.ndarray, area: np.ndarray
+) -> Iterator[np.ndarray]:
+    """Yield (F,) representations of criteria 1 to 3, times areas.
+
+    `component` is the connected component of each face, `area` that of each component.
+    """
+    if degree % 2 == 0:
+        yield _curvature(surface, degree, area[component])
+    angle = np.full(len(surface.corner_vertex), np.pi / 2)
+    halfedges = surface.edges.halfedges
+    normals = surface.face_normal[surface.corner_face[halfedges]]
+    angle[halfedges] = angle_between(normals[:, 0], normals[:, 1])[:, None]
+    yield _along_edges(surface, degree, np.where(angle > CREASE_ANGLE, angle, 0))
+    scale = np.maximum(area, 1e-300)
+    moments = [np.bincount(component, surface.face_area * c) for c in surface.face_center.T]
+    offset = surface.face_center - (np.stack(moments, axis=1) / scale[:, None])[component]
+    x, y = surface.face_frames
+    away = dot(offset, x) + 1j * dot(offset, y)
+    distance = np.abs(away) / np.sqrt(scale)[component]
+    yield surface.face_area * distance * power(unit_complex(away), degree)
+
+
+def _curvature(surface: Surface, degree: int, area: np.ndarray) -> np.ndarray:
+    """Return (F,) representations of principal directions, times areas and confidences.
+
+    For degrees that are no multiple of 4, it is the direction of the curvature with the larger modulus: reversed
+    faces change the sign of curvatures. `area` is that of the component of each face.
+    """
+    smooth = with_smooth_normals(surface)
+    mean, deviator = face_curvature(smooth, *smooth.face_frames)
+    flat = FLAT_CURVATURE * np.sqrt(4 * np.pi / np.maximum(area, 1e-300))
+    larger = np.maximum(np.abs(mean), np.abs(deviator)) + flat
+    confidence = np.abs(deviator) / larger
+    if degree % 4:
+        confidence = confidence * mean / larger
+    return surface.face_area * confidence * power(unit_complex(deviator), degree // 2)
+
+
+def _along_edges(surface: Surface, degree: int, weight: np.ndarray | float = 1.0) -> np.ndarray:
+    """Return (F,) sums of representations of directions along edges, times squared lengths and weights.
+
+    Odd degrees need a direction with a sign that reversed faces do not change: away from the face, across the edge.
+    `weight` has a value for each corner, for the edge that starts there.
+    """
+    x, y = surface.face_frames
+    face, points = surface.corner_face, surface.vertices[surface.corner_vertex]
+    edge = points[surface.next_corner] - points
+    along = dot(edge, x[face]) + 1j * dot(edge, y[face])
+    direction = power(unit_complex(along * (-1j if degree % 2 else 1)), degree)
+    values = weight * np.abs(along) ** 2 * direction
+    start = surface.face_start
+    return sum_per_face(values.real, start) + 1j * sum_per_face(values.imag, start)

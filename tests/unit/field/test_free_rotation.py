@@ -1,0 +1,68 @@
+"""The rotation of a smoothest field depends on the shape alone: mirror images, reversed faces, positions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from field_helpers import angle_differences, bumpy, copies_of
+from shapes import cylinder, from_triangles, icosphere, plane
+
+from rosy_addon.field.smoothest import smoothest_field
+
+BALL = bumpy(icosphere(3))
+MIRROR = np.diag([-1.0, 1.0, 1.0])
+
+
+def symmetric_head():
+    """A surface with one mirror plane, x = 0, and the mirror image of each of its faces."""
+    x, y, z = icosphere(3).vertices.T
+    out = 1 + 0.2 * np.sin(2 * y + 1) * np.cos(2 * x) + 0.15 * np.sin(3 * z + y)
+    vertices = icosphere(3).vertices * out[:, None] * (1.0, 1.3, 1.1)
+    return from_triangles(vertices, icosphere(3).corner_vertex.reshape(-1, 3))
+
+
+@pytest.mark.parametrize("degree", range(1, 7))
+def test_reversed_faces_have_the_same_lines(degree):
+    reverse = from_triangles(BALL.vertices, BALL.corner_vertex.reshape(-1, 3)[:, ::-1])
+    expected, actual = (smoothest_field(s, degree).vectors for s in (BALL, reverse))
+    assert np.degrees(angle_differences(BALL, actual, expected, degree).max()) < 0.1
+
+
+@pytest.mark.parametrize("degree", range(1, 7))
+def test_the_mirror_image_has_the_mirrored_field(degree):
+    image = from_triangles(BALL.vertices @ MIRROR, BALL.corner_vertex.reshape(-1, 3)[:, ::-1])
+    expected = smoothest_field(BALL, degree).vectors
+    actual = smoothest_field(image, degree).vectors @ MIRROR
+    assert np.degrees(angle_differences(BALL, actual, expected, degree).max()) < 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("degree", range(1, 7))
+def test_numbering_and_position_do_not_matter(degree):
+    expected = smoothest_field(BALL, degree).vectors
+    for mesh, rotation in copies_of(BALL):
+        actual = smoothest_field(mesh, degree).vectors @ rotation
+        assert np.degrees(angle_differences(BALL, actual, expected, degree).max()) < 0.1
+
+
+@pytest.mark.parametrize("degree", range(1, 7))
+def test_a_mirror_symmetric_surface_has_a_symmetric_field(degree):
+    surface = symmetric_head()
+    vectors = smoothest_field(surface, degree).vectors
+    distance = np.linalg.norm(
+        surface.face_center[:, None] - (surface.face_center @ MIRROR)[None], axis=2
+    )
+    image = distance.argmin(axis=1)
+    assert distance.min(axis=1).max() < 1e-9
+    turned = angle_differences(surface, vectors[image] @ MIRROR, vectors, degree)
+    assert np.degrees(turned.max()) < 0.1
+
+
+@pytest.mark.parametrize("degree", [1, 2, 4])
+def test_borders_and_curvature_decide(degree):
+    square = smoothest_field(plane(5), degree).vectors
+    if degree == 4:
+        assert np.abs(square).max(axis=1) == pytest.approx(1)
+    around = smoothest_field(cylinder(24, 6), degree).vectors
+    if degree % 2 == 0:
+        assert np.minimum(np.abs(around[:, 2]), 1 - np.abs(around[:, 2])).max() < 1e-6

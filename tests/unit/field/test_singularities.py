@@ -1,0 +1,54 @@
+"""Ties: edges at which a field turns to either side alike."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+from shapes import plane
+
+from rosy_addon.cli.parser import main
+from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.field.singularities import count_ties, find_singularities
+
+SURFACE = plane(6, 6)
+
+
+def turned_field(noise, seed=0):
+    """Crosses, of which every second one is turned by 45 degrees and all by random angles up to `noise`."""
+    column = np.arange(SURFACE.face_count) // 6
+    row = np.arange(SURFACE.face_count) % 6
+    random = np.random.default_rng(seed)
+    angle = np.radians(45) * ((column * row) % 2)
+    angle += noise * random.uniform(-1, 1, SURFACE.face_count)
+    return RosyField(4, np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1))
+
+
+def test_rounding_errors_change_no_singularity():
+    """Nine of 36 faces are turned, with four edges each; five of them are at the border, where six edges end."""
+    expected = [part.tolist() for part in find_singularities(SURFACE, turned_field(0))]
+    ties = count_ties(SURFACE, turned_field(0))
+    inside = SURFACE.edges.halfedges
+    faces = SURFACE.corner_face[inside]
+    is_turned = (faces // 6 % 2) * (faces % 6 % 2) == 1
+    assert ties == np.count_nonzero(is_turned.any(axis=1)) == 30
+    for seed in range(5):
+        field = turned_field(1e-7, seed)
+        assert [part.tolist() for part in find_singularities(SURFACE, field)] == expected
+        assert count_ties(SURFACE, field) == ties
+
+
+def test_a_smaller_turn_is_no_tie():
+    assert count_ties(SURFACE, turned_field(1e-2)) == 0
+
+
+def test_info_counts_ties(tmp_path, capsys):
+    mesh, out = tmp_path / "a.obj", tmp_path / "a.txt"
+    rows = [f"v {x} {y} {z}" for x, y, z in SURFACE.vertices]
+    rows += ["f " + " ".join(str(v + 1) for v in face) for face in SURFACE.faces]
+    mesh.write_text("\n".join(rows) + "\n")
+    np.savetxt(out, turned_field(0).vectors)
+    assert main(["info", str(mesh), str(out), "--degree", "4"]) == 0
+    assert "30 edges where the field turns by 45 degrees" in capsys.readouterr().out
+    assert main(["info", str(mesh), str(out), "--degree", "4", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["ties"] == 30

@@ -1,0 +1,87 @@
+"""Smoothest fields have the least energy of unit vectors: closed forms, random starts, other generators."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from field_helpers import bumpy
+from scipy.optimize import minimize
+from shapes import cube, from_triangles, icosphere, torus
+
+from rosy_addon.core.errors import RosyError
+from rosy_addon.field.analysis import dirichlet_energy
+from rosy_addon.field.generate import generate
+from rosy_addon.field.singularities import find_singularities
+from rosy_addon.field.smoothest import smoothest_field
+from rosy_addon.field.unit_descent import face_energy
+
+QUADS = cube().corner_vertex.reshape(6, 4)
+CUBE_OF_TRIANGLES = from_triangles(
+    cube().vertices, np.concatenate([QUADS[:, [0, 1, 2]], QUADS[:, [0, 2, 3]]])
+)
+OCTAHEDRON = from_triangles(
+    np.concatenate([np.eye(3), -np.eye(3)]),
+    [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]],
+)
+TETRAHEDRON = from_triangles(
+    [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]],
+    [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]],
+)
+
+
+@pytest.mark.parametrize(
+    ("surface", "degree", "index"),
+    [
+        (cube(), 4, [1] * 8),
+        (CUBE_OF_TRIANGLES, 4, [1] * 8),
+        (OCTAHEDRON, 3, [1] * 6),
+        (OCTAHEDRON, 6, [2] * 6),
+        (TETRAHEDRON, 4, [2] * 4),
+    ],
+)
+def test_fields_that_turn_nowhere(surface, degree, index):
+    """The angle defect of each vertex is a multiple of 2 pi / N: such a field has no energy."""
+    field = smoothest_field(surface, degree)
+    assert dirichlet_energy(surface, field) == pytest.approx(0, abs=1e-6)
+    assert find_singularities(surface, field)[1].tolist() == index
+
+
+@pytest.mark.parametrize("degree", [1, 2, 4, 6])
+@pytest.mark.parametrize("subdivisions", [0, 1, 2])
+def test_no_random_start_has_less_energy(degree, subdivisions):
+    surface = bumpy(icosphere(subdivisions))
+    energy = face_energy(surface, degree, np.ones(surface.face_count, dtype=bool))
+
+    def value(angle):
+        products = energy.products(np.exp(1j * angle))
+        return 2 * (energy.weight - products.real).sum(), 2 * energy.sums(products.imag)
+
+    random = np.random.default_rng(1)
+    starts = random.uniform(0, 2 * np.pi, (20, surface.face_count))
+    least = min(minimize(value, start, jac=True, method="L-BFGS-B").fun for start in starts)
+    assert dirichlet_energy(surface, smoothest_field(surface, degree)) <= 1.001 * least + 1e-6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("degree", [2, 4])
+@pytest.mark.parametrize(
+    "surface", [bumpy(icosphere(4)), bumpy(torus(60, 30))], ids=["ball", "torus"]
+)
+def test_no_other_kind_has_less_energy(surface, degree):
+    energy = dirichlet_energy(surface, smoothest_field(surface, degree))
+    for kind in ("form", "curvature", "features"):
+        try:
+            other = generate(surface, kind, degree)
+        except RosyError:  # no sharp edge
+            continue
+        assert energy <= 1.001 * dirichlet_energy(surface, other)
+
+
+def test_parts_of_very_different_sizes_are_solved_alone():
+    """Diffusion times are relative to the area of each component."""
+    ball = bumpy(icosphere(2))
+    alone = dirichlet_energy(ball, smoothest_field(ball, 4))
+    points = np.concatenate([ball.vertices, 1e-3 * ball.vertices + 9])
+    triangles = ball.corner_vertex.reshape(-1, 3)
+    both = from_triangles(points, np.concatenate([triangles, triangles + len(ball.vertices)]))
+    assert dirichlet_energy(both, smoothest_field(both, 4)) == pytest.approx(2 * alone, rel=0.02)

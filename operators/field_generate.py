@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
-import bpy
 import numpy as np
+from bpy.types import ID, Context, Mesh, Object, Operator
 
 from ..rosy_addon.core.errors import NoFeaturesError, RosyError, counted
 from ..rosy_addon.field.generate import GeneratorSettings, generate
@@ -48,11 +48,11 @@ EDGE_ITEMS = [
 ]
 
 
-def _search_guides(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
+def _search_guides(_operator: Any, context: Context, _typed: str) -> list[str]:
     return [obj.name for obj in guides.guide_objects(context.scene.objects)]
 
 
-def _search_points(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
+def _search_points(_operator: Any, context: Context, _typed: str) -> list[str]:
     return [
         obj.name
         for obj in context.scene.objects
@@ -60,15 +60,15 @@ def _search_points(_operator: Any, context: bpy.types.Context, _typed: str) -> l
     ]
 
 
-def _search_uv_maps(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
+def _search_uv_maps(_operator: Any, context: Context, _typed: str) -> list[str]:
     return selected_mesh_objects(context)[0].data.uv_layers.keys()
 
 
-def _search_attributes(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
+def _search_attributes(_operator: Any, context: Context, _typed: str) -> list[str]:
     return selected_mesh_objects(context)[0].data.attributes.keys()
 
 
-class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
+class ROSY_OT_field_generate(ModalJobMixin, Operator):
     """Generate a field on the selected meshes"""
 
     bl_idname = "rosy.field_generate"
@@ -120,7 +120,7 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
         ),
     }
 
-    def begin(self, context: bpy.types.Context) -> Steps[str]:
+    def begin(self, context: Context) -> Steps[str]:
         """Generate the fields of all selected meshes, then store them. The result is a message to the user.
 
         A mesh without features to follow, or on which the field is undefined everywhere, is left out and
@@ -167,7 +167,7 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
         return f"a field of degree {self.degree} on {target}{notes and ': '}{notes}"
 
     def _generator_settings(
-        self, context: bpy.types.Context, mesh: bpy.types.Mesh, surface: Surface
+        self, context: Context, mesh: Mesh, surface: Surface
     ) -> GeneratorSettings:
         """Return the settings of the generator for a mesh. They contain the guides, read from the scene."""
         owner = next(obj for obj in selected_mesh_objects(context) if obj.data == mesh)
@@ -200,7 +200,7 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
             values["vectors"] = vectors
         return GeneratorSettings(**values)
 
-    def _guide_objects(self, context: bpy.types.Context) -> list[bpy.types.Object]:
+    def _guide_objects(self, context: Context) -> list[Object]:
         """Return the guide objects: the one that the settings name, or else the selected ones."""
         if not self.guide:
             objects = guides.guide_objects(context.selected_objects)
@@ -217,12 +217,12 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
             )
         return [obj]
 
-    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
+    def required_data(self, context: Context) -> Iterable[ID]:
         return dict.fromkeys(obj.data for obj in selected_mesh_objects(context))
 
-    def finish(self, context: bpy.types.Context, result: str) -> None:
+    def finish(self, context: Context, result: str) -> None:
         self.report_done(f"Made {result}")
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         draw_generator_settings(self.layout, self)
         draw_settings(self.layout, self, "attribute")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 
-import bpy
 import numpy as np
+from bpy.types import Attribute, Mesh
 
 from ..core.cache import Cache
 from ..core.errors import RosyError, counted
@@ -52,7 +52,7 @@ ELEMENTS = {"FACE": "face", "POINT": "vertex"}
 
 
 def read_mesh_field(
-    mesh: bpy.types.Mesh,
+    mesh: Mesh,
     name: str | None = None,
     degree: int | None = None,
     surface: Surface | None = None,
@@ -125,7 +125,7 @@ def read_mesh_field(
 
 
 def _field_from_directions(
-    mesh: bpy.types.Mesh, surface: Surface, nonfinite: str, label: str, cache: Cache | None
+    mesh: Mesh, surface: Surface, nonfinite: str, label: str, cache: Cache | None
 ) -> RosyField:
     """Read a field from the attributes ``dir0`` ... ``dir{N-1}``. Their number N is the degree."""
     degree = 0
@@ -197,7 +197,7 @@ def _field_from_corners(
     return RosyField(degree, np.where(normalize(normal).any(axis=1)[:, None], mean, 0.0))
 
 
-def _attribute_hint(mesh: bpy.types.Mesh) -> str:
+def _attribute_hint(mesh: Mesh) -> str:
     """Return advice for a message: which vector attribute to choose, or to make a field if there are none."""
     names = [
         f"'{other.name}'"
@@ -221,7 +221,7 @@ STORAGE_FORMS = {
 
 
 def assign_fields(
-    fields: dict[bpy.types.Mesh, RosyField], name: str | None = None, form: str = "VECTOR"
+    fields: dict[Mesh, RosyField], name: str | None = None, form: str = "VECTOR"
 ) -> None:
     """Store fields on meshes: on all of them, or on none if one field cannot be stored.
 
@@ -246,7 +246,7 @@ def assign_fields(
         _store(mesh, field, names[mesh], form)
 
 
-def _default_name(mesh: bpy.types.Mesh, form: str) -> str:
+def _default_name(mesh: Mesh, form: str) -> str:
     """Return the default name of the attribute in which a field of a mesh is stored in a form."""
     if form == "ANGLE":
         return DEFAULT_ANGLE_NAME
@@ -256,8 +256,8 @@ def _default_name(mesh: bpy.types.Mesh, form: str) -> str:
 
 
 def write_mesh_field(
-    mesh: bpy.types.Mesh, field: RosyField, name: str = DEFAULT_FIELD_NAME, form: str = "VECTOR"
-) -> bpy.types.Attribute:
+    mesh: Mesh, field: RosyField, name: str = DEFAULT_FIELD_NAME, form: str = "VECTOR"
+) -> Attribute:
     """Store a field on a mesh. An existing field in an attribute with the same name is replaced.
 
     Parameters
@@ -292,7 +292,7 @@ def write_mesh_field(
     return _store(mesh, field, name, form)
 
 
-def _store(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str) -> bpy.types.Attribute:
+def _store(mesh: Mesh, field: RosyField, name: str, form: str) -> Attribute:
     """Store a field that `_check_storable` has checked. Return its attribute, or the first of several."""
     if form == "DIRECTIONS" or field.direction_ratios is not None:
         attribute = _write_directions(mesh, field, name)
@@ -315,7 +315,7 @@ def _store(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str) -> bpy.
     return attribute
 
 
-def overwrite_vectors(mesh: bpy.types.Mesh, vectors: np.ndarray) -> np.ndarray:
+def overwrite_vectors(mesh: Mesh, vectors: np.ndarray) -> np.ndarray:
     """Replace the vectors of a field that is stored as one vector on each face, without any check.
 
     It is meant for a preview during an edit. `write_mesh_field` stores the final field.
@@ -337,7 +337,7 @@ def overwrite_vectors(mesh: bpy.types.Mesh, vectors: np.ndarray) -> np.ndarray:
     return before
 
 
-def _check_storable(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str) -> None:
+def _check_storable(mesh: Mesh, field: RosyField, name: str, form: str) -> None:
     """Raise an error if `write_mesh_field` cannot store a field. Nothing is changed."""
     check_writable(mesh)
     face_count = len(mesh.polygons)
@@ -363,7 +363,7 @@ def _check_storable(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str
             mesh.attributes.remove(attribute)
 
 
-def _write_directions(mesh: bpy.types.Mesh, field: RosyField, name: str) -> bpy.types.Attribute:
+def _write_directions(mesh: Mesh, field: RosyField, name: str) -> Attribute:
     """Store the N directions of a field as ``dir0`` ... ``dir{N-1}``.
 
     Remove attributes ``dirN``, ``dir{N+1}`` ...
@@ -383,7 +383,7 @@ def _write_directions(mesh: bpy.types.Mesh, field: RosyField, name: str) -> bpy.
     return mesh.attributes["dir0"]
 
 
-def check_writable(mesh: bpy.types.Mesh) -> None:
+def check_writable(mesh: Mesh) -> None:
     """Raise an error if a mesh is linked from a library or in edit mode."""
     if not is_editable(mesh):
         library = mesh.library.filepath if mesh.library else "its library"

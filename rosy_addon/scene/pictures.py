@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-import bpy
 import numpy as np
+from bpy.types import ID, Image, Material, NodeTree, Object, Scene
 
 from ..annotation.key_contents import PictureKey
 from ..compositor.picture import Picture
@@ -86,9 +86,9 @@ class BakeResult:
     """
 
     camera: str
-    image: bpy.types.Image
-    material: bpy.types.Material
-    objects: tuple[bpy.types.Object, ...]
+    image: Image
+    material: Material
+    objects: tuple[Object, ...]
     picture: Picture
     warnings: tuple[str, ...]
 
@@ -117,7 +117,7 @@ class ImageSequence:
     height: int
 
 
-def read_output_settings(scene: bpy.types.Scene, folder: Path | None = None) -> OutputSettings:
+def read_output_settings(scene: Scene, folder: Path | None = None) -> OutputSettings:
     """Return the output settings that are stored in a scene.
 
     Parameters
@@ -145,7 +145,7 @@ def read_output_settings(scene: bpy.types.Scene, folder: Path | None = None) -> 
     )
 
 
-def check_targets(objects: Iterable[bpy.types.Object], settings: OutputSettings) -> None:
+def check_targets(objects: Iterable[Object], settings: OutputSettings) -> None:
     """Check that pictures can be applied to objects. It is called before they are drawn.
 
     Raises
@@ -166,7 +166,7 @@ def check_targets(objects: Iterable[bpy.types.Object], settings: OutputSettings)
 
 
 def apply_picture(
-    scene: bpy.types.Scene,
+    scene: Scene,
     scene_data: SceneData,
     settings: OutputSettings,
     view: ViewInput,
@@ -218,7 +218,7 @@ def apply_picture(
 
 
 def apply_sequence(
-    scene: bpy.types.Scene,
+    scene: Scene,
     scene_data: SceneData,
     sequence: ImageSequence,
     camera: Camera,
@@ -269,8 +269,8 @@ def apply_sequence(
 
 
 def apply_texture(
-    scene: bpy.types.Scene,
-    obj: bpy.types.Object,
+    scene: Scene,
+    obj: Object,
     uv_map: str,
     tiles: Mapping[int, ImageData],
     settings: OutputSettings,
@@ -279,7 +279,7 @@ def apply_texture(
     hatching: Hatching | None,
     *,
     is_udim: bool,
-) -> bpy.types.Image:
+) -> Image:
     """Show a texture on its object, and return its image. It replaces an earlier texture of the object.
 
     If an error is raised, the scene is not changed.
@@ -336,10 +336,8 @@ def _image_stem(settings: OutputSettings, name: str, kind: str = "camera") -> Pa
 
 
 def _new_groups(
-    material: bpy.types.Material,
-    matrices: Mapping[bpy.types.Object, np.ndarray | None],
-    created: list[bpy.types.ID],
-) -> dict[bpy.types.Object, bpy.types.NodeTree]:
+    material: Material, matrices: Mapping[Object, np.ndarray | None], created: list[ID]
+) -> dict[Object, NodeTree]:
     """Create the node groups that show a picture on objects; see `new_group`."""
     node_groups = {}
     for obj, matrix in matrices.items():
@@ -348,9 +346,7 @@ def _new_groups(
     return node_groups
 
 
-def _show_on_objects(
-    node_groups: Mapping[bpy.types.Object, bpy.types.NodeTree], *, keep_textures: bool = True
-) -> None:
+def _show_on_objects(node_groups: Mapping[Object, NodeTree], *, keep_textures: bool = True) -> None:
     """Show a recorded picture on objects, with one new node group for each, and delete the earlier groups.
 
     `keep_textures` says whether an object can still show an earlier texture; see `set_picture_modifier`. The
@@ -363,7 +359,7 @@ def _show_on_objects(
     delete_unused()
 
 
-def show_bake(scene: bpy.types.Scene, camera: str) -> None:
+def show_bake(scene: Scene, camera: str) -> None:
     """Let the objects of a picture show it again, if they show another one.
 
     Parameters
@@ -396,16 +392,16 @@ def show_bake(scene: bpy.types.Scene, camera: str) -> None:
 
 def _object_to_clip_matrices(
     scene_data: SceneData, camera: Camera
-) -> dict[bpy.types.Object, np.ndarray | None]:
+) -> dict[Object, np.ndarray | None]:
     """Return the (4, 4) object-to-clip matrix of each object; None for objects with several instances."""
-    matrices: dict[bpy.types.Object, np.ndarray | None] = {}
+    matrices: dict[Object, np.ndarray | None] = {}
     for instance, owner in zip(scene_data.instances, scene_data.objects, strict=False):
         is_repeated = owner in matrices
         matrices[owner] = None if is_repeated else camera.projection @ camera.view @ instance.matrix
     return matrices
 
 
-def _display_warnings(scene: bpy.types.Scene) -> list[str]:
+def _display_warnings(scene: Scene) -> list[str]:
     """Return warnings about settings of the scene's color management that change the colors of pictures."""
     transform = scene.view_settings.view_transform
     if transform in NEUTRAL_VIEW_TRANSFORMS:

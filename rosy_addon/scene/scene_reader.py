@@ -17,6 +17,7 @@ from functools import partial
 
 import bpy
 import numpy as np
+from bpy.types import Depsgraph, Mesh, Object
 
 from ..core.cache import Cache
 from ..core.errors import REPORTED_ERRORS, RosyError
@@ -72,14 +73,14 @@ class SceneData:
     """
 
     instances: list[MeshInstance]
-    objects: list[bpy.types.Object]
+    objects: list[Object]
     warnings: tuple[str, ...]
     mesh_states: MeshStates
 
 
 def read_scene(
-    depsgraph: bpy.types.Depsgraph,
-    objects: Sequence[bpy.types.Object] | None = None,
+    depsgraph: Depsgraph,
+    objects: Sequence[Object] | None = None,
     request: ReadRequest = FIELDS_ONLY,
     cache: Cache | None = None,
 ) -> SceneData:
@@ -136,9 +137,7 @@ def read_scene(
 
 
 def _field_errors(
-    errors: Mapping[str, Exception],
-    entries: Sequence[SceneInstance],
-    targets: Sequence[bpy.types.Object],
+    errors: Mapping[str, Exception], entries: Sequence[SceneInstance], targets: Sequence[Object]
 ) -> list[RosyError]:
     """Return one error for each object of `targets` whose field cannot be drawn.
 
@@ -175,8 +174,8 @@ class SceneInstance:
     """
 
     instance: MeshInstance
-    owner: bpy.types.Object
-    visibility_object: bpy.types.Object
+    owner: Object
+    visibility_object: Object
 
 
 #: A surface, its field, its tone and its values for the color map. Occluders have only the surface.
@@ -276,7 +275,7 @@ class SceneReader:
         entries: list[SceneInstance] = []
         last_instances = self.cache.get(_INSTANCES_KEY) or {}
         mesh_instances: dict[tuple, MeshInstance] = {}
-        faceless: set[bpy.types.Object] = set()
+        faceless: set[Object] = set()
         for instance, draws_field in instances:
             obj, owner = instance.object, instance.object.original
             mesh_data = self._mesh_data(obj, owner, draws_field)
@@ -311,9 +310,7 @@ class SceneReader:
         """Return whether the last call of `read` left out objects that need `resolve_topologies`."""
         return bool(self._unresolved)
 
-    def resolve_topologies(
-        self, depsgraph: bpy.types.Depsgraph, deadline: float = math.inf
-    ) -> None:
+    def resolve_topologies(self, depsgraph: Depsgraph, deadline: float = math.inf) -> None:
         """Read the rest positions and fields of objects whose modifiers change the topology.
 
         It adds temporary attributes to the meshes, so it must not be called while Blender draws. At least one
@@ -326,7 +323,7 @@ class SceneReader:
             if time.monotonic() > deadline:
                 return
 
-    def _resolve(self, depsgraph: bpy.types.Depsgraph, names: set[str]) -> None:
+    def _resolve(self, depsgraph: Depsgraph, names: set[str]) -> None:
         """Read the rest positions and fields of the evaluated meshes of objects with these full names."""
         unresolved = {key for key in self._unresolved if key[0] in names}
         self._unresolved -= unresolved
@@ -353,8 +350,8 @@ class SceneReader:
 
     def _read_topologies(
         self,
-        depsgraph: bpy.types.Depsgraph,
-        layouts: Mapping[bpy.types.Object, FieldLayout],
+        depsgraph: Depsgraph,
+        layouts: Mapping[Object, FieldLayout],
         problems: dict[str, Exception],
     ) -> None:
         """Add rest positions and fields of evaluated meshes to `_topologies`, or errors to `problems`."""
@@ -380,9 +377,7 @@ class SceneReader:
                 except RosyError as error:
                     problems[owner.name_full] = error
 
-    def _mesh_data(
-        self, obj: bpy.types.Object, owner: bpy.types.Object, draws_field: bool
-    ) -> _MeshData | None:
+    def _mesh_data(self, obj: Object, owner: Object, draws_field: bool) -> _MeshData | None:
         """Return the data of an evaluated mesh; None if it has no faces or cannot be read now."""
         pointer, request = obj.data.as_pointer(), self._request
         key = owner.name_full, pointer, tone_image_key(owner, request.tone), draws_field
@@ -416,7 +411,7 @@ class SceneReader:
             self._meshes[key] = mesh_data
         return mesh_data
 
-    def _read_field_mesh(self, mesh: bpy.types.Mesh, owner: bpy.types.Object) -> _MeshData | None:
+    def _read_field_mesh(self, mesh: Mesh, owner: Object) -> _MeshData | None:
         """Read an evaluated mesh with its field. Return None if it needs `resolve_topologies` first."""
         request, cache, label = self._request, self.cache, f"object '{owner.name}'"
         original = owner.data
@@ -447,7 +442,7 @@ class SceneReader:
         return self._with_rest(surface, rest), field, tone, values
 
     def _edit_mode_field(
-        self, mesh: bpy.types.Mesh, owner: bpy.types.Object, surface: Surface, label: str
+        self, mesh: Mesh, owner: Object, surface: Surface, label: str
     ) -> RosyField:
         """Return the field of an object in edit mode. Only its evaluated mesh has attributes then."""
         original = owner.data

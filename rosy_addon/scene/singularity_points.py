@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from bpy.types import ID, Depsgraph, Mesh, Object, Scene
 
 from ..core.errors import RosyError
 from ..field.rosy_field import RosyField
@@ -57,7 +58,7 @@ class Singularities:
         return len(self.index)
 
 
-def read_singularities(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Singularities:
+def read_singularities(obj: Object, depsgraph: Depsgraph) -> Singularities:
     """Find the singularities of an object's field on its evaluated mesh.
 
     Raises
@@ -81,16 +82,14 @@ def read_singularities(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) ->
     return Singularities(points, normals, index, field.degree)
 
 
-def _own_field(obj: bpy.types.Object) -> tuple[Surface, RosyField]:
+def _own_field(obj: Object) -> tuple[Surface, RosyField]:
     """Return the surface and the field of an object's original mesh."""
     label = f"object '{obj.name}'"
     surface = mesh_surface(obj.data, label)
     return surface, read_mesh_field(obj.data, surface=surface, nonfinite="zero", label=label)
 
 
-def read_editable_singularities(
-    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph
-) -> Singularities:
+def read_editable_singularities(obj: Object, depsgraph: Depsgraph) -> Singularities:
     """Find the singularities of the field of an object's original mesh, which can be edited.
 
     A singularity is at a vertex. Its position is the position of this vertex on the evaluated mesh. The
@@ -110,7 +109,7 @@ def read_editable_singularities(
     return Singularities(points, normals, index, field.degree, vertex)
 
 
-def mesh_of_own_vertices(obj: bpy.types.Object, evaluated: bpy.types.Mesh | None) -> bpy.types.Mesh:
+def mesh_of_own_vertices(obj: Object, evaluated: Mesh | None) -> Mesh:
     """Return the evaluated mesh if its first vertices are the vertices of the original mesh.
 
     That is assumed if it has at least as many vertices: modifiers such as *Armature*, *Subdivision Surface*
@@ -120,9 +119,7 @@ def mesh_of_own_vertices(obj: bpy.types.Object, evaluated: bpy.types.Mesh | None
     return obj.data if is_lost else evaluated
 
 
-def add_singularity_points(
-    scene: bpy.types.Scene, obj: bpy.types.Object, singularity_data: Singularities
-) -> bpy.types.Object:
+def add_singularity_points(scene: Scene, obj: Object, singularity_data: Singularities) -> Object:
     """Create a child object of `obj` with a point for each singularity, and its index as an attribute.
 
     The object is a point cloud, or a mesh without edges if scripts cannot create point clouds in this version
@@ -147,7 +144,7 @@ def add_singularity_points(
 
 
 def read_singularity_points(
-    scene: bpy.types.Scene, obj: bpy.types.Object, degree: int, name: str = ""
+    scene: Scene, obj: Object, degree: int, name: str = ""
 ) -> tuple[np.ndarray, np.ndarray]:
     """Read singularities from point objects: the vertices of a mesh nearest to the points, and indices.
 
@@ -213,12 +210,12 @@ def read_singularity_points(
     return vertex[total != 0], total[total != 0]
 
 
-def has_points(obj: bpy.types.Object) -> bool:
+def has_points(obj: Object) -> bool:
     """Return whether an object is a mesh or a point cloud, which have points with attributes."""
     return obj.type in ("MESH", "POINTCLOUD")
 
 
-def _point_objects(scene: bpy.types.Scene, obj: bpy.types.Object) -> list[bpy.types.Object]:
+def _point_objects(scene: Scene, obj: Object) -> list[Object]:
     """Return the objects in a scene that `add_singularity_points` has created for an object."""
     return [
         candidate
@@ -227,7 +224,7 @@ def _point_objects(scene: bpy.types.Scene, obj: bpy.types.Object) -> list[bpy.ty
     ]
 
 
-def remove_singularity_points(scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
+def remove_singularity_points(scene: Scene, obj: Object) -> None:
     """Delete the objects that `add_singularity_points` has created for an object."""
     for point_object in _point_objects(scene, obj):
         data = point_object.data
@@ -236,7 +233,7 @@ def remove_singularity_points(scene: bpy.types.Scene, obj: bpy.types.Object) -> 
             bpy.data.batch_remove([data])
 
 
-def _new_point_cloud(name: str, count: int) -> bpy.types.ID:
+def _new_point_cloud(name: str, count: int) -> ID:
     """Create a point cloud with `count` points, or a mesh if scripts cannot create point clouds."""
     cloud = bpy.data.pointclouds.new(name)
     if hasattr(cloud, "resize"):

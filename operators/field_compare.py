@@ -9,11 +9,7 @@ from bpy.types import Context, Operator
 
 from ..rosy_addon.core.errors import counted
 from ..rosy_addon.field.analysis import FieldComparison, format_degrees
-from ..rosy_addon.scene.computed_attributes import (
-    DIFFERENCE_ATTRIBUTE,
-    other_field_names,
-    store_difference,
-)
+from ..rosy_addon.scene import computed_attributes
 from ..rosy_addon.ui.operator_settings import draw_settings
 from ..rosy_addon.ui.property_makers import text, toggle
 from ..rosy_addon.worker.job import Steps
@@ -22,7 +18,7 @@ from .modal_job import ActiveMeshMixin, ModalJobMixin
 
 
 def _search_fields(_operator: Any, context: Context, _typed: str) -> list[str]:
-    return other_field_names(selected_mesh_objects(context)[0].data)
+    return computed_attributes.other_field_names(selected_mesh_objects(context)[0].data)
 
 
 class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, Operator):
@@ -44,13 +40,15 @@ class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, Operator):
     )
 
     def begin(self, context: Context) -> Steps[tuple[str, int, FieldComparison]]:
-        return store_difference.begin(selected_mesh_objects(context)[0].data, self.other)
+        return computed_attributes.store_difference.begin(
+            selected_mesh_objects(context)[0].data, self.other
+        )
 
     def finish(self, context: Context, result: tuple[str, int, FieldComparison]) -> None:
         other, degree, comparison = result
         if self.use_as_color:
             settings = context.scene.rosy
-            settings.color_attribute = DIFFERENCE_ATTRIBUTE
+            settings.color_attribute = computed_attributes.DIFFERENCE_ATTRIBUTE
             # The range is reversed. So lines are light, and can be seen, where the fields are the same.
             settings.look.hue, settings.look.color_map = "values", "magma"
             settings.look.color_range = 180.0 / degree, 0.0

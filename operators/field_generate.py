@@ -16,14 +16,9 @@ from ..rosy_addon.field.mesh_checks import copies_warning, orientation_warning
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
 from ..rosy_addon.field.singularities import description
 from ..rosy_addon.field.surface import Surface
-from ..rosy_addon.scene import guides
+from ..rosy_addon.scene import guides, singularity_points
 from ..rosy_addon.scene.look_properties import read_settings
 from ..rosy_addon.scene.meshes import EDGE_MARKS, marked_edges, mesh_surface, read_uvs
-from ..rosy_addon.scene.singularity_points import (
-    INDEX_ATTRIBUTE,
-    has_points,
-    read_singularity_points,
-)
 from ..rosy_addon.ui.operator_settings import draw_generator_settings, draw_settings
 from ..rosy_addon.ui.property_makers import choice, integer, setting_properties, text
 from ..rosy_addon.worker.job import Call, Steps
@@ -56,7 +51,8 @@ def _search_points(_operator: Any, context: Context, _typed: str) -> list[str]:
     return [
         obj.name
         for obj in context.scene.objects
-        if has_points(obj) and INDEX_ATTRIBUTE in obj.data.attributes
+        if singularity_points.has_points(obj)
+        and singularity_points.INDEX_ATTRIBUTE in obj.data.attributes
     ]
 
 
@@ -191,7 +187,7 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
             values["vectors"] = guides.guide_vectors(mesh, name, surface)
             values["vectors_have_firmness"] = name == guides.GUIDE_ATTRIBUTE
         if self.kind == "prescribed":
-            values["singularities"] = read_singularity_points(
+            values["singularities"] = singularity_points.read_singularity_points(
                 context.scene, owner, self.degree, self.singularities
             )
             vectors = guides.guide_vectors(mesh, self.vectors, surface) if self.vectors else None

@@ -10,6 +10,7 @@ from bpy.types import Attribute, Mesh
 from ..core.cache import Cache
 from ..core.errors import RosyError, counted
 from ..core.progress import progress, report
+from ..field import validate
 from ..field.blocks import as_float64
 from ..field.directional_field import field_directions
 from ..field.frames import dot, normalize, tangent_frame
@@ -17,13 +18,6 @@ from ..field.polygon_arrays import mean_per_face
 from ..field.representation import from_representation, to_representation
 from ..field.rosy_field import MAX_DEGREE, RosyField, check_degree
 from ..field.surface import Surface
-from ..field.validate import (
-    VectorPolicy,
-    apply_nonfinite_policy,
-    project_to_tangent,
-    validated_directions,
-    validated_field,
-)
 from .datablocks import has_rosy_properties, is_editable
 from .field_attributes import (
     ANGLE_TYPE,
@@ -116,8 +110,8 @@ def read_mesh_field(
             return _field_from_angles(surface, values, degree, source, nonfinite)
         if domain == "CORNER":
             return _field_from_corners(surface, values, degree, source, nonfinite)
-        policy = VectorPolicy(nonfinite)
-        return validated_field(surface, values, degree, source, policy, ELEMENTS[domain])
+        policy = validate.VectorPolicy(nonfinite)
+        return validate.validated_field(surface, values, degree, source, policy, ELEMENTS[domain])
 
     key_parts = "attribute", domain, data_type, values, degree, source, nonfinite
     with progress(0.5, 1.0, "reading the field"):
@@ -151,8 +145,8 @@ def _field_from_directions(
     if domain == "FACE":
         directions = follow_mesh(mesh, "dir0", directions, surface)
     source = f"{label}, attributes dir0 to dir{degree - 1}"
-    policy, element = VectorPolicy(nonfinite), ELEMENTS[domain]
-    build = partial(validated_directions, surface, directions, source, policy, element)
+    policy, element = validate.VectorPolicy(nonfinite), ELEMENTS[domain]
+    build = partial(validate.validated_directions, surface, directions, source, policy, element)
     with progress(0.0, 1.0, "reading the field"):
         return cached_for_surface(
             cache, surface, build, "directions", directions, source, *policy, element
@@ -170,7 +164,7 @@ def _field_from_angles(
     report(0.5, "reading the field")
     angles = as_float64(angles)
     defined = np.isfinite(angles)
-    apply_nonfinite_policy(angles, source, "face", nonfinite)
+    validate.apply_nonfinite_policy(angles, source, "face", nonfinite)
     vectors = np.cos(angles)[:, None] * x + np.sin(angles)[:, None] * y
     return RosyField(degree, np.where(defined[:, None], vectors, 0.0))
 
@@ -184,12 +178,14 @@ def _field_from_corners(
     the corners of a face do not cancel out. `source` is the name of the attribute in messages.
     """
     vectors = as_float64(vectors)
-    apply_nonfinite_policy(vectors, source, "corner", nonfinite)
+    validate.apply_nonfinite_policy(vectors, source, "corner", nonfinite)
     normal = surface.face_normal
     corner_normal = normal[surface.corner_face]
     report(0.2, "reading the field")
     with progress(0.2, 0.7):
-        vectors = project_to_tangent(vectors, corner_normal, CORNER_TOLERANCE, source, "corner")
+        vectors = validate.project_to_tangent(
+            vectors, corner_normal, CORNER_TOLERANCE, source, "corner"
+        )
     x, y = tangent_frame(normal)
     z = to_representation(vectors, x[surface.corner_face], y[surface.corner_face], degree)
     report(0.9, "reading the field")

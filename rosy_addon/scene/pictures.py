@@ -27,6 +27,7 @@ from ..core.file_io import check_folder
 from ..image_io.image_data import ImageData, image_size
 from ..projection.camera import Camera
 from ..rendering.view_input import ViewInput
+from . import datablocks, picture_nodes, texture_nodes
 from .bake_records import (
     NAME_PREFIX,
     baked_objects,
@@ -37,32 +38,11 @@ from .bake_records import (
 )
 from .blender_images import load_sequence, new_image, new_tiled_image
 from .cameras import CameraSource
-from .datablocks import (
-    OWNED_TAG,
-    delete_unused,
-    is_editable,
-    removable_modifiers,
-    rollback_on_error,
-)
 from .files import output_folder, picture_stem
 from .keys import update_keys
-from .picture_nodes import (
-    OutputSettings,
-    new_group,
-    new_material,
-    projections_of_group,
-    set_picture_modifier,
-    set_sequence_frames,
-)
+from .picture_nodes import OutputSettings, new_group
 from .picture_state import PictureState
 from .scene_reader import SceneData
-from .texture_nodes import (
-    Hatching,
-    brushed_metal_shader,
-    color_shader,
-    hatching_shader,
-    new_texture_material,
-)
 
 #: View transforms of Blender's color management that do not change the colors of a picture.
 NEUTRAL_VIEW_TRANSFORMS = ("Standard", "Raw")
@@ -155,7 +135,7 @@ def check_targets(objects: Iterable[Object], settings: OutputSettings) -> None:
         be written.
     """
     for obj in objects:
-        if not is_editable(obj):
+        if not datablocks.is_editable(obj):
             library = obj.library.filepath if obj.library else "its library"
             raise RosyError(
                 f"object '{obj.name}' is linked from {library} and cannot get a modifier: make a "
@@ -202,12 +182,14 @@ def apply_picture(
         If the image cannot be saved.
     """
     camera = view.camera
-    hatching = Hatching(view.look, picture.line_count) if view.draws_thresholds else None
+    hatching = (
+        texture_nodes.Hatching(view.look, picture.line_count) if view.draws_thresholds else None
+    )
     name, stem = f"{NAME_PREFIX}{camera.name}", _image_stem(settings, camera.name)
-    with rollback_on_error() as created:
+    with datablocks.rollback_on_error() as created:
         image = new_image(name, image_data, is_color=hatching is None, stem=stem)
         created.append(image)
-        material = new_material(image, camera, created, settings, hatching)
+        material = picture_nodes.new_material(image, camera, created, settings, hatching)
         matrices = _object_to_clip_matrices(scene_data, camera)
         node_groups = _new_groups(material, matrices, created)
     size, key = image_size(image_data), picture_key(view.look, picture)
@@ -247,12 +229,12 @@ def apply_sequence(
         Contents of the key (legend) of the pictures.
     """
     settings = replace(settings, window_coordinates=True)
-    with rollback_on_error() as created:
+    with datablocks.rollback_on_error() as created:
         image = load_sequence(sequence.path, settings.as_float)
         created.append(image)
         image.name = f"{NAME_PREFIX}{sequence.name}"
-        material = new_material(image, camera, created, settings)
-        set_sequence_frames(material, sequence.first, sequence.last)
+        material = picture_nodes.new_material(image, camera, created, settings)
+        picture_nodes.set_sequence_frames(material, sequence.first, sequence.last)
         node_groups = _new_groups(material, dict.fromkeys(scene_data.objects), created)
     store_record(
         scene,
@@ -276,7 +258,7 @@ def apply_texture(
     settings: OutputSettings,
     state: PictureState,
     content: str,
-    hatching: Hatching | None,
+    hatching: texture_nodes.Hatching | None,
     *,
     is_udim: bool,
 ) -> Image:
@@ -312,15 +294,15 @@ def apply_texture(
     first = next(iter(tiles.values()))
     is_color = content == "look" and hatching is None
     create, image_data = (new_tiled_image, tiles) if is_udim else (new_image, first)
-    with rollback_on_error() as created:
+    with datablocks.rollback_on_error() as created:
         image = create(name, image_data, is_color=is_color, stem=stem)
         created.append(image)
-        add_shader = color_shader
+        add_shader = texture_nodes.color_shader
         if content == "anisotropy":
-            add_shader = partial(brushed_metal_shader, uv_map=uv_map)
+            add_shader = partial(texture_nodes.brushed_metal_shader, uv_map=uv_map)
         elif hatching is not None:
-            add_shader = partial(hatching_shader, hatching=hatching, created=created)
-        material = new_texture_material(name, image, uv_map, add_shader)
+            add_shader = partial(texture_nodes.hatching_shader, hatching=hatching, created=created)
+        material = texture_nodes.new_texture_material(name, image, uv_map, add_shader)
         created.append(material)
         node_groups = _new_groups(material, {obj: None}, created)
     size = image_size(first)
@@ -355,8 +337,8 @@ def _show_on_objects(node_groups: Mapping[Object, NodeTree], *, keep_textures: b
     """
     materials = recorded_materials(textures=keep_textures)
     for obj, node_group in node_groups.items():
-        set_picture_modifier(obj, node_group, materials)
-    delete_unused()
+        picture_nodes.set_picture_modifier(obj, node_group, materials)
+    datablocks.delete_unused()
 
 
 def show_bake(scene: Scene, camera: str) -> None:
@@ -380,13 +362,13 @@ def show_bake(scene: Scene, camera: str) -> None:
     materials = recorded_materials()
     for obj in baked_objects(scene):
         projections = {}
-        for modifier in removable_modifiers(obj):
-            projections |= projections_of_group(modifier.node_group)
-        if record.material in projections and is_editable(obj):
+        for modifier in datablocks.removable_modifiers(obj):
+            projections |= picture_nodes.projections_of_group(modifier.node_group)
+        if record.material in projections and datablocks.is_editable(obj):
             matrix = projections[record.material]
             node_group = new_group(f"RoSy {obj.name}", record.material, matrix)
-            node_group[OWNED_TAG] = True
-            set_picture_modifier(obj, node_group, materials)
+            node_group[datablocks.OWNED_TAG] = True
+            picture_nodes.set_picture_modifier(obj, node_group, materials)
     update_keys(scene)
 
 

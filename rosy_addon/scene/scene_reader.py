@@ -25,6 +25,7 @@ from ..field.rosy_field import RosyField
 from ..field.surface import Surface, have_same_polygons
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
+from . import look_inputs
 from .datablocks import remedy_for_absence, user_modifiers
 from .evaluated_field import (
     Errors,
@@ -35,14 +36,6 @@ from .evaluated_field import (
     topology_hash,
 )
 from .field_attributes import attribute_name, cached_for_surface, field_degree, is_face_vector_field
-from .look_inputs import (
-    FIELDS_ONLY,
-    ReadRequest,
-    check_sources,
-    read_color_values,
-    read_tone,
-    tone_image_key,
-)
 from .mesh_fields import read_mesh_field
 from .mesh_states import MeshStates, mesh_state_key, read_mesh_state
 from .meshes import REST_ATTRIBUTE, evaluated_mesh, mesh_surface, read_attribute
@@ -81,7 +74,7 @@ class SceneData:
 def read_scene(
     depsgraph: Depsgraph,
     objects: Sequence[Object] | None = None,
-    request: ReadRequest = FIELDS_ONLY,
+    request: look_inputs.ReadRequest = look_inputs.FIELDS_ONLY,
     cache: Cache | None = None,
 ) -> SceneData:
     """Read every mesh that is visible in renders, as arrays.
@@ -126,7 +119,7 @@ def read_scene(
     if errors and (objects is not None or len(errors) == len(targets)):
         raise errors[0]
     with_field = [entry for entry in entries if entry.instance.field is not None]
-    check_sources([(entry.instance, entry.owner) for entry in with_field], request)
+    look_inputs.check_sources([(entry.instance, entry.owner) for entry in with_field], request)
     occluders = [entry.instance for entry in entries if entry.instance.field is None]
     return SceneData(
         [entry.instance for entry in with_field] + occluders,
@@ -213,7 +206,7 @@ class SceneReader:
         self.mesh_states = mesh_states
         self.errors: dict[str, Exception] = {}
         self.is_complete = True
-        self._request = FIELDS_ONLY
+        self._request = look_inputs.FIELDS_ONLY
         self._deadline = math.inf
         self._has_read_any = False
         # Keys: the full name of the object, the pointer of its mesh, `tone_image_key`, and whether its field
@@ -247,7 +240,10 @@ class SceneReader:
                 del by_name[name]
 
     def read(
-        self, instances: Instances, request: ReadRequest = FIELDS_ONLY, deadline: float = math.inf
+        self,
+        instances: Instances,
+        request: look_inputs.ReadRequest = look_inputs.FIELDS_ONLY,
+        deadline: float = math.inf,
     ) -> list[SceneInstance]:
         """Return the mesh instances of a scene in their current state.
 
@@ -380,7 +376,7 @@ class SceneReader:
     def _mesh_data(self, obj: Object, owner: Object, draws_field: bool) -> _MeshData | None:
         """Return the data of an evaluated mesh; None if it has no faces or cannot be read now."""
         pointer, request = obj.data.as_pointer(), self._request
-        key = owner.name_full, pointer, tone_image_key(owner, request.tone), draws_field
+        key = owner.name_full, pointer, look_inputs.tone_image_key(owner, request.tone), draws_field
         if key in self._meshes:
             return self._meshes[key]
         if draws_field and owner.name_full in self.errors:
@@ -416,8 +412,8 @@ class SceneReader:
         request, cache, label = self._request, self.cache, f"object '{owner.name}'"
         original = owner.data
         surface = mesh_surface(mesh, label, cache=cache)
-        tone = read_tone(mesh, owner, request.tone, cache)
-        values = read_color_values(mesh, request.color_attribute, label, cache)
+        tone = look_inputs.read_tone(mesh, owner, request.tone, cache)
+        values = look_inputs.read_color_values(mesh, request.color_attribute, label, cache)
         if original.is_editmode:
             return surface, self._edit_mode_field(mesh, owner, surface, label), tone, values
         modifiers, undeformed = user_modifiers(owner), surface

@@ -13,17 +13,10 @@ from ..field.rosy_field import RosyField
 from ..field.singularities import find_singularities
 from ..field.surface import Surface
 from ..field.validate import vertex_normals
+from . import meshes
 from .datablocks import OWNED_TAG, user_modifiers
 from .look_inputs import ReadRequest
 from .mesh_fields import read_mesh_field
-from .meshes import (
-    evaluated_mesh,
-    mesh_surface,
-    read_attribute,
-    read_collection,
-    vertex_positions,
-    write_attribute,
-)
 from .scene_reader import read_scene
 
 #: Names of attributes of the points: the singularity index in units of 1 / N, and the degree N of the field.
@@ -85,7 +78,7 @@ def read_singularities(obj: Object, depsgraph: Depsgraph) -> Singularities:
 def _own_field(obj: Object) -> tuple[Surface, RosyField]:
     """Return the surface and the field of an object's original mesh."""
     label = f"object '{obj.name}'"
-    surface = mesh_surface(obj.data, label)
+    surface = meshes.mesh_surface(obj.data, label)
     return surface, read_mesh_field(obj.data, surface=surface, nonfinite="zero", label=label)
 
 
@@ -102,10 +95,10 @@ def read_editable_singularities(obj: Object, depsgraph: Depsgraph) -> Singularit
     """
     surface, field = _own_field(obj)
     vertex, index = find_singularities(surface, field)
-    with evaluated_mesh(obj.evaluated_get(depsgraph)) as mesh:
+    with meshes.evaluated_mesh(obj.evaluated_get(depsgraph)) as mesh:
         source = mesh_of_own_vertices(obj, mesh)
-        points = vertex_positions(source)[vertex]
-        normals = read_collection(source.vertex_normals, "vector", np.float32, 3)[vertex]
+        points = meshes.vertex_positions(source)[vertex]
+        normals = meshes.read_collection(source.vertex_normals, "vector", np.float32, 3)[vertex]
     return Singularities(points, normals, index, field.degree, vertex)
 
 
@@ -136,7 +129,7 @@ def add_singularity_points(scene: Scene, obj: Object, singularity_data: Singular
         (INDEX_ATTRIBUTE, singularity_data.index),
         (DEGREE_ATTRIBUTE, np.full(len(singularity_data), singularity_data.degree)),
     ):
-        write_attribute(data.attributes.new(key, "INT", "POINT"), values)
+        meshes.write_attribute(data.attributes.new(key, "INT", "POINT"), values)
     point_object.parent = obj
     for collection in obj.users_collection or (scene.collection,):
         collection.objects.link(point_object)
@@ -183,13 +176,13 @@ def read_singularity_points(
         )
     index = None
     if has_points(source):
-        index = read_attribute(source.data, INDEX_ATTRIBUTE, np.int64, 1)
+        index = meshes.read_attribute(source.data, INDEX_ATTRIBUTE, np.int64, 1)
     if index is None:
         raise RosyError(
             f"object '{source.name}': has no integer attribute '{INDEX_ATTRIBUTE}' on its points, or is in "
             "edit mode"
         )
-    point_degree = read_attribute(source.data, DEGREE_ATTRIBUTE, np.int64, 1)
+    point_degree = meshes.read_attribute(source.data, DEGREE_ATTRIBUTE, np.int64, 1)
     if point_degree is not None:
         scaled = index * degree
         if (scaled % point_degree).any():
@@ -199,10 +192,10 @@ def read_singularity_points(
                 f"{index[bad]}/{point_degree[bad]}: choose another degree"
             )
         index = scaled // point_degree
-    points = read_attribute(source.data, "position", np.float32, 3)
+    points = meshes.read_attribute(source.data, "position", np.float32, 3)
     to_mesh = np.array(obj.matrix_world.inverted_safe() @ source.matrix_world)
     points = points @ to_mesh[:3, :3].T + to_mesh[:3, 3]
-    vertices = vertex_positions(obj.data)
+    vertices = meshes.vertex_positions(obj.data)
     nearest = [np.square(vertices - point).sum(axis=1).argmin() for point in points]
     vertex, position = np.unique(np.array(nearest, dtype=np.int64), return_inverse=True)
     total = np.zeros(len(vertex), dtype=np.int64)

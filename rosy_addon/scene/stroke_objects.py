@@ -21,24 +21,17 @@ from ..core.errors import RosyError
 from ..line_drawing.drawing_outputs import StrokeGeometry
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen
+from . import stroke_data
 from .datablocks import OWNED_TAG, is_editable, rollback_on_error
 from .look_properties import read_settings
 from .meshes import read_collection
-from .stroke_data import (
-    INK_ATTRIBUTE,
-    follow_surface,
-    has_grease_pencil_drawings,
-    new_curves,
-    new_grease_pencil,
-    stop_following,
-)
 from .visible_objects import field_objects
 
 #: Functions that create the data of an object with strokes, by the kind of object.
-DATA_BUILDERS = {"PENCIL": new_grease_pencil, "CURVES": new_curves}
+DATA_BUILDERS = {"PENCIL": stroke_data.new_grease_pencil, "CURVES": stroke_data.new_curves}
 
 #: Attributes that define strokes. Others, such as the selection, may change although strokes are not edited.
-STROKE_ATTRIBUTES = ("position", "radius", "opacity", "material_index", INK_ATTRIBUTE)
+STROKE_ATTRIBUTES = ("position", "radius", "opacity", "material_index", stroke_data.INK_ATTRIBUTE)
 
 #: Properties of the points of a stroke before Blender 4.3, with the number of values of each.
 LEGACY_POINT_PROPERTIES = {"co": 3, "pressure": 1, "strength": 1}
@@ -148,9 +141,9 @@ def store_strokes(
     obj.matrix_parent_inverse = Matrix() if owner is None else owner.matrix_world.inverted_safe()
     obj.matrix_basis = Matrix()
     if kind == "CURVES" and geometry.attachment is not None:
-        follow_surface(obj, owner, vertex_count)
+        stroke_data.follow_surface(obj, owner, vertex_count)
     else:
-        stop_following(obj)
+        stroke_data.stop_following(obj)
     _store_record(scene, kind, camera, obj)
     return obj
 
@@ -212,7 +205,7 @@ def _store_record(scene: Scene, kind: str, camera: str, obj: Object) -> None:
 def _delete_object(obj: Object) -> None:
     """Delete an object with strokes, and its data if RoSy created them and nothing else uses them."""
     data = obj.data
-    stop_following(obj)
+    stroke_data.stop_following(obj)
     bpy.data.objects.remove(obj)
     _remove_data(data)
 
@@ -241,10 +234,10 @@ def _digest_parts(data: ID) -> list[object]:
     styles = [None if material is None else material.grease_pencil for material in data.materials]
     parts: list[object] = [None if style is None else tuple(style.color) for style in styles]
     for layer in data.layers:
-        parts.append(layer.name if has_grease_pencil_drawings() else layer.info)
+        parts.append(layer.name if stroke_data.has_grease_pencil_drawings() else layer.info)
         for frame in layer.frames:
             parts.append(frame.frame_number)
-            if has_grease_pencil_drawings():
+            if stroke_data.has_grease_pencil_drawings():
                 parts += _attribute_parts(frame.drawing.attributes, frame.drawing.curve_offsets)
             else:
                 parts += _legacy_parts(frame)

@@ -12,6 +12,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy.types import Context, Event, Mesh, Object, Operator
 
 from ..rosy_addon.core.errors import RosyError
 from ..rosy_addon.jobs.bake_texture import TextureResult, bake_texture
@@ -29,7 +30,7 @@ ANGLE, MARGIN = math.radians(66), 0.003
 UV_MAP_NAME = "UVMap"
 
 
-class ROSY_OT_bake_texture(DialogJobMixin, bpy.types.Operator):
+class ROSY_OT_bake_texture(DialogJobMixin, Operator):
     """Draw the field of the selected meshes as textures for their UV maps. Unlike a baked picture, a texture covers all sides of a mesh"""
 
     bl_idname = "rosy.bake_texture"
@@ -41,35 +42,35 @@ class ROSY_OT_bake_texture(DialogJobMixin, bpy.types.Operator):
         "Unwrap", "Unwrap meshes that have no UV map, with Smart UV Project", options={"SKIP_SAVE"}
     )
 
-    def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
+    def ask(self, context: Context, event: Event) -> set[str] | None:
         """If there are meshes without a UV map, ask the user whether to unwrap them."""
         if self.unwrap or not self._without_uv_map(context):
             return None
         return context.window_manager.invoke_props_dialog(self, width=340, confirm_text="Unwrap")
 
-    def take_answer(self, context: bpy.types.Context) -> None:
+    def take_answer(self, context: Context) -> None:
         self.unwrap = True
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         names = ", ".join(f"'{obj.name}'" for obj in self._without_uv_map(context))
         column = self.layout.column(align=True)
         column.label(text=f"No UV map: {names}", icon="ERROR")
         column.label(text="Unwrap with Smart UV Project, and bake the texture?")
 
-    def begin(self, context: bpy.types.Context) -> Steps[list[TextureResult]]:
+    def begin(self, context: Context) -> Steps[list[TextureResult]]:
         missing = self._without_uv_map(context) if self.unwrap else []
         steps = bake_texture.begin(context.scene, self.required_data(context))
         return _with_uv_maps(context, missing, steps) if missing else steps
 
-    def required_data(self, context: bpy.types.Context) -> list[bpy.types.Object]:
+    def required_data(self, context: Context) -> list[Object]:
         return [obj for obj in selected_mesh_objects(context) if has_field(obj)]
 
-    def finish(self, context: bpy.types.Context, result: list[TextureResult]) -> None:
+    def finish(self, context: Context, result: list[TextureResult]) -> None:
         names = ", ".join(f"'{texture.object.name}'" for texture in result)
         self.report_done(f"Baked the texture of {names}")
         self.report_warnings(*(text for texture in result for text in texture.warnings))
 
-    def _without_uv_map(self, context: bpy.types.Context) -> list[bpy.types.Object]:
+    def _without_uv_map(self, context: Context) -> list[Object]:
         return [
             obj
             for obj in self.required_data(context)
@@ -77,9 +78,7 @@ class ROSY_OT_bake_texture(DialogJobMixin, bpy.types.Operator):
         ]
 
 
-def _with_uv_maps(
-    context: bpy.types.Context, objects: Sequence[bpy.types.Object], steps: Steps[Any]
-) -> Steps[Any]:
+def _with_uv_maps(context: Context, objects: Sequence[Object], steps: Steps[Any]) -> Steps[Any]:
     """Add UV maps to the meshes of objects. Return the steps of a job that uses the maps.
 
     If the job does not finish, it removes the UV maps.
@@ -118,7 +117,7 @@ def _with_uv_maps(
     return with_cleanup
 
 
-def _with_removal(map_names: Mapping[bpy.types.Mesh, str], steps: Steps[Any]) -> Steps[Any]:
+def _with_removal(map_names: Mapping[Mesh, str], steps: Steps[Any]) -> Steps[Any]:
     """Run the steps of a job. If the job does not finish, remove UV maps, given by name for each mesh."""
     try:
         yield Step(0.0, "unwrapping")
@@ -130,7 +129,7 @@ def _with_removal(map_names: Mapping[bpy.types.Mesh, str], steps: Steps[Any]) ->
         raise
 
 
-def _unwrapped(context: bpy.types.Context, mesh: bpy.types.Mesh) -> np.ndarray:
+def _unwrapped(context: Context, mesh: Mesh) -> np.ndarray:
     """Return new UV coordinates for the C corners of a mesh, (2 C,) float32, as u, v, u, v ...
 
     A copy of the mesh is unwrapped, because Blender's operator needs a visible object, and changes which
@@ -149,9 +148,7 @@ def _unwrapped(context: bpy.types.Context, mesh: bpy.types.Mesh) -> np.ndarray:
 
 
 @contextmanager
-def _only_selected_copy(
-    context: bpy.types.Context, mesh: bpy.types.Mesh
-) -> Iterator[bpy.types.Object]:
+def _only_selected_copy(context: Context, mesh: Mesh) -> Iterator[Object]:
     """Context manager: yield a temporary object with a copy of a mesh, the only one that is selected."""
     active = context.view_layer.objects.active
     selected = list(context.selected_objects)

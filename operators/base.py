@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-import bpy
+from bpy.types import Context, Mesh, Object, Operator
 
 from ..rosy_addon.core.errors import REPORTED_ERRORS, RosyError, as_sentence, error_text
 from ..rosy_addon.field.rosy_field import RosyField
@@ -20,11 +20,11 @@ from ..rosy_addon.ui.preferences import apply_preferences
 class Condition(NamedTuple):
     """A condition for an operator to run, and the message to the user if the condition does not hold."""
 
-    holds: Callable[[bpy.types.Context], object]
+    holds: Callable[[Context], object]
     message: str
 
 
-def selected_mesh_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
+def selected_mesh_objects(context: Context) -> list[Object]:
     """Return the selected mesh objects, the active one first.
 
     If none is selected, only the active object is returned, if it is a mesh.
@@ -68,7 +68,7 @@ class RosyOperator:
     conditions: tuple[Condition, ...] = ()
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Return whether all conditions hold.
 
         If not, set the message that Blender shows for a disabled button.
@@ -79,7 +79,7 @@ class RosyOperator:
                 return False
         return True
 
-    def act(self, context: bpy.types.Context) -> None:
+    def act(self, context: Context) -> None:
         """Do the work of the operator. Operators that run a job implement `ModalJobMixin.begin` instead.
 
         Raises
@@ -89,7 +89,7 @@ class RosyOperator:
         """
         raise NotImplementedError
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         try:
             self.act(context)
         except REPORTED_ERRORS as error:
@@ -126,10 +126,7 @@ class RosyOperator:
             self.report({"WARNING"}, as_sentence(message))
 
     def store_fields(
-        self,
-        context: bpy.types.Context,
-        fields: dict[bpy.types.Mesh, RosyField],
-        name: str | None = None,
+        self, context: Context, fields: dict[Mesh, RosyField], name: str | None = None
     ) -> None:
         """Store fields on meshes with `assign_fields`, and apply the preferences to the scene.
 
@@ -163,7 +160,7 @@ class RosyOperator:
                 self.report_warnings(f"no live view: {error}")
 
 
-def sync_suffix(operator: bpy.types.Operator, suffix: str) -> bool:
+def sync_suffix(operator: Operator, suffix: str) -> bool:
     """Set the suffix of an operator's file path. Return whether the path has changed.
 
     A path without a file name is not changed.

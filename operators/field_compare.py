@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import bpy
 import numpy as np
+from bpy.types import Context, Operator
 
 from ..rosy_addon.core.errors import counted
 from ..rosy_addon.field.analysis import FieldComparison, format_degrees
-from ..rosy_addon.scene.computed_attributes import (
-    DIFFERENCE_ATTRIBUTE,
-    other_field_names,
-    store_difference,
-)
+from ..rosy_addon.scene import computed_attributes
 from ..rosy_addon.ui.operator_settings import draw_settings
 from ..rosy_addon.ui.property_makers import text, toggle
 from ..rosy_addon.worker.job import Steps
@@ -21,11 +17,11 @@ from .base import selected_mesh_objects
 from .modal_job import ActiveMeshMixin, ModalJobMixin
 
 
-def _search_fields(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
-    return other_field_names(selected_mesh_objects(context)[0].data)
+def _search_fields(_operator: Any, context: Context, _typed: str) -> list[str]:
+    return computed_attributes.other_field_names(selected_mesh_objects(context)[0].data)
 
 
-class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
+class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, Operator):
     """Compute the angle between the field of the active mesh and another one, store it as an attribute, and color the lines by it"""
 
     bl_idname = "rosy.field_compare"
@@ -43,14 +39,16 @@ class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         default=True,
     )
 
-    def begin(self, context: bpy.types.Context) -> Steps[tuple[str, int, FieldComparison]]:
-        return store_difference.begin(selected_mesh_objects(context)[0].data, self.other)
+    def begin(self, context: Context) -> Steps[tuple[str, int, FieldComparison]]:
+        return computed_attributes.store_difference.begin(
+            selected_mesh_objects(context)[0].data, self.other
+        )
 
-    def finish(self, context: bpy.types.Context, result: tuple[str, int, FieldComparison]) -> None:
+    def finish(self, context: Context, result: tuple[str, int, FieldComparison]) -> None:
         other, degree, comparison = result
         if self.use_as_color:
             settings = context.scene.rosy
-            settings.color_attribute = DIFFERENCE_ATTRIBUTE
+            settings.color_attribute = computed_attributes.DIFFERENCE_ATTRIBUTE
             # The range is reversed. So lines are light, and can be seen, where the fields are the same.
             settings.look.hue, settings.look.color_map = "values", "magma"
             settings.look.color_range = 180.0 / degree, 0.0
@@ -66,5 +64,5 @@ class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
             f"{comparison.other_count} of '{other}'"
         )
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         draw_settings(self.layout, self, "other", "use_as_color")

@@ -7,7 +7,7 @@ from dataclasses import replace
 from math import pi
 from typing import Any
 
-import bpy
+from bpy.types import ID, Context, Mesh, Operator, OperatorProperties
 
 from ..rosy_addon.core.errors import RosyError, counted
 from ..rosy_addon.field.convert import Conversion, convert
@@ -41,15 +41,15 @@ FORMS = {
 }
 
 
-def _get_degree(operator: bpy.types.OperatorProperties) -> int:
+def _get_degree(operator: OperatorProperties) -> int:
     return operator.degree
 
 
-def _set_degree(operator: bpy.types.OperatorProperties, degree: int) -> None:
+def _set_degree(operator: OperatorProperties, degree: int) -> None:
     operator.degree = degree
 
 
-def _search_values(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
+def _search_values(_operator: Any, context: Context, _typed: str) -> list[str]:
     """Return the names of the vertex groups and the scalar attributes of the active mesh."""
     obj = selected_mesh_objects(context)[0]
     scalar_types = {"FLOAT", "INT", "INT8", "BOOLEAN", "FLOAT_COLOR", "BYTE_COLOR"}
@@ -64,12 +64,12 @@ class _FieldsJobMixin(ModalJobMixin):
 
     conditions = EDITABLE_FIELD
 
-    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
+    def required_data(self, context: Context) -> Iterable[ID]:
         return dict.fromkeys(obj.data for obj in selected_mesh_objects(context) if has_field(obj))
 
     def each_mesh(
-        self, context: bpy.types.Context, begin: Callable[[bpy.types.Mesh], Steps[Any]]
-    ) -> Steps[dict[bpy.types.Mesh, Any]]:
+        self, context: Context, begin: Callable[[Mesh], Steps[Any]]
+    ) -> Steps[dict[Mesh, Any]]:
         """Run a job for each selected mesh. Return the results by mesh.
 
         `begin` returns the steps of the job for a mesh.
@@ -82,7 +82,7 @@ class _FieldsJobMixin(ModalJobMixin):
         return results
 
 
-class ROSY_OT_field_convert(_FieldsJobMixin, bpy.types.Operator):
+class ROSY_OT_field_convert(_FieldsJobMixin, Operator):
     """Change the degree of the fields of the selected meshes, rotate or smooth them, cancel singularities, or replace their magnitudes"""
 
     bl_idname = "rosy.field_convert"
@@ -133,13 +133,13 @@ class ROSY_OT_field_convert(_FieldsJobMixin, bpy.types.Operator):
     )
     values: text("Values", "Name of the attribute or vertex group", search=_search_values)
 
-    def begin(self, context: bpy.types.Context) -> Steps[int]:
+    def begin(self, context: Context) -> Steps[int]:
         """Convert the fields of all selected meshes, then store them. The result is the number of meshes."""
         converted = yield from self.each_mesh(context, self._converted)
         self.store_fields(context, converted)
         return len(converted)
 
-    def _converted(self, mesh: bpy.types.Mesh) -> Steps[RosyField]:
+    def _converted(self, mesh: Mesh) -> Steps[RosyField]:
         """Return the steps of the job that computes the converted field of a mesh."""
         surface = mesh_surface(mesh)
         field = read_mesh_field(mesh, surface=surface)
@@ -155,14 +155,14 @@ class ROSY_OT_field_convert(_FieldsJobMixin, bpy.types.Operator):
         field = yield Call(convert, (surface, field, conversion))
         return replace(field, source_directions=None)
 
-    def finish(self, context: bpy.types.Context, result: int) -> None:
+    def finish(self, context: Context, result: int) -> None:
         self.report_done(f"Converted {counted(result, 'field')}")
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         draw_convert_settings(self.layout, self)
 
 
-class ROSY_OT_field_store(_FieldsJobMixin, bpy.types.Operator):
+class ROSY_OT_field_store(_FieldsJobMixin, Operator):
     """Store the fields of the selected meshes in another form, for Geometry Nodes and other programs"""
 
     bl_idname = "rosy.field_store"
@@ -179,7 +179,7 @@ class ROSY_OT_field_store(_FieldsJobMixin, bpy.types.Operator):
         "'rosy_tangent' for tangents",
     )
 
-    def begin(self, context: bpy.types.Context) -> Steps[int]:
+    def begin(self, context: Context) -> Steps[int]:
         """Read the fields of all selected meshes, then store them. The result is the number of meshes."""
         if self.form == "TANGENT":
             guiding_angle = context.scene.rosy.look.guiding_angle
@@ -193,10 +193,10 @@ class ROSY_OT_field_store(_FieldsJobMixin, bpy.types.Operator):
         assign_fields(fields, self.attribute, self.form)
         return len(fields)
 
-    def finish(self, context: bpy.types.Context, result: int) -> None:
+    def finish(self, context: Context, result: int) -> None:
         self.report_done(f"Stored {counted(result, 'field')} as {FORMS[self.form][0]}")
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         draw_settings(self.layout, self, "form")
         if self.form != "DIRECTIONS":
             draw_settings(self.layout, self, "attribute")

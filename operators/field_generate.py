@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
-import bpy
 import numpy as np
+from bpy.types import ID, Context, Mesh, Object, Operator
 
 from ..rosy_addon.core.errors import NoFeaturesError, RosyError, counted
 from ..rosy_addon.field.generate import GeneratorSettings, generate
@@ -16,14 +16,9 @@ from ..rosy_addon.field.mesh_checks import copies_warning, orientation_warning
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
 from ..rosy_addon.field.singularities import description
 from ..rosy_addon.field.surface import Surface
-from ..rosy_addon.scene import guides
+from ..rosy_addon.scene import guides, singularity_points
 from ..rosy_addon.scene.look_properties import read_settings
 from ..rosy_addon.scene.meshes import EDGE_MARKS, marked_edges, mesh_surface, read_uvs
-from ..rosy_addon.scene.singularity_points import (
-    INDEX_ATTRIBUTE,
-    has_points,
-    read_singularity_points,
-)
 from ..rosy_addon.ui.operator_settings import draw_generator_settings, draw_settings
 from ..rosy_addon.ui.property_makers import choice, integer, setting_properties, text
 from ..rosy_addon.worker.job import Call, Steps
@@ -48,27 +43,28 @@ EDGE_ITEMS = [
 ]
 
 
-def _search_guides(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
+def _search_guides(_operator: Any, context: Context, _typed: str) -> list[str]:
     return [obj.name for obj in guides.guide_objects(context.scene.objects)]
 
 
-def _search_points(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
+def _search_points(_operator: Any, context: Context, _typed: str) -> list[str]:
     return [
         obj.name
         for obj in context.scene.objects
-        if has_points(obj) and INDEX_ATTRIBUTE in obj.data.attributes
+        if singularity_points.has_points(obj)
+        and singularity_points.INDEX_ATTRIBUTE in obj.data.attributes
     ]
 
 
-def _search_uv_maps(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
+def _search_uv_maps(_operator: Any, context: Context, _typed: str) -> list[str]:
     return selected_mesh_objects(context)[0].data.uv_layers.keys()
 
 
-def _search_attributes(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
+def _search_attributes(_operator: Any, context: Context, _typed: str) -> list[str]:
     return selected_mesh_objects(context)[0].data.attributes.keys()
 
 
-class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
+class ROSY_OT_field_generate(ModalJobMixin, Operator):
     """Generate a field on the selected meshes"""
 
     bl_idname = "rosy.field_generate"
@@ -120,7 +116,7 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
         ),
     }
 
-    def begin(self, context: bpy.types.Context) -> Steps[str]:
+    def begin(self, context: Context) -> Steps[str]:
         """Generate the fields of all selected meshes, then store them. The result is a message to the user.
 
         A mesh without features to follow, or on which the field is undefined everywhere, is left out and
@@ -167,7 +163,7 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
         return f"a field of degree {self.degree} on {target}{notes and ': '}{notes}"
 
     def _generator_settings(
-        self, context: bpy.types.Context, mesh: bpy.types.Mesh, surface: Surface
+        self, context: Context, mesh: Mesh, surface: Surface
     ) -> GeneratorSettings:
         """Return the settings of the generator for a mesh. They contain the guides, read from the scene."""
         owner = next(obj for obj in selected_mesh_objects(context) if obj.data == mesh)
@@ -191,7 +187,7 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
             values["vectors"] = guides.guide_vectors(mesh, name, surface)
             values["vectors_have_firmness"] = name == guides.GUIDE_ATTRIBUTE
         if self.kind == "prescribed":
-            values["singularities"] = read_singularity_points(
+            values["singularities"] = singularity_points.read_singularity_points(
                 context.scene, owner, self.degree, self.singularities
             )
             vectors = guides.guide_vectors(mesh, self.vectors, surface) if self.vectors else None
@@ -200,7 +196,7 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
             values["vectors"] = vectors
         return GeneratorSettings(**values)
 
-    def _guide_objects(self, context: bpy.types.Context) -> list[bpy.types.Object]:
+    def _guide_objects(self, context: Context) -> list[Object]:
         """Return the guide objects: the one that the settings name, or else the selected ones."""
         if not self.guide:
             objects = guides.guide_objects(context.selected_objects)
@@ -217,12 +213,12 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
             )
         return [obj]
 
-    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
+    def required_data(self, context: Context) -> Iterable[ID]:
         return dict.fromkeys(obj.data for obj in selected_mesh_objects(context))
 
-    def finish(self, context: bpy.types.Context, result: str) -> None:
+    def finish(self, context: Context, result: str) -> None:
         self.report_done(f"Made {result}")
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         draw_generator_settings(self.layout, self)
         draw_settings(self.layout, self, "attribute")

@@ -12,6 +12,7 @@ from contextlib import contextmanager, nullcontext, suppress
 from typing import Any
 
 import bpy
+from bpy.types import ID, Context, Event, Object, WorkSpace
 from bpy_extras.io_utils import ExportHelper
 
 from ..rosy_addon.core.errors import REPORTED_ERRORS, as_sentence
@@ -79,9 +80,7 @@ class Job:
         A note for the user that is reported when the job has ended. Empty if there is none.
     """
 
-    def __init__(
-        self, context: bpy.types.Context, steps: Steps[Any], required_data: Iterable[bpy.types.ID]
-    ) -> None:
+    def __init__(self, context: Context, steps: Steps[Any], required_data: Iterable[ID]) -> None:
         """Start the timer, the handlers and the progress display, and make this the current job."""
         global _current_job
         self.required_data = list(required_data)
@@ -91,7 +90,7 @@ class Job:
         self.note = ""
         HELPER.is_usable = uses_helper(context)
         self._runner = StepRunner(steps, HELPER)
-        self.workspaces: list[bpy.types.WorkSpace] = []
+        self.workspaces: list[WorkSpace] = []
         self.window_manager = context.window_manager
         self.timer = self.window_manager.event_timer_add(TIMER_SECONDS, window=context.window)
         self.window_manager.progress_begin(0, 100)
@@ -103,7 +102,7 @@ class Job:
         _current_job = self
         self._show_progress(context, Step(0.0, "starting"))
 
-    def advance(self, context: bpy.types.Context) -> bool:
+    def advance(self, context: Context) -> bool:
         """Poll the helper process, and run steps of the job until it waits for the helper process again.
 
         Returns
@@ -138,7 +137,7 @@ class Job:
         self._show_progress(context, self._runner.step)
         return False
 
-    def finish(self, context: bpy.types.Context) -> bool:
+    def finish(self, context: Context) -> bool:
         """Run until the job is done or stopped, and return whether it is done."""
         while self.stop_reason is None:
             if self.advance(context):
@@ -147,7 +146,7 @@ class Job:
         return False
 
     @contextmanager
-    def _waiting(self, context: bpy.types.Context) -> Iterator[None]:
+    def _waiting(self, context: Context) -> Iterator[None]:
         """Context manager: show the wait cursor.
 
         Warn once if there is no helper process although the preferences ask for one.
@@ -161,7 +160,7 @@ class Job:
         finally:
             context.window.cursor_modal_restore()
 
-    def _abort_reason(self, context: bpy.types.Context) -> str | None:
+    def _abort_reason(self, context: Context) -> str | None:
         """Return why the job cannot continue; None if it can."""
         try:
             if context.scene != self.scene:
@@ -169,13 +168,13 @@ class Job:
             if context.view_layer != self.view_layer:  # jobs use the depsgraph of the view layer
                 return "another view layer was chosen"
             for data_block in self.required_data:
-                if isinstance(data_block, bpy.types.Object) and not data_block.users_scene:
+                if isinstance(data_block, Object) and not data_block.users_scene:
                     return f"'{data_block.name}' was deleted"
         except ReferenceError:
             return "required data was deleted"
         return None
 
-    def _show_progress(self, context: bpy.types.Context, step: Step | None) -> None:
+    def _show_progress(self, context: Context, step: Step | None) -> None:
         """If the progress has changed, show it at the cursor, in the status bar and in the sidebars."""
         if step is None or step == job_status.current:
             return
@@ -227,7 +226,7 @@ class ModalJobMixin(RosyOperator):
     #: Sentence for the user that says in which state the scene or files are after the job was cancelled.
     cancel_note = "nothing was changed"
 
-    def begin(self, context: bpy.types.Context) -> Steps[Any]:
+    def begin(self, context: Context) -> Steps[Any]:
         """Return the steps of the operator's job.
 
         Raises
@@ -237,20 +236,20 @@ class ModalJobMixin(RosyOperator):
         """
         raise NotImplementedError
 
-    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
+    def required_data(self, context: Context) -> Iterable[ID]:
         """Return the datablocks that the job needs. It stops if one of them is deleted.
 
         By default, these are all visible objects with a field.
         """
         return field_objects(context.view_layer)
 
-    def finish(self, context: bpy.types.Context, result: Any) -> None:
+    def finish(self, context: Context, result: Any) -> None:
         """Report the result of the job to the user."""
 
-    def act(self, context: bpy.types.Context) -> None:
+    def act(self, context: Context) -> None:
         self.finish(context, run(self.begin(context)))
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         if bpy.app.background or context.window is None:
             return self.execute(context)
         try:
@@ -260,7 +259,7 @@ class ModalJobMixin(RosyOperator):
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def modal(self, context: Context, event: Event) -> set[str]:
         job = self._job
         if job.stop_reason is None and event.type == "ESC" and event.value == "PRESS":
             job.stop("cancelled")
@@ -280,7 +279,7 @@ class ModalJobMixin(RosyOperator):
             return {"CANCELLED"}
         return {"PASS_THROUGH"}
 
-    def cancel(self, context: bpy.types.Context) -> None:
+    def cancel(self, context: Context) -> None:
         """Stop the job. Blender calls this if the window is closed or a file is opened."""
         if self._job is not None:
             self._job.stop("the window was closed")
@@ -291,7 +290,7 @@ class ActiveMeshMixin:
 
     conditions = EDITABLE_FIELD
 
-    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
+    def required_data(self, context: Context) -> Iterable[ID]:
         obj = selected_mesh_objects(context)[0]
         return obj, obj.data
 
@@ -305,7 +304,7 @@ class DialogJobMixin(ModalJobMixin):
 
     _has_asked = False
 
-    def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
+    def ask(self, context: Context, event: Event) -> set[str] | None:
         """Open a dialog or a file browser, and return the result of the operator. None if nothing is asked.
 
         Raises
@@ -315,10 +314,10 @@ class DialogJobMixin(ModalJobMixin):
         """
         raise NotImplementedError
 
-    def take_answer(self, context: bpy.types.Context) -> None:
+    def take_answer(self, context: Context) -> None:
         """Set the properties for the second call of the operator, so that it does not ask again."""
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         if bpy.app.background or context.window is None:
             return self.execute(context)
         try:
@@ -330,7 +329,7 @@ class DialogJobMixin(ModalJobMixin):
         self._has_asked = True
         return result
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         if not self._has_asked:
             return super().execute(context)
         self.take_answer(context)
@@ -358,9 +357,9 @@ class FileJobMixin(DialogJobMixin):
         "Skip Browser", "Start without a file browser", options={"HIDDEN", "SKIP_SAVE"}
     )
 
-    def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
+    def ask(self, context: Context, event: Event) -> set[str] | None:
         """Ask for the path of the file."""
         return None if self.skip_browser else ExportHelper.invoke(self, context, event)
 
-    def take_answer(self, context: bpy.types.Context) -> None:
+    def take_answer(self, context: Context) -> None:
         self.skip_browser = True

@@ -10,14 +10,10 @@ import bpy
 from ..rosy_addon.core.errors import REPORTED_ERRORS, counted
 from ..rosy_addon.field.singularities import format_index
 from ..rosy_addon.field.singularity_changes import OUTSIDE, move_index
+from ..rosy_addon.scene import singularity_points
 from ..rosy_addon.scene.field_attributes import has_field
 from ..rosy_addon.scene.mesh_fields import read_mesh_field
 from ..rosy_addon.scene.meshes import mesh_surface
-from ..rosy_addon.scene.singularity_points import (
-    add_singularity_points,
-    read_singularities,
-    remove_singularity_points,
-)
 from ..rosy_addon.ui import overlay, singularity_handles
 from ..rosy_addon.ui.operator_settings import draw_settings
 from ..rosy_addon.ui.property_makers import choice, fraction, integer, toggle
@@ -50,13 +46,15 @@ class ROSY_OT_singularities(RosyOperator, bpy.types.Operator):
             _hide(context, objects)
             return
         depsgraph = context.evaluated_depsgraph_get()
-        singularities_by_object = {obj: read_singularities(obj, depsgraph) for obj in objects}
+        singularities_by_object = {
+            obj: singularity_points.read_singularities(obj, depsgraph) for obj in objects
+        }
         _hide(context, objects)
         for obj, singularities in singularities_by_object.items():
             if self.show in ("OVERLAY", "BOTH"):
                 overlay.show(obj.name, singularities)
             if self.show in ("POINTS", "BOTH"):
-                add_singularity_points(context.scene, obj, singularities)
+                singularity_points.add_singularity_points(context.scene, obj, singularities)
         count = sum(map(len, singularities_by_object.values()))
         total = "; ".join(
             f"'{obj.name}': sum of the indices "
@@ -70,7 +68,7 @@ def _hide(context: bpy.types.Context, objects: list[bpy.types.Object]) -> None:
     """Hide the singularities of objects in the overlay, and remove the point objects that show them."""
     for obj in objects:
         overlay.hide(obj.name)
-        remove_singularity_points(context.scene, obj)
+        singularity_points.remove_singularity_points(context.scene, obj)
 
 
 def _reach() -> Any:

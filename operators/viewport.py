@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import bpy
+from bpy.types import Context, Operator
 
 from ..rosy_addon.compositor.look import has_flow
 from ..rosy_addon.ui import live_views
@@ -11,7 +11,7 @@ from ..rosy_addon.viewport import session
 from .base import IN_3D_VIEW, Condition, RosyOperator
 
 
-class ROSY_OT_viewport(RosyOperator, bpy.types.Operator):
+class ROSY_OT_viewport(RosyOperator, Operator):
     """Draw the fields of all meshes in this 3D view at every redraw, without baking"""
 
     bl_idname = "rosy.viewport"
@@ -42,7 +42,7 @@ class ROSY_OT_viewport(RosyOperator, bpy.types.Operator):
         ],
     )
 
-    def act(self, context: bpy.types.Context) -> None:
+    def act(self, context: Context) -> None:
         space = context.space_data
         if self.show == "ON" or (self.show == "TOGGLE" and not session.is_live(space)):
             session.start(space, self.device.lower())
@@ -51,7 +51,7 @@ class ROSY_OT_viewport(RosyOperator, bpy.types.Operator):
             live_views.decline(context.scene)
 
 
-class ROSY_OT_flow_play(RosyOperator, bpy.types.Operator):
+class ROSY_OT_flow_play(RosyOperator, Operator):
     """Let the streaks in live views drift, or stop them, without Blender's timeline"""
 
     bl_idname = "rosy.flow_play"
@@ -66,5 +66,5 @@ class ROSY_OT_flow_play(RosyOperator, bpy.types.Operator):
         ),
     )
 
-    def act(self, context: bpy.types.Context) -> None:
+    def act(self, context: Context) -> None:
         session.play_flow(not session.is_flow_playing())

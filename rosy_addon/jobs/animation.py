@@ -17,8 +17,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import bpy
 import numpy as np
+from bpy.types import Object, Scene
 
 from ..compositor.look import Look, has_flow
 from ..core.cache import Cache, content_hash
@@ -74,11 +74,11 @@ class SequenceResult:
 
 @job
 def bake_animation(
-    scene: bpy.types.Scene,
+    scene: Scene,
     frames: Sequence[int],
     *,
     cameras: Sequence[CameraSource] | None = None,
-    objects: Sequence[bpy.types.Object] | None = None,
+    objects: Sequence[Object] | None = None,
     look: Look | None = None,
     size: tuple[int, int] | None = None,
     settings: pictures.OutputSettings | None = None,
@@ -172,7 +172,7 @@ def bake_animation(
 
 
 def _folder_settings(
-    scene: bpy.types.Scene, settings: pictures.OutputSettings | None
+    scene: Scene, settings: pictures.OutputSettings | None
 ) -> pictures.OutputSettings:
     """Return the output settings (by default the scene's) after a check that their folder can be written to.
 
@@ -187,7 +187,7 @@ def _folder_settings(
 
 
 @contextmanager
-def _restored_frame(scene: bpy.types.Scene) -> Iterator[None]:
+def _restored_frame(scene: Scene) -> Iterator[None]:
     """Context manager: at the end, restore the current frame and the active camera of a scene."""
     frame, camera = scene.frame_current + scene.frame_subframe, scene.camera
     try:
@@ -241,10 +241,10 @@ def _sequence_result(
 
 
 def _frame_steps(
-    scene: bpy.types.Scene,
+    scene: Scene,
     frame: int,
     cameras: Sequence[CameraSource] | None,
-    objects: Sequence[bpy.types.Object] | None,
+    objects: Sequence[Object] | None,
     look: Look | None,
     size: tuple[int, int] | None,
     settings: pictures.OutputSettings,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import bpy
+from bpy.types import Object, Scene
 
 from ..compositor.ink_thresholds import unlit_look
 from ..compositor.look import Look, is_hatched
@@ -23,9 +23,9 @@ from ..worker.job import Step, Steps, job, part
 
 @job
 def bake(
-    scene: bpy.types.Scene,
+    scene: Scene,
     *,
-    objects: Sequence[bpy.types.Object] | None = None,
+    objects: Sequence[Object] | None = None,
     cameras: Sequence[CameraSource] | None = None,
     look: Look | None = None,
     size: tuple[int, int] | None = None,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import bpy
 import numpy as np
+from bpy.types import Depsgraph, Image, Object, Scene
 
 from ..compositor.shading import Light
 from ..core.cache import BAKE_CACHE
@@ -34,15 +34,13 @@ class TextureResult:
         Messages for the user.
     """
 
-    object: bpy.types.Object
-    image: bpy.types.Image
+    object: Object
+    image: Image
     warnings: tuple[str, ...]
 
 
 @job
-def bake_texture(
-    scene: bpy.types.Scene, objects: Sequence[bpy.types.Object]
-) -> Steps[list[TextureResult]]:
+def bake_texture(scene: Scene, objects: Sequence[Object]) -> Steps[list[TextureResult]]:
     """Draw the fields of objects as textures for their UV maps, and show them on the objects.
 
     The settings in ``scene.rosy`` say what the textures show, their size and margin, the look, and how images
@@ -104,7 +102,7 @@ def bake_texture(
     return results
 
 
-def _lights_to_bake(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Light]:
+def _lights_to_bake(scene: Scene, depsgraph: Depsgraph) -> list[Light]:
     """Return the lights of a scene, in world space.
 
     Raises

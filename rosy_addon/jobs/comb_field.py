@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import bpy
 import numpy as np
+from bpy.types import Mesh
 
 from ..core.cache import BAKE_CACHE
 from ..field.combing import BrushStroke, Combing, GuideBrush, start_combing
@@ -39,7 +39,7 @@ class CombStroke:
         another by equal angles, or an attribute with the name of the guides has another type.
     """
 
-    def __init__(self, mesh: bpy.types.Mesh, brush: GuideBrush, reach: float) -> None:
+    def __init__(self, mesh: Mesh, brush: GuideBrush, reach: float) -> None:
         check_writable(mesh)
         check_guides_storable(mesh)
         surface = mesh_surface(mesh, cache=BAKE_CACHE)

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import bpy
+from bpy.types import Object, Scene
 
 from ..core.file_io import write_bytes
 from ..gpu.select import picture_steps, select_device
@@ -24,8 +24,8 @@ MIN_SUPERSAMPLING = 2
 
 @job
 def render_turntable(
-    scene: bpy.types.Scene,
-    obj: bpy.types.Object,
+    scene: Scene,
+    obj: Object,
     path: Path,
     *,
     count: int,

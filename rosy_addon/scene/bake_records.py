@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import bpy
 import numpy as np
+from bpy.types import ID, Collection, Image, Material, Object, PropertyGroup, Scene
 
 from ..annotation.key_contents import PictureKey
 from ..compositor.look import Look
@@ -72,7 +73,7 @@ class BakeInfo:
     camera: str
     width: int
     height: int
-    image: bpy.types.Image
+    image: Image
     is_shown: bool
     frame_range: str = ""
     stale_reason: str = ""
@@ -88,10 +89,10 @@ class RemovalCounts(NamedTuple):
 
 
 def store_record(
-    scene: bpy.types.Scene,
+    scene: Scene,
     name: str,
-    image: bpy.types.Image,
-    material: bpy.types.Material,
+    image: Image,
+    material: Material,
     source: CameraSource | None,
     states: Mapping[int | None, PictureState],
     *,
@@ -140,8 +141,8 @@ def store_record(
 
 
 def _find_or_add_record(
-    scene: bpy.types.Scene, name: str, source: CameraSource | None, is_texture: bool
-) -> bpy.types.PropertyGroup:
+    scene: Scene, name: str, source: CameraSource | None, is_texture: bool
+) -> PropertyGroup:
     """Return the record of a camera, scene or textured object, and create it if missing. Update its name."""
     records = scene.rosy.bakes
     camera, view, record = None, "", None
@@ -160,9 +161,7 @@ def _find_or_add_record(
     return record
 
 
-def _find_texture_record(
-    scene: bpy.types.Scene, obj: bpy.types.Object
-) -> bpy.types.PropertyGroup | None:
+def _find_texture_record(scene: Scene, obj: Object) -> PropertyGroup | None:
     """Return the record of a texture that only this object shows; None if there is none.
 
     A copy of an object shows the same texture, until the object or the copy is baked again.
@@ -175,7 +174,7 @@ def _find_texture_record(
     return None
 
 
-def _texture_objects(record: bpy.types.PropertyGroup) -> list[bpy.types.Object]:
+def _texture_objects(record: PropertyGroup) -> list[Object]:
     """Return the objects whose modifier has the texture of a record, sorted by name."""
     objects = [
         obj
@@ -189,9 +188,7 @@ def _texture_objects(record: bpy.types.PropertyGroup) -> list[bpy.types.Object]:
     return sorted(objects, key=lambda obj: obj.name)
 
 
-def _replace_datablocks(
-    record: bpy.types.PropertyGroup, image: bpy.types.Image, material: bpy.types.Material
-) -> None:
+def _replace_datablocks(record: PropertyGroup, image: Image, material: Material) -> None:
     """Set the image and material of a record. Delete its earlier ones, unless another record uses them."""
     old_datablocks = (record.material, record.image)
     record.image, record.material = image, material
@@ -202,12 +199,12 @@ def _replace_datablocks(
             new_datablock.name = f"{NAME_PREFIX}{record.name}"
 
 
-def find_record(scene: bpy.types.Scene, name: str) -> bpy.types.PropertyGroup | None:
+def find_record(scene: Scene, name: str) -> PropertyGroup | None:
     """Return the record of a camera, given its present name; None if there is none."""
     return next((record for record in scene.rosy.bakes if camera_name(record) == name), None)
 
 
-def camera_name(record: bpy.types.PropertyGroup) -> str:
+def camera_name(record: PropertyGroup) -> str:
     """Return the present name of the camera of a record.
 
     For a sequence from several cameras it is the name of the scene, and for a texture the name of its object.
@@ -230,7 +227,7 @@ def _view_from_json(text: str) -> Camera:
     return Camera(np.array(view), np.array(projection), *others)
 
 
-def _is_recorded(datablock: bpy.types.ID | None) -> bool:
+def _is_recorded(datablock: ID | None) -> bool:
     """Return whether any record uses an image or material.
 
     Copies of a scene have records of the same images.
@@ -238,22 +235,19 @@ def _is_recorded(datablock: bpy.types.ID | None) -> bool:
     return any(datablock in (record.image, record.material) for record in _all_records())
 
 
-def _all_records() -> list[bpy.types.PropertyGroup]:
+def _all_records() -> list[PropertyGroup]:
     """Return the records of all scenes."""
     return [record for scene in bpy.data.scenes for record in scene.rosy.bakes]
 
 
-def recorded_materials(*, textures: bool = True) -> set[bpy.types.Material]:
+def recorded_materials(*, textures: bool = True) -> set[Material]:
     """Return the materials of the pictures that all scenes record. `textures` says whether textures count."""
     records = _all_records()
     return {record.material for record in records if textures or record.view != TEXTURE_VIEW}
 
 
 def list_bakes(
-    scene: bpy.types.Scene,
-    *,
-    for_panel: bool = False,
-    automatic_device: Callable[[Look], str] | None = None,
+    scene: Scene, *, for_panel: bool = False, automatic_device: Callable[[Look], str] | None = None
 ) -> list[BakeInfo]:
     """Return the pictures on the objects of a scene, sorted by camera name.
 
@@ -299,8 +293,8 @@ def list_bakes(
 
 
 def _present_reason(
-    scene: bpy.types.Scene,
-    record: bpy.types.PropertyGroup,
+    scene: Scene,
+    record: PropertyGroup,
     state: SceneState,
     automatic_device: Callable[[Look], str] | None,
 ) -> dict[str, str]:
@@ -354,7 +348,7 @@ def _present_reason(
     return {"stale_reason": difference(recorded, present, f"camera '{source.name}'")}
 
 
-def has_pictures(scene: bpy.types.Scene) -> bool:
+def has_pictures(scene: Scene) -> bool:
     """Return whether there is anything for `remove_bakes` to remove.
 
     Appended objects may show a picture that has no record. If the user has deleted an image, a record
@@ -363,7 +357,7 @@ def has_pictures(scene: bpy.types.Scene) -> bool:
     return bool(scene.rosy.bakes or baked_objects(scene))
 
 
-def baked_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+def baked_objects(scene: Scene) -> list[Object]:
     """Return the objects with a picture that belong to a scene, including objects of instanced collections.
 
     Objects that are in no scene are included too, so that their pictures can be removed.
@@ -378,11 +372,11 @@ def baked_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     return [obj for obj in baked if obj in own or obj not in others]
 
 
-def _reached_objects(scene: bpy.types.Scene) -> set[bpy.types.Object]:
+def _reached_objects(scene: Scene) -> set[Object]:
     """Return the objects of a scene, and the objects of all collections that these objects instance."""
-    reached: set[bpy.types.Object] = set()
+    reached: set[Object] = set()
 
-    def add_objects(collection: bpy.types.Collection) -> None:
+    def add_objects(collection: Collection) -> None:
         for obj in collection.all_objects:
             if obj not in reached:
                 reached.add(obj)
@@ -393,7 +387,7 @@ def _reached_objects(scene: bpy.types.Scene) -> set[bpy.types.Object]:
     return reached
 
 
-def remove_bakes(scene: bpy.types.Scene) -> RemovalCounts:
+def remove_bakes(scene: Scene) -> RemovalCounts:
     """Remove baked pictures, backdrops and keys (legends) from a scene. Fields and saved files are kept."""
     objects = baked_objects(scene)
     with _object_mode(objects):
@@ -419,7 +413,7 @@ def _clean_unused_meshes() -> None:
             remove_applied_picture(mesh)
 
 
-def _remove_records(scene: bpy.types.Scene) -> int:
+def _remove_records(scene: Scene) -> int:
     """Remove all records of a scene, and their images and materials. Return the number of deleted images."""
     datablocks = [(record.image, record.material, record.camera) for record in scene.rosy.bakes]
     scene.rosy.bakes.clear()
@@ -436,7 +430,7 @@ def _remove_records(scene: bpy.types.Scene) -> int:
 
 
 @contextmanager
-def _object_mode(objects: Sequence[bpy.types.Object]) -> Iterator[None]:
+def _object_mode(objects: Sequence[Object]) -> Iterator[None]:
     """Context manager: leave edit mode during a block if an edited object has an applied picture.
 
     A picture is applied if the user has applied RoSy's modifier; see `remove_applied_picture`.

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import bpy
+from bpy.types import Image
 
 from ..core.errors import RosyError
 from ..core.file_io import check_writable, make_folder, replacing, write_bytes
@@ -15,7 +16,7 @@ from ..image_io.image_data import ImageData, image_size
 
 def new_image(
     name: str, image_data: ImageData, *, is_color: bool = True, stem: Path | None = None
-) -> bpy.types.Image:
+) -> Image:
     """Create a Blender image.
 
     Parameters
@@ -59,7 +60,7 @@ def new_image(
 
 def new_tiled_image(
     name: str, tiles: Mapping[int, ImageData], *, is_color: bool = True, stem: Path | None = None
-) -> bpy.types.Image:
+) -> Image:
     """Create a Blender image of UDIM tiles.
 
     Parameters
@@ -94,9 +95,7 @@ def new_tiled_image(
     return image
 
 
-def _load_tiles(
-    name: str, tiles: Mapping[int, ImageData], stem: Path, is_color: bool
-) -> bpy.types.Image:
+def _load_tiles(name: str, tiles: Mapping[int, ImageData], stem: Path, is_color: bool) -> Image:
     """Write tiles to files, and load them as one image."""
     as_float = not all(isinstance(tile, bytes) for tile in tiles.values())
     suffix = _suffix(as_float)
@@ -163,7 +162,7 @@ def write_frame(path: Path, image_data: ImageData) -> None:
         bpy.data.scenes.remove(scene)
 
 
-def load_sequence(path: Path, as_float: bool) -> bpy.types.Image:
+def load_sequence(path: Path, as_float: bool) -> Image:
     """Load an image sequence as one Blender image, from the path of its first frame.
 
     `as_float` says whether the files have linear values (.exr) instead of 8-bit sRGB (.png).
@@ -176,7 +175,7 @@ def load_sequence(path: Path, as_float: bool) -> bpy.types.Image:
     return image
 
 
-def _save_image(image: bpy.types.Image, image_data: ImageData, stem: Path) -> None:
+def _save_image(image: Image, image_data: ImageData, stem: Path) -> None:
     """Save an image to a file, and make the image use this file. An existing file is replaced.
 
     A PNG file is written as it is. If the image has pixels in single precision, Blender writes an .exr file.

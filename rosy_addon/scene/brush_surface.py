@@ -6,8 +6,8 @@ from collections.abc import Callable
 from functools import cached_property
 
 import bmesh
-import bpy
 import numpy as np
+from bpy.types import Depsgraph, Mesh, Object
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
@@ -37,9 +37,7 @@ class BrushSurface:
         Surface of the object's original mesh.
     """
 
-    def __init__(
-        self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, surface: Surface
-    ) -> None:
+    def __init__(self, obj: Object, depsgraph: Depsgraph, surface: Surface) -> None:
         self._obj = obj
         self._surface = surface
         self._evaluated = obj.evaluated_get(depsgraph)
@@ -167,7 +165,7 @@ def _deformed(
     return u[:, None] * shown_a + v[:, None] * shown_b
 
 
-def closest_faces(mesh: bpy.types.Mesh, surface: Surface, cache: Cache) -> FaceLocator:
+def closest_faces(mesh: Mesh, surface: Surface, cache: Cache) -> FaceLocator:
     """Return a function that finds the faces of a mesh closest to points in object space.
 
     Parameters

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import bpy
 import numpy as np
+from bpy.types import Depsgraph, Object, Region, RegionView3D, Scene
 
 from ..core.errors import RosyError
 from ..projection.camera import Camera, check_size
@@ -16,10 +16,10 @@ VIEW_NAME = "3D View"
 FRAME_CAMERAS = "frame cameras"
 
 #: The camera of a picture: a camera object of the scene, or a `Camera`, for example of a 3D view.
-CameraSource = bpy.types.Object | Camera
+CameraSource = Object | Camera
 
 
-def scene_cameras(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+def scene_cameras(scene: Scene) -> list[Object]:
     """Return all cameras of a scene, sorted by name. The active camera comes last.
 
     Raises
@@ -33,7 +33,7 @@ def scene_cameras(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     return sorted(cameras, key=lambda obj: (obj == scene.camera, obj.name))
 
 
-def render_camera(scene: bpy.types.Scene) -> bpy.types.Object:
+def render_camera(scene: Scene) -> Object:
     """Return the active camera of a scene.
 
     Raises
@@ -46,7 +46,7 @@ def render_camera(scene: bpy.types.Scene) -> bpy.types.Object:
     return scene.camera
 
 
-def frame_camera(scene: bpy.types.Scene, frame: int) -> bpy.types.Object:
+def frame_camera(scene: Scene, frame: int) -> Object:
     """Return the camera that renders a frame.
 
     Timeline markers may be bound to cameras. The last such marker at or before the frame decides. If all of
@@ -67,7 +67,7 @@ def frame_camera(scene: bpy.types.Scene, frame: int) -> bpy.types.Object:
     return min(bound, key=lambda marker: marker.frame).camera
 
 
-def render_size(scene: bpy.types.Scene, percentage: float = 100.0) -> tuple[int, int]:
+def render_size(scene: Scene, percentage: float = 100.0) -> tuple[int, int]:
     """Return the (width, height) in pixels at which Blender renders a scene.
 
     Parameters
@@ -84,10 +84,7 @@ def render_size(scene: bpy.types.Scene, percentage: float = 100.0) -> tuple[int,
 
 
 def camera_of_object(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    camera_object: bpy.types.Object,
-    size: tuple[int, int] | None = None,
+    scene: Scene, depsgraph: Depsgraph, camera_object: Object, size: tuple[int, int] | None = None
 ) -> Camera:
     """Return the view and projection of a camera object as a `Camera`.
 
@@ -122,10 +119,7 @@ def camera_of_object(
 
 
 def resolve_camera(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    source: CameraSource,
-    size: tuple[int, int] | None = None,
+    scene: Scene, depsgraph: Depsgraph, source: CameraSource, size: tuple[int, int] | None = None
 ) -> Camera:
     """Return the view and projection from which a picture is drawn, as a `Camera`.
 
@@ -151,7 +145,7 @@ def resolve_camera(
     return camera_of_object(scene, depsgraph, source, size)
 
 
-def camera_of_view(region: bpy.types.Region, region_3d: bpy.types.RegionView3D) -> Camera:
+def camera_of_view(region: Region, region_3d: RegionView3D) -> Camera:
     """Return the view and projection of a 3D view as a `Camera` named `VIEW_NAME`, of the region's size."""
     view, projection = np.array(region_3d.view_matrix), np.array(region_3d.window_matrix)
     return Camera(view, projection, region.width, region.height, VIEW_NAME)

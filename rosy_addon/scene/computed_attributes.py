@@ -10,8 +10,8 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-import bpy
 import numpy as np
+from bpy.types import Depsgraph, Mesh, Object
 
 from ..core.errors import RosyError
 from ..field.analysis import FieldComparison, compare_fields
@@ -38,7 +38,7 @@ OCCLUSION_ATTRIBUTE = "Occlusion"
 
 
 @job
-def mesh_tangents(mesh: bpy.types.Mesh, guiding_angle: float, name: str = "") -> Steps[np.ndarray]:
+def mesh_tangents(mesh: Mesh, guiding_angle: float, name: str = "") -> Steps[np.ndarray]:
     """Compute one direction of a mesh's field per corner, for the Tangent input of shaders.
 
     Parameters
@@ -68,7 +68,7 @@ def mesh_tangents(mesh: bpy.types.Mesh, guiding_angle: float, name: str = "") ->
     return call_steps(corner_tangents, surface, field, guiding_angle)
 
 
-def assign_tangents(tangents: Mapping[bpy.types.Mesh, np.ndarray], name: str = "") -> None:
+def assign_tangents(tangents: Mapping[Mesh, np.ndarray], name: str = "") -> None:
     """Store tangents on the corners of meshes: on all of them, or on none if one cannot be changed.
 
     Parameters
@@ -90,7 +90,7 @@ def assign_tangents(tangents: Mapping[bpy.types.Mesh, np.ndarray], name: str = "
         mesh.update()
 
 
-def _check_tangents_storable(mesh: bpy.types.Mesh, name: str) -> None:
+def _check_tangents_storable(mesh: Mesh, name: str) -> None:
     check_writable(mesh)
     check_attribute_type(mesh, name or TANGENT_ATTRIBUTE, VECTOR_TYPE, "CORNER")
 
@@ -98,7 +98,7 @@ def _check_tangents_storable(mesh: bpy.types.Mesh, name: str) -> None:
 # --- difference of two fields --------------------------------------------------------------------
 
 
-def other_field_names(mesh: bpy.types.Mesh) -> list[str]:
+def other_field_names(mesh: Mesh) -> list[str]:
     """Return the names of vector attributes of a mesh that may hold a field other than its own."""
     no_fields = (attribute_name(mesh), "position", GUIDE_ATTRIBUTE, TANGENT_ATTRIBUTE)
     return [
@@ -112,7 +112,7 @@ def other_field_names(mesh: bpy.types.Mesh) -> list[str]:
 
 @job
 def store_difference(
-    mesh: bpy.types.Mesh, other: str, name: str = DIFFERENCE_ATTRIBUTE
+    mesh: Mesh, other: str, name: str = DIFFERENCE_ATTRIBUTE
 ) -> Steps[tuple[str, int, FieldComparison]]:
     """Compute the angle between the field of a mesh and another field, and store it on the faces.
 
@@ -162,8 +162,8 @@ def store_difference(
 
 @job
 def store_occlusion(
-    depsgraph: bpy.types.Depsgraph,
-    objects: Sequence[bpy.types.Object],
+    depsgraph: Depsgraph,
+    objects: Sequence[Object],
     name: str = OCCLUSION_ATTRIBUTE,
     direction_count: int = DIRECTION_COUNT,
 ) -> Steps[None]:
@@ -193,7 +193,7 @@ def store_occlusion(
         check_writable(obj.data)
         check_attribute_type(obj.data, name, "FLOAT", "CORNER")
     scene_data = read_scene(depsgraph, objects, ReadRequest("zero"))
-    values_by_mesh: dict[bpy.types.Mesh, np.ndarray] = {}
+    values_by_mesh: dict[Mesh, np.ndarray] = {}
     for index, obj in enumerate(objects):
         start, stop = index / len(objects), (index + 1) / len(objects)
         inputs = *_with_original_faces(scene_data, obj), direction_count
@@ -203,9 +203,7 @@ def store_occlusion(
         mesh.update()
 
 
-def _with_original_faces(
-    scene_data: SceneData, obj: bpy.types.Object
-) -> tuple[list[MeshInstance], int]:
+def _with_original_faces(scene_data: SceneData, obj: Object) -> tuple[list[MeshInstance], int]:
     """Return the mesh instances of a scene, and the index of the instance of an object.
 
     If the modifiers of the object change the faces, its instance has the surface of the original mesh.

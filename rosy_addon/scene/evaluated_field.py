@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-import bpy
 import numpy as np
+from bpy.types import Depsgraph, Mesh, Object
 
 from ..core.cache import Cache, content_hash
 from ..core.errors import RosyError
@@ -40,7 +40,7 @@ FACE_NORMAL_ATTRIBUTE = "rosy_face_normal"
 TEMP_FIELD_ATTRIBUTE = "rosy_stand_in"
 
 #: The errors of objects whose fields cannot be drawn.
-Errors = dict[bpy.types.Object, RosyError]
+Errors = dict[Object, RosyError]
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class FieldLayout:
         indices = range(self.degree if self.has_deviations else 0)
         return [self.name, *(f"{self.name}_{index}" for index in indices)]
 
-    def is_on(self, mesh: bpy.types.Mesh) -> bool:
+    def is_on(self, mesh: Mesh) -> bool:
         """Return whether an evaluated mesh has all attributes of the layout.
 
         Modifiers may have dropped some.
@@ -80,7 +80,7 @@ class FieldLayout:
 
 
 def read_evaluated_field(
-    mesh: bpy.types.Mesh,
+    mesh: Mesh,
     layout: FieldLayout,
     surface: Surface,
     nonfinite: str,
@@ -177,12 +177,8 @@ def _transport(
 
 @contextmanager
 def temp_attributes(
-    depsgraph: bpy.types.Depsgraph,
-    objects: Sequence[bpy.types.Object],
-    nonfinite: str,
-    cache: Cache,
-    errors: Errors,
-) -> Iterator[dict[bpy.types.Object, FieldLayout]]:
+    depsgraph: Depsgraph, objects: Sequence[Object], nonfinite: str, cache: Cache, errors: Errors
+) -> Iterator[dict[Object, FieldLayout]]:
     """Context manager: add temporary attributes, which modifiers copy to evaluated meshes.
 
     They are removed at the end of the block. The attributes are the rest positions and the normals of the
@@ -202,9 +198,9 @@ def temp_attributes(
     dict of bpy.types.Object to FieldLayout
         The attributes that hold each object's field on its evaluated mesh.
     """
-    layouts: dict[bpy.types.Object, FieldLayout] = {}
-    rest_enabled: list[bpy.types.Object] = []
-    temp_meshes: list[bpy.types.Mesh] = []
+    layouts: dict[Object, FieldLayout] = {}
+    rest_enabled: list[Object] = []
+    temp_meshes: list[Mesh] = []
     try:
         for obj in objects:
             mesh = obj.data
@@ -238,7 +234,7 @@ def temp_attributes(
 
 
 def _prepare_field(
-    obj: bpy.types.Object, nonfinite: str, temp_meshes: list[bpy.types.Mesh], cache: Cache
+    obj: Object, nonfinite: str, temp_meshes: list[Mesh], cache: Cache
 ) -> FieldLayout:
     """Return the layout of the field of an object as vectors on faces; add temporary attributes if needed.
 
@@ -267,12 +263,12 @@ def _prepare_field(
     return layout
 
 
-def _can_modify(mesh: bpy.types.Mesh) -> bool:
+def _can_modify(mesh: Mesh) -> bool:
     """Return whether attributes can be added to a mesh."""
     return is_editable(mesh) and not mesh.is_editmode
 
 
-def lost_field_error(obj: bpy.types.Object, attribute: str | None) -> RosyError:
+def lost_field_error(obj: Object, attribute: str | None) -> RosyError:
     """Return the error for an object whose modifiers remove an attribute.
 
     If `attribute` is None, they remove all faces.
@@ -284,7 +280,7 @@ def lost_field_error(obj: bpy.types.Object, attribute: str | None) -> RosyError:
     return RosyError(f"object '{obj.name}': after its modifiers ({names}) the mesh {problem}")
 
 
-def topology_hash(mesh: bpy.types.Mesh, original: bpy.types.Mesh) -> bytes:
+def topology_hash(mesh: Mesh, original: Mesh) -> bytes:
     """Return a hash of the faces and the field attribute of an evaluated mesh, without positions.
 
     The name of the field attribute is a setting of the original mesh, `original`.

@@ -23,8 +23,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
-import bpy
 import numpy as np
+from bpy.types import Attribute, Mesh, Object
 
 from ..core.cache import Cache, content_hash
 from ..core.errors import RosyError
@@ -46,17 +46,17 @@ MAX_NAME_BYTES = 67
 VECTOR_TYPE, ANGLE_TYPE = "FLOAT_VECTOR", "FLOAT"
 
 
-def attribute_name(mesh: bpy.types.Mesh) -> str:
+def attribute_name(mesh: Mesh) -> str:
     """Return the name of the attribute that holds the mesh's field."""
     return (mesh.rosy.attribute if has_rosy_properties() else "") or DEFAULT_FIELD_NAME
 
 
-def field_degree(mesh: bpy.types.Mesh) -> int:
+def field_degree(mesh: Mesh) -> int:
     """Return the degree of the mesh's field."""
     return mesh.rosy.degree if has_rosy_properties() else DEFAULT_DEGREE
 
 
-def has_field(obj: bpy.types.Object) -> bool:
+def has_field(obj: Object) -> bool:
     """Return whether an object is a mesh with a field attribute, which may be invalid."""
     if obj.type != "MESH" or obj.data is None:
         return False
@@ -64,18 +64,18 @@ def has_field(obj: bpy.types.Object) -> bool:
     return attribute_name(obj.data) in attributes or "dir0" in attributes
 
 
-def is_face_vector_field(mesh: bpy.types.Mesh, name: str | None = None) -> bool:
+def is_face_vector_field(mesh: Mesh, name: str | None = None) -> bool:
     """Return whether the field is stored in the standard form: vectors on faces."""
     return _has_attribute(mesh, name or attribute_name(mesh), "FACE", VECTOR_TYPE)
 
 
-def _has_attribute(mesh: bpy.types.Mesh, name: str, domain: str, data_type: str) -> bool:
+def _has_attribute(mesh: Mesh, name: str, domain: str, data_type: str) -> bool:
     """Return whether a mesh has an attribute with this name, domain and type."""
     attribute = mesh.attributes.get(name)
     return attribute is not None and (attribute.domain, attribute.data_type) == (domain, data_type)
 
 
-def field_values(attribute: bpy.types.Attribute, source: str, mesh: bpy.types.Mesh) -> np.ndarray:
+def field_values(attribute: Attribute, source: str, mesh: Mesh) -> np.ndarray:
     """Return the values of a field attribute: (n, 3) vectors or (n,) angles, float32.
 
     `source` is the name of the attribute in messages.
@@ -100,14 +100,12 @@ def field_values(attribute: bpy.types.Attribute, source: str, mesh: bpy.types.Me
     return read_collection(attribute.data, "value", np.float32)
 
 
-def describe_type(attribute: bpy.types.Attribute) -> str:
+def describe_type(attribute: Attribute) -> str:
     """Return the type and domain of an attribute, for a message."""
     return f"{attribute.data_type} on {attribute.domain}"
 
 
-def check_attribute_type(
-    mesh: bpy.types.Mesh, name: str, data_type: str, domain: str = "FACE"
-) -> None:
+def check_attribute_type(mesh: Mesh, name: str, data_type: str, domain: str = "FACE") -> None:
     """Check that an attribute can be written: it has this type and domain, or can be created with them.
 
     Raises
@@ -128,8 +126,8 @@ def check_attribute_type(
 
 
 def get_or_create_attribute(
-    mesh: bpy.types.Mesh, name: str, data_type: str, domain: str = "FACE"
-) -> bpy.types.Attribute:
+    mesh: Mesh, name: str, data_type: str, domain: str = "FACE"
+) -> Attribute:
     """Return the attribute with this name, type and domain, and create it if it is missing.
 
     Raises
@@ -153,8 +151,8 @@ def get_or_create_attribute(
 
 
 def store_attribute(
-    mesh: bpy.types.Mesh, name: str, data_type: str, values: np.ndarray, domain: str = "FACE"
-) -> bpy.types.Attribute:
+    mesh: Mesh, name: str, data_type: str, values: np.ndarray, domain: str = "FACE"
+) -> Attribute:
     """Write the values of the attribute that `get_or_create_attribute` returns, and return it."""
     attribute = get_or_create_attribute(mesh, name, data_type, domain)
     write_attribute(attribute, values)
@@ -189,7 +187,7 @@ def _attribute_names(name: str) -> tuple[str, str]:
     return f".{name}_rest", f".{name}_check"
 
 
-def store_rest_shape(mesh: bpy.types.Mesh, name: str) -> None:
+def store_rest_shape(mesh: Mesh, name: str) -> None:
     """Store the present shape of a mesh for an attribute of vectors on faces.
 
     Nothing is stored if Blender does not allow the names of the hidden attributes. The vectors then do not
@@ -208,9 +206,7 @@ def store_rest_shape(mesh: bpy.types.Mesh, name: str) -> None:
     write_attribute(mesh.attributes[check_name], vector_checks(vectors))
 
 
-def follow_mesh(
-    mesh: bpy.types.Mesh, name: str, vectors: np.ndarray, surface: Surface
-) -> np.ndarray:
+def follow_mesh(mesh: Mesh, name: str, vectors: np.ndarray, surface: Surface) -> np.ndarray:
     """Rotate vectors with their faces, from the shape in which they were stored to the present one.
 
     Parameters

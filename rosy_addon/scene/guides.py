@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-import bpy
 import numpy as np
+from bpy.types import Mesh, Object, Scene, Spline
 from mathutils.geometry import interpolate_bezier
 
 from ..core.errors import RosyError
@@ -44,13 +44,13 @@ BEZIER_SEGMENT_SAMPLES = 12
 EmptyGuide = tuple[np.ndarray, np.ndarray, float]
 
 
-def guide_objects(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+def guide_objects(objects: Iterable[Object]) -> list[Object]:
     """Return the objects that can guide a field: Grease Pencil, curves, hair curves and empties."""
     return [obj for obj in objects if obj.type in GUIDE_TYPES]
 
 
 def guide_strokes_and_empties(
-    objects: Iterable[bpy.types.Object], owner: bpy.types.Object
+    objects: Iterable[Object], owner: Object
 ) -> tuple[list[np.ndarray], list[EmptyGuide]]:
     """Read guide objects as strokes and empties, in the space of the object whose field they guide.
 
@@ -97,7 +97,7 @@ def guide_strokes_and_empties(
     return strokes, empties
 
 
-def annotation_strokes(scene: bpy.types.Scene, owner: bpy.types.Object) -> list[np.ndarray]:
+def annotation_strokes(scene: Scene, owner: Object) -> list[np.ndarray]:
     """Read the annotations of a scene as strokes, in the space of an object.
 
     The strokes of the current frame of visible layers are read. Strokes that are placed on the view instead
@@ -148,7 +148,7 @@ def _annotation_strokes(layer: Any, number: int) -> Any:
     return max(frames, key=lambda frame: frame.frame_number).strokes if frames else ()
 
 
-def _world_to_object(obj: bpy.types.Object) -> np.ndarray:
+def _world_to_object(obj: Object) -> np.ndarray:
     """Return the (4, 4) matrix from world space to the space of an object."""
     try:
         return np.linalg.inv(np.array(obj.matrix_world, dtype=np.float64))
@@ -156,7 +156,7 @@ def _world_to_object(obj: bpy.types.Object) -> np.ndarray:
         raise RosyError(f"object '{obj.name}' has a scale of zero: scale it up") from None
 
 
-def guide_vectors(mesh: bpy.types.Mesh, name: str, surface: Surface) -> np.ndarray:
+def guide_vectors(mesh: Mesh, name: str, surface: Surface) -> np.ndarray:
     """Read a vector attribute as one guide per face; see `read_face_vectors`.
 
     If RoSy has stored the attribute and the mesh was deformed since, the vectors are rotated with their
@@ -186,7 +186,7 @@ def guide_vectors(mesh: bpy.types.Mesh, name: str, surface: Surface) -> np.ndarr
     return follow_mesh(mesh, name, read_face_vectors(mesh, name), surface)
 
 
-def _object_strokes(obj: bpy.types.Object) -> list[np.ndarray]:
+def _object_strokes(obj: Object) -> list[np.ndarray]:
     """Return the strokes of an object, each (n, 3), in its own space."""
     if obj.type == "CURVE":
         return [_spline_points(spline) for spline in obj.data.splines]
@@ -216,7 +216,7 @@ def _split_strokes(attributes, offsets) -> list[np.ndarray]:
     return np.split(points, read_collection(offsets, "value", np.int32)[1:-1])
 
 
-def _spline_points(spline: bpy.types.Spline) -> np.ndarray:
+def _spline_points(spline: Spline) -> np.ndarray:
     """Return the points of a spline, (n, 3): samples of a Bézier spline, control points of a NURBS."""
     if spline.type != "BEZIER":
         points = _read_coordinates(spline.points, "co", 4)[:, :3]
@@ -242,7 +242,7 @@ GUIDE_ATTRIBUTE, FIELD_CHECK_ATTRIBUTE = "rosy_guides", ".rosy_guides_field"
 STROKE_FIRMNESS = 0.25
 
 
-def read_combed_guides(mesh: bpy.types.Mesh, surface: Surface) -> np.ndarray:
+def read_combed_guides(mesh: Mesh, surface: Surface) -> np.ndarray:
     """Read the combed guides of a mesh.
 
     Parameters
@@ -273,13 +273,13 @@ def read_combed_guides(mesh: bpy.types.Mesh, surface: Surface) -> np.ndarray:
     return guides
 
 
-def check_guides_storable(mesh: bpy.types.Mesh) -> None:
+def check_guides_storable(mesh: Mesh) -> None:
     """Raise an error if `store_combed_guides` cannot store guides on a mesh."""
     check_attribute_type(mesh, GUIDE_ATTRIBUTE, VECTOR_TYPE)
     check_attribute_type(mesh, FIELD_CHECK_ATTRIBUTE, ANGLE_TYPE)
 
 
-def store_combed_guides(mesh: bpy.types.Mesh, guides: np.ndarray) -> None:
+def store_combed_guides(mesh: Mesh, guides: np.ndarray) -> None:
     """Store (F, 3) combed guides. Call it after the field that was computed from them is stored.
 
     Raises

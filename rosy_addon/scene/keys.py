@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import bpy
 import numpy as np
+from bpy.types import ID, Image, Material, Object, PropertyGroup, Scene, UnitSettings, World
 
 from ..annotation.draw_key import DARK_PLATES, LIGHT_PLATES, KeyColors, draw_key
 from ..annotation.key_contents import PictureKey
@@ -42,7 +43,7 @@ FOOT, INCH = 0.3048, 0.0254
 DARK_BACKGROUND = 0.18
 
 
-def update_keys(scene: bpy.types.Scene) -> None:
+def update_keys(scene: Scene) -> None:
     """Replace the keys of a scene by the ones that its settings ask for.
 
     If keys are switched on, a key is added for each of `pictured_cameras`. It explains the picture as it was
@@ -60,12 +61,7 @@ def update_keys(scene: bpy.types.Scene) -> None:
             continue  # the camera was made panoramic after the bake
 
 
-def _add_key(
-    scene: bpy.types.Scene,
-    camera: bpy.types.Object,
-    record: bpy.types.PropertyGroup,
-    fonts: FontShapes,
-) -> None:
+def _add_key(scene: Scene, camera: Object, record: PropertyGroup, fonts: FontShapes) -> None:
     """Add a plane with a key, parented to a camera. Nothing is added if the key would be empty."""
     view = camera_of_object(scene, scene_depsgraph(scene), camera)
     picture = _draw(scene, view, record, fonts)
@@ -86,9 +82,7 @@ def _add_key(
         setattr(obj, probe, True)
 
 
-def _draw(
-    scene: bpy.types.Scene, view: Camera, record: bpy.types.PropertyGroup, fonts: FontShapes
-) -> Picture | None:
+def _draw(scene: Scene, view: Camera, record: PropertyGroup, fonts: FontShapes) -> Picture | None:
     """Draw a key as a picture that fills the frame of the camera. Return None if the key would be empty."""
     settings = scene.rosy
     shrink = min(1.0, MAX_SIDE / max(view.width, view.height))
@@ -122,7 +116,7 @@ def _lines(text: str) -> str:
 # --- scale bar -----------------------------------------------------------------------------------
 
 
-def _scale_bar(scene: bpy.types.Scene, view: Camera, width: int) -> tuple[float, str] | None:
+def _scale_bar(scene: Scene, view: Camera, width: int) -> tuple[float, str] | None:
     """Return the length of the scale bar in pixels and its label; None for perspective cameras.
 
     `width` is the width of the picture of the key in pixels. The picture fills the frame of the camera.
@@ -134,7 +128,7 @@ def _scale_bar(scene: bpy.types.Scene, view: Camera, width: int) -> tuple[float,
     return length / frame * width, label
 
 
-def round_length(largest: float, units: bpy.types.UnitSettings) -> tuple[float, str]:
+def round_length(largest: float, units: UnitSettings) -> tuple[float, str]:
     """Return the largest round length that is at most a given one, and its label in the units of a scene.
 
     Round lengths are 1, 2 and 5 times a power of ten, in meters, feet, inches or Blender units.
@@ -164,7 +158,7 @@ def round_length(largest: float, units: bpy.types.UnitSettings) -> tuple[float, 
 # --- colors --------------------------------------------------------------------------------------
 
 
-def _key_colors(scene: bpy.types.Scene) -> KeyColors:
+def _key_colors(scene: Scene) -> KeyColors:
     """Return the colors of a key: dark panels if the background is known to be dark, light ones otherwise."""
     look = read_look(scene.rosy)
     if scene.rosy.backdrop and is_hatched(look):
@@ -177,7 +171,7 @@ def _key_colors(scene: bpy.types.Scene) -> KeyColors:
     return DARK_PLATES if is_dark else LIGHT_PLATES
 
 
-def _world_color(world: bpy.types.World | None) -> np.ndarray | None:
+def _world_color(world: World | None) -> np.ndarray | None:
     """Return the (3,) linear color of a world; None if nodes vary it. Without a world it is black."""
     if world is None:
         return np.zeros(3, dtype=np.float32)
@@ -191,7 +185,7 @@ def _world_color(world: bpy.types.World | None) -> np.ndarray | None:
     return np.array(color.default_value[:3], dtype=np.float32) * strength.default_value
 
 
-def _new_material(name: str, image: bpy.types.Image, strength: float) -> bpy.types.Material:
+def _new_material(name: str, image: Image, strength: float) -> Material:
     """Create a material that emits an image with its alpha. Seen from behind it is fully transparent."""
     material, build = new_empty_material(name)
     material[KEY_TAG] = True
@@ -240,7 +234,7 @@ def _text_triangles(text: str) -> np.ndarray:
     """Return (n, 3, 2) triangles of a text of font size 1, moved so that the smallest x is 0."""
     fonts = set(bpy.data.fonts)
     curve = bpy.data.curves.new("RoSy text", type="FONT")
-    created: list[bpy.types.ID] = [curve]
+    created: list[ID] = [curve]
     try:
         curve.body = text
         curve.resolution_u = CURVE_RESOLUTION

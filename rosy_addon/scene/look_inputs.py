@@ -14,6 +14,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from bpy.types import Depsgraph, Image, Mesh, Object, Scene
 
 from ..compositor.look import Look, colors_values
 from ..compositor.target_tone import ReferenceRender
@@ -68,7 +69,7 @@ class ReadRequest:
 FIELDS_ONLY = ReadRequest()
 
 
-def read_request(scene: bpy.types.Scene, look: Look) -> ReadRequest:
+def read_request(scene: Scene, look: Look) -> ReadRequest:
     """Return what to read from the meshes of a scene to draw a look, with the settings of the scene."""
     tone = None
     if look.tone == "attribute":
@@ -78,12 +79,12 @@ def read_request(scene: bpy.types.Scene, look: Look) -> ReadRequest:
     return ReadRequest(nonfinite_policy(scene), tone, color_attribute_of(scene, look))
 
 
-def nonfinite_policy(scene: bpy.types.Scene) -> str:
+def nonfinite_policy(scene: Scene) -> str:
     """Return how vectors that are not finite are treated, by the setting of a scene: "zero" or "error"."""
     return "zero" if scene.rosy.undefined else "error"
 
 
-def color_attribute_of(scene: bpy.types.Scene, look: Look) -> str | None:
+def color_attribute_of(scene: Scene, look: Look) -> str | None:
     """Return the name of the attribute with values for the color map; None if the look does not use it."""
     return scene.rosy.color_attribute if colors_values(look) else None
 
@@ -92,10 +93,7 @@ def color_attribute_of(scene: bpy.types.Scene, look: Look) -> str | None:
 
 
 def read_tone(
-    mesh: bpy.types.Mesh,
-    owner: bpy.types.Object,
-    tone_request: ToneRequest | None,
-    cache: Cache | None = None,
+    mesh: Mesh, owner: Object, tone_request: ToneRequest | None, cache: Cache | None = None
 ) -> SurfaceTone | None:
     """Read the surface tone of a mesh.
 
@@ -145,9 +143,7 @@ def read_tone(
     return cache.get_or_create(key, lambda: SurfaceTone(values, image))
 
 
-def tone_digest(
-    mesh: bpy.types.Mesh, owner: bpy.types.Object, tone_request: ToneRequest | None
-) -> bytes:
+def tone_digest(mesh: Mesh, owner: Object, tone_request: ToneRequest | None) -> bytes:
     """Return a digest of the result of `read_tone`; empty if the mesh has no tone.
 
     If the tone cannot be read, a digest of the error message is returned.
@@ -159,7 +155,7 @@ def tone_digest(
     return b"" if tone is None else content_hash(tone.values, tone.image)
 
 
-def tone_image_key(owner: bpy.types.Object, tone_request: ToneRequest | None) -> tuple[str, ...]:
+def tone_image_key(owner: Object, tone_request: ToneRequest | None) -> tuple[str, ...]:
     """Return a cache key for the tone image and UV map of an object; empty if the tone is not an image."""
     if tone_request is None or tone_request.kind != "image" or not has_rosy_properties():
         return ()
@@ -168,7 +164,7 @@ def tone_image_key(owner: bpy.types.Object, tone_request: ToneRequest | None) ->
 
 
 def read_color_values(
-    mesh: bpy.types.Mesh, name: str | None, label: str, cache: Cache | None = None
+    mesh: Mesh, name: str | None, label: str, cache: Cache | None = None
 ) -> np.ndarray | None:
     """Read the values for the color map from a mesh attribute.
 
@@ -204,7 +200,7 @@ def read_color_values(
     return cache.get_or_create(("color values", content_hash(values)), lambda: values)
 
 
-def color_values_digest(mesh: bpy.types.Mesh, name: str | None) -> bytes:
+def color_values_digest(mesh: Mesh, name: str | None) -> bytes:
     """Return a digest of the result of `read_color_values`; empty if the mesh has no such attribute.
 
     If the attribute cannot be read, a digest of the error message is returned.
@@ -216,9 +212,7 @@ def color_values_digest(mesh: bpy.types.Mesh, name: str | None) -> bytes:
     return b"" if values is None else content_hash(values)
 
 
-def check_sources(
-    with_field: Sequence[tuple[MeshInstance, bpy.types.Object]], request: ReadRequest
-) -> None:
+def check_sources(with_field: Sequence[tuple[MeshInstance, Object]], request: ReadRequest) -> None:
     """Check that the requested tones and values for the color map were found on some mesh with a field.
 
     At least one mesh must have a tone, if tones are requested. At least one mesh must have values for the
@@ -257,7 +251,7 @@ def check_sources(
         raise RosyError(f"{names}: {problem}")
 
 
-def _attribute_listing(owners: Sequence[bpy.types.Object], types: Sequence[str]) -> str:
+def _attribute_listing(owners: Sequence[Object], types: Sequence[str]) -> str:
     """Return the names of all attributes of objects with a data type in `types`, as text for a message."""
     available = dict.fromkeys(
         attribute.name
@@ -273,7 +267,7 @@ def _attribute_listing(owners: Sequence[bpy.types.Object], types: Sequence[str])
 # --- reference renders -------------------------------------------------------------------------------
 
 
-def reference_path(scene: bpy.types.Scene) -> Path:
+def reference_path(scene: Scene) -> Path:
     """Return the path of the reference render for the current frame of a scene.
 
     In the path that the user has chosen, a run of ``#`` is replaced by the frame number, padded with zeros to
@@ -292,9 +286,9 @@ def reference_path(scene: bpy.types.Scene) -> Path:
 
 
 def load_reference(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    camera: bpy.types.Object | None,
+    scene: Scene,
+    depsgraph: Depsgraph,
+    camera: Object | None,
     look: Look,
     picture_luminance: np.ndarray | None = None,
 ) -> ReferenceRender | None:
@@ -349,7 +343,7 @@ def load_luminance(path: Path) -> np.ndarray:
         bpy.data.images.remove(image)
 
 
-def image_luminance(image: bpy.types.Image) -> np.ndarray:
+def image_luminance(image: Image) -> np.ndarray:
     """Return the linear luminance of an image, (H, W) float32, composited over white.
 
     Raises

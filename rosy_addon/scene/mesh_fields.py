@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from functools import partial
 
-import bpy
 import numpy as np
+from bpy.types import Attribute, Mesh
 
 from ..core.cache import Cache
 from ..core.errors import RosyError, counted
 from ..core.progress import progress, report
+from ..field import validate
 from ..field.blocks import as_float64
 from ..field.directional_field import field_directions
 from ..field.frames import dot, normalize, tangent_frame
@@ -17,13 +18,6 @@ from ..field.polygon_arrays import mean_per_face
 from ..field.representation import from_representation, to_representation
 from ..field.rosy_field import MAX_DEGREE, RosyField, check_degree
 from ..field.surface import Surface
-from ..field.validate import (
-    VectorPolicy,
-    apply_nonfinite_policy,
-    project_to_tangent,
-    validated_directions,
-    validated_field,
-)
 from .datablocks import has_rosy_properties, is_editable
 from .field_attributes import (
     ANGLE_TYPE,
@@ -52,7 +46,7 @@ ELEMENTS = {"FACE": "face", "POINT": "vertex"}
 
 
 def read_mesh_field(
-    mesh: bpy.types.Mesh,
+    mesh: Mesh,
     name: str | None = None,
     degree: int | None = None,
     surface: Surface | None = None,
@@ -116,8 +110,8 @@ def read_mesh_field(
             return _field_from_angles(surface, values, degree, source, nonfinite)
         if domain == "CORNER":
             return _field_from_corners(surface, values, degree, source, nonfinite)
-        policy = VectorPolicy(nonfinite)
-        return validated_field(surface, values, degree, source, policy, ELEMENTS[domain])
+        policy = validate.VectorPolicy(nonfinite)
+        return validate.validated_field(surface, values, degree, source, policy, ELEMENTS[domain])
 
     key_parts = "attribute", domain, data_type, values, degree, source, nonfinite
     with progress(0.5, 1.0, "reading the field"):
@@ -125,7 +119,7 @@ def read_mesh_field(
 
 
 def _field_from_directions(
-    mesh: bpy.types.Mesh, surface: Surface, nonfinite: str, label: str, cache: Cache | None
+    mesh: Mesh, surface: Surface, nonfinite: str, label: str, cache: Cache | None
 ) -> RosyField:
     """Read a field from the attributes ``dir0`` ... ``dir{N-1}``. Their number N is the degree."""
     degree = 0
@@ -151,8 +145,8 @@ def _field_from_directions(
     if domain == "FACE":
         directions = follow_mesh(mesh, "dir0", directions, surface)
     source = f"{label}, attributes dir0 to dir{degree - 1}"
-    policy, element = VectorPolicy(nonfinite), ELEMENTS[domain]
-    build = partial(validated_directions, surface, directions, source, policy, element)
+    policy, element = validate.VectorPolicy(nonfinite), ELEMENTS[domain]
+    build = partial(validate.validated_directions, surface, directions, source, policy, element)
     with progress(0.0, 1.0, "reading the field"):
         return cached_for_surface(
             cache, surface, build, "directions", directions, source, *policy, element
@@ -170,7 +164,7 @@ def _field_from_angles(
     report(0.5, "reading the field")
     angles = as_float64(angles)
     defined = np.isfinite(angles)
-    apply_nonfinite_policy(angles, source, "face", nonfinite)
+    validate.apply_nonfinite_policy(angles, source, "face", nonfinite)
     vectors = np.cos(angles)[:, None] * x + np.sin(angles)[:, None] * y
     return RosyField(degree, np.where(defined[:, None], vectors, 0.0))
 
@@ -184,12 +178,14 @@ def _field_from_corners(
     the corners of a face do not cancel out. `source` is the name of the attribute in messages.
     """
     vectors = as_float64(vectors)
-    apply_nonfinite_policy(vectors, source, "corner", nonfinite)
+    validate.apply_nonfinite_policy(vectors, source, "corner", nonfinite)
     normal = surface.face_normal
     corner_normal = normal[surface.corner_face]
     report(0.2, "reading the field")
     with progress(0.2, 0.7):
-        vectors = project_to_tangent(vectors, corner_normal, CORNER_TOLERANCE, source, "corner")
+        vectors = validate.project_to_tangent(
+            vectors, corner_normal, CORNER_TOLERANCE, source, "corner"
+        )
     x, y = tangent_frame(normal)
     z = to_representation(vectors, x[surface.corner_face], y[surface.corner_face], degree)
     report(0.9, "reading the field")
@@ -197,7 +193,7 @@ def _field_from_corners(
     return RosyField(degree, np.where(normalize(normal).any(axis=1)[:, None], mean, 0.0))
 
 
-def _attribute_hint(mesh: bpy.types.Mesh) -> str:
+def _attribute_hint(mesh: Mesh) -> str:
     """Return advice for a message: which vector attribute to choose, or to make a field if there are none."""
     names = [
         f"'{other.name}'"
@@ -221,7 +217,7 @@ STORAGE_FORMS = {
 
 
 def assign_fields(
-    fields: dict[bpy.types.Mesh, RosyField], name: str | None = None, form: str = "VECTOR"
+    fields: dict[Mesh, RosyField], name: str | None = None, form: str = "VECTOR"
 ) -> None:
     """Store fields on meshes: on all of them, or on none if one field cannot be stored.
 
@@ -246,7 +242,7 @@ def assign_fields(
         _store(mesh, field, names[mesh], form)
 
 
-def _default_name(mesh: bpy.types.Mesh, form: str) -> str:
+def _default_name(mesh: Mesh, form: str) -> str:
     """Return the default name of the attribute in which a field of a mesh is stored in a form."""
     if form == "ANGLE":
         return DEFAULT_ANGLE_NAME
@@ -256,8 +252,8 @@ def _default_name(mesh: bpy.types.Mesh, form: str) -> str:
 
 
 def write_mesh_field(
-    mesh: bpy.types.Mesh, field: RosyField, name: str = DEFAULT_FIELD_NAME, form: str = "VECTOR"
-) -> bpy.types.Attribute:
+    mesh: Mesh, field: RosyField, name: str = DEFAULT_FIELD_NAME, form: str = "VECTOR"
+) -> Attribute:
     """Store a field on a mesh. An existing field in an attribute with the same name is replaced.
 
     Parameters
@@ -292,7 +288,7 @@ def write_mesh_field(
     return _store(mesh, field, name, form)
 
 
-def _store(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str) -> bpy.types.Attribute:
+def _store(mesh: Mesh, field: RosyField, name: str, form: str) -> Attribute:
     """Store a field that `_check_storable` has checked. Return its attribute, or the first of several."""
     if form == "DIRECTIONS" or field.direction_ratios is not None:
         attribute = _write_directions(mesh, field, name)
@@ -315,7 +311,7 @@ def _store(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str) -> bpy.
     return attribute
 
 
-def overwrite_vectors(mesh: bpy.types.Mesh, vectors: np.ndarray) -> np.ndarray:
+def overwrite_vectors(mesh: Mesh, vectors: np.ndarray) -> np.ndarray:
     """Replace the vectors of a field that is stored as one vector on each face, without any check.
 
     It is meant for a preview during an edit. `write_mesh_field` stores the final field.
@@ -337,7 +333,7 @@ def overwrite_vectors(mesh: bpy.types.Mesh, vectors: np.ndarray) -> np.ndarray:
     return before
 
 
-def _check_storable(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str) -> None:
+def _check_storable(mesh: Mesh, field: RosyField, name: str, form: str) -> None:
     """Raise an error if `write_mesh_field` cannot store a field. Nothing is changed."""
     check_writable(mesh)
     face_count = len(mesh.polygons)
@@ -363,7 +359,7 @@ def _check_storable(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str
             mesh.attributes.remove(attribute)
 
 
-def _write_directions(mesh: bpy.types.Mesh, field: RosyField, name: str) -> bpy.types.Attribute:
+def _write_directions(mesh: Mesh, field: RosyField, name: str) -> Attribute:
     """Store the N directions of a field as ``dir0`` ... ``dir{N-1}``.
 
     Remove attributes ``dirN``, ``dir{N+1}`` ...
@@ -383,7 +379,7 @@ def _write_directions(mesh: bpy.types.Mesh, field: RosyField, name: str) -> bpy.
     return mesh.attributes["dir0"]
 
 
-def check_writable(mesh: bpy.types.Mesh) -> None:
+def check_writable(mesh: Mesh) -> None:
     """Raise an error if a mesh is linked from a library or in edit mode."""
     if not is_editable(mesh):
         library = mesh.library.filepath if mesh.library else "its library"

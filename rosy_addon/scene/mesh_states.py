@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import bpy
 import numpy as np
+from bpy.types import Mesh, Object
 
 from ..core.cache import content_hash
 from ..field.rosy_field import MAX_DEGREE
@@ -40,9 +40,7 @@ class MeshState:
 MeshStates = dict[tuple, MeshState | None]
 
 
-def mesh_state_key(
-    obj: bpy.types.Object, owner: bpy.types.Object, request: ReadRequest | None
-) -> tuple:
+def mesh_state_key(obj: Object, owner: Object, request: ReadRequest | None) -> tuple:
     """Return the key under which a `MeshStates` dictionary holds the mesh of an evaluated object.
 
     The first item of the key is the session UID of the original object.
@@ -60,7 +58,7 @@ def mesh_state_key(
 
 
 def read_mesh_state(
-    mesh: bpy.types.Mesh | None, owner: bpy.types.Object, request: ReadRequest | None
+    mesh: Mesh | None, owner: Object, request: ReadRequest | None
 ) -> MeshState | None:
     """Return the state of an evaluated mesh; None if it has no faces.
 
@@ -90,7 +88,7 @@ def read_mesh_state(
     return MeshState(digest(*parts), bounds, lacks_tone)
 
 
-def field_parts(mesh: bpy.types.Mesh, original: bpy.types.Mesh) -> list:
+def field_parts(mesh: Mesh, original: Mesh) -> list:
     """Return the values on which the field of a mesh depends, for `digest`.
 
     They are the degree, and the domain and the values of each attribute of the field. The degree and the name

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 
 import bpy
 import numpy as np
+from bpy.types import Attribute, Mesh, Object, bpy_prop_collection
 
 from ..core.cache import Cache, content_hash
 from ..core.errors import NoFeaturesError, RosyError
@@ -31,7 +32,7 @@ EDGE_SELECTION_ATTRIBUTE = ".select_edge"
 REST_ATTRIBUTE = "rest_position"
 
 
-def mesh_label(mesh: bpy.types.Mesh) -> str:
+def mesh_label(mesh: Mesh) -> str:
     """Return the name of a mesh for messages: the name of an object that uses it, if there is one.
 
     Selected objects are preferred.
@@ -43,11 +44,7 @@ def mesh_label(mesh: bpy.types.Mesh) -> str:
 
 
 def mesh_surface(
-    mesh: bpy.types.Mesh,
-    name: str | None = None,
-    *,
-    occluder_only: bool = False,
-    cache: Cache | None = None,
+    mesh: Mesh, name: str | None = None, *, occluder_only: bool = False, cache: Cache | None = None
 ) -> Surface:
     """Read a mesh as a surface.
 
@@ -99,20 +96,20 @@ def mesh_surface(
     return cache.get_or_create(("surface", name, occluder_only, shape_hash), build)
 
 
-def no_faces_error(mesh: bpy.types.Mesh, name: str) -> RosyError:
+def no_faces_error(mesh: Mesh, name: str) -> RosyError:
     """Return the error for a mesh without faces, which is called `name`."""
     content = "only vertices and loose edges" if len(mesh.vertices) else "it is empty"
     return RosyError(f"{name}: the mesh has no faces, {content}")
 
 
-def shape_digest(mesh: bpy.types.Mesh, *, occluder_only: bool = False) -> bytes:
+def shape_digest(mesh: Mesh, *, occluder_only: bool = False) -> bytes:
     """Return a digest of everything that `mesh_surface` reads. Much faster than reading the surface."""
     vertices, topology, custom_normals = _read_shape(mesh, occluder_only)
     return content_hash(vertices, *topology.values(), custom_normals)
 
 
 def _read_shape(
-    mesh: bpy.types.Mesh, occluder_only: bool
+    mesh: Mesh, occluder_only: bool
 ) -> tuple[np.ndarray, dict[str, np.ndarray | None], np.ndarray | None]:
     """Return the arguments of `build_surface` that determine all others.
 
@@ -144,12 +141,12 @@ def _read_shape(
     return vertex_positions(mesh), topology, custom_normals
 
 
-def _corner_normals(mesh: bpy.types.Mesh) -> np.ndarray:
+def _corner_normals(mesh: Mesh) -> np.ndarray:
     """Return the shading normals at the corners, (C, 3) float32."""
     return read_collection(mesh.corner_normals, "vector", np.float32, 3)
 
 
-def uv_map_name(mesh: bpy.types.Mesh, name: str, label: str) -> str:
+def uv_map_name(mesh: Mesh, name: str, label: str) -> str:
     """Return the name of a UV map of a mesh: `name`, or the active one if it is empty.
 
     Raises
@@ -166,7 +163,7 @@ def uv_map_name(mesh: bpy.types.Mesh, name: str, label: str) -> str:
     raise RosyError(f"{label} has no UV map '{name}', only {available}")
 
 
-def read_uvs(mesh: bpy.types.Mesh, name: str = "", label: str | None = None) -> np.ndarray:
+def read_uvs(mesh: Mesh, name: str = "", label: str | None = None) -> np.ndarray:
     """Return the UV coordinates of the corners of a mesh, (C, 2) float32.
 
     Parameters
@@ -192,7 +189,7 @@ def read_uvs(mesh: bpy.types.Mesh, name: str = "", label: str | None = None) -> 
     return values
 
 
-def polygon_arrays(mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
+def polygon_arrays(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     """Return `Surface.corner_vertex`, (C,) int32, and `Surface.face_start`, (F + 1,) int32."""
     loops, face_count = mesh.loops, len(mesh.polygons)
     corner_vertex = _attribute_or_collection(mesh, ".corner_vert", loops, "vertex_index", np.int32)
@@ -204,13 +201,13 @@ def polygon_arrays(mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
     return corner_vertex, face_start
 
 
-def vertex_positions(mesh: bpy.types.Mesh) -> np.ndarray:
+def vertex_positions(mesh: Mesh) -> np.ndarray:
     """Return the positions of the vertices in object space, (V, 3) float32."""
     return _attribute_or_collection(mesh, "position", mesh.vertices, "co", np.float32, 3)
 
 
 @contextmanager
-def evaluated_mesh(obj: bpy.types.Object) -> Iterator[bpy.types.Mesh | None]:
+def evaluated_mesh(obj: Object) -> Iterator[Mesh | None]:
     """Context manager: yield the temporary mesh of an evaluated object; None if it has no faces."""
     mesh = obj.to_mesh()
     try:
@@ -219,7 +216,7 @@ def evaluated_mesh(obj: bpy.types.Object) -> Iterator[bpy.types.Mesh | None]:
         obj.to_mesh_clear()
 
 
-def marked_edges(mesh: bpy.types.Mesh, mark: str) -> np.ndarray:
+def marked_edges(mesh: Mesh, mark: str) -> np.ndarray:
     """Return the vertex indices of the edges that are selected, marked sharp, or marked as seams.
 
     Parameters
@@ -247,7 +244,7 @@ def marked_edges(mesh: bpy.types.Mesh, mark: str) -> np.ndarray:
     return _edge_vertices(mesh)[is_marked]
 
 
-def flush_edit_mode(mesh: bpy.types.Mesh) -> None:
+def flush_edit_mode(mesh: Mesh) -> None:
     """Write the current state of editing to a mesh that is in edit mode. Do nothing otherwise."""
     if not mesh.is_editmode:
         return
@@ -257,7 +254,7 @@ def flush_edit_mode(mesh: bpy.types.Mesh) -> None:
             return
 
 
-def read_attribute(mesh: bpy.types.Mesh, name: str, dtype: type, columns: int) -> np.ndarray | None:
+def read_attribute(mesh: Mesh, name: str, dtype: type, columns: int) -> np.ndarray | None:
     """Return an attribute as (n, columns), or (n,) for one column; None if it is missing or empty."""
     attribute = mesh.attributes.get(name)
     if attribute is None or not len(attribute.data):  # in edit mode, attributes are empty
@@ -266,14 +263,14 @@ def read_attribute(mesh: bpy.types.Mesh, name: str, dtype: type, columns: int) -
     return read_collection(attribute.data, key, dtype, columns)
 
 
-def write_attribute(attribute: bpy.types.Attribute, values: np.ndarray) -> None:
+def write_attribute(attribute: Attribute, values: np.ndarray) -> None:
     """Set the values of an attribute of a mesh, Curves or a Grease Pencil drawing."""
     dtype = {"INT": np.int32, "INT8": np.int8}.get(attribute.data_type, np.float32)
     key = VALUE_KEYS.get(attribute.data_type, "value")
     attribute.data.foreach_set(key, np.ascontiguousarray(values, dtype=dtype).ravel())
 
 
-def _triangles(mesh: bpy.types.Mesh) -> dict[str, np.ndarray]:
+def _triangles(mesh: Mesh) -> dict[str, np.ndarray]:
     """Return Blender's triangulation as arguments of `build_surface`; empty if it is not computed yet."""
     face_count = len(mesh.polygons)
     if len(mesh.loops) == 3 * face_count:
@@ -287,12 +284,12 @@ def _triangles(mesh: bpy.types.Mesh) -> dict[str, np.ndarray]:
     }
 
 
-def _edge_vertices(mesh: bpy.types.Mesh) -> np.ndarray:
+def _edge_vertices(mesh: Mesh) -> np.ndarray:
     """Return the vertex indices of all edges, (E, 2) int32."""
     return _attribute_or_collection(mesh, ".edge_verts", mesh.edges, "vertices", np.int32, 2)
 
 
-def _edge_flags(mesh: bpy.types.Mesh, property_name: str) -> np.ndarray:
+def _edge_flags(mesh: Mesh, property_name: str) -> np.ndarray:
     """Return a boolean RNA property of all edges, (E,) bool."""
     flags = np.empty(len(mesh.edges), dtype=bool)
     is_selection = property_name == "select"
@@ -308,9 +305,9 @@ def _edge_flags(mesh: bpy.types.Mesh, property_name: str) -> np.ndarray:
 
 
 def _attribute_or_collection(
-    mesh: bpy.types.Mesh,
+    mesh: Mesh,
     attribute: str,
-    collection: bpy.types.bpy_prop_collection,
+    collection: bpy_prop_collection,
     key: str,
     dtype: type,
     columns: int = 1,
@@ -326,9 +323,7 @@ def _attribute_or_collection(
     return values
 
 
-def read_collection(
-    collection: bpy.types.bpy_prop_collection, key: str, dtype: type, columns: int = 1
-):
+def read_collection(collection: bpy_prop_collection, key: str, dtype: type, columns: int = 1):
     """Return a property of all items of a collection as (n, columns), or (n,) if `columns` is 1."""
     values = np.empty(len(collection) * columns, dtype=dtype)
     collection.foreach_get(key, values)

@@ -7,6 +7,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy.types import Image, Material, Node, NodeSocket, NodeTree
 
 
 class NodeBuilder:
@@ -17,13 +18,13 @@ class NodeBuilder:
     the socket with this name that the properties of the node enable.
     """
 
-    def __init__(self, tree: bpy.types.NodeTree) -> None:
+    def __init__(self, tree: NodeTree) -> None:
         self.tree = tree
         self.node_count = 0
 
     def __call__(
         self, kind: str, inputs: Mapping[str | int, Any] | None = None, /, **settings: Any
-    ) -> bpy.types.Node:
+    ) -> Node:
         node = self.tree.nodes.new(kind)
         node.location = (180 * (self.node_count % 12), -220 * (self.node_count // 12))
         self.node_count += 1
@@ -34,56 +35,51 @@ class NodeBuilder:
             self.connect(value, node.inputs[key] if isinstance(key, int) else enabled[key])
         return node
 
-    def connect(self, value: Any, socket: bpy.types.NodeSocket) -> None:
+    def connect(self, value: Any, socket: NodeSocket) -> None:
         """Link a socket to an input, or set the input to a constant."""
-        if isinstance(value, bpy.types.NodeSocket):
+        if isinstance(value, NodeSocket):
             self.tree.links.new(value, socket)
         else:
             socket.default_value = value
 
-    def math(self, operation: str, *values: Any) -> bpy.types.NodeSocket:
+    def math(self, operation: str, *values: Any) -> NodeSocket:
         """Add a math node, and return its output. Values are sockets or constants."""
         node = self("ShaderNodeMath", dict(enumerate(values)), operation=operation)
         return node.outputs["Value"]
 
-    def vector_math(self, operation: str, *values: Any) -> bpy.types.NodeSocket:
+    def vector_math(self, operation: str, *values: Any) -> NodeSocket:
         """Add a vector math node, and return its output. Values are sockets or constants."""
         node = self("ShaderNodeVectorMath", dict(enumerate(values)), operation=operation)
         return enabled_output(node)
 
-    def scaled(self, vector: bpy.types.NodeSocket, factor: Any) -> bpy.types.NodeSocket:
+    def scaled(self, vector: NodeSocket, factor: Any) -> NodeSocket:
         """Add a node that scales a vector, and return its output."""
         inputs = {0: vector, "Scale": factor}
         return self("ShaderNodeVectorMath", inputs, operation="SCALE").outputs[0]
 
-    def mix(self, kind: str, factor: Any, a: Any, b: Any) -> bpy.types.NodeSocket:
+    def mix(self, kind: str, factor: Any, a: Any, b: Any) -> NodeSocket:
         """Add a mix node of a data type, and return its output: it is `a` for factor 0, `b` for factor 1."""
         inputs = {"Factor": factor, "A": a, "B": b}
         return enabled_output(self("ShaderNodeMix", inputs, data_type=kind))
 
-    def mix_shaders(self, factor: Any, a: Any, b: Any) -> bpy.types.NodeSocket:
+    def mix_shaders(self, factor: Any, a: Any, b: Any) -> NodeSocket:
         """Add a node that mixes shaders, and return its output: it is `a` for factor 0, `b` for factor 1."""
         return self("ShaderNodeMixShader", {0: factor, 1: a, 2: b}).outputs["Shader"]
 
-    def frame_image(self, image: bpy.types.Image, vector: bpy.types.NodeSocket) -> bpy.types.Node:
+    def frame_image(self, image: Image, vector: NodeSocket) -> Node:
         """Add a node with the pixels of an image, not interpolated, mapped to coordinates from 0 to 1."""
         settings = {"image": image, "interpolation": "Closest", "extension": "EXTEND"}
         return self("ShaderNodeTexImage", {"Vector": vector}, **settings)
 
     def stored_attribute(
-        self,
-        geometry: bpy.types.NodeSocket,
-        name: str,
-        data_type: str,
-        domain: str,
-        value: bpy.types.NodeSocket,
-    ) -> bpy.types.NodeSocket:
+        self, geometry: NodeSocket, name: str, data_type: str, domain: str, value: NodeSocket
+    ) -> NodeSocket:
         """Add a node that stores a named attribute, and return the geometry with the attribute."""
         inputs = {"Geometry": geometry, "Name": name, "Value": value}
         kind = "GeometryNodeStoreNamedAttribute"
         return self(kind, inputs, data_type=data_type, domain=domain).outputs["Geometry"]
 
-    def projected(self, point: bpy.types.NodeSocket, matrix: np.ndarray) -> bpy.types.NodeSocket:
+    def projected(self, point: NodeSocket, matrix: np.ndarray) -> NodeSocket:
         """Add nodes that transform a point to clip space by a (4, 4) matrix.
 
         Return their output, the vector (x, y, w) in clip space.
@@ -95,7 +91,7 @@ class NodeBuilder:
         return self("ShaderNodeCombineXYZ", components).outputs[0]
 
 
-def enabled_output(node: bpy.types.Node) -> bpy.types.NodeSocket:
+def enabled_output(node: Node) -> NodeSocket:
     """Return the first output socket of a node that is enabled by its properties."""
     return next(socket for socket in node.outputs if socket.enabled)
 
@@ -109,7 +105,7 @@ class Number:
     socket : bpy.types.NodeSocket
     """
 
-    def __init__(self, build: NodeBuilder, socket: bpy.types.NodeSocket) -> None:
+    def __init__(self, build: NodeBuilder, socket: NodeSocket) -> None:
         self.build, self.socket = build, socket
 
     def _math(self, operation: str, *values: Any) -> Number:
@@ -160,7 +156,7 @@ class Number:
         return Number(self.build, node.outputs["Result"])
 
 
-def new_empty_material(name: str) -> tuple[bpy.types.Material, NodeBuilder]:
+def new_empty_material(name: str) -> tuple[Material, NodeBuilder]:
     """Create a material without nodes. Return it with the builder of its node tree."""
     material = bpy.data.materials.new(name)
     if material.node_tree is None:  # before Blender 5.0
@@ -169,7 +165,7 @@ def new_empty_material(name: str) -> tuple[bpy.types.Material, NodeBuilder]:
     return material, NodeBuilder(material.node_tree)
 
 
-def new_emissive_material(name: str, color: Any, strength: float = 1.0) -> bpy.types.Material:
+def new_emissive_material(name: str, color: Any, strength: float = 1.0) -> Material:
     """Create a material that emits a color: a constant, or the name of an attribute with the color."""
     material, build = new_empty_material(name)
     if isinstance(color, str):
@@ -179,7 +175,7 @@ def new_emissive_material(name: str, color: Any, strength: float = 1.0) -> bpy.t
     return material
 
 
-def new_modifier_group(name: str) -> tuple[bpy.types.NodeTree, NodeBuilder, bpy.types.NodeSocket]:
+def new_modifier_group(name: str) -> tuple[NodeTree, NodeBuilder, NodeSocket]:
     """Create a geometry node group for a modifier.
 
     Return it with its builder and the socket of its input geometry.

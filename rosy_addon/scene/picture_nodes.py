@@ -12,6 +12,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from bpy.types import ID, Image, Material, Mesh, Node, NodeTree, Object
 
 from ..projection.camera import Camera
 from ..rendering.picture_images import NEUTRAL_GRAY
@@ -66,12 +67,12 @@ class OutputSettings:
 
 
 def new_material(
-    image: bpy.types.Image,
+    image: Image,
     camera: Camera,
-    created: list[bpy.types.ID],
+    created: list[ID],
     settings: OutputSettings,
     hatching: Hatching | None = None,
-) -> bpy.types.Material:
+) -> Material:
     """Create a material that shows a picture. It looks the same in Cycles and EEVEE.
 
     The attribute `CLIP_ATTRIBUTE` maps the surface to the picture. An object without it, such as one with
@@ -127,7 +128,7 @@ def new_material(
     return material
 
 
-def set_sequence_frames(material: bpy.types.Material, first: int, last: int) -> None:
+def set_sequence_frames(material: Material, first: int, last: int) -> None:
     """Let a material show its image sequence: at each frame, the file with the number of the frame.
 
     `first` and `last` are the numbers of the first and the last file.
@@ -140,7 +141,7 @@ def set_sequence_frames(material: bpy.types.Material, first: int, last: int) -> 
             image_user.use_auto_refresh = True
 
 
-def _clip_position(build: NodeBuilder, view_projection: np.ndarray) -> bpy.types.Node:
+def _clip_position(build: NodeBuilder, view_projection: np.ndarray) -> Node:
     """Add nodes that compute the clip-space position.
 
     Outputs X, Y and Z of the returned node are x, y and w.
@@ -153,9 +154,7 @@ def _clip_position(build: NodeBuilder, view_projection: np.ndarray) -> bpy.types
     return build("ShaderNodeSeparateXYZ", {0: clip})
 
 
-def new_group(
-    name: str, material: bpy.types.Material, matrix: np.ndarray | None
-) -> bpy.types.NodeTree:
+def new_group(name: str, material: Material, matrix: np.ndarray | None) -> NodeTree:
     """Create a geometry node group that sets a material and the attribute `CLIP_ATTRIBUTE`.
 
     It is the node group of RoSy's modifier. The mesh, its material slots and other modifiers stay unchanged.
@@ -181,9 +180,7 @@ def new_group(
     return group
 
 
-def _add_projection(
-    group: bpy.types.NodeTree, material: bpy.types.Material, matrix: np.ndarray | None
-) -> None:
+def _add_projection(group: NodeTree, material: Material, matrix: np.ndarray | None) -> None:
     """Store a picture, given by its material, and its projection matrix in a node group.
 
     The matrix is (4, 4), from object space to clip space, or None; see `projections_of_group`.
@@ -193,7 +190,7 @@ def _add_projection(
     projection.matrix = (np.zeros(16) if matrix is None else matrix.ravel()).tolist()
 
 
-def projections_of_group(group: bpy.types.NodeTree) -> dict[bpy.types.Material, np.ndarray | None]:
+def projections_of_group(group: NodeTree) -> dict[Material, np.ndarray | None]:
     """Return the projections of the pictures that an object can show, by the materials of the pictures.
 
     The values are (4, 4) object-to-clip matrices, or None if the object has several instances.
@@ -207,7 +204,7 @@ def projections_of_group(group: bpy.types.NodeTree) -> dict[bpy.types.Material, 
     return projections
 
 
-def material_of_group(group: bpy.types.NodeTree) -> bpy.types.Material | None:
+def material_of_group(group: NodeTree) -> Material | None:
     """Return the material that a node group of `new_group` assigns; None if it assigns none."""
     for node in group.nodes:
         if node.bl_idname == "GeometryNodeSetMaterial":
@@ -215,16 +212,14 @@ def material_of_group(group: bpy.types.NodeTree) -> bpy.types.Material | None:
     return None
 
 
-def image_node(material: bpy.types.Material) -> bpy.types.Node | None:
+def image_node(material: Material) -> Node | None:
     """Return the image texture node of a material that shows a picture; None if there is none."""
     nodes = material.node_tree.nodes if material.node_tree is not None else ()
     return next((node for node in nodes if node.bl_idname == "ShaderNodeTexImage"), None)
 
 
 def set_picture_modifier(
-    obj: bpy.types.Object,
-    node_group: bpy.types.NodeTree,
-    pictures: Container[bpy.types.Material] = (),
+    obj: Object, node_group: NodeTree, pictures: Container[Material] = ()
 ) -> None:
     """Set the node group of RoSy's modifier, and move the modifier to the end of the object's stack.
 
@@ -248,7 +243,7 @@ def set_picture_modifier(
     node_group.name = f"RoSy {obj.name}"
 
 
-def applied_materials(data: bpy.types.ID | None) -> list[bpy.types.Material]:
+def applied_materials(data: ID | None) -> list[Material]:
     """Return the materials of pictures in the slots of a mesh, or of other object data.
 
     There are some if the user has applied RoSy's modifier. Data that are linked from a library are not
@@ -259,13 +254,13 @@ def applied_materials(data: bpy.types.ID | None) -> list[bpy.types.Material]:
     return [material for material in getattr(data, "materials", ()) if _is_picture(material)]
 
 
-def shown_materials(obj: bpy.types.Object) -> set[bpy.types.Material]:
+def shown_materials(obj: Object) -> set[Material]:
     """Return the materials of the pictures that an object shows, by a modifier or in its slots."""
     materials = {material_of_group(modifier.node_group) for modifier in rosy_modifiers(obj)}
     return (materials | set(applied_materials(obj.data))) - {None}
 
 
-def _is_picture(material: bpy.types.Material | None) -> bool:
+def _is_picture(material: Material | None) -> bool:
     """Return whether RoSy created a material for a picture, and not for strokes or a key."""
     return (
         material is not None
@@ -275,12 +270,12 @@ def _is_picture(material: bpy.types.Material | None) -> bool:
     )
 
 
-def has_applied_picture(data: bpy.types.ID | None) -> bool:
+def has_applied_picture(data: ID | None) -> bool:
     """Return whether a mesh, or other object data, has materials or attributes of an applied picture."""
     return bool(applied_materials(data) or _applied_attributes(data))
 
 
-def remove_applied_picture(data: bpy.types.ID | None) -> None:
+def remove_applied_picture(data: ID | None) -> None:
     """Remove the materials and attributes of an applied modifier of RoSy.
 
     The mesh must not be in edit mode.
@@ -300,14 +295,14 @@ def remove_applied_picture(data: bpy.types.ID | None) -> None:
         data.attributes.remove(data.attributes[name])
 
 
-def _applied_attributes(data: bpy.types.ID | None) -> list[str]:
+def _applied_attributes(data: ID | None) -> list[str]:
     """Return the names of the attributes of RoSy's modifier that are stored on a mesh."""
-    if not isinstance(data, bpy.types.Mesh) or not is_editable(data):
+    if not isinstance(data, Mesh) or not is_editable(data):
         return []
     return [name for name in (CLIP_ATTRIBUTE, MATERIAL_ATTRIBUTE) if name in data.attributes]
 
 
-def _restore_material_indices(mesh: bpy.types.Mesh) -> None:
+def _restore_material_indices(mesh: Mesh) -> None:
     """Give the faces that show a picture the material index that they had without RoSy's modifier."""
     shows_picture = np.array([_is_picture(material) for material in mesh.materials], dtype=bool)
     index = read_attribute(mesh, "material_index", np.int32, 1)

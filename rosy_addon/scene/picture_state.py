@@ -12,8 +12,8 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from itertools import product, starmap
 
-import bpy
 import numpy as np
+from bpy.types import Depsgraph, Object, PropertyGroup, Scene, ViewLayer
 
 from ..compositor.ink_thresholds import unlit_look
 from ..compositor.look import Look, is_hatched
@@ -128,9 +128,7 @@ class SceneState:
         Known states of meshes that have not changed. The states of other meshes are read and added.
     """
 
-    def __init__(
-        self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, mesh_states: MeshStates
-    ) -> None:
+    def __init__(self, scene: Scene, depsgraph: Depsgraph, mesh_states: MeshStates) -> None:
         self._lacks_tone = False
         self._fields: dict[str, _Instances] = {}
         self._occluders: dict[str, _Instances] = {}
@@ -140,7 +138,7 @@ class SceneState:
         self._lights = _light_digests(depsgraph) if _uses_lights(look) else {}
 
     def _read_meshes(
-        self, depsgraph: bpy.types.Depsgraph, request: ReadRequest, mesh_states: MeshStates
+        self, depsgraph: Depsgraph, request: ReadRequest, mesh_states: MeshStates
     ) -> None:
         targets = field_objects(depsgraph.view_layer)
         for instance, draws_field in rendered_instances(depsgraph, targets):
@@ -162,11 +160,7 @@ class SceneState:
             instances.corners.append(corners @ matrix[:3, :3].T + matrix[:3, 3])
 
     def picture_state(
-        self,
-        scene: bpy.types.Scene,
-        depsgraph: bpy.types.Depsgraph,
-        source: CameraSource,
-        is_frame: bool = False,
+        self, scene: Scene, depsgraph: Depsgraph, source: CameraSource, is_frame: bool = False
     ) -> PictureState:
         """Return the state of a picture from a camera.
 
@@ -200,9 +194,7 @@ class SceneState:
             reference=_reference_digest(scene, depsgraph) if has_reference else "",
         )
 
-    def texture_state(
-        self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, obj: bpy.types.Object
-    ) -> PictureState:
+    def texture_state(self, scene: Scene, depsgraph: Depsgraph, obj: Object) -> PictureState:
         """Return the state of the texture of an object. It is cached for equal settings."""
         settings = scene.rosy
         key = (
@@ -240,7 +232,7 @@ class SceneState:
         return [box for box in boxes if box is not None]
 
 
-def _light_digests(depsgraph: bpy.types.Depsgraph) -> dict[str, list[str]]:
+def _light_digests(depsgraph: Depsgraph) -> dict[str, list[str]]:
     """Return the digests of the visible lights of a scene, by the names of their objects."""
     lights: dict[str, list[str]] = {}
     for light, owner in rendered_lights(depsgraph, np.eye(4)):
@@ -249,8 +241,8 @@ def _light_digests(depsgraph: bpy.types.Depsgraph) -> dict[str, list[str]]:
 
 
 def read_picture_states(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
+    scene: Scene,
+    depsgraph: Depsgraph,
     sources: Iterable[CameraSource],
     mesh_states: MeshStates,
     is_frame: bool = False,
@@ -266,7 +258,7 @@ def read_picture_states(
     return [scene_state.picture_state(scene, depsgraph, source, is_frame) for source in sources]
 
 
-def bakes_light(settings: bpy.types.PropertyGroup, look: Look) -> bool:
+def bakes_light(settings: PropertyGroup, look: Look) -> bool:
     """Return whether textures show hatching that was drawn in the light of the scene.
 
     Otherwise, a texture of hatching stores thresholds, and its material draws the ink in the present light.
@@ -280,9 +272,7 @@ def bakes_light(settings: bpy.types.PropertyGroup, look: Look) -> bool:
     return settings.texture_bake_light and settings.texture_content == "LOOK" and is_hatched(look)
 
 
-def read_texture_state(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, obj: bpy.types.Object
-) -> PictureState:
+def read_texture_state(scene: Scene, depsgraph: Depsgraph, obj: Object) -> PictureState:
     """Return the state that the texture of an object depends on, with the present settings of the scene.
 
     It does not depend on movement and deformation of the object, unless light is baked into the texture.
@@ -328,7 +318,7 @@ def _uses_lights(look: Look) -> bool:
     return look.light == "scene" and look.shading > 0
 
 
-def settings_key(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> tuple:
+def settings_key(scene: Scene, view_layer: ViewLayer) -> tuple:
     """Return the settings on which a `SceneState` depends. Blender does not report all changes of them."""
     look = read_look(scene.rosy)
     objects = []
@@ -357,7 +347,7 @@ def applied_settings(look: Look, lacks_tone: bool = False) -> dict:
     }
 
 
-def _reference_digest(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> str:
+def _reference_digest(scene: Scene, depsgraph: Depsgraph) -> str:
     """Return a digest of the file and the camera of the reference render.
 
     If it cannot be read, return the error message.

@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-import bpy
 import numpy as np
+from bpy.types import ID, Image, Material, NodeTree, Object, Scene
 
 from ..annotation.key_contents import PictureKey
 from ..compositor.picture import Picture
@@ -27,6 +27,7 @@ from ..core.file_io import check_folder
 from ..image_io.image_data import ImageData, image_size
 from ..projection.camera import Camera
 from ..rendering.view_input import ViewInput
+from . import datablocks, picture_nodes, texture_nodes
 from .bake_records import (
     NAME_PREFIX,
     baked_objects,
@@ -37,32 +38,11 @@ from .bake_records import (
 )
 from .blender_images import load_sequence, new_image, new_tiled_image
 from .cameras import CameraSource
-from .datablocks import (
-    OWNED_TAG,
-    delete_unused,
-    is_editable,
-    removable_modifiers,
-    rollback_on_error,
-)
 from .files import output_folder, picture_stem
 from .keys import update_keys
-from .picture_nodes import (
-    OutputSettings,
-    new_group,
-    new_material,
-    projections_of_group,
-    set_picture_modifier,
-    set_sequence_frames,
-)
+from .picture_nodes import OutputSettings, new_group
 from .picture_state import PictureState
 from .scene_reader import SceneData
-from .texture_nodes import (
-    Hatching,
-    brushed_metal_shader,
-    color_shader,
-    hatching_shader,
-    new_texture_material,
-)
 
 #: View transforms of Blender's color management that do not change the colors of a picture.
 NEUTRAL_VIEW_TRANSFORMS = ("Standard", "Raw")
@@ -86,9 +66,9 @@ class BakeResult:
     """
 
     camera: str
-    image: bpy.types.Image
-    material: bpy.types.Material
-    objects: tuple[bpy.types.Object, ...]
+    image: Image
+    material: Material
+    objects: tuple[Object, ...]
     picture: Picture
     warnings: tuple[str, ...]
 
@@ -117,7 +97,7 @@ class ImageSequence:
     height: int
 
 
-def read_output_settings(scene: bpy.types.Scene, folder: Path | None = None) -> OutputSettings:
+def read_output_settings(scene: Scene, folder: Path | None = None) -> OutputSettings:
     """Return the output settings that are stored in a scene.
 
     Parameters
@@ -145,7 +125,7 @@ def read_output_settings(scene: bpy.types.Scene, folder: Path | None = None) -> 
     )
 
 
-def check_targets(objects: Iterable[bpy.types.Object], settings: OutputSettings) -> None:
+def check_targets(objects: Iterable[Object], settings: OutputSettings) -> None:
     """Check that pictures can be applied to objects. It is called before they are drawn.
 
     Raises
@@ -155,7 +135,7 @@ def check_targets(objects: Iterable[bpy.types.Object], settings: OutputSettings)
         be written.
     """
     for obj in objects:
-        if not is_editable(obj):
+        if not datablocks.is_editable(obj):
             library = obj.library.filepath if obj.library else "its library"
             raise RosyError(
                 f"object '{obj.name}' is linked from {library} and cannot get a modifier: make a "
@@ -166,7 +146,7 @@ def check_targets(objects: Iterable[bpy.types.Object], settings: OutputSettings)
 
 
 def apply_picture(
-    scene: bpy.types.Scene,
+    scene: Scene,
     scene_data: SceneData,
     settings: OutputSettings,
     view: ViewInput,
@@ -202,12 +182,14 @@ def apply_picture(
         If the image cannot be saved.
     """
     camera = view.camera
-    hatching = Hatching(view.look, picture.line_count) if view.draws_thresholds else None
+    hatching = (
+        texture_nodes.Hatching(view.look, picture.line_count) if view.draws_thresholds else None
+    )
     name, stem = f"{NAME_PREFIX}{camera.name}", _image_stem(settings, camera.name)
-    with rollback_on_error() as created:
+    with datablocks.rollback_on_error() as created:
         image = new_image(name, image_data, is_color=hatching is None, stem=stem)
         created.append(image)
-        material = new_material(image, camera, created, settings, hatching)
+        material = picture_nodes.new_material(image, camera, created, settings, hatching)
         matrices = _object_to_clip_matrices(scene_data, camera)
         node_groups = _new_groups(material, matrices, created)
     size, key = image_size(image_data), picture_key(view.look, picture)
@@ -218,7 +200,7 @@ def apply_picture(
 
 
 def apply_sequence(
-    scene: bpy.types.Scene,
+    scene: Scene,
     scene_data: SceneData,
     sequence: ImageSequence,
     camera: Camera,
@@ -247,12 +229,12 @@ def apply_sequence(
         Contents of the key (legend) of the pictures.
     """
     settings = replace(settings, window_coordinates=True)
-    with rollback_on_error() as created:
+    with datablocks.rollback_on_error() as created:
         image = load_sequence(sequence.path, settings.as_float)
         created.append(image)
         image.name = f"{NAME_PREFIX}{sequence.name}"
-        material = new_material(image, camera, created, settings)
-        set_sequence_frames(material, sequence.first, sequence.last)
+        material = picture_nodes.new_material(image, camera, created, settings)
+        picture_nodes.set_sequence_frames(material, sequence.first, sequence.last)
         node_groups = _new_groups(material, dict.fromkeys(scene_data.objects), created)
     store_record(
         scene,
@@ -269,17 +251,17 @@ def apply_sequence(
 
 
 def apply_texture(
-    scene: bpy.types.Scene,
-    obj: bpy.types.Object,
+    scene: Scene,
+    obj: Object,
     uv_map: str,
     tiles: Mapping[int, ImageData],
     settings: OutputSettings,
     state: PictureState,
     content: str,
-    hatching: Hatching | None,
+    hatching: texture_nodes.Hatching | None,
     *,
     is_udim: bool,
-) -> bpy.types.Image:
+) -> Image:
     """Show a texture on its object, and return its image. It replaces an earlier texture of the object.
 
     If an error is raised, the scene is not changed.
@@ -312,15 +294,15 @@ def apply_texture(
     first = next(iter(tiles.values()))
     is_color = content == "look" and hatching is None
     create, image_data = (new_tiled_image, tiles) if is_udim else (new_image, first)
-    with rollback_on_error() as created:
+    with datablocks.rollback_on_error() as created:
         image = create(name, image_data, is_color=is_color, stem=stem)
         created.append(image)
-        add_shader = color_shader
+        add_shader = texture_nodes.color_shader
         if content == "anisotropy":
-            add_shader = partial(brushed_metal_shader, uv_map=uv_map)
+            add_shader = partial(texture_nodes.brushed_metal_shader, uv_map=uv_map)
         elif hatching is not None:
-            add_shader = partial(hatching_shader, hatching=hatching, created=created)
-        material = new_texture_material(name, image, uv_map, add_shader)
+            add_shader = partial(texture_nodes.hatching_shader, hatching=hatching, created=created)
+        material = texture_nodes.new_texture_material(name, image, uv_map, add_shader)
         created.append(material)
         node_groups = _new_groups(material, {obj: None}, created)
     size = image_size(first)
@@ -336,10 +318,8 @@ def _image_stem(settings: OutputSettings, name: str, kind: str = "camera") -> Pa
 
 
 def _new_groups(
-    material: bpy.types.Material,
-    matrices: Mapping[bpy.types.Object, np.ndarray | None],
-    created: list[bpy.types.ID],
-) -> dict[bpy.types.Object, bpy.types.NodeTree]:
+    material: Material, matrices: Mapping[Object, np.ndarray | None], created: list[ID]
+) -> dict[Object, NodeTree]:
     """Create the node groups that show a picture on objects; see `new_group`."""
     node_groups = {}
     for obj, matrix in matrices.items():
@@ -348,9 +328,7 @@ def _new_groups(
     return node_groups
 
 
-def _show_on_objects(
-    node_groups: Mapping[bpy.types.Object, bpy.types.NodeTree], *, keep_textures: bool = True
-) -> None:
+def _show_on_objects(node_groups: Mapping[Object, NodeTree], *, keep_textures: bool = True) -> None:
     """Show a recorded picture on objects, with one new node group for each, and delete the earlier groups.
 
     `keep_textures` says whether an object can still show an earlier texture; see `set_picture_modifier`. The
@@ -359,11 +337,11 @@ def _show_on_objects(
     """
     materials = recorded_materials(textures=keep_textures)
     for obj, node_group in node_groups.items():
-        set_picture_modifier(obj, node_group, materials)
-    delete_unused()
+        picture_nodes.set_picture_modifier(obj, node_group, materials)
+    datablocks.delete_unused()
 
 
-def show_bake(scene: bpy.types.Scene, camera: str) -> None:
+def show_bake(scene: Scene, camera: str) -> None:
     """Let the objects of a picture show it again, if they show another one.
 
     Parameters
@@ -384,28 +362,28 @@ def show_bake(scene: bpy.types.Scene, camera: str) -> None:
     materials = recorded_materials()
     for obj in baked_objects(scene):
         projections = {}
-        for modifier in removable_modifiers(obj):
-            projections |= projections_of_group(modifier.node_group)
-        if record.material in projections and is_editable(obj):
+        for modifier in datablocks.removable_modifiers(obj):
+            projections |= picture_nodes.projections_of_group(modifier.node_group)
+        if record.material in projections and datablocks.is_editable(obj):
             matrix = projections[record.material]
             node_group = new_group(f"RoSy {obj.name}", record.material, matrix)
-            node_group[OWNED_TAG] = True
-            set_picture_modifier(obj, node_group, materials)
+            node_group[datablocks.OWNED_TAG] = True
+            picture_nodes.set_picture_modifier(obj, node_group, materials)
     update_keys(scene)
 
 
 def _object_to_clip_matrices(
     scene_data: SceneData, camera: Camera
-) -> dict[bpy.types.Object, np.ndarray | None]:
+) -> dict[Object, np.ndarray | None]:
     """Return the (4, 4) object-to-clip matrix of each object; None for objects with several instances."""
-    matrices: dict[bpy.types.Object, np.ndarray | None] = {}
+    matrices: dict[Object, np.ndarray | None] = {}
     for instance, owner in zip(scene_data.instances, scene_data.objects, strict=False):
         is_repeated = owner in matrices
         matrices[owner] = None if is_repeated else camera.projection @ camera.view @ instance.matrix
     return matrices
 
 
-def _display_warnings(scene: bpy.types.Scene) -> list[str]:
+def _display_warnings(scene: Scene) -> list[str]:
     """Return warnings about settings of the scene's color management that change the colors of pictures."""
     transform = scene.view_settings.view_transform
     if transform in NEUTRAL_VIEW_TRANSFORMS:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import bpy
 import numpy as np
+from bpy.types import Depsgraph, Object, Scene
 
 from ..compositor.look import Look
 from ..compositor.shading import Light
@@ -20,14 +21,14 @@ from .scene_reader import SceneData, read_scene
 
 
 def read_views(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
+    scene: Scene,
+    depsgraph: Depsgraph,
     cameras: Sequence[CameraSource],
     look: Look,
     *,
-    objects: Sequence[bpy.types.Object] | None = None,
+    objects: Sequence[Object] | None = None,
     size: tuple[int, int] | None = None,
-    reference_camera: bpy.types.Object | None = None,
+    reference_camera: Object | None = None,
     cache: Cache | None = None,
 ) -> tuple[tuple[ViewInput, ...], SceneData]:
     """Read a scene as the input of a renderer, for one or more cameras. Each mesh is read only once.
@@ -83,7 +84,7 @@ def read_views(
 
 
 def read_turntable(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, obj: bpy.types.Object, look: Look
+    scene: Scene, depsgraph: Depsgraph, obj: Object, look: Look
 ) -> tuple[MeshInstance, list[Light]]:
     """Read one object and the lights of the scene, for views of the object from all sides.
 
@@ -103,7 +104,7 @@ def read_turntable(
     return scene_data.instances[0], lights
 
 
-def scene_depsgraph(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
+def scene_depsgraph(scene: Scene) -> Depsgraph:
     """Return the evaluated depsgraph of a scene.
 
     If the scene is the current one, its current view layer is evaluated, otherwise its first view layer.
@@ -115,7 +116,7 @@ def scene_depsgraph(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
         return context.evaluated_depsgraph_get()
 
 
-def read_lights(depsgraph: bpy.types.Depsgraph, view_matrix: np.ndarray) -> list[Light]:
+def read_lights(depsgraph: Depsgraph, view_matrix: np.ndarray) -> list[Light]:
     """Return all lights that are visible in renders, including instances, in camera space.
 
     A white diffuse surface that faces a sun with a strength of pi W/m2 has a radiance of 1. At the distance r
@@ -136,9 +137,7 @@ def read_lights(depsgraph: bpy.types.Depsgraph, view_matrix: np.ndarray) -> list
     return [light for light, _ in rendered_lights(depsgraph, view_matrix)]
 
 
-def rendered_lights(
-    depsgraph: bpy.types.Depsgraph, view_matrix: np.ndarray
-) -> list[tuple[Light, bpy.types.Object]]:
+def rendered_lights(depsgraph: Depsgraph, view_matrix: np.ndarray) -> list[tuple[Light, Object]]:
     """Return the lights of `read_lights`, each with its original object."""
     lights = []
     for instance in depsgraph.object_instances:
@@ -163,9 +162,9 @@ def _convert_light(data: bpy.types.Light, matrix: np.ndarray) -> Light:
 
 
 def read_texture_input(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    obj: bpy.types.Object,
+    scene: Scene,
+    depsgraph: Depsgraph,
+    obj: Object,
     uv_map: str,
     cache: Cache,
     color_attribute: str | None,

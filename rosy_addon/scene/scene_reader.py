@@ -17,6 +17,7 @@ from functools import partial
 
 import bpy
 import numpy as np
+from bpy.types import Depsgraph, Mesh, Object
 
 from ..core.cache import Cache
 from ..core.errors import REPORTED_ERRORS, RosyError
@@ -24,6 +25,7 @@ from ..field.rosy_field import RosyField
 from ..field.surface import Surface, have_same_polygons
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
+from . import look_inputs
 from .datablocks import remedy_for_absence, user_modifiers
 from .evaluated_field import (
     Errors,
@@ -34,14 +36,6 @@ from .evaluated_field import (
     topology_hash,
 )
 from .field_attributes import attribute_name, cached_for_surface, field_degree, is_face_vector_field
-from .look_inputs import (
-    FIELDS_ONLY,
-    ReadRequest,
-    check_sources,
-    read_color_values,
-    read_tone,
-    tone_image_key,
-)
 from .mesh_fields import read_mesh_field
 from .mesh_states import MeshStates, mesh_state_key, read_mesh_state
 from .meshes import REST_ATTRIBUTE, evaluated_mesh, mesh_surface, read_attribute
@@ -72,15 +66,15 @@ class SceneData:
     """
 
     instances: list[MeshInstance]
-    objects: list[bpy.types.Object]
+    objects: list[Object]
     warnings: tuple[str, ...]
     mesh_states: MeshStates
 
 
 def read_scene(
-    depsgraph: bpy.types.Depsgraph,
-    objects: Sequence[bpy.types.Object] | None = None,
-    request: ReadRequest = FIELDS_ONLY,
+    depsgraph: Depsgraph,
+    objects: Sequence[Object] | None = None,
+    request: look_inputs.ReadRequest = look_inputs.FIELDS_ONLY,
     cache: Cache | None = None,
 ) -> SceneData:
     """Read every mesh that is visible in renders, as arrays.
@@ -125,7 +119,7 @@ def read_scene(
     if errors and (objects is not None or len(errors) == len(targets)):
         raise errors[0]
     with_field = [entry for entry in entries if entry.instance.field is not None]
-    check_sources([(entry.instance, entry.owner) for entry in with_field], request)
+    look_inputs.check_sources([(entry.instance, entry.owner) for entry in with_field], request)
     occluders = [entry.instance for entry in entries if entry.instance.field is None]
     return SceneData(
         [entry.instance for entry in with_field] + occluders,
@@ -136,9 +130,7 @@ def read_scene(
 
 
 def _field_errors(
-    errors: Mapping[str, Exception],
-    entries: Sequence[SceneInstance],
-    targets: Sequence[bpy.types.Object],
+    errors: Mapping[str, Exception], entries: Sequence[SceneInstance], targets: Sequence[Object]
 ) -> list[RosyError]:
     """Return one error for each object of `targets` whose field cannot be drawn.
 
@@ -175,8 +167,8 @@ class SceneInstance:
     """
 
     instance: MeshInstance
-    owner: bpy.types.Object
-    visibility_object: bpy.types.Object
+    owner: Object
+    visibility_object: Object
 
 
 #: A surface, its field, its tone and its values for the color map. Occluders have only the surface.
@@ -214,7 +206,7 @@ class SceneReader:
         self.mesh_states = mesh_states
         self.errors: dict[str, Exception] = {}
         self.is_complete = True
-        self._request = FIELDS_ONLY
+        self._request = look_inputs.FIELDS_ONLY
         self._deadline = math.inf
         self._has_read_any = False
         # Keys: the full name of the object, the pointer of its mesh, `tone_image_key`, and whether its field
@@ -248,7 +240,10 @@ class SceneReader:
                 del by_name[name]
 
     def read(
-        self, instances: Instances, request: ReadRequest = FIELDS_ONLY, deadline: float = math.inf
+        self,
+        instances: Instances,
+        request: look_inputs.ReadRequest = look_inputs.FIELDS_ONLY,
+        deadline: float = math.inf,
     ) -> list[SceneInstance]:
         """Return the mesh instances of a scene in their current state.
 
@@ -276,7 +271,7 @@ class SceneReader:
         entries: list[SceneInstance] = []
         last_instances = self.cache.get(_INSTANCES_KEY) or {}
         mesh_instances: dict[tuple, MeshInstance] = {}
-        faceless: set[bpy.types.Object] = set()
+        faceless: set[Object] = set()
         for instance, draws_field in instances:
             obj, owner = instance.object, instance.object.original
             mesh_data = self._mesh_data(obj, owner, draws_field)
@@ -311,9 +306,7 @@ class SceneReader:
         """Return whether the last call of `read` left out objects that need `resolve_topologies`."""
         return bool(self._unresolved)
 
-    def resolve_topologies(
-        self, depsgraph: bpy.types.Depsgraph, deadline: float = math.inf
-    ) -> None:
+    def resolve_topologies(self, depsgraph: Depsgraph, deadline: float = math.inf) -> None:
         """Read the rest positions and fields of objects whose modifiers change the topology.
 
         It adds temporary attributes to the meshes, so it must not be called while Blender draws. At least one
@@ -326,7 +319,7 @@ class SceneReader:
             if time.monotonic() > deadline:
                 return
 
-    def _resolve(self, depsgraph: bpy.types.Depsgraph, names: set[str]) -> None:
+    def _resolve(self, depsgraph: Depsgraph, names: set[str]) -> None:
         """Read the rest positions and fields of the evaluated meshes of objects with these full names."""
         unresolved = {key for key in self._unresolved if key[0] in names}
         self._unresolved -= unresolved
@@ -353,8 +346,8 @@ class SceneReader:
 
     def _read_topologies(
         self,
-        depsgraph: bpy.types.Depsgraph,
-        layouts: Mapping[bpy.types.Object, FieldLayout],
+        depsgraph: Depsgraph,
+        layouts: Mapping[Object, FieldLayout],
         problems: dict[str, Exception],
     ) -> None:
         """Add rest positions and fields of evaluated meshes to `_topologies`, or errors to `problems`."""
@@ -380,12 +373,10 @@ class SceneReader:
                 except RosyError as error:
                     problems[owner.name_full] = error
 
-    def _mesh_data(
-        self, obj: bpy.types.Object, owner: bpy.types.Object, draws_field: bool
-    ) -> _MeshData | None:
+    def _mesh_data(self, obj: Object, owner: Object, draws_field: bool) -> _MeshData | None:
         """Return the data of an evaluated mesh; None if it has no faces or cannot be read now."""
         pointer, request = obj.data.as_pointer(), self._request
-        key = owner.name_full, pointer, tone_image_key(owner, request.tone), draws_field
+        key = owner.name_full, pointer, look_inputs.tone_image_key(owner, request.tone), draws_field
         if key in self._meshes:
             return self._meshes[key]
         if draws_field and owner.name_full in self.errors:
@@ -416,13 +407,13 @@ class SceneReader:
             self._meshes[key] = mesh_data
         return mesh_data
 
-    def _read_field_mesh(self, mesh: bpy.types.Mesh, owner: bpy.types.Object) -> _MeshData | None:
+    def _read_field_mesh(self, mesh: Mesh, owner: Object) -> _MeshData | None:
         """Read an evaluated mesh with its field. Return None if it needs `resolve_topologies` first."""
         request, cache, label = self._request, self.cache, f"object '{owner.name}'"
         original = owner.data
         surface = mesh_surface(mesh, label, cache=cache)
-        tone = read_tone(mesh, owner, request.tone, cache)
-        values = read_color_values(mesh, request.color_attribute, label, cache)
+        tone = look_inputs.read_tone(mesh, owner, request.tone, cache)
+        values = look_inputs.read_color_values(mesh, request.color_attribute, label, cache)
         if original.is_editmode:
             return surface, self._edit_mode_field(mesh, owner, surface, label), tone, values
         modifiers, undeformed = user_modifiers(owner), surface
@@ -447,7 +438,7 @@ class SceneReader:
         return self._with_rest(surface, rest), field, tone, values
 
     def _edit_mode_field(
-        self, mesh: bpy.types.Mesh, owner: bpy.types.Object, surface: Surface, label: str
+        self, mesh: Mesh, owner: Object, surface: Surface, label: str
     ) -> RosyField:
         """Return the field of an object in edit mode. Only its evaluated mesh has attributes then."""
         original = owner.data

@@ -6,23 +6,17 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from bpy.types import ID, Depsgraph, Mesh, Object, Scene
 
 from ..core.errors import RosyError
 from ..field.rosy_field import RosyField
 from ..field.singularities import find_singularities
 from ..field.surface import Surface
 from ..field.validate import vertex_normals
+from . import meshes
 from .datablocks import OWNED_TAG, user_modifiers
 from .look_inputs import ReadRequest
 from .mesh_fields import read_mesh_field
-from .meshes import (
-    evaluated_mesh,
-    mesh_surface,
-    read_attribute,
-    read_collection,
-    vertex_positions,
-    write_attribute,
-)
 from .scene_reader import read_scene
 
 #: Names of attributes of the points: the singularity index in units of 1 / N, and the degree N of the field.
@@ -57,7 +51,7 @@ class Singularities:
         return len(self.index)
 
 
-def read_singularities(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Singularities:
+def read_singularities(obj: Object, depsgraph: Depsgraph) -> Singularities:
     """Find the singularities of an object's field on its evaluated mesh.
 
     Raises
@@ -81,16 +75,14 @@ def read_singularities(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) ->
     return Singularities(points, normals, index, field.degree)
 
 
-def _own_field(obj: bpy.types.Object) -> tuple[Surface, RosyField]:
+def _own_field(obj: Object) -> tuple[Surface, RosyField]:
     """Return the surface and the field of an object's original mesh."""
     label = f"object '{obj.name}'"
-    surface = mesh_surface(obj.data, label)
+    surface = meshes.mesh_surface(obj.data, label)
     return surface, read_mesh_field(obj.data, surface=surface, nonfinite="zero", label=label)
 
 
-def read_editable_singularities(
-    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph
-) -> Singularities:
+def read_editable_singularities(obj: Object, depsgraph: Depsgraph) -> Singularities:
     """Find the singularities of the field of an object's original mesh, which can be edited.
 
     A singularity is at a vertex. Its position is the position of this vertex on the evaluated mesh. The
@@ -103,14 +95,14 @@ def read_editable_singularities(
     """
     surface, field = _own_field(obj)
     vertex, index = find_singularities(surface, field)
-    with evaluated_mesh(obj.evaluated_get(depsgraph)) as mesh:
+    with meshes.evaluated_mesh(obj.evaluated_get(depsgraph)) as mesh:
         source = mesh_of_own_vertices(obj, mesh)
-        points = vertex_positions(source)[vertex]
-        normals = read_collection(source.vertex_normals, "vector", np.float32, 3)[vertex]
+        points = meshes.vertex_positions(source)[vertex]
+        normals = meshes.read_collection(source.vertex_normals, "vector", np.float32, 3)[vertex]
     return Singularities(points, normals, index, field.degree, vertex)
 
 
-def mesh_of_own_vertices(obj: bpy.types.Object, evaluated: bpy.types.Mesh | None) -> bpy.types.Mesh:
+def mesh_of_own_vertices(obj: Object, evaluated: Mesh | None) -> Mesh:
     """Return the evaluated mesh if its first vertices are the vertices of the original mesh.
 
     That is assumed if it has at least as many vertices: modifiers such as *Armature*, *Subdivision Surface*
@@ -120,9 +112,7 @@ def mesh_of_own_vertices(obj: bpy.types.Object, evaluated: bpy.types.Mesh | None
     return obj.data if is_lost else evaluated
 
 
-def add_singularity_points(
-    scene: bpy.types.Scene, obj: bpy.types.Object, singularity_data: Singularities
-) -> bpy.types.Object:
+def add_singularity_points(scene: Scene, obj: Object, singularity_data: Singularities) -> Object:
     """Create a child object of `obj` with a point for each singularity, and its index as an attribute.
 
     The object is a point cloud, or a mesh without edges if scripts cannot create point clouds in this version
@@ -139,7 +129,7 @@ def add_singularity_points(
         (INDEX_ATTRIBUTE, singularity_data.index),
         (DEGREE_ATTRIBUTE, np.full(len(singularity_data), singularity_data.degree)),
     ):
-        write_attribute(data.attributes.new(key, "INT", "POINT"), values)
+        meshes.write_attribute(data.attributes.new(key, "INT", "POINT"), values)
     point_object.parent = obj
     for collection in obj.users_collection or (scene.collection,):
         collection.objects.link(point_object)
@@ -147,7 +137,7 @@ def add_singularity_points(
 
 
 def read_singularity_points(
-    scene: bpy.types.Scene, obj: bpy.types.Object, degree: int, name: str = ""
+    scene: Scene, obj: Object, degree: int, name: str = ""
 ) -> tuple[np.ndarray, np.ndarray]:
     """Read singularities from point objects: the vertices of a mesh nearest to the points, and indices.
 
@@ -186,13 +176,13 @@ def read_singularity_points(
         )
     index = None
     if has_points(source):
-        index = read_attribute(source.data, INDEX_ATTRIBUTE, np.int64, 1)
+        index = meshes.read_attribute(source.data, INDEX_ATTRIBUTE, np.int64, 1)
     if index is None:
         raise RosyError(
             f"object '{source.name}': has no integer attribute '{INDEX_ATTRIBUTE}' on its points, or is in "
             "edit mode"
         )
-    point_degree = read_attribute(source.data, DEGREE_ATTRIBUTE, np.int64, 1)
+    point_degree = meshes.read_attribute(source.data, DEGREE_ATTRIBUTE, np.int64, 1)
     if point_degree is not None:
         scaled = index * degree
         if (scaled % point_degree).any():
@@ -202,10 +192,10 @@ def read_singularity_points(
                 f"{index[bad]}/{point_degree[bad]}: choose another degree"
             )
         index = scaled // point_degree
-    points = read_attribute(source.data, "position", np.float32, 3)
+    points = meshes.read_attribute(source.data, "position", np.float32, 3)
     to_mesh = np.array(obj.matrix_world.inverted_safe() @ source.matrix_world)
     points = points @ to_mesh[:3, :3].T + to_mesh[:3, 3]
-    vertices = vertex_positions(obj.data)
+    vertices = meshes.vertex_positions(obj.data)
     nearest = [np.square(vertices - point).sum(axis=1).argmin() for point in points]
     vertex, position = np.unique(np.array(nearest, dtype=np.int64), return_inverse=True)
     total = np.zeros(len(vertex), dtype=np.int64)
@@ -213,12 +203,12 @@ def read_singularity_points(
     return vertex[total != 0], total[total != 0]
 
 
-def has_points(obj: bpy.types.Object) -> bool:
+def has_points(obj: Object) -> bool:
     """Return whether an object is a mesh or a point cloud, which have points with attributes."""
     return obj.type in ("MESH", "POINTCLOUD")
 
 
-def _point_objects(scene: bpy.types.Scene, obj: bpy.types.Object) -> list[bpy.types.Object]:
+def _point_objects(scene: Scene, obj: Object) -> list[Object]:
     """Return the objects in a scene that `add_singularity_points` has created for an object."""
     return [
         candidate
@@ -227,7 +217,7 @@ def _point_objects(scene: bpy.types.Scene, obj: bpy.types.Object) -> list[bpy.ty
     ]
 
 
-def remove_singularity_points(scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
+def remove_singularity_points(scene: Scene, obj: Object) -> None:
     """Delete the objects that `add_singularity_points` has created for an object."""
     for point_object in _point_objects(scene, obj):
         data = point_object.data
@@ -236,7 +226,7 @@ def remove_singularity_points(scene: bpy.types.Scene, obj: bpy.types.Object) -> 
             bpy.data.batch_remove([data])
 
 
-def _new_point_cloud(name: str, count: int) -> bpy.types.ID:
+def _new_point_cloud(name: str, count: int) -> ID:
     """Create a point cloud with `count` points, or a mesh if scripts cannot create point clouds."""
     cloud = bpy.data.pointclouds.new(name)
     if hasattr(cloud, "resize"):

@@ -11,6 +11,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy.types import ID, Material, Modifier, Node, NodeSocket, NodeTree, Object
 
 from ..core.color import from_hex, to_linear
 from ..line_drawing.drawing_outputs import StrokeGeometry
@@ -20,7 +21,7 @@ from .meshes import write_attribute
 from .node_builder import NodeBuilder, enabled_output, new_emissive_material, new_modifier_group
 
 #: A function that is called with each new datablock and the name that it should have.
-RegisterDatablock = Callable[[bpy.types.ID, str], None]
+RegisterDatablock = Callable[[ID, str], None]
 
 #: Name of the attribute of curves with the color of their family of strokes, linear RGBA.
 INK_ATTRIBUTE = "ink"
@@ -29,9 +30,7 @@ INK_ATTRIBUTE = "ink"
 POLY_CURVE_TYPE = 1
 
 
-def new_curves(
-    name: str, geometry: StrokeGeometry, frame: int, register: RegisterDatablock
-) -> bpy.types.ID:
+def new_curves(name: str, geometry: StrokeGeometry, frame: int, register: RegisterDatablock) -> ID:
     """Create Curves data from strokes: polylines with a radius, and a material with the ink colors.
 
     Parameters
@@ -96,7 +95,7 @@ def has_grease_pencil_drawings() -> bool:
 
 def new_grease_pencil(
     name: str, geometry: StrokeGeometry, frame: int, register: RegisterDatablock
-) -> bpy.types.ID:
+) -> ID:
     """Create Grease Pencil data from strokes, with one layer and one material for each family.
 
     All kinds of outlines (silhouettes, creases, borders) share one layer.
@@ -187,7 +186,7 @@ def _add_to_frame(
         stroke.line_width, stroke.material_index = line_width, material_index
 
 
-def _new_material(name: str, color: str) -> bpy.types.Material:
+def _new_material(name: str, color: str) -> Material:
     """Create a Grease Pencil material with a hex color."""
     material = bpy.data.materials.new(name)
     bpy.data.materials.create_gpencil_data(material)
@@ -204,7 +203,7 @@ VERTEX_ATTRIBUTES = ("surface_vertex_0", "surface_vertex_1", "surface_vertex_2")
 WEIGHTS_ATTRIBUTE, HEIGHT_ATTRIBUTE = "surface_weights", "surface_height"
 
 
-def follow_surface(obj: bpy.types.Object, surface: bpy.types.Object, vertex_count: int) -> None:
+def follow_surface(obj: Object, surface: Object, vertex_count: int) -> None:
     """Add a modifier to strokes with which they follow the surface of an object. It replaces an earlier one.
 
     Parameters
@@ -226,7 +225,7 @@ def follow_surface(obj: bpy.types.Object, surface: bpy.types.Object, vertex_coun
     _delete_unused(old_group)
 
 
-def stop_following(obj: bpy.types.Object) -> None:
+def stop_following(obj: Object) -> None:
     """Remove the modifier of `follow_surface`, if there is one."""
     modifier = _modifier_of(obj)
     if modifier is not None:
@@ -235,7 +234,7 @@ def stop_following(obj: bpy.types.Object) -> None:
         _delete_unused(group)
 
 
-def _modifier_of(obj: bpy.types.Object) -> bpy.types.Modifier | None:
+def _modifier_of(obj: Object) -> Modifier | None:
     """Return the modifier of `follow_surface`; None if there is none."""
     for modifier in obj.modifiers:
         group = modifier.node_group if modifier.type == "NODES" else None
@@ -244,12 +243,12 @@ def _modifier_of(obj: bpy.types.Object) -> bpy.types.Modifier | None:
     return None
 
 
-def _delete_unused(group: bpy.types.NodeTree | None) -> None:
+def _delete_unused(group: NodeTree | None) -> None:
     if group is not None and not group.users:
         bpy.data.node_groups.remove(group)
 
 
-def _new_group(name: str, surface: bpy.types.Object, vertex_count: int) -> bpy.types.NodeTree:
+def _new_group(name: str, surface: Object, vertex_count: int) -> NodeTree:
     """Create a node group that moves the points of strokes to their triangles on the evaluated surface."""
     group, build, strokes = new_modifier_group(name)
     group[OWNED_TAG] = group[STROKES_TAG] = True
@@ -270,15 +269,13 @@ def _new_group(name: str, surface: bpy.types.Object, vertex_count: int) -> bpy.t
     return group
 
 
-def _named(build: NodeBuilder, name: str, data_type: str) -> bpy.types.NodeSocket:
+def _named(build: NodeBuilder, name: str, data_type: str) -> NodeSocket:
     """Add a node that reads a named attribute, and return its output."""
     kind = "GeometryNodeInputNamedAttribute"
     return enabled_output(build(kind, {"Name": name}, data_type=data_type))
 
 
-def _weighted_mean(
-    build: NodeBuilder, mesh: bpy.types.NodeSocket, kind: str, weights: bpy.types.Node
-) -> bpy.types.NodeSocket:
+def _weighted_mean(build: NodeBuilder, mesh: NodeSocket, kind: str, weights: Node) -> NodeSocket:
     """Add nodes that interpolate a vector of a mesh in the triangle of each point, and return their output.
 
     `kind` is the type of the node that reads the vector on the mesh, such as "GeometryNodeInputNormal". The

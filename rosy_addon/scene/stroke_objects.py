@@ -11,6 +11,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy.types import ID, Collection, Curves, Object, PropertyGroup, Scene, ViewLayer
 from mathutils import Matrix
 
 from ..compositor.family_hues import PALETTE
@@ -20,24 +21,17 @@ from ..core.errors import RosyError
 from ..line_drawing.drawing_outputs import StrokeGeometry
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen
+from . import stroke_data
 from .datablocks import OWNED_TAG, is_editable, rollback_on_error
 from .look_properties import read_settings
 from .meshes import read_collection
-from .stroke_data import (
-    INK_ATTRIBUTE,
-    follow_surface,
-    has_grease_pencil_drawings,
-    new_curves,
-    new_grease_pencil,
-    stop_following,
-)
 from .visible_objects import field_objects
 
 #: Functions that create the data of an object with strokes, by the kind of object.
-DATA_BUILDERS = {"PENCIL": new_grease_pencil, "CURVES": new_curves}
+DATA_BUILDERS = {"PENCIL": stroke_data.new_grease_pencil, "CURVES": stroke_data.new_curves}
 
 #: Attributes that define strokes. Others, such as the selection, may change although strokes are not edited.
-STROKE_ATTRIBUTES = ("position", "radius", "opacity", "material_index", INK_ATTRIBUTE)
+STROKE_ATTRIBUTES = ("position", "radius", "opacity", "material_index", stroke_data.INK_ATTRIBUTE)
 
 #: Properties of the points of a stroke before Blender 4.3, with the number of values of each.
 LEGACY_POINT_PROPERTIES = {"co": 3, "pressure": 1, "strength": 1}
@@ -46,12 +40,12 @@ LEGACY_POINT_PROPERTIES = {"co": 3, "pressure": 1, "strength": 1}
 _VALUES_BY_TYPE = {"FLOAT_VECTOR": ("vector", 3), "FLOAT_COLOR": ("color", 4)}
 
 
-def read_stroke_style(settings: bpy.types.PropertyGroup) -> StrokeStyle:
+def read_stroke_style(settings: PropertyGroup) -> StrokeStyle:
     """Return the stroke style that the properties ``scene.rosy.strokes`` hold."""
     return StrokeStyle(**read_settings(settings, StrokeStyle))
 
 
-def read_pen(settings: bpy.types.PropertyGroup) -> Pen:
+def read_pen(settings: PropertyGroup) -> Pen:
     """Return the pen that the properties ``scene.rosy.strokes`` hold."""
     ink = to_hex(settings.ink_color)
     return Pen(
@@ -64,9 +58,7 @@ def read_pen(settings: bpy.types.PropertyGroup) -> Pen:
     )
 
 
-def target_objects(
-    scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer
-) -> list[bpy.types.Object] | None:
+def target_objects(scene: Scene, view_layer: ViewLayer) -> list[Object] | None:
     """Return the objects to draw strokes on.
 
     If the setting *Selected Only* is on, these are the selected objects with a field. If it is off, return
@@ -88,14 +80,14 @@ def target_objects(
 
 
 def store_strokes(
-    scene: bpy.types.Scene,
+    scene: Scene,
     kind: str,
     geometry: StrokeGeometry,
     camera: str,
-    owner: bpy.types.Object | None = None,
-    collection: bpy.types.Collection | None = None,
+    owner: Object | None = None,
+    collection: Collection | None = None,
     vertex_count: int = 0,
-) -> bpy.types.Object:
+) -> Object:
     """Store strokes in an object. They replace the strokes of the same kind from the same camera.
 
     If an error is raised, the scene is not changed.
@@ -123,10 +115,10 @@ def store_strokes(
         The object with the strokes.
     """
     name, first_frame = f"RoSy Strokes {camera}", min(scene.frame_start, scene.frame_current)
-    final_names: dict[bpy.types.ID, str] = {}
+    final_names: dict[ID, str] = {}
     with rollback_on_error() as created:
 
-        def register(datablock: bpy.types.ID, final_name: str) -> None:
+        def register(datablock: ID, final_name: str) -> None:
             created.append(datablock)
             final_names[datablock] = final_name
 
@@ -149,20 +141,20 @@ def store_strokes(
     obj.matrix_parent_inverse = Matrix() if owner is None else owner.matrix_world.inverted_safe()
     obj.matrix_basis = Matrix()
     if kind == "CURVES" and geometry.attachment is not None:
-        follow_surface(obj, owner, vertex_count)
+        stroke_data.follow_surface(obj, owner, vertex_count)
     else:
-        stop_following(obj)
+        stroke_data.stop_following(obj)
     _store_record(scene, kind, camera, obj)
     return obj
 
 
-def stroke_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+def stroke_objects(scene: Scene) -> list[Object]:
     """Return the stroke objects that RoSy created and that are still in the scene."""
     objects = (record.thing for record in scene.rosy.strokes.made)
     return [obj for obj in objects if obj is not None and obj.name in scene.objects]
 
 
-def remove_strokes(scene: bpy.types.Scene) -> int:
+def remove_strokes(scene: Scene) -> int:
     """Delete all stroke objects that RoSy created in a scene. Return their number.
 
     They also disappear from other scenes that share the objects.
@@ -175,7 +167,7 @@ def remove_strokes(scene: bpy.types.Scene) -> int:
     return len(objects)
 
 
-def edited_strokes(scene: bpy.types.Scene, kind: str, camera: str) -> bpy.types.Object | None:
+def edited_strokes(scene: Scene, kind: str, camera: str) -> Object | None:
     """Return the object whose strokes `store_strokes` would replace, if the user has edited the strokes.
 
     None is returned if there is no such object, or its strokes were not edited since they were drawn.
@@ -186,7 +178,7 @@ def edited_strokes(scene: bpy.types.Scene, kind: str, camera: str) -> bpy.types.
     return record.thing
 
 
-def _find_record(scene: bpy.types.Scene, kind: str, camera: str) -> bpy.types.PropertyGroup | None:
+def _find_record(scene: Scene, kind: str, camera: str) -> PropertyGroup | None:
     """Return the record of an object with strokes; None if the user has deleted it or given it other data."""
     for record in scene.rosy.strokes.made:
         if (record.kind, record.name) == (kind, camera) and record.thing in stroke_objects(scene):
@@ -194,7 +186,7 @@ def _find_record(scene: bpy.types.Scene, kind: str, camera: str) -> bpy.types.Pr
     return None
 
 
-def _store_record(scene: bpy.types.Scene, kind: str, camera: str, obj: bpy.types.Object) -> None:
+def _store_record(scene: Scene, kind: str, camera: str, obj: Object) -> None:
     """Record an object with strokes, and remove the records of objects that the user has deleted."""
     records = scene.rosy.strokes.made
     for index in reversed(range(len(records))):
@@ -210,15 +202,15 @@ def _store_record(scene: bpy.types.Scene, kind: str, camera: str, obj: bpy.types
     record.digest = _digest(obj.data)
 
 
-def _delete_object(obj: bpy.types.Object) -> None:
+def _delete_object(obj: Object) -> None:
     """Delete an object with strokes, and its data if RoSy created them and nothing else uses them."""
     data = obj.data
-    stop_following(obj)
+    stroke_data.stop_following(obj)
     bpy.data.objects.remove(obj)
     _remove_data(data)
 
 
-def _remove_data(data: bpy.types.ID) -> None:
+def _remove_data(data: ID) -> None:
     """Delete data and their materials, as far as RoSy created them and nothing uses them."""
     if data.users or not data.get(OWNED_TAG):
         return
@@ -227,7 +219,7 @@ def _remove_data(data: bpy.types.ID) -> None:
     bpy.data.batch_remove([material for material in materials if not material.users])
 
 
-def _digest(data: bpy.types.ID) -> str:
+def _digest(data: ID) -> str:
     """Return a digest of the strokes in Grease Pencil or Curves data.
 
     It depends on layers, points, widths and colors, but not on values that Blender changes without an edit.
@@ -235,17 +227,17 @@ def _digest(data: bpy.types.ID) -> str:
     return content_hash(*_digest_parts(data)).hex()
 
 
-def _digest_parts(data: bpy.types.ID) -> list[object]:
+def _digest_parts(data: ID) -> list[object]:
     """Return the values from which `_digest` is computed."""
-    if isinstance(data, bpy.types.Curves):
+    if isinstance(data, Curves):
         return _attribute_parts(data.attributes, data.curve_offset_data)
     styles = [None if material is None else material.grease_pencil for material in data.materials]
     parts: list[object] = [None if style is None else tuple(style.color) for style in styles]
     for layer in data.layers:
-        parts.append(layer.name if has_grease_pencil_drawings() else layer.info)
+        parts.append(layer.name if stroke_data.has_grease_pencil_drawings() else layer.info)
         for frame in layer.frames:
             parts.append(frame.frame_number)
-            if has_grease_pencil_drawings():
+            if stroke_data.has_grease_pencil_drawings():
                 parts += _attribute_parts(frame.drawing.attributes, frame.drawing.curve_offsets)
             else:
                 parts += _legacy_parts(frame)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-import bpy
 import numpy as np
+from bpy.types import ID, Image, Material, Node, NodeSocket
 
 from ..compositor.look import Look
 from ..core.color import alpha_from_hex
@@ -33,11 +33,8 @@ class Hatching(NamedTuple):
 
 
 def new_texture_material(
-    name: str,
-    image: bpy.types.Image,
-    uv_map: str,
-    add_shader: Callable[[NodeBuilder, bpy.types.Node], bpy.types.NodeSocket],
-) -> bpy.types.Material:
+    name: str, image: Image, uv_map: str, add_shader: Callable[[NodeBuilder, Node], NodeSocket]
+) -> Material:
     """Create a material that shows a texture on a UV map.
 
     Parameters
@@ -57,15 +54,15 @@ def new_texture_material(
     return material
 
 
-def color_shader(build: NodeBuilder, image_node: bpy.types.Node) -> bpy.types.NodeSocket:
+def color_shader(build: NodeBuilder, image_node: Node) -> NodeSocket:
     """Add a diffuse shader with the colors of an image, and return its output."""
     inputs = {"Base Color": image_node.outputs["Color"], "Roughness": 1.0}
     return build("ShaderNodeBsdfPrincipled", inputs).outputs["BSDF"]
 
 
 def hatching_shader(
-    build: NodeBuilder, image_node: bpy.types.Node, hatching: Hatching, created: list[bpy.types.ID]
-) -> bpy.types.NodeSocket:
+    build: NodeBuilder, image_node: Node, hatching: Hatching, created: list[ID]
+) -> NodeSocket:
     """Add nodes that draw hatching from an image of thresholds. The darker the surface, the denser it is.
 
     In EEVEE, the tone is the diffuse light on the surface. Cycles has no node that returns this light, so the
@@ -111,9 +108,7 @@ def hatching_shader(
     return build.mix_shaders(0.0, surface, exported.outputs["Emission"])
 
 
-def brushed_metal_shader(
-    build: NodeBuilder, image_node: bpy.types.Node, uv_map: str
-) -> bpy.types.NodeSocket:
+def brushed_metal_shader(build: NodeBuilder, image_node: Node, uv_map: str) -> NodeSocket:
     """Add a metal shader that looks brushed along the directions of an anisotropy map, and return its output.
 
     The nodes are linked as Blender's glTF importer links them, so the exporter recognizes the map. Nodes
@@ -149,8 +144,8 @@ def brushed_metal_shader(
 
 
 def _along_bitangent(
-    build: NodeBuilder, decoded: bpy.types.NodeSocket, tangent: bpy.types.NodeSocket, uv_map: str
-) -> bpy.types.NodeSocket:
+    build: NodeBuilder, decoded: NodeSocket, tangent: NodeSocket, uv_map: str
+) -> NodeSocket:
     """Add nodes that compute the bitangent component of an anisotropy direction, and return their output.
 
     Where the UV map is mirrored, the component is negated, as Blender does not mirror the bitangent there.

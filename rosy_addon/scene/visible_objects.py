@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator
 
 import bpy
+from bpy.types import Depsgraph, DepsgraphObjectInstance, LayerCollection, Object, ViewLayer
 
 from ..core.errors import RosyError
 from .datablocks import OWNED_TAG, check_object_type, has_rosy_properties, remedy_for_absence
 from .field_attributes import attribute_name, has_field
 
 
-def field_objects(
-    view_layer: bpy.types.ViewLayer, names: Iterable[str] | None = None
-) -> list[bpy.types.Object]:
+def field_objects(view_layer: ViewLayer, names: Iterable[str] | None = None) -> list[Object]:
     """Return the mesh objects with a field that are visible in renders, sorted by name.
 
     Objects in instanced collections are included. Objects whose field the user has switched off are left out.
@@ -37,12 +36,10 @@ def field_objects(
 
 #: Iterator over instances of meshes, each with whether its field is drawn. An instance is valid until the
 #: next one is taken.
-Instances = Iterator[tuple[bpy.types.DepsgraphObjectInstance, bool]]
+Instances = Iterator[tuple[DepsgraphObjectInstance, bool]]
 
 
-def rendered_instances(
-    depsgraph: bpy.types.Depsgraph, targets: Collection[bpy.types.Object]
-) -> Instances:
+def rendered_instances(depsgraph: Depsgraph, targets: Collection[Object]) -> Instances:
     """Return the instances of meshes that are visible in renders.
 
     `targets` are the original objects whose fields are drawn. All other meshes only hide what is behind them.
@@ -56,7 +53,7 @@ def rendered_instances(
     )
 
 
-def shown_instances(depsgraph: bpy.types.Depsgraph, *, include_occluders: bool) -> Instances:
+def shown_instances(depsgraph: Depsgraph, *, include_occluders: bool) -> Instances:
     """Return the instances of meshes that are visible in 3D views: all, or only meshes with a field."""
     meshes = (
         (instance, _draws_field(instance.object.original))
@@ -70,9 +67,7 @@ def shown_instances(depsgraph: bpy.types.Depsgraph, *, include_occluders: bool) 
     )
 
 
-def _is_rendered(
-    instance: bpy.types.DepsgraphObjectInstance, visible_objects: set[bpy.types.Object]
-) -> bool:
+def _is_rendered(instance: DepsgraphObjectInstance, visible_objects: set[Object]) -> bool:
     """Return whether an instance is a mesh that is visible in renders."""
     obj = instance.object
     # For curves, texts, surfaces and metaballs, the depsgraph lists separate instances of their meshes.
@@ -87,16 +82,16 @@ def _is_rendered(
     return obj.original in visible_objects
 
 
-def _draws_field(obj: bpy.types.Object) -> bool:
+def _draws_field(obj: Object) -> bool:
     """Return whether an object has a field that the user has not switched off."""
     return has_field(obj) and (not has_rosy_properties() or obj.rosy.include)
 
 
-def _visible_objects(view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
+def _visible_objects(view_layer: ViewLayer) -> list[Object]:
     """Return the original objects that are visible in renders, including those in instanced collections."""
-    visible: dict[bpy.types.Object, None] = {}
+    visible: dict[Object, None] = {}
 
-    def add_object(obj: bpy.types.Object) -> None:
+    def add_object(obj: Object) -> None:
         """Add an object and the objects of the collection that it instances."""
         if obj.hide_render or obj in visible:
             return
@@ -105,7 +100,7 @@ def _visible_objects(view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
             for child in obj.instance_collection.all_objects:
                 add_object(child)
 
-    def visit_layer(layer: bpy.types.LayerCollection) -> None:
+    def visit_layer(layer: LayerCollection) -> None:
         """Add the objects of a layer collection and its children."""
         if layer.exclude or layer.collection.hide_render:
             return
@@ -118,7 +113,7 @@ def _visible_objects(view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
     return list(visible)
 
 
-def _find_field_object(name: str, candidates: dict[str, bpy.types.Object]) -> bpy.types.Object:
+def _find_field_object(name: str, candidates: dict[str, Object]) -> Object:
     """Return the candidate with a name, or raise an error that says why there is none."""
     if name in candidates:
         return candidates[name]

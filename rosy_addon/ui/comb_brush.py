@@ -6,8 +6,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import bpy
 import numpy as np
+from bpy.types import Context, UILayout, WorkSpaceTool
 from gpu_extras.presets import draw_circle_2d
 
 from ..core.errors import RosyError
@@ -24,7 +24,7 @@ FREE_COLOR, GUIDED_COLOR = (0.85, 0.85, 0.85, 0.9), (1.0, 0.55, 0.15, 1.0)
 DASH_WIDTH = 1.5
 
 
-def draw_settings(layout: bpy.types.UILayout, settings: Any) -> None:
+def draw_settings(layout: UILayout, settings: Any) -> None:
     """Draw the settings that the operator and the tool have in common, in a panel."""
     layout.prop(settings, "exact")
     layout.prop(settings, "reach")
@@ -74,18 +74,14 @@ class CombTool:
 
     # Blender calls both functions without an instance, so they are static.
     @staticmethod
-    def draw_settings(
-        context: bpy.types.Context, layout: bpy.types.UILayout, tool: bpy.types.WorkSpaceTool
-    ) -> None:
+    def draw_settings(context: Context, layout: UILayout, tool: WorkSpaceTool) -> None:
         comb = context.scene.rosy.comb
         layout.prop(comb, "size")
         layout.prop(comb, "strength", slider=True)
         draw_settings(layout, tool.operator_properties("rosy.field_comb"))
 
     @staticmethod
-    def draw_cursor(
-        context: bpy.types.Context, tool: bpy.types.WorkSpaceTool, mouse: tuple[int, int]
-    ) -> None:
+    def draw_cursor(context: Context, tool: WorkSpaceTool, mouse: tuple[int, int]) -> None:
         """Draw the circle of the brush. If the view is not live, also draw the field around it as dashes."""
         comb = context.scene.rosy.comb
         draw_circle_2d(mouse, CURSOR_COLOR, comb.size, segments=64)
@@ -104,14 +100,14 @@ class CombTool:
                     draw_lines("LINES", ends[chosen & in_view].reshape(-1, 2), color, width)
 
 
-class VIEW3D_TOOL_rosy_comb(CombTool, bpy.types.WorkSpaceTool):
+class VIEW3D_TOOL_rosy_comb(CombTool, WorkSpaceTool):
     """Comb a field in Object Mode"""
 
     bl_context_mode = "OBJECT"
     bl_idname = "rosy.comb_tool"
 
 
-class VIEW3D_TOOL_rosy_comb_sculpt(CombTool, bpy.types.WorkSpaceTool):
+class VIEW3D_TOOL_rosy_comb_sculpt(CombTool, WorkSpaceTool):
     """Comb a field in Sculpt Mode"""
 
     bl_context_mode = "SCULPT"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import bpy
+from bpy.types import Context, Menu, Object, Panel, PropertyGroup, UILayout
 
 from ..compositor.look import Look, colors_magnitude, colors_values, is_hatched
 from ..compositor.picture_key import fixed_color_range
@@ -49,13 +49,13 @@ SEARCH_COLLECTIONS = {
 }
 
 
-class VIEW3D_PT_rosy_look(sidebar.SidebarPanel, bpy.types.Panel):
+class VIEW3D_PT_rosy_look(sidebar.SidebarPanel, Panel):
     """How fields are drawn."""
 
     bl_label = "Look"
     bl_parent_id = "VIEW3D_PT_rosy"
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         settings = context.scene.rosy
         column = self.layout.column(align=True)
         column.template_icon_view(
@@ -77,12 +77,12 @@ class VIEW3D_PT_rosy_look(sidebar.SidebarPanel, bpy.types.Panel):
                 lines.label(text=line)
 
 
-class VIEW3D_MT_rosy_presets(bpy.types.Menu):
+class VIEW3D_MT_rosy_presets(Menu):
     """Commands for presets."""
 
     bl_label = "Presets"
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         layout, settings = self.layout, context.scene.rosy
         entry = preset_library.active_entry(settings)
         row = layout.row()
@@ -123,7 +123,7 @@ def _make_settings_panel(
         Names of properties of `Scene.rosy`, shown below them.
     """
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         layout = self.layout
         sidebar.use_property_columns(layout)
         column = layout.column()
@@ -154,19 +154,17 @@ def _make_settings_panel(
         "bl_options": {"DEFAULT_CLOSED"},
         "draw": draw,
     }
-    return type(f"VIEW3D_PT_rosy_{suffix}", (sidebar.SidebarPanel, bpy.types.Panel), namespace)
+    return type(f"VIEW3D_PT_rosy_{suffix}", (sidebar.SidebarPanel, Panel), namespace)
 
 
-def _unused_output(settings: bpy.types.PropertyGroup) -> tuple[str, ...]:
+def _unused_output(settings: PropertyGroup) -> tuple[str, ...]:
     """Return the names of properties of the output that have no effect with the present settings."""
     if not is_hatched(settings.look):
         return "backdrop", "relight"
     return ("device", "emission", "diffuse") if settings.relight else ()
 
 
-def _draw_setting(
-    column: bpy.types.UILayout, look: bpy.types.PropertyGroup, setting: Setting
-) -> None:
+def _draw_setting(column: UILayout, look: PropertyGroup, setting: Setting) -> None:
     """Draw a property of the look. If its label is long, give the label more room."""
     if isinstance(setting, Numbers):
         for index, part in enumerate(setting.parts):
@@ -184,15 +182,13 @@ def _draw_setting(
     split.prop(look, setting.name, text="")
 
 
-def _active_mesh_object(context: bpy.types.Context) -> bpy.types.Object | None:
+def _active_mesh_object(context: Context) -> Object | None:
     """Return the active object if it is a mesh, and None otherwise."""
     obj = context.view_layer.objects.active
     return obj if obj is not None and obj.type == "MESH" else None
 
 
-def _draw_name(
-    row: bpy.types.UILayout, owner: Any, name: str, mesh_object: bpy.types.Object | None
-) -> None:
+def _draw_name(row: UILayout, owner: Any, name: str, mesh_object: Object | None) -> None:
     """Draw a text property.
 
     If it names an attribute or UV map (see `SEARCH_COLLECTIONS`), and there is a mesh, its text box suggests
@@ -204,7 +200,7 @@ def _draw_name(
         row.prop(owner, name)
 
 
-def _draw_tone_source(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
+def _draw_tone_source(column: UILayout, context: Context) -> None:
     """Draw the properties of the scene and of the active object that set the source of the tone."""
     settings, mesh_object = context.scene.rosy, _active_mesh_object(context)
     for name, source in TONE_SOURCE_OF_SETTING.items():
@@ -219,17 +215,17 @@ def _draw_tone_source(column: bpy.types.UILayout, context: bpy.types.Context) ->
             _draw_name(row, owner, name, mesh_object)
 
 
-class VIEW3D_PT_rosy_look_key(sidebar.SidebarPanel, bpy.types.Panel):
+class VIEW3D_PT_rosy_look_key(sidebar.SidebarPanel, Panel):
     """The key (legend) that explains a picture in renders."""
 
     bl_label = "Key"
     bl_parent_id = "VIEW3D_PT_rosy_look"
     bl_options = {"DEFAULT_CLOSED"}
 
-    def draw_header(self, context: bpy.types.Context) -> None:
+    def draw_header(self, context: Context) -> None:
         self.layout.prop(context.scene.rosy, "key", text="")
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         layout, settings = self.layout, context.scene.rosy
         sidebar.use_property_columns(layout)
         layout.active = settings.key
@@ -246,7 +242,7 @@ class VIEW3D_PT_rosy_look_key(sidebar.SidebarPanel, bpy.types.Panel):
             sidebar.draw_wrapped(layout, context, [hint])
 
 
-def _range_may_differ(settings: bpy.types.PropertyGroup) -> bool:
+def _range_may_differ(settings: PropertyGroup) -> bool:
     """Return whether the frames of a baked animation may have different ranges of the color map.
 
     `settings` is the `Scene.rosy` of the scene with the animation.

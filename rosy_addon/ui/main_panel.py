@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bpy
+from bpy.types import Context, Menu, Object, Panel, Scene, UILayout
 
 from ..compositor.look import has_flow, is_hatched
 from ..core.errors import counted
@@ -22,12 +23,12 @@ from .operator_settings import draw_convert_settings, draw_generator_settings, d
 SHADING_WITHOUT_MATERIALS = ("WIREFRAME", "SOLID")
 
 
-class VIEW3D_PT_rosy(sidebar.SidebarPanel, bpy.types.Panel):
+class VIEW3D_PT_rosy(sidebar.SidebarPanel, Panel):
     """Make a field, bake its picture and look at it."""
 
     bl_label = "RoSy"
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         job_status.start_helper_once(context)
         layout = self.layout
         sidebar.use_property_columns(layout)
@@ -36,7 +37,7 @@ class VIEW3D_PT_rosy(sidebar.SidebarPanel, bpy.types.Panel):
         _draw_picture_section(layout, context)
 
 
-def _draw_field_section(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+def _draw_field_section(layout: UILayout, context: Context) -> None:
     obj = context.view_layer.objects.active
     layout.label(text="1.  Field", icon="FORCE_VORTEX")
     if obj is None or obj.type != "MESH":
@@ -48,9 +49,7 @@ def _draw_field_section(layout: bpy.types.UILayout, context: bpy.types.Context) 
         _draw_new_field(layout, context)
 
 
-def _draw_existing_field(
-    layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object
-) -> None:
+def _draw_existing_field(layout: UILayout, context: Context, obj: Object) -> None:
     mesh = obj.data
     box = layout.box().column(align=True)
     row = box.row()
@@ -75,7 +74,7 @@ def _draw_existing_field(
         _draw_new_field(body, context)
 
 
-def _draw_convert_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+def _draw_convert_settings(layout: UILayout, context: Context) -> None:
     """Draw the settings and the button that convert fields, and the menu to store them in another form."""
     settings = context.window_manager.operator_properties_last("rosy.field_convert")
     draw_convert_settings(layout.column(), settings)
@@ -83,9 +82,7 @@ def _draw_convert_settings(layout: bpy.types.UILayout, context: bpy.types.Contex
     layout.operator_menu_enum("rosy.field_store", "form", text="Store As")
 
 
-def _draw_compare_settings(
-    layout: bpy.types.UILayout, context: bpy.types.Context, other_fields: list[str]
-) -> None:
+def _draw_compare_settings(layout: UILayout, context: Context, other_fields: list[str]) -> None:
     """Draw the settings and the button that compare the field with another field.
 
     `other_fields` are the names of the attributes of the mesh that may hold another field.
@@ -96,7 +93,7 @@ def _draw_compare_settings(
     layout.operator("rosy.field_compare")
 
 
-def _draw_new_field(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+def _draw_new_field(layout: UILayout, context: Context) -> None:
     """Draw the settings of the generator and the buttons that make or import a field."""
     settings = context.window_manager.operator_properties_last("rosy.field_generate")
     draw_generator_settings(layout.column(), settings)
@@ -109,7 +106,7 @@ def _draw_new_field(layout: bpy.types.UILayout, context: bpy.types.Context) -> N
     layout.operator("rosy.field_import", text="Import a Field File...", icon="IMPORT")
 
 
-def _draw_picture_section(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+def _draw_picture_section(layout: UILayout, context: Context) -> None:
     """Draw the switch of the live view, the list of baked pictures, and the buttons that bake."""
     layout.label(text="2.  Picture", icon="RENDER_STILL")
     _draw_live_toggle(layout, context)
@@ -126,7 +123,7 @@ def _draw_picture_section(layout: bpy.types.UILayout, context: bpy.types.Context
     sidebar.draw_wrapped(layout, context, session.messages(context.area))
 
 
-def _draw_bakes(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+def _draw_bakes(layout: UILayout, context: Context) -> None:
     objects = field_objects(context.view_layer)
     bake_infos = list_bakes(context.scene, for_panel=True, automatic_device=automatic_device)
     _redraw_later(SCENE_STATES.seconds_to_wait())
@@ -160,7 +157,7 @@ def bake_label(bake_infos: list[BakeInfo]) -> str:
     return "Bake Again" if pictures else "Bake"
 
 
-def _draw_texture_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+def _draw_texture_settings(layout: UILayout, context: Context) -> None:
     """Draw the settings and the button that bake textures."""
     if (body := sidebar.closed_panel(layout, "texture", "Texture")) is None:
         return
@@ -182,21 +179,19 @@ def _draw_texture_settings(layout: bpy.types.UILayout, context: bpy.types.Contex
         column.label(text="Only Cycles draws anisotropy", icon="INFO")
 
 
-def _draw_live_toggle(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+def _draw_live_toggle(layout: UILayout, context: Context) -> None:
     is_live = session.is_live(context.space_data)
     icon = "HIDE_OFF" if is_live else "HIDE_ON"
     button = layout.operator("rosy.viewport", text="Live in This View", icon=icon, depress=is_live)
     button.show = "OFF" if is_live else "ON"
 
 
-def draw_overlay_popover(popover: bpy.types.Menu, context: bpy.types.Context) -> None:
+def draw_overlay_popover(popover: Menu, context: Context) -> None:
     """Draw the switch of the live view in Blender's popover of overlays."""
     _draw_live_toggle(popover.layout, context)
 
 
-def _draw_bake_info(
-    layout: bpy.types.UILayout, context: bpy.types.Context, bake: BakeInfo, several: bool
-) -> None:
+def _draw_bake_info(layout: UILayout, context: Context, bake: BakeInfo, several: bool) -> None:
     box = layout.box().column(align=True)
     if bake.is_texture:
         box.label(text=f"Texture of {bake.camera}", icon="TEXTURE")
@@ -232,9 +227,7 @@ def unregister() -> None:
         bpy.app.timers.unregister(redraw)
 
 
-def _draw_view_hints(
-    layout: bpy.types.UILayout, context: bpy.types.Context, bake_infos: list[BakeInfo]
-) -> None:
+def _draw_view_hints(layout: UILayout, context: Context, bake_infos: list[BakeInfo]) -> None:
     """If this view does not show baked pictures, draw buttons that make them visible."""
     view, camera = context.space_data, context.scene.camera
     column = layout.column(align=True)
@@ -249,7 +242,7 @@ def _draw_view_hints(
         column.operator("view3d.view_camera", text="Look Through the Camera")
 
 
-def _draw_view_transform_warning(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+def _draw_view_transform_warning(layout: UILayout, scene: Scene) -> None:
     """Draw a warning if the view transform of the scene changes the tones of the picture."""
     transform = scene.view_settings.view_transform
     if transform not in NEUTRAL_VIEW_TRANSFORMS:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import bpy
+from bpy.types import UILayout
 
 from ..field.generate import options_of
 from .sidebar import use_property_columns
@@ -26,9 +26,7 @@ _GUIDE_OF_INPUT = {"guide": "OBJECTS", "edges": "EDGES", "uv_map": "UV", "vector
 _PLACEHOLDERS = {"guide": "Selected", "uv_map": "Active", "vectors": "Attribute"}
 
 
-def draw_settings(
-    layout: bpy.types.UILayout, settings: Any, *names: str, **placeholders: str
-) -> None:
+def draw_settings(layout: UILayout, settings: Any, *names: str, **placeholders: str) -> None:
     """Draw properties in two columns.
 
     Parameters
@@ -45,14 +43,14 @@ def draw_settings(
         layout.prop(settings, name, placeholder=placeholders.get(name, ""))
 
 
-def draw_convert_settings(layout: bpy.types.UILayout, settings: Any) -> None:
+def draw_convert_settings(layout: UILayout, settings: Any) -> None:
     """Draw the settings of ``rosy.field_convert``."""
     draw_settings(layout, settings, *_CONVERT_SETTINGS)
     if settings.magnitude == "values":
         draw_settings(layout, settings, "values")
 
 
-def draw_generator_settings(layout: bpy.types.UILayout, settings: Any) -> None:
+def draw_generator_settings(layout: UILayout, settings: Any) -> None:
     """Draw the settings of ``rosy.field_generate`` that apply to the chosen generator, guides and edges."""
     inputs = _INPUTS_BY_KIND.get(settings.kind, ())
     if settings.kind == "guided":

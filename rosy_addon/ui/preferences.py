@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import bpy
+from bpy.types import AddonPreferences, Context
 
 from ..compositor.look import Look
 from ..core.settings import settings_of
@@ -11,7 +11,7 @@ from . import preset_library
 from .property_makers import integer, text, toggle
 
 
-class ROSY_AP_preferences(bpy.types.AddonPreferences):
+class ROSY_AP_preferences(AddonPreferences):
     """What happens when the first field of a scene is made, and the defaults that the scene gets."""
 
     bl_idname = EXTENSION_ID
@@ -50,7 +50,7 @@ class ROSY_AP_preferences(bpy.types.AddonPreferences):
         default=True,
     )
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.prop(self, "use_helper")
@@ -61,25 +61,25 @@ class ROSY_AP_preferences(bpy.types.AddonPreferences):
         layout.prop(self, "directory")
 
 
-def addon_preferences(context: bpy.types.Context) -> ROSY_AP_preferences | None:
+def addon_preferences(context: Context) -> ROSY_AP_preferences | None:
     """Return the preferences; None if RoSy does not run as an extension."""
     addon = context.preferences.addons.get(EXTENSION_ID)
     return None if addon is None else addon.preferences
 
 
-def worker_count(context: bpy.types.Context) -> int:
+def worker_count(context: Context) -> int:
     """Return the number of processes that draw a large picture. 0 means one for each processor core."""
     preferences = addon_preferences(context)
     return 0 if preferences is None else preferences.workers
 
 
-def uses_helper(context: bpy.types.Context) -> bool:
+def uses_helper(context: Context) -> bool:
     """Return whether jobs compute in a helper process, and not in Blender's process."""
     preferences = addon_preferences(context)
     return preferences is None or preferences.use_helper
 
 
-def apply_preferences(context: bpy.types.Context) -> None:
+def apply_preferences(context: Context) -> None:
     """Apply the preferences to a scene, if the user has not changed its settings.
 
     Raises

@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Sequence
 
-import bpy
+from bpy.types import Context, UILayout
 
 from ..core.errors import as_sentence
 from . import job_status
@@ -26,17 +26,14 @@ class SidebarPanel:
     bl_category = "RoSy"
 
 
-def use_property_columns(layout: bpy.types.UILayout) -> None:
+def use_property_columns(layout: UILayout) -> None:
     """Let a layout show labels and values in two columns, without buttons for keyframes."""
     layout.use_property_split = True
     layout.use_property_decorate = False
 
 
 def draw_wrapped(
-    layout: bpy.types.UILayout,
-    context: bpy.types.Context,
-    messages: Sequence[str],
-    icon: str = "INFO",
+    layout: UILayout, context: Context, messages: Sequence[str], icon: str = "INFO"
 ) -> None:
     """Draw messages as sentences, each wrapped to the width of the region."""
     for message in messages:
@@ -45,13 +42,13 @@ def draw_wrapped(
             column.label(text=row, icon="BLANK1" if index else icon)
 
 
-def wrap_to_sidebar(text: str, context: bpy.types.Context) -> list[str]:
+def wrap_to_sidebar(text: str, context: Context) -> list[str]:
     """Return the rows of a text that is wrapped to the width of the region."""
     width = context.region.width / context.preferences.system.ui_scale - MARGIN_PIXELS
     return textwrap.wrap(text, max(int(width / CHARACTER_PIXELS), MIN_CHARACTERS))
 
 
-def closed_panel(layout: bpy.types.UILayout, key: str, title: str) -> bpy.types.UILayout | None:
+def closed_panel(layout: UILayout, key: str, title: str) -> UILayout | None:
     """Add a subpanel that is closed by default. Return its layout; None while it is closed.
 
     Blender stores under the name `key` whether the user has opened the subpanel.
@@ -61,14 +58,14 @@ def closed_panel(layout: bpy.types.UILayout, key: str, title: str) -> bpy.types.
     return body
 
 
-def draw_progress(layout: bpy.types.UILayout) -> None:
+def draw_progress(layout: UILayout) -> None:
     """Draw the progress of the running job."""
     progress = job_status.current
     layout.progress(factor=progress.fraction, text=as_sentence(progress.label))
     layout.label(text="Press ESC to cancel")
 
 
-def draw_cycles_hint(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+def draw_cycles_hint(layout: UILayout, context: Context) -> None:
     """Draw a note on what hatching with the light of the scene looks like in Cycles, if Cycles is chosen."""
     if context.scene.render.engine == "CYCLES":
         layout.label(text="Cycles: occlusion, not light", icon="INFO")

@@ -11,6 +11,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy.types import Context, Object, Region, SpaceView3D, UILayout, WorkSpaceTool
 from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_3d
 
 from ..core.errors import RosyError
@@ -45,16 +46,16 @@ class Drag:
         Vertex nearest to the surface point under the mouse. None if the mouse is not over the object.
     """
 
-    def __init__(self, obj: bpy.types.Object, source: int, region: bpy.types.Region) -> None:
+    def __init__(self, obj: Object, source: int, region: Region) -> None:
         self.source = source
         self.target: int | None = None
         self._obj = obj
         self._region = region
         self._ends = _own_points(bpy.context, obj)[[source]]
-        add = bpy.types.SpaceView3D.draw_handler_add
+        add = SpaceView3D.draw_handler_add
         self._handler: Any = add(self._draw, (), "WINDOW", "POST_PIXEL")
 
-    def move(self, context: bpy.types.Context, mouse: tuple[float, float]) -> None:
+    def move(self, context: Context, mouse: tuple[float, float]) -> None:
         """Find the target vertex for a new position of the mouse, in region pixels. Redraw the view."""
         points = _own_points(context, self._obj)
         self.target = _vertex_under(context, self._obj, points, mouse)
@@ -65,7 +66,7 @@ class Drag:
     def stop(self) -> None:
         """Remove the drawing of the drag from the view. Later calls have no effect."""
         if self._handler is not None:
-            bpy.types.SpaceView3D.draw_handler_remove(self._handler, "WINDOW")
+            SpaceView3D.draw_handler_remove(self._handler, "WINDOW")
             self._handler = None
             redraw()
 
@@ -83,10 +84,7 @@ class Drag:
 
 
 def start_drag(
-    context: bpy.types.Context,
-    obj: bpy.types.Object,
-    mouse: tuple[float, float],
-    from_any_vertex: bool,
+    context: Context, obj: Object, mouse: tuple[float, float], from_any_vertex: bool
 ) -> Drag | None:
     """Start to drag the handle under the mouse (or with `from_any_vertex` the vertex under the mouse).
 
@@ -105,7 +103,7 @@ def start_drag(
     return None if source is None else Drag(obj, source, context.region)
 
 
-def show_handles(context: bpy.types.Context, obj: bpy.types.Object) -> None:
+def show_handles(context: Context, obj: Object) -> None:
     """Show the singularities of the original mesh (without modifiers), unless the overlay shows them already.
 
     Only these can be edited. The evaluated mesh may have others.
@@ -121,7 +119,7 @@ def show_handles(context: bpy.types.Context, obj: bpy.types.Object) -> None:
         overlay.show(obj.name, read_editable_singularities(obj, depsgraph))
 
 
-def _own_points(context: bpy.types.Context, obj: bpy.types.Object) -> np.ndarray:
+def _own_points(context: Context, obj: Object) -> np.ndarray:
     """Return the (V, 3) vertices of an object's original mesh, moved by its modifiers, in object space.
 
     Vertices that modifiers add are left out.
@@ -131,10 +129,7 @@ def _own_points(context: bpy.types.Context, obj: bpy.types.Object) -> np.ndarray
 
 
 def _vertex_under(
-    context: bpy.types.Context,
-    obj: bpy.types.Object,
-    points: np.ndarray,
-    mouse: tuple[float, float],
+    context: Context, obj: Object, points: np.ndarray, mouse: tuple[float, float]
 ) -> int | None:
     """Return the vertex (an index of `_own_points`) nearest to the surface point under the mouse.
 
@@ -151,9 +146,7 @@ def _vertex_under(
     return int(np.square(points - np.array(location, np.float32)).sum(axis=1).argmin())
 
 
-def _handle_under(
-    context: bpy.types.Context, obj: bpy.types.Object, mouse: tuple[float, float]
-) -> int | None:
+def _handle_under(context: Context, obj: Object, mouse: tuple[float, float]) -> int | None:
     """Return the vertex of the visible handle nearest to the mouse. None if no handle is near enough."""
     shown = overlay.shown(obj.name)
     assert shown is not None and shown.vertex is not None
@@ -169,7 +162,7 @@ def _handle_under(
     return None
 
 
-class VIEW3D_TOOL_rosy_singularities(bpy.types.WorkSpaceTool):
+class VIEW3D_TOOL_rosy_singularities(WorkSpaceTool):
     """Move the singularities of a field"""
 
     bl_space_type = "VIEW_3D"
@@ -190,16 +183,12 @@ class VIEW3D_TOOL_rosy_singularities(bpy.types.WorkSpaceTool):
 
     # Blender calls both functions without an instance, so they are static.
     @staticmethod
-    def draw_settings(
-        context: bpy.types.Context, layout: bpy.types.UILayout, tool: bpy.types.WorkSpaceTool
-    ) -> None:
+    def draw_settings(context: Context, layout: UILayout, tool: WorkSpaceTool) -> None:
         properties = tool.operator_properties("rosy.drag_singularity")
         layout.prop(properties, "reach")
 
     @staticmethod
-    def draw_cursor(
-        context: bpy.types.Context, tool: bpy.types.WorkSpaceTool, mouse: tuple[int, int]
-    ) -> None:
+    def draw_cursor(context: Context, tool: WorkSpaceTool, mouse: tuple[int, int]) -> None:
         """Show the handles while the tool is active."""
         obj = context.view_layer.objects.active
         if obj is not None and has_field(obj):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import bpy
+from bpy.types import Context, Panel, PropertyGroup, UILayout
 
 from ..core.settings import panel_settings, settings_of
 from ..line_drawing.style import StrokeStyle
@@ -27,13 +27,13 @@ STROKE_PANELS = {
 }
 
 
-class VIEW3D_PT_rosy_strokes(SidebarPanel, bpy.types.Panel):
+class VIEW3D_PT_rosy_strokes(SidebarPanel, Panel):
     """Draw lines along the field, as scene objects or as a file."""
 
     bl_label = "Strokes"
     bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Context) -> None:
         layout = self.layout
         use_property_columns(layout)
         settings = context.scene.rosy.strokes
@@ -67,7 +67,7 @@ class VIEW3D_PT_rosy_strokes(SidebarPanel, bpy.types.Panel):
 
 
 def _draw_stroke_settings(
-    layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, names: tuple[str, ...]
+    layout: UILayout, settings: PropertyGroup, names: tuple[str, ...]
 ) -> None:
     column = layout.column()
     descriptions = settings_of(StrokeStyle)

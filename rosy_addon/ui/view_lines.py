@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import bpy
 import gpu
 import numpy as np
+from bpy.types import Region, RegionView3D
 from gpu_extras.batch import batch_for_shader
 
 
-def to_pixels(
-    region: bpy.types.Region, view: bpy.types.RegionView3D, points: np.ndarray
-) -> np.ndarray:
+def to_pixels(region: Region, view: RegionView3D, points: np.ndarray) -> np.ndarray:
     """Project (..., 3) points in world space to (..., 2) pixels of a region of a 3D view.
 
     The pixels of points behind the camera are infinite.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-import bpy
 import numpy as np
+from bpy.types import Context, Object
 from bpy_extras import view3d_utils
 from mathutils import Vector
 
@@ -21,7 +21,7 @@ from .view3d import to_world
 class BrushMouse:
     """The points of an object under the mouse, in a region of a 3D view."""
 
-    def __init__(self, context: bpy.types.Context, obj: bpy.types.Object) -> None:
+    def __init__(self, context: Context, obj: Object) -> None:
         self._region, self._view = context.region, context.region_data
         self._obj = obj
         surface = mesh_surface(obj.data, cache=BAKE_CACHE)
@@ -76,7 +76,7 @@ _current: tuple[tuple[str, int], BrushMouse] | None = None
 _is_held = False
 
 
-def current_mouse(context: bpy.types.Context, obj: bpy.types.Object) -> BrushMouse:
+def current_mouse(context: Context, obj: Object) -> BrushMouse:
     """Return the `BrushMouse` of an object in the region of the context.
 
     It is created again after each change of the scene, unless `hold_mouse` keeps it.
@@ -87,7 +87,7 @@ def current_mouse(context: bpy.types.Context, obj: bpy.types.Object) -> BrushMou
     return _current[1]
 
 
-def hold_mouse(context: bpy.types.Context, obj: bpy.types.Object) -> BrushMouse:
+def hold_mouse(context: Context, obj: Object) -> BrushMouse:
     """Return the `BrushMouse` of an object, and keep it until `release_mouse`, whatever changes."""
     global _is_held
     _read(context, obj)
@@ -107,7 +107,7 @@ def unregister() -> None:
     remove_handlers(_HANDLERS)
 
 
-def _read(context: bpy.types.Context, obj: bpy.types.Object) -> None:
+def _read(context: Context, obj: Object) -> None:
     global _current
     _current = (obj.name, context.region.as_pointer()), BrushMouse(context, obj)
     add_handlers(_HANDLERS)

@@ -11,6 +11,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy.types import Context, Depsgraph, Scene, ViewLayer
 
 from ..compositor.look import Look
 from ..compositor.target_tone import ReferenceRender
@@ -65,17 +66,12 @@ class LayerStates:
         self._layers: dict[tuple[str, str], LayerState] = {}
         self._is_resolving = False
 
-    def get(self, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> LayerState | None:
+    def get(self, scene: Scene, view_layer: ViewLayer) -> LayerState | None:
         """Return the state of a view layer, or None if it was never read."""
         return self._layers.get((scene.name, view_layer.name))
 
     def read(
-        self,
-        context: bpy.types.Context,
-        depsgraph: bpy.types.Depsgraph,
-        look: Look,
-        *,
-        include_occluders: bool,
+        self, context: Context, depsgraph: Depsgraph, look: Look, *, include_occluders: bool
     ) -> LayerState:
         """Return the state of the context's view layer, up to date unless its `is_starting` is true.
 
@@ -114,9 +110,7 @@ class LayerStates:
             for key, layer in self._layers.items()
         }
 
-    def invalidate(
-        self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None
-    ) -> None:
+    def invalidate(self, scene: Scene, depsgraph: Depsgraph | None = None) -> None:
         """Mark what has changed in a scene, so that it is read again.
 
         Parameters
@@ -213,9 +207,7 @@ class ReferenceImages:
             except REPORTED_ERRORS as error:
                 self._images[name] = file_key, error_text(error)
 
-    def current(
-        self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, look: Look
-    ) -> ReferenceRender | None:
+    def current(self, scene: Scene, depsgraph: Depsgraph, look: Look) -> ReferenceRender | None:
         """Return the reference render of a scene.
 
         Returns

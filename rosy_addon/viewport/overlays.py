@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import blf
-import bpy
 import gpu
 import numpy as np
+from bpy.types import Area, Context, Region
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
@@ -58,9 +58,7 @@ MAX_EXACT_TRIANGLES = 200_000
 ARC_POINTS = 4
 
 
-def pixel_frames(
-    context: bpy.types.Context, points: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def pixel_frames(context: Context, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the vectors of one pixel at (K, 3) points in world space, in the region that is drawn.
 
     Returns
@@ -178,11 +176,7 @@ def singularity_dots(
 
 
 def draw_dots(
-    context: bpy.types.Context,
-    objects: Sequence[SingularityDots],
-    size: float,
-    *,
-    shows_hidden: bool = False,
+    context: Context, objects: Sequence[SingularityDots], size: float, *, shows_hidden: bool = False
 ) -> None:
     """Draw dots in a view. Surfaces in front of dots hide them.
 
@@ -205,11 +199,7 @@ def draw_dots(
 
 
 def draw_singularities(
-    context: bpy.types.Context,
-    view_input: ViewInput,
-    look: Look,
-    overlay: ViewOverlay,
-    cache: Cache,
+    context: Context, view_input: ViewInput, look: Look, overlay: ViewOverlay, cache: Cache
 ) -> None:
     """Draw the dots of a view, and store in its overlay those that get labels."""
     found = [
@@ -224,7 +214,7 @@ def draw_singularities(
 
 
 def _draw_all(
-    context: bpy.types.Context, objects: Sequence[SingularityDots], size: float, opacity: float
+    context: Context, objects: Sequence[SingularityDots], size: float, opacity: float
 ) -> None:
     outline = singularity_marks.OUTLINE * size
     for dots in objects:
@@ -242,7 +232,7 @@ def _draw_all(
 
 
 def _disc_triangles(
-    context: bpy.types.Context, points: np.ndarray, radius: np.ndarray, depth_offset: np.ndarray
+    context: Context, points: np.ndarray, radius: np.ndarray, depth_offset: np.ndarray
 ) -> np.ndarray:
     """Return the (n, 3) corners of the triangles of a disc at each of K points, facing the camera.
 
@@ -260,9 +250,7 @@ def _disc_triangles(
     return vertices.reshape(-1, 3).astype(np.float32)
 
 
-def draw_labels(
-    context: bpy.types.Context, objects: Sequence[SingularityDots], size: float
-) -> None:
+def draw_labels(context: Context, objects: Sequence[SingularityDots], size: float) -> None:
     """Draw the index of each visible dot beside the dot, where there is room for it.
 
     Parameters
@@ -300,7 +288,7 @@ def draw_labels(
     blf.disable(font_id, blf.SHADOW)
 
 
-def is_occluded(context: bpy.types.Context, point: np.ndarray) -> bool:
+def is_occluded(context: Context, point: np.ndarray) -> bool:
     """Return whether a surface is between a point in world space and the camera.
 
     Surfaces very close to the point do not count, so that the point may lie on one; see `NEAR_SURFACE`.
@@ -316,7 +304,7 @@ def is_occluded(context: bpy.types.Context, point: np.ndarray) -> bool:
 
 
 def draw_view_arrowheads(
-    context: bpy.types.Context, view: ViewInput, key: Hashable, overlay: ViewOverlay, cache: Cache
+    context: Context, view: ViewInput, key: Hashable, overlay: ViewOverlay, cache: Cache
 ) -> None:
     """Draw arrowheads over the lines of a view. Surfaces in front of arrowheads hide them.
 
@@ -337,7 +325,7 @@ def draw_view_arrowheads(
 
 
 def _head_triangles(
-    context: bpy.types.Context, marks: ArrowMarks, grown: float, nearness: float
+    context: Context, marks: ArrowMarks, grown: float, nearness: float
 ) -> np.ndarray:
     """Return the (n, 3) float32 corners of the triangles of arrowheads, facing the camera.
 
@@ -390,7 +378,7 @@ _FONT_SIZE, _LINE_HEIGHT, _LEFT, _BOTTOM = 12, 18, 16, 64
 _MIN_CHARACTERS = 20
 
 
-def draw_messages(messages: Sequence[str], context: bpy.types.Context) -> None:
+def draw_messages(messages: Sequence[str], context: Context) -> None:
     """Draw messages in the lower left corner of the context's region, the first one lowest.
 
     Lines are wrapped to the width of the region that the sidebar does not cover.
@@ -413,7 +401,7 @@ def draw_messages(messages: Sequence[str], context: bpy.types.Context) -> None:
         blf.draw(0, row)
 
 
-def _uncovered_width(area: bpy.types.Area, region: bpy.types.Region) -> int:
+def _uncovered_width(area: Area, region: Region) -> int:
     """Return the width, in pixels, of the part of a region that no sidebar overlaps."""
     sidebars = (
         other.x - region.x

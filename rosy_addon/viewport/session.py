@@ -12,6 +12,7 @@ from itertools import chain
 from typing import Any
 
 import bpy
+from bpy.types import Area, Context, Depsgraph, Scene, SpaceView3D
 
 from ..annotation.singularity_settings import shows_singularities
 from ..compositor.flow import NO_DRIFT, Drift
@@ -91,8 +92,8 @@ class ViewportSession:
         self._marks_cache = Cache()
         self._references = ReferenceImages()
         self._draw_handlers = [
-            bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW"),
-            bpy.types.SpaceView3D.draw_handler_add(self._draw_text, (), "WINDOW", "POST_PIXEL"),
+            SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW"),
+            SpaceView3D.draw_handler_add(self._draw_text, (), "WINDOW", "POST_PIXEL"),
         ]
         self._app_handlers = {
             "depsgraph_update_post": self.layers.invalidate,
@@ -118,7 +119,7 @@ class ViewportSession:
 
     # --- switching -------------------------------------------------------------------------------
 
-    def add(self, space: bpy.types.SpaceView3D) -> None:
+    def add(self, space: SpaceView3D) -> None:
         """Make a view live: from now on, the fields of its objects are drawn over it."""
         self.spaces.add(space.as_pointer())
         view3d.redraw()
@@ -134,7 +135,7 @@ class ViewportSession:
     def stop(self) -> None:
         """Remove all handlers and timers, and free all resources."""
         for handler in self._draw_handlers:
-            bpy.types.SpaceView3D.draw_handler_remove(handler, "WINDOW")
+            SpaceView3D.draw_handler_remove(handler, "WINDOW")
         remove_handlers(self._app_handlers)
         for timer in self._timers.values():
             if bpy.app.timers.is_registered(timer):
@@ -266,7 +267,7 @@ class ViewportSession:
         self.layers.forget()
         self._schedule_redraw(0.0)
 
-    def _draw_view(self, context: bpy.types.Context, overlay: ViewOverlay) -> None:
+    def _draw_view(self, context: Context, overlay: ViewOverlay) -> None:
         """Update the picture of a view, and composite the picture and its overlays over the view."""
         depsgraph = context.evaluated_depsgraph_get()
         look = read_look(context.scene.rosy)
@@ -302,11 +303,7 @@ class ViewportSession:
         self._marks_cache.evict_over_limit()
 
     def _read_view(
-        self,
-        context: bpy.types.Context,
-        depsgraph: bpy.types.Depsgraph,
-        look: Look,
-        overlay: ViewOverlay,
+        self, context: Context, depsgraph: Depsgraph, look: Look, overlay: ViewOverlay
     ) -> ViewInput | None:
         """Return the input of the picture of a view, or None if there is nothing to draw yet.
 
@@ -354,7 +351,7 @@ class ViewportSession:
             drift=self._drift(look, context.scene),
         )
 
-    def _drift(self, look: Look, scene: bpy.types.Scene) -> Drift:
+    def _drift(self, look: Look, scene: Scene) -> Drift:
         """Return how far streaks have drifted at the current frame of a scene plus the frames of `flow_clock`."""
         if has_flow(look):
             self._has_shown_flow = True
@@ -393,7 +390,7 @@ class ViewportSession:
         rest = len(errors) - MAX_OBJECT_ERRORS
         return lines + [f"{counted(rest, 'more object')} cannot be drawn"] * (rest > 0)
 
-    def messages(self, area: bpy.types.Area) -> list[str]:
+    def messages(self, area: Area) -> list[str]:
         """Return the rows of text in the views of an area, as they were drawn last."""
         space_pointer = area.spaces.active.as_pointer()
         views = ((space_pointer, region.as_pointer()) for region in area.regions)
@@ -401,7 +398,7 @@ class ViewportSession:
         return list(dict.fromkeys(chain.from_iterable(lines)))
 
 
-def _pointers(context: bpy.types.Context) -> ViewPointers:
+def _pointers(context: Context) -> ViewPointers:
     """Return the pointers of the space and the region that are being drawn."""
     return context.space_data.as_pointer(), context.region.as_pointer()
 
@@ -423,12 +420,12 @@ def _picture_key(view_input: ViewInput) -> Hashable:
 _session: ViewportSession | None = None
 
 
-def is_live(space: bpy.types.SpaceView3D) -> bool:
+def is_live(space: SpaceView3D) -> bool:
     """Return whether a 3D view is live, that is, fields are drawn over it."""
     return _session is not None and space.as_pointer() in _session.spaces
 
 
-def messages(area: bpy.types.Area) -> list[str]:
+def messages(area: Area) -> list[str]:
     """Return the messages in the live views of an area: progress, and reasons why a field is not drawn."""
     return [] if _session is None else _session.messages(area)
 
@@ -444,7 +441,7 @@ def play_flow(plays: bool) -> None:
         _session.play_flow(plays)
 
 
-def start(space: bpy.types.SpaceView3D, device: str = "auto") -> None:
+def start(space: SpaceView3D, device: str = "auto") -> None:
     """Make a 3D view live: from now on, the fields of its objects are drawn over it.
 
     Parameters
@@ -465,7 +462,7 @@ def start(space: bpy.types.SpaceView3D, device: str = "auto") -> None:
     _session.add(space)
 
 
-def stop(space: bpy.types.SpaceView3D | None = None) -> None:
+def stop(space: SpaceView3D | None = None) -> None:
     """Stop drawing over a live 3D view or, if `space` is None, over all live views."""
     global _session
     if _session is None:

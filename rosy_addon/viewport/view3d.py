@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+from bpy.types import Context, Depsgraph, Object, RegionView3D, SpaceView3D
 
 from ..compositor.look import Look, is_hatched
 from ..core.color import from_hex, to_linear
@@ -17,13 +18,13 @@ from ..scene.cameras import camera_of_object
 _NO_CLIP_PLANE = 0.0, 0.0, 0.0, 1.0
 
 
-def to_world(obj: bpy.types.Object, points: np.ndarray) -> np.ndarray:
+def to_world(obj: Object, points: np.ndarray) -> np.ndarray:
     """Transform (..., 3) points from the object space of an object to world space."""
     matrix = np.array(obj.matrix_world)
     return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
-def open_view3d_spaces() -> list[bpy.types.SpaceView3D]:
+def open_view3d_spaces() -> list[SpaceView3D]:
     """Return the 3D views of all screens, shown or not."""
     return [
         space
@@ -66,14 +67,12 @@ def is_timeline_playing() -> bool:
     return any(window.screen.is_animation_playing for window in windows)
 
 
-def shows_surfaces(space: bpy.types.SpaceView3D) -> bool:
+def shows_surfaces(space: SpaceView3D) -> bool:
     """Return whether the shading mode of a view shows surfaces. Wireframe shading does not."""
     return space.shading.type in {"SOLID", "MATERIAL", "RENDERED"}
 
 
-def is_visible(
-    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D
-) -> bool:
+def is_visible(obj: Object, depsgraph: Depsgraph, space: SpaceView3D) -> bool:
     """Return whether a view shows an object as a surface."""
     try:
         # In some versions of Blender only the evaluated object knows which local views it is in.
@@ -84,7 +83,7 @@ def is_visible(
         return False
 
 
-def clip_planes(region_3d: bpy.types.RegionView3D) -> np.ndarray | None:
+def clip_planes(region_3d: RegionView3D) -> np.ndarray | None:
     """Return the planes of a view's clipping region, or None if it has none.
 
     Returns
@@ -100,7 +99,7 @@ def clip_planes(region_3d: bpy.types.RegionView3D) -> np.ndarray | None:
 
 
 def view_background(
-    context: bpy.types.Context, depsgraph: bpy.types.Depsgraph, camera: Camera, look: Look
+    context: Context, depsgraph: Depsgraph, camera: Camera, look: Look
 ) -> Background | None:
     """Return the background of a view in the color of the paper.
 

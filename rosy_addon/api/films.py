@@ -308,8 +308,7 @@ class Film:
         if self.between and not has_same:
             counts = f"{counted(mesh.face_count, 'face')} after {other.face_count:,}"
             raise RosyError(
-                f"{name} has other polygons than the one before it ({counts}): there can be no pictures "
-                "between them"
+                f"{name} has other polygons than the one before it ({counts}): there can be no pictures between them"
             )
         return has_same
 

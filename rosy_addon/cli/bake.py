@@ -39,10 +39,7 @@ def add_bake_command(subparsers: Any, has_cluster: bool) -> None:
     parser.add_argument("--device", choices=list(RENDER_DEVICES), help=text)
     parser.add_workers_option()
     parser.add_switch("--save", "save the Blender file")
-    text = (
-        "draw a picture of each frame from the camera that renders it; pictures that exist and "
-        "are up to date are kept"
-    )
+    text = "draw a picture of each frame from the camera that renders it; pictures that exist and are up to date are kept"
     parser.add_value("--frames", "A-B[:STEP]", text)
     workers = parser.add_mutually_exclusive_group()
     text, parse = "number of processes for the frames", int_between(1, 1024)

@@ -62,10 +62,7 @@ def _add_generator_options(parser: CommandParser) -> None:
         kinds = [kind for kind in GENERATORS if name in options_of(kind)]
         if kinds:
             parser.add_setting_option(setting, f"; for --generate {', '.join(kinds)}")
-    text = (
-        "strokes on the mesh that a guided field follows: rows x y z, with an empty line between two "
-        "strokes"
-    )
+    text = "strokes on the mesh that a guided field follows: rows x y z, with an empty line between two strokes"
     parser.add_value("--strokes", "FILE", text, Path)
     text = (
         "a field file that a guided field follows where its vectors are not zero; a prescribed field "

@@ -199,8 +199,7 @@ def _flat_faces(
         rows = np.asarray(rows)
         if rows.ndim != 2 or not np.issubdtype(rows.dtype, np.integer):
             raise RosyError(
-                f"faces must be whole numbers, one row for each face, not {rows.dtype} of shape "
-                f"{rows.shape}"
+                f"faces must be whole numbers, one row for each face, not {rows.dtype} of shape {rows.shape}"
             )
         return rows.ravel(), np.arange(len(rows) + 1) * rows.shape[1]
     if any(row.ndim != 1 or not np.issubdtype(row.dtype, np.integer) for row in rows):

@@ -81,7 +81,6 @@ def _faces(rows: TextRows, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
         corner = int(np.argmax(out_of_range))
         raise rows.error(
             corners.row_of_word(corner),
-            f"a face refers to vertex {corner_vertex[corner]}, but the vertices are numbered 0 "
-            f"to {vertex_count - 1}",
+            f"a face refers to vertex {corner_vertex[corner]}, but the vertices are numbered 0 to {vertex_count - 1}",
         )
     return corner_vertex, offsets_from_sizes(sizes)

@@ -248,8 +248,7 @@ def _check_columns(source: str, columns: int) -> None:
     """Raise a `RosyError` unless a row has 3 N numbers for a degree N from 1 to `MAX_DEGREE`."""
     if columns % 3 or not 3 <= columns <= 3 * MAX_DEGREE:
         raise RosyError(
-            f"{source}: has {counted(columns, 'number')} per row, expected 3 for each of up to {MAX_DEGREE} "
-            "directions"
+            f"{source}: has {counted(columns, 'number')} per row, expected 3 for each of up to {MAX_DEGREE} directions"
         )
 
 

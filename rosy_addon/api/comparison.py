@@ -190,9 +190,8 @@ def compare(
         if field.degree != reference.degree:
             continue
         if not is_same_surface(field.surface, reference.surface):
-            text = (
-                f"{title}: is on other vertices or faces than {next(iter(titled))}: no angles to it"
-            )
+            first = next(iter(titled))
+            text = f"{title}: is on other vertices or faces than {first}: no angles to it"
             warnings.warn(text, RosyWarning, stacklevel=2)
             continue
         comparison.differences[title] = reference.difference(field)

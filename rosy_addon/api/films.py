@@ -114,9 +114,8 @@ def film(
         raise RosyError(f"{path}: a film needs a rate above 0")
     look = picture_look(str(path), preset, settings)
     framing = (*view, *check_size(*size))
-    series = Film(
-        fields, look, framing, not orthographic, between, loop, "anchor" in settings, str(path)
-    )
+    timing, keeps_anchor = (between, loop), "anchor" in settings
+    series = Film(fields, look, framing, not orthographic, *timing, keeps_anchor, str(path))
     draw = partial(draw_picture, cache=Cache(), keep_gbuffers=False, workers=workers)
     result = turntable(draw, series.views(), series.picture_count, path, rate, encode, on_picture)
     warn(series.advice)

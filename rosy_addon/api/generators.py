@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Integral
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -207,9 +208,7 @@ def guided(
     return generated(surface, settings, degree)
 
 
-def _edge_ends(
-    surface: Surface, edges: ArrayLike | str | os.PathLike[str] | None
-) -> np.ndarray | None:
+def _edge_ends(surface: Surface, edges: Any) -> np.ndarray | None:
     """Return the argument `edges` of `features` as pairs of vertices, or None if it is None."""
     if isinstance(edges, (str, os.PathLike)):
         return read_edges(edges, surface)
@@ -375,12 +374,7 @@ def along_uv(surface: Surface, degree: int = 4) -> Field:
 
 #: Functions that generate fields, by the kind of the field.
 GENERATOR_FUNCTIONS: dict[str, Callable[..., Field]] = {
-    "form": form,
-    "smoothest": smoothest,
-    "curvature": curvature,
-    "features": features,
-    "guided": guided,
-    "prescribed": prescribed,
+    **{f.__name__: f for f in (form, smoothest, curvature, features, guided, prescribed)},
     "axis": along_axis,
     "uv": along_uv,
 }

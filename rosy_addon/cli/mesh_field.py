@@ -122,10 +122,8 @@ def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
         )
     if options.array is not None and has_source:
         raise RosyError(f"{options.mesh}: give either --array, or a field file or --generate")
-    up = getattr(options, "up", None)
-    surface = api.Surface(
-        options.mesh, up=up, step=options.step, join=getattr(options, "join", None)
-    )
+    up, join = getattr(options, "up", None), getattr(options, "join", None)
+    surface = api.Surface(options.mesh, up=up, step=options.step, join=join)
     if options.field is not None:
         field = read_field(options, options.field, surface, options.degree)
     elif (is_simulation and not has_source) or options.array is not None:

@@ -41,9 +41,7 @@ _INTERNAL_ARRAYS = (
 )
 
 
-def surface_arrays(
-    datasets: list[Any], name: str, has_parts: bool, repeats_blocks: bool
-) -> MeshArrays:
+def surface_arrays(datasets: list, name: str, has_parts: bool, repeats_blocks: bool) -> MeshArrays:
     """Return the surface of the datasets of a time step, with the arrays at its points and cells.
 
     Parameters

@@ -55,15 +55,12 @@ _READERS: dict[str, Callable[[Path], RawField]] = {
     ".rosy": read_rosy,
     ".rawfield": read_rawfield,
     ".obj": read_fieldgen,
-    ".txt": read_text,
-    ".vec": read_text,
-    ".csv": read_text,
+    **dict.fromkeys((".txt", ".vec", ".csv"), read_text),
     ".npy": read_npy,
     ".npz": read_npz,
     ".dmat": read_dmat,
     ".crossfield": read_crossfield,
-    ".ffield": read_vcg_frames,
-    ".vfield": read_vcg_frames,
+    **dict.fromkeys((".ffield", ".vfield"), read_vcg_frames),
     ".om": read_om,
 }
 READ_SUFFIXES = tuple(_READERS)
@@ -306,12 +303,11 @@ def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface
         lost = angle_errors(surface, field, stored)
         worst = np.degrees(np.nanmax(lost, initial=0.0))
         if worst > ANGLE_TOLERANCE_DEG:
-            warnings.warn(
+            text = (
                 f"{path}: an .obj file has one direction for each vertex, so directions of faces are off by up "
-                f"to {worst:.0f} degrees, and lengths are 1: .rosy and .rawfield files keep them",
-                RosyWarning,
-                stacklevel=3,
+                f"to {worst:.0f} degrees, and lengths are 1: .rosy and .rawfield files keep them"
             )
+            warnings.warn(text, RosyWarning, stacklevel=3)
 
 
 def field_file(path: str | os.PathLike[str], field: RosyField, surface: Surface) -> bytes:
@@ -360,9 +356,7 @@ def _join_names(names: tuple[str, ...]) -> str:
     return f"{', '.join(names[:-1])} or {names[-1]}"
 
 
-def transfer_field(
-    source: Surface, field: RosyField, target: Surface, field_name: str
-) -> RosyField:
+def transfer_field(source: Surface, field: RosyField, target: Surface, name: str) -> RosyField:
     """Transfer a field to another mesh: each face takes the value of the closest source face.
 
     Parameters
@@ -372,7 +366,7 @@ def transfer_field(
         The field on the faces of `source`.
     target : Surface
         The same shape in the same space, with different faces: for example triangulated or reordered.
-    field_name : str
+    name : str
         Name of the field in messages.
 
     Returns
@@ -398,7 +392,7 @@ def transfer_field(
     unmatched = undefined & normal.any(axis=1)
     if unmatched.sum() > MAX_UNMATCHED_FRACTION * len(undefined):
         raise RosyError(
-            f"{field_name}: {unmatched.sum()} of {len(undefined)} faces of {target.name} do not lie on "
+            f"{name}: {unmatched.sum()} of {len(undefined)} faces of {target.name} do not lie on "
             f"{source.name} (distances up to {distance.max():.3g}): the two meshes must have the same "
             "shape and position"
         )

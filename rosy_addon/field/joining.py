@@ -63,11 +63,11 @@ def coinciding_borders(polygons: Polygons, vertex_data: Mapping[str, Any] | None
 
 
 def _have_same_data(
-    vertex_data: Mapping[str, Any], count: int, first: np.ndarray, second: np.ndarray
+    data: Mapping[str, Any], count: int, first: np.ndarray, second: np.ndarray
 ) -> np.ndarray:
     """Return for (n,) pairs of vertices whether their numbers are the same. Whole numbers are only labels."""
     is_same = np.ones(len(first), dtype=bool)
-    for name, values in vertex_data.items():
+    for name, values in data.items():
         if name.lower() in SHADING_NAMES:
             continue
         rows = np.asarray(values)

@@ -66,13 +66,11 @@ def _faces(rows: TextRows, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
     sizes = first_words.ints("number of corners of a face")
     corner_words = []
     for row, (size, words) in enumerate(zip(sizes.tolist(), rows.words, strict=True)):
-        if not 3 <= size < len(words):
-            message = (
-                f"has {size} corners, expected 3 or more"
-                if size < 3
-                else f"declares {size} corners, but lists {len(words) - 1}"
-            )
-            raise rows.error(row, f"face {row} {message}")
+        if size < 3:
+            raise rows.error(row, f"face {row} has {size} corners, expected 3 or more")
+        if size >= len(words):
+            found = len(words) - 1
+            raise rows.error(row, f"face {row} declares {size} corners, but lists {found}")
         corner_words.append(words[1 : size + 1])
     corners = rows.with_words(corner_words)
     corner_vertex = corners.ints("vertex of a face")

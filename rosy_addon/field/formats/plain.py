@@ -62,9 +62,8 @@ def read_text(path: Path) -> RawField:
     _check_columns(str(path), columns - (columns % 3 == 1))
     for row, words in enumerate(rows.words):
         if len(words) != columns:
-            raise rows.error(
-                row, f"the row has {counted(len(words), 'number')}, the rows above have {columns}"
-            )
+            found = counted(len(words), "number")
+            raise rows.error(row, f"the row has {found}, the rows above have {columns}")
     values = rows.floats("part of a vector").reshape(-1, columns)
     if columns == 15 and not (values[:, 3:9] + values[:, 9:]).any():
         values = values[:, 3:]
@@ -173,9 +172,7 @@ def read_npz(path: Path) -> RawField:
     name = next((name for name in _FIELD_NAMES if name in rows), None)
     if name is None:
         if len(rows) != 1:
-            found = ", ".join(
-                f"'{name}' {values.shape}" for name, values in (rows or arrays).items()
-            )
+            found = ", ".join(f"'{name}' {each.shape}" for name, each in (rows or arrays).items())
             fault = "several arrays can be the field" if rows else "no array can be the field"
             raise RosyError(
                 f"{path}: {fault}; call it '{_FIELD_NAMES[0]}': {found or 'it is empty'}"
@@ -197,12 +194,7 @@ def _has_vectors(shape: tuple[int, ...]) -> bool:
 
 def _polygons(vertices: np.ndarray, faces: np.ndarray) -> Polygons | None:
     """Return the mesh of two arrays; None if they are not (V, 3) points and (F, k) indices of vertices."""
-    if (
-        vertices.ndim != 2
-        or vertices.shape[1] != 3
-        or faces.ndim != 2
-        or faces.dtype.kind not in "iu"
-    ):
+    if vertices.shape[1:] != (3,) or faces.ndim != 2 or faces.dtype.kind not in "iu":
         return None
     if faces.shape[1] < 3 or not len(faces) or faces.min() < 0 or faces.max() >= len(vertices):
         return None

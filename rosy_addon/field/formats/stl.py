@@ -81,9 +81,7 @@ def _text_points(path: Path, data: bytes) -> np.ndarray:
     corners = rows.select(is_corner, slice(1, None))
     loops = sum(words[0].lower() == b"endloop" for words in rows.words)
     if len(corners) != 3 * loops:
-        raise rows.error(
-            np.flatnonzero(is_corner)[-1] if len(corners) else len(rows),
-            f"the file has {counted(len(corners), 'corner')} in "
-            f"{counted(loops, 'complete triangle')}; is it truncated?",
-        )
+        row = np.flatnonzero(is_corner)[-1] if len(corners) else len(rows)
+        found, complete = counted(len(corners), "corner"), counted(loops, "complete triangle")
+        raise rows.error(row, f"the file has {found} in {complete}; is it truncated?")
     return corners.points("corner")

@@ -188,10 +188,9 @@ class Film:
     def __post_init__(self) -> None:
         if len(self.fields) < 2:
             raise RosyError(f"{self.name}: a film needs 2 fields or more")
-        if self.between is not None and not 0 <= self.between <= MAX_BETWEEN:
-            raise RosyError(
-                f"{self.name}: between must be from 0 to {MAX_BETWEEN}, not {self.between}"
-            )
+        name, count = self.name, self.between
+        if count is not None and not 0 <= count <= MAX_BETWEEN:
+            raise RosyError(f"{name}: between must be from 0 to {MAX_BETWEEN}, not {count}")
 
     @property
     def picture_count(self) -> int:
@@ -298,11 +297,9 @@ class Film:
             If the degrees differ, or the polygons differ although fields are to be interpolated.
         """
         name = f"{field.surface.name}: field {number + 1} of {len(self.fields)}"
-        if field.degree != previous.degree:
-            raise RosyError(
-                f"{name} has degree {field.degree}, but the one before it {previous.degree}"
-            )
-        mesh, other = field.surface, previous.surface
+        degree, mesh, other = field.degree, field.surface, previous.surface
+        if degree != previous.degree:
+            raise RosyError(f"{name} has degree {degree}, but the one before it {previous.degree}")
         has_same = mesh is other or have_same_polygons(mesh, other)
         if self.between and not has_same:
             counts = f"{counted(mesh.face_count, 'face')} after {other.face_count:,}"

@@ -215,9 +215,7 @@ def _edge_ends(surface: Surface, edges: Any) -> np.ndarray | None:
     return None if edges is None else np.asarray(edges)
 
 
-def _guide_vectors(
-    surface: Surface, vectors: ArrayLike | Field | None, degree: int
-) -> np.ndarray | None:
+def _guide_vectors(surface: Surface, vectors: Any, degree: int) -> np.ndarray | None:
     """Return the argument `vectors` of `guided` as (F, 3) vectors, or None if it is None.
 
     Raises

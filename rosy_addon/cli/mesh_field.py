@@ -108,22 +108,18 @@ def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
     """
     if options.field is not None and options.generate is not None:
         raise RosyError(f"{options.field}: give either a field file or --generate, not both")
-    is_simulation = options.mesh.suffix.lower() in SIMULATION_READERS
+    mesh, suffix = options.mesh, options.mesh.suffix.lower()
+    is_simulation = suffix in SIMULATION_READERS
     names = ("field", "generate", "strokes", "guides", "singularities", "edges")
     has_source = options.uv or any(getattr(options, name) is not None for name in names)
-    is_ply = options.mesh.suffix.lower() == ".ply"
-    if options.array is not None and not (is_simulation or is_ply):
-        raise RosyError(
-            f"{options.mesh}: --array applies only to .ply files and files of simulations"
-        )
+    if options.array is not None and not (is_simulation or suffix == ".ply"):
+        raise RosyError(f"{mesh}: --array applies only to .ply files and files of simulations")
     if options.step is not None and not is_simulation:
-        raise RosyError(
-            f"{options.mesh}: --step applies only to files of simulations, such as .vtu"
-        )
+        raise RosyError(f"{mesh}: --step applies only to files of simulations, such as .vtu")
     if options.array is not None and has_source:
-        raise RosyError(f"{options.mesh}: give either --array, or a field file or --generate")
+        raise RosyError(f"{mesh}: give either --array, or a field file or --generate")
     up, join = getattr(options, "up", None), getattr(options, "join", None)
-    surface = api.Surface(options.mesh, up=up, step=options.step, join=join)
+    surface = api.Surface(mesh, up=up, step=options.step, join=join)
     if options.field is not None:
         field = read_field(options, options.field, surface, options.degree)
     elif (is_simulation and not has_source) or options.array is not None:
@@ -156,12 +152,10 @@ def _generate_field(options: Options, surface: api.Surface) -> api.Field:
         if options.singularities is None:
             raise RosyError(f"{options.mesh}: give the singularities: --singularities FILE.sings")
         arguments["singularities"] = options.singularities
-    if options.edges is not None:
+    if (edges := options.edges) is not None:
         if kind not in ("features", "guided"):
-            raise RosyError(
-                f"{options.edges}: --edges applies only to --generate features and guided"
-            )
-        arguments["edges"] = options.edges
+            raise RosyError(f"{edges}: --edges applies only to --generate features and guided")
+        arguments["edges"] = edges
     if kind == "guided":
         arguments |= {"uv": options.uv, "vectors_have_firmness": options.firmness}
         if options.strokes is not None:

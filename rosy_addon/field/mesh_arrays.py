@@ -157,15 +157,14 @@ def _with_joined_borders(arrays: MeshArrays) -> tuple[MeshArrays, int]:
     return replace(arrays, vertices=arrays.vertices[kept], vertex_data=data), count
 
 
-def _with_faces(
-    arrays: MeshArrays, corner_vertex: Any, face_start: Any, corner: Any, face: Any
-) -> MeshArrays:
-    """Return arrays with other faces, which have the data of these corners and faces of the old ones."""
+def _with_faces(arrays: MeshArrays, vertex: Any, start: Any, corner: Any, face: Any) -> MeshArrays:
+    """Return arrays with other faces, which have the data of these corners and faces of the old ones.
+
+    `vertex` and `start` are the new `corner_vertex` and `face_start`.
+    """
     uv = None if arrays.uv is None else arrays.uv[corner]
     data = _selected_rows(arrays.face_data, face, len(arrays.face_start) - 1)
-    return replace(
-        arrays, corner_vertex=corner_vertex, face_start=face_start, uv=uv, face_data=data
-    )
+    return replace(arrays, corner_vertex=vertex, face_start=start, uv=uv, face_data=data)
 
 
 def _selected_rows(data: Mapping[str, Any] | None, index: Any, count: int) -> dict[str, Any] | None:

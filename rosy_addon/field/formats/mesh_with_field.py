@@ -34,9 +34,7 @@ _VTK_FILE = """<?xml version="1.0"?>
 """
 
 
-def field_arrays(
-    surface: Surface, field: RosyField
-) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+def field_arrays(surface: Surface, field: RosyField) -> tuple[dict[str, np.ndarray], ...]:
     """Return the arrays that describe a field at the faces, and those at the vertices, by name.
 
     Returns

@@ -77,8 +77,7 @@ def _faces(rows: TextRows, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
     out_of_range = (corner_vertex < 0) | (corner_vertex >= vertex_count)
     if out_of_range.any():
         corner = int(np.argmax(out_of_range))
-        raise rows.error(
-            corners.row_of_word(corner),
-            f"a face refers to vertex {corner_vertex[corner]}, but the vertices are numbered 0 to {vertex_count - 1}",
-        )
+        row, vertex, last = corners.row_of_word(corner), corner_vertex[corner], vertex_count - 1
+        text = f"a face refers to vertex {vertex}, but the vertices are numbered 0 to {last}"
+        raise rows.error(row, text)
     return corner_vertex, offsets_from_sizes(sizes)

@@ -78,10 +78,9 @@ def read_ply(path: Path) -> Polygons:
     if out_of_range.any():
         corner = int(np.argmax(out_of_range))
         face_index = int(np.searchsorted(face_start, corner, side="right")) - 1
-        raise RosyError(
-            f"{path}: face {face_index} refers to vertex {corner_vertex[corner]:.10g}, "
-            f"but the vertices are numbered 0 to {len(vertices) - 1}"
-        )
+        place, last = f"{path}: face {face_index}", len(vertices) - 1
+        text = f"refers to vertex {corner_vertex[corner]:.10g}, but the vertices are numbered 0 to {last}"
+        raise RosyError(f"{place} {text}")
     return Polygons(as_float64(vertices), corner_vertex.astype(np.int64), face_start)
 
 
@@ -275,12 +274,11 @@ def _binary_elements(
         dtype = np.dtype(layout)
         end, count = offset + dtype.itemsize * element.count, element.count
         lists = [prop.name for prop in element.properties if prop.count_type is not None]
-        if end > len(data) and not lists:
+        is_cut = end > len(data)
+        if is_cut and not lists:
             raise _truncated(path, element, (len(data) - offset) // dtype.itemsize)
-        table = np.frombuffer(data, dtype, count, offset) if end <= len(data) else None
-        if table is None or not all(
-            (table[f"{name} count"] == table[name].shape[1]).all() for name in lists
-        ):
+        table = np.empty(0, dtype) if is_cut else np.frombuffer(data, dtype, count, offset)
+        if is_cut or any((table[f"{k} count"] != table[k].shape[1]).any() for k in lists):
             values, offset = _read_rows(path, data, offset, byte_order, element, count)
         else:
             values, offset = {prop.name: table[prop.name] for prop in element.properties}, end

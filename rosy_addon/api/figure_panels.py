@@ -129,8 +129,7 @@ class Studio:
         """
         reference, first = next(iter(self.instances.items()))
         other, difference = self.instances[title], self.comparison.differences[title]
-        degrees = np.degrees(difference.angle)
-        values = degrees.astype(np.float32)[first.surface.corner_face]
+        values = np.degrees(difference.angle).astype(np.float32)[first.surface.corner_face]
         at_zero, at_top = DIFFERENCE_ENDS
         slope = top / (at_top - at_zero)
         look = {"hue": "values", "magnitude_length": False, "color_map": DIFFERENCE_COLORS}

@@ -277,8 +277,7 @@ class Film:
                 turn = max(turn, _mean_turn(previous, field))
             largest = max(largest, float(field.magnitude.max()))
             if number == 0 or mesh is not previous.surface:
-                instance = mesh_instance(mesh, field)
-                points = np.concatenate([points, instance.face_points()])
+                points = np.concatenate([points, mesh_instance(mesh, field).face_points()])
                 points = framing_points(points, *self.framing, perspective=self.perspective)
             previous = field
         if self.loop and self._check(0, first, previous):

@@ -288,12 +288,11 @@ def prescribed(
         degree = 4 if degree is None else degree
         index = _whole_indices(surface, singularities, degree)
     else:
-        file_degree, vertex, index = read_sings(Path(singularities))
-        if degree not in (None, file_degree):
-            raise RosyError(
-                f"{os.fspath(singularities)}: is of degree {file_degree}, not {degree}: leave the degree out"
-            )
-        degree = file_degree
+        path = os.fspath(singularities)
+        own, vertex, index = read_sings(Path(path))
+        if degree not in (None, own):
+            raise RosyError(f"{path}: is of degree {own}, not {degree}: leave the degree out")
+        degree = own
     settings = GeneratorSettings(
         "prescribed",
         singularities=(vertex, index),

@@ -25,8 +25,7 @@ JOIN_TEXT = (
 def add_mesh_options(parser: CommandParser) -> None:
     """Add the arguments MESH and FIELD, and the options that generate a field."""
     *suffixes, last = READERS
-    text = f"{', '.join(suffixes)} or {last}"
-    parser.add_argument("mesh", type=Path, metavar="MESH", help=text)
+    parser.add_argument("mesh", type=Path, metavar="MESH", help=f"{', '.join(suffixes)} or {last}")
     parser.add_toggle("--join", JOIN_TEXT)
     add_field_options(parser)
 
@@ -161,6 +160,5 @@ def _generate_field(options: Options, surface: api.Surface) -> api.Field:
         if options.strokes is not None:
             arguments["strokes"] = read_guide_strokes(options.strokes)
     if kind in ("guided", "prescribed") and options.guides is not None:
-        guides = read_field(options, options.guides, surface, arguments["degree"])
-        arguments["vectors"] = guides
+        arguments["vectors"] = read_field(options, options.guides, surface, arguments["degree"])
     return GENERATOR_FUNCTIONS[kind](surface, **arguments)

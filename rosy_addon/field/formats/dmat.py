@@ -32,8 +32,7 @@ def read_dmat(path: Path) -> RawField:
         values = np.frombuffer(rest, "<f8", min(columns * count, len(rest) // 8))
     else:
         columns, count = _size(path, header)
-        rows = read_rows(path, comment=None, data=b"\n" + rest)
-        values = rows.floats("entry of the matrix")
+        values = read_rows(path, comment=None, data=b"\n" + rest).floats("entry of the matrix")
     if len(values) != columns * count:
         raise RosyError(f"{path}: declares {columns * count} numbers, but contains {len(values)}")
     if not count:

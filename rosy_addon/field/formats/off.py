@@ -62,8 +62,7 @@ def _after_keyword(rows: TextRows) -> TextRows:
 
 def _faces(rows: TextRows, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return `corner_vertex` and `face_start` of `Polygons`, given one row of text for each face."""
-    first_words = rows.with_words([words[:1] for words in rows.words])
-    sizes = first_words.ints("number of corners of a face")
+    sizes = rows.with_words([words[:1] for words in rows.words]).ints("number of corners of a face")
     corner_words = []
     for row, (size, words) in enumerate(zip(sizes.tolist(), rows.words, strict=True)):
         if size < 3:

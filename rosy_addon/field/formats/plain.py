@@ -123,10 +123,8 @@ def _load_npy(data: bytes, source: str) -> Any:
         _check_npy_size(data)
         return np.load(io.BytesIO(data), allow_pickle=False)
     except Exception as reason:  # numpy evaluates the header as Python, which can raise any error
-        message_lines = str(reason).splitlines() or [type(reason).__name__]
-        raise RosyError(
-            f"{source}: is not a valid .npy file of numbers: {message_lines[0]}"
-        ) from None
+        line = (str(reason).splitlines() or [type(reason).__name__])[0]
+        raise RosyError(f"{source}: is not a valid .npy file of numbers: {line}") from None
 
 
 def _array_field(values: Any, source: str) -> RawField:
@@ -174,9 +172,8 @@ def read_npz(path: Path) -> RawField:
         if len(rows) != 1:
             found = ", ".join(f"'{name}' {each.shape}" for name, each in (rows or arrays).items())
             fault = "several arrays can be the field" if rows else "no array can be the field"
-            raise RosyError(
-                f"{path}: {fault}; call it '{_FIELD_NAMES[0]}': {found or 'it is empty'}"
-            )
+            advice = f"call it '{_FIELD_NAMES[0]}'"
+            raise RosyError(f"{path}: {fault}; {advice}: {found or 'it is empty'}")
         (name,) = rows
     raw = _array_field(rows[name], f"{path}, {name}")
     degree = arrays.get("degree", np.empty(0))

@@ -87,6 +87,5 @@ def _reversed_faces(surface: Surface) -> np.ndarray:
     side, other_side = connected_components(2 * count, pairs.reshape(-1, 2)).reshape(2, count)
     size = np.bincount(side, minlength=other_side.max() + 1)
     # Of two halves, the one with the first face keeps its orientation.
-    is_reversed = size[side] < size[other_side]
-    is_reversed |= (size[side] == size[other_side]) & (side > other_side)
-    return is_reversed
+    is_second = (size[side] == size[other_side]) & (side > other_side)
+    return is_second | (size[side] < size[other_side])

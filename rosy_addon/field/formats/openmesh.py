@@ -63,9 +63,8 @@ def _read(path: Path) -> tuple[Polygons, dict[bytes, np.ndarray]]:
     try:
         return _parse(data)
     except (ValueError, IndexError, KeyError, struct.error):
-        raise RosyError(
-            f"{path}: is damaged, or not a binary .om file of OpenMesh 2 or later"
-        ) from None
+        fault = "is damaged, or not a binary .om file of OpenMesh 2 or later"
+        raise RosyError(f"{path}: {fault}") from None
 
 
 def _parse(data: bytes) -> tuple[Polygons, dict[bytes, np.ndarray]]:

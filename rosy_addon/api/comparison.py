@@ -136,12 +136,10 @@ class Comparison:
     def to_latex(self) -> str:
         """Return the table as a ``tabular`` of LaTeX, which needs the package ``booktabs``."""
         cells = self.cells()
-        lines = [" & ".join(map(_latex_text, row)) + r" \\" for row in cells]
-        columns = "l" + "r" * (len(cells[0]) - 1)
-        return "\n".join(
-            [rf"\begin{{tabular}}{{{columns}}}", r"\toprule", lines[0], r"\midrule", *lines[1:]]
-            + [r"\bottomrule", r"\end{tabular}"]
-        )
+        head, *body = [" & ".join(map(_latex_text, row)) + r" \\" for row in cells]
+        begin = rf"\begin{{tabular}}{{l{'r' * (len(cells[0]) - 1)}}}"
+        lines = [begin, r"\toprule", head, r"\midrule", *body, r"\bottomrule", r"\end{tabular}"]
+        return "\n".join(lines)
 
     def _repr_html_(self) -> str:
         head, *body = [[escape(text) for text in row] for row in self.cells()]
@@ -190,9 +188,8 @@ def compare(
         if field.degree != reference.degree:
             continue
         if not is_same_surface(field.surface, reference.surface):
-            text = (
-                f"{title}: is on other vertices or faces than {next(iter(titled))}: no angles to it"
-            )
+            first = next(iter(titled))
+            text = f"{title}: is on other vertices or faces than {first}: no angles to it"
             warnings.warn(text, RosyWarning, stacklevel=2)
             continue
         comparison.differences[title] = reference.difference(field)

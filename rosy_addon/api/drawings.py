@@ -158,6 +158,5 @@ def strokes(
     instance = upright_instance(surface, field)
     points, frame = instance.face_points(), (*view, *check_size(*size))
     camera = orbit_camera(points, *frame, perspective=not orthographic)
-    lights = lights_of(stroke_style, ())
-    drawing = draw_instances([instance], camera, stroke_style, lights=lights)
+    drawing = draw_instances([instance], camera, stroke_style, lights=lights_of(stroke_style, ()))
     return Drawing(drawing, camera, pen, surface.up)

@@ -72,11 +72,8 @@ def from_vectors(
     >>> wind.degree
     1
     """
-    array, policy = (
-        np.asarray(vectors, dtype=np.float64),
-        VectorPolicy(nonfinite, off_surface).checked(),
-    )
-    source = f"{surface.name}: vectors"
+    array, source = np.asarray(vectors, dtype=np.float64), f"{surface.name}: vectors"
+    policy = VectorPolicy(nonfinite, off_surface).checked()
     return Field.of(surface, validated_field(surface, array, degree, source, policy))
 
 
@@ -294,9 +291,8 @@ def from_array(
     >>> stress = rf.from_array(rf.Surface(pyvista.read("beam.vtu")), "stress")  # doctest: +SKIP
     """
     arrays = SurfaceArrays(surface.name, surface, surface.vertex_data, surface.face_data)
-    return Field.of(
-        surface, array_field(arrays, name, degree, VectorPolicy(nonfinite, off_surface).checked())
-    )
+    policy = VectorPolicy(nonfinite, off_surface).checked()
+    return Field.of(surface, array_field(arrays, name, degree, policy))
 
 
 def read_field(

@@ -129,35 +129,24 @@ class Studio:
         """
         reference, first = next(iter(self.instances.items()))
         other, difference = self.instances[title], self.comparison.differences[title]
-        degrees = np.degrees(difference.angle)
-        values = degrees.astype(np.float32)[first.surface.corner_face]
+        values = np.degrees(difference.angle).astype(np.float32)[first.surface.corner_face]
         at_zero, at_top = DIFFERENCE_ENDS
         slope = top / (at_top - at_zero)
-        pictures = [
-            self._rgba(
-                replace(instance, color_values=values),
-                hue="values",
-                magnitude_length=False,
-                color_range=(-slope * at_zero, slope * (1.0 - at_zero)),
-                color_map=DIFFERENCE_COLORS,
-            )
-            for instance in {"first": [first], "other": [other], "both": [first, other]}[lines]
-        ]
+        look = {"hue": "values", "magnitude_length": False, "color_map": DIFFERENCE_COLORS}
+        look["color_range"] = -slope * at_zero, slope * (1.0 - at_zero)
+        drawn = {"first": [first], "other": [other], "both": [first, other]}[lines]
+        pictures = [self._rgba(replace(each, color_values=values), **look) for each in drawn]
         # The pictures cover the same pixels, so their mean has the same coverage.
         rgba = np.mean(pictures, axis=0)
         mean, p95, largest = (
             f"{format_degrees(np.degrees(angle))}\u00b0"
             for angle in (difference.mean, difference.p95, difference.max)
         )
-        return Panel(
-            f"{title} vs. {reference}",
-            to_srgb_uint8(rgba[::-1]),
-            self._marks[title],
-            self._marks[reference],
-            self._links(title) if shows_singularities(self.look) else None,
-            self._worst_place(difference.worst_face),
-            f"mean {mean}, 95 % {p95}, largest {largest}",
-        )
+        marks = self._marks[title], self._marks[reference]
+        links = self._links(title) if shows_singularities(self.look) else None
+        place = self._worst_place(difference.worst_face)
+        heading, note = f"{title} vs. {reference}", f"mean {mean}, 95 % {p95}, largest {largest}"
+        return Panel(heading, to_srgb_uint8(rgba[::-1]), *marks, links, place, note)
 
     def _links(self, title: str) -> NDArray[np.float64]:
         """Return the (n, 2, 2) end points, in pixels, of lines that connect matching singularities.
@@ -183,9 +172,7 @@ class Studio:
         place, is_visible = self._projected(corners)
         return place[is_visible].mean(axis=0) if is_visible.any() else None
 
-    def _projected(
-        self, vertices: NDArray[np.integer[Any]]
-    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    def _projected(self, vertices: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Return the (n, 2) positions of vertices of the first surface in pixels, and which are visible."""
         first = next(iter(self.instances.values()))
         projected = project_vertices([first], self.camera, [vertices])

@@ -269,9 +269,9 @@ def _check_parts(comparison: Comparison, parts: Sequence[str], lines: str) -> No
     if lines not in LINES:
         raise RosyError(f"lines is {lines!r}: choose {', '.join(LINES)}")
     if "differences" in parts and not comparison.differences:
-        first = next(iter(comparison.fields))
+        name = next(iter(comparison.fields))
         raise RosyError(
-            f"'{first}': there is no other field of its degree on its surface to compare"
+            f"'{name}': there is no other field of its degree on its surface to compare"
         )
 
 

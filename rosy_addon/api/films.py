@@ -114,9 +114,8 @@ def film(
         raise RosyError(f"{path}: a film needs a rate above 0")
     look = picture_look(str(path), preset, settings)
     framing = (*view, *check_size(*size))
-    series = Film(
-        fields, look, framing, not orthographic, between, loop, "anchor" in settings, str(path)
-    )
+    timing, keeps_anchor = (between, loop), "anchor" in settings
+    series = Film(fields, look, framing, not orthographic, *timing, keeps_anchor, str(path))
     draw = partial(draw_picture, cache=Cache(), keep_gbuffers=False, workers=workers)
     result = turntable(draw, series.views(), series.picture_count, path, rate, encode, on_picture)
     warn(series.advice)
@@ -189,10 +188,9 @@ class Film:
     def __post_init__(self) -> None:
         if len(self.fields) < 2:
             raise RosyError(f"{self.name}: a film needs 2 fields or more")
-        if self.between is not None and not 0 <= self.between <= MAX_BETWEEN:
-            raise RosyError(
-                f"{self.name}: between must be from 0 to {MAX_BETWEEN}, not {self.between}"
-            )
+        name, count = self.name, self.between
+        if count is not None and not 0 <= count <= MAX_BETWEEN:
+            raise RosyError(f"{name}: between must be from 0 to {MAX_BETWEEN}, not {count}")
 
     @property
     def picture_count(self) -> int:
@@ -279,8 +277,7 @@ class Film:
                 turn = max(turn, _mean_turn(previous, field))
             largest = max(largest, float(field.magnitude.max()))
             if number == 0 or mesh is not previous.surface:
-                instance = mesh_instance(mesh, field)
-                points = np.concatenate([points, instance.face_points()])
+                points = np.concatenate([points, mesh_instance(mesh, field).face_points()])
                 points = framing_points(points, *self.framing, perspective=self.perspective)
             previous = field
         if self.loop and self._check(0, first, previous):
@@ -299,17 +296,14 @@ class Film:
             If the degrees differ, or the polygons differ although fields are to be interpolated.
         """
         name = f"{field.surface.name}: field {number + 1} of {len(self.fields)}"
-        if field.degree != previous.degree:
-            raise RosyError(
-                f"{name} has degree {field.degree}, but the one before it {previous.degree}"
-            )
-        mesh, other = field.surface, previous.surface
+        degree, mesh, other = field.degree, field.surface, previous.surface
+        if degree != previous.degree:
+            raise RosyError(f"{name} has degree {degree}, but the one before it {previous.degree}")
         has_same = mesh is other or have_same_polygons(mesh, other)
         if self.between and not has_same:
             counts = f"{counted(mesh.face_count, 'face')} after {other.face_count:,}"
             raise RosyError(
-                f"{name} has other polygons than the one before it ({counts}): there can be no pictures "
-                "between them"
+                f"{name} has other polygons than the one before it ({counts}): there can be no pictures between them"
             )
         return has_same
 

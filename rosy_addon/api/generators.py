@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Integral
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -207,18 +208,14 @@ def guided(
     return generated(surface, settings, degree)
 
 
-def _edge_ends(
-    surface: Surface, edges: ArrayLike | str | os.PathLike[str] | None
-) -> np.ndarray | None:
+def _edge_ends(surface: Surface, edges: Any) -> np.ndarray | None:
     """Return the argument `edges` of `features` as pairs of vertices, or None if it is None."""
     if isinstance(edges, (str, os.PathLike)):
         return read_edges(edges, surface)
     return None if edges is None else np.asarray(edges)
 
 
-def _guide_vectors(
-    surface: Surface, vectors: ArrayLike | Field | None, degree: int
-) -> np.ndarray | None:
+def _guide_vectors(surface: Surface, vectors: Any, degree: int) -> np.ndarray | None:
     """Return the argument `vectors` of `guided` as (F, 3) vectors, or None if it is None.
 
     Raises
@@ -291,12 +288,11 @@ def prescribed(
         degree = 4 if degree is None else degree
         index = _whole_indices(surface, singularities, degree)
     else:
-        file_degree, vertex, index = read_sings(Path(singularities))
-        if degree not in (None, file_degree):
-            raise RosyError(
-                f"{os.fspath(singularities)}: is of degree {file_degree}, not {degree}: leave the degree out"
-            )
-        degree = file_degree
+        path = os.fspath(singularities)
+        own, vertex, index = read_sings(Path(path))
+        if degree not in (None, own):
+            raise RosyError(f"{path}: is of degree {own}, not {degree}: leave the degree out")
+        degree = own
     settings = GeneratorSettings(
         "prescribed",
         singularities=(vertex, index),
@@ -375,12 +371,7 @@ def along_uv(surface: Surface, degree: int = 4) -> Field:
 
 #: Functions that generate fields, by the kind of the field.
 GENERATOR_FUNCTIONS: dict[str, Callable[..., Field]] = {
-    "form": form,
-    "smoothest": smoothest,
-    "curvature": curvature,
-    "features": features,
-    "guided": guided,
-    "prescribed": prescribed,
+    **{f.__name__: f for f in (form, smoothest, curvature, features, guided, prescribed)},
     "axis": along_axis,
     "uv": along_uv,
 }

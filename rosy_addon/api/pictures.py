@@ -341,35 +341,33 @@ def upright_instance(
     return mesh_instance(surface, field, tone, numbers)
 
 
-def corner_numbers(
-    surface: Surface, color_values: str | ArrayLike | None
-) -> NDArray[np.float32] | None:
+def corner_numbers(surface: Surface, values: str | ArrayLike | None) -> NDArray[np.float32] | None:
     """Return the values for the color map at the corners of a surface; NaN where they are not finite.
 
     Parameters
     ----------
     surface : Surface
-    color_values : str or (F,), (V,) or (C,) array_like or None
-        See `render`.
+    values : str or (F,), (V,) or (C,) array_like or None
+        The argument `color_values` of `render`.
 
     Returns
     -------
     (C,) float32 ndarray or None
-        None if `color_values` is None.
+        None if `values` is None.
 
     Raises
     ------
     RosyError
         If there is not one value for each face, vertex or corner, or no array has the given name.
     """
-    if color_values is None:
+    if values is None:
         return None
-    if isinstance(color_values, str):
+    if isinstance(values, str):
         # An array of faces takes precedence over an array of vertices with the same name.
         data = {**surface.face_data, **surface.vertex_data, **surface.face_data}
         kinds = "attribute", "attributes of faces or vertices"
-        color_values = _named_array(surface, color_values, data, *kinds)
-    numbers = _at_corners(surface, color_values, "color_values", may_be_of_faces=True)
+        values = _named_array(surface, values, data, *kinds)
+    numbers = _at_corners(surface, values, "color_values", may_be_of_faces=True)
     numbers[~np.isfinite(numbers)] = np.nan
     return numbers
 

@@ -184,8 +184,7 @@ def texture(
     instance = upright_instance(surface, field, color_values)
     lights = None if light_direction is None else [_lamp(light_direction, instance)]
     layout: dict[str, Any] = {"margin": margin, "is_udim": udim, "content": content}
-    drift = Drift(flow_phase)
-    drawn = draw_texture(instance, uv, look, size, drift=drift, lights=lights, **layout)
+    drawn = draw_texture(instance, uv, look, size, drift=Drift(flow_phase), lights=lights, **layout)
     warn(drawn.overlap_note(surface.name))
     tiles = {}
     for number, rgba in drawn.tiles().items():

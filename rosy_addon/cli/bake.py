@@ -39,10 +39,7 @@ def add_bake_command(subparsers: Any, has_cluster: bool) -> None:
     parser.add_argument("--device", choices=list(RENDER_DEVICES), help=text)
     parser.add_workers_option()
     parser.add_switch("--save", "save the Blender file")
-    text = (
-        "draw a picture of each frame from the camera that renders it; pictures that exist and "
-        "are up to date are kept"
-    )
+    text = "draw a picture of each frame from the camera that renders it; pictures that exist and are up to date are kept"
     parser.add_value("--frames", "A-B[:STEP]", text)
     workers = parser.add_mutually_exclusive_group()
     text, parse = "number of processes for the frames", int_between(1, 1024)
@@ -109,15 +106,11 @@ def _bake(options: Options, scene: Any, settings: Any) -> list[Any]:
     from ..jobs.bake import bake
     from ..scene.look_properties import read_look
 
-    has_look_options = bool(options.preset or options.set)
-    arguments = {
-        "objects": requested_objects(options),
-        "cameras": requested_cameras(scene, options),
-        "look": options.requested_look(read_look(scene.rosy)) if has_look_options else None,
-        "size": options.size,
-        "settings": settings,
-        "workers": options.workers,
-    }
+    objects, cameras = requested_objects(options), requested_cameras(scene, options)
+    has_look = options.preset or options.set
+    look = options.requested_look(read_look(scene.rosy)) if has_look else None
+    arguments = {"objects": objects, "cameras": cameras, "look": look, "size": options.size}
+    arguments |= {"settings": settings, "workers": options.workers}
     if options.frames is None:
         return bake(scene, **arguments)
     frames = parse_frames(options.frames)

@@ -41,10 +41,7 @@ def add_field_command(subparsers: Any) -> None:
     share = float_between(0.0, 10.0)
     text = "diffuse the field over this fraction of the size of the mesh"
     parser.add_value("--smooth", "SHARE", text, share, default=0.0)
-    text = (
-        "remove pairs of singularities with opposite indices that are nearer than this fraction of "
-        "the size of the mesh"
-    )
+    text = "remove pairs of singularities with opposite indices that are nearer than this fraction of the size of the mesh"
     parser.add_value("--cancel-pairs", "SHARE", text, share, default=0.0)
     text = "replace the lengths of the vectors; the curvature is in 1 / unit of the mesh"
     parser.add_argument("--magnitude", choices=list(MAGNITUDES), help=text)
@@ -116,8 +113,7 @@ def _compare(options: Options, field: api.Field) -> dict[str, Any]:
     degree, other_element, other_index = read_sings(options.against)
     if degree != field.degree:
         raise RosyError(
-            f"{options.against}: is for a field of degree {degree}, but this field has degree "
-            f"{field.degree}"
+            f"{options.against}: is for a field of degree {degree}, but this field has degree {field.degree}"
         )
     own_pairs = set(map(tuple, np.stack(field.singularities, axis=1).tolist()))
     other_pairs = set(zip(other_element.tolist(), other_index.tolist(), strict=True))
@@ -188,10 +184,7 @@ def add_compare_command(subparsers: Any) -> None:
     text = "degree of generated fields, 1 to 12; by default that of the first field file, or 4"
     parser.add_degree_option(text)
     add_field_file_options(parser)
-    text = (
-        "largest distance of singularities that match, as a fraction of the size of the mesh "
-        "(%(default)g)"
-    )
+    text = "largest distance of singularities that match, as a fraction of the size of the mesh (%(default)g)"
     parser.add_value("--match-reach", "SHARE", text, float_between(0.0, 10.0), dest="reach")
     _add_layout_options(parser)
     parser.add_direction_options()

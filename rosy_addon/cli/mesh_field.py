@@ -25,8 +25,7 @@ JOIN_TEXT = (
 def add_mesh_options(parser: CommandParser) -> None:
     """Add the arguments MESH and FIELD, and the options that generate a field."""
     *suffixes, last = READERS
-    text = f"{', '.join(suffixes)} or {last}"
-    parser.add_argument("mesh", type=Path, metavar="MESH", help=text)
+    parser.add_argument("mesh", type=Path, metavar="MESH", help=f"{', '.join(suffixes)} or {last}")
     parser.add_toggle("--join", JOIN_TEXT)
     add_field_options(parser)
 
@@ -62,10 +61,7 @@ def _add_generator_options(parser: CommandParser) -> None:
         kinds = [kind for kind in GENERATORS if name in options_of(kind)]
         if kinds:
             parser.add_setting_option(setting, f"; for --generate {', '.join(kinds)}")
-    text = (
-        "strokes on the mesh that a guided field follows: rows x y z, with an empty line between two "
-        "strokes"
-    )
+    text = "strokes on the mesh that a guided field follows: rows x y z, with an empty line between two strokes"
     parser.add_value("--strokes", "FILE", text, Path)
     text = (
         "a field file that a guided field follows where its vectors are not zero; a prescribed field "
@@ -111,24 +107,18 @@ def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
     """
     if options.field is not None and options.generate is not None:
         raise RosyError(f"{options.field}: give either a field file or --generate, not both")
-    is_simulation = options.mesh.suffix.lower() in SIMULATION_READERS
+    mesh, suffix = options.mesh, options.mesh.suffix.lower()
+    is_simulation = suffix in SIMULATION_READERS
     names = ("field", "generate", "strokes", "guides", "singularities", "edges")
     has_source = options.uv or any(getattr(options, name) is not None for name in names)
-    is_ply = options.mesh.suffix.lower() == ".ply"
-    if options.array is not None and not (is_simulation or is_ply):
-        raise RosyError(
-            f"{options.mesh}: --array applies only to .ply files and files of simulations"
-        )
+    if options.array is not None and not (is_simulation or suffix == ".ply"):
+        raise RosyError(f"{mesh}: --array applies only to .ply files and files of simulations")
     if options.step is not None and not is_simulation:
-        raise RosyError(
-            f"{options.mesh}: --step applies only to files of simulations, such as .vtu"
-        )
+        raise RosyError(f"{mesh}: --step applies only to files of simulations, such as .vtu")
     if options.array is not None and has_source:
-        raise RosyError(f"{options.mesh}: give either --array, or a field file or --generate")
-    up = getattr(options, "up", None)
-    surface = api.Surface(
-        options.mesh, up=up, step=options.step, join=getattr(options, "join", None)
-    )
+        raise RosyError(f"{mesh}: give either --array, or a field file or --generate")
+    up, join = getattr(options, "up", None), getattr(options, "join", None)
+    surface = api.Surface(mesh, up=up, step=options.step, join=join)
     if options.field is not None:
         field = read_field(options, options.field, surface, options.degree)
     elif (is_simulation and not has_source) or options.array is not None:
@@ -161,17 +151,14 @@ def _generate_field(options: Options, surface: api.Surface) -> api.Field:
         if options.singularities is None:
             raise RosyError(f"{options.mesh}: give the singularities: --singularities FILE.sings")
         arguments["singularities"] = options.singularities
-    if options.edges is not None:
+    if (edges := options.edges) is not None:
         if kind not in ("features", "guided"):
-            raise RosyError(
-                f"{options.edges}: --edges applies only to --generate features and guided"
-            )
-        arguments["edges"] = options.edges
+            raise RosyError(f"{edges}: --edges applies only to --generate features and guided")
+        arguments["edges"] = edges
     if kind == "guided":
         arguments |= {"uv": options.uv, "vectors_have_firmness": options.firmness}
         if options.strokes is not None:
             arguments["strokes"] = read_guide_strokes(options.strokes)
     if kind in ("guided", "prescribed") and options.guides is not None:
-        guides = read_field(options, options.guides, surface, arguments["degree"])
-        arguments["vectors"] = guides
+        arguments["vectors"] = read_field(options, options.guides, surface, arguments["degree"])
     return GENERATOR_FUNCTIONS[kind](surface, **arguments)

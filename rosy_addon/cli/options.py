@@ -146,10 +146,7 @@ class CommandParser(argparse.ArgumentParser):
 
     def add_direction_options(self) -> None:
         """Add the options --view, --up and --ortho, which set the camera."""
-        text = (
-            "azimuth and elevation in degrees: 0,0 is from the front, 90,0 from the right, "
-            "0,90 from above"
-        )
+        text = "azimuth and elevation in degrees: 0,0 is from the front, 90,0 from the right, 0,90 from above"
         self.add_value("--view", "AZ,EL", text, float_tuple(2, "AZ,EL"), default=DEFAULT_VIEW)
         text = "upward axis of the file; by default y for .obj, .off, .om and glTF, otherwise z"
         self.add_argument("--up", choices=list(UP_AXIS_MATRIX), help=text)
@@ -158,10 +155,7 @@ class CommandParser(argparse.ArgumentParser):
 
     def add_look_options(self) -> None:
         """Add the options --preset and --set."""
-        text = (
-            f"preset of the look: {', '.join(preset_keys())}, one of your own, or a .json file; "
-            "`presets` lists them"
-        )
+        text = f"preset of the look: {', '.join(preset_keys())}, one of your own, or a .json file; `presets` lists them"
         self.add_value("--preset", "NAME", text)
         self.add_set_option(Look, "one setting of the look, after the preset")
 
@@ -194,10 +188,7 @@ class CommandParser(argparse.ArgumentParser):
             "property of a .ply file"
         )
         self.add_value("--color-values", "NAME", text)
-        text = (
-            "take the tone from a vertex property of a .ply file, or from the vertex colors: "
-            f"'{VERTEX_COLOR}'"
-        )
+        text = f"take the tone from a vertex property of a .ply file, or from the vertex colors: '{VERTEX_COLOR}'"
         self.add_value("--tone-attribute", "NAME", text, dest="tone_values")
         text = "take the tone from an image on the UV map of an .obj file"
         self.add_value("--tone-image", "IMAGE.png", text, Path)

@@ -116,16 +116,10 @@ def _build_parser(prog: str, extras: Extras = NO_EXTRAS) -> CommandParser:
     parser.set_defaults(extras=extras)
     subparsers = parser.add_subparsers(metavar="VERB", required=True)
     add_bake_command(subparsers, extras.run_on_cluster is not None)
-    add_render_command(subparsers)
-    add_strokes_command(subparsers)
-    add_turntable_command(subparsers)
-    add_texture_command(subparsers)
-    add_field_command(subparsers)
-    add_info_command(subparsers)
-    add_compare_command(subparsers)
-    for add_command in extras.add_commands:
+    drawing = add_render_command, add_strokes_command, add_turntable_command, add_texture_command
+    of_fields = add_field_command, add_info_command, add_compare_command
+    for add_command in (*drawing, *of_fields, *extras.add_commands, add_presets_command):
         add_command(subparsers)
-    add_presets_command(subparsers)
     if extras.run_in_blender is not None:
         text = "Blender to run; by default Python's module bpy, or a Blender that is installed"
         for verb in BLENDER_VERBS & subparsers.choices.keys():

@@ -102,10 +102,7 @@ def add_texture_command(subparsers: Any) -> None:
     parser.add_value("--size", "N", text, int_between(MIN_SIZE, MAX_SIZE))
     text = "width of the margin around charts, in texels (%(default)d)"
     parser.add_value("--margin", "N", text, int_between(0, MAX_MARGIN))
-    text = (
-        "direction to a lamp, in the axes of the mesh: draw its hatching as ink, and not thresholds "
-        "for a shader"
-    )
+    text = "direction to a lamp, in the axes of the mesh: draw its hatching as ink, and not thresholds for a shader"
     parser.add_value("--light-direction", "X,Y,Z", text, float_tuple(3, "X,Y,Z"))
     texts = [f"{name}: {text[0].lower()}{text[1:]}" for name, text in CONTENTS.items()]
     parser.add_argument("--content", choices=list(CONTENTS), help="; ".join(texts))

@@ -85,8 +85,7 @@ def run_strokes(options: Options) -> None:
     arguments = {"view": options.view, "size": size, "orthographic": bool(options.orthographic)}
     arguments |= {name: getattr(pen, name) for name in PEN_ARGUMENTS}
     surface, field = load_mesh_and_field(options)
-    drawing = api.strokes(surface, field, **arguments, **options.requested_settings())
-    drawing.save(options.output)
+    api.strokes(surface, field, **arguments, **options.requested_settings()).save(options.output)
 
 
 def _draw_scene_strokes(options: Options) -> None:
@@ -95,10 +94,9 @@ def _draw_scene_strokes(options: Options) -> None:
     The settings of the scene apply unless an option overrides them.
     """
     frames = [None] if options.frames is None else list(parse_frames(options.frames))
-    if len(frames) > 1 and "#" not in options.output.name:
-        raise RosyError(
-            f"{options.output}: several frames need # in the file name for the frame number"
-        )
+    output = options.output
+    if len(frames) > 1 and "#" not in output.name:
+        raise RosyError(f"{output}: several frames need # in the file name for the frame number")
     scene = open_scene(options, "strokes", options.mesh)
     for frame in frames:
         if frame is None:

@@ -396,15 +396,10 @@ def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: Pixel
         hue = map_colors(np.nan_to_num(position), look.color_map)
     elif look.hue == "families":
         hue = family_hues(field, images, look)
-    plain = undefined_drawing(look) != "texture"
-    undefined = np.flatnonzero(field.representation == 0) if plain else np.zeros(0, dtype=np.intp)
-    if hue is None:
-        color = to_linear(tone)
-        color[undefined] = to_linear(np.float32(NOISE_MEAN))
-        return color
-    color = to_linear(hue * (1 + COLOR_CONTRAST * (tone - NOISE_MEAN)))
-    color[undefined] = to_linear(np.float32(NOISE_MEAN))
-    if position is not None:
+    color = to_linear(tone if hue is None else hue * (1 + COLOR_CONTRAST * (tone - NOISE_MEAN)))
+    if undefined_drawing(look) != "texture":
+        color[field.representation == 0] = to_linear(np.float32(NOISE_MEAN))
+    if hue is not None and position is not None:
         missing = np.isnan(position)
         color[missing] = to_linear(tone[missing])
     return color

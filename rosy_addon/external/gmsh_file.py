@@ -81,8 +81,7 @@ def read_gmsh(path: Path) -> Any:
     if (corner_point < 0).any():
         raise RosyError(f"{path}: cannot be read: an element has a node that is missing")
     starts = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64)
-    cells = np.insert(corner_point, starts, sizes)
-    grid = pyvista.UnstructuredGrid(cells, types, points)
+    grid = pyvista.UnstructuredGrid(np.insert(corner_point, starts, sizes), types, points)
     for name, data in sections:
         if name in (b"NodeData", b"ElementData"):
             is_node = name == b"NodeData"

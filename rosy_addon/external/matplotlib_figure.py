@@ -304,8 +304,7 @@ class Page:
                 self._text(left, line_top, text, size, ha="left" if column == 0 else "right")
         for offset, line_width in ((0.1, 0.8), (1.25, 0.5), (len(table) + 0.55, 0.8)):
             y = 1 - (top + offset * height) / self._height
-            line = Line2D([0, 1], [y, y], linewidth=line_width, color=INK)
-            self._figure.add_artist(line)
+            self._figure.add_artist(Line2D([0, 1], [y, y], linewidth=line_width, color=INK))
 
 
 def _text_height(size: float) -> float:

@@ -196,9 +196,8 @@ def _steps_of(path: Path) -> list[Step]:
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         *others, last = SUFFIXES
-        raise RosyError(
-            f"{path}: is not a file of a simulation: its name must end in {', '.join(others)} or {last}"
-        )
+        names = f"{', '.join(others)} or {last}"
+        raise RosyError(f"{path}: is not a file of a simulation: its name must end in {names}")
     check_readable(path)
     if suffix in SERIES_SUFFIXES:
         return _listed_steps(path)

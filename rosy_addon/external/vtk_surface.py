@@ -41,9 +41,7 @@ _INTERNAL_ARRAYS = (
 )
 
 
-def surface_arrays(
-    datasets: list[Any], name: str, has_parts: bool, repeats_blocks: bool
-) -> MeshArrays:
+def surface_arrays(datasets: list, name: str, has_parts: bool, repeats_blocks: bool) -> MeshArrays:
     """Return the surface of the datasets of a time step, with the arrays at its points and cells.
 
     Parameters
@@ -147,12 +145,10 @@ def _surface_polygons(grid: Any, name: str) -> tuple[Polygons, np.ndarray, np.nd
     elif np.isin(cell_types, [*_LINEAR_VOLUME_CELL, _POLYHEDRON]).any():
         corner_point, face_start, cells = _boundary(grid, cell_types)
     else:
-        raise RosyError(
-            f"{name}: has no surface: none of its {counted(len(cell_types), 'cell')} is a face or a volume"
-        )
+        found = counted(len(cell_types), "cell")
+        raise RosyError(f"{name}: has no surface: none of its {found} is a face or a volume")
     points, corner_vertex = np.unique(corner_point, return_inverse=True)
-    polygons = Polygons(np.asarray(grid.points)[points], corner_vertex, face_start)
-    return polygons, points, cells
+    return Polygons(np.asarray(grid.points)[points], corner_vertex, face_start), points, cells
 
 
 def _surface_cells(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -25,9 +25,8 @@ from .formats.mesh_with_field import npz_bytes, ply_bytes, vtk_bytes
 from .formats.openmesh import read_om
 from .formats.plain import npy_bytes, read_npy, read_npz, read_text
 from .formats.polygons import RawField
-from .formats.rosy_rawfield import rawfield_text, read_rawfield, read_rosy, rosy_text
+from .formats.rosy_rawfield import rawfield_text, read_rawfield, read_rosy, rosy_text, rows_text
 from .formats.sings import SINGULARITY_SUFFIXES, sings_text
-from .formats.text_rows import format_lines
 from .frames import dot, normalize, transport
 from .mesh_io import READERS as MESH_READERS
 from .mesh_io import SHARP_ANGLE
@@ -55,15 +54,12 @@ _READERS: dict[str, Callable[[Path], RawField]] = {
     ".rosy": read_rosy,
     ".rawfield": read_rawfield,
     ".obj": read_fieldgen,
-    ".txt": read_text,
-    ".vec": read_text,
-    ".csv": read_text,
+    **dict.fromkeys((".txt", ".vec", ".csv"), read_text),
     ".npy": read_npy,
     ".npz": read_npz,
     ".dmat": read_dmat,
     ".crossfield": read_crossfield,
-    ".ffield": read_vcg_frames,
-    ".vfield": read_vcg_frames,
+    **dict.fromkeys((".ffield", ".vfield"), read_vcg_frames),
     ".om": read_om,
 }
 READ_SUFFIXES = tuple(_READERS)
@@ -71,6 +67,10 @@ WRITE_SUFFIXES = (
     *(".rosy", ".rawfield", ".obj", ".txt", ".npy", ".npz", ".vtp", ".vtu", ".ply"),
     *SINGULARITY_SUFFIXES,
 )
+
+#: The functions that return the contents of files with the mesh, and of files with only rows of all directions.
+_MESH_WRITERS = {".npz": npz_bytes, ".ply": ply_bytes, ".obj": fieldgen_text}
+_ROW_WRITERS = {".npy": npy_bytes, ".rawfield": rawfield_text, ".txt": rows_text}
 
 #: Degree of fields from files that do not state a degree, if the caller gives none.
 DEFAULT_DEGREE = 4
@@ -150,9 +150,8 @@ def load_field(
     if path.suffix.lower() in SINGULARITY_SUFFIXES:
         raise RosyError(f"{path}: contains singularities, not directions: choose a field file")
     if reader is None:
-        raise RosyError(
-            f"{path}: is not a field file: its name must end in {_join_names(READ_SUFFIXES)}"
-        )
+        suffixes = _join_names(READ_SUFFIXES)
+        raise RosyError(f"{path}: is not a field file: its name must end in {suffixes}")
     check_parsing_memory(path, NPY_MEMORY)
     with progress(0.0, 0.5):
         raw = reader(path)
@@ -303,15 +302,13 @@ def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface
     if Path(path).suffix.lower() == ".obj":
         members = vertex_members(surface, field)
         stored = validated_field(surface, members, field.degree, str(path), domain="vertex")
-        lost = angle_errors(surface, field, stored)
-        worst = np.degrees(np.nanmax(lost, initial=0.0))
+        worst = np.degrees(np.nanmax(angle_errors(surface, field, stored), initial=0.0))
         if worst > ANGLE_TOLERANCE_DEG:
-            warnings.warn(
+            text = (
                 f"{path}: an .obj file has one direction for each vertex, so directions of faces are off by up "
-                f"to {worst:.0f} degrees, and lengths are 1: .rosy and .rawfield files keep them",
-                RosyWarning,
-                stacklevel=3,
+                f"to {worst:.0f} degrees, and lengths are 1: .rosy and .rawfield files keep them"
             )
+            warnings.warn(text, RosyWarning, stacklevel=3)
 
 
 def field_file(path: str | os.PathLike[str], field: RosyField, surface: Surface) -> bytes:
@@ -324,35 +321,27 @@ def field_file(path: str | os.PathLike[str], field: RosyField, surface: Surface)
     """
     suffix = Path(path).suffix.lower()
     if suffix not in WRITE_SUFFIXES:
-        raise RosyError(
-            f"{path}: cannot be written as a field: its name must end in {_join_names(WRITE_SUFFIXES)}"
-        )
+        suffixes = _join_names(WRITE_SUFFIXES)
+        raise RosyError(f"{path}: cannot be written as a field: its name must end in {suffixes}")
     if suffix in (".rosy", ".obj") and field.direction_ratios is not None:
         raise RosyError(
             f"{path}: a {suffix} file stores one member per row, but the directions of this field "
             "do not form a RoSy: write a .rawfield, .txt or .npy file"
         )
     report(0.0, "writing the file")
-    if suffix == ".npz":
-        return npz_bytes(surface, field)
-    if suffix == ".ply":
-        return ply_bytes(surface, field)
-    if suffix in (".vtp", ".vtu"):
-        return vtk_bytes(surface, field, suffix)
-    if suffix == ".rosy":
-        return rosy_text(field).encode("ascii")
-    if suffix == ".obj":
-        return fieldgen_text(surface, field).encode("ascii")
-    if suffix in SINGULARITY_SUFFIXES:
-        return sings_text(field.degree, *find_singularities(surface, field)).encode("ascii")
-    rows = field.source_directions
-    if rows is None:
-        rows = field_directions(surface, field)
-    if suffix == ".npy":
-        return npy_bytes(rows)
-    if suffix == ".rawfield":
-        return rawfield_text(rows).encode("ascii")
-    return format_lines(rows.reshape(len(rows), -1)).encode("ascii")
+    if suffix in _MESH_WRITERS:
+        contents = _MESH_WRITERS[suffix](surface, field)
+    elif suffix in (".vtp", ".vtu"):
+        contents = vtk_bytes(surface, field, suffix)
+    elif suffix == ".rosy":
+        contents = rosy_text(field)
+    elif suffix in SINGULARITY_SUFFIXES:
+        contents = sings_text(field.degree, *find_singularities(surface, field))
+    else:
+        rows = field.source_directions
+        rows = field_directions(surface, field) if rows is None else rows
+        contents = _ROW_WRITERS[suffix](rows)
+    return contents if isinstance(contents, bytes) else contents.encode("ascii")
 
 
 def _join_names(names: tuple[str, ...]) -> str:
@@ -360,9 +349,7 @@ def _join_names(names: tuple[str, ...]) -> str:
     return f"{', '.join(names[:-1])} or {names[-1]}"
 
 
-def transfer_field(
-    source: Surface, field: RosyField, target: Surface, field_name: str
-) -> RosyField:
+def transfer_field(source: Surface, field: RosyField, target: Surface, name: str) -> RosyField:
     """Transfer a field to another mesh: each face takes the value of the closest source face.
 
     Parameters
@@ -372,7 +359,7 @@ def transfer_field(
         The field on the faces of `source`.
     target : Surface
         The same shape in the same space, with different faces: for example triangulated or reordered.
-    field_name : str
+    name : str
         Name of the field in messages.
 
     Returns
@@ -398,7 +385,7 @@ def transfer_field(
     unmatched = undefined & normal.any(axis=1)
     if unmatched.sum() > MAX_UNMATCHED_FRACTION * len(undefined):
         raise RosyError(
-            f"{field_name}: {unmatched.sum()} of {len(undefined)} faces of {target.name} do not lie on "
+            f"{name}: {unmatched.sum()} of {len(undefined)} faces of {target.name} do not lie on "
             f"{source.name} (distances up to {distance.max():.3g}): the two meshes must have the same "
             "shape and position"
         )

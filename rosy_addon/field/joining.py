@@ -53,7 +53,7 @@ def coinciding_borders(polygons: Polygons, vertex_data: Mapping[str, Any] | None
         is_same = (cell[order[1:]] == cell[order[:-1]]).all(axis=1)
         pairs.append(np.stack([order[:-1], order[1:]], axis=1)[is_same])
     near = np.concatenate(pairs)
-    near = near[_have_same_data(vertex_data or {}, len(target), *border[near].T)]
+    near = near[_have_same_data(vertex_data or {}, len(target), border[near])]
     label = connected_components(len(border), near)
     _, first = np.unique(label, return_index=True)
     target[border] = border[first[label]]
@@ -62,12 +62,10 @@ def coinciding_borders(polygons: Polygons, vertex_data: Mapping[str, Any] | None
     return np.where(touching[target], np.arange(len(target)), target)
 
 
-def _have_same_data(
-    vertex_data: Mapping[str, Any], count: int, first: np.ndarray, second: np.ndarray
-) -> np.ndarray:
-    """Return for (n,) pairs of vertices whether their numbers are the same. Whole numbers are only labels."""
-    is_same = np.ones(len(first), dtype=bool)
-    for name, values in vertex_data.items():
+def _have_same_data(data: Mapping[str, Any], count: int, pairs: np.ndarray) -> np.ndarray:
+    """Return for (n, 2) pairs of vertices whether their numbers are the same. Whole numbers are only labels."""
+    is_same, (first, second) = np.ones(len(pairs), dtype=bool), pairs.T
+    for name, values in data.items():
         if name.lower() in SHADING_NAMES:
             continue
         rows = np.asarray(values)

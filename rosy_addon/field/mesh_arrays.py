@@ -146,38 +146,35 @@ def _with_joined_borders(arrays: MeshArrays) -> tuple[MeshArrays, int]:
         Number of vertices that have been joined to others.
     """
     target = coinciding_borders(arrays.polygons, arrays.vertex_data)
-    kept = np.flatnonzero(target == np.arange(len(target)))
-    count = len(target) - len(kept)
+    kept = target == np.arange(len(target))
+    count = int((~kept).sum())
     if not count:
         return arrays, 0
     corner_vertex, face_start, corner, face = without_repeats(target, arrays.polygons)
-    number = np.cumsum(target == np.arange(len(target))) - 1
-    data = [
-        None
-        if rows is None
-        else {name: np.asarray(v)[index] if len(v) == total else v for name, v in rows.items()}
-        for rows, index, total in (
-            (arrays.vertex_data, kept, len(target)),
-            (arrays.face_data, face, len(arrays.face_start) - 1),
-        )
-    ]
+    number = np.cumsum(kept) - 1
+    arrays = _with_faces(arrays, number[corner_vertex], face_start, corner, face)
+    data = _selected_rows(arrays.vertex_data, kept, len(target))
+    return replace(arrays, vertices=arrays.vertices[kept], vertex_data=data), count
+
+
+def _with_faces(arrays: MeshArrays, vertex: Any, start: Any, corner: Any, face: Any) -> MeshArrays:
+    """Return arrays with other faces, which have the data of these corners and faces of the old ones.
+
+    `vertex` and `start` are the new `corner_vertex` and `face_start`.
+    """
     uv = None if arrays.uv is None else arrays.uv[corner]
-    vertices = arrays.vertices[kept]
-    joined = replace(
-        arrays,
-        vertices=vertices,
-        corner_vertex=number[corner_vertex],
-        face_start=face_start,
-        uv=uv,
-        vertex_data=data[0],
-        face_data=data[1],
-    )
-    return joined, count
+    data = _selected_rows(arrays.face_data, face, len(arrays.face_start) - 1)
+    return replace(arrays, corner_vertex=vertex, face_start=start, uv=uv, face_data=data)
 
 
-def _corner_uv(
-    uv: ArrayLike, vertex_count: int, corner_vertex: NDArray[Any], name: str
-) -> NDArray[np.float64]:
+def _selected_rows(data: Mapping[str, Any] | None, index: Any, count: int) -> dict[str, Any] | None:
+    """Return the rows of named arrays that `index` selects; arrays that do not have `count` rows stay as they are."""
+    if data is None:
+        return None
+    return {key: np.asarray(v)[index] if len(v) == count else v for key, v in data.items()}
+
+
+def _corner_uv(uv: Any, vertex_count: int, corner_vertex: NDArray[Any], name: str) -> NDArray[Any]:
     """Return (C, 2) texture coordinates of corners; `uv` has a row for each vertex or for each corner."""
     array = np.asarray(uv, dtype=np.float64)
     if array.shape not in ((vertex_count, 2), (len(corner_vertex), 2)):
@@ -190,17 +187,14 @@ def _corner_uv(
     return array[corner_vertex] if len(array) == vertex_count else array
 
 
-def _flat_faces(
-    faces: ArrayLike | Sequence[Sequence[int]],
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _flat_faces(faces: ArrayLike | Sequence[Sequence[int]]) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return `corner_vertex` and `face_start` (see `MeshArrays`) for faces as an array or as sequences."""
     rows: Any = faces if isinstance(faces, np.ndarray) else [np.asarray(face) for face in faces]
     if isinstance(rows, np.ndarray) or len({row.shape for row in rows}) == 1:
         rows = np.asarray(rows)
         if rows.ndim != 2 or not np.issubdtype(rows.dtype, np.integer):
             raise RosyError(
-                f"faces must be whole numbers, one row for each face, not {rows.dtype} of shape "
-                f"{rows.shape}"
+                f"faces must be whole numbers, one row for each face, not {rows.dtype} of shape {rows.shape}"
             )
         return rows.ravel(), np.arange(len(rows) + 1) * rows.shape[1]
     if any(row.ndim != 1 or not np.issubdtype(row.dtype, np.integer) for row in rows):
@@ -259,14 +253,10 @@ def _from_triangles(mesh: Any, faces: NDArray[Any]) -> MeshArrays:
     colors = _vertex_colors(mesh)
     if colors.shape[0] == len(vertices):
         vertex_data.update(zip(("red", "green", "blue"), colors.T, strict=False))
-    return MeshArrays(
-        vertices,
-        faces.ravel(),
-        np.arange(len(faces) + 1) * 3,
-        uv if is_uv and len(uv) else None,
-        vertex_data,
-        dict(getattr(mesh, "face_attributes", {})),
-    )
+    face_start = np.arange(len(faces) + 1) * 3
+    face_data = dict(getattr(mesh, "face_attributes", {}))
+    uv = uv if is_uv and len(uv) else None
+    return MeshArrays(vertices, faces.ravel(), face_start, uv, vertex_data, face_data)
 
 
 def _vertex_colors(mesh: Any) -> NDArray[np.float64]:
@@ -292,18 +282,14 @@ def _from_meshio(mesh: Any, name: str) -> MeshArrays:
     if not kept:
         found = ", ".join(sorted({block.type for block in mesh.cells})) or "none"
         raise RosyError(f"{name}: has no triangles, quads or polygons, only these cells: {found}")
+    vertex_data = {key: np.asarray(values) for key, values in mesh.point_data.items()}
     face_data = {
         key: np.concatenate([np.asarray(blocks[index]) for index in kept])
         for key, blocks in mesh.cell_data.items()
     }
-    return MeshArrays(
-        mesh.points,
-        np.concatenate(corners),
-        offsets_from_sizes(np.concatenate(sizes)),
-        None,
-        {key: np.asarray(values) for key, values in mesh.point_data.items()},
-        face_data,
-    )
+    face_start = offsets_from_sizes(np.concatenate(sizes))
+    corner_vertex = np.concatenate(corners)
+    return MeshArrays(mesh.points, corner_vertex, face_start, None, vertex_data, face_data)
 
 
 def _from_pyvista(mesh: Any, name: str) -> MeshArrays:
@@ -319,14 +305,12 @@ def _from_pyvista(mesh: Any, name: str) -> MeshArrays:
         raise RosyError(f"{name}: has no faces")
     sizes = np.diff(cells.cell_offsets if hasattr(cells, "cell_offsets") else cells.offset)
     uv = getattr(surface, "active_texture_coordinates", None)
-    return MeshArrays(
-        np.asarray(surface.points),
-        np.asarray(cells.cell_connectivity)[np.repeat(is_face, sizes)],
-        offsets_from_sizes(sizes[is_face]),
-        None if uv is None or uv.shape[1] != 2 else np.asarray(uv),
-        _arrays_of_pyvista(surface.point_data),
-        {key: rows[is_face] for key, rows in _arrays_of_pyvista(surface.cell_data).items()},
-    )
+    uv = None if uv is None or uv.shape[1] != 2 else np.asarray(uv)
+    corner_vertex = np.asarray(cells.cell_connectivity)[np.repeat(is_face, sizes)]
+    faces = corner_vertex, offsets_from_sizes(sizes[is_face])
+    vertex_data, face_data = map(_arrays_of_pyvista, (surface.point_data, surface.cell_data))
+    face_data = {key: rows[is_face] for key, rows in face_data.items()}
+    return MeshArrays(np.asarray(surface.points), *faces, uv, vertex_data, face_data)
 
 
 def _arrays_of_pyvista(attributes: Any) -> dict[str, NDArray[Any]]:
@@ -386,19 +370,7 @@ def _extracted_surface(mesh: Any) -> Any:
 def _without_copied_faces(arrays: MeshArrays) -> tuple[MeshArrays, int]:
     """Remove `copied_faces`. Return the other faces, with their data, and the number of removed ones."""
     is_kept = ~copied_faces(*arrays.polygons)
-    size, count = np.diff(arrays.face_start), len(is_kept)
-    corner = np.repeat(is_kept, size)
-    face_data = arrays.face_data
-    if face_data is not None:
-        face_data = {
-            name: np.asarray(values)[is_kept] if len(values) == count else values
-            for name, values in face_data.items()
-        }
-    kept = replace(
-        arrays,
-        corner_vertex=arrays.corner_vertex[corner],
-        face_start=offsets_from_sizes(size[is_kept]),
-        uv=None if arrays.uv is None else arrays.uv[corner],
-        face_data=face_data,
-    )
-    return kept, int(count - is_kept.sum())
+    size = np.diff(arrays.face_start)
+    corner, face_start = np.repeat(is_kept, size), offsets_from_sizes(size[is_kept])
+    kept = _with_faces(arrays, arrays.corner_vertex[corner], face_start, corner, is_kept)
+    return kept, int((~is_kept).sum())

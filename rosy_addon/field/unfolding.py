@@ -28,7 +28,8 @@ def folded_faces(surface: Surface) -> np.ndarray:
     face_a, face_b = surface.corner_face[edges.halfedges].T
     is_opposite = np.zeros(len(edges.ends), dtype=bool)
     is_opposite[edges.interior] = dot(normal[face_a], normal[face_b]) < OPPOSITE
-    is_folded = _for_most_edges(surface, is_opposite)
+    count = is_opposite[edges.corner_edge].astype(np.int32)
+    is_folded = 2 * np.add.reduceat(count, surface.face_start[:-1]) > np.diff(surface.face_start)
     if not is_folded.any():
         return is_folded
     corner_vertex, corner_face = surface.corner_vertex, surface.corner_face
@@ -86,12 +87,5 @@ def _reversed_faces(surface: Surface) -> np.ndarray:
     side, other_side = connected_components(2 * count, pairs.reshape(-1, 2)).reshape(2, count)
     size = np.bincount(side, minlength=other_side.max() + 1)
     # Of two halves, the one with the first face keeps its orientation.
-    is_reversed = size[side] < size[other_side]
-    is_reversed |= (size[side] == size[other_side]) & (side > other_side)
-    return is_reversed
-
-
-def _for_most_edges(surface: Surface, is_true: np.ndarray) -> np.ndarray:
-    """Return (F,) bool: whether an (E,) condition on the edges is true for more than half of those of a face."""
-    count = is_true[surface.edges.corner_edge].astype(np.int32)
-    return 2 * np.add.reduceat(count, surface.face_start[:-1]) > np.diff(surface.face_start)
+    is_second = (size[side] == size[other_side]) & (side > other_side)
+    return is_second | (size[side] < size[other_side])

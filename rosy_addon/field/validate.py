@@ -126,9 +126,8 @@ def validated_field(
     domain = checked_domain(surface, len(vectors), domain, source)
     apply_nonfinite_policy(vectors, source, domain, policy.nonfinite)
     normal = tangent_normals(surface, domain)
-    vectors = project_to_tangent(
-        vectors, normal, TOLERANCE_DEG[domain], source, domain, policy.off_surface
-    )
+    limit = TOLERANCE_DEG[domain]
+    vectors = project_to_tangent(vectors, normal, limit, source, domain, policy.off_surface)
     if domain == "vertex":
         rest = surface.in_rest_shape()
         z = to_representation(vectors, *tangent_frame(normal), degree)
@@ -207,9 +206,8 @@ def validated_directions(
         return replace(field, source_directions=source_directions)
     apply_nonfinite_policy(directions.reshape(count, -1), source, domain, policy.nonfinite)
     rows, normals = directions.reshape(-1, 3), np.repeat(normal, degree, axis=0)
-    rows = project_to_tangent(
-        rows, normals, TOLERANCE_DEG[domain], source, domain, policy.off_surface
-    )
+    limit = TOLERANCE_DEG[domain]
+    rows = project_to_tangent(rows, normals, limit, source, domain, policy.off_surface)
     directions = rows.reshape(count, degree, 3)
     surface = surface.in_rest_shape()
     if domain == "face":
@@ -238,9 +236,7 @@ def _average_directions(surface: Surface, directions: np.ndarray, normal: np.nda
     return RosyField(degree, vectors, ratios_from_harmonics(coefficients, degree))
 
 
-def _vertex_averages(
-    surface: Surface, normal: np.ndarray
-) -> Callable[[np.ndarray, int], np.ndarray]:
+def _vertex_averages(surface: Surface, normal: np.ndarray) -> Callable[..., np.ndarray]:
     """Return a function that averages (V,) complex values at the vertices onto the faces.
 
     The second argument of the function is the order k of the values: if a tangent vector is rotated by t,
@@ -265,9 +261,7 @@ def tangent_normals(surface: Surface, domain: str) -> np.ndarray:
         on vertices without a face.
     """
     surface = surface.in_rest_shape()
-    if domain == "face":
-        return surface.face_normal
-    return vertex_normals(surface)
+    return surface.face_normal if domain == "face" else vertex_normals(surface)
 
 
 def vertex_normals(surface: Surface) -> np.ndarray:
@@ -320,9 +314,7 @@ def project_to_tangent(
     outlier = angle > tolerance_deg
     if off_surface == "undefined":
         tangent[outlier] = 0.0
-    elif off_surface == "error" and outlier.sum() > MAX_OUTLIER_FRACTION * np.count_nonzero(
-        ~is_zero
-    ):
+    elif off_surface == "error" and outlier.sum() > MAX_OUTLIER_FRACTION * (~is_zero).sum():
         worst = int(np.argmax(angle))
         raise RosyError(
             f"{source}: {outlier.sum()} of {len(vectors)} vectors are not tangent to the surface: they "
@@ -344,9 +336,8 @@ def _project(vectors: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.nd
     angle = np.degrees(np.arcsin(np.minimum(sine, 1.0)))
     # If a vector is parallel to the normal, its projection is only a rounding error.
     tangent = np.where((sine < 1 - 1e-12)[:, None], vectors - component[:, None] * normal, 0.0)
-    tangent = np.where(
-        (sine > ROUNDING_SINE)[:, None], normalize(tangent) * length[:, None], vectors
-    )
+    projected = normalize(tangent) * length[:, None]
+    tangent = np.where((sine > ROUNDING_SINE)[:, None], projected, vectors)
     return np.where(normal.any(axis=1)[:, None], tangent, 0.0), angle, length == 0
 
 

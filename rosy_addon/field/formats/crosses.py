@@ -46,9 +46,8 @@ def read_vcg_frames(path: Path) -> RawField:
     if len(rows) > first and not any(map(is_number, rows.words[first])):
         first += 1
     count = int(rows.words[counts[0]][0])
-    return _crosses(
-        rows[first:], 8, count, "vertex" if path.suffix.lower() == ".vfield" else "face"
-    )
+    domain = "vertex" if path.suffix.lower() == ".vfield" else "face"
+    return _crosses(rows[first:], 8, count, domain)
 
 
 def _crosses(rows: TextRows, columns: int, count: int, domain: str | None) -> RawField:
@@ -60,8 +59,7 @@ def _crosses(rows: TextRows, columns: int, count: int, domain: str | None) -> Ra
         raise RosyError(f"{rows.path}: contains no rows of {columns} numbers")
     for row, words in enumerate(rows.words):
         if len(words) != columns:
-            raise rows.error(
-                row, f"expected {columns} numbers, found {counted(len(words), 'word')}"
-            )
+            found = counted(len(words), "word")
+            raise rows.error(row, f"expected {columns} numbers, found {found}")
     values = rows.floats("part of a vector").reshape(-1, columns)[:, -6:].reshape(-1, 2, 3)
     return RawField(np.concatenate([values, -values], axis=1), 4, count, domain)

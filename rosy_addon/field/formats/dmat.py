@@ -29,19 +29,12 @@ def read_dmat(path: Path) -> RawField:
     if header.split() == [b"0", b"0"]:
         header, _, rest = rest.partition(b"\n")
         columns, count = _size(path, header)
-        if len(rest) < 8 * columns * count:
-            raise RosyError(
-                f"{path}: declares {columns * count} numbers, but contains {len(rest) // 8}"
-            )
-        values = np.frombuffer(rest, "<f8", columns * count)
+        values = np.frombuffer(rest, "<f8", min(columns * count, len(rest) // 8))
     else:
         columns, count = _size(path, header)
-        rows = read_rows(path, comment=None, data=b"\n" + rest)
-        values = rows.floats("entry of the matrix")
-        if len(values) != columns * count:
-            raise RosyError(
-                f"{path}: declares {columns * count} numbers, but contains {len(values)}"
-            )
+        values = read_rows(path, comment=None, data=b"\n" + rest).floats("entry of the matrix")
+    if len(values) != columns * count:
+        raise RosyError(f"{path}: declares {columns * count} numbers, but contains {len(values)}")
     if not count:
         raise RosyError(f"{path}: contains no numbers")
     matrix = as_float64(values.reshape(columns, count).T)

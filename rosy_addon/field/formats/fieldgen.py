@@ -105,12 +105,7 @@ def fieldgen_text(surface: Surface, field: RosyField) -> str:
     faces = (corners[start:stop] for start, stop in pairwise(starts))
     face_lines = (" ".join(f"{v}//{v}" for v in vertices) for vertices in faces)
     field_lines = enumerate(format_rows(member), 1)
-    return "".join(
-        [
-            format_lines(surface.vertices, "v "),
-            format_lines(normal, "vn "),
-            *(f"f {line}\n" for line in face_lines),
-            f"# degree {field.degree}\n",
-            *(f"# field {number} {line}\n" for number, line in field_lines),
-        ]
-    )
+    lines = [format_lines(surface.vertices, "v "), format_lines(normal, "vn ")]
+    lines += [*(f"f {line}\n" for line in face_lines), f"# degree {field.degree}\n"]
+    lines += (f"# field {number} {line}\n" for number, line in field_lines)
+    return "".join(lines)

@@ -34,9 +34,7 @@ _VTK_FILE = """<?xml version="1.0"?>
 """
 
 
-def field_arrays(
-    surface: Surface, field: RosyField
-) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+def field_arrays(surface: Surface, field: RosyField) -> tuple[dict[str, np.ndarray], ...]:
     """Return the arrays that describe a field at the faces, and those at the vertices, by name.
 
     Returns
@@ -59,25 +57,19 @@ def field_arrays(
 def vtk_bytes(surface: Surface, field: RosyField, suffix: str) -> bytes:
     """Return the contents of a `.vtp` or `.vtu` file."""
     face_arrays, vertex_arrays = field_arrays(surface, field)
-    topology = {
-        "connectivity": surface.corner_vertex.astype("<i8"),
-        "offsets": surface.face_start[1:].astype("<i8"),
-    }
+    connectivity, offsets = (a.astype("<i8") for a in (surface.corner_vertex, surface.face_start))
+    topology = {"connectivity": connectivity, "offsets": offsets[1:]}
+    kind, cells = "PolyData", "Polys"
     if suffix == ".vtu":
+        kind, cells = "UnstructuredGrid", "Cells"
         sizes = np.diff(surface.face_start)
         types = np.select([sizes == 3, sizes == 4], [_TRIANGLE, _QUAD], _POLYGON)
         topology["types"] = types.astype("u1")
-    text = _VTK_FILE.format(
-        kind="UnstructuredGrid" if suffix == ".vtu" else "PolyData",
-        cells="Cells" if suffix == ".vtu" else "Polys",
-        points=len(surface.vertices),
-        faces=surface.face_count,
-        positions=_vtk_arrays({"Points": surface.vertices}),
-        topology=_vtk_arrays(topology),
-        point_data=_vtk_arrays(vertex_arrays),
-        cell_data=_vtk_arrays(face_arrays),
-    )
-    return text.encode("ascii")
+    arrays = {"positions": {"Points": surface.vertices}, "topology": topology}
+    arrays |= {"point_data": vertex_arrays, "cell_data": face_arrays}
+    texts: dict[str, object] = {key: _vtk_arrays(each) for key, each in arrays.items()}
+    texts |= {"points": len(surface.vertices), "faces": surface.face_count}
+    return _VTK_FILE.format(kind=kind, cells=cells, **texts).encode("ascii")
 
 
 def _vtk_arrays(arrays: dict[str, np.ndarray]) -> str:
@@ -105,11 +97,8 @@ def ply_bytes(surface: Surface, field: RosyField) -> bytes:
     header += [f"property double {name}" for name in vertices.dtype.names]
     header += [f"element face {len(values)}", "property list int int vertex_indices"]
     header += [f"property double {name}" for name in values.dtype.names]
-    return (
-        "\n".join([*header, "end_header\n"]).encode("ascii")
-        + vertices.tobytes()
-        + _ply_faces(surface, values)
-    )
+    text = "\n".join([*header, "end_header\n"]).encode("ascii")
+    return text + vertices.tobytes() + _ply_faces(surface, values)
 
 
 def _table(arrays: dict[str, np.ndarray]) -> np.ndarray:
@@ -134,9 +123,8 @@ def _ply_faces(surface: Surface, values: np.ndarray) -> bytes:
     data = np.empty(int(row_bytes.sum()), dtype=np.uint8)
     for size in np.unique(sizes).tolist():
         faces = np.flatnonzero(sizes == size)
-        rows = np.empty(
-            len(faces), [("count", "<i4"), ("corners", "<i4", (size,)), ("values", values.dtype)]
-        )
+        columns = [("count", "<i4"), ("corners", "<i4", (size,)), ("values", values.dtype)]
+        rows = np.empty(len(faces), columns)
         rows["count"] = size
         rows["corners"] = surface.corner_vertex[surface.face_start[faces, None] + np.arange(size)]
         rows["values"] = values[faces]
@@ -152,9 +140,8 @@ def npz_bytes(surface: Surface, field: RosyField) -> bytes:
     """
     rows = field.source_directions
     vertices, indices = find_singularities(surface, field)
-    faces = surface.faces
-    mesh = {"faces": faces}
-    if isinstance(faces, list):
+    mesh = {"faces": surface.faces}
+    if isinstance(mesh["faces"], list):
         mesh = {"corner_vertex": surface.corner_vertex, "face_start": surface.face_start}
     file = io.BytesIO()
     np.savez(

@@ -37,9 +37,7 @@ def read_obj(path: Path) -> Polygons:
     return Polygons(vertices, corner_vertex, offsets_from_sizes(list(map(len, corners.words))))
 
 
-def _resolved(
-    rows: TextRows, label: str, defined_above: np.ndarray, count: int, message: str
-) -> np.ndarray:
+def _resolved(rows: TextRows, label: str, defined: np.ndarray, count: int, text: str) -> np.ndarray:
     """Return the indices in rows of a file, counted from 0; the file counts vertices (or `vt` lines) from 1.
 
     Parameters
@@ -48,22 +46,21 @@ def _resolved(
         Rows of indices. A negative index counts back from the last vertex that is defined above the line.
     label : str
         Name of the indices in messages.
-    defined_above : (rows,) int ndarray
+    defined : (rows,) int ndarray
         Number of vertices that are defined above each line.
     count : int
         Number of vertices in the whole file.
-    message : str
+    text : str
         Beginning of the message about an index out of range, with a format field for the index.
     """
     index = rows.ints(label)
-    defined_above = np.repeat(defined_above, list(map(len, rows.words)))
-    result = np.where(index < 0, index + defined_above, index - 1)
+    defined = np.repeat(defined, list(map(len, rows.words)))
+    result = np.where(index < 0, index + defined, index - 1)
     out_of_range = (result < 0) | (result >= count)
     if out_of_range.any():
         word = int(np.argmax(out_of_range))
-        raise rows.error(
-            rows.row_of_word(word), f"{message.format(index[word])} are numbered 1 to {count}"
-        )
+        subject, row = text.format(index[word]), rows.row_of_word(word)
+        raise rows.error(row, f"{subject} are numbered 1 to {count}")
     return result
 
 

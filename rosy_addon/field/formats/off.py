@@ -62,26 +62,21 @@ def _after_keyword(rows: TextRows) -> TextRows:
 
 def _faces(rows: TextRows, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return `corner_vertex` and `face_start` of `Polygons`, given one row of text for each face."""
-    first_words = rows.with_words([words[:1] for words in rows.words])
-    sizes = first_words.ints("number of corners of a face")
+    sizes = rows.with_words([words[:1] for words in rows.words]).ints("number of corners of a face")
     corner_words = []
     for row, (size, words) in enumerate(zip(sizes.tolist(), rows.words, strict=True)):
-        if not 3 <= size < len(words):
-            message = (
-                f"has {size} corners, expected 3 or more"
-                if size < 3
-                else f"declares {size} corners, but lists {len(words) - 1}"
-            )
-            raise rows.error(row, f"face {row} {message}")
+        if size < 3:
+            raise rows.error(row, f"face {row} has {size} corners, expected 3 or more")
+        if size >= len(words):
+            found = len(words) - 1
+            raise rows.error(row, f"face {row} declares {size} corners, but lists {found}")
         corner_words.append(words[1 : size + 1])
     corners = rows.with_words(corner_words)
     corner_vertex = corners.ints("vertex of a face")
     out_of_range = (corner_vertex < 0) | (corner_vertex >= vertex_count)
     if out_of_range.any():
         corner = int(np.argmax(out_of_range))
-        raise rows.error(
-            corners.row_of_word(corner),
-            f"a face refers to vertex {corner_vertex[corner]}, but the vertices are numbered 0 "
-            f"to {vertex_count - 1}",
-        )
+        row, vertex, last = corners.row_of_word(corner), corner_vertex[corner], vertex_count - 1
+        text = f"a face refers to vertex {vertex}, but the vertices are numbered 0 to {last}"
+        raise rows.error(row, text)
     return corner_vertex, offsets_from_sizes(sizes)

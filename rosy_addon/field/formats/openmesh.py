@@ -63,9 +63,8 @@ def _read(path: Path) -> tuple[Polygons, dict[bytes, np.ndarray]]:
     try:
         return _parse(data)
     except (ValueError, IndexError, KeyError, struct.error):
-        raise RosyError(
-            f"{path}: is damaged, or not a binary .om file of OpenMesh 2 or later"
-        ) from None
+        fault = "is damaged, or not a binary .om file of OpenMesh 2 or later"
+        raise RosyError(f"{path}: {fault}") from None
 
 
 def _parse(data: bytes) -> tuple[Polygons, dict[bytes, np.ndarray]]:
@@ -108,15 +107,12 @@ def _text(data: bytes, position: int) -> tuple[bytes, int]:
     return data[position + 1 : end], end
 
 
-def _corners(
-    halfedges: np.ndarray, first: np.ndarray, vertex_count: int
-) -> tuple[np.ndarray, np.ndarray]:
+def _corners(halfedges: np.ndarray, first: np.ndarray, vertex_count: int) -> list[np.ndarray]:
     """Return `corner_vertex` and `face_start` of faces, given by their first halfedges.
 
     A row of `halfedges` is the next halfedge, the vertex to which it points, and its face.
     """
-    columns, active, current = [], np.ones(len(first), dtype=bool), first.copy()
-    visited = 0
+    columns, active, current, visited = [], np.ones(len(first), dtype=bool), first, 0
     while active.any():
         visited += np.count_nonzero(active)
         # Each halfedge belongs to one face, unless the file is damaged.
@@ -128,4 +124,4 @@ def _corners(
     if not columns:
         raise ValueError
     table = np.stack(columns, axis=1)
-    return table[table >= 0], offsets_from_sizes((table >= 0).sum(axis=1))
+    return [table[table >= 0], offsets_from_sizes((table >= 0).sum(axis=1))]

@@ -62,9 +62,8 @@ def read_text(path: Path) -> RawField:
     _check_columns(str(path), columns - (columns % 3 == 1))
     for row, words in enumerate(rows.words):
         if len(words) != columns:
-            raise rows.error(
-                row, f"the row has {counted(len(words), 'number')}, the rows above have {columns}"
-            )
+            found = counted(len(words), "number")
+            raise rows.error(row, f"the row has {found}, the rows above have {columns}")
     values = rows.floats("part of a vector").reshape(-1, columns)
     if columns == 15 and not (values[:, 3:9] + values[:, 9:]).any():
         values = values[:, 3:]
@@ -124,10 +123,8 @@ def _load_npy(data: bytes, source: str) -> Any:
         _check_npy_size(data)
         return np.load(io.BytesIO(data), allow_pickle=False)
     except Exception as reason:  # numpy evaluates the header as Python, which can raise any error
-        message_lines = str(reason).splitlines() or [type(reason).__name__]
-        raise RosyError(
-            f"{source}: is not a valid .npy file of numbers: {message_lines[0]}"
-        ) from None
+        line = (str(reason).splitlines() or [type(reason).__name__])[0]
+        raise RosyError(f"{source}: is not a valid .npy file of numbers: {line}") from None
 
 
 def _array_field(values: Any, source: str) -> RawField:
@@ -173,13 +170,10 @@ def read_npz(path: Path) -> RawField:
     name = next((name for name in _FIELD_NAMES if name in rows), None)
     if name is None:
         if len(rows) != 1:
-            found = ", ".join(
-                f"'{name}' {values.shape}" for name, values in (rows or arrays).items()
-            )
+            found = ", ".join(f"'{name}' {each.shape}" for name, each in (rows or arrays).items())
             fault = "several arrays can be the field" if rows else "no array can be the field"
-            raise RosyError(
-                f"{path}: {fault}; call it '{_FIELD_NAMES[0]}': {found or 'it is empty'}"
-            )
+            advice = f"call it '{_FIELD_NAMES[0]}'"
+            raise RosyError(f"{path}: {fault}; {advice}: {found or 'it is empty'}")
         (name,) = rows
     raw = _array_field(rows[name], f"{path}, {name}")
     degree = arrays.get("degree", np.empty(0))
@@ -197,12 +191,7 @@ def _has_vectors(shape: tuple[int, ...]) -> bool:
 
 def _polygons(vertices: np.ndarray, faces: np.ndarray) -> Polygons | None:
     """Return the mesh of two arrays; None if they are not (V, 3) points and (F, k) indices of vertices."""
-    if (
-        vertices.ndim != 2
-        or vertices.shape[1] != 3
-        or faces.ndim != 2
-        or faces.dtype.kind not in "iu"
-    ):
+    if vertices.shape[1:] != (3,) or faces.ndim != 2 or faces.dtype.kind not in "iu":
         return None
     if faces.shape[1] < 3 or not len(faces) or faces.min() < 0 or faces.max() >= len(vertices):
         return None
@@ -248,8 +237,7 @@ def _check_columns(source: str, columns: int) -> None:
     """Raise a `RosyError` unless a row has 3 N numbers for a degree N from 1 to `MAX_DEGREE`."""
     if columns % 3 or not 3 <= columns <= 3 * MAX_DEGREE:
         raise RosyError(
-            f"{source}: has {counted(columns, 'number')} per row, expected 3 for each of up to {MAX_DEGREE} "
-            "directions"
+            f"{source}: has {counted(columns, 'number')} per row, expected 3 for each of up to {MAX_DEGREE} directions"
         )
 
 

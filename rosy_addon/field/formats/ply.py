@@ -20,16 +20,10 @@ from ..blocks import as_float64
 from .polygons import Polygons, offsets_from_sizes
 from .text_rows import TextRows, abbreviate, read_rows
 
-_DTYPES = {
-    **dict.fromkeys(("char", "int8"), "i1"),
-    **dict.fromkeys(("uchar", "uint8"), "u1"),
-    **dict.fromkeys(("short", "int16"), "i2"),
-    **dict.fromkeys(("ushort", "uint16"), "u2"),
-    **dict.fromkeys(("int", "int32"), "i4"),
-    **dict.fromkeys(("uint", "uint32"), "u4"),
-    **dict.fromkeys(("float", "float32"), "f4"),
-    **dict.fromkeys(("double", "float64"), "f8"),
-}
+#: numpy's codes of types by their names: those of C, and those of numpy, such as int8.
+_CODES = ("i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8")
+_C_NAMES = ("char", "uchar", "short", "ushort", "int", "uint", "float", "double")
+_DTYPES = dict(zip(_C_NAMES, _CODES, strict=True)) | {np.dtype(k).name: k for k in _CODES}
 _BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _CORNER_PROPERTIES = ("vertex_indices", "vertex_index")
 
@@ -84,10 +78,9 @@ def read_ply(path: Path) -> Polygons:
     if out_of_range.any():
         corner = int(np.argmax(out_of_range))
         face_index = int(np.searchsorted(face_start, corner, side="right")) - 1
-        raise RosyError(
-            f"{path}: face {face_index} refers to vertex {corner_vertex[corner]:.10g}, "
-            f"but the vertices are numbered 0 to {len(vertices) - 1}"
-        )
+        place, last = f"{path}: face {face_index}", len(vertices) - 1
+        text = f"refers to vertex {corner_vertex[corner]:.10g}, but the vertices are numbered 0 to {last}"
+        raise RosyError(f"{place} {text}")
     return Polygons(as_float64(vertices), corner_vertex.astype(np.int64), face_start)
 
 
@@ -227,7 +220,7 @@ def _text_columns(rows: TextRows, element: _Element) -> _Columns:
     for prop in element.properties:
         count = np.ones(len(rows), dtype=np.int64)
         if prop.count_type is not None:
-            _check_row_lengths(rows, element, position + 1, starts)
+            _check_lengths(rows, element, position + 1, starts)
             count_value = values[position]
             invalid = ~_is_index(count_value, len(values) + 1)
             if invalid.any():
@@ -235,7 +228,7 @@ def _text_columns(rows: TextRows, element: _Element) -> _Columns:
                 raise rows.error(row, f"expected the length of a list, found {count_value[row]:g}")
             count = count_value.astype(np.int64)
             position = position + 1
-        _check_row_lengths(rows, element, position + count, starts)
+        _check_lengths(rows, element, position + count, starts)
         list_starts = offsets_from_sizes(count)
         index = np.arange(list_starts[-1]) + np.repeat(position - list_starts[:-1], count)
         part = values[index]
@@ -244,9 +237,7 @@ def _text_columns(rows: TextRows, element: _Element) -> _Columns:
     return columns
 
 
-def _check_row_lengths(
-    rows: TextRows, element: _Element, end: np.ndarray, starts: np.ndarray
-) -> None:
+def _check_lengths(rows: TextRows, element: _Element, end: np.ndarray, starts: np.ndarray) -> None:
     """Raise a `RosyError` if a row has too few values.
 
     All words of `rows` are numbered consecutively. Row i has the words ``starts[i] .. starts[i + 1] - 1``,
@@ -283,23 +274,17 @@ def _binary_elements(
         dtype = np.dtype(layout)
         end, count = offset + dtype.itemsize * element.count, element.count
         lists = [prop.name for prop in element.properties if prop.count_type is not None]
-        if end > len(data) and not lists:
+        is_cut = end > len(data)
+        if is_cut and not lists:
             raise _truncated(path, element, (len(data) - offset) // dtype.itemsize)
-        table = np.frombuffer(data, dtype, count, offset) if end <= len(data) else None
-        if table is not None and all(
-            (table[f"{name} count"] == table[name].shape[1]).all() for name in lists
-        ):
-            columns[element.name] = {
-                prop.name: table[prop.name]
-                if prop.count_type is None
-                else (table[prop.name].ravel(), np.arange(count + 1) * table[prop.name].shape[1])
-                for prop in element.properties
-            }
-            offset = end
+        table = np.empty(0, dtype) if is_cut else np.frombuffer(data, dtype, count, offset)
+        if is_cut or any((table[f"{k} count"] != table[k].shape[1]).any() for k in lists):
+            values, offset = _read_rows(path, data, offset, byte_order, element, count)
         else:
-            columns[element.name], offset = _read_rows(
-                path, data, offset, byte_order, element, count
-            )
+            values, offset = {prop.name: table[prop.name] for prop in element.properties}, end
+            for name in lists:
+                values[name] = table[name].ravel(), np.arange(count + 1) * table[name].shape[1]
+        columns[element.name] = values
     return columns
 
 

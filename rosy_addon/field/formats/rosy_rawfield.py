@@ -56,7 +56,12 @@ def rosy_text(field: RosyField) -> str:
 def rawfield_text(directions: np.ndarray) -> str:
     """Return the text of a `.rawfield` file with (F, N, 3) directions."""
     count, degree = directions.shape[:2]
-    return f"{degree} {count}\n{format_lines(directions.reshape(count, -1))}"
+    return f"{degree} {count}\n{rows_text(directions)}"
+
+
+def rows_text(directions: np.ndarray) -> str:
+    """Return (F, N, 3) directions as text, with a row for each face."""
+    return format_lines(directions.reshape(len(directions), -1))
 
 
 def _read_header(rows: TextRows, *names: str) -> list[int]:

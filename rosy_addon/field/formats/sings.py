@@ -37,10 +37,8 @@ def read_sings(path: Path) -> tuple[int, np.ndarray, np.ndarray]:
     numbers = rows.ints("degree, count, elements and indices")
     if len(numbers) < 2 or len(numbers) != 2 + 2 * int(numbers[1]):
         declared = numbers[1] if len(numbers) > 1 else "no"
-        contained = max(len(numbers) - 2, 0) / 2
-        raise rows.error(
-            len(rows), f"declares {declared} singularities, but contains {contained:g}"
-        )
+        found = max(len(numbers) - 2, 0) / 2
+        raise rows.error(len(rows), f"declares {declared} singularities, but contains {found:g}")
     return int(numbers[0]), numbers[2::2], numbers[3::2]
 
 

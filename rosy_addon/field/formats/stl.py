@@ -64,13 +64,11 @@ def weld(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _binary_points(path: Path, data: bytes, count: int) -> np.ndarray:
     """Return (3 T, 3) float32 corners of the triangles of a binary file."""
-    available = (len(data) - _HEADER_BYTES) // _TRIANGLE_DTYPE.itemsize
+    found = (len(data) - _HEADER_BYTES) // _TRIANGLE_DTYPE.itemsize
     if len(data) < _HEADER_BYTES:
         raise RosyError(f"{path}: is not an .stl file: it is shorter than the header")
-    if available < count:
-        raise RosyError(
-            f"{path}: declares {counted(count, 'triangle')}, but ends after {available}"
-        )
+    if found < count:
+        raise RosyError(f"{path}: declares {counted(count, 'triangle')}, but ends after {found}")
     return np.frombuffer(data, _TRIANGLE_DTYPE, count, _HEADER_BYTES)["points"].reshape(-1, 3)
 
 
@@ -81,9 +79,7 @@ def _text_points(path: Path, data: bytes) -> np.ndarray:
     corners = rows.select(is_corner, slice(1, None))
     loops = sum(words[0].lower() == b"endloop" for words in rows.words)
     if len(corners) != 3 * loops:
-        raise rows.error(
-            np.flatnonzero(is_corner)[-1] if len(corners) else len(rows),
-            f"the file has {counted(len(corners), 'corner')} in "
-            f"{counted(loops, 'complete triangle')}; is it truncated?",
-        )
+        row = np.flatnonzero(is_corner)[-1] if len(corners) else len(rows)
+        found, complete = counted(len(corners), "corner"), counted(loops, "complete triangle")
+        raise rows.error(row, f"the file has {found} in {complete}; is it truncated?")
     return corners.points("corner")

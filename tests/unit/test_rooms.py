@@ -39,7 +39,7 @@ BLENDER_GPU_FILES = ("device.py",)
 
 #: What the Python package can use where it is installed.
 EXTRA_LIBRARIES = {
-    *("distributed", "h5py", "imageio_ffmpeg", "matplotlib", "meshio", "pyvista", "vtkmodules"),
+    *("distributed", "h5py", "imageio_ffmpeg", "matplotlib", "meshio", "pyvista", "vtkmodules")
 }
 FILES = sorted(PACKAGE.rglob("*.py"))
 

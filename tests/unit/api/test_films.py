@@ -76,10 +76,7 @@ def test_noise_moves_with_the_mesh(square):
     deformed = np.ascontiguousarray(bent.T)
     drawn, expected = (
         face_values(mesh, np.eye(3), deformed, field, False)[0].channels[REPRESENTATION]
-        for mesh, field in (
-            (instance.surface, instance.field),
-            (other, fields[1]),
-        )
+        for mesh, field in ((instance.surface, instance.field), (other, fields[1]))
     )
     assert drawn == pytest.approx(expected, abs=1e-5)
     half = views_of(fields, between=1)[1].instances[0].surface

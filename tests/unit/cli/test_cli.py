@@ -38,10 +38,7 @@ REFUSED = {
         "unknown setting 'lenght'",
     ),
     "lights": (["render", "{mesh}", "-o", "{out}", "--set", "light=scene"], "has no lights"),
-    "still without flow": (
-        ["turntable", "{mesh}", "-o", "{out}.gif", "--still"],
-        "nothing moves",
-    ),
+    "still without flow": (["turntable", "{mesh}", "-o", "{out}.gif", "--still"], "nothing moves"),
     "value": (
         ["render", "{mesh}", "-o", "{out}", "--set", "length=long"],
         "--set length=long: expected a whole",

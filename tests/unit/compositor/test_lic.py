@@ -142,11 +142,7 @@ def test_the_standard_deviation_of_one_member_matches_theory(kernel, line_width,
 
 
 @pytest.mark.parametrize(
-    "settings",
-    [
-        {"method": "members", "weights": "cosine"},
-        {"method": "sheets"},
-    ],
+    "settings", [{"method": "members", "weights": "cosine"}, {"method": "sheets"}]
 )
 def test_breaking_points_are_not_visible(settings):
     size, degree, guides = 384, 4, 4

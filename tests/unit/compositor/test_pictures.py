@@ -147,8 +147,7 @@ def test_magnitude_is_colored(ends):
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
-    "ends",
-    [(0.0, 0.0), (0.0, 5e-324), (0.0, 1e30), (7.0, 7.0), (1e30, -1e30)],
+    "ends", [(0.0, 0.0), (0.0, 5e-324), (0.0, 1e30), (7.0, 7.0), (1e30, -1e30)]
 )
 def test_magnitudes_of_any_scale(ends):
     surface = plane(4, 4)

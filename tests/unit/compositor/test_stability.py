@@ -72,8 +72,7 @@ LOOKS = {
 
 
 @pytest.mark.parametrize(
-    ("name", "motion"),
-    [("hatch", "zoomed"), ("uneven", "bent"), ("even", "bent far")],
+    ("name", "motion"), [("hatch", "zoomed"), ("uneven", "bent"), ("even", "bent far")]
 )
 def test_streaks_stay_on_the_surface(name, motion):
     assert warped_correlation(*MOTIONS[motion](), LOOKS[name]) >= 0.9

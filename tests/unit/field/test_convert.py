@@ -21,11 +21,7 @@ from rosy_addon.field.curvature import face_magnitude
 from rosy_addon.field.directional_field import field_from_directions, field_matching
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import axis_field, generate
-from rosy_addon.field.representation import (
-    face_representation,
-    from_representation,
-    power,
-)
+from rosy_addon.field.representation import face_representation, from_representation, power
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
 

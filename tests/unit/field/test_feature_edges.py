@@ -11,11 +11,7 @@ from rosy_addon.extras.command_line import main
 from rosy_addon.field.formats.feature_edges import read_edges
 
 SQUARES = plane(3, 2)
-FILES = {
-    "a.sharp": "2\n1,0,0\n0,4,2\n",
-    "a.feature": "2\n0,0\n4,2\n",
-    "b.feature": "2\n0 0\n4 2\n",
-}
+FILES = {"a.sharp": "2\n1,0,0\n0,4,2\n", "a.feature": "2\n0,0\n4,2\n", "b.feature": "2\n0 0\n4 2\n"}
 
 
 @pytest.mark.parametrize("name", FILES)

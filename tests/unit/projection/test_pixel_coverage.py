@@ -25,10 +25,7 @@ def instance(surface, scale=1.0, shift=(0, 0, 0), has_field=True):
 SCENES = {
     "dense sphere": [instance(icosphere(5))],
     "cube": [instance(CUBE)],
-    "torus behind a sphere": [
-        instance(torus(60, 30)),
-        instance(icosphere(3), 0.4, (0, -1.5, 0)),
-    ],
+    "torus behind a sphere": [instance(torus(60, 30)), instance(icosphere(3), 0.4, (0, -1.5, 0))],
     "behind an occluder": [instance(icosphere(3)), instance(CUBE, 0.3, (0.6, -2, 0.2), False)],
     "specks": [instance(icosphere(1), 0.02, (0.013 * k, -k / 2, 0.1 * k)) for k in range(4)],
 }

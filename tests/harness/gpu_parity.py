@@ -128,8 +128,7 @@ def draw_pair(
     view = rosy.ViewInput(
         tuple(instances), camera.resized(width, height), look, tuple(lights), reference, drift=drift
     )
-    items = card.upload(instances, look.display)
-    texture = rosy.run(card.texture_steps(items, view))
+    texture = rosy.run(card.texture_steps(card.upload(instances, look.display), view))
     card_picture = card.device.read(texture)
     images = read_gbuffer(card, width, height)
     gbuffer = rosy.project(instances, view.camera, look.display, samples=supersampling)
@@ -142,8 +141,7 @@ def draw_pair(
         with one_streamline_per_pixel(rosy.package):
             numpy_picture = rosy.compose(gbuffer, look, lights, reference, drift=drift).rgba
     else:
-        brute_look = replace(look, method="brute")
-        numpy_picture = rosy.compose(gbuffer, brute_look, lights, reference).rgba
+        numpy_picture = rosy.compose(gbuffer, replace(look, method="brute"), lights, reference).rgba
     return Pair(
         gbuffer,
         {name: np.array(image) for name, image in images.items()},
@@ -166,8 +164,7 @@ def draw_on_card(
 ) -> np.ndarray:
     """Draw a picture on the card: (H, W, 4), without supersampling."""
     view = rosy.ViewInput(tuple(instances), camera, look)
-    items = card.upload(instances, look.display)
-    texture = rosy.run(card.texture_steps(items, view))
+    texture = rosy.run(card.texture_steps(card.upload(instances, look.display), view))
     return card.device.read(texture)
 
 

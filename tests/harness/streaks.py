@@ -57,8 +57,7 @@ def orientation_spectrum(tone: np.ndarray, bins: int = 180) -> np.ndarray:
     used = (radius > BAND[0]) & (radius < BAND[1])
     bin_index = (angle[used] * bins / 180).astype(int) % bins
     total = np.bincount(bin_index, power[used], bins)
-    count = np.bincount(bin_index, minlength=bins)
-    spectrum = total / np.maximum(count, 1)
+    spectrum = total / np.maximum(np.bincount(bin_index, minlength=bins), 1)
     return spectrum / spectrum.mean()
 
 

@@ -50,8 +50,7 @@ def copies_of(surface, scale=3.0):
 def awkward_surface(name):
     """One of the meshes of `awkward.AWKWARD`."""
     points, faces = AWKWARD[name]()
-    starts = np.cumsum([0, *map(len, faces)])
-    return build_surface(points, np.concatenate(faces), starts, name=name)
+    return build_surface(points, np.concatenate(faces), np.cumsum([0, *map(len, faces)]), name=name)
 
 
 def random_field(surface, degree, seed=0):

@@ -188,8 +188,7 @@ def test_text_is_wrapped_at_spaces():
 def drawn(request):
     layout = lay_out_key(PARTS, (640, 480), text_width)
     rgba = np.zeros((480, 640, 4), dtype=np.float32)
-    scale = ColorScale("", "magma", 0.0, 1.0)
-    draw_key(rgba, layout, scale, text_triangles, request.param)
+    draw_key(rgba, layout, ColorScale("", "magma", 0.0, 1.0), text_triangles, request.param)
     return rgba, layout
 
 
@@ -256,8 +255,7 @@ def test_the_range_is_the_largest_visible_magnitude():
     low, high = picture.color_range
     assert low == 0 and high == pytest.approx(largest_visible(view_input), rel=1e-6)
     # A look with this range gives the same picture.
-    fixed = view(replace(look, color_range=(0.0, high)))
-    again = draw_picture(fixed)
+    again = draw_picture(view(replace(look, color_range=(0.0, high))))
     np.testing.assert_array_equal(again.rgba, picture.rgba)
     assert again.color_range == (0.0, high)
     scale = picture_key(look, picture).color_scale
@@ -296,13 +294,11 @@ def test_the_range_of_numbers_as_colors(ends):
     heights = instance.surface.vertices[instance.surface.corner_vertex, 2].astype(np.float32)
     colored = replace(instance, color_values=heights)
     look = Look(hue="values", color_range=ends)
-    view_input = view(look, (colored,))
-    picture = draw_picture(view_input)
+    picture = draw_picture(view(look, (colored,)))
     expected = ends if any(ends) else (float(heights.min()), float(heights.max()))
     assert picture.color_range == expected == fixed_color_range(look, (colored,))
     assert fixed_color_range(look) == (ends if any(ends) else None)
-    scale = picture_key(look, picture).color_scale
-    assert scale == ColorScale("", look.color_map, *expected)
+    assert picture_key(look, picture).color_scale == ColorScale("", look.color_map, *expected)
 
 
 @pytest.mark.parametrize(

@@ -152,8 +152,7 @@ def test_files_and_arrays_give_the_same_field(sphere, field, tmp_path):
         field.save(tmp_path / name)
         again = rf.read_field(tmp_path / name, sphere, 4)
         assert np.array_equal(again.directions, field.directions)
-    vectors = rf.from_vectors(sphere, field.vectors, 4)
-    assert np.array_equal(vectors.vectors, field.vectors)
+    assert np.array_equal(rf.from_vectors(sphere, field.vectors, 4).vectors, field.vectors)
 
 
 def test_fields_from_arrays_of_a_surface(sphere, field, error_of):
@@ -249,8 +248,7 @@ def test_the_command_draws_the_same_picture(tmp_path):
     out = tmp_path / "command.png"
     assert main(["render", str(tmp_path / "torus.obj"), "-o", str(out), *words]) == 0
     surface = rf.Surface(tmp_path / "torus.obj")
-    field = rf.smoothest(surface)
-    picture = rf.render(surface, field, size=(64, 48), preset="plaid", seed=3)
+    picture = rf.render(surface, rf.smoothest(surface), size=(64, 48), preset="plaid", seed=3)
     assert out.read_bytes() == picture._repr_png_()
     same = rf.Surface(surface.vertices, surface.faces, up="y")
     again = rf.render(same, rf.smoothest(same), size=(64, 48), preset="plaid", seed=3)
@@ -328,8 +326,7 @@ def test_colors_of_vertices_as_a_tone():
 
 def test_an_image_on_the_uv_map(error_of):
     """The left half is dark."""
-    uv = np.array(SQUARE)[:, :2]
-    square = rf.Surface(SQUARE, [[0, 1, 2, 3]], uv=uv)
+    square = rf.Surface(SQUARE, [[0, 1, 2, 3]], uv=np.array(SQUARE)[:, :2])
     field = rf.along_uv(square)
     image = np.array([[0, 255]], dtype=np.uint8)
     picture = rf.render(
@@ -355,8 +352,7 @@ def test_lines_in_space_are_in_the_space_of_the_mesh(tmp_path, error_of):
     """An ellipsoid whose y points up in its file, unlike in pictures of it."""
     axes = (1.0, 2.0, 0.5)
     mesh = icosphere(3)
-    faces = mesh.corner_vertex.reshape(-1, 3)
-    surface = rf.Surface(mesh.vertices * axes, faces, up="y")
+    surface = rf.Surface(mesh.vertices * axes, mesh.corner_vertex.reshape(-1, 3), up="y")
     arguments = {"size": (200, 200), "width": 3.0, "hidden": True, "orthographic": True}
     drawing = rf.strokes(surface, spacing=8, taper=0.0, **arguments)
     drawing.save(tmp_path / "a.csv")
@@ -424,6 +420,5 @@ def test_tones_of_corners_and_of_vertices_draw_the_same_picture():
 
 
 def test_other_numbers_of_tones_are_refused(error_of):
-    surface = rf.Surface(*CUBE)
-    message = error_of(rf.render, surface, tone_values=np.ones(6), preset="engraving")
+    message = error_of(rf.render, rf.Surface(*CUBE), tone_values=np.ones(6), preset="engraving")
     assert "8 numbers, one for each vertex, or 24 numbers, one for each corner" in message

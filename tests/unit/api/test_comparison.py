@@ -24,8 +24,7 @@ def members(surface, vectors, degree):
     """The members of one face: a vector rotated about the normal."""
     angles = 2 * np.pi * np.arange(degree) / degree
     for vector, normal in zip(vectors, surface.face_normal, strict=True):
-        perpendicular = np.cross(normal, vector)
-        yield np.cos(angles)[:, None] * vector + np.sin(angles)[:, None] * perpendicular
+        yield np.cos(angles)[:, None] * vector + np.sin(angles)[:, None] * np.cross(normal, vector)
 
 
 @pytest.mark.parametrize("degree", range(1, 8))

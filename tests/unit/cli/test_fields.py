@@ -111,8 +111,7 @@ def test_info_compares(sphere, tmp_path):
     assert facts["is_rosy"] and facts["energy"] > 4 * np.pi * 4
     facts = facts_of(sphere, turned, "--against", sings)
     assert facts["against"] == {"same": 8, "only_here": [], "only_there": []}
-    done = rosy("info", sphere, made, "--against", turned)
-    assert "off by 5 degrees on average" in done.stdout
+    assert "off by 5 degrees on average" in rosy("info", sphere, made, "--against", turned).stdout
 
 
 @pytest.mark.slow

@@ -141,8 +141,7 @@ def painted(tmp_path_factory):
     """A ball that is dark on the left and light on the right, in its colors and in a number."""
     ball = icosphere(4)
     right = ball.vertices[:, 0] > 0
-    gray = np.where(right, 230, 60)
-    colors = dict.fromkeys(("red", "green", "blue"), gray)
+    colors = dict.fromkeys(("red", "green", "blue"), np.where(right, 230, 60))
     path = tmp_path_factory.mktemp("painted") / "ball.ply"
     return write_ply(path, ball, **colors, cavity=np.where(right, 0.8, 0.1))
 

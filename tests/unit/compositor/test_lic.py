@@ -31,8 +31,7 @@ def plain(**settings):
 
 def tone(angles, degree, look=PLAIN, **more):
     """(H, W) display values of a planar picture before clipping, one channel."""
-    picture = compose_planar(angles, degree, look, **more)
-    return picture.layer.tone[:, 0].reshape(angles.shape)
+    return compose_planar(angles, degree, look, **more).layer.tone[:, 0].reshape(angles.shape)
 
 
 def make_noise(size, line_width=1.5, seed=0):
@@ -59,8 +58,7 @@ def runge_kutta_lic(angle, noise, size, length, kernel):
 
     def look_up(p):
         column = np.clip(p.real.astype(int), 0, size - 1)
-        row = np.clip(p.imag.astype(int), 0, size - 1)
-        return noise[row, column]
+        return noise[np.clip(p.imag.astype(int), 0, size - 1), column]
 
     total, count = noise.copy(), np.ones_like(noise)
     for sign in (1, -1):
@@ -70,8 +68,7 @@ def runge_kutta_lic(angle, noise, size, length, kernel):
             k1 = direction(p)
             k2 = direction(p + h / 2 * k1)
             k3 = direction(p + h / 2 * k2)
-            k4 = direction(p + h * k3)
-            p = p + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+            p = p + h / 6 * (k1 + 2 * k2 + 2 * k3 + direction(p + h * k3))
             alive &= inside(p)
             total += weight * np.where(alive, look_up(p), 0)
             count += weight * alive
@@ -136,8 +133,7 @@ def test_the_standard_deviation_of_one_member_matches_theory(kernel, line_width,
     look = plain(line_width=line_width, length=length, high_pass=high_pass, **KERNELS[kernel])
     stds = []
     for angle in (0.1, 0.9, 1.7, 2.6):
-        image = tone(np.full((size, size), angle), 1, look)
-        stds.append(crop_margin(image, length + 5).std())
+        stds.append(crop_margin(tone(np.full((size, size), angle), 1, look), length + 5).std())
     assert np.mean(stds) == pytest.approx(expected_std(pixel_look(look)), rel=0.05)
 
 
@@ -213,8 +209,7 @@ def test_pictures_of_any_size(method, shape):
 
 def test_color_noise_has_three_channels():
     angles = pair_angle(*pixel_centers(128), 128, 4)
-    picture = compose_planar(angles, 4, plain(hue="noise"))
-    channels = picture.layer.tone
+    channels = compose_planar(angles, 4, plain(hue="noise")).layer.tone
     assert channels.shape == (128 * 128, 3)
     assert abs(correlation(channels[:, 0], channels[:, 1])) < 0.1
     gray = tone(angles, 4)

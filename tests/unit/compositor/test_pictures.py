@@ -69,8 +69,7 @@ def test_two_degrees_in_one_picture():
     gbuffer = project(instances, camera)
     picture, layers = compose(gbuffer, PLAIN), degree_layers(gbuffer, PLAIN)
     assert [layer.degree for layer in layers] == [3, 4]
-    covered = sum(len(layer.pixel) for layer in layers)
-    assert covered == np.count_nonzero(picture.rgba[..., 3])
+    assert sum(len(layer.pixel) for layer in layers) == np.count_nonzero(picture.rgba[..., 3])
 
 
 def test_streaks_of_a_tilted_plane_follow_the_projected_direction():
@@ -118,8 +117,7 @@ def test_lights_of_the_scene():
     camera = perspective_camera(look_at((0, 0, 3), (0, 0, 0), (0, 1, 0)), 64, 64)
     gbuffer = project([MeshInstance(surface, np.eye(4), axis_field(surface, 1, (1, 0, 0)))], camera)
     look = plain(shading=1.0, light="scene")
-    white = np.ones(3)
-    sun = Light("sun", normalize(np.array([0.0, 1.0, 1.0])), white, 2.0)
+    sun = Light("sun", normalize(np.array([0.0, 1.0, 1.0])), np.ones(3), 2.0)
     assert np.allclose(diffuse(gbuffer, look, [sun]), np.sqrt(2), atol=1e-5)
     # A point light two units above the center of the plane: 1 / r^2 and the cosine.
     lamp = Light("point", np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.5, 0.0]), 4.0)
@@ -135,8 +133,7 @@ def test_lights_of_the_scene():
 def test_magnitude_is_colored(ends):
     surface = plane(32, 2)
     rho = (surface.face_center[:, :1] + 1) / 2
-    field = RosyField(1, rho * [1.0, 0, 0])
-    gbuffer = project_surface(surface, field, 128)
+    gbuffer = project_surface(surface, RosyField(1, rho * [1.0, 0, 0]), 128)
     picture = compose(gbuffer, plain(hue="magnitude", color_range=ends, gain=0.0))
     x = gbuffer.position[:, 0]
     actual = to_display(picture.rgba.reshape(-1, 4)[gbuffer.pixel, :3])

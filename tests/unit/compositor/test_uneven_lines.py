@@ -32,8 +32,7 @@ def plane_coverage(look, tone, degree=2, angle=0.3, side=320):
     noise = look_noise(field, look)
     break_images = paper_grain = None
     if look.breaks or look.wobble:
-        break_look = look.with_length(break_steps(look))
-        (break_images,) = fast_lic(field, [break_look], noise)
+        (break_images,) = fast_lic(field, [look.with_length(break_steps(look))], noise)
     if look.paper_grain:
         paper_grain = picture_paper_grain(
             field.pixel, field.width, look.line_width, look.seed, 1, field.line_count

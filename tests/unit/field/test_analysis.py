@@ -122,5 +122,4 @@ def test_fields_are_described():
     vectors = field.vectors.copy()
     vectors[[3, 70]] = 0
     fields = [(sphere, field), (sphere, RosyField(4, vectors))]
-    note = description(fields, count_singularities=False)
-    assert note == "2 faces without a direction"
+    assert description(fields, count_singularities=False) == "2 faces without a direction"

@@ -143,8 +143,7 @@ def test_values_that_are_not_finite(box, error_of):
     velocity = np.tile([1.0, 2.0, 3.0], (box.face_count, 1))
     velocity[2] = np.nan
     arrays = arrays_of(box, cells={"U": velocity})
-    message = error_of(array_field, arrays)
-    assert "flow.vtu: array 'U': 1 of 6 vectors are not finite" in message
+    assert "flow.vtu: array 'U': 1 of 6 vectors are not finite" in error_of(array_field, arrays)
     field = array_field(arrays, policy=VectorPolicy("zero"))
     assert np.flatnonzero(~field.vectors.any(axis=1)).tolist() == [2]
     assert np.isnan(velocity[2]).all(), "the array stays as it is"

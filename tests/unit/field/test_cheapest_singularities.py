@@ -48,8 +48,7 @@ def test_one_given_costs_no_more_than_the_smoothest_field():
     ball = icosphere(4)
     vertex, index = cheapest_singularities(ball, 4, [7], [1])
     assert index.tolist() == [1] * 8
-    energy = energy_of(ball, 4, vertex, index)
-    assert energy < dirichlet_energy(ball, smoothest_field(ball, 4))
+    assert energy_of(ball, 4, vertex, index) < dirichlet_energy(ball, smoothest_field(ball, 4))
 
 
 def test_a_field_with_a_border_needs_no_more():

@@ -22,8 +22,7 @@ MAJOR, MINOR = 1.0, 0.4
 def start(surface: Surface, degree: int, kind: str = "smoothest", reach: float = 0.1) -> Combing:
     system = guided_system(surface, degree)
     no_guides = np.zeros((surface.face_count, 3))
-    field = generate(surface, kind, degree)
-    return start_combing(system, field, no_guides, reach * surface.extent)
+    return start_combing(system, generate(surface, kind, degree), no_guides, reach * surface.extent)
 
 
 def draw(combing: Combing, points: np.ndarray, batch: int = 1000, pressure: float = 1.0, **brush):

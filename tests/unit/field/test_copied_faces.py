@@ -16,8 +16,7 @@ SHEET = plane(4, 3)
 def two_sided(*, apart: bool = False, turn: int = 0):
     """Return the arrays of a sheet with a second side, whose vertices may be its own."""
     back = np.roll(SHEET.faces[:, ::-1], turn, axis=1) + apart * len(SHEET.vertices)
-    vertices = np.concatenate([SHEET.vertices] * (1 + apart))
-    return vertices, np.concatenate([SHEET.faces, back])
+    return np.concatenate([SHEET.vertices] * (1 + apart)), np.concatenate([SHEET.faces, back])
 
 
 @pytest.mark.parametrize("apart", [False, True])

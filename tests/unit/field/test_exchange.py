@@ -148,8 +148,7 @@ def test_rosy_files_without_a_degree(degree, tmp_path):
 
 
 def test_tensors_are_distinguished_from_three_directions(tmp_path):
-    random = np.random.default_rng(0)
-    matrices = random.standard_normal((BALL.face_count, 3, 3))
+    matrices = np.random.default_rng(0).standard_normal((BALL.face_count, 3, 3))
     matrices += matrices.swapaxes(1, 2)
     np.save(tmp_path / "a.npy", matrices)
     field = read_field(tmp_path / "a.npy", BALL)
@@ -251,5 +250,4 @@ def test_another_shape_is_refused(tmp_path, error_of):
     write_off(tmp_path / "a.off", BALL)
     write_field(tmp_path / "a.rosy", axis_field(BALL, 4), BALL)
     far = rebuilt(plane(5, 5), plane(5, 5).vertices + 3)
-    message = error_of(read_field, tmp_path / "a.rosy", far)
-    assert "must have the same shape and position" in message
+    assert "must have the same shape and position" in error_of(read_field, tmp_path / "a.rosy", far)

@@ -206,8 +206,7 @@ def test_unwritable_output_is_an_error_and_keeps_the_old_file(tmp_path, error_of
 
 
 def test_small_deviations_are_projected_and_keep_their_length():
-    vectors = WEST + (0, 0, 0.1)
-    field = validated_field(SQUARES, vectors, 4, "here")
+    field = validated_field(SQUARES, WEST + (0, 0, 0.1), 4, "here")
     assert np.allclose(field.vectors, (-np.hypot(2, 0.1), 0, 0), atol=1e-14)
 
 
@@ -247,8 +246,7 @@ def test_vectors_off_the_surface_are_projected_or_undefined_on_request(domain, s
         directions = np.stack([vectors, -vectors], axis=1)
         return validated_directions(surface, directions, "a", policy, domain)
 
-    message = error_of(made, given, VectorPolicy())
-    assert "off_surface, --off-surface" in message
+    assert "off_surface, --off-surface" in error_of(made, given, VectorPolicy())
     expected = made(right, VectorPolicy()).vectors
     projected = made(given, VectorPolicy(off_surface="project"))
     assert np.abs(projected.vectors - expected).max() < 1e-12
@@ -297,8 +295,7 @@ def test_a_field_belongs_to_the_rest_shape():
     field = axis_field(tube, 4)
     turned = tube.vertices[:, [2, 1, 0]] * (1, 1, -1.0)
     bent = tube.with_parts(vertices=turned, rest_vertices=tube.vertices)
-    again = validated_field(bent, field.vectors, 4, "here")
-    assert np.array_equal(again.vectors, field.vectors)
+    assert np.array_equal(validated_field(bent, field.vectors, 4, "here").vectors, field.vectors)
 
 
 def test_vectors_beyond_the_range_of_single_precision(error_of):

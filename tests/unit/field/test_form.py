@@ -88,8 +88,7 @@ def test_lines_run_around_a_torus_tube():
     surface = torus()
     field = generate(surface, "form", 2)
     outside = np.hypot(*surface.face_center[:, :2].T) > 1
-    along = direction_on_torus(surface.face_center)
-    assert np.abs(dot(field.vectors, along))[outside].max() < 0.02
+    assert np.abs(dot(field.vectors, direction_on_torus(surface.face_center)))[outside].max() < 0.02
 
 
 def test_noise_is_measured():

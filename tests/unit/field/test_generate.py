@@ -64,8 +64,7 @@ def test_view_frames_are_the_transported_camera_axes(a):
 def test_all_members_have_one_representation(angle, rho, degree, k):
     x, y = np.array([1.0, 0, 0]), np.array([0, 1.0, 0])
     turned = angle + 2 * np.pi * k / degree
-    member = rho * (np.cos(turned) * x + np.sin(turned) * y)
-    z = to_representation(member, x, y, degree)
+    z = to_representation(rho * (np.cos(turned) * x + np.sin(turned) * y), x, y, degree)
     assert z == pytest.approx(rho * np.exp(1j * degree * angle), abs=1e-9)
     again = to_representation(from_representation(z, x, y, degree), x, y, degree)
     assert again == pytest.approx(z, abs=1e-9)
@@ -182,12 +181,10 @@ def test_the_length_of_an_axis_does_not_count(length):
 @pytest.mark.parametrize("length", [1e-320, 1e-160, 1e-9])
 def test_smoothing_over_no_distance_changes_nothing(length):
     surface = torus()
-    settings = GeneratorSettings("curvature", reach=length)
-    vectors = generate(surface, settings, 4).vectors
+    vectors = generate(surface, GeneratorSettings("curvature", reach=length), 4).vectors
     np.testing.assert_array_equal(vectors, curvature_field(surface, 4).vectors)
     guides = GeneratorSettings("guided", reach=length, vectors=vectors)
-    exact = GeneratorSettings("guided", vectors=vectors)
-    expected = generate(surface, exact, 4).vectors
+    expected = generate(surface, GeneratorSettings("guided", vectors=vectors), 4).vectors
     np.testing.assert_array_equal(generate(surface, guides, 4).vectors, expected)
     again = convert(surface, RosyField(4, vectors), Conversion(smoothing_length=length))
     np.testing.assert_array_equal(again.vectors, vectors)
@@ -196,8 +193,7 @@ def test_smoothing_over_no_distance_changes_nothing(length):
 def test_faces_perpendicular_to_an_axis_are_undefined():
     """Also where the normal is rounded."""
     points = [(0, 0, 0), (1, 0, 0.3), (0, 1, 0.7), (5, 0, 0), (6, 0, 1), (5, 1, 0)]
-    surface = from_triangles(points, [(0, 1, 2), (3, 4, 5)])
-    field = axis_field(surface, 4, (-0.3, -0.7, 1))
+    field = axis_field(from_triangles(points, [(0, 1, 2), (3, 4, 5)]), 4, (-0.3, -0.7, 1))
     assert not field.vectors[0].any() and field.vectors[1].any()
 
 

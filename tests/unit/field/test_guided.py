@@ -101,8 +101,7 @@ def test_the_edges_of_a_cube_are_sharp_and_guide_all_its_faces():
     box = cube()
     ends = feature_edges(box, 0.5)
     assert len(ends) == 12
-    guides = guides_from_edges(box, ends, 4)
-    along = np.abs(guides).max(axis=1)
+    along = np.abs(guides_from_edges(box, ends, 4)).max(axis=1)
     np.testing.assert_allclose(along, 1, atol=1e-12)
     # In degree 2 the edges of a square cancel.
     assert not guides_from_edges(box, ends, 2).any()
@@ -139,8 +138,7 @@ def test_curvature_spreads_into_flat_regions():
     quads = np.stack([first, first + 1, first + count + 1, first + count], axis=-1).reshape(-1, 4)
     surface = from_quads(points, quads)
     flat = surface.face_center[:, 0] < -1
-    plain = generate(surface, "curvature", 4)
-    assert plain.magnitude[flat].max() < 1e-3
+    assert generate(surface, "curvature", 4).magnitude[flat].max() < 1e-3
     field = generate(surface, GeneratorSettings("curvature", reach=0.05), 4)
     np.testing.assert_allclose(field.magnitude, 1, atol=1e-6)
     assert np.abs(field.vectors[flat]).max(axis=1).min() > np.cos(np.radians(1))

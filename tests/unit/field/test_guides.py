@@ -136,8 +136,7 @@ def test_maps_without_area_are_undefined():
     uv = uv_of(surface, np.eye(2))
     uv[:8] = 0.5
     uv[8:12, 1] = 0.0
-    guides = guides_from_uv(surface, uv, 4)
-    assert guides.any(axis=1).tolist() == [False] * 3 + [True] * 6
+    assert guides_from_uv(surface, uv, 4).any(axis=1).tolist() == [False] * 3 + [True] * 6
 
 
 def test_guides_of_several_kinds_are_combined(error_of):

@@ -280,5 +280,4 @@ def test_off_coordinates_are_read_exactly(tmp_path_factory, numbers):
     path = tmp_path_factory.getbasetemp() / "exact.off"
     rows = [" ".join(map(repr, numbers[k : k + 3])) for k in (0, 3, 6)]
     path.write_text("\n".join(["OFF", "3 1 0", *rows, "3 0 1 2", ""]))
-    surface = Surface(path)
-    assert surface.vertices.ravel().tolist() == numbers
+    assert Surface(path).vertices.ravel().tolist() == numbers

@@ -85,8 +85,7 @@ def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
     content, expected = DAMAGED[name]
     path = tmp_path / "a.om"
     path.write_bytes(content)
-    surface = rf.Surface(POINTS, [[0, 1, 2, 3], [1, 4, 2]])
-    assert expected in error_of(read_field, path, surface)
+    assert expected in error_of(read_field, path, rf.Surface(POINTS, [[0, 1, 2, 3], [1, 4, 2]]))
 
 
 def test_every_changed_byte_is_an_error_or_a_mesh(tmp_path):

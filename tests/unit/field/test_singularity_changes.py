@@ -81,8 +81,7 @@ def test_curvature_is_cleaned(degree, subdivisions, noise):
     With large faces, some pairs have to stay.
     """
     surface = icosphere(subdivisions)
-    random = np.random.default_rng(degree)
-    noise = noise * random.standard_normal((len(surface.vertices), 3))
+    noise = noise * np.random.default_rng(degree).standard_normal((len(surface.vertices), 3))
     surface = rebuilt(surface, surface.vertices * (1, 1.3, 0.7) + noise)
     field = generate(surface, GeneratorSettings("curvature"), degree)
     clean = convert(surface, field, Conversion(pair_distance=0.4 / subdivisions))

@@ -25,8 +25,7 @@ from rosy_addon.field.sparse_multigrid import (
 
 @pytest.fixture(scope="module")
 def laplacian():
-    connection = build_connection(torus(60, 30))
-    matrix = field_laplacian(connection, 4)
+    matrix = field_laplacian(build_connection(torus(60, 30)), 4)
     return matrix.plus_diagonal(1e-3 * matrix.diagonal)
 
 

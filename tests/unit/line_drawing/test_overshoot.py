@@ -216,6 +216,5 @@ def test_extensions_double_short_strokes():
     traced = strokes_of((SQUARE,), TOP_CAMERA, StrokeStyle(spacing=6, taper=0))
     short = traced.runs_where(np.abs(traced.points[:, 0]) < 0.02)
     assert short.free_end_mask.all()
-    depth_buffer = rasterize_depth([SQUARE], TOP_CAMERA)
-    extended = extend_free_ends(short, TOP_CAMERA, 100.0, depth_buffer)
+    extended = extend_free_ends(short, TOP_CAMERA, 100.0, rasterize_depth([SQUARE], TOP_CAMERA))
     assert np.allclose(pixel_growth(short, extended, TOP_CAMERA), 100 * short.length)

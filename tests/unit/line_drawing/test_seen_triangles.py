@@ -65,8 +65,7 @@ def meets_another(points, direction, triangles):
 
 def test_the_margin_is_a_distance_on_the_surface():
     """Triangles are kept up to the margin, also if they are long and thin."""
-    strip = instance(plane(200, 2, 1.0))
-    mesh = build_tangent_mesh(strip)
+    mesh = build_tangent_mesh(instance(plane(200, 2, 1.0)))
     x = mesh.points[:, :, 0]
     spacing = 0.02
     first = x.max(axis=1) < x.min() + 0.011

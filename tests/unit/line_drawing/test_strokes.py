@@ -134,8 +134,7 @@ def test_strokes_stop_at_creases_unless_asked():
 
 def test_straight_ahead_is_a_geodesic():
     """Geodesics on a cylinder are straight lines in the plane to which it is unrolled."""
-    surface = cylinder(64, 8)
-    mesh = build_tangent_mesh(turned(surface, 2))
+    mesh = build_tangent_mesh(turned(cylinder(64, 8), 2))
     count = 20
     triangle = np.full(count, 100, dtype=np.int32)
     weights = np.full((count, 3), 1 / 3)
@@ -272,8 +271,7 @@ def test_ink_coverage_follows_a_ramp_of_tone():
     """Coverage is the length of strokes per area, times the width that is solid at the minimum."""
     surface = plane(40, 40)
     width = 0.025
-    tone = 0.85 * (surface.vertices[:, 0] + 1) / 2
-    spacing = width * spacing_by_tone(tone, max_ratio=1 / 0.15)
+    spacing = width * spacing_by_tone(0.85 * (surface.vertices[:, 0] + 1) / 2, max_ratio=1 / 0.15)
     instance = MeshInstance(surface, IDENTITY, axis_field(surface, 2, (0, 1, 0)))
     start, end, _ = segments_of(trace_strokes(instance, spacing))
     length = np.linalg.norm(end - start, axis=1)
@@ -375,8 +373,7 @@ def test_a_sphere_shows_its_near_side():
     is_near_side = (start + end)[:, 1] < 0
     near_length = np.linalg.norm(end - start, axis=1)[is_near_side].sum()
     assert np.isclose(visible.length.sum(), near_length, rtol=0.02)
-    unclipped = clip_to_visible(strokes, camera, None)
-    assert np.isclose(unclipped.length.sum(), strokes.length.sum())
+    assert np.isclose(clip_to_visible(strokes, camera, None).length.sum(), strokes.length.sum())
 
 
 @pytest.mark.slow

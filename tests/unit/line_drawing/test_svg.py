@@ -99,8 +99,7 @@ def test_outlines_hold_as_much_ink_as_their_strokes():
 @settings(max_examples=30, deadline=None)
 @given(st.integers(1, 60), st.integers(0, 10**6))
 def test_plotter_order_is_a_permutation_with_little_travel(count, seed):
-    random = np.random.default_rng(seed)
-    first, last = random.random((2, count, 2))
+    first, last = np.random.default_rng(seed).random((2, count, 2))
     order, is_reversed = plotter_order(first, last)
     assert sorted(order.tolist()) == list(range(count))
     begin = np.where(is_reversed[:, None], last[order], first[order])
@@ -138,8 +137,7 @@ def test_command_line(tmp_path, capsys, monkeypatch):
         assert main([*command, *options.split()]) == 0
         contents.append(out.read_bytes())
     assert contents[0] == contents[1]
-    root = ElementTree.fromstring(contents[0])
-    assert len(root.findall("{http://www.w3.org/2000/svg}g")) == 4
+    assert len(ElementTree.fromstring(contents[0]).findall("{http://www.w3.org/2000/svg}g")) == 4
     for arguments, message in (
         (["-o", str(tmp_path / "ball.png")], "ball.png"),
         (["--camera", "Close"], "ball.off: --camera applies only to .blend files"),

@@ -100,8 +100,7 @@ def test_an_uneven_surface_is_continuous(perspective, height):
 def test_the_near_side_of_a_torus_is_separate_from_the_far_side(perspective):
     """A torus seen over its near side: the near tube is not linked to the far one."""
     camera = camera_above(300, 3.2, perspective, eye=(0, -5.6, 2.2), up=(0, 0, 1))
-    surface = torus(200, 100)
-    gbuffer = project_surfaces([surface], camera)
+    gbuffer = project_surfaces([torus(200, 100)], camera)
     pairs, linked = neighbor_pairs(gbuffer, neighbor_masks(gbuffer, None))
     first, second = pairs.T
     jump = np.abs(gbuffer.position[first, 2] - gbuffer.position[second, 2])

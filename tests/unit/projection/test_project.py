@@ -372,8 +372,7 @@ def test_undefined_and_degenerate_faces_are_zero(display):
     triangles[5, 1] = triangles[5, 0]
     vertices[triangles[9, 2]] = vertices[triangles[9, 1]]
     surface = from_triangles(vertices, triangles)
-    field = tangent_field(surface, 4)
-    vectors = field.vectors.copy()
+    vectors = tangent_field(surface, 4).vectors.copy()
     vectors[::3] = 0
     camera = orbit_camera(surface.vertices, 0, 0, 100, 100)
     for matrix in (IDENTITY, placed(np.diag([1.0, 0.0, 1.0])), placed(np.diag([1, 1e-9, 1]))):
@@ -388,8 +387,7 @@ def test_custom_normals_within_a_fan():
     """Corner normals that differ within a fan: values are close to those with equal normals."""
     surface = icosphere(2)
     field = tangent_field(surface, 4)
-    random = np.random.default_rng(1)
-    noise = 0.05 * random.normal(size=surface.corner_normal.shape)
+    noise = 0.05 * np.random.default_rng(1).normal(size=surface.corner_normal.shape)
     custom = rebuilt(surface, corner_normal=normalize(surface.corner_normal + noise))
     camera = orbit_camera(surface.vertices, 0, 0, 60, 60)
     first, second = (project([MeshInstance(s, IDENTITY, field)], camera) for s in (surface, custom))

@@ -212,8 +212,7 @@ def test_the_first_of_equal_depths_is_visible():
 
 @pytest.mark.parametrize(("block", "band"), [(1, 1), (7, 100), (1 << 20, 1 << 30)])
 def test_the_size_of_blocks_does_not_matter(monkeypatch, block, band):
-    random = np.random.default_rng(5)
-    points = random.normal(size=(60, 3)) * (2, 2, 2) + (0, 0, -3)
+    points = np.random.default_rng(5).normal(size=(60, 3)) * (2, 2, 2) + (0, 0, -3)
     triangles = np.arange(60).reshape(20, 3)
     triangles = np.concatenate([triangles, triangles])
     clip = to_clip(points, make_camera(True))

@@ -86,8 +86,7 @@ def test_lines_along_a_cylinder(rounds):
 @pytest.mark.parametrize("degree", [2, 4])
 def test_rings_on_a_torus(degree):
     surface = torus()
-    field = generate(surface, "curvature", degree)
-    lines = lines_of(surface, field, 0.06)
+    lines = lines_of(surface, generate(surface, "curvature", degree), 0.06)
     assert share_within(lines, 0.06, TOLERANCE, AWAY) >= SHARE
 
 
@@ -245,8 +244,7 @@ def test_deformations_and_rotations_keep_the_lines():
         return cached_surface_lines(surface, matrix, field, "smooth", 0.05, cache)
 
     def deformed(amount):
-        points = surface.vertices * (1, 1, amount)
-        return rebuilt(surface, points, rest_vertices=surface.vertices)
+        return rebuilt(surface, surface.vertices * (1, 1, amount), rest_vertices=surface.vertices)
 
     first = cached(deformed(1.2), np.eye(4))
     assert cached(deformed(1.5), np.eye(4)) is first
@@ -258,5 +256,4 @@ def test_deformations_and_rotations_keep_the_lines():
 def test_rest_matrices_measure_lengths():
     rotation = np.array([(0.6, -0.8, 0), (0.8, 0.6, 0), (0, 0, 1.0)])
     for scale, sign in ((np.diag([1, 2, 3.0]), 1), (2 * np.eye(3), -1)):
-        matrix = rest_matrix(placed(sign * rotation @ scale))
-        np.testing.assert_allclose(matrix, scale, atol=1e-12)
+        np.testing.assert_allclose(rest_matrix(placed(sign * rotation @ scale)), scale, atol=1e-12)

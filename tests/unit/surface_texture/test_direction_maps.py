@@ -47,8 +47,7 @@ def decoded(image, surface, uv):
 def test_maps_decode_to_the_field(uv, degree):
     """Also in charts that are turned and mirrored; the direction is one of the field."""
     surface = torus()
-    field = generate(surface, "curvature", degree)
-    vectors = field.vectors.copy()
+    vectors = generate(surface, "curvature", degree).vectors.copy()
     vectors[:48] = 0
     instance = MeshInstance(surface, np.eye(4), RosyField(degree, vectors))
     texture = draw_texture(instance, uv, Look(display="flat"), 512, content="anisotropy")

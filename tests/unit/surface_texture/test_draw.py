@@ -202,7 +202,6 @@ def test_bad_maps_and_looks_are_named(error_of):
 
 def test_textures_are_refused_before_they_are_drawn(error_of, monkeypatch):
     monkeypatch.setattr("rosy_addon.core.memory.available_memory", lambda: 10**9)
-    surface = torus(8, 12)
-    message = error_of(draw_texture, instance_of(surface, 4), torus_uv(8, 12), Look(), 16384)
+    message = error_of(draw_texture, instance_of(torus(8, 12), 4), torus_uv(8, 12), Look(), 16384)
     assert message.startswith("a texture of 16384 x 16384 texels needs about ")
     assert message.endswith(" of memory, 1.0 GB are free: choose a smaller size")

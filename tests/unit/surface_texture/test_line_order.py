@@ -59,8 +59,7 @@ def test_lines_continue_where_the_field_turns():
     mesh = mesh_of(torus(), "curvature", 4, matrix)
     line, share = first_lines(mesh)
     assert share_of(mesh, share > 0.99) > 0.999
-    axis = matrix[:3, 2]
-    around = np.cross(axis, mesh.points.mean(axis=1))
+    around = np.cross(matrix[:3, 2], mesh.points.mean(axis=1))
     around /= np.linalg.norm(around, axis=1, keepdims=True)
     is_around = np.abs((line * around).sum(axis=1)) > 0.7
     assert share_of(mesh, is_around) > 0.999

@@ -65,8 +65,7 @@ class NotingRenderer:
 
 @pytest.fixture
 def view_input():
-    camera = orthographic_camera(np.eye(4), 32, 32)
-    return ViewInput((), camera, Look())
+    return ViewInput((), orthographic_camera(np.eye(4), 32, 32), Look())
 
 
 def progressive_of(renderer, helper=None):

@@ -114,8 +114,7 @@ def test_places_are_even_and_on_the_side_that_the_camera_sees(subdivisions, is_e
     surface = icosphere(subdivisions)
     camera = orthographic_camera(look_at((0, -3, 0.0), (0, 0, 0)), 400, 400, scale=2.2)
     marks = arrows([instance_of(surface, 1)], camera, spacing=25.0, is_exact=is_exact)
-    assert gap(marks.position) >= 25.0
-    assert (marks.anchor[:, 1] < 0).all()
+    assert gap(marks.position) >= 25.0 and (marks.anchor[:, 1] < 0).all()
     radius = 400 / 2.2
     y, x = np.mgrid[:400:2, :400:2] + 0.5
     inside = np.hypot(x - 200, y - 200) < 0.95 * radius

@@ -88,8 +88,7 @@ def test_coverage_is_cut_at_the_window():
 def test_every_round_number_is_the_nearest():
     for value in [1.0, 2e-7, 0.05, *np.geomspace(1e-9, 1e9, 500).tolist()]:
         below, above = round_below(value), round_above(value)
-        assert below <= value * (1 + 1e-9) and above >= value * (1 - 1e-9)
-        assert above / below < 2.51
+        assert below <= value * (1 + 1e-9) and above >= value * (1 - 1e-9) and above / below < 2.51
         assert f"{below:.0e}"[0] in "125" and float(f"{below:.0e}") == below
 
 
@@ -149,8 +148,7 @@ def test_nothing_overlaps(size):
         assert len(layout.plates) == count
         assert layout.text_size >= min(text_size or max(TEXT_SIZE * min(size), MIN_TEXT_SIZE), 5.5)
         boxes = np.array(layout.plates).reshape(-1, 4)
-        assert (boxes >= 0).all() and (boxes[:, 2:] <= size).all()
-        assert pair_count(boxes) == 0
+        assert (boxes >= 0).all() and (boxes[:, 2:] <= size).all() and pair_count(boxes) == 0
         low = np.array([(text.left, text.baseline) for text in layout.texts]).reshape(-1, 2)
         width = [text_width(text.text) for text in layout.texts]
         letters = np.hstack([low, low + layout.text_size * np.c_[width, np.full(len(low), 0.7)]])

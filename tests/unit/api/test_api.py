@@ -132,8 +132,7 @@ def test_difference_of_a_rotated_field(sphere, field):
 
 
 def test_singularities_sum_to_the_euler_characteristic(sphere, field):
-    assert sphere.euler_characteristic == 2
-    assert field.singularities.index.sum() == 4 * 2
+    assert sphere.euler_characteristic == 2 and field.singularities.index.sum() == 4 * 2
     assert field.to_degree(8).singularities.index.sum() == 8 * 2
 
 
@@ -379,8 +378,7 @@ def test_a_turntable_counts_its_pictures(sphere, field, tmp_path):
     path = rf.turntable(
         sphere, field, path=tmp_path / "a.gif", pictures=3, size=(32, 32), on_picture=numbers.append
     )
-    assert numbers == [1, 2, 3]
-    assert Image.open(path).n_frames == 3
+    assert numbers == [1, 2, 3] and Image.open(path).n_frames == 3
     with pytest.raises(rf.RosyError, match="2 or more"):
         rf.turntable(sphere, field, path=tmp_path / "b.gif", pictures=1)
 

@@ -72,9 +72,7 @@ def test_bad_input_is_one_line_and_status_2(case, sphere, tmp_path, capsys, monk
     assert main(words) == 2
     output = capsys.readouterr()
     assert output.err.startswith("rosy: ") and output.err.count("\n") == 1
-    assert expected in output.err
-    assert output.out == ""
-    assert not out.exists()
+    assert expected in output.err and output.out == "" and not out.exists()
 
 
 @pytest.mark.slow
@@ -100,8 +98,7 @@ def test_bad_input_in_a_process_of_its_own(sphere, tmp_path):
 )
 def test_wrong_usage_is_status_2(words):
     done = rosy(*words)
-    assert done.returncode == 2
-    assert done.stderr.startswith("usage: python -m rosy_addon")
+    assert done.returncode == 2 and done.stderr.startswith("usage: python -m rosy_addon")
     assert "Traceback" not in done.stderr
 
 
@@ -141,8 +138,7 @@ def test_ctrl_c_is_status_130_without_a_traceback(sphere, tmp_path):
         _, error_output = process.communicate(timeout=60)
     finally:
         process.kill()
-    assert process.returncode == 130
-    assert error_output == "rosy: stopped\n"
+    assert process.returncode == 130 and error_output == "rosy: stopped\n"
     assert list(tmp_path.iterdir()) == []
 
 
@@ -155,8 +151,7 @@ def test_ctrl_c_while_python_ends_is_status_130_without_a_traceback():
         "sys.argv = ['rosy_addon', '--help']; sys.exit(run())"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
-    assert done.returncode == 130
-    assert done.stderr == "rosy: stopped\n"
+    assert done.returncode == 130 and done.stderr == "rosy: stopped\n"
 
 
 def test_bake_without_blender_is_an_error(monkeypatch, capsys):
@@ -168,8 +163,7 @@ def test_bake_without_blender_is_an_error(monkeypatch, capsys):
 
 
 def test_bake_without_an_output_is_refused(capsys):
-    assert main(["bake"]) == 2
-    assert "give --out DIR" in capsys.readouterr().err
+    assert main(["bake"]) == 2 and "give --out DIR" in capsys.readouterr().err
 
 
 def test_workers_get_the_options_as_they_are(tmp_path, monkeypatch):
@@ -187,8 +181,7 @@ def test_workers_get_the_options_as_they_are(tmp_path, monkeypatch):
     ):
         assert main(["bake", str(scene), *arguments, "--frames", "1-2", "--jobs", "2"]) == 0
     command = [sys.executable, "-m", "rosy_addon", "bake", str(scene), *words, "--workers=1"]
-    assert commands == [command, command]
-    assert main([*command[3:], "--frames=1-2", "--jobs=2"]) == 0
+    assert commands == [command, command] and main([*command[3:], "--frames=1-2", "--jobs=2"]) == 0
     assert commands[2] == command
 
 
@@ -212,8 +205,7 @@ def test_outputs_replace_only_regular_files(tmp_path, capsys):
         before = mesh.read_bytes()
         assert main(words) == 2
         error = capsys.readouterr().err
-        assert message in error and error.count("\n") == 1
-        assert mesh.read_bytes() == before
+        assert message in error and error.count("\n") == 1 and mesh.read_bytes() == before
     longest = tmp_path / ("a" * 251 + ".png")
     for output in (link, longest):
         assert main([*render, str(mesh), "-o", str(output)]) == 0

@@ -103,8 +103,7 @@ def test_streamlines_end_where_brute_force_ends_them(kernel, degree):
     inside = field.representation != 0
     assert (actual.effective_samples[~inside] == 1).all()
     difference = actual.effective_samples[inside] - expected.effective_samples[inside]
-    assert abs(difference.mean()) < 0.5
-    assert np.abs(difference).mean() < 2
+    assert abs(difference.mean()) < 0.5 and np.abs(difference).mean() < 2
 
 
 @pytest.mark.parametrize("kernel", KERNELS)
@@ -129,8 +128,7 @@ def test_long_streamlines_end_when_they_have_closed_a_loop():
     samples = fast_images(field, replace(LOOK, length=8000)).effective_samples
     samples = samples.reshape(64, 64)[np.hypot(x - 32, y - 32) < 31]
     loop = 2 * np.pi * 31
-    assert samples.max() < 4 * (256 + 2 * loop)
-    assert np.median(samples) > 256
+    assert samples.max() < 4 * (256 + 2 * loop) and np.median(samples) > 256
 
 
 @pytest.mark.parametrize("degree", [1, 4])

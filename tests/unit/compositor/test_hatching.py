@@ -119,8 +119,7 @@ def test_crowded_even_lines_are_drawn_last():
     tone = np.full((1, 3), 0.9, dtype=np.float32)
     first, second = line_shares(field, pixel_look(look), tone, lines)
     np.testing.assert_allclose(first + second, 1, atol=1e-6)
-    assert first[0] > 0.95 and second[1] > 0.95
-    assert abs(first[2] - first[0]) < 1e-6
+    assert first[0] > 0.95 and second[1] > 0.95 and abs(first[2] - first[0]) < 1e-6
 
 
 def test_lines_run_along_the_field():

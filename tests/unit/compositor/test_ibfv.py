@@ -147,8 +147,7 @@ def test_a_loop_closes(degree):
     ]
     np.testing.assert_array_equal(frames[0], frames[3])
     to_next, to_last = np.std(frames[1] - frames[0]), np.std(frames[2] - frames[3])
-    assert to_last == pytest.approx(to_next, rel=0.1)
-    assert to_next < 0.5 * np.std(frames[0])
+    assert to_last == pytest.approx(to_next, rel=0.1) and to_next < 0.5 * np.std(frames[0])
 
 
 def test_frames_in_sequence_are_those_drawn_alone(monkeypatch):

@@ -63,8 +63,7 @@ def test_breaks_and_paper_grain_shorten_lines():
         return uneven / plain
 
     light, middle, dark = (shorter(tone, breaks=1.0) for tone in (0.9, 0.5, 0.2))
-    assert light < middle < dark < 1
-    assert shorter(0.6, paper_grain=1.0) < 1
+    assert light < middle < dark < 1 and shorter(0.6, paper_grain=1.0) < 1
 
 
 @pytest.mark.parametrize("line_width", [1.5, 3.0, 8.0])
@@ -101,8 +100,7 @@ def test_statistics_of_the_wobble(anchor, distance):
     """Mean 0, standard deviation `WOBBLE_STD`, small differences of neighbors, at any distance."""
     gbuffer = project([make_instance(tube())], make_camera(distance=distance, zoom=distance / 4))
     actual = wobble_angle(gbuffer, pixel_look(replace(INK, anchor=anchor, line_width=1.5)))
-    assert abs(actual.mean()) < 0.25 * WOBBLE_STD
-    assert 0.75 < actual.std() / WOBBLE_STD < 1.25
+    assert abs(actual.mean()) < 0.25 * WOBBLE_STD and 0.75 < actual.std() / WOBBLE_STD < 1.25
     right = np.flatnonzero((np.diff(gbuffer.pixel) == 1) & (np.diff(gbuffer.triangle) == 0))
     assert np.abs(np.diff(actual)[right]).mean() < 0.15 * WOBBLE_STD
 

@@ -39,8 +39,7 @@ def test_given_ones_stay_and_the_sum_is_right():
             vertex, index = cheapest_singularities(surface, 4, given, sign)
             assert vertex[:count].tolist() == given.tolist()
             assert index[:count].tolist() == sign.tolist()
-            assert len(set(vertex.tolist())) == len(vertex)
-            assert index.sum() == 4 * characteristic
+            assert len(set(vertex.tolist())) == len(vertex) and index.sum() == 4 * characteristic
 
 
 def test_one_given_costs_no_more_than_the_smoothest_field():

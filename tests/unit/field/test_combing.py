@@ -76,8 +76,7 @@ def test_strokes_do_not_depend_on_the_rate_of_their_points():
         combing = start(torus(96, 48, MAJOR, MINOR), 4)
         draw(combing, on_torus(np.linspace(0, 1, 60)), batch, pressure=0.5)
         results.append(combing.guides.copy())
-    assert np.array_equal(results[0], results[1])
-    assert np.array_equal(results[0], results[2])
+    assert np.array_equal(results[0], results[1]) and np.array_equal(results[0], results[2])
 
 
 @pytest.mark.slow
@@ -114,8 +113,7 @@ def test_erasing_everything_removes_all_guides():
     # All of the surface is within the radius, where the falloff is not yet 0.
     for _ in range(60):
         draw(combing, points, radius=4.0, effect="erase", front_faces=False)
-    assert not combing.guides.any()
-    assert np.isfinite(combing.vectors).all()
+    assert not combing.guides.any() and np.isfinite(combing.vectors).all()
 
 
 def test_smoothing_lowers_the_difference_between_neighbors():
@@ -192,5 +190,4 @@ def test_exact_guides_survive_storing():
     stored = combing.guide_vectors.astype(np.float32)
     again = start_combing(combing.system, RosyField(4, combing.vectors), stored, 0.1)
     again.settle()
-    assert is_exact.any()
-    assert angles(again, again.vectors, normalize(stored))[is_exact].max() < 1e-4
+    assert is_exact.any() and angles(again, again.vectors, normalize(stored))[is_exact].max() < 1e-4

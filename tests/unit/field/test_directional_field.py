@@ -95,8 +95,7 @@ def test_a_rosy_has_no_direction_ratios():
     surface = icosphere(2)
     angles = 0.3 + 2 * np.pi * np.arange(6) / 6
     field = field_from_directions(surface, directions_at_angles(surface, angles, np.full(6, 2.0)))
-    assert field.direction_ratios is None
-    assert np.allclose(field.magnitude, 2)
+    assert field.direction_ratios is None and np.allclose(field.magnitude, 2)
 
 
 def test_opposite_directions_are_detected():
@@ -189,8 +188,7 @@ def test_streaks_run_along_free_directions(method, angles):
     # From -5 to 175 degrees: no direction is near the ends.
     actual = np.sort((np.array(peaks(orientation_spectrum(tone))) + 5) % 180 - 5)
     expected = np.unique(np.mod(angles, 180))
-    assert len(actual) == len(expected)
-    assert np.abs(actual - expected).max() < 2
+    assert len(actual) == len(expected) and np.abs(actual - expected).max() < 2
 
 
 def test_hues_of_families_tell_their_directions():

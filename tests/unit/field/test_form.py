@@ -130,10 +130,8 @@ def test_salient_edges():
     assert len(salient(cube())) == 12
     tube = cylinder(8, 3)
     border = salient(tube)
-    assert len(border) == 16
-    assert len(np.unique(tube.vertices[border.ravel(), 2])) == 2
-    assert len(salient(icosphere(1))) == 0
-    assert len(salient(with_noise(torus(200, 100), 0.001))) == 0
+    assert len(border) == 16 and len(np.unique(tube.vertices[border.ravel(), 2])) == 2
+    assert len(salient(icosphere(1))) == 0 and len(salient(with_noise(torus(200, 100), 0.001))) == 0
 
 
 def three_cylinders(count: int) -> Surface:
@@ -215,8 +213,7 @@ def test_averages_of_numbers_below_all_normal_ones():
     matrix = laplacian(connection, 0)
     matrix = replace(matrix, data=matrix.data.real.astype(np.float32))
     sums = averages.node_sums(np.full(surface.face_count, 1e-320), 0)
-    assert sums.any()
-    assert not averages.smooth(matrix, 0.1, sums).any()
+    assert sums.any() and not averages.smooth(matrix, 0.1, sums).any()
 
 
 def test_averages_with_an_indefinite_matrix():

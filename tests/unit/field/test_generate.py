@@ -36,8 +36,7 @@ def test_transport_is_the_minimal_rotation(a, b, angle):
     x, y = tangent_frame(s)
     v = np.cos(3 * angle) * x + np.sin(3 * angle) * y
     moved = transport(v, s, t)
-    assert abs(moved @ t) < 1e-12
-    assert np.linalg.norm(moved) == pytest.approx(1)
+    assert abs(moved @ t) < 1e-12 and np.linalg.norm(moved) == pytest.approx(1)
     assert np.allclose(transport(moved, t, s), v)
     axis = np.cross(s, t)  # invariant under the rotation that takes s to t
     assert moved @ axis == pytest.approx(v @ axis, abs=1e-9)
@@ -47,8 +46,7 @@ def test_transport_is_the_minimal_rotation(a, b, angle):
 def test_tangent_frames_are_right_handed(a):
     n = normalize(np.array(a))
     x, y = tangent_frame(n)
-    assert np.allclose(np.cross(x, y), n)
-    assert x @ y == pytest.approx(0, abs=1e-12)
+    assert np.allclose(np.cross(x, y), n) and x @ y == pytest.approx(0, abs=1e-12)
 
 
 @given(vector.filter(lambda v: v[2] / np.linalg.norm(v) > -0.5))
@@ -117,8 +115,7 @@ def test_a_planar_singularity_has_its_index(degree, sign):
     angle = sign * np.arctan2(direction[:, 1], direction[:, 0]) / degree + 0.4
     field = RosyField(degree, np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1))
     vertices, index = find_singularities(surface, field)
-    assert vertices.tolist() == [vertex]
-    assert index.tolist() == [sign]
+    assert vertices.tolist() == [vertex] and index.tolist() == [sign]
 
 
 @pytest.mark.parametrize("degree", [1, 3, 4, 7])

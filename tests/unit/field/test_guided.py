@@ -104,8 +104,7 @@ def test_the_edges_of_a_cube_are_sharp_and_guide_all_its_faces():
     along = np.abs(guides_from_edges(box, ends, 4)).max(axis=1)
     np.testing.assert_allclose(along, 1, atol=1e-12)
     # In degree 2 the edges of a square cancel.
-    assert not guides_from_edges(box, ends, 2).any()
-    assert not len(feature_edges(box, 2.0))
+    assert not guides_from_edges(box, ends, 2).any() and not len(feature_edges(box, 2.0))
 
 
 def test_borders_are_features():
@@ -121,8 +120,7 @@ def test_guides_lie_in_their_faces():
     points = np.array([[0, 0, 0], [1, 0, 0.2], [1, 1, 0], [0, 1, 0.3]], dtype=float)
     bent = from_quads(points, np.array([[0, 1, 2, 3]]))
     guides = guides_from_edges(bent, [[1, 0]], 3)
-    assert abs(dot(guides, bent.face_normal)[0]) < 1e-12
-    assert guides[0] @ [1, 0, 0] > 0.9
+    assert abs(dot(guides, bent.face_normal)[0]) < 1e-12 and guides[0] @ [1, 0, 0] > 0.9
 
 
 def test_curvature_spreads_into_flat_regions():

@@ -49,8 +49,7 @@ def test_the_mesh_and_its_crosses(tmp_path):
     assert np.array_equal(surface.vertices, POINTS)
     assert [face.tolist() for face in surface.faces] == [[0, 1, 2, 3], [1, 4, 2]]
     field = read_field(path, surface)
-    assert field.degree == 4
-    assert np.array_equal(field.source_directions[:, 0], U)
+    assert field.degree == 4 and np.array_equal(field.source_directions[:, 0], U)
     assert np.array_equal(field.source_directions[:, 1], V)
     path.write_bytes(MESH + vectors(b"wind", U, kind=b"Vec3f") + END)
     assert read_field(path, surface, 1).vectors == pytest.approx(np.array(U, float))

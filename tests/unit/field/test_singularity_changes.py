@@ -46,8 +46,7 @@ def test_near_pairs_are_cancelled_and_nothing_else():
     for reach, left in ((0.05, 8), (0.15, 6), (0.4, 4), (1.0, 2)):
         clean = convert(BALL, field, Conversion(pair_distance=reach))
         vertex, _ = find_singularities(BALL, clean)
-        assert len(vertex) == left
-        assert set(poles) <= set(vertex)
+        assert len(vertex) == left and set(poles) <= set(vertex)
     assert indices(BALL, clean) == dict.fromkeys(poles, 4)
 
 
@@ -56,8 +55,7 @@ def test_far_from_a_pair_nothing_turns():
     clean = convert(BALL, field, Conversion(pair_distance=0.15))
     turned = turned_by(BALL, field, clean)
     distance = np.linalg.norm(BALL.face_center - (1, 0.1, 0), axis=1)
-    assert turned[distance > 1].max() < 0.5
-    assert turned[distance < 0.1].max() > 20
+    assert turned[distance > 1].max() < 0.5 and turned[distance < 0.1].max() > 20
     assert convert(BALL, field, Conversion(pair_distance=0.01)) is field
 
 

@@ -44,8 +44,7 @@ def assert_filled(polygon):
     points, triangles, _ = triangulate_polygons(polygon)
     areas = signed_areas(points, triangles)
     area = polygon_area(np.asarray(polygon, dtype=float))
-    assert (areas * np.sign(area) > 0).all()
-    assert areas.sum() == pytest.approx(area)
+    assert (areas * np.sign(area) > 0).all() and areas.sum() == pytest.approx(area)
 
 
 def star(random, corners):
@@ -117,8 +116,7 @@ def test_a_polygon_in_space_is_split_as_in_the_plane(seed):
     q *= np.sign(np.linalg.det(q))
     _, triangles, _ = triangulate_polygons(bumpy @ q.T + 100 * random.normal(size=3))
     areas = signed_areas(flat, triangles)
-    assert (areas > 0).all()
-    assert areas.sum() == pytest.approx(polygon_area(flat))
+    assert (areas > 0).all() and areas.sum() == pytest.approx(polygon_area(flat))
 
 
 def test_a_mixed_mesh_keeps_its_order():

@@ -163,8 +163,7 @@ def test_kinds_of_several_fields():
     surface = icosphere(1)
     two, free, other = axis_field(surface, 2), perturbed_field(surface, 3), axis_field(surface, 3)
     kinds = field_kinds([other, two, free])
-    assert list(kinds) == [2, 3]
-    assert kinds[2].channels == () and kinds[2].family_count == 1
+    assert list(kinds) == [2, 3] and kinds[2].channels == () and kinds[2].family_count == 1
     assert kinds[3].channels == field_kinds([free])[3].channels
 
 
@@ -197,5 +196,4 @@ def test_boxes_contain_all_pixels_of_a_mesh(make_camera):
 
 def test_union_of_boxes():
     assert union_box([(1, 2, 5, 6), (0, 0, 0, 0), (9, 3, 9, 8), (3, 1, 8, 4)]) == (1, 1, 8, 6)
-    assert is_empty(union_box([]))
-    assert is_empty(union_box([(0, 0, 0, 0)]))
+    assert is_empty(union_box([])) and is_empty(union_box([(0, 0, 0, 0)]))

@@ -46,8 +46,7 @@ def test_meshes_stay_on_the_card(device):
     moved = ball(4, 2 * rotation(1, 2, 3), (4, 5, 6))
     (second,) = card.upload([moved], "smooth")
     (sheared,) = card.upload([ball(4, SHEAR)], "smooth")
-    assert second.mesh is first.mesh is not sheared.mesh
-    assert kept_kinds(card) == ["mesh", "mesh"]
+    assert second.mesh is first.mesh is not sheared.mesh and kept_kinds(card) == ["mesh", "mesh"]
     for _ in range(resources.MESH_LIFETIME + 1):
         assert card.upload([moved], "smooth")[0].mesh is first.mesh
     assert kept_kinds(card) == ["mesh"]
@@ -77,8 +76,7 @@ def test_creases_are_found_for_each_angle(card):
 
     first = textures(0.7)
     assert first.crease_count == 24 and first.triangle_parts is not None
-    assert textures(1.7).crease_count == textures(None).crease_count == 0
-    assert textures(0.7) is first
+    assert textures(1.7).crease_count == textures(None).crease_count == 0 and textures(0.7) is first
 
 
 @pytest.mark.parametrize("max_steps", [None, 1, 200_000, 300_000, 450_000])
@@ -115,8 +113,7 @@ def test_singularities_and_arrowheads_are_drawn_over_the_picture(card, degree, m
             for shown_marks in (marks, {})
         )
         changed.append((marked != plain).any(axis=2))
-    assert changed[0].sum() > 100
-    assert (changed[0] != changed[1]).sum() <= 2
+    assert changed[0].sum() > 100 and (changed[0] != changed[1]).sum() <= 2
 
 
 def test_what_is_too_large_is_refused(device, error_of, monkeypatch):

@@ -60,8 +60,7 @@ def test_svg_has_one_layer_per_family_and_one_path_per_stroke():
         assert path.get("d").endswith("Z") == (path.get("stroke") == "none")
         # An outline is half the width of the pen away from its stroke.
         points = path_points(path.get("d"))
-        assert len(points) >= 2
-        assert (points >= -0.51).all() and (points <= (200.51, 100.51)).all()
+        assert len(points) >= 2 and (points >= -0.51).all() and (points <= (200.51, 100.51)).all()
 
 
 @pytest.mark.slow
@@ -147,10 +146,8 @@ def test_command_line(tmp_path, capsys, monkeypatch):
         (["--set", "wobble=1"], "--set wobble=1: unknown setting 'wobble'"),
         (["--set", "light"], "--set light: expected NAME=VALUE"),
     ):
-        assert main([*command, *arguments]) == 2
-        assert message in capsys.readouterr().err
-    assert main(["strokes", "-o", str(out)]) == 2
-    assert "give a mesh file" in capsys.readouterr().err
+        assert main([*command, *arguments]) == 2 and message in capsys.readouterr().err
+    assert main(["strokes", "-o", str(out)]) == 2 and "give a mesh file" in capsys.readouterr().err
     monkeypatch.setitem(sys.modules, "bpy", None)
     assert main(["strokes", "scene.blend", "-o", str(out)]) == 2
     assert "needs Blender" in capsys.readouterr().err

@@ -58,8 +58,7 @@ def test_everything_is_framed_and_touches_the_margin(seed, azimuth, elevation, p
     points = random.normal(size=(20, 3)) * random.uniform(0.01, 100, 3) + random.normal(size=3) * 50
     camera = orbit_camera(points, azimuth, elevation, *size, perspective=perspective, margin=0.05)
     ndc = device_coordinates(camera, points)
-    assert np.abs(ndc[:, :2]).max() <= 0.9 + 1e-6
-    assert np.abs(ndc[:, 2]).max() < 1
+    assert np.abs(ndc[:, :2]).max() <= 0.9 + 1e-6 and np.abs(ndc[:, 2]).max() < 1
     # As large as possible: the points touch both margins in one direction, unless the eye would
     # then be among the points.
     low, high = ndc[:, :2].min(axis=0), ndc[:, :2].max(axis=0)
@@ -130,8 +129,7 @@ def test_look_at():
     view = look_at((3, 4, 5), (1, 1, 1))
     np.testing.assert_allclose(view @ (1, 1, 1, 1), (0, 0, -np.sqrt(29), 1), atol=1e-12)
     above = view @ (1, 1, 2, 1)
-    assert abs(above[0]) < 1e-12
-    assert above[1] > 0
+    assert abs(above[0]) < 1e-12 and above[1] > 0
 
 
 def make_camera(view=None, projection=None, size=(10, 10)):

@@ -195,8 +195,7 @@ def test_order_of_triangles_and_corners_does_not_matter(seed):
     for name in ("pixel", "barycentric", "depth"):
         np.testing.assert_array_equal(getattr(again, name), getattr(fragments, name))
     turned = rasterize(clip, triangles[:, [1, 2, 0]], WIDTH, HEIGHT)
-    assert (turned.pixel == fragments.pixel).all()
-    assert (turned.triangle == fragments.triangle).all()
+    assert (turned.pixel == fragments.pixel).all() and (turned.triangle == fragments.triangle).all()
     np.testing.assert_allclose(turned.barycentric[:, [2, 0, 1]], fragments.barycentric, atol=1e-6)
     assert (turned.front_facing == fragments.front_facing).all()
     mirrored = rasterize(clip, triangles[:, ::-1], WIDTH, HEIGHT)
@@ -243,8 +242,7 @@ def test_vertices_far_outside_the_frame():
     """A triangle of 10^12 pixels with an edge across the picture."""
     x, y = np.array([18.5, 18.5, 1e12]), np.array([-1e12, 1e12, 0.0])
     fragments = rasterize(flat_clip(x, y), np.array([[0, 1, 2]]), WIDTH, HEIGHT)
-    assert len(fragments.pixel) == HEIGHT * (WIDTH - 18)
-    assert (fragments.pixel % WIDTH >= 18).all()
+    assert len(fragments.pixel) == HEIGHT * (WIDTH - 18) and (fragments.pixel % WIDTH >= 18).all()
 
 
 @pytest.mark.slow

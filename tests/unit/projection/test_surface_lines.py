@@ -108,8 +108,7 @@ def test_distances_on_a_sphere(degree):
     """There are singularities, and lines end because they converge."""
     surface = icosphere(3)
     lines = lines_of(surface, generate(surface, "smoothest", degree), 0.07)
-    assert lines.pattern.index.any()
-    assert share_within(lines, 0.07, TOLERANCE, AWAY) >= SHARE
+    assert lines.pattern.index.any() and share_within(lines, 0.07, TOLERANCE, AWAY) >= SHARE
 
 
 @pytest.mark.slow
@@ -146,8 +145,7 @@ def test_lines_continue_over_a_coarse_cube():
     """Eight vertices. Form follows the edges, and lines of faces meet there."""
     surface = sharp_cube()
     lines = lines_of(surface, generate(surface, "form", 4), 0.04)
-    assert len(lines.tree.leaf_root) > 1000
-    assert share_within(lines, 0.04, 0.02, AWAY) >= SHARE
+    assert len(lines.tree.leaf_root) > 1000 and share_within(lines, 0.04, 0.02, AWAY) >= SHARE
     assert not lines.pattern.index.any()
 
 
@@ -220,8 +218,7 @@ def test_the_number_of_triangles_is_bounded():
     surface = icosphere(2)
     field = generate(surface, "smoothest", 4)
     lines = surface_lines(surface, np.eye(3), field, "smooth", 0.004, max_triangles=2000)
-    assert 500 < len(lines.tree.leaf_root) <= 2000
-    assert np.isfinite(lines.pattern.phase).all()
+    assert 500 < len(lines.tree.leaf_root) <= 2000 and np.isfinite(lines.pattern.phase).all()
 
 
 def test_too_little_memory_is_an_error(monkeypatch, error_of):

@@ -171,7 +171,5 @@ def test_numpy_rooms_import_without_blender():
             "assert not heavy, heavy",
         ]
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
-    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from shapes import from_quads, globe, icosphere, instance_of, plane, torus
+from shapes import from_quads, globe, icosphere, instance_of, plane, rebuilt, torus
 
 from rosy_addon.annotation.arrow_marks import (
     FILL_COLOR,
@@ -172,9 +172,7 @@ def test_arrowheads_stay_on_the_surface_while_the_camera_turns():
 
 def test_places_do_not_depend_on_how_a_mesh_is_deformed():
     surface = icosphere(4)
-    stretched = surface.with_parts(
-        vertices=surface.vertices * (1.0, 1.0, 1.1), rest_vertices=surface.vertices
-    )
+    stretched = rebuilt(surface, surface.vertices * (1, 1, 1.1), rest_vertices=surface.vertices)
     cache = Cache()
     places = [surface_places(shape, 0.1, cache) for shape in (surface, stretched)]
     assert places[0] is places[1] and places[0].distance[-1] == places[0].finest <= 0.1

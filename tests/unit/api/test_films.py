@@ -38,9 +38,8 @@ def views_of(fields, look=LOOK, **options):
 
 def turns(views):
     """Angles in degrees between the fields of the views and that of the first one."""
-    z = [
-        face_representation(view.instances[0].surface, view.instances[0].field)[0] for view in views
-    ]
+    shown = [view.instances[0] for view in views]
+    z = [face_representation(each.surface, each.field)[0] for each in shown]
     return [np.degrees(np.angle(value / z[0]) / 4) for value in z]
 
 

@@ -35,9 +35,7 @@ def test_what_a_page_names_exists(page):
         assert hasattr(rf, name), name
     imports = re.findall(r"((?:rosy_addon|rosyfields)(?:\.\w+)+) import ([\w, ]+)", text)
     modules = re.findall(r"module `((?:rosy_addon)(?:\.\w+)+)`: ([^.]*)\.", text)
-    modules += [
-        (module, name) for name, module in re.findall(r"(`\w+`) from `(rosy_addon[\w.]+)`", text)
-    ]
+    modules += [pair[::-1] for pair in re.findall(r"(`\w+`) from `(rosy_addon[\w.]+)`", text)]
     for module, names in imports + modules:
         assert set(re.findall(r"\w\w+", names)) - {"and"} <= names_in(module), module
     operators = "".join(path.read_text() for path in (ROOT / "operators").glob("*.py"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from command_helpers import assert_refused, facts_of, rosy
+from command_helpers import assert_refused, facts_of, rosy, write_obj
 
 import rosy_addon as rf
 from rosy_addon.extras.command_line import main
@@ -150,15 +150,11 @@ def test_info_says_that_borders_coincide(tmp_path, capsys):
     """A tube of quads whose first and last column are two rows of vertices at the same positions."""
     angle, height = np.meshgrid(np.linspace(0, 2 * np.pi, 9), [0.0, 1.0, 2.0], indexing="ij")
     points = np.stack([np.cos(angle), np.sin(angle), height], axis=-1).reshape(-1, 3)
-    quads = [
-        (3 * i + j, 3 * i + j + 1, 3 * i + j + 4, 3 * i + j + 3) for i in range(8) for j in (0, 1)
-    ]
-    lines = [f"v {x} {y} {z}" for x, y, z in points]
-    lines += ["f " + " ".join(str(corner + 1) for corner in quad) for quad in quads]
-    (tmp_path / "tube.obj").write_text("\n".join([*lines, ""]))
-    assert main(["info", str(tmp_path / "tube.obj"), "--generate", "axis"]) == 0
+    quads = [(k, k + 1, k + 4, k + 3) for k in range(24) if k % 3 < 2]
+    tube = write_obj(tmp_path / "tube.obj", points, quads)
+    assert main(["info", str(tube), "--generate", "axis"]) == 0
     printed = capsys.readouterr().out
     assert "Euler characteristic 1\n3 vertices on borders coincide" in printed
-    assert main(["info", str(tmp_path / "tube.obj"), "--generate", "axis", "--join"]) == 0
+    assert main(["info", str(tube), "--generate", "axis", "--join"]) == 0
     printed = capsys.readouterr()
     assert "Euler characteristic 0\nmagnitude" in printed.out and "were joined" in printed.err

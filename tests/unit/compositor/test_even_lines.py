@@ -45,9 +45,8 @@ LOOK = Look(
 
 def wall_instance(degree=2, angle=0.0, size=20.0):
     surface = plane(2, 2, size)
-    return MeshInstance(
-        surface, np.eye(4), axis_field(surface, degree, (np.cos(angle), np.sin(angle), 0))
-    )
+    field = axis_field(surface, degree, (np.cos(angle), np.sin(angle), 0))
+    return MeshInstance(surface, np.eye(4), field)
 
 
 def partly_undefined(degree):

@@ -139,8 +139,6 @@ def test_lines_drift_toward_the_guiding_angle():
 
 def test_a_loop_closes():
     look, count = Look(flow=1.0, length=20), 24
-    frames = [
-        member(0.4, 1, look, drift_at(look, frame, count)) for frame in (0, 1, 12, 13, count - 1)
-    ]
+    frames = [member(0.4, 1, look, drift_at(look, at, count)) for at in (0, 1, 12, 13, count - 1)]
     neighbors = [correlation(frames[0], frames[1]), correlation(frames[2], frames[3])]
     assert correlation(frames[-1], frames[0]) > min(neighbors) - 0.01

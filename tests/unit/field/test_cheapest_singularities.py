@@ -52,9 +52,8 @@ def test_one_given_costs_no_more_than_the_smoothest_field():
 
 def test_a_field_with_a_border_needs_no_more():
     tube = cylinder(24, 12)
-    settings = GeneratorSettings(
-        "prescribed", singularities=(np.array([150]), np.array([1])), add_missing=True
-    )
+    one = np.array([150]), np.array([1])
+    settings = GeneratorSettings("prescribed", singularities=one, add_missing=True)
     vertex, index = find_singularities(tube, generate(tube, settings, 4))
     assert vertex.tolist() == [150] and index.tolist() == [1]
 

@@ -100,10 +100,8 @@ def test_settled_field_is_the_guided_field():
         expected = generate(surface, settings, 4)
         assert np.percentile(angles(combing, combing.vectors, expected.vectors), 95) < 0.01
         found = find_singularities(surface, RosyField(4, combing.vectors))
-        for values, expected_values in zip(
-            found, find_singularities(surface, expected), strict=True
-        ):
-            assert np.array_equal(values, expected_values)
+        for values, others in zip(found, find_singularities(surface, expected), strict=True):
+            assert np.array_equal(values, others)
 
 
 def test_erasing_everything_removes_all_guides():

@@ -59,8 +59,7 @@ def test_only_equal_faces_are_copies():
     ball, grid = icosphere(3), plane(30, 30)
     for surface in (ball, grid):
         assert not copied_faces(surface.vertices, surface.corner_vertex, surface.face_start).any()
-    zeros = from_triangles(
-        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [-0.0, -0.0, 0]], [[0, 1, 2], [3, 2, 1]]
-    )
+    points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [-0.0, -0.0, 0]]
+    zeros = from_triangles(points, [[0, 1, 2], [3, 2, 1]])
     copies = copied_faces(zeros.vertices, zeros.corner_vertex, zeros.face_start)
     assert copies.tolist() == [False, True]

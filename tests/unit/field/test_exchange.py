@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from field_helpers import angle_differences, read_field, write_off
+from field_helpers import angle_differences, read_damaged, read_field, write_off
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from shapes import from_triangles, icosphere, plane, rebuilt, torus
@@ -197,12 +197,7 @@ DAMAGED_SUFFIXES = [".rosy", ".rawfield", ".obj", ".txt", ".npy"]
 def test_random_damage_raises_only_rosy_errors(tmp_path, garbage, offset, ending):
     path = tmp_path / f"damaged{ending}"
     write_field(path, axis_field(BALL, 4), BALL)
-    data = path.read_bytes()
-    path.write_bytes(data[:offset] + garbage + data[offset + len(garbage) :])
-    try:
-        read_field(path, BALL)
-    except RosyError as error:
-        assert "\n" not in str(error) and str(path) in str(error)
+    read_damaged(path, path.read_bytes(), garbage, offset, lambda path: read_field(path, BALL))
 
 
 # --- by position -----------------------------------------------------------------------------

@@ -39,9 +39,8 @@ def rosy_text(rows, count=None, degree=4, form="{count}\n{degree}\n"):
 def npy_that_claims(count):
     """An array of 6 rows whose header claims more."""
     file = io.BytesIO()
-    np.lib.format.write_array_header_1_0(
-        file, {"descr": "<f8", "fortran_order": False, "shape": (count, 3)}
-    )
+    header = {"descr": "<f8", "fortran_order": False, "shape": (count, 3)}
+    np.lib.format.write_array_header_1_0(file, header)
     return file.getvalue() + WEST.tobytes()
 
 

@@ -7,10 +7,10 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from field_helpers import read_damaged
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from rosy_addon.core.errors import RosyError
 from rosy_addon.field.formats.stl import weld
 from rosy_addon.field.surface import MIN_EXTENT, Surface
 
@@ -264,12 +264,7 @@ def test_missing_files_and_folders(tmp_path, error_of):
 @given(st.binary(max_size=300), st.sampled_from(sorted(FILES)), st.integers(0, 400))
 def test_random_damage_raises_only_rosy_errors(tmp_path_factory, garbage, name, offset):
     path = tmp_path_factory.getbasetemp() / f"damaged-{name}"
-    data = FILES[name]
-    path.write_bytes(data[:offset] + garbage + data[offset + len(garbage) :])
-    try:
-        Surface(path)
-    except RosyError as error:
-        assert "\n" not in str(error) and str(path) in str(error)
+    read_damaged(path, FILES[name], garbage, offset, Surface)
 
 
 @pytest.mark.slow

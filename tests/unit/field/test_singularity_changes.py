@@ -129,9 +129,8 @@ def test_guides_bend_a_field_with_the_same_singularities(degree):
         ((-1, 0.3, 0), (0, 1, 0.2)),
         ((0, 1, 0), (1, 0, 0)),
     ):
-        distance = np.linalg.norm(
-            BALL.face_center - np.divide(center, np.linalg.norm(center)), axis=1
-        )
+        center = np.divide(center, np.linalg.norm(center))
+        distance = np.linalg.norm(BALL.face_center - center, axis=1)
         guides[distance < 0.15] = direction
     whole = prescribed_field(BALL, degree, last, [degree, degree], guides)
     bent = prescribed_field(BALL, degree, last, [degree, degree], guides, 0.02)

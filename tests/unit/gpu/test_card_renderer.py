@@ -95,9 +95,7 @@ def test_clip_planes(card):
     planes = uniforms.NO_CLIP_PLANES.copy()
     planes[3] = (1.0, 0.0, 0.0, 0.2)
     instances = [ball(4, rotation(0, 0, 1))]
-    unclipped, clipped = (
-        card_rgba(card, instances, clip_planes=clip_planes) for clip_planes in (None, planes)
-    )
+    unclipped, clipped = (card_rgba(card, instances, clip_planes=each) for each in (None, planes))
     visible = read_gbuffer(card, *SIZE)["field_values"][..., 3] > 0
     assert 0.2 < visible.sum() / (unclipped[..., 3] > 0).sum() < 1.0
     assert (clipped[..., 3] > 0).sum() == visible.sum()
@@ -164,9 +162,7 @@ def test_the_range_of_the_colors(card, samples, top):
     """It is the range of numpy, and a look with this range gives the same picture."""
     look = replace(LOOK, hue="magnitude", color_range=(0.0, top), supersampling=samples)
     instances = ball(), shown(BALL, axis_field(BALL, 2), shift=(0, 0, -9))
-    drawn, expected = (
-        draw(renderer, ViewInput(instances, view(), look)) for renderer in (card, None)
-    )
+    drawn, expected = (draw(each, ViewInput(instances, view(), look)) for each in (card, None))
     # Numpy finds the field of several samples at the centers of pixels.
     assert drawn.color_range == pytest.approx(
         expected.color_range, rel=1e-4 if samples == 1 else 5e-3

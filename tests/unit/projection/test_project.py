@@ -180,9 +180,8 @@ def test_a_tilted_plane_under_a_wide_lens(perspective, display):
         camera = lens(view, 300, 200, fov=1.9)
     else:
         camera = orthographic_camera(view, 300, 200, scale=5.0)
-    gbuffer = project(
-        [MeshInstance(surface, IDENTITY, RosyField(1, vector[None]))], camera, display
-    )
+    instance = MeshInstance(surface, IDENTITY, RosyField(1, vector[None]))
+    gbuffer = project([instance], camera, display)
     moved = camera.view[:3, :3] @ vector
     h = 1e-6
 
@@ -227,9 +226,8 @@ def test_flat_faces_show_their_own_member(display):
     camera = orbit_camera(surface.vertices, 30, 30, 100, 80)
     gbuffer = project([MeshInstance(surface, IDENTITY, field)], camera, display)
     assert len(np.unique(gbuffer.face)) == 3
-    np.testing.assert_allclose(
-        np.abs(gbuffer.representation), field.magnitude[gbuffer.face], rtol=1e-5
-    )
+    modulus = np.abs(gbuffer.representation)
+    np.testing.assert_allclose(modulus, field.magnitude[gbuffer.face], rtol=1e-5)
     own = field.vectors[gbuffer.face] @ camera.view[:3, :3].T
     normal = gbuffer.normal.astype(float)
     turn = representation(members_in_space(gbuffer, 3), normal, 3)

@@ -67,9 +67,7 @@ UNEVEN = {"wobble": 0.5, "breaks": 0.5, "paper_grain": 0.3}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("settings", "lights"), [({"ink": "even"}, None), (UNEVEN, [LAMP])], ids=str
-)
+@pytest.mark.parametrize("settings, lights", [({"ink": "even"}, None), (UNEVEN, [LAMP])], ids=str)
 def test_hatching_does_not_depend_on_the_charts(settings, lights):
     """Evenly spaced lines and uneven ones, their order, and the ink for a lamp.
 

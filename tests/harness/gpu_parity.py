@@ -142,21 +142,14 @@ def draw_pair(
             numpy_picture = rosy.compose(gbuffer, look, lights, reference, drift=drift).rgba
     else:
         numpy_picture = rosy.compose(gbuffer, replace(look, method="brute"), lights, reference).rgba
-    return Pair(
-        gbuffer,
-        {name: np.array(image) for name, image in images.items()},
-        card_picture,
-        numpy_picture,
-        is_center,
-    )
+    named = {name: np.array(image) for name, image in images.items()}
+    return Pair(gbuffer, named, card_picture, numpy_picture, is_center)
 
 
 def read_gbuffer(card: Any, width: int, height: int) -> dict[str, np.ndarray]:
     """Return the G-buffer of the last picture of a card, by the names of its images."""
-    return {
-        name: card.device.read(card.resources.image(name, (width, height)))
-        for name in ("normals", "field_values")
-    }
+    names = "normals", "field_values"
+    return {name: card.device.read(card.resources.image(name, (width, height))) for name in names}
 
 
 def draw_on_card(

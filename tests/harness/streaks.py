@@ -30,10 +30,8 @@ def local_correlation(
     with np.errstate(invalid="ignore", divide="ignore"):
         mean_a, mean_b = mean(a) / total_weight, mean(b) / total_weight
         product = mean(a * b) / total_weight - mean_a * mean_b
-        spread_a, spread_b = (
-            mean(a * a) / total_weight - mean_a**2,
-            mean(b * b) / total_weight - mean_b**2,
-        )
+        spread_a = mean(a * a) / total_weight - mean_a**2
+        spread_b = mean(b * b) / total_weight - mean_b**2
         result = product / np.sqrt(spread_a * spread_b)
     return np.where(weight > 0, result, np.nan)
 

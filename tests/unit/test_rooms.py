@@ -90,9 +90,8 @@ def test_imports_of_finds_all_kinds_of_imports(tmp_path, monkeypatch):
     monkeypatch.setitem(globals(), "PACKAGE", tmp_path)
     (tmp_path / "field").mkdir()
     path = tmp_path / "field" / "wrong.py"
-    path.write_text(
-        "import bpy\nfrom ..scene.apply import x\nfrom .. import ui\nfrom . import frames\n"
-    )
+    imports = "import bpy\nfrom ..scene.apply import x\nfrom .. import ui\nfrom . import frames\n"
+    path.write_text(imports)
     assert imports_of(path) == ({"scene.apply", "ui", "field.frames"}, {"bpy"})
 
 

@@ -345,10 +345,8 @@ def test_lines_in_space_are_in_the_space_of_the_mesh(tmp_path, error_of):
     drawing = rf.strokes(surface, spacing=8, taper=0.0, **arguments)
     drawing.save(tmp_path / "a.csv")
     rows = np.genfromtxt(tmp_path / "a.csv", delimiter=",", names=True, dtype=None, encoding=None)
-    points, normals = (
-        np.stack([rows[name] for name in names], 1)
-        for names in (("x", "y", "z"), ("nx", "ny", "nz"))
-    )
+    points = np.stack([rows[name] for name in ("x", "y", "z")], 1)
+    normals = np.stack([rows[name] for name in ("nx", "ny", "nz")], 1)
     assert len(np.unique(rows["stroke"])) == len(drawing)
     assert set(rows["family"]) == set(drawing.family_names)
     assert np.abs(np.linalg.norm(points / axes, axis=1) - 1).max() < 0.02

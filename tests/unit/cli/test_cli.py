@@ -158,10 +158,8 @@ def test_workers_get_the_options_as_they_are(tmp_path, monkeypatch):
     words = [f"--out={tmp_path}", "--object=-a", "--object=b", "--object=--save", "--camera=-x"]
     words += ["--size=8x8", "--preset=plaid", "--device=cpu", "--set=gain=2", "--set=-1=-1"]
     words += ["--blender=-no such program"]
-    for arguments in (
-        words,
-        ["--object=-a", "--object", "b", "--object=--save", *words[:1], *words[4:]],
-    ):
+    in_two_words = ["--object=-a", "--object", "b", "--object=--save", *words[:1], *words[4:]]
+    for arguments in (words, in_two_words):
         assert main(["bake", str(scene), *arguments, "--frames", "1-2", "--jobs", "2"]) == 0
     command = [sys.executable, "-m", "rosy_addon", "bake", str(scene), *words, "--workers=1"]
     assert commands == [command, command] and main([*command[3:], "--frames=1-2", "--jobs=2"]) == 0

@@ -119,9 +119,7 @@ def test_unused_vertices_change_nothing(tmp_path):
 
 def write_ply(path, surface: Surface, **columns):
     """Write a .ply file with further columns of vertices, integers as bytes and others as floats."""
-    kinds = {
-        name: "uchar" if values.dtype.kind in "iu" else "float" for name, values in columns.items()
-    }
+    kinds = {k: "uchar" if v.dtype.kind in "iu" else "float" for k, v in columns.items()}
     head = ["ply", "format ascii 1.0", f"element vertex {len(surface.vertices)}"]
     head += [f"property float {axis}" for axis in "xyz"]
     head += [f"property {kind} {name}" for name, kind in kinds.items()]

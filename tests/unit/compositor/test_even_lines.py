@@ -103,10 +103,8 @@ def test_distances_in_blender_units_are_exact():
 
 def test_spacings_in_pixels_come_in_steps():
     instance, look = wall_instance(), pixel_look(LOOK)
-    spacings = {
-        instance_line_spacing(look, camera_above(scale), instance)
-        for scale in np.linspace(8, 16, 200)
-    }
+    cameras = [camera_above(scale) for scale in np.linspace(8, 16, 200)]
+    spacings = {instance_line_spacing(look, camera, instance) for camera in cameras}
     np.testing.assert_allclose(np.diff(np.log2(sorted(spacings))), 1 / 8, atol=1e-9)
     assert len(spacings) == 9
 

@@ -28,9 +28,8 @@ def make_noise(field):
 
 
 def fast_images(field, look=LOOK, noise=None):
-    (images,) = fast_lic.fast_lic(
-        field, [pixel_look(look)], make_noise(field) if noise is None else noise
-    )
+    noise = make_noise(field) if noise is None else noise
+    (images,) = fast_lic.fast_lic(field, [pixel_look(look)], noise)
     return images
 
 
@@ -136,8 +135,6 @@ def test_fields_that_change_a_little_keep_their_streamlines(degree):
     """Pictures of a series do not flicker: pixels keep the streamline from which they take their average."""
     x, y = pixel_centers(SIZE)
     angle = pair_angle(x, y, SIZE, degree)
-    first, second = (
-        fast_images(planar_pixel_field(angle + np.radians(turn), degree)).members.ravel()
-        for turn in (0.0, 0.02)
-    )
+    fields = [planar_pixel_field(angle + np.radians(turn), degree) for turn in (0.0, 0.02)]
+    first, second = (fast_images(field).members.ravel() for field in fields)
     assert np.corrcoef(first, second)[0, 1] > 0.975

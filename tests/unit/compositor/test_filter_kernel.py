@@ -31,8 +31,7 @@ def test_sums_of_weights_in_closed_form(kernel, streamline):
 
 def test_other_kernels_have_three_quarters_of_the_samples():
     for length in (40, 400):
-        plain, tapered, oriented = (
-            full_sample_count(length, kernel) for kernel in ("box", "taper", "ramp")
-        )
+        kernels = "box", "taper", "ramp"
+        plain, tapered, oriented = (full_sample_count(length, kernel) for kernel in kernels)
         assert plain == 2 * length + 1
         assert abs(tapered / plain - 0.75) < 0.01 and abs(oriented / plain - 0.75) < 0.01

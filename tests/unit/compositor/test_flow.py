@@ -37,10 +37,8 @@ def correlation(first, second):
 def best_shift(first, second, direction, expected, reach=3.0):
     """The shift of an image along a direction that makes it most like another one, in pixels."""
     shifts = np.arange(expected - reach, expected + reach + 0.01, 0.25)
-    likeness = [
-        correlation(ndimage.shift(first, shift * np.asarray(direction)[::-1]), second)
-        for shift in shifts
-    ]
+    shifted = [ndimage.shift(first, shift * np.asarray(direction)[::-1]) for shift in shifts]
+    likeness = [correlation(each, second) for each in shifted]
     return shifts[int(np.argmax(likeness))]
 
 

@@ -254,9 +254,8 @@ def test_lines_overshoot_the_border_of_a_tone():
     beyond = (from_border > overshoot + 2) & (from_border < SIZE / 2 - overshoot - 4)
     assert (light[:, beyond] > 0.999).all()
     # Lines end at different distances from the border.
-    dark_beyond_border = [
-        row[SIZE // 2 :] < 0.5 for row in light if (row[SIZE // 2 - 4 : SIZE // 2] < 0.5).all()
-    ]
+    is_dark = (light[:, SIZE // 2 - 4 : SIZE // 2] < 0.5).all(axis=1)
+    dark_beyond_border = light[is_dark, SIZE // 2 :] < 0.5
     ends = np.argmin(dark_beyond_border, axis=1)
     assert ends.max() > 0.5 * overshoot and np.std(ends) > 0.1 * overshoot
 

@@ -42,9 +42,8 @@ def project_surface(
 def test_decomposition_agrees_with_brute_force_on_a_sphere():
     sphere = icosphere(5)
     gbuffer = project_surface(sphere, axis_field(sphere, 4, (0.3, 0.9, 0.1)), 384)
-    members, brute = (
-        degree_layers(gbuffer, plain(method=method))[0].tone for method in ("members", "brute")
-    )
+    looks = [plain(method=method) for method in ("members", "brute")]
+    members, brute = (degree_layers(gbuffer, look)[0].tone for look in looks)
     assert correlation(members, brute) > 0.98
 
 
@@ -95,10 +94,8 @@ def test_breaking_points_are_visible_on_a_tilted_surface_without_the_view_plane(
     eye = (0, -4 * np.sin(tilt), 4 * np.cos(tilt))
     gbuffer = project_surface(surface, field, 300, eye, 1.5, (0, 0, 1))
     brute = degree_layers(gbuffer, plain(method="brute"))[0].tone
-    with_it, without = (
-        degree_layers(gbuffer, plain(method="members", view_plane=on))[0].tone
-        for on in (True, False)
-    )
+    looks = [plain(method="members", view_plane=on) for on in (True, False)]
+    with_it, without = (degree_layers(gbuffer, look)[0].tone for look in looks)
     assert correlation(with_it, brute) > correlation(without, brute)
 
 

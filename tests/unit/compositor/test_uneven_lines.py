@@ -56,10 +56,9 @@ def test_breaks_and_paper_grain_shorten_lines():
     look = Look(ink="hatch", line_width=2.0, length=60, crispness=1.0)
 
     def shorter(tone, **settings):
-        plain, uneven = (
-            mean_run_length(plane_coverage(each, tone, angle=0.0))
-            for each in (look, replace(look, **settings))
-        )
+        looks = look, replace(look, **settings)
+        coverages = [plane_coverage(each, tone, angle=0.0) for each in looks]
+        plain, uneven = map(mean_run_length, coverages)
         return uneven / plain
 
     light, middle, dark = (shorter(tone, breaks=1.0) for tone in (0.9, 0.5, 0.2))
@@ -116,6 +115,5 @@ def test_wobble_rotates_all_directions(degree):
     before = field.member_direction(member)
     after = turned.member_direction(member * np.exp(1j * angle))
     np.testing.assert_allclose(after, before * np.exp(1j * angle), atol=1e-5)
-    np.testing.assert_allclose(
-        turned.representation, field.representation * np.exp(1j * degree * angle), atol=1e-5
-    )
+    expected = field.representation * np.exp(1j * degree * angle)
+    np.testing.assert_allclose(turned.representation, expected, atol=1e-5)

@@ -84,14 +84,8 @@ def test_percentiles_of_errors_are_weighted_by_area():
     assert statistics.worst_face == 3 and statistics.max == 0.4
     error[3] = np.nan
     assert error_statistics(mesh, error).worst_face == 2
-    assert list(vars(error_statistics(mesh, np.full(4, np.nan))).values())[1:] == [
-        0,
-        0,
-        0,
-        0,
-        -1,
-        0,
-    ]
+    values = list(vars(error_statistics(mesh, np.full(4, np.nan))).values())
+    assert values[1:] == [0, 0, 0, 0, -1, 0]
 
 
 def test_fields_that_are_no_rosys_are_compared_by_their_best_matching():

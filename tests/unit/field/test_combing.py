@@ -29,9 +29,7 @@ def draw(combing: Combing, points: np.ndarray, batch: int = 1000, pressure: floa
     """Draw a stroke, and let the field settle."""
     tree = cKDTree(combing.system.surface.face_center)
     settings = GuideBrush(**({"radius": 0.15} | brush))
-    stroke = BrushStroke(
-        combing.system, combing.guides, settings, lambda places: tree.query(places)[1]
-    )
+    stroke = BrushStroke(combing.system, combing.guides, settings, lambda at: tree.query(at)[1])
     for first in range(0, len(points), batch):
         part = points[first : first + batch]
         combing.follow(stroke.extend(part, np.full(len(part), pressure)))
@@ -89,14 +87,12 @@ def test_settled_field_is_the_guided_field():
         angle = np.linspace(0, random.uniform(0.2, 2), 40)[:, None]
         points = np.cos(angle) * around[0] + np.sin(angle) * around[1]
         effect = ("comb", "comb", "comb", "erase", "smooth")[index % 5]
-        draw(
-            combing, points, radius=random.uniform(0.1, 0.4), effect=effect, is_exact=index % 7 == 0
-        )
+        radius = random.uniform(0.1, 0.4)
+        draw(combing, points, radius=radius, effect=effect, is_exact=index % 7 == 0)
         if index % 5:
             continue
-        settings = GeneratorSettings(
-            "guided", vectors=combing.guide_vectors, vectors_have_firmness=True
-        )
+        vectors = combing.guide_vectors
+        settings = GeneratorSettings("guided", vectors=vectors, vectors_have_firmness=True)
         expected = generate(surface, settings, 4)
         assert np.percentile(angles(combing, combing.vectors, expected.vectors), 95) < 0.01
         found = find_singularities(surface, RosyField(4, combing.vectors))

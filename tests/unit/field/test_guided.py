@@ -26,9 +26,8 @@ def random_guides(surface, count, seed=0):
     random = np.random.default_rng(seed)
     chosen = random.choice(surface.face_count, count, replace=False)
     guides = np.zeros((surface.face_count, 3))
-    guides[chosen] = normalize(
-        np.cross(surface.face_normal[chosen], random.standard_normal((count, 3)))
-    )
+    vectors = random.standard_normal((count, 3))
+    guides[chosen] = normalize(np.cross(surface.face_normal[chosen], vectors))
     return guides
 
 
@@ -54,9 +53,8 @@ def test_soft_guides_match_a_direct_solver():
     shape = len(corner), connection.node_count
     entries = np.arange(len(corner)), connection.corner_node[corner]
     root_weight = np.sqrt(weight * np.repeat(connection.area / 3, 3)[corner])
-    transport_matrix = sparse.csr_matrix(
-        (root_weight * np.exp(1j * degree * frame_angle[corner]), entries), shape
-    )
+    values = root_weight * np.exp(1j * degree * frame_angle[corner])
+    transport_matrix = sparse.csr_matrix((values, entries), shape)
     target = root_weight * np.repeat(to_representation(guides, x, y, degree), 3)[corner]
     matrix = as_scipy(laplacian(connection, degree)) + transport_matrix.getH() @ transport_matrix
     z = spsolve(matrix.tocsc(), transport_matrix.getH() @ target)

@@ -79,9 +79,8 @@ def test_axes_guide_the_faces_around_them():
     near = np.linalg.norm(BALL.face_center - position[0], axis=1) < 0.3
     assert guides[near].any(axis=1).all() and guides.any(axis=1).sum() == near.sum() + 1
     assert (np.abs(guides[near, 0]) > 0.9).all()
-    generator_settings = GeneratorSettings(
-        "guided", axis_guides=list(zip(position, axis, (0.3, 0.0), strict=True))
-    )
+    axis_guides = list(zip(position, axis, (0.3, 0.0), strict=True))
+    generator_settings = GeneratorSettings("guided", axis_guides=axis_guides)
     field = generate(BALL, generator_settings, 2)
     np.testing.assert_allclose(np.abs(dot(field.vectors, guides))[near], 1, atol=1e-9)
 

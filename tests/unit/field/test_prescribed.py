@@ -205,9 +205,8 @@ def test_the_energy_is_that_of_a_dense_solver(surface, degree, vertex, index):
     node_index = prescribed.index_at_nodes(faces, np.array(vertex, int), np.array(index, int))
     turn = 2 * np.pi / degree
     required = turn * node_index - faces.defect
-    loops = turning_angles._loops(
-        graph, spanning_forest(len(graph.component), graph.source, graph.target)
-    )
+    forest = spanning_forest(len(graph.component), graph.source, graph.target)
+    loops = turning_angles._loops(graph, forest)
     rows = np.zeros((len(loops), len(edge)))
     for row, (crossed, signs) in zip(rows, loops, strict=True):
         row[crossed] = signs

@@ -124,11 +124,8 @@ def test_guides_bend_a_field_with_the_same_singularities(degree):
     """Near the guides the field follows them, and no singularity comes or goes."""
     last = pole_field(degree, [])[1]
     guides = np.zeros((BALL.face_count, 3))
-    for center, direction in (
-        ((1, 0, 0), (0, 1, 1)),
-        ((-1, 0.3, 0), (0, 1, 0.2)),
-        ((0, 1, 0), (1, 0, 0)),
-    ):
+    directions = {(1, 0, 0): (0, 1, 1), (-1, 0.3, 0): (0, 1, 0.2), (0, 1, 0): (1, 0, 0)}
+    for center, direction in directions.items():
         center = np.divide(center, np.linalg.norm(center))
         distance = np.linalg.norm(BALL.face_center - center, axis=1)
         guides[distance < 0.15] = direction

@@ -69,9 +69,8 @@ def test_levels_with_another_diagonal(laplacian):
     rhs = random.standard_normal(len(laplacian)) + 0j
     new_levels = add_diagonal(levels, diagonal)
     # 15 iterations would not be enough without a suitable preconditioner.
-    solution = conjugate_gradient(
-        new_levels[0].matrix, rhs, 1e-12, partial(w_cycle, new_levels), max_iterations=20
-    )
+    cycle = partial(w_cycle, new_levels)
+    solution = conjugate_gradient(new_levels[0].matrix, rhs, 1e-12, cycle, max_iterations=20)
     expected = spsolve(as_scipy(laplacian) + sparse.diags(diagonal), rhs)
     assert np.abs(solution - expected).max() < 1e-6 * np.abs(expected).max()
 

@@ -97,11 +97,8 @@ def test_convex_faces_are_fans_around_their_first_corner():
     hexagon = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     square = [(0, 0), (1, 0), (1, 1), (0, 1)]
     _, triangles, face = triangulate_polygons(square, hexagon, square[:3])
-    assert triangles.tolist() == [
-        *([0, 1, 2], [0, 2, 3]),
-        *([4, 5, 6], [4, 6, 7], [4, 7, 8], [4, 8, 9]),
-        [10, 11, 12],
-    ]
+    expected = [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7], [4, 7, 8], [4, 8, 9], [10, 11, 12]]
+    assert triangles.tolist() == expected
     assert face.tolist() == [0, 0, 1, 1, 1, 1, 2]
 
 

@@ -164,9 +164,8 @@ def test_the_range_of_the_colors(card, samples, top):
     instances = ball(), shown(BALL, axis_field(BALL, 2), shift=(0, 0, -9))
     drawn, expected = (draw(each, ViewInput(instances, view(), look)) for each in (card, None))
     # Numpy finds the field of several samples at the centers of pixels.
-    assert drawn.color_range == pytest.approx(
-        expected.color_range, rel=1e-4 if samples == 1 else 5e-3
-    )
+    tolerance = 1e-4 if samples == 1 else 5e-3
+    assert drawn.color_range == pytest.approx(expected.color_range, rel=tolerance)
     assert (drawn.color_range == (0.0, 0.7)) == bool(top)
     fixed = replace(look, color_range=drawn.color_range)
     again = draw(card, ViewInput(instances, view(), fixed))

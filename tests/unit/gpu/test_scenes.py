@@ -148,12 +148,10 @@ def test_samples_of_neighbors(card, ink):
 @pytest.mark.parametrize("samples", [1, 2])
 def test_meshes_without_a_field_occlude(card, samples):
     look = replace(LOOK, supersampling=samples)
-    others = [
-        shown(BALL, None, 0.4, (0.3, -0.9, 0.2)),
-        shown(torus(48, 24), None, rotation(1, 0.3, 0)),
-    ]
+    small = shown(BALL, None, 0.4, (0.3, -0.9, 0.2))
+    ring = shown(torus(48, 24), None, rotation(1, 0.3, 0))
     unoccluded = assert_parity(card, [ball()], look=look)
-    pair = assert_parity(card, [others[0], ball(), others[1]], look=look)
+    pair = assert_parity(card, [small, ball(), ring], look=look)
     assert (pair.card[..., 3] != pair.numpy[..., 3]).sum() < 5
     assert (pair.card[..., 3] > 0).sum() < 0.8 * (unoccluded.card[..., 3] > 0).sum()
 

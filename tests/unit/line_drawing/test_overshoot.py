@@ -38,10 +38,8 @@ def strokes_of(instances, camera, style):
 
 def draw_both(instances, camera, **options):
     """Return the same strokes without and with overshoot."""
-    return (
-        strokes_of(tuple(instances), camera, StrokeStyle(**options, overshoot=overshoot))
-        for overshoot in (0, MAX_PIXELS)
-    )
+    styles = [StrokeStyle(**options, overshoot=overshoot) for overshoot in (0, MAX_PIXELS)]
+    return (strokes_of(tuple(instances), camera, style) for style in styles)
 
 
 def ends_of(strokes):

@@ -25,9 +25,8 @@ pytestmark = pytest.mark.slow
 
 WIDTH, HEIGHT = 480, 360
 
-BROWSER = next(
-    filter(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome")), None
-)
+BROWSERS = "chromium", "chromium-browser", "google-chrome", "chrome"
+BROWSER = next(filter(shutil.which, BROWSERS), None)
 INKSCAPE = shutil.which("inkscape")
 
 #: Option of Inkscape to list the layers of a file.

@@ -165,9 +165,8 @@ def test_inconsistently_oriented_faces_are_continuous():
 
 
 def test_links_are_symmetric_and_include_the_pixel_itself():
-    gbuffer = project_surfaces(
-        [torus(30, 20), icosphere(1)], camera_above(97, 3.0, True), [(0, 0, 0), (0, 0.8, 0.3)]
-    )
+    surfaces, shifts = [torus(30, 20), icosphere(1)], [(0, 0, 0), (0, 0.8, 0.3)]
+    gbuffer = project_surfaces(surfaces, camera_above(97, 3.0, True), shifts)
     masks = neighbor_masks(gbuffer, 0.4)
     assert (masks >> 4 & 1).all() and (masks < 512).all()
     pairs, linked = neighbor_pairs(gbuffer, masks)

@@ -26,9 +26,8 @@ def to_clip(points, camera):
 
 def flat_clip(x, y, z=0.0, width=WIDTH, height=HEIGHT):
     """Clip coordinates of points given in pixels."""
-    return np.stack(
-        [2 * x / width - 1, 2 * y / height - 1, np.broadcast_to(z, x.shape), np.ones(x.shape)], 1
-    )
+    z = np.broadcast_to(z, x.shape)
+    return np.stack([2 * x / width - 1, 2 * y / height - 1, z, np.ones(x.shape)], 1)
 
 
 def make_camera(perspective, width=WIDTH, height=HEIGHT):
@@ -85,9 +84,8 @@ def test_visible_triangles_match_a_ray_caster(seed, perspective):
     actual[fragments.pixel] = fragments.triangle
     assert (actual == owner)[~doubtful].all()
     certain = (actual == owner)[fragments.pixel]
-    np.testing.assert_allclose(
-        fragments.barycentric[certain], weights[fragments.pixel[certain]], atol=1e-7
-    )
+    actual, expected = fragments.barycentric[certain], weights[fragments.pixel[certain]]
+    np.testing.assert_allclose(actual, expected, atol=1e-7)
     z = -depth[fragments.pixel[certain]]
     projection = camera.projection
     ndc = (projection[2, 2] * z + projection[2, 3]) / (projection[3, 2] * z + projection[3, 3])

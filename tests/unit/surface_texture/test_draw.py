@@ -51,11 +51,8 @@ def test_colors_of_all_kinds_do_not_depend_on_the_charts():
     field = generate(TORUS, "curvature", 4)
     middle = np.linalg.norm(TORUS.face_center, axis=1, keepdims=True)
     instance = MeshInstance(TORUS, np.eye(4), RosyField(4, field.vectors * middle))
-    for changes in (
-        {"hue": "noise"},
-        {"hue": "magnitude", "magnitude_length": True},
-        {"method": "ibfv"},
-    ):
+    by_length = {"hue": "magnitude", "magnitude_length": True}
+    for changes in ({"hue": "noise"}, by_length, {"method": "ibfv"}):
         look = WIDER.with_settings(changes)
         maps = SINGLE, PATCHES
         colors = [texture_colors(instance, uv, look, 512, POINTS) for uv in maps]
@@ -89,10 +86,8 @@ def test_stretched_charts_show_the_same_lines():
     surface = plane(16, 16)
     instance, points = instance_of(surface, 4), surface_points(surface, 20_000)
     even = surface.vertices[surface.corner_vertex, :2] / 4 + 0.5
-    colors = [
-        texture_colors(instance, uv, WIDER, size, points)
-        for uv, size in ((even, 512), (even * [1, 0.25], 1024))
-    ]
+    maps = (even, 512), (even * [1, 0.25], 1024)
+    colors = [texture_colors(instance, uv, WIDER, size, points) for uv, size in maps]
     assert correlation(*colors) > 0.95
 
 

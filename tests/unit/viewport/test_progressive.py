@@ -259,10 +259,8 @@ def test_meshes_that_change_faster_than_they_are_prepared_are_shown(helper, view
 def test_two_views_share_the_helper(helper, view_input):
     progressive = progressive_of(HelpedRenderer(), helper)
     for _ in range(500):
-        views = [
-            progressive.update(pointers, Request("key", "key", view_input))
-            for pointers in (POINTERS, (1, 3))
-        ]
+        request = Request("key", "key", view_input)
+        views = [progressive.update(pointers, request) for pointers in (POINTERS, (1, 3))]
         if all(view.texture == ((), 32) for view in views):
             break
         progressive.poll()

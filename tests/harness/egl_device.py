@@ -110,11 +110,8 @@ class EglDevice(Device):
             f"{'flat ' * (name == 'triangle_id')}{{}} {kind} {name};\n"
             for name, kind in shader.vertex.outputs
         ]
-        vertex = (
-            header
-            + "in vec4 vertex_data;\n"
-            + "".join(varying.format("out") for varying in varyings)
-        )
+        outputs = "".join(varying.format("out") for varying in varyings)
+        vertex = header + "in vec4 vertex_data;\n" + outputs
         fragment = header + BLENDER_DEFINES + f"out vec4 {shader.fragment.outputs[0][0]};\n"
         fragment += "".join(varying.format("in") for varying in varyings)
         fragment += shader_defines() + shader.fragment.code

@@ -128,8 +128,7 @@ def draw_pair(
     view = rosy.ViewInput(
         tuple(instances), camera.resized(width, height), look, tuple(lights), reference, drift=drift
     )
-    items = card.upload(instances, look.display)
-    texture = rosy.run(card.texture_steps(items, view))
+    texture = rosy.run(card.texture_steps(card.upload(instances, look.display), view))
     card_picture = card.device.read(texture)
     images = read_gbuffer(card, width, height)
     gbuffer = rosy.project(instances, view.camera, look.display, samples=supersampling)
@@ -142,23 +141,15 @@ def draw_pair(
         with one_streamline_per_pixel(rosy.package):
             numpy_picture = rosy.compose(gbuffer, look, lights, reference, drift=drift).rgba
     else:
-        brute_look = replace(look, method="brute")
-        numpy_picture = rosy.compose(gbuffer, brute_look, lights, reference).rgba
-    return Pair(
-        gbuffer,
-        {name: np.array(image) for name, image in images.items()},
-        card_picture,
-        numpy_picture,
-        is_center,
-    )
+        numpy_picture = rosy.compose(gbuffer, replace(look, method="brute"), lights, reference).rgba
+    named = {name: np.array(image) for name, image in images.items()}
+    return Pair(gbuffer, named, card_picture, numpy_picture, is_center)
 
 
 def read_gbuffer(card: Any, width: int, height: int) -> dict[str, np.ndarray]:
     """Return the G-buffer of the last picture of a card, by the names of its images."""
-    return {
-        name: card.device.read(card.resources.image(name, (width, height)))
-        for name in ("normals", "field_values")
-    }
+    names = "normals", "field_values"
+    return {name: card.device.read(card.resources.image(name, (width, height))) for name in names}
 
 
 def draw_on_card(
@@ -166,8 +157,7 @@ def draw_on_card(
 ) -> np.ndarray:
     """Draw a picture on the card: (H, W, 4), without supersampling."""
     view = rosy.ViewInput(tuple(instances), camera, look)
-    items = card.upload(instances, look.display)
-    texture = rosy.run(card.texture_steps(items, view))
+    texture = rosy.run(card.texture_steps(card.upload(instances, look.display), view))
     return card.device.read(texture)
 
 

@@ -172,9 +172,7 @@ def assert_parity(
     pair = draw_pair(ROSY, card, instances, camera, look, lights, reference, drift)
     assert np.isfinite(pair.card).all()
     both = (pair.card[..., 3] == 1) & (pair.numpy[..., 3] == 1)
-    assert both.sum() > 500
-    assert pair.agreement >= agreement
-    assert pair.likeness >= likeness
+    assert both.sum() > 500 and pair.agreement >= agreement and pair.likeness >= likeness
     brightness = pair.card[both].mean(axis=0) - pair.numpy[both].mean(axis=0)
     assert np.abs(brightness).max() < 0.01
     contrast = pair.card[both][:, :3].std(axis=0) / pair.numpy[both][:, :3].std(axis=0)

@@ -133,8 +133,7 @@ def _members(
         mean = (rosy.image_noise.NOISE_MEAN + mean).astype(np.float32)
         number = samples[member].astype(np.float32)
         members[member] = rosy.contrast.normalize_variance(mean, number, look)
-    mean_samples = samples.mean(axis=0).astype(np.float32)
-    return rosy.lic_images.lic_images(members, mean_samples)
+    return rosy.lic_images.lic_images(members, samples.mean(axis=0).astype(np.float32))
 
 
 def _sampler(

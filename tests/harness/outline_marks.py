@@ -69,9 +69,8 @@ def visible_silhouettes(
     size = camera.width * FINE, camera.height * FINE
     fragments = rasterize(clip, triangles.astype(np.int32), *size)
     fine_depth = np.full(size[0] * size[1], np.inf)
-    fine_depth[fragments.pixel] = (
-        depth[triangles[fragments.triangle]] * fragments.barycentric
-    ).sum(axis=1)
+    at_corners = depth[triangles[fragments.triangle]]
+    fine_depth[fragments.pixel] = (at_corners * fragments.barycentric).sum(axis=1)
     fine_depth = fine_depth.reshape(size[1], size[0])
     p, q = screen[ends[:, 0]], screen[ends[:, 1]]
     length = np.hypot(*(q - p).T)

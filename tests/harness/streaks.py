@@ -30,10 +30,8 @@ def local_correlation(
     with np.errstate(invalid="ignore", divide="ignore"):
         mean_a, mean_b = mean(a) / total_weight, mean(b) / total_weight
         product = mean(a * b) / total_weight - mean_a * mean_b
-        spread_a, spread_b = (
-            mean(a * a) / total_weight - mean_a**2,
-            mean(b * b) / total_weight - mean_b**2,
-        )
+        spread_a = mean(a * a) / total_weight - mean_a**2
+        spread_b = mean(b * b) / total_weight - mean_b**2
         result = product / np.sqrt(spread_a * spread_b)
     return np.where(weight > 0, result, np.nan)
 
@@ -57,8 +55,7 @@ def orientation_spectrum(tone: np.ndarray, bins: int = 180) -> np.ndarray:
     used = (radius > BAND[0]) & (radius < BAND[1])
     bin_index = (angle[used] * bins / 180).astype(int) % bins
     total = np.bincount(bin_index, power[used], bins)
-    count = np.bincount(bin_index, minlength=bins)
-    spectrum = total / np.maximum(count, 1)
+    spectrum = total / np.maximum(np.bincount(bin_index, minlength=bins), 1)
     return spectrum / spectrum.mean()
 
 

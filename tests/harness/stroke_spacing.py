@@ -63,8 +63,7 @@ def lateral_gaps(mesh: TangentMesh, strokes: Strokes, max_points: int = 20_000) 
     max_points : int
         About the number of points at which gaps are measured, evenly distributed.
     """
-    arc = strokes.arc
-    step = np.diff(arc, prepend=0)
+    step = np.diff(strokes.arc, prepend=0)
     step[strokes.start[:-1]] = 0
     samples = strokes.subdivided(np.ceil(step / (SAMPLE_STEP * strokes.spacing)).clip(1, 1000))
     tangent = _tangents(samples)

@@ -54,9 +54,8 @@ def write_svg(path: Path, *drawing: object) -> None:
 def turned(surface, degree, angle=0.0):
     """Return an instance with a field at an angle to the first edges of its faces."""
     x, y = surface.face_frames
-    return MeshInstance(
-        surface, np.eye(4), RosyField(degree, np.cos(angle) * x + np.sin(angle) * y)
-    )
+    field = RosyField(degree, np.cos(angle) * x + np.sin(angle) * y)
+    return MeshInstance(surface, np.eye(4), field)
 
 
 def latitudes(surface):

@@ -63,6 +63,5 @@ def triangle():
     return [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]
 
 
-AWKWARD = {
-    make.__name__: make for make in (cube, moebius, grid, pieces, fan, faces_without_area, triangle)
-}
+MAKERS = cube, moebius, grid, pieces, fan, faces_without_area, triangle
+AWKWARD = {make.__name__: make for make in MAKERS}

@@ -32,18 +32,20 @@ def pixels_of(path) -> np.ndarray:
 def assert_refused(completed: subprocess.CompletedProcess, *expected: str) -> None:
     """Check that a command has status 2 and prints one line with the expected texts."""
     assert completed.returncode == 2, completed.stderr
-    assert completed.stderr.startswith("rosy: ") and completed.stderr.count("\n") == 1, (
-        completed.stderr
-    )
+    assert completed.stderr.startswith("rosy: ") and completed.stderr.count("\n") == 1
     assert completed.stdout == ""
     for text in expected:
         assert text in completed.stderr
 
 
+def write_obj(path, points, faces):
+    """Write a mesh as an .obj file, and return its path."""
+    rows = ["v " + " ".join(map(repr, point)) for point in np.asarray(points, float).tolist()]
+    rows += ["f " + " ".join(str(corner + 1) for corner in face) for face in faces]
+    path.write_text("\n".join([*rows, ""]))
+    return path
+
+
 def write_cube(path):
     """Write a cube as an .obj file, and return its path."""
-    surface = cube()
-    quads = surface.corner_vertex.reshape(-1, 4) + 1
-    rows = [f"v {x} {y} {z}\n" for x, y, z in surface.vertices]
-    path.write_text("".join(rows + [f"f {a} {b} {c} {d}\n" for a, b, c, d in quads]))
-    return path
+    return write_obj(path, cube().vertices, cube().faces)

@@ -19,10 +19,8 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def mainly(common, cases):
     """Parameters of all cases; `make test` runs the common ones, `make test LONG=1` all."""
-    return [
-        case if case in set(common) else pytest.param(case, marks=pytest.mark.long)
-        for case in cases
-    ]
+    long = pytest.mark.long
+    return [case if case in set(common) else pytest.param(case, marks=long) for case in cases]
 
 
 def pytest_collection_modifyitems(items):

@@ -6,10 +6,12 @@ import numpy as np
 from awkward import AWKWARD
 from scipy import sparse
 from scipy.spatial.transform import Rotation
-from shapes import from_triangles, rebuilt
+from shapes import from_triangles, icosphere, rebuilt
 
+from rosy_addon.core.errors import RosyError
 from rosy_addon.field.convert import rotate_field
 from rosy_addon.field.field_io import load_field
+from rosy_addon.field.frames import dot
 from rosy_addon.field.representation import from_representation, to_representation
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
@@ -50,8 +52,7 @@ def copies_of(surface, scale=3.0):
 def awkward_surface(name):
     """One of the meshes of `awkward.AWKWARD`."""
     points, faces = AWKWARD[name]()
-    starts = np.cumsum([0, *map(len, faces)])
-    return build_surface(points, np.concatenate(faces), starts, name=name)
+    return build_surface(points, np.concatenate(faces), np.cumsum([0, *map(len, faces)]), name=name)
 
 
 def random_field(surface, degree, seed=0):
@@ -76,6 +77,28 @@ def write_off(path, surface):
     rows += [" ".join(map(str, [len(face), *face])) for face in faces]
     path.write_text("\n".join(rows) + "\n")
     return path
+
+
+def read_damaged(path, data, garbage, offset, read):
+    """Read a file with garbage in its data, which is possible or ends in an error that names the file."""
+    path.write_bytes(data[:offset] + garbage + data[offset + len(garbage) :])
+    try:
+        read(path)
+    except RosyError as error:
+        assert "\n" not in str(error) and str(path) in str(error)
+
+
+def cross_errors(surface, vectors, expected):
+    """(F,) angles in degrees between the directions of crosses, projected on the faces."""
+    normal = surface.face_normal
+    vectors, expected = (a - dot(a, normal)[:, None] * normal for a in (vectors, expected))
+    turn = np.arctan2(dot(np.cross(expected, vectors), normal), dot(expected, vectors))
+    return np.abs((np.degrees(turn) + 45) % 90 - 45)
+
+
+def ellipsoid(subdivisions, axes=(1.0, 0.8, 0.6)):
+    ball = icosphere(subdivisions)
+    return rebuilt(ball, ball.vertices * axes)
 
 
 def read_field(*arguments, **settings):

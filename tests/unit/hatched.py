@@ -65,9 +65,8 @@ def make_wall(angle=0.0, half=9.0, matrix=None):
 
 def make_camera(azimuth=0.0, zoom=1.0, distance=4.0):
     position = distance * np.array([np.sin(azimuth), -np.cos(azimuth), 0.3])
-    return perspective_camera(
-        look_at(position, (0, 0, 0)), SIZE, SIZE, fov=2 * np.arctan(np.tan(0.28) / zoom)
-    )
+    fov = 2 * np.arctan(np.tan(0.28) / zoom)
+    return perspective_camera(look_at(position, (0, 0, 0)), SIZE, SIZE, fov=fov)
 
 
 def camera_before_wall(scale, x=0.0, z=0.0):

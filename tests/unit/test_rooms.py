@@ -39,7 +39,7 @@ BLENDER_GPU_FILES = ("device.py",)
 
 #: What the Python package can use where it is installed.
 EXTRA_LIBRARIES = {
-    *("distributed", "h5py", "imageio_ffmpeg", "matplotlib", "meshio", "pyvista", "vtkmodules"),
+    *("distributed", "h5py", "imageio_ffmpeg", "matplotlib", "meshio", "pyvista", "vtkmodules")
 }
 FILES = sorted(PACKAGE.rglob("*.py"))
 
@@ -90,9 +90,8 @@ def test_imports_of_finds_all_kinds_of_imports(tmp_path, monkeypatch):
     monkeypatch.setitem(globals(), "PACKAGE", tmp_path)
     (tmp_path / "field").mkdir()
     path = tmp_path / "field" / "wrong.py"
-    path.write_text(
-        "import bpy\nfrom ..scene.apply import x\nfrom .. import ui\nfrom . import frames\n"
-    )
+    imports = "import bpy\nfrom ..scene.apply import x\nfrom .. import ui\nfrom . import frames\n"
+    path.write_text(imports)
     assert imports_of(path) == ({"scene.apply", "ui", "field.frames"}, {"bpy"})
 
 
@@ -171,7 +170,5 @@ def test_numpy_rooms_import_without_blender():
             "assert not heavy, heavy",
         ]
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
-    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -7,8 +7,7 @@ import numpy as np
 
 def torus_uv(columns: int = 96, rows: int = 48, width: float = 0.9) -> np.ndarray:
     """(C, 2) coordinates of a single chart, which is cut along two circles."""
-    face = np.arange(columns * rows)
-    column, row = np.divmod(face, rows)
+    column, row = np.divmod(np.arange(columns * rows), rows)
     steps = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
     u = (column[:, None] + steps[:, 0]) / columns
     v = (row[:, None] + steps[:, 1]) / rows
@@ -19,8 +18,7 @@ def torus_uv(columns: int = 96, rows: int = 48, width: float = 0.9) -> np.ndarra
 def patches_uv(seed: int, columns: int = 96, rows: int = 48, patch: int = 12) -> np.ndarray:
     """(C, 2) coordinates of square charts, each at a random angle, half of them mirrored."""
     rng = np.random.default_rng(seed)
-    face = np.arange(columns * rows)
-    column, row = np.divmod(face, rows)
+    column, row = np.divmod(np.arange(columns * rows), rows)
     chart = column // patch * (rows // patch) + row // patch
     count = int(chart.max()) + 1
     steps = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])

@@ -88,8 +88,7 @@ def test_coverage_is_cut_at_the_window():
 def test_every_round_number_is_the_nearest():
     for value in [1.0, 2e-7, 0.05, *np.geomspace(1e-9, 1e9, 500).tolist()]:
         below, above = round_below(value), round_above(value)
-        assert below <= value * (1 + 1e-9) and above >= value * (1 - 1e-9)
-        assert above / below < 2.51
+        assert below <= value * (1 + 1e-9) and above >= value * (1 - 1e-9) and above / below < 2.51
         assert f"{below:.0e}"[0] in "125" and float(f"{below:.0e}") == below
 
 
@@ -149,8 +148,7 @@ def test_nothing_overlaps(size):
         assert len(layout.plates) == count
         assert layout.text_size >= min(text_size or max(TEXT_SIZE * min(size), MIN_TEXT_SIZE), 5.5)
         boxes = np.array(layout.plates).reshape(-1, 4)
-        assert (boxes >= 0).all() and (boxes[:, 2:] <= size).all()
-        assert pair_count(boxes) == 0
+        assert (boxes >= 0).all() and (boxes[:, 2:] <= size).all() and pair_count(boxes) == 0
         low = np.array([(text.left, text.baseline) for text in layout.texts]).reshape(-1, 2)
         width = [text_width(text.text) for text in layout.texts]
         letters = np.hstack([low, low + layout.text_size * np.c_[width, np.full(len(low), 0.7)]])
@@ -188,8 +186,7 @@ def test_text_is_wrapped_at_spaces():
 def drawn(request):
     layout = lay_out_key(PARTS, (640, 480), text_width)
     rgba = np.zeros((480, 640, 4), dtype=np.float32)
-    scale = ColorScale("", "magma", 0.0, 1.0)
-    draw_key(rgba, layout, scale, text_triangles, request.param)
+    draw_key(rgba, layout, ColorScale("", "magma", 0.0, 1.0), text_triangles, request.param)
     return rgba, layout
 
 
@@ -256,8 +253,7 @@ def test_the_range_is_the_largest_visible_magnitude():
     low, high = picture.color_range
     assert low == 0 and high == pytest.approx(largest_visible(view_input), rel=1e-6)
     # A look with this range gives the same picture.
-    fixed = view(replace(look, color_range=(0.0, high)))
-    again = draw_picture(fixed)
+    again = draw_picture(view(replace(look, color_range=(0.0, high))))
     np.testing.assert_array_equal(again.rgba, picture.rgba)
     assert again.color_range == (0.0, high)
     scale = picture_key(look, picture).color_scale
@@ -296,13 +292,11 @@ def test_the_range_of_numbers_as_colors(ends):
     heights = instance.surface.vertices[instance.surface.corner_vertex, 2].astype(np.float32)
     colored = replace(instance, color_values=heights)
     look = Look(hue="values", color_range=ends)
-    view_input = view(look, (colored,))
-    picture = draw_picture(view_input)
+    picture = draw_picture(view(look, (colored,)))
     expected = ends if any(ends) else (float(heights.min()), float(heights.max()))
     assert picture.color_range == expected == fixed_color_range(look, (colored,))
     assert fixed_color_range(look) == (ends if any(ends) else None)
-    scale = picture_key(look, picture).color_scale
-    assert scale == ColorScale("", look.color_map, *expected)
+    assert picture_key(look, picture).color_scale == ColorScale("", look.color_map, *expected)
 
 
 @pytest.mark.parametrize(

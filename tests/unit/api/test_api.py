@@ -98,10 +98,8 @@ def test_meshes_that_are_refused(arguments, options, expected, error_of):
 def test_the_extension_reads_no_simulations(error_of, monkeypatch):
     """The readers are not in it."""
     monkeypatch.setattr(mesh_arrays, "SIMULATION_READERS", {})
-    message = error_of(rf.Surface, "a.vtu")
-    assert (
-        message == "a.vtu: is not a mesh file: its name must end in .obj, .off, .ply, .stl or .om"
-    )
+    expected = "a.vtu: is not a mesh file: its name must end in .obj, .off, .ply, .stl or .om"
+    assert error_of(rf.Surface, "a.vtu") == expected
 
 
 def test_angles_are_those_of_the_frames(sphere):
@@ -132,8 +130,7 @@ def test_difference_of_a_rotated_field(sphere, field):
 
 
 def test_singularities_sum_to_the_euler_characteristic(sphere, field):
-    assert sphere.euler_characteristic == 2
-    assert field.singularities.index.sum() == 4 * 2
+    assert sphere.euler_characteristic == 2 and field.singularities.index.sum() == 4 * 2
     assert field.to_degree(8).singularities.index.sum() == 8 * 2
 
 
@@ -152,8 +149,7 @@ def test_files_and_arrays_give_the_same_field(sphere, field, tmp_path):
         field.save(tmp_path / name)
         again = rf.read_field(tmp_path / name, sphere, 4)
         assert np.array_equal(again.directions, field.directions)
-    vectors = rf.from_vectors(sphere, field.vectors, 4)
-    assert np.array_equal(vectors.vectors, field.vectors)
+    assert np.array_equal(rf.from_vectors(sphere, field.vectors, 4).vectors, field.vectors)
 
 
 def test_fields_from_arrays_of_a_surface(sphere, field, error_of):
@@ -201,9 +197,8 @@ def test_a_surface_is_its_content(sphere, field, error_of):
     again = rf.Surface(sphere.vertices.copy(), sphere.faces, name="again")
     for other in (again, pickle.loads(pickle.dumps(sphere))):
         copied = rf.from_vectors(other, field.vectors, field.degree)
-        assert rf.compare([field, copied.rotated(0.2)]).rows[1]["mean"] == pytest.approx(
-            np.degrees(0.2)
-        )
+        mean = rf.compare([field, copied.rotated(0.2)]).rows[1]["mean"]
+        assert mean == pytest.approx(np.degrees(0.2))
         assert copied.difference(field).max < 1e-12
         size = {"size": (32, 32)}
         assert np.array_equal(rf.render(sphere, copied, **size), rf.render(sphere, field, **size))
@@ -221,11 +216,9 @@ def test_a_field_of_another_surface_is_refused(sphere, field, error_of):
 
 def test_warnings_name_the_surface():
     square = rf.Surface(SQUARE, [[0, 1, 2, 3]], name="square")
-    with pytest.warns(
-        rf.RosyWarning, match="square: axis gives no direction on any face"
-    ) as caught:
+    with pytest.warns(rf.RosyWarning, match="square: axis gives no direction on any face") as told:
         rf.along_axis(square)
-    assert caught[0].filename == __file__
+    assert told[0].filename == __file__
 
 
 def test_a_picture_is_an_array_and_a_png(sphere, field, tmp_path):
@@ -249,8 +242,7 @@ def test_the_command_draws_the_same_picture(tmp_path):
     out = tmp_path / "command.png"
     assert main(["render", str(tmp_path / "torus.obj"), "-o", str(out), *words]) == 0
     surface = rf.Surface(tmp_path / "torus.obj")
-    field = rf.smoothest(surface)
-    picture = rf.render(surface, field, size=(64, 48), preset="plaid", seed=3)
+    picture = rf.render(surface, rf.smoothest(surface), size=(64, 48), preset="plaid", seed=3)
     assert out.read_bytes() == picture._repr_png_()
     same = rf.Surface(surface.vertices, surface.faces, up="y")
     again = rf.render(same, rf.smoothest(same), size=(64, 48), preset="plaid", seed=3)
@@ -260,10 +252,7 @@ def test_the_command_draws_the_same_picture(tmp_path):
 def test_numbers_as_colors(error_of):
     """Of faces, vertices and corners; those of faces if there are as many of both."""
     quad = rf.Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
-    tetrahedron = rf.Surface(
-        [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]],
-        [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]],
-    )
+    tetrahedron = rf.Surface(np.eye(4)[:, :3], [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
     for surface, numbers, expected in (
         (quad, [1, 2], [1, 1, 1, 2, 2, 2]),
         (quad, [1, 2, np.nan, np.inf], [1, 2, np.nan, 1, np.nan, np.nan]),
@@ -288,9 +277,7 @@ def test_sources_of_the_tone(sphere, field, error_of):
     """Light to the left: the same from values, from a picture and from an array."""
     look = {"view": (0, 0), "size": (64, 64), "orthographic": True, "preset": "pen-and-ink"}
     values = (sphere.vertices[:, 0] < 0).astype(float)
-    by_values = np.asarray(rf.render(sphere, field, tone_values=values, **look))[..., :3].mean(
-        axis=2
-    )
+    by_values = np.asarray(rf.render(sphere, field, tone_values=values, **look))[..., :3].mean(2)
     assert by_values[:, :24].mean() > by_values[:, -24:].mean() + 50
     tone = np.zeros((64, 64, 3), dtype=np.uint8)
     tone[:, :32] = 255
@@ -328,13 +315,11 @@ def test_colors_of_vertices_as_a_tone():
 
 def test_an_image_on_the_uv_map(error_of):
     """The left half is dark."""
-    uv = np.array(SQUARE)[:, :2]
-    square = rf.Surface(SQUARE, [[0, 1, 2, 3]], uv=uv)
+    square = rf.Surface(SQUARE, [[0, 1, 2, 3]], uv=np.array(SQUARE)[:, :2])
     field = rf.along_uv(square)
     image = np.array([[0, 255]], dtype=np.uint8)
-    picture = rf.render(
-        square, field, view=(0, 90), size=(64, 64), preset="pen-and-ink", tone_image=image
-    )
+    look = {"preset": "pen-and-ink", "tone_image": image}
+    picture = rf.render(square, field, view=(0, 90), size=(64, 64), **look)
     gray = np.asarray(picture)[..., :3].mean(axis=2)
     assert gray[16:48, 8:24].mean() < gray[16:48, 40:56].mean() - 50
 
@@ -355,16 +340,13 @@ def test_lines_in_space_are_in_the_space_of_the_mesh(tmp_path, error_of):
     """An ellipsoid whose y points up in its file, unlike in pictures of it."""
     axes = (1.0, 2.0, 0.5)
     mesh = icosphere(3)
-    faces = mesh.corner_vertex.reshape(-1, 3)
-    surface = rf.Surface(mesh.vertices * axes, faces, up="y")
+    surface = rf.Surface(mesh.vertices * axes, mesh.corner_vertex.reshape(-1, 3), up="y")
     arguments = {"size": (200, 200), "width": 3.0, "hidden": True, "orthographic": True}
     drawing = rf.strokes(surface, spacing=8, taper=0.0, **arguments)
     drawing.save(tmp_path / "a.csv")
     rows = np.genfromtxt(tmp_path / "a.csv", delimiter=",", names=True, dtype=None, encoding=None)
-    points, normals = (
-        np.stack([rows[name] for name in names], 1)
-        for names in (("x", "y", "z"), ("nx", "ny", "nz"))
-    )
+    points = np.stack([rows[name] for name in ("x", "y", "z")], 1)
+    normals = np.stack([rows[name] for name in ("nx", "ny", "nz")], 1)
     assert len(np.unique(rows["stroke"])) == len(drawing)
     assert set(rows["family"]) == set(drawing.family_names)
     assert np.abs(np.linalg.norm(points / axes, axis=1) - 1).max() < 0.02
@@ -380,11 +362,9 @@ def test_lines_in_space_are_in_the_space_of_the_mesh(tmp_path, error_of):
 
 def test_a_turntable_counts_its_pictures(sphere, field, tmp_path):
     numbers = []
-    path = rf.turntable(
-        sphere, field, path=tmp_path / "a.gif", pictures=3, size=(32, 32), on_picture=numbers.append
-    )
-    assert numbers == [1, 2, 3]
-    assert Image.open(path).n_frames == 3
+    options = {"pictures": 3, "size": (32, 32), "on_picture": numbers.append}
+    path = rf.turntable(sphere, field, path=tmp_path / "a.gif", **options)
+    assert numbers == [1, 2, 3] and Image.open(path).n_frames == 3
     with pytest.raises(rf.RosyError, match="2 or more"):
         rf.turntable(sphere, field, path=tmp_path / "b.gif", pictures=1)
 
@@ -424,6 +404,5 @@ def test_tones_of_corners_and_of_vertices_draw_the_same_picture():
 
 
 def test_other_numbers_of_tones_are_refused(error_of):
-    surface = rf.Surface(*CUBE)
-    message = error_of(rf.render, surface, tone_values=np.ones(6), preset="engraving")
+    message = error_of(rf.render, rf.Surface(*CUBE), tone_values=np.ones(6), preset="engraving")
     assert "8 numbers, one for each vertex, or 24 numbers, one for each corner" in message

@@ -24,8 +24,7 @@ def members(surface, vectors, degree):
     """The members of one face: a vector rotated about the normal."""
     angles = 2 * np.pi * np.arange(degree) / degree
     for vector, normal in zip(vectors, surface.face_normal, strict=True):
-        perpendicular = np.cross(normal, vector)
-        yield np.cos(angles)[:, None] * vector + np.sin(angles)[:, None] * perpendicular
+        yield np.cos(angles)[:, None] * vector + np.sin(angles)[:, None] * np.cross(normal, vector)
 
 
 @pytest.mark.parametrize("degree", range(1, 8))
@@ -97,8 +96,7 @@ def test_tables(sphere):
     assert len({len(line) for line in lines[:3]}) == 1  # columns of equal width
     assert r"50 \% \& more\_1 & 4" in latex and latex.count(r"\\") == 3
     assert re.search(r"tabular\}\{l(r+)\}", latex)[1] == "r" * latex.splitlines()[2].count("&")
-    assert " & -- & -- " in latex
-    assert json.loads(comparison.to_json())[1]["title"] == "b"
+    assert " & -- & -- " in latex and json.loads(comparison.to_json())[1]["title"] == "b"
     assert "<td>50 % &amp; more_1</td>" in comparison._repr_html_()
     assert "matched" not in str(rf.compare([one]))
 
@@ -127,8 +125,7 @@ def test_the_command(sphere, tmp_path, capfd):
         (["form", "b=curvature", "-o", str(tmp_path / "a.gif")], ".pdf, .svg, .png"),
         (["nothing.rosy"], "nothing.rosy"),
     ):
-        assert main(["compare", str(mesh), *words]) == 2
-        assert message in capfd.readouterr().err
+        assert main(["compare", str(mesh), *words]) == 2 and message in capfd.readouterr().err
 
 
 def test_figures_need_matplotlib(sphere):

@@ -38,9 +38,8 @@ def views_of(fields, look=LOOK, **options):
 
 def turns(views):
     """Angles in degrees between the fields of the views and that of the first one."""
-    z = [
-        face_representation(view.instances[0].surface, view.instances[0].field)[0] for view in views
-    ]
+    shown = [view.instances[0] for view in views]
+    z = [face_representation(each.surface, each.field)[0] for each in shown]
     return [np.degrees(np.angle(value / z[0]) / 4) for value in z]
 
 
@@ -60,8 +59,7 @@ def test_streaks_drift_and_loops_close(square):
     assert drifts == [drift_at(look, number) for number in range(5)]
     drifts = [view.drift for view in views_of(fields, look, between=1, loop=True)]
     assert drifts == [drift_at(look, number, 6) for number in range(6)]
-    assert len({each.phase for each in drifts}) == 6
-    assert drift_at(look, 6, 6) == drifts[0]
+    assert len({each.phase for each in drifts}) == 6 and drift_at(look, 6, 6) == drifts[0]
 
 
 def test_noise_moves_with_the_mesh(square):
@@ -76,10 +74,7 @@ def test_noise_moves_with_the_mesh(square):
     deformed = np.ascontiguousarray(bent.T)
     drawn, expected = (
         face_values(mesh, np.eye(3), deformed, field, False)[0].channels[REPRESENTATION]
-        for mesh, field in (
-            (instance.surface, instance.field),
-            (other, fields[1]),
-        )
+        for mesh, field in ((instance.surface, instance.field), (other, fields[1]))
     )
     assert drawn == pytest.approx(expected, abs=1e-5)
     half = views_of(fields, between=1)[1].instances[0].surface

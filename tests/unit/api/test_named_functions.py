@@ -10,11 +10,8 @@ from conftest import ROOT
 
 import rosy_addon as rf
 
-PAGES = [
-    ROOT / "README.md",
-    *sorted((ROOT / "docs").rglob("*.md")),
-    *sorted((ROOT / "docs").rglob("*.ipynb")),
-]
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md")), *sorted(DOCS.rglob("*.ipynb"))]
 
 
 def names_in(module: str) -> set[str]:
@@ -35,9 +32,7 @@ def test_what_a_page_names_exists(page):
         assert hasattr(rf, name), name
     imports = re.findall(r"((?:rosy_addon|rosyfields)(?:\.\w+)+) import ([\w, ]+)", text)
     modules = re.findall(r"module `((?:rosy_addon)(?:\.\w+)+)`: ([^.]*)\.", text)
-    modules += [
-        (module, name) for name, module in re.findall(r"(`\w+`) from `(rosy_addon[\w.]+)`", text)
-    ]
+    modules += [pair[::-1] for pair in re.findall(r"(`\w+`) from `(rosy_addon[\w.]+)`", text)]
     for module, names in imports + modules:
         assert set(re.findall(r"\w\w+", names)) - {"and"} <= names_in(module), module
     operators = "".join(path.read_text() for path in (ROOT / "operators").glob("*.py"))
@@ -46,5 +41,5 @@ def test_what_a_page_names_exists(page):
 
 
 def test_the_functions_of_the_reference_are_public():
-    listed = re.findall(r"^::: rosyfields\.(\w+)", (ROOT / "docs" / "api.md").read_text(), re.M)
+    listed = re.findall(r"^::: rosyfields\.(\w+)", (DOCS / "api.md").read_text(), re.M)
     assert set(listed) == set(rf.__all__)

@@ -62,10 +62,7 @@ def test_tiles_have_files_of_their_own(tmp_path, error_of):
     texture = rf.texture(square, rf.along_uv(square, 2), size=32, udim=True)
     assert repr(texture) == "<Texture: 32 x 32 texels, 2 tiles>"
     texture.save(tmp_path / "square.<UDIM>.png")
-    assert sorted(file.name for file in tmp_path.iterdir()) == [
-        "square.1001.png",
-        "square.1002.png",
-    ]
+    assert {path.name for path in tmp_path.iterdir()} == {"square.1001.png", "square.1002.png"}
     assert "no <UDIM>" in error_of(texture.save, tmp_path / "square.png")
 
 
@@ -154,9 +151,8 @@ def test_hatching_for_one_light():
     assert abs(np.corrcoef(red, green)[0, 1]) < 0.1
     for cosine, length in ((0.2, 1.0), (0.5, 1e-260), (0.9, 1e200)):
         light = (0, length * np.sqrt(1 - cosine**2), length * cosine)
-        ink = rf.texture(
-            square, field, size=256, margin=0, light_direction=light, **settings
-        ).tiles[1001]
+        options = settings | {"size": 256, "margin": 0, "light_direction": light}
+        ink = rf.texture(square, field, **options).tiles[1001]
         assert ink.rgba[..., 0].mean() == pytest.approx(cosine, abs=0.03)
         clear = rf.texture(
             square,

@@ -17,52 +17,32 @@ from rosy_addon.cli import bake, parser
 from rosy_addon.extras.command_line import main
 from rosy_addon.preset_files.store import preset_files
 
+#: Commands and their errors. {render} is `render`, a mesh and an output.
 REFUSED = {
-    "no mesh": (["render", "none.off", "-o", "{out}"], "none.off: cannot be read"),
-    "no field": (["render", "{mesh}", "none.rosy", "-o", "{out}"], "none.rosy: cannot be read"),
-    "kind of mesh": (["info", "a.step"], "a.step: is not a mesh file"),
-    "degree 0": (["render", "{mesh}", "-o", "{out}", "--degree", "0"], "degree 0 is not"),
-    "curvature 3": (
-        ["info", "{mesh}", "--degree", "3", "--generate", "curvature"],
-        "even degree, not 3",
-    ),
-    "axis": (["info", "{mesh}", "--generate", "axis", "--axis", "0,0,0"], "not a direction"),
-    "both": (["info", "{mesh}", "a.rosy", "--generate", "axis"], "not both"),
-    "size 0": (["render", "{mesh}", "-o", "{out}", "--size", "0x10"], "size 0x10: a side must be"),
-    "preset": (
-        ["render", "{mesh}", "-o", "{out}", "--preset", "none"],
-        "there is no preset 'none'",
-    ),
-    "setting": (
-        ["render", "{mesh}", "-o", "{out}", "--set", "lenght=3"],
-        "unknown setting 'lenght'",
-    ),
-    "lights": (["render", "{mesh}", "-o", "{out}", "--set", "light=scene"], "has no lights"),
-    "still without flow": (
-        ["turntable", "{mesh}", "-o", "{out}.gif", "--still"],
-        "nothing moves",
-    ),
-    "value": (
-        ["render", "{mesh}", "-o", "{out}", "--set", "length=long"],
-        "--set length=long: expected a whole",
-    ),
+    "no mesh": ("render none.off -o {out}", "none.off: cannot be read"),
+    "no field": ("render {mesh} none.rosy -o {out}", "none.rosy: cannot be read"),
+    "kind of mesh": ("info a.step", "a.step: is not a mesh file"),
+    "degree 0": ("{render} --degree 0", "degree 0 is not"),
+    "curvature 3": ("info {mesh} --degree 3 --generate curvature", "even degree, not 3"),
+    "axis": ("info {mesh} --generate axis --axis 0,0,0", "not a direction"),
+    "both": ("info {mesh} a.rosy --generate axis", "not both"),
+    "size 0": ("{render} --size 0x10", "size 0x10: a side must be"),
+    "preset": ("{render} --preset none", "there is no preset 'none'"),
+    "setting": ("{render} --set lenght=3", "unknown setting 'lenght'"),
+    "lights": ("{render} --set light=scene", "has no lights"),
+    "still without flow": ("turntable {mesh} -o {out}.gif --still", "nothing moves"),
+    "value": ("{render} --set length=long", "--set length=long: expected a whole"),
     "numbers": (
-        ["render", "{mesh}", "-o", "{out}", "--set", "color_range=0;1"],
+        "{render} --set color_range=0;1",
         "--set color_range=0;1: expected numbers with commas",
     ),
-    "range": (["render", "{mesh}", "-o", "{out}", "--set", "gain=-1"], "setting 'gain' is -1"),
-    "switch": (
-        ["render", "{mesh}", "-o", "{out}", "--set", "view_plane=2"],
-        "expected true or false",
-    ),
-    "no value": (["render", "{mesh}", "-o", "{out}", "--set", "gain"], "expected NAME=VALUE"),
-    "no folder": (
-        ["render", "{mesh}", "-o", "no/folder/a.png"],
-        "the folder no/folder does not exist",
-    ),
-    "a folder": (["render", "{mesh}", "-o", "tests"], "tests: cannot be written: it is a folder"),
-    "format": (["field", "{mesh}", "-o", "{out}"], "cannot be written as a field"),
-    "view": (["render", "{mesh}", "-o", "{out}", "--view", "nan,0"], "view nan,0"),
+    "range": ("{render} --set gain=-1", "setting 'gain' is -1"),
+    "switch": ("{render} --set view_plane=2", "expected true or false"),
+    "no value": ("{render} --set gain", "expected NAME=VALUE"),
+    "no folder": ("render {mesh} -o no/folder/a.png", "the folder no/folder does not exist"),
+    "a folder": ("render {mesh} -o tests", "tests: cannot be written: it is a folder"),
+    "format": ("field {mesh} -o {out}", "cannot be written as a field"),
+    "view": ("{render} --view nan,0", "view nan,0"),
 }
 
 
@@ -71,13 +51,11 @@ def test_bad_input_is_one_line_and_status_2(case, sphere, tmp_path, capsys, monk
     monkeypatch.chdir(ROOT)
     words, expected = REFUSED[case]
     out = tmp_path / "a.png"
-    words = [word.format(mesh=sphere, out=out) for word in words]
-    assert main(words) == 2
+    render = f"render {sphere} -o {out}"
+    assert main(words.format(mesh=sphere, out=out, render=render).split()) == 2
     output = capsys.readouterr()
     assert output.err.startswith("rosy: ") and output.err.count("\n") == 1
-    assert expected in output.err
-    assert output.out == ""
-    assert not out.exists()
+    assert expected in output.err and output.out == "" and not out.exists()
 
 
 @pytest.mark.slow
@@ -103,8 +81,7 @@ def test_bad_input_in_a_process_of_its_own(sphere, tmp_path):
 )
 def test_wrong_usage_is_status_2(words):
     done = rosy(*words)
-    assert done.returncode == 2
-    assert done.stderr.startswith("usage: python -m rosy_addon")
+    assert done.returncode == 2 and done.stderr.startswith("usage: python -m rosy_addon")
     assert "Traceback" not in done.stderr
 
 
@@ -144,8 +121,7 @@ def test_ctrl_c_is_status_130_without_a_traceback(sphere, tmp_path):
         _, error_output = process.communicate(timeout=60)
     finally:
         process.kill()
-    assert process.returncode == 130
-    assert error_output == "rosy: stopped\n"
+    assert process.returncode == 130 and error_output == "rosy: stopped\n"
     assert list(tmp_path.iterdir()) == []
 
 
@@ -158,8 +134,7 @@ def test_ctrl_c_while_python_ends_is_status_130_without_a_traceback():
         "sys.argv = ['rosy_addon', '--help']; sys.exit(run())"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
-    assert done.returncode == 130
-    assert done.stderr == "rosy: stopped\n"
+    assert done.returncode == 130 and done.stderr == "rosy: stopped\n"
 
 
 def test_bake_without_blender_is_an_error(monkeypatch, capsys):
@@ -171,8 +146,7 @@ def test_bake_without_blender_is_an_error(monkeypatch, capsys):
 
 
 def test_bake_without_an_output_is_refused(capsys):
-    assert main(["bake"]) == 2
-    assert "give --out DIR" in capsys.readouterr().err
+    assert main(["bake"]) == 2 and "give --out DIR" in capsys.readouterr().err
 
 
 def test_workers_get_the_options_as_they_are(tmp_path, monkeypatch):
@@ -184,14 +158,11 @@ def test_workers_get_the_options_as_they_are(tmp_path, monkeypatch):
     words = [f"--out={tmp_path}", "--object=-a", "--object=b", "--object=--save", "--camera=-x"]
     words += ["--size=8x8", "--preset=plaid", "--device=cpu", "--set=gain=2", "--set=-1=-1"]
     words += ["--blender=-no such program"]
-    for arguments in (
-        words,
-        ["--object=-a", "--object", "b", "--object=--save", *words[:1], *words[4:]],
-    ):
+    in_two_words = ["--object=-a", "--object", "b", "--object=--save", *words[:1], *words[4:]]
+    for arguments in (words, in_two_words):
         assert main(["bake", str(scene), *arguments, "--frames", "1-2", "--jobs", "2"]) == 0
     command = [sys.executable, "-m", "rosy_addon", "bake", str(scene), *words, "--workers=1"]
-    assert commands == [command, command]
-    assert main([*command[3:], "--frames=1-2", "--jobs=2"]) == 0
+    assert commands == [command, command] and main([*command[3:], "--frames=1-2", "--jobs=2"]) == 0
     assert commands[2] == command
 
 
@@ -215,8 +186,7 @@ def test_outputs_replace_only_regular_files(tmp_path, capsys):
         before = mesh.read_bytes()
         assert main(words) == 2
         error = capsys.readouterr().err
-        assert message in error and error.count("\n") == 1
-        assert mesh.read_bytes() == before
+        assert message in error and error.count("\n") == 1 and mesh.read_bytes() == before
     longest = tmp_path / ("a" * 251 + ".png")
     for output in (link, longest):
         assert main([*render, str(mesh), "-o", str(output)]) == 0

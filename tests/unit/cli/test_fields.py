@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from command_helpers import assert_refused, facts_of, rosy
+from command_helpers import assert_refused, facts_of, rosy, write_obj
 
 import rosy_addon as rf
 from rosy_addon.extras.command_line import main
@@ -23,8 +23,7 @@ def test_field_makes_converts_and_info_reads(sphere, tmp_path):
     assert sum(index for _, index in facts["singularities"]) == 6 * 2
     assert all(isinstance(part, int) for pair in facts["singularities"] for part in pair)
     words = rosy("info", sphere, rosy_file)
-    assert words.returncode == 0
-    assert "degree 6" in words.stdout and "1,280 faces" in words.stdout
+    assert words.returncode == 0 and "degree 6" in words.stdout and "1,280 faces" in words.stdout
 
 
 @pytest.mark.slow
@@ -49,8 +48,7 @@ def test_a_kind_without_directions_is_noted(tmp_path, capsys):
     command = ["field", str(mesh), "-o", str(tmp_path / "a.rosy")]
     assert main([*command, "--generate", "curvature"]) == 0
     assert "curvature gives no direction on any face" in capsys.readouterr().err
-    assert main(command) == 0
-    assert capsys.readouterr().err == ""
+    assert main(command) == 0 and capsys.readouterr().err == ""
 
 
 @pytest.mark.slow
@@ -111,8 +109,7 @@ def test_info_compares(sphere, tmp_path):
     assert facts["is_rosy"] and facts["energy"] > 4 * np.pi * 4
     facts = facts_of(sphere, turned, "--against", sings)
     assert facts["against"] == {"same": 8, "only_here": [], "only_there": []}
-    done = rosy("info", sphere, made, "--against", turned)
-    assert "off by 5 degrees on average" in done.stdout
+    assert "off by 5 degrees on average" in rosy("info", sphere, made, "--against", turned).stdout
 
 
 @pytest.mark.slow
@@ -153,15 +150,11 @@ def test_info_says_that_borders_coincide(tmp_path, capsys):
     """A tube of quads whose first and last column are two rows of vertices at the same positions."""
     angle, height = np.meshgrid(np.linspace(0, 2 * np.pi, 9), [0.0, 1.0, 2.0], indexing="ij")
     points = np.stack([np.cos(angle), np.sin(angle), height], axis=-1).reshape(-1, 3)
-    quads = [
-        (3 * i + j, 3 * i + j + 1, 3 * i + j + 4, 3 * i + j + 3) for i in range(8) for j in (0, 1)
-    ]
-    lines = [f"v {x} {y} {z}" for x, y, z in points]
-    lines += ["f " + " ".join(str(corner + 1) for corner in quad) for quad in quads]
-    (tmp_path / "tube.obj").write_text("\n".join([*lines, ""]))
-    assert main(["info", str(tmp_path / "tube.obj"), "--generate", "axis"]) == 0
+    quads = [(k, k + 1, k + 4, k + 3) for k in range(24) if k % 3 < 2]
+    tube = write_obj(tmp_path / "tube.obj", points, quads)
+    assert main(["info", str(tube), "--generate", "axis"]) == 0
     printed = capsys.readouterr().out
     assert "Euler characteristic 1\n3 vertices on borders coincide" in printed
-    assert main(["info", str(tmp_path / "tube.obj"), "--generate", "axis", "--join"]) == 0
+    assert main(["info", str(tube), "--generate", "axis", "--join"]) == 0
     printed = capsys.readouterr()
     assert "Euler characteristic 0\nmagnitude" in printed.out and "were joined" in printed.err

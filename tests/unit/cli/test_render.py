@@ -93,8 +93,7 @@ def test_a_transferred_field_is_reported(sphere, tmp_path):
     cut = write_off(tmp_path / "cut.off", icosphere(4))
     done = rosy("render", cut, made, "-o", tmp_path / "a.png", "--size", "64x64",
                 "--field-mesh", sphere)  # fmt: skip
-    assert done.returncode == 0
-    assert "transferred by position from sphere.off" in done.stderr
+    assert done.returncode == 0 and "transferred by position from sphere.off" in done.stderr
 
 
 @pytest.mark.slow
@@ -120,9 +119,7 @@ def test_unused_vertices_change_nothing(tmp_path):
 
 def write_ply(path, surface: Surface, **columns):
     """Write a .ply file with further columns of vertices, integers as bytes and others as floats."""
-    kinds = {
-        name: "uchar" if values.dtype.kind in "iu" else "float" for name, values in columns.items()
-    }
+    kinds = {k: "uchar" if v.dtype.kind in "iu" else "float" for k, v in columns.items()}
     head = ["ply", "format ascii 1.0", f"element vertex {len(surface.vertices)}"]
     head += [f"property float {axis}" for axis in "xyz"]
     head += [f"property {kind} {name}" for name, kind in kinds.items()]
@@ -141,8 +138,7 @@ def painted(tmp_path_factory):
     """A ball that is dark on the left and light on the right, in its colors and in a number."""
     ball = icosphere(4)
     right = ball.vertices[:, 0] > 0
-    gray = np.where(right, 230, 60)
-    colors = dict.fromkeys(("red", "green", "blue"), gray)
+    colors = dict.fromkeys(("red", "green", "blue"), np.where(right, 230, 60))
     path = tmp_path_factory.mktemp("painted") / "ball.ply"
     return write_ply(path, ball, **colors, cavity=np.where(right, 0.8, 0.1))
 

@@ -111,8 +111,7 @@ def test_pixels_without_a_number(look):
     """They are as with one hue, and do not count for the range."""
     values = BALL.vertices[:, 0].copy()
     values[BALL.vertices[:, 1] > 0.2] = np.nan
-    instance = of_vertices(BALL, values)
-    gbuffer = project([instance], camera())
+    gbuffer = project([of_vertices(BALL, values)], camera())
     missing = np.isnan(surface_values(gbuffer))
     assert 0.2 < missing.mean() < 0.6
     of_values, of_one = (
@@ -133,5 +132,4 @@ def test_processes_draw_the_same_bytes():
     view = ViewInput((instance,), camera(320, 1216), look)
     alone = draw_picture(view).rgba
     assert len(picture_groups(view, 2)) == 2
-    together = draw_picture(view, workers=2).rgba
-    assert together.tobytes() == alone.tobytes()
+    assert draw_picture(view, workers=2).rgba.tobytes() == alone.tobytes()

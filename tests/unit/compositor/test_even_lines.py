@@ -45,9 +45,8 @@ LOOK = Look(
 
 def wall_instance(degree=2, angle=0.0, size=20.0):
     surface = plane(2, 2, size)
-    return MeshInstance(
-        surface, np.eye(4), axis_field(surface, degree, (np.cos(angle), np.sin(angle), 0))
-    )
+    field = axis_field(surface, degree, (np.cos(angle), np.sin(angle), 0))
+    return MeshInstance(surface, np.eye(4), field)
 
 
 def partly_undefined(degree):
@@ -58,8 +57,7 @@ def partly_undefined(degree):
 
 
 def camera_above(scale=8.0, size=SIZE, eye=(0, 0, 5)):
-    view = look_at(eye, (0, 0, 0), (0, 1, 0))
-    return orthographic_camera(view, size, size, scale=scale)
+    return orthographic_camera(look_at(eye, (0, 0, 0), (0, 1, 0)), size, size, scale=scale)
 
 
 def picture(instance, camera, look=LOOK):
@@ -90,8 +88,7 @@ def test_the_distance_between_lines(distance, supersampling):
     """Distances in pixels are rounded to steps of 1 / 8 octave."""
     look = replace(LOOK, line_distance=distance, supersampling=supersampling)
     rgba = picture(wall_instance(), camera_above(), look)
-    drawn = distance_of_lines(rgba)
-    assert abs(np.log2(drawn / distance)) <= 0.5 / 8 + 0.01
+    assert abs(np.log2(distance_of_lines(rgba) / distance)) <= 0.5 / 8 + 0.01
     # Lines are along the rows.
     assert rgba[..., 0].std(axis=1).max() < 0.01
 
@@ -106,12 +103,9 @@ def test_distances_in_blender_units_are_exact():
 
 def test_spacings_in_pixels_come_in_steps():
     instance, look = wall_instance(), pixel_look(LOOK)
-    spacings = {
-        instance_line_spacing(look, camera_above(scale), instance)
-        for scale in np.linspace(8, 16, 200)
-    }
-    steps = np.diff(np.log2(sorted(spacings)))
-    np.testing.assert_allclose(steps, 1 / 8, atol=1e-9)
+    cameras = [camera_above(scale) for scale in np.linspace(8, 16, 200)]
+    spacings = {instance_line_spacing(look, camera, instance) for camera in cameras}
+    np.testing.assert_allclose(np.diff(np.log2(sorted(spacings))), 1 / 8, atol=1e-9)
     assert len(spacings) == 9
 
 
@@ -120,8 +114,7 @@ def test_lines_at_a_larger_distance_replace_crowded_ones():
     """On a wall that is seen at a small angle, all lines along the horizon would run together."""
     cosine = 0.2
     eye = (0, -5 * np.sqrt(1 - cosine**2), 5 * cosine)
-    view = look_at(eye, (0, 0, 0), (0, 0, 1))
-    camera = orthographic_camera(view, SIZE, SIZE, scale=2.0)
+    camera = orthographic_camera(look_at(eye, (0, 0, 0), (0, 0, 1)), SIZE, SIZE, scale=2.0)
     rgba = picture(wall_instance(), camera, replace(LOOK, line_distance=8.0))
     assert rgba[..., 0].std() > 0.2
     distance = distance_of_lines(rgba)
@@ -132,16 +125,13 @@ def test_lines_at_a_larger_distance_replace_crowded_ones():
 @pytest.mark.parametrize("side", [1, -1])
 def test_members_get_the_lines_along_them(degree, side):
     """The gradient of the streaks is across the member, on both sides of the surface."""
-    instance = wall_instance(degree, 0.4)
-    camera = camera_above(eye=(0, 0, 5 * side))
-    gbuffer = project([instance], camera)
+    gbuffer = project([wall_instance(degree, 0.4)], camera_above(eye=(0, 0, 5 * side)))
     field = surface_pixel_field(gbuffer, degree, 0.7)
     look = replace(LOOK, line_distance=16.0, guiding_angle=0.3)
     lines = even_lines(gbuffer, field, pixel_look(look))
     members = all_members(field, look.guiding_angle)
     for member, streak in zip(members, lines.streaks, strict=False):
-        image = streak.reshape(SIZE, SIZE)
-        up, right = np.gradient(image)
+        up, right = np.gradient(streak.reshape(SIZE, SIZE))
         gradient = (right + 1j * up).reshape(-1) * np.conj(member)
         steep = np.abs(gradient) > 0.5 * np.abs(gradient).max()
         assert np.median(np.abs(gradient.real[steep] / gradient.imag[steep])) < 0.02
@@ -214,13 +204,11 @@ def test_the_mean_coverage_is_exact(crispness, period, growth):
 @pytest.mark.parametrize("paper_grain", [0.0, 0.8])
 def test_uneven_lines_have_the_mean_width(breaks, paper_grain):
     look = replace(LOOK, breaks=breaks, paper_grain=paper_grain, wobble=0.3)
-    rng = np.random.default_rng(0)
-    streak, grain = rng.standard_normal((2, 200_000))
+    streak, grain = np.random.default_rng(0).standard_normal((2, 200_000))
     for width in (0.05, 0.3, 0.7, 0.95):
         widths = uneven_width(np.full(streak.shape, width), look, streak, grain)
         assert widths.mean() == pytest.approx(width, abs=6e-3)
-    table = look_width_table(look)
-    assert (np.diff(table) > 0).all()
+    assert (np.diff(look_width_table(look)) > 0).all()
 
 
 @pytest.mark.slow
@@ -230,8 +218,7 @@ def test_flat_tones(shading, degree):
     look = replace(look, light="scene", shading=shading, paper_color="#ffffff")
     rgba = picture(wall_instance(degree, 0.4), camera_above(), look)
     ink = to_linear(from_hex(look.ink_color))[0]
-    tone = (rgba[..., 0] - ink) / (1 - ink)
-    blurred = gaussian_filter(tone, 16)[40:-40, 40:-40]
+    blurred = gaussian_filter((rgba[..., 0] - ink) / (1 - ink), 16)[40:-40, 40:-40]
     assert np.abs(blurred - (1 - shading)).max() <= 0.04
 
 
@@ -243,8 +230,7 @@ def test_lines_grow_between_lines_that_are_too_far_apart():
     """A floor that runs from near the eye to far away."""
     surface = plane(2, 2, 40.0)
     instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2, (0, 1, 0)))
-    view = look_at((0, -18.5, 1.0), (0, 0, 0), (0, 0, 1))
-    camera = perspective_camera(view, SIZE, SIZE, fov=1.0)
+    camera = perspective_camera(look_at((0, -18.5, 1.0), (0, 0, 0), (0, 0, 1)), SIZE, SIZE, fov=1.0)
     look = replace(LOOK, line_distance=4.0)
     lines, gbuffer = lines_at_pixels(instance, camera, look)
     assert lines.growth is not None and lines.growth.max() > 0.99
@@ -256,5 +242,4 @@ def test_lines_grow_between_lines_that_are_too_far_apart():
     assert lines.period[0, near].min() > 3.6 and lines.period[0, near].max() < 8.4
     coverage = lines.coverage(0, np.full(len(depth), 0.4, np.float32), look)
     assert coverage[near].mean() == pytest.approx(0.4, abs=0.05)
-    world = replace(look, unit_size=0.2)
-    assert lines_at_pixels(instance, camera, world)[0].growth is None
+    assert lines_at_pixels(instance, camera, replace(look, unit_size=0.2))[0].growth is None

@@ -28,9 +28,8 @@ def make_noise(field):
 
 
 def fast_images(field, look=LOOK, noise=None):
-    (images,) = fast_lic.fast_lic(
-        field, [pixel_look(look)], make_noise(field) if noise is None else noise
-    )
+    noise = make_noise(field) if noise is None else noise
+    (images,) = fast_lic.fast_lic(field, [pixel_look(look)], noise)
     return images
 
 
@@ -103,8 +102,7 @@ def test_streamlines_end_where_brute_force_ends_them(kernel, degree):
     inside = field.representation != 0
     assert (actual.effective_samples[~inside] == 1).all()
     difference = actual.effective_samples[inside] - expected.effective_samples[inside]
-    assert abs(difference.mean()) < 0.5
-    assert np.abs(difference).mean() < 2
+    assert abs(difference.mean()) < 0.5 and np.abs(difference).mean() < 2
 
 
 @pytest.mark.parametrize("kernel", KERNELS)
@@ -129,8 +127,7 @@ def test_long_streamlines_end_when_they_have_closed_a_loop():
     samples = fast_images(field, replace(LOOK, length=8000)).effective_samples
     samples = samples.reshape(64, 64)[np.hypot(x - 32, y - 32) < 31]
     loop = 2 * np.pi * 31
-    assert samples.max() < 4 * (256 + 2 * loop)
-    assert np.median(samples) > 256
+    assert samples.max() < 4 * (256 + 2 * loop) and np.median(samples) > 256
 
 
 @pytest.mark.parametrize("degree", [1, 4])
@@ -138,8 +135,6 @@ def test_fields_that_change_a_little_keep_their_streamlines(degree):
     """Pictures of a series do not flicker: pixels keep the streamline from which they take their average."""
     x, y = pixel_centers(SIZE)
     angle = pair_angle(x, y, SIZE, degree)
-    first, second = (
-        fast_images(planar_pixel_field(angle + np.radians(turn), degree)).members.ravel()
-        for turn in (0.0, 0.02)
-    )
+    fields = [planar_pixel_field(angle + np.radians(turn), degree) for turn in (0.0, 0.02)]
+    first, second = (fast_images(field).members.ravel() for field in fields)
     assert np.corrcoef(first, second)[0, 1] > 0.975

@@ -25,15 +25,13 @@ def test_sums_of_weights_in_closed_form(kernel, streamline):
     weight = 1 - distance / (full_length + 1)
     actual = kernel_weights(np.float64(forward), np.float64(backward), full_length, kernel)
     np.testing.assert_allclose(actual.total, weight.sum(), rtol=1e-9)
-    np.testing.assert_allclose(
-        actual.effective_samples, weight.sum() ** 2 / (weight**2).sum(), rtol=1e-9
-    )
+    expected = weight.sum() ** 2 / (weight**2).sum()
+    np.testing.assert_allclose(actual.effective_samples, expected, rtol=1e-9)
 
 
 def test_other_kernels_have_three_quarters_of_the_samples():
     for length in (40, 400):
-        plain, tapered, oriented = (
-            full_sample_count(length, kernel) for kernel in ("box", "taper", "ramp")
-        )
+        kernels = "box", "taper", "ramp"
+        plain, tapered, oriented = (full_sample_count(length, kernel) for kernel in kernels)
         assert plain == 2 * length + 1
         assert abs(tapered / plain - 0.75) < 0.01 and abs(oriented / plain - 0.75) < 0.01

@@ -37,10 +37,8 @@ def correlation(first, second):
 def best_shift(first, second, direction, expected, reach=3.0):
     """The shift of an image along a direction that makes it most like another one, in pixels."""
     shifts = np.arange(expected - reach, expected + reach + 0.01, 0.25)
-    likeness = [
-        correlation(ndimage.shift(first, shift * np.asarray(direction)[::-1]), second)
-        for shift in shifts
-    ]
+    shifted = [ndimage.shift(first, shift * np.asarray(direction)[::-1]) for shift in shifts]
+    likeness = [correlation(each, second) for each in shifted]
     return shifts[int(np.argmax(likeness))]
 
 
@@ -106,8 +104,7 @@ def test_frames_of_a_loop_are_whole_cycles():
     distance = pixel_look(look, drift=first).flow_distance
     assert distance <= look.length
     cycles = 1.3 * 50 / distance
-    assert cycles == pytest.approx(round(cycles))
-    assert second.phase * distance == pytest.approx(1.3)
+    assert cycles == pytest.approx(round(cycles)) and second.phase * distance == pytest.approx(1.3)
 
 
 def test_looks_without_flow_do_not_drift():
@@ -140,8 +137,6 @@ def test_lines_drift_toward_the_guiding_angle():
 
 def test_a_loop_closes():
     look, count = Look(flow=1.0, length=20), 24
-    frames = [
-        member(0.4, 1, look, drift_at(look, frame, count)) for frame in (0, 1, 12, 13, count - 1)
-    ]
+    frames = [member(0.4, 1, look, drift_at(look, at, count)) for at in (0, 1, 12, 13, count - 1)]
     neighbors = [correlation(frames[0], frames[1]), correlation(frames[2], frames[3])]
     assert correlation(frames[-1], frames[0]) > min(neighbors) - 0.01

@@ -79,8 +79,7 @@ def test_looks_reproduce_a_ramp(name):
 @pytest.mark.parametrize("name", mainly(["pencil", "families", "ramp"], RAMPS))
 def test_undefined_faces_keep_the_tone(name):
     """Without a direction, hatching draws an undirected texture of the tone of the light."""
-    undefined = RosyField(4, np.zeros((BALL.face_count, 3)))
-    assert ramp_error(RAMPS[name], undefined) <= 0.03
+    assert ramp_error(RAMPS[name], RosyField(4, np.zeros((BALL.face_count, 3)))) <= 0.03
 
 
 def test_detail_shows_the_tone_of_small_features():
@@ -103,11 +102,9 @@ def test_shares_of_families_sum_to_one_and_are_continuous(degree, layers):
         shares = np.array(line_shares(field, pixel_look(look), transmittance))
         np.testing.assert_allclose(shares.sum(axis=0), 1, atol=1e-5)
         # Members jump where two are equally near the guiding angle, but the sorted shares do not.
-        ordered = np.sort(shares, axis=0)
-        assert np.abs(np.diff(ordered, axis=1)).max() < 0.03
+        assert np.abs(np.diff(np.sort(shares, axis=0), axis=1)).max() < 0.03
         # Where two families swap ranks, both are drawn, and possibly a third one.
-        typical_count = np.median((shares > 0.02).sum(axis=0))
-        assert typical_count <= min(layers, field.line_count)
+        assert np.median((shares > 0.02).sum(axis=0)) <= min(layers, field.line_count)
         if layers >= field.line_count and tone < 0.1:
             # All lines are drawn, whatever their angle to the guiding angle.
             np.testing.assert_allclose(shares, 1 / field.line_count, atol=0.02)
@@ -122,8 +119,7 @@ def test_crowded_even_lines_are_drawn_last():
     tone = np.full((1, 3), 0.9, dtype=np.float32)
     first, second = line_shares(field, pixel_look(look), tone, lines)
     np.testing.assert_allclose(first + second, 1, atol=1e-6)
-    assert first[0] > 0.95 and second[1] > 0.95
-    assert abs(first[2] - first[0]) < 1e-6
+    assert first[0] > 0.95 and second[1] > 0.95 and abs(first[2] - first[0]) < 1e-6
 
 
 def test_lines_run_along_the_field():
@@ -164,8 +160,7 @@ def test_required_coverage_has_the_target_luminance(kind):
     expected = inks.target_transmittance(1 - tone if inks.is_light else tone)
     for index in range(len(inks.dark)):
         ink = inks.ink_at_tone(np.full(101, float(index)), tone)
-        covered = inks.required_coverage(expected, ink)[:, None]
-        mixed = inks.paper + covered * (ink - inks.paper)
+        mixed = inks.paper + inks.required_coverage(expected, ink)[:, None] * (ink - inks.paper)
         np.testing.assert_allclose(inks.luminance_transmittance(mixed), expected, atol=2e-3)
 
 
@@ -259,9 +254,8 @@ def test_lines_overshoot_the_border_of_a_tone():
     beyond = (from_border > overshoot + 2) & (from_border < SIZE / 2 - overshoot - 4)
     assert (light[:, beyond] > 0.999).all()
     # Lines end at different distances from the border.
-    dark_beyond_border = [
-        row[SIZE // 2 :] < 0.5 for row in light if (row[SIZE // 2 - 4 : SIZE // 2] < 0.5).all()
-    ]
+    is_dark = (light[:, SIZE // 2 - 4 : SIZE // 2] < 0.5).all(axis=1)
+    dark_beyond_border = light[is_dark, SIZE // 2 :] < 0.5
     ends = np.argmin(dark_beyond_border, axis=1)
     assert ends.max() > 0.5 * overshoot and np.std(ends) > 0.1 * overshoot
 

@@ -44,8 +44,7 @@ def drawn_lines(look: PixelLook, degree: int = 4, undefined: slice = slice(0)):
     angles[undefined] = np.nan
     field = planar_pixel_field(angles, degree)
     noise = look_noise(field, look)
-    looks = [look, look.with_length(break_steps(look))]
-    images, breaks = lic_lengths(field, looks, noise)
+    images, breaks = lic_lengths(field, [look, look.with_length(break_steps(look))], noise)
     grain = None
     if look.paper_grain:
         grain = picture_paper_grain(field.pixel, SIZE, look.line_width, 1, 1, field.line_count)
@@ -64,12 +63,10 @@ def test_thresholds_draw_the_lines_of_a_picture(breaks, wobble, grain):
     expected = np.linspace(0.1, 0.9, 9)
     np.testing.assert_allclose(np.quantile(thresholds, expected), expected, atol=0.025)
     for coverage in (0.15, 0.5, 0.8):
-        target = np.full(len(thresholds), coverage)
-        covered = lines.coverage(1, target)
+        covered = lines.coverage(1, np.full(len(thresholds), coverage))
         is_clear = np.abs(covered - 0.5) > 0.05
         differs = (thresholds < coverage) != (covered > 0.5)
-        assert differs[is_clear].mean() < 1e-4
-        assert is_clear.mean() > 0.9
+        assert differs[is_clear].mean() < 1e-4 and is_clear.mean() > 0.9
 
 
 def random_lines(lines: int, count: int = 40_000, seed: int = 1):
@@ -134,8 +131,7 @@ def test_ordered_thresholds_are_continuous():
 
 def test_undefined_pixels_have_the_ink_of_all_lines():
     """There the first line alone transmits what the tone asks."""
-    rng = np.random.default_rng(2)
-    thresholds = rng.random((3, 40_000), dtype=np.float32)
+    thresholds = np.random.default_rng(2).random((3, 40_000), dtype=np.float32)
     everywhere = np.ones(40_000, dtype=bool)
     places = cyclic_places(np.full_like(thresholds, 1 / 3))
     ordered = ordered_thresholds(thresholds, places, everywhere, INK)

@@ -31,8 +31,7 @@ def plain(**settings):
 
 def tone(angles, degree, look=PLAIN, **more):
     """(H, W) display values of a planar picture before clipping, one channel."""
-    picture = compose_planar(angles, degree, look, **more)
-    return picture.layer.tone[:, 0].reshape(angles.shape)
+    return compose_planar(angles, degree, look, **more).layer.tone[:, 0].reshape(angles.shape)
 
 
 def make_noise(size, line_width=1.5, seed=0):
@@ -59,8 +58,7 @@ def runge_kutta_lic(angle, noise, size, length, kernel):
 
     def look_up(p):
         column = np.clip(p.real.astype(int), 0, size - 1)
-        row = np.clip(p.imag.astype(int), 0, size - 1)
-        return noise[row, column]
+        return noise[np.clip(p.imag.astype(int), 0, size - 1), column]
 
     total, count = noise.copy(), np.ones_like(noise)
     for sign in (1, -1):
@@ -70,8 +68,7 @@ def runge_kutta_lic(angle, noise, size, length, kernel):
             k1 = direction(p)
             k2 = direction(p + h / 2 * k1)
             k3 = direction(p + h / 2 * k2)
-            k4 = direction(p + h * k3)
-            p = p + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+            p = p + h / 6 * (k1 + 2 * k2 + 2 * k3 + direction(p + h * k3))
             alive &= inside(p)
             total += weight * np.where(alive, look_up(p), 0)
             count += weight * alive
@@ -136,17 +133,12 @@ def test_the_standard_deviation_of_one_member_matches_theory(kernel, line_width,
     look = plain(line_width=line_width, length=length, high_pass=high_pass, **KERNELS[kernel])
     stds = []
     for angle in (0.1, 0.9, 1.7, 2.6):
-        image = tone(np.full((size, size), angle), 1, look)
-        stds.append(crop_margin(image, length + 5).std())
+        stds.append(crop_margin(tone(np.full((size, size), angle), 1, look), length + 5).std())
     assert np.mean(stds) == pytest.approx(expected_std(pixel_look(look)), rel=0.05)
 
 
 @pytest.mark.parametrize(
-    "settings",
-    [
-        {"method": "members", "weights": "cosine"},
-        {"method": "sheets"},
-    ],
+    "settings", [{"method": "members", "weights": "cosine"}, {"method": "sheets"}]
 )
 def test_breaking_points_are_not_visible(settings):
     size, degree, guides = 384, 4, 4
@@ -211,14 +203,12 @@ def test_the_spectrum_peaks_at_the_members(method, degree):
 def test_pictures_of_any_size(method, shape):
     for angle in (0.7, np.nan):
         images = lic(planar_pixel_field(np.full(shape, angle), 3), Look(method=method))
-        assert np.isfinite(images.members).all()
-        assert images.effective_samples.min() >= 0.99
+        assert np.isfinite(images.members).all() and images.effective_samples.min() >= 0.99
 
 
 def test_color_noise_has_three_channels():
     angles = pair_angle(*pixel_centers(128), 128, 4)
-    picture = compose_planar(angles, 4, plain(hue="noise"))
-    channels = picture.layer.tone
+    channels = compose_planar(angles, 4, plain(hue="noise")).layer.tone
     assert channels.shape == (128 * 128, 3)
     assert abs(correlation(channels[:, 0], channels[:, 1])) < 0.1
     gray = tone(angles, 4)
@@ -228,5 +218,4 @@ def test_color_noise_has_three_channels():
 def test_the_same_settings_give_the_same_bytes():
     angles = pair_angle(*pixel_centers(128), 128, 4)
     first, second = (compose_planar(angles, 4, Look()).rgba.tobytes() for _ in range(2))
-    assert first == second
-    assert compose_planar(angles, 4, Look(seed=1)).rgba.tobytes() != first
+    assert first == second and compose_planar(angles, 4, Look(seed=1)).rgba.tobytes() != first

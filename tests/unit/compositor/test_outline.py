@@ -178,8 +178,7 @@ def test_tiny_parts_keep_their_outlines():
 
 def line_is_covered(coverage, camera, start, end, least=0.6) -> bool:
     """Whether all points on a line in space have a coverage in the picture, within a pixel."""
-    points = np.linspace(start, end, 400)
-    clip = np.c_[points, np.ones(400)] @ (camera.projection @ camera.view).T
+    clip = np.c_[np.linspace(start, end, 400), np.ones(400)] @ (camera.projection @ camera.view).T
     place = (clip[:, :2] / clip[:, 3:] * 0.5 + 0.5) * (camera.width, camera.height)
     column, row = place.astype(int).T
     return bool((maximum_filter(coverage, 3)[row, column] >= least).all())

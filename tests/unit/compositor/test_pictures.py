@@ -42,9 +42,8 @@ def project_surface(
 def test_decomposition_agrees_with_brute_force_on_a_sphere():
     sphere = icosphere(5)
     gbuffer = project_surface(sphere, axis_field(sphere, 4, (0.3, 0.9, 0.1)), 384)
-    members, brute = (
-        degree_layers(gbuffer, plain(method=method))[0].tone for method in ("members", "brute")
-    )
+    looks = [plain(method=method) for method in ("members", "brute")]
+    members, brute = (degree_layers(gbuffer, look)[0].tone for look in looks)
     assert correlation(members, brute) > 0.98
 
 
@@ -69,8 +68,7 @@ def test_two_degrees_in_one_picture():
     gbuffer = project(instances, camera)
     picture, layers = compose(gbuffer, PLAIN), degree_layers(gbuffer, PLAIN)
     assert [layer.degree for layer in layers] == [3, 4]
-    covered = sum(len(layer.pixel) for layer in layers)
-    assert covered == np.count_nonzero(picture.rgba[..., 3])
+    assert sum(len(layer.pixel) for layer in layers) == np.count_nonzero(picture.rgba[..., 3])
 
 
 def test_streaks_of_a_tilted_plane_follow_the_projected_direction():
@@ -96,10 +94,8 @@ def test_breaking_points_are_visible_on_a_tilted_surface_without_the_view_plane(
     eye = (0, -4 * np.sin(tilt), 4 * np.cos(tilt))
     gbuffer = project_surface(surface, field, 300, eye, 1.5, (0, 0, 1))
     brute = degree_layers(gbuffer, plain(method="brute"))[0].tone
-    with_it, without = (
-        degree_layers(gbuffer, plain(method="members", view_plane=on))[0].tone
-        for on in (True, False)
-    )
+    looks = [plain(method="members", view_plane=on) for on in (True, False)]
+    with_it, without = (degree_layers(gbuffer, look)[0].tone for look in looks)
     assert correlation(with_it, brute) > correlation(without, brute)
 
 
@@ -118,8 +114,7 @@ def test_lights_of_the_scene():
     camera = perspective_camera(look_at((0, 0, 3), (0, 0, 0), (0, 1, 0)), 64, 64)
     gbuffer = project([MeshInstance(surface, np.eye(4), axis_field(surface, 1, (1, 0, 0)))], camera)
     look = plain(shading=1.0, light="scene")
-    white = np.ones(3)
-    sun = Light("sun", normalize(np.array([0.0, 1.0, 1.0])), white, 2.0)
+    sun = Light("sun", normalize(np.array([0.0, 1.0, 1.0])), np.ones(3), 2.0)
     assert np.allclose(diffuse(gbuffer, look, [sun]), np.sqrt(2), atol=1e-5)
     # A point light two units above the center of the plane: 1 / r^2 and the cosine.
     lamp = Light("point", np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.5, 0.0]), 4.0)
@@ -127,16 +122,14 @@ def test_lights_of_the_scene():
     across = np.hypot(gbuffer.position[:, 0], gbuffer.position[:, 1])
     expected = 4 / (4 + across**2) * 2 / np.sqrt(4 + across**2)
     assert np.allclose(lighting[:, 0], expected, atol=1e-4)
-    assert np.allclose(lighting[:, 1], expected / 2, atol=1e-4)
-    assert not diffuse(gbuffer, look).any()
+    assert np.allclose(lighting[:, 1], expected / 2, atol=1e-4) and not diffuse(gbuffer, look).any()
 
 
 @pytest.mark.parametrize("ends", [(0.0, 1.0), (0.25, 0.75), (1.0, 0.0)], ids=str)
 def test_magnitude_is_colored(ends):
     surface = plane(32, 2)
     rho = (surface.face_center[:, :1] + 1) / 2
-    field = RosyField(1, rho * [1.0, 0, 0])
-    gbuffer = project_surface(surface, field, 128)
+    gbuffer = project_surface(surface, RosyField(1, rho * [1.0, 0, 0]), 128)
     picture = compose(gbuffer, plain(hue="magnitude", color_range=ends, gain=0.0))
     x = gbuffer.position[:, 0]
     actual = to_display(picture.rgba.reshape(-1, 4)[gbuffer.pixel, :3])
@@ -147,8 +140,7 @@ def test_magnitude_is_colored(ends):
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
-    "ends",
-    [(0.0, 0.0), (0.0, 5e-324), (0.0, 1e30), (7.0, 7.0), (1e30, -1e30)],
+    "ends", [(0.0, 0.0), (0.0, 5e-324), (0.0, 1e30), (7.0, 7.0), (1e30, -1e30)]
 )
 def test_magnitudes_of_any_scale(ends):
     surface = plane(4, 4)

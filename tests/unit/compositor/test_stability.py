@@ -72,8 +72,7 @@ LOOKS = {
 
 
 @pytest.mark.parametrize(
-    ("name", "motion"),
-    [("hatch", "zoomed"), ("uneven", "bent"), ("even", "bent far")],
+    ("name", "motion"), [("hatch", "zoomed"), ("uneven", "bent"), ("even", "bent far")]
 )
 def test_streaks_stay_on_the_surface(name, motion):
     assert warped_correlation(*MOTIONS[motion](), LOOKS[name]) >= 0.9
@@ -84,8 +83,7 @@ def test_streaks_stay_on_the_surface(name, motion):
 
 def line_width(picture):
     """The lag in pixels at which the autocorrelation across horizontal lines is 1/2."""
-    columns = picture - picture.mean()
-    spectrum = np.abs(np.fft.fft(columns, axis=0)) ** 2
+    spectrum = np.abs(np.fft.fft(picture - picture.mean(), axis=0)) ** 2
     correlation = np.fft.ifft(spectrum.mean(axis=1)).real
     correlation /= correlation[0]
     below = int(np.argmax(correlation < 0.5))
@@ -127,8 +125,7 @@ def test_rest_coordinates_match_the_rest_shape():
 def test_statistics_of_surface_noise(high_pass, distance):
     gbuffer = project([make_instance(tube())], make_camera(distance=distance, zoom=distance / 4))
     noise = surface_noise(gbuffer, 2.0, 0, 3, density=0.3, high_pass=high_pass)
-    assert np.abs(noise.mean(axis=0) - 0.5).max() < 0.02
-    assert 0.3 < noise.std() < 0.5
+    assert np.abs(noise.mean(axis=0) - 0.5).max() < 0.02 and 0.3 < noise.std() < 0.5
     channels = np.corrcoef(noise.T)
     assert np.abs(channels[np.triu_indices(3, 1)]).max() < 0.03
 
@@ -142,8 +139,7 @@ def test_noise_of_a_mesh_far_from_its_origin_is_as_fine(offset):
         far = rebuilt(surface, points + moved_by)
         gbuffer = project([make_instance(far, matrix=placed(shift=-moved_by))], camera)
         noises.append(surface_noise(gbuffer, 2.0, 0, 1, density=0.3, high_pass=0.0))
-    correlation = np.corrcoef(noises[0].T, noises[1].T)[0, 1]
-    assert correlation > 0.99
+    assert np.corrcoef(noises[0].T, noises[1].T)[0, 1] > 0.99
 
 
 def test_instances_have_different_noise():

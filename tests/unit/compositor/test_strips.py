@@ -97,5 +97,4 @@ def test_joining_fades_from_one_strip_to_the_next():
     joined = join_strips([low, high], strips)
     assert joined.shape == (40 + FADE_ROWS, 3, 4)
     assert (joined[:21] == low[:21]).all() and (joined[20 + FADE_ROWS :] == 0.8).any()
-    assert (np.diff(joined[20 : 21 + FADE_ROWS, 0, 0]) > 0).all()
-    assert (joined[..., 3] == 1).all()
+    assert (np.diff(joined[20 : 21 + FADE_ROWS, 0, 0]) > 0).all() and (joined[..., 3] == 1).all()

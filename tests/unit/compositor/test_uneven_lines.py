@@ -32,8 +32,7 @@ def plane_coverage(look, tone, degree=2, angle=0.3, side=320):
     noise = look_noise(field, look)
     break_images = paper_grain = None
     if look.breaks or look.wobble:
-        break_look = look.with_length(break_steps(look))
-        (break_images,) = fast_lic(field, [break_look], noise)
+        (break_images,) = fast_lic(field, [look.with_length(break_steps(look))], noise)
     if look.paper_grain:
         paper_grain = picture_paper_grain(
             field.pixel, field.width, look.line_width, look.seed, 1, field.line_count
@@ -57,15 +56,13 @@ def test_breaks_and_paper_grain_shorten_lines():
     look = Look(ink="hatch", line_width=2.0, length=60, crispness=1.0)
 
     def shorter(tone, **settings):
-        plain, uneven = (
-            mean_run_length(plane_coverage(each, tone, angle=0.0))
-            for each in (look, replace(look, **settings))
-        )
+        looks = look, replace(look, **settings)
+        coverages = [plane_coverage(each, tone, angle=0.0) for each in looks]
+        plain, uneven = map(mean_run_length, coverages)
         return uneven / plain
 
     light, middle, dark = (shorter(tone, breaks=1.0) for tone in (0.9, 0.5, 0.2))
-    assert light < middle < dark < 1
-    assert shorter(0.6, paper_grain=1.0) < 1
+    assert light < middle < dark < 1 and shorter(0.6, paper_grain=1.0) < 1
 
 
 @pytest.mark.parametrize("line_width", [1.5, 3.0, 8.0])
@@ -102,8 +99,7 @@ def test_statistics_of_the_wobble(anchor, distance):
     """Mean 0, standard deviation `WOBBLE_STD`, small differences of neighbors, at any distance."""
     gbuffer = project([make_instance(tube())], make_camera(distance=distance, zoom=distance / 4))
     actual = wobble_angle(gbuffer, pixel_look(replace(INK, anchor=anchor, line_width=1.5)))
-    assert abs(actual.mean()) < 0.25 * WOBBLE_STD
-    assert 0.75 < actual.std() / WOBBLE_STD < 1.25
+    assert abs(actual.mean()) < 0.25 * WOBBLE_STD and 0.75 < actual.std() / WOBBLE_STD < 1.25
     right = np.flatnonzero((np.diff(gbuffer.pixel) == 1) & (np.diff(gbuffer.triangle) == 0))
     assert np.abs(np.diff(actual)[right]).mean() < 0.15 * WOBBLE_STD
 
@@ -119,6 +115,5 @@ def test_wobble_rotates_all_directions(degree):
     before = field.member_direction(member)
     after = turned.member_direction(member * np.exp(1j * angle))
     np.testing.assert_allclose(after, before * np.exp(1j * angle), atol=1e-5)
-    np.testing.assert_allclose(
-        turned.representation, field.representation * np.exp(1j * degree * angle), atol=1e-5
-    )
+    expected = field.representation * np.exp(1j * degree * angle)
+    np.testing.assert_allclose(turned.representation, expected, atol=1e-5)

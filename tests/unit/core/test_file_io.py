@@ -26,9 +26,8 @@ with replacing(sys.argv[1]) as temporary:
 @pytest.fixture
 def writer(tmp_path):
     """A process in the midst of writing a file."""
-    process = subprocess.Popen(
-        [sys.executable, "-c", WRITER, tmp_path / "a.png"], stdout=subprocess.PIPE, text=True
-    )
+    command = [sys.executable, "-c", WRITER, tmp_path / "a.png"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert process.stdout.readline() == "writing\n"
     yield process
     process.kill()

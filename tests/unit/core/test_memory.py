@@ -31,8 +31,7 @@ from rosy_addon.rendering.view_input import ViewInput
 
 def ball_view(width: int = 512, height: int = 512, degree: int = 4, **settings) -> ViewInput:
     """Return a view of a ball that covers most of the frame."""
-    ball = cases.instance(1000, degree)
-    return ViewInput((ball,), cases.camera(width, height), Look(**settings))
+    return ViewInput((cases.instance(1000, degree),), cases.camera(width, height), Look(**settings))
 
 
 def limit_memory(monkeypatch, free: float) -> None:
@@ -160,8 +159,7 @@ def test_meshes_and_fields_are_refused_by_the_size_of_the_file(tmp_path, monkeyp
 
 def test_a_gif_is_refused_before_its_first_picture(tmp_path, monkeypatch, error_of):
     limit_memory(monkeypatch, 2e9)
-    ball = cases.instance(1000, 4)
-    views = turntable_views(ball, Look(), 500, (1000, 1000), (0, 0))
+    views = turntable_views(cases.instance(1000, 4), Look(), 500, (1000, 1000), (0, 0))
     message = error_of(turntable, draw_picture, views, 500, tmp_path / "a.gif", 24)
     assert "a .gif of 500 pictures of 1000 x 1000 pixels needs about 2.2 GB" in message
     assert not list(tmp_path.iterdir())

@@ -63,9 +63,8 @@ def test_errors_are_angles_to_the_nearest_member(degree, error_of):
     error = angle_errors(ball, field, other)
     np.testing.assert_allclose(error, angle, atol=1e-9)
     statistics = error_statistics(ball, error)
-    np.testing.assert_allclose(
-        [statistics.mean, statistics.rms, statistics.p95, statistics.max], angle
-    )
+    errors = [statistics.mean, statistics.rms, statistics.p95, statistics.max]
+    np.testing.assert_allclose(errors, angle)
     vectors = field.vectors.copy()
     vectors[:10] = 0
     partial = angle_errors(ball, RosyField(degree, vectors), other)
@@ -85,14 +84,8 @@ def test_percentiles_of_errors_are_weighted_by_area():
     assert statistics.worst_face == 3 and statistics.max == 0.4
     error[3] = np.nan
     assert error_statistics(mesh, error).worst_face == 2
-    assert list(vars(error_statistics(mesh, np.full(4, np.nan))).values())[1:] == [
-        0,
-        0,
-        0,
-        0,
-        -1,
-        0,
-    ]
+    values = list(vars(error_statistics(mesh, np.full(4, np.nan))).values())
+    assert values[1:] == [0, 0, 0, 0, -1, 0]
 
 
 def test_fields_that_are_no_rosys_are_compared_by_their_best_matching():
@@ -103,9 +96,8 @@ def test_fields_that_are_no_rosys_are_compared_by_their_best_matching():
 
     def field_at(offsets, first):
         turned = np.roll(angles + offsets, -first)[:, None, None]
-        return field_from_directions(
-            ball, np.moveaxis(np.cos(turned) * x + np.sin(turned) * y, 0, 1)
-        )
+        members = np.cos(turned) * x + np.sin(turned) * y
+        return field_from_directions(ball, np.moveaxis(members, 0, 1))
 
     same = angle_errors(ball, field_at(0, 0), field_at(0, 1))
     np.testing.assert_allclose(same, 0, atol=1e-7)
@@ -122,5 +114,4 @@ def test_fields_are_described():
     vectors = field.vectors.copy()
     vectors[[3, 70]] = 0
     fields = [(sphere, field), (sphere, RosyField(4, vectors))]
-    note = description(fields, count_singularities=False)
-    assert note == "2 faces without a direction"
+    assert description(fields, count_singularities=False) == "2 faces without a direction"

@@ -64,8 +64,7 @@ def test_points_are_in_the_leaves_that_are_found():
     root = rng.integers(0, len(triangles), 5000)
     weights = rng.dirichlet(np.ones(3), len(root)).astype(np.float32)
     leaf, leaf_weights = tree.locate(root, weights)
-    assert (tree.leaf_root[leaf] == root).all()
-    assert leaf_weights.min() >= -1e-5
+    assert (tree.leaf_root[leaf] == root).all() and leaf_weights.min() >= -1e-5
     np.testing.assert_allclose(leaf_weights.sum(axis=0), 1, atol=1e-5)
     expected = np.einsum("pk,pki->pi", weights, vertices[triangles[root]])
     found = np.einsum("kp,pki->pi", leaf_weights, tree.vertices[tree.leaf_vertex[leaf]])

@@ -67,8 +67,7 @@ def test_distances_match_dense_samples_of_the_triangle(numbers):
     nearest = np.linalg.norm(net - point, axis=1).min()
     actual = point_triangle_distances(point[None], corners[None])[0]
     size = np.abs(corners - corners[0]).max()
-    assert actual <= nearest + 1e-9
-    assert actual >= nearest - size / 10
+    assert actual <= nearest + 1e-9 and actual >= nearest - size / 10
 
 
 def test_a_surface_that_is_a_point():
@@ -76,5 +75,4 @@ def test_a_surface_that_is_a_point():
     surface = from_triangles(np.zeros((3, 3)), [[0, 1, 2]])
     points = np.array([[0.0, 0.0, 0.0], [1e6, 0.0, 0.0], [0.0, 3.0, -4e12]])
     triangle, distance = closest_triangles(surface, points)
-    assert (triangle == 0).all()
-    assert np.allclose(distance, [0, 1e6, 4e12])
+    assert (triangle == 0).all() and np.allclose(distance, [0, 1e6, 4e12])

@@ -22,17 +22,14 @@ MAJOR, MINOR = 1.0, 0.4
 def start(surface: Surface, degree: int, kind: str = "smoothest", reach: float = 0.1) -> Combing:
     system = guided_system(surface, degree)
     no_guides = np.zeros((surface.face_count, 3))
-    field = generate(surface, kind, degree)
-    return start_combing(system, field, no_guides, reach * surface.extent)
+    return start_combing(system, generate(surface, kind, degree), no_guides, reach * surface.extent)
 
 
 def draw(combing: Combing, points: np.ndarray, batch: int = 1000, pressure: float = 1.0, **brush):
     """Draw a stroke, and let the field settle."""
     tree = cKDTree(combing.system.surface.face_center)
     settings = GuideBrush(**({"radius": 0.15} | brush))
-    stroke = BrushStroke(
-        combing.system, combing.guides, settings, lambda places: tree.query(places)[1]
-    )
+    stroke = BrushStroke(combing.system, combing.guides, settings, lambda at: tree.query(at)[1])
     for first in range(0, len(points), batch):
         part = points[first : first + batch]
         combing.follow(stroke.extend(part, np.full(len(part), pressure)))
@@ -77,8 +74,7 @@ def test_strokes_do_not_depend_on_the_rate_of_their_points():
         combing = start(torus(96, 48, MAJOR, MINOR), 4)
         draw(combing, on_torus(np.linspace(0, 1, 60)), batch, pressure=0.5)
         results.append(combing.guides.copy())
-    assert np.array_equal(results[0], results[1])
-    assert np.array_equal(results[0], results[2])
+    assert np.array_equal(results[0], results[1]) and np.array_equal(results[0], results[2])
 
 
 @pytest.mark.slow
@@ -91,21 +87,17 @@ def test_settled_field_is_the_guided_field():
         angle = np.linspace(0, random.uniform(0.2, 2), 40)[:, None]
         points = np.cos(angle) * around[0] + np.sin(angle) * around[1]
         effect = ("comb", "comb", "comb", "erase", "smooth")[index % 5]
-        draw(
-            combing, points, radius=random.uniform(0.1, 0.4), effect=effect, is_exact=index % 7 == 0
-        )
+        radius = random.uniform(0.1, 0.4)
+        draw(combing, points, radius=radius, effect=effect, is_exact=index % 7 == 0)
         if index % 5:
             continue
-        settings = GeneratorSettings(
-            "guided", vectors=combing.guide_vectors, vectors_have_firmness=True
-        )
+        vectors = combing.guide_vectors
+        settings = GeneratorSettings("guided", vectors=vectors, vectors_have_firmness=True)
         expected = generate(surface, settings, 4)
         assert np.percentile(angles(combing, combing.vectors, expected.vectors), 95) < 0.01
         found = find_singularities(surface, RosyField(4, combing.vectors))
-        for values, expected_values in zip(
-            found, find_singularities(surface, expected), strict=True
-        ):
-            assert np.array_equal(values, expected_values)
+        for values, others in zip(found, find_singularities(surface, expected), strict=True):
+            assert np.array_equal(values, others)
 
 
 def test_erasing_everything_removes_all_guides():
@@ -115,8 +107,7 @@ def test_erasing_everything_removes_all_guides():
     # All of the surface is within the radius, where the falloff is not yet 0.
     for _ in range(60):
         draw(combing, points, radius=4.0, effect="erase", front_faces=False)
-    assert not combing.guides.any()
-    assert np.isfinite(combing.vectors).all()
+    assert not combing.guides.any() and np.isfinite(combing.vectors).all()
 
 
 def test_smoothing_lowers_the_difference_between_neighbors():
@@ -193,5 +184,4 @@ def test_exact_guides_survive_storing():
     stored = combing.guide_vectors.astype(np.float32)
     again = start_combing(combing.system, RosyField(4, combing.vectors), stored, 0.1)
     again.settle()
-    assert is_exact.any()
-    assert angles(again, again.vectors, normalize(stored))[is_exact].max() < 1e-4
+    assert is_exact.any() and angles(again, again.vectors, normalize(stored))[is_exact].max() < 1e-4

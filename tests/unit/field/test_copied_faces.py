@@ -16,8 +16,7 @@ SHEET = plane(4, 3)
 def two_sided(*, apart: bool = False, turn: int = 0):
     """Return the arrays of a sheet with a second side, whose vertices may be its own."""
     back = np.roll(SHEET.faces[:, ::-1], turn, axis=1) + apart * len(SHEET.vertices)
-    vertices = np.concatenate([SHEET.vertices] * (1 + apart))
-    return vertices, np.concatenate([SHEET.faces, back])
+    return np.concatenate([SHEET.vertices] * (1 + apart)), np.concatenate([SHEET.faces, back])
 
 
 @pytest.mark.parametrize("apart", [False, True])
@@ -60,8 +59,7 @@ def test_only_equal_faces_are_copies():
     ball, grid = icosphere(3), plane(30, 30)
     for surface in (ball, grid):
         assert not copied_faces(surface.vertices, surface.corner_vertex, surface.face_start).any()
-    zeros = from_triangles(
-        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [-0.0, -0.0, 0]], [[0, 1, 2], [3, 2, 1]]
-    )
+    points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [-0.0, -0.0, 0]]
+    zeros = from_triangles(points, [[0, 1, 2], [3, 2, 1]])
     copies = copied_faces(zeros.vertices, zeros.corner_vertex, zeros.face_start)
     assert copies.tolist() == [False, True]

@@ -95,8 +95,7 @@ def test_a_rosy_has_no_direction_ratios():
     surface = icosphere(2)
     angles = 0.3 + 2 * np.pi * np.arange(6) / 6
     field = field_from_directions(surface, directions_at_angles(surface, angles, np.full(6, 2.0)))
-    assert field.direction_ratios is None
-    assert np.allclose(field.magnitude, 2)
+    assert field.direction_ratios is None and np.allclose(field.magnitude, 2)
 
 
 def test_opposite_directions_are_detected():
@@ -129,8 +128,7 @@ def test_directions_on_vertices_are_averaged_onto_faces():
 
 def test_matching_follows_the_stored_members():
     surface = plane(5, 5)
-    random = np.random.default_rng(3)
-    member_index = random.integers(0, 4, surface.face_count)
+    member_index = np.random.default_rng(3).integers(0, 4, surface.face_count)
     angle = member_index * np.pi / 2
     vectors = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     faces, matching = field_matching(surface, RosyField(4, vectors))
@@ -139,8 +137,7 @@ def test_matching_follows_the_stored_members():
 
 def test_eigenvectors_of_a_tensor():
     surface = icosphere(3)
-    random = np.random.default_rng(0)
-    matrix = random.standard_normal((3, 3))
+    matrix = np.random.default_rng(0).standard_normal((3, 3))
     matrix = matrix + matrix.T
     field = tensor_field(surface, np.tile(matrix, (surface.face_count, 1, 1)))
     assert (field.degree, field.family_count) == (4, 2)
@@ -185,15 +182,13 @@ def test_streaks_run_along_free_directions(method, angles):
     directions = np.tile(directions, (surface.face_count, 1, 1))
     for face in range(surface.face_count):  # the order must not matter
         directions[face] = np.roll(directions[face], face, axis=0)
-    field = field_from_directions(surface, directions)
-    gbuffer = project_from_above(surface, field, 256)
+    gbuffer = project_from_above(surface, field_from_directions(surface, directions), 256)
     (layer,) = degree_layers(gbuffer, WEAVE.with_settings({"method": method}))
     tone = layer.tone.reshape(256, 256)[32:-32, 32:-32]
     # From -5 to 175 degrees: no direction is near the ends.
     actual = np.sort((np.array(peaks(orientation_spectrum(tone))) + 5) % 180 - 5)
     expected = np.unique(np.mod(angles, 180))
-    assert len(actual) == len(expected)
-    assert np.abs(actual - expected).max() < 2
+    assert len(actual) == len(expected) and np.abs(actual - expected).max() < 2
 
 
 def test_hues_of_families_tell_their_directions():

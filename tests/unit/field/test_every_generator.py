@@ -79,8 +79,7 @@ def test_options_of_the_command_line(kind, words, options, tmp_path):
     mesh, out = write_off(tmp_path / "a.off", bumpy(torus(24, 12))), tmp_path / "a.rosy"
     assert main(["field", str(mesh), "-o", str(out), "--generate", kind, *words]) == 0
     surface = Surface(mesh)
-    settings = GeneratorSettings(kind, **options)
-    expected = generate(surface, settings, 4).vectors
+    expected = generate(surface, GeneratorSettings(kind, **options), 4).vectors
     assert np.array_equal(read_field(out, surface).vectors, expected)
     assert list(options) == options_of(kind)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from command_helpers import write_obj
 from shapes import plane
 
 import rosy_addon as rf
@@ -11,11 +12,7 @@ from rosy_addon.extras.command_line import main
 from rosy_addon.field.formats.feature_edges import read_edges
 
 SQUARES = plane(3, 2)
-FILES = {
-    "a.sharp": "2\n1,0,0\n0,4,2\n",
-    "a.feature": "2\n0,0\n4,2\n",
-    "b.feature": "2\n0 0\n4 2\n",
-}
+FILES = {"a.sharp": "2\n1,0,0\n0,4,2\n", "a.feature": "2\n0,0\n4,2\n", "b.feature": "2\n0 0\n4 2\n"}
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -26,10 +23,13 @@ def test_edges_of_faces(name, tmp_path):
     assert read_edges(tmp_path / name, SQUARES).tolist() == expected
 
 
+def degrees_of(vectors):
+    return np.degrees(np.arctan2(vectors[:, 1], vectors[:, 0]))
+
+
 def diagonal():
     """A square of 2 x 2 squares of 2 triangles, and the (face, edge) of its rising diagonals."""
-    x, y = np.meshgrid([0.0, 1.0, 2.0], [0.0, 1.0, 2.0])
-    points = np.stack([x.ravel(), y.ravel(), np.zeros(9)], axis=1)
+    points = [[x, y, 0.0] for y in range(3) for x in range(3)]
     faces, rows = [], []
     for corner in (0, 1, 3, 4):
         faces += [[corner, corner + 1, corner + 4], [corner, corner + 4, corner + 3]]
@@ -42,24 +42,19 @@ def test_features_follow_the_file(tmp_path):
     lines = [f"1,{face},{edge}\n" for face, edge in rows]
     (tmp_path / "a.sharp").write_text(f"{len(rows)}\n" + "".join(lines))
     field = rf.features(surface, edges=tmp_path / "a.sharp")
-    angle = np.degrees(np.arctan2(field.vectors[:, 1], field.vectors[:, 0]))
-    assert angle % 90 == pytest.approx(45)
+    assert degrees_of(field.vectors) % 90 == pytest.approx(45)
     field = rf.guided(surface, 2, edges=tmp_path / "a.sharp")
-    angle = np.degrees(np.arctan2(field.vectors[:, 1], field.vectors[:, 0]))
-    assert angle % 180 == pytest.approx(45)
+    assert degrees_of(field.vectors) % 180 == pytest.approx(45)
 
 
 def test_the_command_line(tmp_path, capfd):
     surface, rows = diagonal()
-    points = "".join(f"v {x} {y} {z}\n" for x, y, z in surface.vertices)
-    faces = "".join("f " + " ".join(str(v + 1) for v in face) + "\n" for face in surface.faces)
-    mesh, edges, out = tmp_path / "a.obj", tmp_path / "a.feature", tmp_path / "a.npy"
-    mesh.write_text(points + faces)
+    mesh = write_obj(tmp_path / "a.obj", surface.vertices, surface.faces)
+    edges, out = tmp_path / "a.feature", tmp_path / "a.npy"
     edges.write_text(f"{len(rows)}\n" + "".join(f"{face},{edge}\n" for face, edge in rows))
     words = ["field", str(mesh), "-o", str(out), "--edges", str(edges)]
     assert main(words) == 0
-    vectors = np.load(out)[:, :3]
-    assert np.degrees(np.arctan2(vectors[:, 1], vectors[:, 0])) % 90 == pytest.approx(45)
+    assert degrees_of(np.load(out)) % 90 == pytest.approx(45)
     assert main([*words, "--generate", "form"]) == 2
     assert "--edges applies only to --generate features and guided" in capfd.readouterr().err
 

@@ -39,9 +39,8 @@ def rosy_text(rows, count=None, degree=4, form="{count}\n{degree}\n"):
 def npy_that_claims(count):
     """An array of 6 rows whose header claims more."""
     file = io.BytesIO()
-    np.lib.format.write_array_header_1_0(
-        file, {"descr": "<f8", "fortran_order": False, "shape": (count, 3)}
-    )
+    header = {"descr": "<f8", "fortran_order": False, "shape": (count, 3)}
+    np.lib.format.write_array_header_1_0(file, header)
     return file.getvalue() + WEST.tobytes()
 
 
@@ -56,8 +55,7 @@ def test_line_breaks_have_no_meaning(form, tmp_path):
     for content in (text, "\n".join(text.split())):
         (tmp_path / "a.rosy").write_text(content)
         field = read_field(tmp_path / "a.rosy", SQUARES)
-        assert field.degree == 4
-        assert np.array_equal(field.vectors, WEST)
+        assert field.degree == 4 and np.array_equal(field.vectors, WEST)
 
 
 def test_a_vertex_count_is_accepted_above_face_rows(tmp_path, error_of):
@@ -95,8 +93,7 @@ def test_written_fields_are_read_back_exactly(tmp_path, degree, vectors, ending)
     path = tmp_path / f"field{ending}"
     write_field(path, field, SQUARES)
     again = read_field(path, SQUARES, degree)
-    assert again.degree == degree
-    assert np.array_equal(again.vectors, field.vectors)
+    assert again.degree == degree and np.array_equal(again.vectors, field.vectors)
 
 
 def test_rawfield_members_run_counter_clockwise_from_the_stored_one(tmp_path):
@@ -119,8 +116,7 @@ def test_fields_of_other_programs(name, shared_data):
     mesh, _, degree = name.partition("-")
     surface = Surface(shared_data / "meshes" / f"{mesh}.off")
     field = read_field(shared_data / "fields" / f"{name}.rawfield", surface)
-    assert field.degree == int(degree or 4)
-    assert np.allclose(field.magnitude, 1, atol=1e-4)
+    assert field.degree == int(degree or 4) and np.allclose(field.magnitude, 1, atol=1e-4)
     assert np.abs(dot(field.vectors, surface.face_normal)).max() < 3e-7
     if name == "cheburashka":  # the only closed mesh
         _, index = find_singularities(surface, field)
@@ -137,8 +133,7 @@ def test_tolerances_of_a_rosy(angle, longer, rosy, tmp_path):
     rows = np.tile(members.reshape(1, 9), (6, 1))
     (tmp_path / "a.rawfield").write_text(rosy_text(rows, degree=3, form="{degree} {count}\n"))
     field = read_field(tmp_path / "a.rawfield", SQUARES)
-    assert field.degree == 3
-    assert (field.direction_ratios is None) == rosy
+    assert field.degree == 3 and (field.direction_ratios is None) == rosy
 
 
 DAMAGED = {
@@ -172,8 +167,7 @@ def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
     message = error_of(read_field, tmp_path / name, SQUARES)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert expected in message
-    assert str(tmp_path / name) in message
+    assert expected in message and str(tmp_path / name) in message
     assert peak < 1e6, "a claim in a header must not be believed"
 
 
@@ -206,8 +200,7 @@ def test_unwritable_output_is_an_error_and_keeps_the_old_file(tmp_path, error_of
 
 
 def test_small_deviations_are_projected_and_keep_their_length():
-    vectors = WEST + (0, 0, 0.1)
-    field = validated_field(SQUARES, vectors, 4, "here")
+    field = validated_field(SQUARES, WEST + (0, 0, 0.1), 4, "here")
     assert np.allclose(field.vectors, (-np.hypot(2, 0.1), 0, 0), atol=1e-14)
 
 
@@ -225,8 +218,7 @@ def test_vectors_off_the_surface_are_refused(error_of):
     vectors[many] += 0.3 * surface.face_normal[many] * field.magnitude[many, None]
     vectors[500] += 2 * surface.face_normal[500] * field.magnitude[500, None]
     message = error_of(validated_field, surface, vectors, 4, "there")
-    assert message.startswith("there: ")
-    assert "face 500 by" in message
+    assert message.startswith("there: ") and "face 500 by" in message
     assert f"{np.degrees(np.arctan(2.35)):.1f} degrees" in message
 
 
@@ -247,8 +239,7 @@ def test_vectors_off_the_surface_are_projected_or_undefined_on_request(domain, s
         directions = np.stack([vectors, -vectors], axis=1)
         return validated_directions(surface, directions, "a", policy, domain)
 
-    message = error_of(made, given, VectorPolicy())
-    assert "off_surface, --off-surface" in message
+    assert "off_surface, --off-surface" in error_of(made, given, VectorPolicy())
     expected = made(right, VectorPolicy()).vectors
     projected = made(given, VectorPolicy(off_surface="project"))
     assert np.abs(projected.vectors - expected).max() < 1e-12
@@ -297,8 +288,7 @@ def test_a_field_belongs_to_the_rest_shape():
     field = axis_field(tube, 4)
     turned = tube.vertices[:, [2, 1, 0]] * (1, 1, -1.0)
     bent = tube.with_parts(vertices=turned, rest_vertices=tube.vertices)
-    again = validated_field(bent, field.vectors, 4, "here")
-    assert np.array_equal(again.vectors, field.vectors)
+    assert np.array_equal(validated_field(bent, field.vectors, 4, "here").vectors, field.vectors)
 
 
 def test_vectors_beyond_the_range_of_single_precision(error_of):

@@ -36,8 +36,7 @@ def test_transport_is_the_minimal_rotation(a, b, angle):
     x, y = tangent_frame(s)
     v = np.cos(3 * angle) * x + np.sin(3 * angle) * y
     moved = transport(v, s, t)
-    assert abs(moved @ t) < 1e-12
-    assert np.linalg.norm(moved) == pytest.approx(1)
+    assert abs(moved @ t) < 1e-12 and np.linalg.norm(moved) == pytest.approx(1)
     assert np.allclose(transport(moved, t, s), v)
     axis = np.cross(s, t)  # invariant under the rotation that takes s to t
     assert moved @ axis == pytest.approx(v @ axis, abs=1e-9)
@@ -47,8 +46,7 @@ def test_transport_is_the_minimal_rotation(a, b, angle):
 def test_tangent_frames_are_right_handed(a):
     n = normalize(np.array(a))
     x, y = tangent_frame(n)
-    assert np.allclose(np.cross(x, y), n)
-    assert x @ y == pytest.approx(0, abs=1e-12)
+    assert np.allclose(np.cross(x, y), n) and x @ y == pytest.approx(0, abs=1e-12)
 
 
 @given(vector.filter(lambda v: v[2] / np.linalg.norm(v) > -0.5))
@@ -64,8 +62,7 @@ def test_view_frames_are_the_transported_camera_axes(a):
 def test_all_members_have_one_representation(angle, rho, degree, k):
     x, y = np.array([1.0, 0, 0]), np.array([0, 1.0, 0])
     turned = angle + 2 * np.pi * k / degree
-    member = rho * (np.cos(turned) * x + np.sin(turned) * y)
-    z = to_representation(member, x, y, degree)
+    z = to_representation(rho * (np.cos(turned) * x + np.sin(turned) * y), x, y, degree)
     assert z == pytest.approx(rho * np.exp(1j * degree * angle), abs=1e-9)
     again = to_representation(from_representation(z, x, y, degree), x, y, degree)
     assert again == pytest.approx(z, abs=1e-9)
@@ -118,8 +115,7 @@ def test_a_planar_singularity_has_its_index(degree, sign):
     angle = sign * np.arctan2(direction[:, 1], direction[:, 0]) / degree + 0.4
     field = RosyField(degree, np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1))
     vertices, index = find_singularities(surface, field)
-    assert vertices.tolist() == [vertex]
-    assert index.tolist() == [sign]
+    assert vertices.tolist() == [vertex] and index.tolist() == [sign]
 
 
 @pytest.mark.parametrize("degree", [1, 3, 4, 7])
@@ -182,12 +178,10 @@ def test_the_length_of_an_axis_does_not_count(length):
 @pytest.mark.parametrize("length", [1e-320, 1e-160, 1e-9])
 def test_smoothing_over_no_distance_changes_nothing(length):
     surface = torus()
-    settings = GeneratorSettings("curvature", reach=length)
-    vectors = generate(surface, settings, 4).vectors
+    vectors = generate(surface, GeneratorSettings("curvature", reach=length), 4).vectors
     np.testing.assert_array_equal(vectors, curvature_field(surface, 4).vectors)
     guides = GeneratorSettings("guided", reach=length, vectors=vectors)
-    exact = GeneratorSettings("guided", vectors=vectors)
-    expected = generate(surface, exact, 4).vectors
+    expected = generate(surface, GeneratorSettings("guided", vectors=vectors), 4).vectors
     np.testing.assert_array_equal(generate(surface, guides, 4).vectors, expected)
     again = convert(surface, RosyField(4, vectors), Conversion(smoothing_length=length))
     np.testing.assert_array_equal(again.vectors, vectors)
@@ -196,8 +190,7 @@ def test_smoothing_over_no_distance_changes_nothing(length):
 def test_faces_perpendicular_to_an_axis_are_undefined():
     """Also where the normal is rounded."""
     points = [(0, 0, 0), (1, 0, 0.3), (0, 1, 0.7), (5, 0, 0), (6, 0, 1), (5, 1, 0)]
-    surface = from_triangles(points, [(0, 1, 2), (3, 4, 5)])
-    field = axis_field(surface, 4, (-0.3, -0.7, 1))
+    field = axis_field(from_triangles(points, [(0, 1, 2), (3, 4, 5)]), 4, (-0.3, -0.7, 1))
     assert not field.vectors[0].any() and field.vectors[1].any()
 
 

@@ -26,9 +26,8 @@ def random_guides(surface, count, seed=0):
     random = np.random.default_rng(seed)
     chosen = random.choice(surface.face_count, count, replace=False)
     guides = np.zeros((surface.face_count, 3))
-    guides[chosen] = normalize(
-        np.cross(surface.face_normal[chosen], random.standard_normal((count, 3)))
-    )
+    vectors = random.standard_normal((count, 3))
+    guides[chosen] = normalize(np.cross(surface.face_normal[chosen], vectors))
     return guides
 
 
@@ -54,9 +53,8 @@ def test_soft_guides_match_a_direct_solver():
     shape = len(corner), connection.node_count
     entries = np.arange(len(corner)), connection.corner_node[corner]
     root_weight = np.sqrt(weight * np.repeat(connection.area / 3, 3)[corner])
-    transport_matrix = sparse.csr_matrix(
-        (root_weight * np.exp(1j * degree * frame_angle[corner]), entries), shape
-    )
+    values = root_weight * np.exp(1j * degree * frame_angle[corner])
+    transport_matrix = sparse.csr_matrix((values, entries), shape)
     target = root_weight * np.repeat(to_representation(guides, x, y, degree), 3)[corner]
     matrix = as_scipy(laplacian(connection, degree)) + transport_matrix.getH() @ transport_matrix
     z = spsolve(matrix.tocsc(), transport_matrix.getH() @ target)
@@ -101,12 +99,10 @@ def test_the_edges_of_a_cube_are_sharp_and_guide_all_its_faces():
     box = cube()
     ends = feature_edges(box, 0.5)
     assert len(ends) == 12
-    guides = guides_from_edges(box, ends, 4)
-    along = np.abs(guides).max(axis=1)
+    along = np.abs(guides_from_edges(box, ends, 4)).max(axis=1)
     np.testing.assert_allclose(along, 1, atol=1e-12)
     # In degree 2 the edges of a square cancel.
-    assert not guides_from_edges(box, ends, 2).any()
-    assert not len(feature_edges(box, 2.0))
+    assert not guides_from_edges(box, ends, 2).any() and not len(feature_edges(box, 2.0))
 
 
 def test_borders_are_features():
@@ -122,8 +118,7 @@ def test_guides_lie_in_their_faces():
     points = np.array([[0, 0, 0], [1, 0, 0.2], [1, 1, 0], [0, 1, 0.3]], dtype=float)
     bent = from_quads(points, np.array([[0, 1, 2, 3]]))
     guides = guides_from_edges(bent, [[1, 0]], 3)
-    assert abs(dot(guides, bent.face_normal)[0]) < 1e-12
-    assert guides[0] @ [1, 0, 0] > 0.9
+    assert abs(dot(guides, bent.face_normal)[0]) < 1e-12 and guides[0] @ [1, 0, 0] > 0.9
 
 
 def test_curvature_spreads_into_flat_regions():
@@ -139,8 +134,7 @@ def test_curvature_spreads_into_flat_regions():
     quads = np.stack([first, first + 1, first + count + 1, first + count], axis=-1).reshape(-1, 4)
     surface = from_quads(points, quads)
     flat = surface.face_center[:, 0] < -1
-    plain = generate(surface, "curvature", 4)
-    assert plain.magnitude[flat].max() < 1e-3
+    assert generate(surface, "curvature", 4).magnitude[flat].max() < 1e-3
     field = generate(surface, GeneratorSettings("curvature", reach=0.05), 4)
     np.testing.assert_allclose(field.magnitude, 1, atol=1e-6)
     assert np.abs(field.vectors[flat]).max(axis=1).min() > np.cos(np.radians(1))

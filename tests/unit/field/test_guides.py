@@ -79,9 +79,8 @@ def test_axes_guide_the_faces_around_them():
     near = np.linalg.norm(BALL.face_center - position[0], axis=1) < 0.3
     assert guides[near].any(axis=1).all() and guides.any(axis=1).sum() == near.sum() + 1
     assert (np.abs(guides[near, 0]) > 0.9).all()
-    generator_settings = GeneratorSettings(
-        "guided", axis_guides=list(zip(position, axis, (0.3, 0.0), strict=True))
-    )
+    axis_guides = list(zip(position, axis, (0.3, 0.0), strict=True))
+    generator_settings = GeneratorSettings("guided", axis_guides=axis_guides)
     field = generate(BALL, generator_settings, 2)
     np.testing.assert_allclose(np.abs(dot(field.vectors, guides))[near], 1, atol=1e-9)
 
@@ -136,8 +135,7 @@ def test_maps_without_area_are_undefined():
     uv = uv_of(surface, np.eye(2))
     uv[:8] = 0.5
     uv[8:12, 1] = 0.0
-    guides = guides_from_uv(surface, uv, 4)
-    assert guides.any(axis=1).tolist() == [False] * 3 + [True] * 6
+    assert guides_from_uv(surface, uv, 4).any(axis=1).tolist() == [False] * 3 + [True] * 6
 
 
 def test_guides_of_several_kinds_are_combined(error_of):

@@ -56,12 +56,10 @@ def test_round_trip(ending, surface, degree, tmp_path):
 
 
 def test_the_numbers_in_an_archive(tmp_path):
-    field = axis_field(BALL, 2, (0.0, 0.0, 1.0))
-    write_field(tmp_path / "a.npz", field, BALL)
+    write_field(tmp_path / "a.npz", axis_field(BALL, 2, (0.0, 0.0, 1.0)), BALL)
     with np.load(tmp_path / "a.npz") as arrays:
         assert arrays["directions"].shape == (BALL.face_count, 2, 3) and arrays["degree"] == 2
-        assert np.array_equal(arrays["faces"], BALL.faces)
-        assert arrays["singular_indices"].sum() == 4
+        assert np.array_equal(arrays["faces"], BALL.faces) and arrays["singular_indices"].sum() == 4
 
 
 def test_vectors_of_a_ply_file(tmp_path, capfd):

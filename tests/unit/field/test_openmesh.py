@@ -49,8 +49,7 @@ def test_the_mesh_and_its_crosses(tmp_path):
     assert np.array_equal(surface.vertices, POINTS)
     assert [face.tolist() for face in surface.faces] == [[0, 1, 2, 3], [1, 4, 2]]
     field = read_field(path, surface)
-    assert field.degree == 4
-    assert np.array_equal(field.source_directions[:, 0], U)
+    assert field.degree == 4 and np.array_equal(field.source_directions[:, 0], U)
     assert np.array_equal(field.source_directions[:, 1], V)
     path.write_bytes(MESH + vectors(b"wind", U, kind=b"Vec3f") + END)
     assert read_field(path, surface, 1).vectors == pytest.approx(np.array(U, float))
@@ -85,8 +84,7 @@ def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
     content, expected = DAMAGED[name]
     path = tmp_path / "a.om"
     path.write_bytes(content)
-    surface = rf.Surface(POINTS, [[0, 1, 2, 3], [1, 4, 2]])
-    assert expected in error_of(read_field, path, surface)
+    assert expected in error_of(read_field, path, rf.Surface(POINTS, [[0, 1, 2, 3], [1, 4, 2]]))
 
 
 def test_every_changed_byte_is_an_error_or_a_mesh(tmp_path):

@@ -31,8 +31,7 @@ def block(holes: int, missing: int = 0) -> Surface:
         steps[:, axis] = side
         steps[1:3, (axis + 1) % 3], steps[2:, (axis + 2) % 3] = 1, 1
         quads.append(cells[:, None] + (steps if side else steps[::-1]))
-    corners = np.concatenate(quads).reshape(-1, 3)
-    vertices, quads = np.unique(corners, axis=0, return_inverse=True)
+    vertices, quads = np.unique(np.concatenate(quads).reshape(-1, 3), axis=0, return_inverse=True)
     vertices, quads = vertices.astype(float), quads.reshape(-1, 4)
     sides = np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)])
     for _ in range(8):
@@ -206,9 +205,8 @@ def test_the_energy_is_that_of_a_dense_solver(surface, degree, vertex, index):
     node_index = prescribed.index_at_nodes(faces, np.array(vertex, int), np.array(index, int))
     turn = 2 * np.pi / degree
     required = turn * node_index - faces.defect
-    loops = turning_angles._loops(
-        graph, spanning_forest(len(graph.component), graph.source, graph.target)
-    )
+    forest = spanning_forest(len(graph.component), graph.source, graph.target)
+    loops = turning_angles._loops(graph, forest)
     rows = np.zeros((len(loops), len(edge)))
     for row, (crossed, signs) in zip(rows, loops, strict=True):
         row[crossed] = signs

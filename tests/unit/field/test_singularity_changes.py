@@ -46,8 +46,7 @@ def test_near_pairs_are_cancelled_and_nothing_else():
     for reach, left in ((0.05, 8), (0.15, 6), (0.4, 4), (1.0, 2)):
         clean = convert(BALL, field, Conversion(pair_distance=reach))
         vertex, _ = find_singularities(BALL, clean)
-        assert len(vertex) == left
-        assert set(poles) <= set(vertex)
+        assert len(vertex) == left and set(poles) <= set(vertex)
     assert indices(BALL, clean) == dict.fromkeys(poles, 4)
 
 
@@ -56,8 +55,7 @@ def test_far_from_a_pair_nothing_turns():
     clean = convert(BALL, field, Conversion(pair_distance=0.15))
     turned = turned_by(BALL, field, clean)
     distance = np.linalg.norm(BALL.face_center - (1, 0.1, 0), axis=1)
-    assert turned[distance > 1].max() < 0.5
-    assert turned[distance < 0.1].max() > 20
+    assert turned[distance > 1].max() < 0.5 and turned[distance < 0.1].max() > 20
     assert convert(BALL, field, Conversion(pair_distance=0.01)) is field
 
 
@@ -81,8 +79,7 @@ def test_curvature_is_cleaned(degree, subdivisions, noise):
     With large faces, some pairs have to stay.
     """
     surface = icosphere(subdivisions)
-    random = np.random.default_rng(degree)
-    noise = noise * random.standard_normal((len(surface.vertices), 3))
+    noise = noise * np.random.default_rng(degree).standard_normal((len(surface.vertices), 3))
     surface = rebuilt(surface, surface.vertices * (1, 1.3, 0.7) + noise)
     field = generate(surface, GeneratorSettings("curvature"), degree)
     clean = convert(surface, field, Conversion(pair_distance=0.4 / subdivisions))
@@ -127,14 +124,10 @@ def test_guides_bend_a_field_with_the_same_singularities(degree):
     """Near the guides the field follows them, and no singularity comes or goes."""
     last = pole_field(degree, [])[1]
     guides = np.zeros((BALL.face_count, 3))
-    for center, direction in (
-        ((1, 0, 0), (0, 1, 1)),
-        ((-1, 0.3, 0), (0, 1, 0.2)),
-        ((0, 1, 0), (1, 0, 0)),
-    ):
-        distance = np.linalg.norm(
-            BALL.face_center - np.divide(center, np.linalg.norm(center)), axis=1
-        )
+    directions = {(1, 0, 0): (0, 1, 1), (-1, 0.3, 0): (0, 1, 0.2), (0, 1, 0): (1, 0, 0)}
+    for center, direction in directions.items():
+        center = np.divide(center, np.linalg.norm(center))
+        distance = np.linalg.norm(BALL.face_center - center, axis=1)
         guides[distance < 0.15] = direction
     whole = prescribed_field(BALL, degree, last, [degree, degree], guides)
     bent = prescribed_field(BALL, degree, last, [degree, degree], guides, 0.02)

@@ -25,8 +25,7 @@ from rosy_addon.field.sparse_multigrid import (
 
 @pytest.fixture(scope="module")
 def laplacian():
-    connection = build_connection(torus(60, 30))
-    matrix = field_laplacian(connection, 4)
+    matrix = field_laplacian(build_connection(torus(60, 30)), 4)
     return matrix.plus_diagonal(1e-3 * matrix.diagonal)
 
 
@@ -70,9 +69,8 @@ def test_levels_with_another_diagonal(laplacian):
     rhs = random.standard_normal(len(laplacian)) + 0j
     new_levels = add_diagonal(levels, diagonal)
     # 15 iterations would not be enough without a suitable preconditioner.
-    solution = conjugate_gradient(
-        new_levels[0].matrix, rhs, 1e-12, partial(w_cycle, new_levels), max_iterations=20
-    )
+    cycle = partial(w_cycle, new_levels)
+    solution = conjugate_gradient(new_levels[0].matrix, rhs, 1e-12, cycle, max_iterations=20)
     expected = spsolve(as_scipy(laplacian) + sparse.diags(diagonal), rhs)
     assert np.abs(solution - expected).max() < 1e-6 * np.abs(expected).max()
 
@@ -121,5 +119,4 @@ def test_cycles_converge_and_ignore_rows_of_rounding():
         for _ in range(12):
             solution += w_cycle(levels, rhs - with_row @ solution)
             errors.append(np.linalg.norm(solution[:-1] - expected))
-    assert len(levels) > 1
-    assert (np.array(errors[1:]) < 0.8 * np.array(errors[:-1])).all()
+    assert len(levels) > 1 and (np.array(errors[1:]) < 0.8 * np.array(errors[:-1])).all()

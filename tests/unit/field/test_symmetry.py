@@ -21,6 +21,5 @@ from rosy_addon.field.symmetry import FieldSymmetry
 )
 def test_symmetry(degree, orders, has_opposites, line_count, sheets_per_turn):
     symmetry = FieldSymmetry(degree, orders)
-    assert symmetry.has_opposites == has_opposites
-    assert symmetry.line_count == line_count
+    assert symmetry.has_opposites == has_opposites and symmetry.line_count == line_count
     assert symmetry.sheets_per_turn == sheets_per_turn

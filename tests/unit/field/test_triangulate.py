@@ -44,8 +44,7 @@ def assert_filled(polygon):
     points, triangles, _ = triangulate_polygons(polygon)
     areas = signed_areas(points, triangles)
     area = polygon_area(np.asarray(polygon, dtype=float))
-    assert (areas * np.sign(area) > 0).all()
-    assert areas.sum() == pytest.approx(area)
+    assert (areas * np.sign(area) > 0).all() and areas.sum() == pytest.approx(area)
 
 
 def star(random, corners):
@@ -98,11 +97,8 @@ def test_convex_faces_are_fans_around_their_first_corner():
     hexagon = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     square = [(0, 0), (1, 0), (1, 1), (0, 1)]
     _, triangles, face = triangulate_polygons(square, hexagon, square[:3])
-    assert triangles.tolist() == [
-        *([0, 1, 2], [0, 2, 3]),
-        *([4, 5, 6], [4, 6, 7], [4, 7, 8], [4, 8, 9]),
-        [10, 11, 12],
-    ]
+    expected = [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7], [4, 7, 8], [4, 8, 9], [10, 11, 12]]
+    assert triangles.tolist() == expected
     assert face.tolist() == [0, 0, 1, 1, 1, 1, 2]
 
 
@@ -117,8 +113,7 @@ def test_a_polygon_in_space_is_split_as_in_the_plane(seed):
     q *= np.sign(np.linalg.det(q))
     _, triangles, _ = triangulate_polygons(bumpy @ q.T + 100 * random.normal(size=3))
     areas = signed_areas(flat, triangles)
-    assert (areas > 0).all()
-    assert areas.sum() == pytest.approx(polygon_area(flat))
+    assert (areas > 0).all() and areas.sum() == pytest.approx(polygon_area(flat))
 
 
 def test_a_mixed_mesh_keeps_its_order():

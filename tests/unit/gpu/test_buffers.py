@@ -81,9 +81,8 @@ def test_records_hold_the_values_of_numpy_at_the_corners(surface, degree, displa
     np.testing.assert_array_equal(corners[..., 3], np.arange(count)[:, None] + np.zeros(3))
     points = surface.vertices[surface.triangle_vertex]
     extent = np.ptp(points.reshape(-1, 3), axis=0).max()
-    np.testing.assert_allclose(
-        corners[..., :3] + buffers.center, points, atol=1e-6 * extent, rtol=1e-12
-    )
+    actual = corners[..., :3] + buffers.center
+    np.testing.assert_allclose(actual, points, atol=1e-6 * extent, rtol=1e-12)
     # The unused vertex does not change the bounds.
     low, high = buffers.bounds.min(axis=0), buffers.bounds.max(axis=0)
     np.testing.assert_allclose(high, -low, atol=1e-9 * extent)
@@ -117,9 +116,7 @@ def test_channels_are_in_their_layers():
     np.testing.assert_array_equal(records[0, 8:17:2, 3], [0, 0, 1, 2, 3])
     # A RoSy with the same channels has the constant harmonic 1, and no families.
     rosy = axis_field(surface, 3)
-    records = records_of(
-        build_mesh_buffers(surface, np.eye(3), rosy, "smooth", kind.channels), 10 + 2 * 4
-    )
+    records = records_of(build_mesh_buffers(surface, np.eye(3), rosy, "smooth", kind.channels), 18)
     for texel, value in ((9, 0), (11, 1), (15, 0)):
         assert (records[:, texel] == [value, 0, value, 0]).all()
 
@@ -163,8 +160,7 @@ def test_kinds_of_several_fields():
     surface = icosphere(1)
     two, free, other = axis_field(surface, 2), perturbed_field(surface, 3), axis_field(surface, 3)
     kinds = field_kinds([other, two, free])
-    assert list(kinds) == [2, 3]
-    assert kinds[2].channels == () and kinds[2].family_count == 1
+    assert list(kinds) == [2, 3] and kinds[2].channels == () and kinds[2].family_count == 1
     assert kinds[3].channels == field_kinds([free])[3].channels
 
 
@@ -197,5 +193,4 @@ def test_boxes_contain_all_pixels_of_a_mesh(make_camera):
 
 def test_union_of_boxes():
     assert union_box([(1, 2, 5, 6), (0, 0, 0, 0), (9, 3, 9, 8), (3, 1, 8, 4)]) == (1, 1, 8, 6)
-    assert is_empty(union_box([]))
-    assert is_empty(union_box([(0, 0, 0, 0)]))
+    assert is_empty(union_box([])) and is_empty(union_box([(0, 0, 0, 0)]))

@@ -46,8 +46,7 @@ def test_meshes_stay_on_the_card(device):
     moved = ball(4, 2 * rotation(1, 2, 3), (4, 5, 6))
     (second,) = card.upload([moved], "smooth")
     (sheared,) = card.upload([ball(4, SHEAR)], "smooth")
-    assert second.mesh is first.mesh is not sheared.mesh
-    assert kept_kinds(card) == ["mesh", "mesh"]
+    assert second.mesh is first.mesh is not sheared.mesh and kept_kinds(card) == ["mesh", "mesh"]
     for _ in range(resources.MESH_LIFETIME + 1):
         assert card.upload([moved], "smooth")[0].mesh is first.mesh
     assert kept_kinds(card) == ["mesh"]
@@ -77,8 +76,7 @@ def test_creases_are_found_for_each_angle(card):
 
     first = textures(0.7)
     assert first.crease_count == 24 and first.triangle_parts is not None
-    assert textures(1.7).crease_count == textures(None).crease_count == 0
-    assert textures(0.7) is first
+    assert textures(1.7).crease_count == textures(None).crease_count == 0 and textures(0.7) is first
 
 
 @pytest.mark.parametrize("max_steps", [None, 1, 200_000, 300_000, 450_000])
@@ -97,9 +95,7 @@ def test_clip_planes(card):
     planes = uniforms.NO_CLIP_PLANES.copy()
     planes[3] = (1.0, 0.0, 0.0, 0.2)
     instances = [ball(4, rotation(0, 0, 1))]
-    unclipped, clipped = (
-        card_rgba(card, instances, clip_planes=clip_planes) for clip_planes in (None, planes)
-    )
+    unclipped, clipped = (card_rgba(card, instances, clip_planes=each) for each in (None, planes))
     visible = read_gbuffer(card, *SIZE)["field_values"][..., 3] > 0
     assert 0.2 < visible.sum() / (unclipped[..., 3] > 0).sum() < 1.0
     assert (clipped[..., 3] > 0).sum() == visible.sum()
@@ -115,8 +111,7 @@ def test_singularities_and_arrowheads_are_drawn_over_the_picture(card, degree, m
             for shown_marks in (marks, {})
         )
         changed.append((marked != plain).any(axis=2))
-    assert changed[0].sum() > 100
-    assert (changed[0] != changed[1]).sum() <= 2
+    assert changed[0].sum() > 100 and (changed[0] != changed[1]).sum() <= 2
 
 
 def test_what_is_too_large_is_refused(device, error_of, monkeypatch):
@@ -167,13 +162,10 @@ def test_the_range_of_the_colors(card, samples, top):
     """It is the range of numpy, and a look with this range gives the same picture."""
     look = replace(LOOK, hue="magnitude", color_range=(0.0, top), supersampling=samples)
     instances = ball(), shown(BALL, axis_field(BALL, 2), shift=(0, 0, -9))
-    drawn, expected = (
-        draw(renderer, ViewInput(instances, view(), look)) for renderer in (card, None)
-    )
+    drawn, expected = (draw(each, ViewInput(instances, view(), look)) for each in (card, None))
     # Numpy finds the field of several samples at the centers of pixels.
-    assert drawn.color_range == pytest.approx(
-        expected.color_range, rel=1e-4 if samples == 1 else 5e-3
-    )
+    tolerance = 1e-4 if samples == 1 else 5e-3
+    assert drawn.color_range == pytest.approx(expected.color_range, rel=tolerance)
     assert (drawn.color_range == (0.0, 0.7)) == bool(top)
     fixed = replace(look, color_range=drawn.color_range)
     again = draw(card, ViewInput(instances, view(), fixed))

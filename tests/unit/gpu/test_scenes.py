@@ -148,12 +148,10 @@ def test_samples_of_neighbors(card, ink):
 @pytest.mark.parametrize("samples", [1, 2])
 def test_meshes_without_a_field_occlude(card, samples):
     look = replace(LOOK, supersampling=samples)
-    others = [
-        shown(BALL, None, 0.4, (0.3, -0.9, 0.2)),
-        shown(torus(48, 24), None, rotation(1, 0.3, 0)),
-    ]
+    small = shown(BALL, None, 0.4, (0.3, -0.9, 0.2))
+    ring = shown(torus(48, 24), None, rotation(1, 0.3, 0))
     unoccluded = assert_parity(card, [ball()], look=look)
-    pair = assert_parity(card, [others[0], ball(), others[1]], look=look)
+    pair = assert_parity(card, [small, ball(), ring], look=look)
     assert (pair.card[..., 3] != pair.numpy[..., 3]).sum() < 5
     assert (pair.card[..., 3] > 0).sum() < 0.8 * (unoccluded.card[..., 3] > 0).sum()
 
@@ -269,8 +267,7 @@ FREE_LOOKS = {
 @pytest.mark.parametrize("look", FREE_LOOKS)
 @pytest.mark.parametrize("name", ["three", "two lines"])
 def test_looks_of_free_directions(card, name, look):
-    instance = shown(BALL, FREE[name](BALL))
-    assert_parity(card, [instance], look=FREE_LOOKS[look], drift=Drift(0.2))
+    assert_parity(card, [shown(BALL, FREE[name](BALL))], look=FREE_LOOKS[look], drift=Drift(0.2))
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.9])
@@ -349,7 +346,6 @@ def test_the_picture_is_empty_if_there_is_nothing_to_draw(card, instances):
 @pytest.mark.parametrize("size", [(1, 1), (3, 200), (200, 3), (257, 129)])
 def test_odd_sizes(card, size):
     rgba = card_rgba(card, [ball()], camera=view(size))
-    gbuffer = ROSY.project([ball()], view(size))
-    expected = ROSY.compose(gbuffer, replace(LOOK, method="brute")).rgba
+    expected = ROSY.compose(ROSY.project([ball()], view(size)), replace(LOOK, method="brute")).rgba
     assert rgba.shape == expected.shape
     assert ((rgba[..., 3] > 0) != (expected[..., 3] > 0)).mean() < 0.01

@@ -53,10 +53,8 @@ def names_in(code):
 def names_of(shader):
     """Return the uniforms of a pass, and its textures and images with the mark of arrays."""
     images = shader.images if isinstance(shader, passes.ComputePass) else ()
-    return {name for name, _ in shader.uniforms}, {
-        *shader.declared.textures,
-        *(name for name, _ in images),
-    }
+    textures = {*shader.declared.textures, *(name for name, _ in images)}
+    return {name for name, _ in shader.uniforms}, textures
 
 
 def listed_names(shader):

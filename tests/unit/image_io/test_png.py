@@ -31,8 +31,7 @@ def chunks_of(data: bytes) -> dict[bytes, bytes]:
 
 
 def test_files_hold_srgb_values_from_the_top(tmp_path):
-    generator = np.random.default_rng(0)
-    rgba = generator.random((5, 7, 4), dtype=np.float32) * 1.2 - 0.1
+    rgba = np.random.default_rng(0).random((5, 7, 4), dtype=np.float32) * 1.2 - 0.1
     write_png(tmp_path / "a.png", rgba)
     chunks = chunks_of((tmp_path / "a.png").read_bytes())
     assert struct.unpack(">IIBBBBB", chunks[b"IHDR"]) == (7, 5, 8, 6, 0, 0, 0)

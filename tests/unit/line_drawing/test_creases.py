@@ -32,8 +32,7 @@ def test_spacing_and_width_are_even_up_to_creases(light):
     spacings = set()
     for face in np.unique(strokes.face):
         spacing, width = strokes.spacing[strokes.face == face], strokes.width[strokes.face == face]
-        assert np.ptp(spacing) < 1e-6 * spacing.max()
-        assert np.ptp(width) < 1e-6
+        assert np.ptp(spacing) < 1e-6 * spacing.max() and np.ptp(width) < 1e-6
         spacings.add(round(float(spacing[0]), 6))
     assert len(spacings) == 3
 
@@ -45,6 +44,5 @@ def test_strokes_reach_creases_at_full_width():
     strokes = draw_instances([instance], CAMERA, StrokeStyle(spacing=7.0, taper=0.8)).strokes
     ends = np.concatenate([strokes.start[:-1], strokes.start[1:] - 1])
     at_crease = (np.abs(np.abs(strokes.points[ends] - 0.5) - 0.5) < 1e-6).sum(axis=1) >= 2
-    assert at_crease.sum() > 60
-    assert strokes.width[ends][at_crease].min() == 1
+    assert at_crease.sum() > 60 and strokes.width[ends][at_crease].min() == 1
     assert strokes.width[ends][~at_crease].min() < 0.5

@@ -31,8 +31,7 @@ SCENES = {
 def mesh_and_part(name):
     surface, camera = SCENES[name]
     settings = GeneratorSettings("axis", (1, 0.3, 0)) if name == "ground" else "form"
-    field = generate(surface, settings, 4)
-    mesh = build_tangent_mesh(MeshInstance(surface, np.eye(4), field))
+    mesh = build_tangent_mesh(MeshInstance(surface, np.eye(4), generate(surface, settings, 4)))
     return mesh, mesh_in_view(mesh, camera), camera
 
 
@@ -50,8 +49,7 @@ def test_part_is_what_is_in_the_frame(name):
     pixels, _ = project_to_pixels(points + 1e-7 * (points.mean(axis=0) - points), camera)
     size = np.array([camera.width, camera.height])
     limit = size / 2 + np.minimum(MARGIN_PIXELS, MARGIN_RATIO * size)
-    finite = np.isfinite(pixels).all(axis=1)
-    assert np.all(np.abs(pixels[finite] - size / 2) <= limit + 0.01)
+    assert np.all(np.abs(pixels[np.isfinite(pixels).all(axis=1)] - size / 2) <= limit + 0.01)
     assert 0 < part.mesh.area.sum() < mesh.area.sum()
     # Random points of triangles that are in the frame are in one part each, others in none.
     rng = np.random.default_rng(5)
@@ -65,8 +63,7 @@ def test_part_is_what_is_in_the_frame(name):
     for piece, inverse in zip(part.triangle[part.mesh.area > 0], to_part, strict=True):
         on_triangle = np.flatnonzero(triangle == piece)
         parts_around[on_triangle] += (weights[on_triangle] @ inverse >= 0).all(axis=1)
-    assert expected.sum() > 30
-    assert np.array_equal(parts_around, expected)
+    assert expected.sum() > 30 and np.array_equal(parts_around, expected)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -78,8 +75,7 @@ def test_parts_are_connected_as_the_mesh(name):
     assert np.array_equal(part.mesh.neighbor[other], triangle)
     assert np.array_equal(part.mesh.neighbor_edge[other], edge)
     rng = np.random.default_rng(6)
-    with_area = np.flatnonzero(part.mesh.area > 0)
-    start = rng.choice(with_area, 500).astype(np.int32)
+    start = rng.choice(np.flatnonzero(part.mesh.area > 0), 500).astype(np.int32)
     weights = random_weights(len(start), rng)
     direction = np.exp(2j * np.pi * rng.random(len(start)))
     length = rng.random(len(start)) * 0.4 * np.sqrt(part.mesh.area[start])

@@ -132,9 +132,7 @@ def folded(cells=60, gap=()):
 def test_gaps_in_creases_are_closed_and_specks_left_out():
     """A hysteresis closes the gap of two cells; the pyramids are one cell high and wide."""
     camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 120, 120, scale=2.4)
-    surface = folded(gap=(30, 31))
-    lines = outlines_of(surface, camera)
+    lines = outlines_of(folded(gap=(30, 31)), camera)
     creases = lines.select(lines.family == lines.names.index("creases"))
-    assert len(creases) == 1
-    assert pixel_lengths(creases, camera)[0] == pytest.approx(100, abs=2)
+    assert len(creases) == 1 and pixel_lengths(creases, camera)[0] == pytest.approx(100, abs=2)
     assert pixel_lengths(lines, camera).min() >= MIN_MARK_PX

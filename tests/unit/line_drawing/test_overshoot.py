@@ -38,10 +38,8 @@ def strokes_of(instances, camera, style):
 
 def draw_both(instances, camera, **options):
     """Return the same strokes without and with overshoot."""
-    return (
-        strokes_of(tuple(instances), camera, StrokeStyle(**options, overshoot=overshoot))
-        for overshoot in (0, MAX_PIXELS)
-    )
+    styles = [StrokeStyle(**options, overshoot=overshoot) for overshoot in (0, MAX_PIXELS)]
+    return (strokes_of(tuple(instances), camera, style) for style in styles)
 
 
 def ends_of(strokes):
@@ -98,8 +96,7 @@ def test_extensions_cross_the_silhouette():
     is_beyond = outside & (radius > max_radius + 1)
     inner = is_beyond[:-2] & is_beyond[1:-1] & is_beyond[2:]
     inner &= (np.diff(extended.stroke)[1:] == 0) & (np.diff(extended.stroke)[:-1] == 0)
-    assert inner.sum() > 50
-    assert np.abs(np.diff(depth)[1:][inner]).max() < 1e-9
+    assert inner.sum() > 50 and np.abs(np.diff(depth)[1:][inner]).max() < 1e-9
     assert np.abs(np.diff(pixels, 2, axis=0)[inner]).max() < 1e-6
 
 
@@ -113,8 +110,7 @@ def test_extensions_lie_on_occluders_in_front():
     min_growth = 0.01 * (MIN_EXTENSION_RATIO * MAX_PIXELS - 1)
     assert (extended_end - plain_end > min_growth).all()
     on_occluder = extended.points[:, 0] > 0.22
-    assert on_occluder.sum() > 100
-    assert np.allclose(extended.points[on_occluder, 2], 0.7, atol=1e-6)
+    assert on_occluder.sum() > 100 and np.allclose(extended.points[on_occluder, 2], 0.7, atol=1e-6)
     on_square = extended.points[:, 0] < 0.18
     assert np.allclose(extended.points[on_square, 2], 0, atol=1e-6)
 
@@ -129,8 +125,7 @@ def test_extensions_into_the_light_follow_the_surface():
     facing = dot(normalize(extended.points), FRONT_CAMERA.view_directions(extended.points))
     compared = (triangle >= 0) & (facing > 0.5)
     height = np.linalg.norm(extended.points[compared], axis=1) - 1
-    assert np.abs(height).max() < 0.02
-    assert pixel_growth(plain, extended, FRONT_CAMERA).mean() > 1
+    assert np.abs(height).max() < 0.02 and pixel_growth(plain, extended, FRONT_CAMERA).mean() > 1
 
 
 @pytest.mark.slow
@@ -146,8 +141,7 @@ def test_ends_at_gaps_and_at_neighbors_are_not_extended():
     # On the sphere, strokes end where they come too near to others.
     plain, extended = draw_both([SPHERE], FRONT_CAMERA, spacing=9.0)
     facing = dot(normalize(ends_of(plain)), FRONT_CAMERA.view_directions(ends_of(plain))) > 0.5
-    assert facing.sum() > 10
-    assert np.allclose(ends_of(plain)[facing], ends_of(extended)[facing])
+    assert facing.sum() > 10 and np.allclose(ends_of(plain)[facing], ends_of(extended)[facing])
 
 
 @pytest.mark.slow
@@ -216,6 +210,5 @@ def test_extensions_double_short_strokes():
     traced = strokes_of((SQUARE,), TOP_CAMERA, StrokeStyle(spacing=6, taper=0))
     short = traced.runs_where(np.abs(traced.points[:, 0]) < 0.02)
     assert short.free_end_mask.all()
-    depth_buffer = rasterize_depth([SQUARE], TOP_CAMERA)
-    extended = extend_free_ends(short, TOP_CAMERA, 100.0, depth_buffer)
+    extended = extend_free_ends(short, TOP_CAMERA, 100.0, rasterize_depth([SQUARE], TOP_CAMERA))
     assert np.allclose(pixel_growth(short, extended, TOP_CAMERA), 100 * short.length)

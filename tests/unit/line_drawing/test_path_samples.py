@@ -48,8 +48,7 @@ def test_samples_of_a_straight_path():
     np.testing.assert_allclose(last, path.length, atol=1e-9)
 
     cut = path.cut(0.37 * path.length)
-    lengths = np.bincount(cut.particle, cut.length)
-    np.testing.assert_allclose(lengths, 0.37 * path.length, atol=1e-9)
+    np.testing.assert_allclose(np.bincount(cut.particle, cut.length), 0.37 * path.length, atol=1e-9)
     end = np.flatnonzero(np.diff(cut.particle, append=-1))
     reached = mesh.points_at(cut.triangle[end], cut.end_weights[end])[:, 0]
     np.testing.assert_allclose(reached, x + 0.37 * path.length, atol=1e-9)

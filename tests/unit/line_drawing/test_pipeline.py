@@ -201,10 +201,8 @@ def test_swelling_strokes_are_evenly_spaced():
     swelling_style = replace(style, light="headlight", swell=1.0)
     swelling = draw_instances([SPHERE], CAMERA, swelling_style).strokes
     denser = draw_instances([SPHERE], CAMERA, replace(style, light="headlight")).strokes
-    share, share_of_denser = (
-        np.mean(cKDTree(even.points).query(strokes.points)[0] < 1e-6)
-        for strokes in (swelling, denser)
-    )
+    distances = [cKDTree(even.points).query(each.points)[0] for each in (swelling, denser)]
+    share, share_of_denser = (np.mean(distance < 1e-6) for distance in distances)
     assert share > 0.9 > 0.5 > share_of_denser
     first = swelling.family[swelling.stroke] == 0
     to_eye = CAMERA.view_directions(swelling.points)

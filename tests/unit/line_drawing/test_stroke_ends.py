@@ -51,8 +51,7 @@ def test_parallel_strokes_do_not_cross():
 @pytest.mark.parametrize("columns", [3, 7])
 def test_gaps_at_crossings(columns):
     """All strokes cross all others once; some do so at the edges of triangles."""
-    instance = instance_of(plane(columns, columns), 4)
-    strokes = trace_strokes(instance, 0.2)
+    strokes = trace_strokes(instance_of(plane(columns, columns), 4), 0.2)
     crossings = find_crossings(strokes)
     max_count = (strokes.family == 0).sum() * (strokes.family == 1).sum()
     assert len(crossings.stroke) == max_count

@@ -69,11 +69,9 @@ def test_in_the_plane_strokes_are_straight_and_evenly_spaced(angle, degree, cell
     chord_angle = np.angle(np.exp(1j * angle) / (chord[:, 0] + 1j * chord[:, 1]))
     line_count = degree if degree % 2 else degree // 2
     error = (chord_angle * line_count / np.pi + 0.5) % 1 - 0.5
-    assert np.abs(error).max() < 1e-4
-    assert np.abs(strokes.points).max() <= 1 + 1e-9
+    assert np.abs(error).max() < 1e-4 and np.abs(strokes.points).max() <= 1 + 1e-9
     gaps = lateral_gaps(build_tangent_mesh(instance), strokes, 4000)
-    assert gaps.evenness() > 0.9
-    assert gaps.nearest_distance.min() > 0.5
+    assert gaps.evenness() > 0.9 and gaps.nearest_distance.min() > 0.5
 
 
 @pytest.mark.slow
@@ -116,8 +114,7 @@ def test_strokes_look_like_the_render():
     error = np.degrees(np.abs(np.angle(z * np.exp(-4j * angle)))) / 4
     # Where z is smaller, the field turns within a pixel.
     compared &= np.abs(z) > 0.5
-    assert compared.sum() > 1000
-    assert np.percentile(error[compared], 99) < 1.0
+    assert compared.sum() > 1000 and np.percentile(error[compared], 99) < 1.0
 
 
 @pytest.mark.slow
@@ -134,8 +131,7 @@ def test_strokes_stop_at_creases_unless_asked():
 
 def test_straight_ahead_is_a_geodesic():
     """Geodesics on a cylinder are straight lines in the plane to which it is unrolled."""
-    surface = cylinder(64, 8)
-    mesh = build_tangent_mesh(turned(surface, 2))
+    mesh = build_tangent_mesh(turned(cylinder(64, 8), 2))
     count = 20
     triangle = np.full(count, 100, dtype=np.int32)
     weights = np.full((count, 3), 1 / 3)
@@ -162,8 +158,7 @@ def test_strokes_are_even_and_not_too_close(surface):
     instance = instance_of(surface, 4)
     strokes = trace_strokes(instance, 0.03 * surface.extent)
     gaps = lateral_gaps(build_tangent_mesh(instance), strokes, 4000)
-    assert gaps.nearest_distance.min() >= 0.5
-    assert gaps.evenness() >= 0.9
+    assert gaps.nearest_distance.min() >= 0.5 and gaps.evenness() >= 0.9
 
 
 def instance_with_singularity(degree, sign, center, phase):
@@ -272,8 +267,7 @@ def test_ink_coverage_follows_a_ramp_of_tone():
     """Coverage is the length of strokes per area, times the width that is solid at the minimum."""
     surface = plane(40, 40)
     width = 0.025
-    tone = 0.85 * (surface.vertices[:, 0] + 1) / 2
-    spacing = width * spacing_by_tone(tone, max_ratio=1 / 0.15)
+    spacing = width * spacing_by_tone(0.85 * (surface.vertices[:, 0] + 1) / 2, max_ratio=1 / 0.15)
     instance = MeshInstance(surface, IDENTITY, axis_field(surface, 2, (0, 1, 0)))
     start, end, _ = segments_of(trace_strokes(instance, spacing))
     length = np.linalg.norm(end - start, axis=1)
@@ -281,8 +275,7 @@ def test_ink_coverage_follows_a_ramp_of_tone():
     coverage, _ = np.histogram((start + end)[:, 0] / 2, bins, weights=length * width)
     coverage /= 2 * np.diff(bins)
     expected = 1 - 0.85 * ((bins[1:] + bins[:-1]) / 2 + 1) / 2
-    assert (np.diff(coverage) < 0).all()
-    assert np.abs(coverage - expected).max() < 0.1
+    assert (np.diff(coverage) < 0).all() and np.abs(coverage - expected).max() < 0.1
 
 
 @pytest.mark.slow
@@ -375,8 +368,7 @@ def test_a_sphere_shows_its_near_side():
     is_near_side = (start + end)[:, 1] < 0
     near_length = np.linalg.norm(end - start, axis=1)[is_near_side].sum()
     assert np.isclose(visible.length.sum(), near_length, rtol=0.02)
-    unclipped = clip_to_visible(strokes, camera, None)
-    assert np.isclose(unclipped.length.sum(), strokes.length.sum())
+    assert np.isclose(clip_to_visible(strokes, camera, None).length.sum(), strokes.length.sum())
 
 
 @pytest.mark.slow
@@ -388,8 +380,7 @@ def test_strokes_are_clipped_by_occluders_and_by_the_frame():
     assert np.abs(in_frame.points[:, :2]).max() <= 0.5 + 1e-9
     occluder = MeshInstance(plane(), moved(x=1.0, z=1.0))
     visible = visible_strokes(strokes, [instance, occluder], camera)
-    assert visible.points[:, 0].max() < 0.02
-    assert len(visible) >= 15
+    assert visible.points[:, 0].max() < 0.02 and len(visible) >= 15
 
 
 def test_outlines_of_simple_shapes():

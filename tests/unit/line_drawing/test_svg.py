@@ -60,8 +60,7 @@ def test_svg_has_one_layer_per_family_and_one_path_per_stroke():
         assert path.get("d").endswith("Z") == (path.get("stroke") == "none")
         # An outline is half the width of the pen away from its stroke.
         points = path_points(path.get("d"))
-        assert len(points) >= 2
-        assert (points >= -0.51).all() and (points <= (200.51, 100.51)).all()
+        assert len(points) >= 2 and (points >= -0.51).all() and (points <= (200.51, 100.51)).all()
 
 
 @pytest.mark.slow
@@ -99,8 +98,7 @@ def test_outlines_hold_as_much_ink_as_their_strokes():
 @settings(max_examples=30, deadline=None)
 @given(st.integers(1, 60), st.integers(0, 10**6))
 def test_plotter_order_is_a_permutation_with_little_travel(count, seed):
-    random = np.random.default_rng(seed)
-    first, last = random.random((2, count, 2))
+    first, last = np.random.default_rng(seed).random((2, count, 2))
     order, is_reversed = plotter_order(first, last)
     assert sorted(order.tolist()) == list(range(count))
     begin = np.where(is_reversed[:, None], last[order], first[order])
@@ -138,8 +136,7 @@ def test_command_line(tmp_path, capsys, monkeypatch):
         assert main([*command, *options.split()]) == 0
         contents.append(out.read_bytes())
     assert contents[0] == contents[1]
-    root = ElementTree.fromstring(contents[0])
-    assert len(root.findall("{http://www.w3.org/2000/svg}g")) == 4
+    assert len(ElementTree.fromstring(contents[0]).findall("{http://www.w3.org/2000/svg}g")) == 4
     for arguments, message in (
         (["-o", str(tmp_path / "ball.png")], "ball.png"),
         (["--camera", "Close"], "ball.off: --camera applies only to .blend files"),
@@ -149,10 +146,8 @@ def test_command_line(tmp_path, capsys, monkeypatch):
         (["--set", "wobble=1"], "--set wobble=1: unknown setting 'wobble'"),
         (["--set", "light"], "--set light: expected NAME=VALUE"),
     ):
-        assert main([*command, *arguments]) == 2
-        assert message in capsys.readouterr().err
-    assert main(["strokes", "-o", str(out)]) == 2
-    assert "give a mesh file" in capsys.readouterr().err
+        assert main([*command, *arguments]) == 2 and message in capsys.readouterr().err
+    assert main(["strokes", "-o", str(out)]) == 2 and "give a mesh file" in capsys.readouterr().err
     monkeypatch.setitem(sys.modules, "bpy", None)
     assert main(["strokes", "scene.blend", "-o", str(out)]) == 2
     assert "needs Blender" in capsys.readouterr().err

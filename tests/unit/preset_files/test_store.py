@@ -192,8 +192,7 @@ def test_hostile_files(data, expected, tmp_path, error_of):
     path.write_bytes(data)
     message = error_of(read_preset, path)
     assert message.startswith(str(path)) and expected in message
-    assert len(message) < len(str(path)) + 200
-    assert message.isprintable()
+    assert len(message) < len(str(path)) + 200 and message.isprintable()
 
 
 def test_an_endless_file_is_refused(tmp_path, error_of):
@@ -233,8 +232,7 @@ def test_keys_of_names(name, expected):
 def test_keys_are_valid_file_names_everywhere(name):
     stem = preset_key(name)
     assert Path(stem).name == stem and not set(stem) & set('<>:"/\\|?* .\0')
-    assert len(stem.encode()) <= 240
-    assert preset_key(stem) == stem
+    assert len(stem.encode()) <= 240 and preset_key(stem) == stem
 
 
 # --- presets of the user ---------------------------------------------------------------------
@@ -264,8 +262,7 @@ def test_presets_are_replaced_only_on_request(user_folder, blank_previews, error
 @pytest.mark.parametrize("name", ["pLAID!", "Print at 300 dpi", "print 300 dpi"])
 def test_shipped_presets_cannot_be_replaced(user_folder, blank_previews, error_of, replace, name):
     message = error_of(save_preset, MINE._replace(name=name), user_folder, replace=replace)
-    assert f"'{name}' is the name of a preset of RoSy" in message
-    assert not user_folder.exists()
+    assert f"'{name}' is the name of a preset of RoSy" in message and not user_folder.exists()
 
 
 @pytest.mark.parametrize("key", preset_keys())
@@ -389,11 +386,9 @@ def test_list_presets(saved_folder, capsys):
     listed = {each["preset"]: each for each in json.loads(output.out)}
     assert list(listed) == [*preset_keys(), "my-ink"]
     expected = {"preset": "my-ink", "name": "My Ink", "description": "Long lines", "own": True}
-    assert listed["my-ink"] == expected
-    assert not listed["plaid"]["own"]
+    assert listed["my-ink"] == expected and not listed["plaid"]["own"]
     (line,) = output.err.splitlines()
-    assert "broken.json:1: expecting" in line
-    assert main(["presets"]) == 0
+    assert "broken.json:1: expecting" in line and main(["presets"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert any(line.startswith("plaid ") and "Broad bands" in line for line in lines)
     assert any(line.startswith("my-ink ") and line.endswith("Long lines  (own)") for line in lines)

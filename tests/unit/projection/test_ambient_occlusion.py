@@ -89,8 +89,7 @@ def test_a_plane_below_a_sphere():
     actual = values_at_vertices(ground, ambient_occlusion(instances, 0, 300))
     distance = np.sqrt(ground.vertices[:, 0] ** 2 + ground.vertices[:, 1] ** 2 + 1.6**2)
     expected = 1 - 1.6 / distance**3
-    assert expected.min() < 0.65
-    assert np.abs(actual - expected).mean() < 0.006
+    assert expected.min() < 0.65 and np.abs(actual - expected).mean() < 0.006
     assert np.abs(actual - expected).max() < 0.05
 
 

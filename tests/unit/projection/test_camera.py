@@ -58,8 +58,7 @@ def test_everything_is_framed_and_touches_the_margin(seed, azimuth, elevation, p
     points = random.normal(size=(20, 3)) * random.uniform(0.01, 100, 3) + random.normal(size=3) * 50
     camera = orbit_camera(points, azimuth, elevation, *size, perspective=perspective, margin=0.05)
     ndc = device_coordinates(camera, points)
-    assert np.abs(ndc[:, :2]).max() <= 0.9 + 1e-6
-    assert np.abs(ndc[:, 2]).max() < 1
+    assert np.abs(ndc[:, :2]).max() <= 0.9 + 1e-6 and np.abs(ndc[:, 2]).max() < 1
     # As large as possible: the points touch both margins in one direction, unless the eye would
     # then be among the points.
     low, high = ndc[:, :2].min(axis=0), ndc[:, :2].max(axis=0)
@@ -71,10 +70,8 @@ def test_everything_is_framed_and_touches_the_margin(seed, azimuth, elevation, p
 def test_framing_ignores_loose_vertices():
     ball = icosphere(2)
     loose = ball.with_parts(vertices=np.concatenate([ball.vertices, [[100.0, 0, 0]]]))
-    first, second = (
-        orbit_camera(MeshInstance(s, np.eye(4)).face_points(), 10, 20, 50, 50)
-        for s in (ball, loose)
-    )
+    points = [MeshInstance(each, np.eye(4)).face_points() for each in (ball, loose)]
+    first, second = (orbit_camera(each, 10, 20, 50, 50) for each in points)
     assert (first.view == second.view).all()
 
 
@@ -87,12 +84,8 @@ def test_a_single_point_can_be_framed(perspective):
 def test_blenders_default_lens():
     """50 mm on 36 mm at 1920 x 1080; expected values are from Blender's calc_matrix_camera."""
     camera = perspective_camera(np.eye(4), 1920, 1080, clip=(0.1, 100))
-    expected = [
-        [2.7777777, 0, 0, 0],
-        [0, 4.9382715, 0, 0],
-        [0, 0, -1.0020020, -0.2002002],
-        [0, 0, -1, 0],
-    ]
+    expected = [[2.7777777, 0, 0, 0], [0, 4.9382715, 0, 0]]
+    expected += [[0, 0, -1.0020020, -0.2002002], [0, 0, -1, 0]]
     np.testing.assert_allclose(camera.projection, expected, atol=1e-6)
     by_angle = perspective_camera(np.eye(4), 1920, 1080, fov=2 * np.arctan(0.36), clip=(0.1, 100))
     np.testing.assert_allclose(by_angle.projection, expected, atol=1e-6)
@@ -113,9 +106,8 @@ def test_pixel_rays_go_through_pixel_centers(make):
     pixel = np.arange(31 * 17)
     x, y = pixel_rays(camera, pixel)
     depth = 3.0 if camera.is_perspective else 1.0
-    ndc = device_coordinates(
-        camera, np.stack([depth * x, depth * y, np.full(x.shape, -3.0)], axis=1)
-    )
+    points = np.stack([depth * x, depth * y, np.full(x.shape, -3.0)], axis=1)
+    ndc = device_coordinates(camera, points)
     np.testing.assert_allclose((ndc[:, 0] + 1) * 15.5, pixel % 31 + 0.5)
     np.testing.assert_allclose((ndc[:, 1] + 1) * 8.5, pixel // 31 + 0.5)
 
@@ -130,18 +122,14 @@ def test_look_at():
     view = look_at((3, 4, 5), (1, 1, 1))
     np.testing.assert_allclose(view @ (1, 1, 1, 1), (0, 0, -np.sqrt(29), 1), atol=1e-12)
     above = view @ (1, 1, 2, 1)
-    assert abs(above[0]) < 1e-12
-    assert above[1] > 0
+    assert abs(above[0]) < 1e-12 and above[1] > 0
 
 
 def make_camera(view=None, projection=None, size=(10, 10)):
     good = perspective_camera(np.eye(4), 10, 10)
-    return Camera(
-        good.view if view is None else view,
-        good.projection if projection is None else projection,
-        *size,
-        "Cam",
-    )
+    view = good.view if view is None else view
+    projection = good.projection if projection is None else projection
+    return Camera(view, projection, *size, "Cam")
 
 
 @pytest.mark.parametrize(

@@ -25,10 +25,7 @@ def instance(surface, scale=1.0, shift=(0, 0, 0), has_field=True):
 SCENES = {
     "dense sphere": [instance(icosphere(5))],
     "cube": [instance(CUBE)],
-    "torus behind a sphere": [
-        instance(torus(60, 30)),
-        instance(icosphere(3), 0.4, (0, -1.5, 0)),
-    ],
+    "torus behind a sphere": [instance(torus(60, 30)), instance(icosphere(3), 0.4, (0, -1.5, 0))],
     "behind an occluder": [instance(icosphere(3)), instance(CUBE, 0.3, (0.6, -2, 0.2), False)],
     "specks": [instance(icosphere(1), 0.02, (0.013 * k, -k / 2, 0.1 * k)) for k in range(4)],
 }
@@ -86,8 +83,7 @@ def test_the_sides_of_a_crease_have_their_shares(view):
     actual = np.array(shares(gbuffer, gbuffer.face))
     expected = np.array(sampled_shares(fine, fine.face, camera, 4))
     mixed = (expected > 0).sum(axis=0) > 1
-    assert mixed.sum() > 30
-    assert np.abs(actual - expected)[:, mixed].mean() < 0.02
+    assert mixed.sum() > 30 and np.abs(actual - expected)[:, mixed].mean() < 0.02
     alone = np.bincount(gbuffer.pixel, minlength=actual.shape[1])[mixed]
     assert alone.max() == 1  # the other face is that of a pixel beside it
 

@@ -68,8 +68,7 @@ def test_a_tilted_plane_is_continuous(perspective, tilt, roll):
     eye = 6 * np.array([np.sin(t) * np.sin(r), -np.sin(t) * np.cos(r), np.cos(t)])
     camera = camera_above(perspective=perspective, eye=eye)
     gbuffer = project_surfaces([plane(7, 5)], camera)
-    assert len(gbuffer.pixel) > 200
-    assert unlinked_fraction(gbuffer, 0.01) == 0
+    assert len(gbuffer.pixel) > 200 and unlinked_fraction(gbuffer, 0.01) == 0
 
 
 @pytest.mark.parametrize("perspective", [False, True])
@@ -78,8 +77,7 @@ def test_spheres_are_continuous(perspective, radius):
     """Spheres of a radius in pixels, up to the silhouette, where the surface is seen edge-on."""
     camera = camera_above(200, 200 / radius, perspective)
     gbuffer = project_surfaces([icosphere(5)], camera)
-    assert unlinked_fraction(gbuffer) == 0
-    assert unlinked_fraction(gbuffer, 1.3) < 0.002
+    assert unlinked_fraction(gbuffer) == 0 and unlinked_fraction(gbuffer, 1.3) < 0.002
 
 
 @pytest.mark.slow
@@ -100,14 +98,12 @@ def test_an_uneven_surface_is_continuous(perspective, height):
 def test_the_near_side_of_a_torus_is_separate_from_the_far_side(perspective):
     """A torus seen over its near side: the near tube is not linked to the far one."""
     camera = camera_above(300, 3.2, perspective, eye=(0, -5.6, 2.2), up=(0, 0, 1))
-    surface = torus(200, 100)
-    gbuffer = project_surfaces([surface], camera)
+    gbuffer = project_surfaces([torus(200, 100)], camera)
     pairs, linked = neighbor_pairs(gbuffer, neighbor_masks(gbuffer, None))
     first, second = pairs.T
     jump = np.abs(gbuffer.position[first, 2] - gbuffer.position[second, 2])
     far = jump > 0.5
-    assert far.sum() > 100
-    assert not linked[far].any()
+    assert far.sum() > 100 and not linked[far].any()
     near = jump < 0.1
     assert linked[near].mean() > 0.9995
 
@@ -130,9 +126,7 @@ def test_parallel_sheets_are_separate(perspective, tilt, same_instance):
     assert 100 < upper.sum() < len(upper) - 100
     pairs, linked = neighbor_pairs(gbuffer, neighbor_masks(gbuffer, None))
     across = upper[pairs[:, 0]] != upper[pairs[:, 1]]
-    assert across.sum() > 100
-    assert not linked[across].any()
-    assert linked[~across].all()
+    assert across.sum() > 100 and not linked[across].any() and linked[~across].all()
 
 
 def test_the_rim_of_a_bowl_is_a_silhouette():
@@ -145,8 +139,7 @@ def test_the_rim_of_a_bowl_is_a_silhouette():
     front = gbuffer.front_facing
     assert 0.1 < front.mean() < 0.9
     across_rim = front[pairs[:, 0]] != front[pairs[:, 1]]
-    assert across_rim.sum() > 100
-    assert not linked[across_rim].any()
+    assert across_rim.sum() > 100 and not linked[across_rim].any()
     assert linked[~across_rim].mean() > 0.999
 
 
@@ -157,10 +150,8 @@ def test_creases_separate_pixels_unless_crossed(perspective):
     gbuffer = project_surfaces([box], camera)
     pairs, linked = neighbor_pairs(gbuffer, neighbor_masks(gbuffer, 0.7))
     across = gbuffer.face[pairs[:, 0]] != gbuffer.face[pairs[:, 1]]
-    assert across.sum() > 300
-    assert not linked[across].any()
-    assert linked[~across].all()
-    assert unlinked_fraction(gbuffer) == 0
+    assert across.sum() > 300 and not linked[across].any()
+    assert linked[~across].all() and unlinked_fraction(gbuffer) == 0
     assert unlinked_fraction(gbuffer, 1.6) == 0
 
 
@@ -170,20 +161,17 @@ def test_inconsistently_oriented_faces_are_continuous():
     quads = sheet.corner_vertex.reshape(-1, 4).copy()
     quads[::2] = quads[::2, ::-1]
     gbuffer = project_surfaces([from_quads(sheet.vertices, quads)], camera_above(eye=(1, -5, 2)))
-    assert 0.2 < gbuffer.front_facing.mean() < 0.8
-    assert unlinked_fraction(gbuffer) == 0
+    assert 0.2 < gbuffer.front_facing.mean() < 0.8 and unlinked_fraction(gbuffer) == 0
 
 
 def test_links_are_symmetric_and_include_the_pixel_itself():
-    gbuffer = project_surfaces(
-        [torus(30, 20), icosphere(1)], camera_above(97, 3.0, True), [(0, 0, 0), (0, 0.8, 0.3)]
-    )
+    surfaces, shifts = [torus(30, 20), icosphere(1)], [(0, 0, 0), (0, 0.8, 0.3)]
+    gbuffer = project_surfaces(surfaces, camera_above(97, 3.0, True), shifts)
     masks = neighbor_masks(gbuffer, 0.4)
     assert (masks >> 4 & 1).all() and (masks < 512).all()
     pairs, linked = neighbor_pairs(gbuffer, masks)
     linked_pairs = set(map(tuple, pairs[linked].tolist()))
-    assert len(linked_pairs) < len(pairs)
-    assert all((b, a) in linked_pairs for a, b in linked_pairs)
+    assert len(linked_pairs) < len(pairs) and all((b, a) in linked_pairs for a, b in linked_pairs)
 
 
 def test_links_do_not_leave_the_frame():

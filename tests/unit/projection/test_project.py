@@ -180,9 +180,8 @@ def test_a_tilted_plane_under_a_wide_lens(perspective, display):
         camera = lens(view, 300, 200, fov=1.9)
     else:
         camera = orthographic_camera(view, 300, 200, scale=5.0)
-    gbuffer = project(
-        [MeshInstance(surface, IDENTITY, RosyField(1, vector[None]))], camera, display
-    )
+    instance = MeshInstance(surface, IDENTITY, RosyField(1, vector[None]))
+    gbuffer = project([instance], camera, display)
     moved = camera.view[:3, :3] @ vector
     h = 1e-6
 
@@ -195,8 +194,7 @@ def test_a_tilted_plane_under_a_wide_lens(perspective, display):
     expected = (on_screen(position + h * moved) - on_screen(position - h * moved)) / (2 * h)
     actual = screen_directions(gbuffer, 1)
     off = np.degrees(np.abs(np.angle(actual / expected)))
-    assert len(gbuffer.pixel) > 5000
-    assert off.max() < 5e-3
+    assert len(gbuffer.pixel) > 5000 and off.max() < 5e-3
     depth = -position[:, 2] if perspective else 1.0
     length = np.abs(expected) * depth / camera.pixels_per_unit
     np.testing.assert_allclose(np.abs(actual), length, rtol=1e-3)
@@ -228,9 +226,8 @@ def test_flat_faces_show_their_own_member(display):
     camera = orbit_camera(surface.vertices, 30, 30, 100, 80)
     gbuffer = project([MeshInstance(surface, IDENTITY, field)], camera, display)
     assert len(np.unique(gbuffer.face)) == 3
-    np.testing.assert_allclose(
-        np.abs(gbuffer.representation), field.magnitude[gbuffer.face], rtol=1e-5
-    )
+    modulus = np.abs(gbuffer.representation)
+    np.testing.assert_allclose(modulus, field.magnitude[gbuffer.face], rtol=1e-5)
     own = field.vectors[gbuffer.face] @ camera.view[:3, :3].T
     normal = gbuffer.normal.astype(float)
     turn = representation(members_in_space(gbuffer, 3), normal, 3)
@@ -302,8 +299,7 @@ def test_the_field_of_a_sheet_bends_with_it(columns):
     actual = members_in_space(gbuffer, 1) @ camera.view[:3, :3]
     off = np.degrees(np.arccos(np.clip(dot(actual, expected), -1, 1)))
     # Normals at the border of the sheet are averages over one side only: half a column off.
-    assert off.max() < 1.3 * 90 / columns
-    assert np.median(off) < 8 / columns
+    assert off.max() < 1.3 * 90 / columns and np.median(off) < 8 / columns
 
 
 def test_instances_are_projected_independently():
@@ -313,8 +309,7 @@ def test_instances_are_projected_independently():
     camera = lens(look_at((6, 0, 3), (0, 0, 0)), 150, 100)
     instances = [MeshInstance(surface, matrix, field) for matrix in matrices]
     together = project(instances, camera)
-    assert set(together.instance_id) == {0, 1}
-    assert together.instance_degrees == [6, 6]
+    assert set(together.instance_id) == {0, 1} and together.instance_degrees == [6, 6]
     for index, instance in enumerate(instances):
         alone, pixels = project([instance], camera), together.instance_id == index
         for name in ("pixel", "face", "triangle", "normal", "position", "representation"):
@@ -331,8 +326,7 @@ def test_instances_of_different_degrees_and_an_occluder():
     ]
     free = project(instances[1:], camera)
     hidden = project(instances, camera)
-    assert hidden.instance_degrees == [0, 2, 5]
-    assert set(hidden.instance_id) == {1, 2}
+    assert hidden.instance_degrees == [0, 2, 5] and set(hidden.instance_id) == {1, 2}
     assert (hidden.instance_id == 2).sum() == (free.instance_id == 1).sum()
     assert 0 < (hidden.instance_id == 1).sum() < 0.9 * (free.instance_id == 0).sum()
     where = np.searchsorted(free.pixel, hidden.pixel)
@@ -372,14 +366,12 @@ def test_undefined_and_degenerate_faces_are_zero(display):
     triangles[5, 1] = triangles[5, 0]
     vertices[triangles[9, 2]] = vertices[triangles[9, 1]]
     surface = from_triangles(vertices, triangles)
-    field = tangent_field(surface, 4)
-    vectors = field.vectors.copy()
+    vectors = tangent_field(surface, 4).vectors.copy()
     vectors[::3] = 0
     camera = orbit_camera(surface.vertices, 0, 0, 100, 100)
     for matrix in (IDENTITY, placed(np.diag([1.0, 0.0, 1.0])), placed(np.diag([1, 1e-9, 1]))):
         gbuffer = project([MeshInstance(surface, matrix, RosyField(4, vectors))], camera, display)
-        assert np.isfinite(gbuffer.representation).all()
-        assert np.isfinite(gbuffer.normal).all()
+        assert np.isfinite(gbuffer.representation).all() and np.isfinite(gbuffer.normal).all()
         assert (gbuffer.representation[gbuffer.face % 3 == 0] == 0).all()
     assert (gbuffer.representation[gbuffer.face % 3 == 1] != 0).mean() > 0.9
 
@@ -388,8 +380,7 @@ def test_custom_normals_within_a_fan():
     """Corner normals that differ within a fan: values are close to those with equal normals."""
     surface = icosphere(2)
     field = tangent_field(surface, 4)
-    random = np.random.default_rng(1)
-    noise = 0.05 * random.normal(size=surface.corner_normal.shape)
+    noise = 0.05 * np.random.default_rng(1).normal(size=surface.corner_normal.shape)
     custom = rebuilt(surface, corner_normal=normalize(surface.corner_normal + noise))
     camera = orbit_camera(surface.vertices, 0, 0, 60, 60)
     first, second = (project([MeshInstance(s, IDENTITY, field)], camera) for s in (surface, custom))
@@ -401,8 +392,7 @@ def test_an_eye_inside_a_mesh_sees_it_at_all_pixels():
     surface = icosphere(2)
     camera = lens(look_at((0, 0, 0), (1, 0, 0)), 40, 30, fov=1.6, clip=(0.01, 10))
     gbuffer = project([MeshInstance(surface, IDENTITY, tangent_field(surface, 4))], camera)
-    assert len(gbuffer.pixel) == 1200
-    assert not gbuffer.front_facing.any()
+    assert len(gbuffer.pixel) == 1200 and not gbuffer.front_facing.any()
     assert (dot(gbuffer.normal, gbuffer.view_direction) > 0.8).all()
 
 

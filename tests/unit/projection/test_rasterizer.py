@@ -26,9 +26,8 @@ def to_clip(points, camera):
 
 def flat_clip(x, y, z=0.0, width=WIDTH, height=HEIGHT):
     """Clip coordinates of points given in pixels."""
-    return np.stack(
-        [2 * x / width - 1, 2 * y / height - 1, np.broadcast_to(z, x.shape), np.ones(x.shape)], 1
-    )
+    z = np.broadcast_to(z, x.shape)
+    return np.stack([2 * x / width - 1, 2 * y / height - 1, z, np.ones(x.shape)], 1)
 
 
 def make_camera(perspective, width=WIDTH, height=HEIGHT):
@@ -85,9 +84,8 @@ def test_visible_triangles_match_a_ray_caster(seed, perspective):
     actual[fragments.pixel] = fragments.triangle
     assert (actual == owner)[~doubtful].all()
     certain = (actual == owner)[fragments.pixel]
-    np.testing.assert_allclose(
-        fragments.barycentric[certain], weights[fragments.pixel[certain]], atol=1e-7
-    )
+    actual, expected = fragments.barycentric[certain], weights[fragments.pixel[certain]]
+    np.testing.assert_allclose(actual, expected, atol=1e-7)
     z = -depth[fragments.pixel[certain]]
     projection = camera.projection
     ndc = (projection[2, 2] * z + projection[2, 3]) / (projection[3, 2] * z + projection[3, 3])
@@ -195,8 +193,7 @@ def test_order_of_triangles_and_corners_does_not_matter(seed):
     for name in ("pixel", "barycentric", "depth"):
         np.testing.assert_array_equal(getattr(again, name), getattr(fragments, name))
     turned = rasterize(clip, triangles[:, [1, 2, 0]], WIDTH, HEIGHT)
-    assert (turned.pixel == fragments.pixel).all()
-    assert (turned.triangle == fragments.triangle).all()
+    assert (turned.pixel == fragments.pixel).all() and (turned.triangle == fragments.triangle).all()
     np.testing.assert_allclose(turned.barycentric[:, [2, 0, 1]], fragments.barycentric, atol=1e-6)
     assert (turned.front_facing == fragments.front_facing).all()
     mirrored = rasterize(clip, triangles[:, ::-1], WIDTH, HEIGHT)
@@ -212,8 +209,7 @@ def test_the_first_of_equal_depths_is_visible():
 
 @pytest.mark.parametrize(("block", "band"), [(1, 1), (7, 100), (1 << 20, 1 << 30)])
 def test_the_size_of_blocks_does_not_matter(monkeypatch, block, band):
-    random = np.random.default_rng(5)
-    points = random.normal(size=(60, 3)) * (2, 2, 2) + (0, 0, -3)
+    points = np.random.default_rng(5).normal(size=(60, 3)) * (2, 2, 2) + (0, 0, -3)
     triangles = np.arange(60).reshape(20, 3)
     triangles = np.concatenate([triangles, triangles])
     clip = to_clip(points, make_camera(True))
@@ -244,8 +240,7 @@ def test_vertices_far_outside_the_frame():
     """A triangle of 10^12 pixels with an edge across the picture."""
     x, y = np.array([18.5, 18.5, 1e12]), np.array([-1e12, 1e12, 0.0])
     fragments = rasterize(flat_clip(x, y), np.array([[0, 1, 2]]), WIDTH, HEIGHT)
-    assert len(fragments.pixel) == HEIGHT * (WIDTH - 18)
-    assert (fragments.pixel % WIDTH >= 18).all()
+    assert len(fragments.pixel) == HEIGHT * (WIDTH - 18) and (fragments.pixel % WIDTH >= 18).all()
 
 
 @pytest.mark.slow

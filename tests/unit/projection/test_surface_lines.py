@@ -61,10 +61,8 @@ def test_lines_on_a_plane_are_straight_and_exactly_spaced(degree, display):
     families = lines.pattern.index.shape[1]
     assert families == (degree // 2 if degree % 2 == 0 else degree)
     for triangle in gradient:
-        errors = [
-            np.abs(triangle - np.roll(across, shift, axis=0)[:families]).max()
-            for shift in range(degree)
-        ]
+        rolled = [np.roll(across, shift, axis=0)[:families] for shift in range(degree)]
+        errors = [np.abs(triangle - each).max() for each in rolled]
         assert min(errors) < 1e-3 / spacing
 
 
@@ -86,8 +84,7 @@ def test_lines_along_a_cylinder(rounds):
 @pytest.mark.parametrize("degree", [2, 4])
 def test_rings_on_a_torus(degree):
     surface = torus()
-    field = generate(surface, "curvature", degree)
-    lines = lines_of(surface, field, 0.06)
+    lines = lines_of(surface, generate(surface, "curvature", degree), 0.06)
     assert share_within(lines, 0.06, TOLERANCE, AWAY) >= SHARE
 
 
@@ -109,8 +106,7 @@ def test_distances_on_a_sphere(degree):
     """There are singularities, and lines end because they converge."""
     surface = icosphere(3)
     lines = lines_of(surface, generate(surface, "smoothest", degree), 0.07)
-    assert lines.pattern.index.any()
-    assert share_within(lines, 0.07, TOLERANCE, AWAY) >= SHARE
+    assert lines.pattern.index.any() and share_within(lines, 0.07, TOLERANCE, AWAY) >= SHARE
 
 
 @pytest.mark.slow
@@ -147,8 +143,7 @@ def test_lines_continue_over_a_coarse_cube():
     """Eight vertices. Form follows the edges, and lines of faces meet there."""
     surface = sharp_cube()
     lines = lines_of(surface, generate(surface, "form", 4), 0.04)
-    assert len(lines.tree.leaf_root) > 1000
-    assert share_within(lines, 0.04, 0.02, AWAY) >= SHARE
+    assert len(lines.tree.leaf_root) > 1000 and share_within(lines, 0.04, 0.02, AWAY) >= SHARE
     assert not lines.pattern.index.any()
 
 
@@ -221,8 +216,7 @@ def test_the_number_of_triangles_is_bounded():
     surface = icosphere(2)
     field = generate(surface, "smoothest", 4)
     lines = surface_lines(surface, np.eye(3), field, "smooth", 0.004, max_triangles=2000)
-    assert 500 < len(lines.tree.leaf_root) <= 2000
-    assert np.isfinite(lines.pattern.phase).all()
+    assert 500 < len(lines.tree.leaf_root) <= 2000 and np.isfinite(lines.pattern.phase).all()
 
 
 def test_too_little_memory_is_an_error(monkeypatch, error_of):
@@ -245,8 +239,7 @@ def test_deformations_and_rotations_keep_the_lines():
         return cached_surface_lines(surface, matrix, field, "smooth", 0.05, cache)
 
     def deformed(amount):
-        points = surface.vertices * (1, 1, amount)
-        return rebuilt(surface, points, rest_vertices=surface.vertices)
+        return rebuilt(surface, surface.vertices * (1, 1, amount), rest_vertices=surface.vertices)
 
     first = cached(deformed(1.2), np.eye(4))
     assert cached(deformed(1.5), np.eye(4)) is first
@@ -258,5 +251,4 @@ def test_deformations_and_rotations_keep_the_lines():
 def test_rest_matrices_measure_lengths():
     rotation = np.array([(0.6, -0.8, 0), (0.8, 0.6, 0), (0, 0, 1.0)])
     for scale, sign in ((np.diag([1, 2, 3.0]), 1), (2 * np.eye(3), -1)):
-        matrix = rest_matrix(placed(sign * rotation @ scale))
-        np.testing.assert_allclose(matrix, scale, atol=1e-12)
+        np.testing.assert_allclose(rest_matrix(placed(sign * rotation @ scale)), scale, atol=1e-12)

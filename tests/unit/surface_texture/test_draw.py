@@ -51,11 +51,8 @@ def test_colors_of_all_kinds_do_not_depend_on_the_charts():
     field = generate(TORUS, "curvature", 4)
     middle = np.linalg.norm(TORUS.face_center, axis=1, keepdims=True)
     instance = MeshInstance(TORUS, np.eye(4), RosyField(4, field.vectors * middle))
-    for changes in (
-        {"hue": "noise"},
-        {"hue": "magnitude", "magnitude_length": True},
-        {"method": "ibfv"},
-    ):
+    by_length = {"hue": "magnitude", "magnitude_length": True}
+    for changes in ({"hue": "noise"}, by_length, {"method": "ibfv"}):
         look = WIDER.with_settings(changes)
         maps = SINGLE, PATCHES
         colors = [texture_colors(instance, uv, look, 512, POINTS) for uv in maps]
@@ -67,11 +64,7 @@ UNEVEN = {"wobble": 0.5, "breaks": 0.5, "paper_grain": 0.3}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("settings", "lights"),
-    [({"ink": "even"}, None), (UNEVEN, [LAMP])],
-    ids=str,
-)
+@pytest.mark.parametrize("settings, lights", [({"ink": "even"}, None), (UNEVEN, [LAMP])], ids=str)
 def test_hatching_does_not_depend_on_the_charts(settings, lights):
     """Evenly spaced lines and uneven ones, their order, and the ink for a lamp.
 
@@ -93,10 +86,8 @@ def test_stretched_charts_show_the_same_lines():
     surface = plane(16, 16)
     instance, points = instance_of(surface, 4), surface_points(surface, 20_000)
     even = surface.vertices[surface.corner_vertex, :2] / 4 + 0.5
-    colors = [
-        texture_colors(instance, uv, WIDER, size, points)
-        for uv, size in ((even, 512), (even * [1, 0.25], 1024))
-    ]
+    maps = (even, 512), (even * [1, 0.25], 1024)
+    colors = [texture_colors(instance, uv, WIDER, size, points) for uv, size in maps]
     assert correlation(*colors) > 0.95
 
 
@@ -204,7 +195,6 @@ def test_bad_maps_and_looks_are_named(error_of):
 
 def test_textures_are_refused_before_they_are_drawn(error_of, monkeypatch):
     monkeypatch.setattr("rosy_addon.core.memory.available_memory", lambda: 10**9)
-    surface = torus(8, 12)
-    message = error_of(draw_texture, instance_of(surface, 4), torus_uv(8, 12), Look(), 16384)
+    message = error_of(draw_texture, instance_of(torus(8, 12), 4), torus_uv(8, 12), Look(), 16384)
     assert message.startswith("a texture of 16384 x 16384 texels needs about ")
     assert message.endswith(" of memory, 1.0 GB are free: choose a smaller size")

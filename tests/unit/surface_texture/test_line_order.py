@@ -59,8 +59,7 @@ def test_lines_continue_where_the_field_turns():
     mesh = mesh_of(torus(), "curvature", 4, matrix)
     line, share = first_lines(mesh)
     assert share_of(mesh, share > 0.99) > 0.999
-    axis = matrix[:3, 2]
-    around = np.cross(axis, mesh.points.mean(axis=1))
+    around = np.cross(matrix[:3, 2], mesh.points.mean(axis=1))
     around /= np.linalg.norm(around, axis=1, keepdims=True)
     is_around = np.abs((line * around).sum(axis=1)) > 0.7
     assert share_of(mesh, is_around) > 0.999
@@ -73,8 +72,7 @@ def test_lines_swap_only_between_singularities():
     """On a sphere they must, but on a small part of it."""
     mesh = mesh_of(icosphere(4), "smoothest", 4)
     _, share = first_lines(mesh)
-    assert share_of(mesh, share < 0.9) < 0.12
-    assert share.min() < 0.9
+    assert share_of(mesh, share < 0.9) < 0.12 and share.min() < 0.9
 
 
 @pytest.mark.slow
@@ -84,5 +82,4 @@ def test_the_order_does_not_depend_on_the_size_of_triangles_or_of_the_mesh():
         mesh = mesh_of(cube(), "axis", 4, placed(scale))
         line, share = first_lines(mesh, blend=0.02 * scale)
         is_side = np.abs(mesh.normal[:, 2]) < 0.1
-        assert share[is_side].min() > 0.99
-        assert np.ptp(np.abs(line[is_side, 2])) < 0.01
+        assert share[is_side].min() > 0.99 and np.ptp(np.abs(line[is_side, 2])) < 0.01

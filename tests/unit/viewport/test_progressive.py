@@ -65,8 +65,7 @@ class NotingRenderer:
 
 @pytest.fixture
 def view_input():
-    camera = orthographic_camera(np.eye(4), 32, 32)
-    return ViewInput((), camera, Look())
+    return ViewInput((), orthographic_camera(np.eye(4), 32, 32), Look())
 
 
 def progressive_of(renderer, helper=None):
@@ -154,8 +153,7 @@ def test_streaks_that_drift_have_no_previews(slow, view_input):
         assert view.downscale == 1
         if view.texture not in shown:
             shown.append(view.texture)
-    assert len(shown) >= 5
-    assert {width for _, width, _ in shown} == {32}
+    assert len(shown) >= 5 and {width for _, width, _ in shown} == {32}
     assert slow.renderer.pictures <= len(shown) + 1, "pictures were abandoned"
     assert all(one[2] != other[2] for one, other in pairwise(shown))
 
@@ -261,10 +259,8 @@ def test_meshes_that_change_faster_than_they_are_prepared_are_shown(helper, view
 def test_two_views_share_the_helper(helper, view_input):
     progressive = progressive_of(HelpedRenderer(), helper)
     for _ in range(500):
-        views = [
-            progressive.update(pointers, Request("key", "key", view_input))
-            for pointers in (POINTERS, (1, 3))
-        ]
+        request = Request("key", "key", view_input)
+        views = [progressive.update(pointers, request) for pointers in (POINTERS, (1, 3))]
         if all(view.texture == ((), 32) for view in views):
             break
         progressive.poll()

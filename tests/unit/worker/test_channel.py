@@ -52,15 +52,13 @@ def test_meshes_are_sent_once(ends):
     assert passed(ends, ("draw again", instance, ball)) == ("draw again", first, first.surface)
     moved = MeshInstance(ball, 2 * np.eye(4), instance.field)
     second = passed(ends, (moved,))[0]
-    assert second.surface is first.surface and second.field is first.field
-    assert second is not first
+    assert second.surface is first.surface and second.field is first.field and second is not first
 
 
 def test_what_is_not_used_is_forgotten(ends):
     ball = icosphere(1)
     first = passed(ends, ball)
-    assert passed(ends, "nothing") == "nothing"
-    assert not ends[1]._kept
+    assert passed(ends, "nothing") == "nothing" and not ends[1]._kept
     assert passed(ends, ball) is not first
 
 

@@ -54,8 +54,7 @@ def has_ended(pid: int, seconds: float) -> bool:
 def test_it_returns_results_and_stays_for_the_next_call(helper):
     assert waited(helper, max, 3, 4) == 4
     pid = helper.pid
-    assert waited(helper, sorted, [3, 1]) == [1, 3]
-    assert helper.pid == pid
+    assert waited(helper, sorted, [3, 1]) == [1, 3] and helper.pid == pid
 
 
 def test_progress_arrives(helper):
@@ -66,8 +65,7 @@ def test_progress_arrives(helper):
         time.sleep(0.005)
     fractions = [fraction for fraction, _ in seen]
     assert fractions == sorted(fractions) and len(set(fractions)) > 5
-    assert any(label.startswith("step ") for _, label in seen)
-    assert outcome() == 60
+    assert any(label.startswith("step ") for _, label in seen) and outcome() == 60
 
 
 def test_errors_are_those_of_the_function_with_its_traceback(helper):
@@ -87,15 +85,13 @@ def test_cancelling_ends_the_process_at_once(helper):
         helper.poll()
     pid, start = helper.pid, time.monotonic()
     helper.close()
-    assert not is_running(pid) and time.monotonic() - start < 0.2
-    assert waited(helper, max, 3, 4) == 4
+    assert not is_running(pid) and time.monotonic() - start < 0.2 and waited(helper, max, 3, 4) == 4
 
 
 def test_a_process_that_ends_is_lost(helper):
     with pytest.raises(HelperLostError, match="has ended") as caught:
         waited(helper, calls.end)
-    assert caught.value.has_started
-    assert waited(helper, max, 3, 4) == 4
+    assert caught.value.has_started and waited(helper, max, 3, 4) == 4
 
 
 @pytest.mark.parametrize("program", ["/no/such/program", "/bin/false"])

@@ -58,8 +58,7 @@ def _no_helpers_stay():
 
 @pytest.mark.slow
 def test_the_number_of_processes_changes_nothing(expected):
-    assert len(picture_groups(VIEW, 3)) == 3
-    assert drawn(VIEW, 3) == expected
+    assert len(picture_groups(VIEW, 3)) == 3 and drawn(VIEW, 3) == expected
     assert len(POOL.helpers) == 2
 
 
@@ -76,8 +75,7 @@ def test_helpers_draw_one_picture_after_the_other(expected):
     other = replace(view_from((1.0, -2.0, 4.0), ink="hatch", outline=2.0), instances=VIEW.instances)
     drawn(VIEW, 2)
     pid = POOL.helpers[0].pid
-    assert drawn(other, 2) == drawn(other)
-    assert drawn(VIEW, 2) == expected
+    assert drawn(other, 2) == drawn(other) and drawn(VIEW, 2) == expected
     assert POOL.helpers[0].pid == pid
 
 

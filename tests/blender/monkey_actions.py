@@ -159,15 +159,9 @@ class Monkey:
         """Return a path that can be written, mostly one of a file with the suffix."""
         if suffix and self.chance(0.8):
             return str(self.folder / f"file{suffix}")
-        names = (
-            "pictures",
-            "pictures",
-            "a.svg",
-            *("field.rosy", "field.txt", "turn.gif"),
-            "preset.json",
-        )
+        names = ("pictures", "a.svg", "field.rosy", "field.txt", "turn.gif", "preset.json")
         paths = [str(self.folder / name) for name in names]
-        return self.pick([*paths, "//rosy/", "/proc/none", ""])
+        return self.pick([paths[0], *paths, "//rosy/", "/proc/none", ""])
 
 
 # --- choices --------------------------------------------------------------------------------------

@@ -76,19 +76,9 @@ def test_parity_of_uneven_lines(rosy, card, surface_of):
     surface = surface_of("torus")
     camera = camera_of_shape(rosy, "torus", surface, 2 * SIZE)
     instance = rosy.MeshInstance(surface, np.eye(4), rosy.generate(surface, "smoothest", 4))
-    look = rosy.Look(
-        ink="hatch",
-        hue="families",
-        anchor="surface",
-        shading=0.9,
-        line_width=2.5,
-        length=LENGTH,
-        supersampling=2,
-        breaks=0.6,
-        wobble=0.6,
-        paper_grain=0.4,
-        outline=1.5,
-    )
+    uneven = {"breaks": 0.6, "wobble": 0.6, "paper_grain": 0.4, "outline": 1.5}
+    lines = {"anchor": "surface", "shading": 0.9, "line_width": 2.5, "length": LENGTH, **uneven}
+    look = rosy.Look(ink="hatch", hue="families", supersampling=2, **lines)
     assert draw_pair(rosy, card, [instance], camera, look).likeness >= 0.98
 
 

@@ -47,15 +47,6 @@ def test_bad_input_is_one_line_and_status_2(saved, tmp_path):
     assert not list(tmp_path.glob("*.png"))
 
 
-def test_strokes_of_the_file(saved, tmp_path):
-    bpy.context.scene.rosy.strokes.spacing = 9.0
-    bpy.ops.wm.save_mainfile()
-    bpy.ops.rosy.strokes(kind="FILE", filepath=str(tmp_path / "button.svg"))
-    status, output = command("strokes", "-o", tmp_path / "out.svg", scene=saved)
-    assert status == 0, output
-    assert (tmp_path / "out.svg").read_bytes() == (tmp_path / "button.svg").read_bytes()
-
-
 def test_render(with_field, tmp_path):
     mesh = tmp_path / "suzanne.obj"
     bpy.ops.wm.obj_export(filepath=str(mesh), export_materials=False)

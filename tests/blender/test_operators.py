@@ -330,11 +330,10 @@ def test_singularities_are_where_their_points_are_moved(scene):
 
 
 def editable_singularities(obj):
-    from bl_ext.user_default.rosy.rosy_addon.scene.singularity_points import (
-        read_editable_singularities,
-    )
+    from bl_ext.user_default.rosy.rosy_addon.scene import singularity_points
 
-    found = read_editable_singularities(obj, bpy.context.evaluated_depsgraph_get())
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    found = singularity_points.read_editable_singularities(obj, depsgraph)
     return dict(zip(found.vertex.tolist(), found.index.tolist(), strict=True)), found
 
 

@@ -28,7 +28,7 @@ from window_steps import (
     preferences,
     press,
     rosy,
-    run_steps,
+    run_module,
     status,
     view,
     wait_until,
@@ -91,7 +91,7 @@ def wait_for_job():
     return longest
 
 
-def picture_from_the_helper():
+def test_picture_from_the_helper():
     """Blender reacts while the helper draws, and the picture is that of a script."""
     yield from suzanne((1280, 960))
     first = helper_id()
@@ -108,7 +108,7 @@ def picture_from_the_helper():
     np.testing.assert_array_equal(baked_pixels(), picture)
 
 
-def escape_ends_the_helper_at_once():
+def test_escape_ends_the_helper_at_once():
     yield from suzanne((1600, 1200))
     before = contents()
     yield from start_long_bake()
@@ -133,7 +133,7 @@ def escape_ends_the_helper_at_once():
     assert helper_id() not in (None, first), "there is no helper for the next job"
 
 
-def a_helper_that_is_killed():
+def test_a_helper_that_is_killed():
     """Another helper draws the picture. If that is killed as well, there is one message."""
     yield from suzanne((800, 600))
     yield from start_long_bake()
@@ -155,7 +155,7 @@ def a_helper_that_is_killed():
     assert_reported("has ended twice")
 
 
-def without_a_helper():
+def test_without_a_helper():
     """Blender waits for the picture if no process can be started, or the user wants none."""
     helper = rosy("rosy_addon.worker.helper")
     start_process = helper.start_module
@@ -203,7 +203,7 @@ def report_texts():
     return bpy.context.window_manager.clipboard.splitlines()
 
 
-def switched_off():
+def test_switched_off():
     """The helper ends with the extension."""
     yield from suzanne()
     start_bake()
@@ -215,7 +215,7 @@ def switched_off():
     yield 0.2
 
 
-def blender_is_killed():
+def test_blender_is_killed():
     """All processes end, while they draw a large picture together."""
     yield from suzanne((1920, 1440))
     bpy.context.scene.rosy.look.supersampling = 2
@@ -229,11 +229,4 @@ def blender_is_killed():
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-run_steps(
-    picture_from_the_helper,
-    escape_ends_the_helper_at_once,
-    a_helper_that_is_killed,
-    without_a_helper,
-    switched_off,
-    blender_is_killed,
-)
+run_module(globals())

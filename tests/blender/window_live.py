@@ -39,14 +39,14 @@ from window_steps import (
     preferences,
     redraws,
     rosy,
-    run_steps,
+    run_module,
     view,
     wait_until,
 )
 
 
 @live()
-def every_view_is_a_bake(monkey):
+def test_every_view_is_a_bake(monkey):
     """From several sides, perspective and orthographic."""
     views = ((0.0, -0.6, "PERSP"), (2.1, 0.2, "PERSP"), (4.2, -0.2, "ORTHO"))
     for azimuth, elevation, perspective in views:
@@ -55,7 +55,7 @@ def every_view_is_a_bake(monkey):
         yield from check_is_bake(f"live-view-{azimuth}")
 
 
-def off_restores_the_view():
+def test_off_restores_the_view():
     """Switched on and off again, the view is the same as before, pixel for pixel."""
     yield from fresh_scene()
     # Blender's own antialiasing continues over many redraws, and its result varies.
@@ -73,7 +73,7 @@ def off_restores_the_view():
     check_nothing_is_left()
 
 
-def surfaces_in_front_occlude():
+def test_surfaces_in_front_occlude():
     """An opaque cube covers the field; what the cube hides is not drawn over it."""
     yield from fresh_scene()
     with in_view():
@@ -90,7 +90,7 @@ def surfaces_in_front_occlude():
     switch("OFF")
 
 
-def paper_is_behind_everything():
+def test_paper_is_behind_everything():
     """The backdrop of a hatching: the whole view, the frame of a camera, nothing if it is off."""
     yield from fresh_scene(levels=0)
     scene, space = bpy.context.scene, view()[1].spaces.active
@@ -132,7 +132,7 @@ def paper_is_behind_everything():
 
 
 @live()
-def only_visible_objects_are_drawn(monkey):
+def test_only_visible_objects_are_drawn(monkey):
     """Hidden objects, local view and wireframe; the frame of a camera."""
     space = view()[1].spaces.active
     with in_view():
@@ -166,7 +166,7 @@ def only_visible_objects_are_drawn(monkey):
     space.region_3d.view_perspective = "PERSP"
 
 
-def clipped_region():
+def test_clipped_region():
     """The side that Blender's clipping region cuts away is not drawn."""
     yield from fresh_scene()
     region = view()[2]
@@ -191,7 +191,7 @@ def clipped_region():
 
 
 @live()
-def quad_view(monkey):
+def test_quad_view(monkey):
     """Four views in one, each from its own side."""
     with in_view():
         bpy.ops.screen.region_quadview()
@@ -208,7 +208,7 @@ def quad_view(monkey):
 
 
 @live()
-def edits_are_followed(monkey):
+def test_edits_are_followed(monkey):
     """The look, the transform, modifiers, edit mode, sculpting and undo."""
     bpy.context.view_layer.objects.active = monkey
     bpy.context.scene.rosy.look.gain = 1.2
@@ -243,7 +243,7 @@ def edits_are_followed(monkey):
 
 
 @live()
-def every_frame_is_drawn(monkey):
+def test_every_frame_is_drawn(monkey):
     """Every frame of an animation shows the mesh of that frame, also while it is played."""
     cast = monkey.modifiers.new("Cast", "CAST")
     for frame, factor in ((1, 0.0), (3, 0.6)):
@@ -269,7 +269,7 @@ def every_frame_is_drawn(monkey):
     assert all(shows for _, shows in steps)
 
 
-def fallback_to_the_processor():
+def test_fallback_to_the_processor():
     """If the driver rejects a shader, the processor draws, and a message says so."""
     yield from fresh_scene()
     sources = rosy("rosy_addon.gpu.passes").ComputePass
@@ -299,7 +299,7 @@ def fallback_to_the_processor():
 
 
 @live(levels=0)
-def a_view_without_a_field_says_why_and_rests(monkey):
+def test_a_view_without_a_field_says_why_and_rests(monkey):
     """Each cause is named in the view; nothing is drawn again; later the field is back."""
     # Blender's own antialiasing continues over many redraws.
     bpy.context.preferences.system.viewport_aa = "OFF"
@@ -319,7 +319,7 @@ def a_view_without_a_field_says_why_and_rests(monkey):
     bpy.context.preferences.system.viewport_aa = "8"
 
 
-def two_windows_with_two_scenes_rest():
+def test_two_windows_with_two_scenes_rest():
     """Two scenes share a mesh with modifiers."""
     yield from fresh_scene(levels=1)
     bpy.context.preferences.system.viewport_aa = "OFF"
@@ -351,7 +351,7 @@ def two_windows_with_two_scenes_rest():
     check_nothing_is_left()
 
 
-def the_first_field_is_shown():
+def test_the_first_field_is_shown():
     """Make Field makes its view live once, unless the user or the preferences do not want that."""
 
     def make_field(how="EXEC_DEFAULT"):
@@ -384,7 +384,7 @@ def the_first_field_is_shown():
     check_nothing_is_left()
 
 
-def live_views_are_remembered():
+def test_live_views_are_remembered():
     """A file shows its live views again if the scene says so, and only then."""
     yield from fresh_scene(levels=0)
     path = str(SHOTS / "remembered.blend")
@@ -414,7 +414,7 @@ def shown_phases():
 
 
 @live(levels=0)
-def streaks_drift_while_they_are_played(monkey):
+def test_streaks_drift_while_they_are_played(monkey):
     """Streaks drift by the button; nothing runs on afterwards."""
     bpy.context.scene.rosy.look.flow = 1.5
     yield from wait_for_final_pictures()
@@ -454,7 +454,7 @@ def streaks_drift_while_they_are_played(monkey):
     assert not has_timers()
 
 
-def nothing_is_left():
+def test_nothing_is_left():
     """Toggles and opened files free all textures; the extension stops the live view with it."""
     path = str(SHOTS / "leak.blend")
     yield from fresh_scene(levels=1)
@@ -476,21 +476,4 @@ def nothing_is_left():
     os.remove(path)
 
 
-run_steps(
-    every_view_is_a_bake,
-    off_restores_the_view,
-    surfaces_in_front_occlude,
-    paper_is_behind_everything,
-    only_visible_objects_are_drawn,
-    clipped_region,
-    quad_view,
-    edits_are_followed,
-    every_frame_is_drawn,
-    fallback_to_the_processor,
-    a_view_without_a_field_says_why_and_rests,
-    two_windows_with_two_scenes_rest,
-    the_first_field_is_shown,
-    live_views_are_remembered,
-    streaks_drift_while_they_are_played,
-    nothing_is_left,
-)
+run_module(globals())

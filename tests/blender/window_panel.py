@@ -24,7 +24,7 @@ from window_steps import (
     preferences,
     press,
     rosy,
-    run_steps,
+    run_module,
     save_part,
     status,
     view,
@@ -68,18 +68,18 @@ def save_screenshot(name, height=10_000):
 # The steps
 
 
-def panel_without_field():
+def test_panel_without_field():
     yield from fresh_scene()
     yield from save_screenshot("panel-1-no-field")
 
 
-def panel_with_field():
+def test_panel_with_field():
     yield from fresh_scene(size=(640, 480))
     make_field()
     yield from save_screenshot("panel-2-field")
 
 
-def singularities_as_dots():
+def test_singularities_as_dots():
     """Dots of both signs are drawn while they are shown; otherwise there is no handler."""
     overlay = rosy("rosy_addon.ui.overlay")
     yield from fresh_scene()
@@ -117,7 +117,7 @@ def count_dots(name):
     )
 
 
-def bake_with_progress():
+def test_bake_with_progress():
     yield from fresh_scene(size=(800, 600))
     make_field()
     bpy.context.scene.rosy.look.method = "brute"  # slow enough to observe the progress
@@ -132,13 +132,13 @@ def bake_with_progress():
     assert [image for image in bpy.data.images if image.name.lower().startswith("rosy")]
 
 
-def panel_with_picture():
+def test_panel_with_picture():
     view()[1].spaces.active.shading.type = "MATERIAL"
     yield 3.0
     yield from save_screenshot("panel-3-baked")
 
 
-def panel_out_of_date():
+def test_panel_out_of_date():
     scene = bpy.context.scene
     scene.camera.location.x += 0.5
     other = add_camera("Another Camera", (0.0, 5.0, 0.0), (math.pi / 2, 0.0, math.pi))
@@ -154,7 +154,7 @@ def panel_out_of_date():
     yield from save_screenshot("panel-4-out-of-date")
 
 
-def eevee_shows_the_picture():
+def test_eevee_shows_the_picture():
     """A render by EEVEE, which needs a window on most machines, shows the picture."""
     yield from fresh_scene(size=(200, 150))
     make_field()
@@ -179,7 +179,7 @@ def eevee_shows_the_picture():
     assert difference < 0.02, difference
 
 
-def undo_after_bake():
+def test_undo_after_bake():
     """Undo and redo restore the file, with all pixels, as it was before and after each of two bakes."""
 
     def state():
@@ -220,12 +220,12 @@ def interrupt(action, screenshot=None):
     return before
 
 
-def stop_with_escape():
+def test_stop_with_escape():
     before = yield from interrupt(lambda: press("ESC"), screenshot="baking")
     assert contents() == before
 
 
-def stop_when_the_scene_changes():
+def test_stop_when_the_scene_changes():
     """An object is deleted, the field undone, the scene changed, a file opened; RoSy is switched off."""
 
     def switch_off():
@@ -251,7 +251,7 @@ def stop_when_the_scene_changes():
         yield from interrupt(act)
 
 
-def export_and_import_from_the_file_browser():
+def test_export_and_import_from_the_file_browser():
     """The file browser opens; after its confirmation the operators run as modal jobs."""
     yield from fresh_scene()
     make_field()
@@ -276,7 +276,7 @@ def export_and_import_from_the_file_browser():
         yield from job_ends()
 
 
-def turntable_encoded_by_another_blender():
+def test_turntable_encoded_by_another_blender():
     """Another Blender encodes an .mp4, and this one handles its events."""
     yield from fresh_scene()
     make_field()
@@ -303,7 +303,7 @@ def browser_params():
     raise AssertionError("there is no file browser")
 
 
-def animation_asks_for_a_folder():
+def test_animation_asks_for_a_folder():
     """In a file that was never saved, Animation opens a file browser for the folder."""
     yield from fresh_scene(size=(64, 48))
     make_field()
@@ -323,7 +323,7 @@ def animation_asks_for_a_folder():
     assert Path(scene.rosy.directory) == folder
 
 
-def edited_strokes_are_replaced_on_request():
+def test_edited_strokes_are_replaced_on_request():
     """Draw Strokes asks first; without an edit it does not."""
     yield from fresh_scene()
     make_field()
@@ -353,7 +353,7 @@ def edited_strokes_are_replaced_on_request():
     yield from job_ends()
 
 
-def bake_the_current_view():
+def test_bake_the_current_view():
     yield from fresh_scene()
     make_field()
     with in_view():
@@ -362,20 +362,4 @@ def bake_the_current_view():
     assert tuple(image.size) == (view()[2].width, view()[2].height)
 
 
-run_steps(
-    panel_without_field,
-    panel_with_field,
-    singularities_as_dots,
-    bake_with_progress,
-    panel_with_picture,
-    panel_out_of_date,
-    eevee_shows_the_picture,
-    undo_after_bake,
-    stop_with_escape,
-    stop_when_the_scene_changes,
-    export_and_import_from_the_file_browser,
-    turntable_encoded_by_another_blender,
-    animation_asks_for_a_folder,
-    edited_strokes_are_replaced_on_request,
-    bake_the_current_view,
-)
+run_module(globals())

@@ -11,7 +11,7 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from window_steps import capture, in_view, open_tab, press, rosy, run_steps, save_part, view
+from window_steps import capture, in_view, open_tab, press, rosy, run_module, save_part, view
 
 EXTENSION = "bl_ext.user_default.rosy"
 
@@ -53,7 +53,7 @@ def preview_tones(sidebar):
     return sidebar[low : low + 100, left : left + 100].mean(axis=2)
 
 
-def panel_with_previews():
+def test_panel_with_previews():
     bpy.ops.preferences.addon_disable(module=EXTENSION)
     rosy("rosy_addon.ui.look_panels").VIEW3D_PT_rosy_look.bl_options = set()
     bpy.ops.preferences.addon_enable(module=EXTENSION)
@@ -80,7 +80,7 @@ def press_key(key):
     yield 0.5
 
 
-def preset_chosen_by_its_preview():
+def test_preset_chosen_by_its_preview():
     with in_view():
         bpy.ops.ed.undo_push(message="before")
     x, y = point_on_preview()
@@ -108,7 +108,7 @@ def preset_chosen_by_its_preview():
     assert bpy.context.scene.rosy.look.ink == "soft"
 
 
-def preset_saved_by_a_dialog():
+def test_preset_saved_by_a_dialog():
     settings = bpy.context.scene.rosy
     settings.look.length = 120
     move_to(400, 400)
@@ -122,7 +122,7 @@ def preset_saved_by_a_dialog():
     assert not library().is_changed(settings)
 
 
-def preset_deleted_only_if_confirmed():
+def test_preset_deleted_only_if_confirmed():
     for key, remaining in (("ESC", ["mine"]), ("RET", [])):
         with in_view():
             bpy.ops.rosy.preset_remove("INVOKE_DEFAULT")
@@ -133,7 +133,7 @@ def preset_deleted_only_if_confirmed():
     yield from save_screenshot("presets-10-deleted")
 
 
-def previews_are_freed_with_the_extension():
+def test_previews_are_freed_with_the_extension():
     yield from wait_for_previews()
     previews = library()._LIBRARY.previews
     assert len(previews) == len(library().entries())
@@ -143,10 +143,4 @@ def previews_are_freed_with_the_extension():
     bpy.ops.preferences.addon_enable(module=EXTENSION)
 
 
-run_steps(
-    panel_with_previews,
-    preset_chosen_by_its_preview,
-    preset_saved_by_a_dialog,
-    preset_deleted_only_if_confirmed,
-    previews_are_freed_with_the_extension,
-)
+run_module(globals())

@@ -35,6 +35,7 @@ from scenes import (
 )
 from test_live_reading import LOSSES
 from test_reading import add_directions
+from test_up_to_date import put
 
 
 def assert_refused(*words, **options):
@@ -162,10 +163,6 @@ def test_odd_meshes_are_drawn(scene, camera, vertices, faces, edges):
     assert bake(scene)
 
 
-def hide(monkey):
-    monkey.hide_viewport = True
-
-
 def roll_vectors(monkey):
     set_vectors(monkey.data, member_vectors(monkey.data)[:, [1, 2, 0]])
 
@@ -175,16 +172,8 @@ def store_too_many_directions(monkey):
     add_directions(monkey.data, 13)
 
 
-def move_away(monkey):
-    monkey.location.x = 100.0
-
-
 def put_a_wall_in_front(monkey):
     add_plane("Wall", size=3.0).location.y = -3.0
-
-
-def use_a_panoramic_camera(monkey):
-    bpy.context.scene.camera.data.type = "PANO"
 
 
 def lose_the_camera(monkey):
@@ -202,12 +191,12 @@ def use_an_odd_name(monkey):
     [
         *((lose, ("'Suzanne'", *words)) for lose, words in LOSSES.values()),
         (lose_the_camera, ("scene 'Scene' has no active camera",)),
-        (hide, ("'Suzanne'", "hidden in the viewport")),
+        (put("Suzanne:hide_viewport", True), ("'Suzanne'", "hidden in the viewport")),
         (roll_vectors, ("'Suzanne', attribute 'rosy'", "not tangent to the surface", "off, face")),
         (store_too_many_directions, ("'Suzanne'", "13 attributes", "at most 12")),
-        (move_away, ("'Camera'", "Suzanne", "outside the frame")),
+        (put("Suzanne:location", (100.0, 0.0, 0.0)), ("'Camera'", "Suzanne", "outside the frame")),
         (put_a_wall_in_front, ("'Camera'", "Suzanne", "hidden behind")),
-        (use_a_panoramic_camera, ("camera 'Camera' is panoramic",)),
+        (put("Camera:data.type", "PANO"), ("camera 'Camera' is panoramic",)),
         (use_an_odd_name, (r"line\nbreak\t\x1b[31m",)),
     ],
 )

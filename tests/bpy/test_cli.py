@@ -44,16 +44,8 @@ def saved(monkey, camera, tmp_path):
 
 def test_bake_writes_the_picture_and_keeps_the_file(saved, tmp_path):
     before = saved.read_bytes()
-    command = [
-        sys.executable,
-        "-m",
-        "rosy_addon",
-        "bake",
-        str(saved),
-        "--out",
-        str(tmp_path / "out"),
-    ]
-    command += ["--size", "96x64", "--set", "length=10"]
+    words = ("bake", saved, "--out", tmp_path / "out", "--size", "96x64", "--set", "length=10")
+    command = [sys.executable, "-m", "rosy_addon", *map(str, words)]
     process = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert process.returncode == 0, process.stderr
     (picture,) = (tmp_path / "out").iterdir()

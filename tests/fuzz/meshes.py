@@ -10,6 +10,7 @@ from numpy.random import Generator
 
 #: Points (V, 3), and the faces as tuples of vertex indices.
 Polygons = tuple[np.ndarray, list[tuple[int, ...]]]
+Writer = Callable[[Generator, np.ndarray, list], bytes]
 
 
 def random_mesh(rng: Generator, *, faults: int | None = None) -> Polygons:
@@ -224,9 +225,4 @@ def _stl(rng: Generator, points: np.ndarray, faces: list) -> bytes:
 
 
 #: The writer of each extension.
-WRITERS: dict[str, Callable[[Generator, np.ndarray, list], bytes]] = {
-    ".obj": _obj,
-    ".off": _off,
-    ".ply": _ply,
-    ".stl": _stl,
-}
+WRITERS: dict[str, Writer] = {".obj": _obj, ".off": _off, ".ply": _ply, ".stl": _stl}

@@ -16,7 +16,7 @@ from mathutils import Euler
 sys.path.insert(0, str(Path(__file__).parent))
 from conftest import add_suzanne
 from monkey_checks import handlers
-from window_steps import capture, in_view, redraws, rosy, view, wait_until
+from window_steps import call_in_view, capture, in_view, redraws, rosy, view, wait_until
 
 #: Seconds for which a window at rest is measured, and CPU seconds that it may take in each of them:
 #: it looks for closed views, and draws no pixel.
@@ -33,8 +33,7 @@ def messages():
 
 
 def switch(show, **options):
-    with in_view():
-        assert bpy.ops.rosy.viewport(show=show, **options) == {"FINISHED"}
+    assert call_in_view(bpy.ops.rosy.viewport, show=show, **options) == {"FINISHED"}
 
 
 def bare_view():

@@ -22,6 +22,7 @@ from conftest import contents, pixels
 from run import is_running
 from window_steps import (
     RESULTS,
+    call_in_view,
     descendants,
     fresh_scene,
     in_view,
@@ -59,8 +60,7 @@ def helper_id():
 
 
 def start_bake():
-    with in_view():
-        assert bpy.ops.rosy.bake("INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
+    assert call_in_view(bpy.ops.rosy.bake, "INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
 
 
 def start_long_bake():
@@ -103,8 +103,7 @@ def test_picture_from_the_helper():
     assert longest < LARGEST_PAUSE * seconds, (longest, seconds)
     assert helper_id() == first and is_running(first)
     picture = baked_pixels()
-    with in_view():
-        bpy.ops.rosy.bake("EXEC_DEFAULT", True)
+    call_in_view(bpy.ops.rosy.bake, "EXEC_DEFAULT", True)
     np.testing.assert_array_equal(baked_pixels(), picture)
 
 

@@ -34,6 +34,7 @@ from live_views import (
 )
 from window_steps import (
     SHOTS,
+    call_in_view,
     capture,
     in_view,
     preferences,
@@ -100,8 +101,7 @@ def test_paper_is_behind_everything():
     paper = np.array(list(bytes.fromhex(hex_color[1:]))) / 255
     scene.render.resolution_x = scene.render.resolution_y = 400
     scene.camera = add_camera("Camera", (0.0, -6.0, 1.0), (math.radians(80), 0.0, 0.0))
-    with in_view():
-        bpy.ops.mesh.primitive_cube_add(size=0.8, location=(0.0, -2.0, 0.3))
+    call_in_view(bpy.ops.mesh.primitive_cube_add, size=0.8, location=(0.0, -2.0, 0.3))
     switch("ON")
 
     def shows_paper(name):
@@ -142,13 +142,11 @@ def test_only_visible_objects_are_drawn(monkey):
     yield from check_is_bake("live-two-degrees")
     monkey.select_set(True)
     bpy.context.view_layer.objects.active = monkey
-    with in_view():
-        bpy.ops.view3d.localview(frame_selected=False)
+    call_in_view(bpy.ops.view3d.localview, frame_selected=False)
     yield from wait_for_final_pictures()
     torus = bpy.data.objects["Torus"]
     assert visible_owners() == [monkey]
-    with in_view():
-        bpy.ops.view3d.localview(frame_selected=False)
+    call_in_view(bpy.ops.view3d.localview, frame_selected=False)
     monkey.select_set(False)
     torus.hide_set(True)
     yield from wait_for_final_pictures()
@@ -185,16 +183,14 @@ def test_clipped_region():
     assert changed[:, middle + 5 :].sum() > 2000
     assert changed[:, : middle - 5].sum() == 0
     switch("OFF")
-    with in_view():
-        bpy.ops.view3d.clip_border()
+    call_in_view(bpy.ops.view3d.clip_border)
     yield 0.5
 
 
 @live()
 def test_quad_view(monkey):
     """Four views in one, each from its own side."""
-    with in_view():
-        bpy.ops.screen.region_quadview()
+    call_in_view(bpy.ops.screen.region_quadview)
     yield 0.5
     _, area, _, _ = view()
     regions = [region for region in area.regions if region.type == "WINDOW"]
@@ -203,8 +199,7 @@ def test_quad_view(monkey):
     for region, region_3d in pairs:
         options = {"region": region, "region_3d": region_3d}
         yield from check_is_bake("live-quad", 0.97, **options)
-    with in_view():
-        bpy.ops.screen.region_quadview()
+    call_in_view(bpy.ops.screen.region_quadview)
 
 
 @live()
@@ -226,8 +221,7 @@ def test_edits_are_followed(monkey):
         bpy.ops.mesh.select_all(action="SELECT")
         bpy.ops.transform.resize(value=(1.0, 1.0, 1.08))
     yield from wait_for_final_pictures()
-    with in_view():
-        bpy.ops.object.mode_set(mode="OBJECT")
+    call_in_view(bpy.ops.object.mode_set, mode="OBJECT")
     yield from check_is_bake("live-after-edit")
     if bpy.app.version >= (5, 0):  # before, Blender crashes on this operator in a script
         with in_view():
@@ -261,11 +255,9 @@ def test_every_frame_is_drawn(monkey):
         steps.append((bpy.context.scene.frame_current, shows))
 
     with redraws(record):
-        with in_view():
-            bpy.ops.screen.animation_play()
+        call_in_view(bpy.ops.screen.animation_play)
         yield from wait_until(lambda: len({frame for frame, _ in steps}) >= 3 and len(steps) > 20)
-        with in_view():
-            bpy.ops.screen.animation_cancel(restore_frame=False)
+        call_in_view(bpy.ops.screen.animation_cancel, restore_frame=False)
     assert all(shows for _, shows in steps)
 
 
@@ -327,8 +319,7 @@ def test_two_windows_with_two_scenes_rest():
     second_scene = bpy.data.scenes.new("Second")
     second_scene.collection.objects.link(monkey)
     switch("ON")
-    with in_view():
-        bpy.ops.wm.window_new_main()
+    call_in_view(bpy.ops.wm.window_new_main)
     yield 0.5
     window = bpy.context.window_manager.windows[-1]
     window.scene = second_scene
@@ -364,15 +355,13 @@ def test_the_first_field_is_shown():
             bpy.ops.wm.read_homefile(use_empty=True)
             yield 0.5
             preferences().live_first_field = wanted
-            with in_view():
-                make_field(how)
+            call_in_view(make_field, how)
             if wanted:
                 yield from wait_until(is_live)
             yield 0.5
             assert is_live() == wanted
         preferences().live_first_field = True
-        with in_view():
-            make_field()
+        call_in_view(make_field)
         assert not is_live(), "the second field came on"
         bpy.ops.wm.read_homefile(use_empty=True)
         yield 0.5
@@ -422,8 +411,7 @@ def test_streaks_drift_while_they_are_played(monkey):
     session = session_module()._session
 
     def play_or_pause():
-        with in_view():
-            assert bpy.ops.rosy.flow_play() == {"FINISHED"}
+        assert call_in_view(bpy.ops.rosy.flow_play) == {"FINISHED"}
 
     def has_timers():
         return any(map(bpy.app.timers.is_registered, session._timers.values()))

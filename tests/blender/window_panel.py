@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import sys
+from functools import partial
 from pathlib import Path
 
 import bpy
@@ -18,6 +19,7 @@ from conftest import add_camera, contents, pixels
 from monkey_checks import handlers
 from window_steps import (
     SHOTS,
+    call_in_view,
     capture,
     fresh_scene,
     in_view,
@@ -33,14 +35,12 @@ from window_steps import (
 
 
 def make_field():
-    with in_view():
-        bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="curvature", degree=4)
+    call_in_view(bpy.ops.rosy.field_generate, "EXEC_DEFAULT", True, kind="curvature", degree=4)
 
 
 def start_job(operator, **settings):
     """Start a job as its button does, and wait until it has made progress."""
-    with in_view():
-        assert operator("INVOKE_DEFAULT", True, **settings) == {"RUNNING_MODAL"}
+    assert call_in_view(operator, "INVOKE_DEFAULT", True, **settings) == {"RUNNING_MODAL"}
     yield from wait_until(lambda: status().current is None or status().current.fraction > 0.1)
     assert status().current is not None, "the job ended before it could be interrupted"
 
@@ -89,13 +89,11 @@ def test_singularities_as_dots():
     assert not overlay.DRAW_HANDLERS
     yield from save_screenshot("panel-5-no-singularities")
     without = count_dots("panel-5-no-singularities")
-    with in_view():
-        assert bpy.ops.rosy.singularities(show="OVERLAY") == {"FINISHED"}
+    assert call_in_view(bpy.ops.rosy.singularities, show="OVERLAY") == {"FINISHED"}
     yield from save_screenshot("panel-6-singularities", 450)
     orange, blue = count_dots("panel-6-singularities") - without
     assert orange > 200 and blue > 200, (orange, blue)
-    with in_view():
-        bpy.ops.rosy.singularities(show="NONE")
+    call_in_view(bpy.ops.rosy.singularities, show="NONE")
     assert not overlay.DRAW_HANDLERS
     yield from save_screenshot("panel-7-hidden")
     assert np.abs(count_dots("panel-7-hidden") - without).max() < 100
@@ -109,12 +107,9 @@ def count_dots(name):
     region = view()[2]
     screen = screen[region.y : region.y + region.height, region.x : region.x + region.width // 2]
     red, green, blue = screen[..., 0], screen[..., 1], screen[..., 2]
-    return np.array(
-        [
-            np.count_nonzero((red > 0.8) & (green < 0.5) & (blue < 0.25)),
-            np.count_nonzero((blue > 0.8) & (red < 0.3) & (green < 0.5)),
-        ]
-    )
+    orange = (red > 0.8) & (green < 0.5) & (blue < 0.25)
+    is_blue = (blue > 0.8) & (red < 0.3) & (green < 0.5)
+    return np.array([np.count_nonzero(orange), np.count_nonzero(is_blue)])
 
 
 def test_bake_with_progress():
@@ -143,12 +138,10 @@ def test_panel_out_of_date():
     scene.camera.location.x += 0.5
     other = add_camera("Another Camera", (0.0, 5.0, 0.0), (math.pi / 2, 0.0, math.pi))
     yield 1.0
-    assert [
-        bake.stale_reason for bake in rosy("rosy_addon.scene.bake_records").list_bakes(scene)
-    ] == ["camera 'Camera' was changed"]
+    (info,) = rosy("rosy_addon.scene.bake_records").list_bakes(scene)
+    assert info.stale_reason == "camera 'Camera' was changed"
     scene.camera = other
-    with in_view():
-        bpy.ops.rosy.bake("EXEC_DEFAULT", True)
+    call_in_view(bpy.ops.rosy.bake, "EXEC_DEFAULT", True)
     scene.view_settings.view_transform = "Standard"
     view()[1].spaces.active.shading.type = "SOLID"
     yield from save_screenshot("panel-4-out-of-date")
@@ -161,8 +154,7 @@ def test_eevee_shows_the_picture():
     scene = bpy.context.scene
     scene.rosy.look.shading = 0.0
     scene.view_settings.view_transform = "Standard"
-    with in_view():
-        bpy.ops.rosy.bake("EXEC_DEFAULT", True)
+    call_in_view(bpy.ops.rosy.bake, "EXEC_DEFAULT", True)
     engines = scene.render.bl_rna.properties["engine"].enum_items_static.keys()
     scene.render.engine = next(name for name in engines if name.startswith("BLENDER_EEVEE"))
     scene.render.film_transparent, scene.render.filter_size = True, 0.0
@@ -190,16 +182,14 @@ def test_undo_after_bake():
     states = [state()]
     for seed in (1, 2):
         bpy.context.scene.rosy.look.seed = seed
-        with in_view():
-            bpy.ops.rosy.bake("INVOKE_DEFAULT", True)
+        call_in_view(bpy.ops.rosy.bake, "INVOKE_DEFAULT", True)
         yield from wait_until(lambda: status().current is None)
         yield 0.3
         states.append(state())
     assert states[0] != states[1] != states[2]
     undo, redo = bpy.ops.ed.undo, bpy.ops.ed.redo
     for operator, expected in ((undo, 1), (undo, 0), (redo, 1), (redo, 2)):
-        with in_view():
-            operator()
+        call_in_view(operator)
         yield 0.3
         assert state() == states[expected], expected
 
@@ -233,22 +223,10 @@ def test_stop_when_the_scene_changes():
             switch(module="bl_ext.user_default.rosy")
         preferences().live_first_field = False
 
-    for action in (
-        bpy.ops.object.delete,
-        bpy.ops.ed.undo,
-        lambda: bpy.ops.scene.new(type="EMPTY"),
-        switch_off,
-        None,
-    ):
-
-        def act(action=action):
-            if action is None:
-                bpy.ops.wm.read_homefile(use_empty=True)
-            else:
-                with in_view():
-                    action()
-
-        yield from interrupt(act)
+    actions = [bpy.ops.object.delete, bpy.ops.ed.undo, partial(bpy.ops.scene.new, type="EMPTY")]
+    for action in (*actions, switch_off):
+        yield from interrupt(partial(call_in_view, action))
+    yield from interrupt(partial(bpy.ops.wm.read_homefile, use_empty=True))
 
 
 def test_export_and_import_from_the_file_browser():
@@ -262,8 +240,7 @@ def test_export_and_import_from_the_file_browser():
         (bpy.ops.rosy.field_export, path.is_file),
         (bpy.ops.rosy.field_import, lambda: "rosy" in attributes),
     ):
-        with in_view():
-            assert operator("INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
+        assert call_in_view(operator, "INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
         yield 1.0
         params = browser_params()
         params.directory, params.filename = str(SHOTS).encode(), path.name
@@ -311,8 +288,7 @@ def test_animation_asks_for_a_folder():
     folder.mkdir(exist_ok=True)
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 3, 4
-    with in_view():
-        assert bpy.ops.rosy.bake_animation("INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
+    assert call_in_view(bpy.ops.rosy.bake_animation, "INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
     yield 1.0
     browser_params().directory = str(folder).encode()
     yield 0.5
@@ -330,8 +306,7 @@ def test_edited_strokes_are_replaced_on_request():
     bpy.context.scene.rosy.strokes.spacing = 30.0
 
     def draw():
-        with in_view():
-            bpy.ops.rosy.strokes("INVOKE_DEFAULT", True)
+        call_in_view(bpy.ops.rosy.strokes, "INVOKE_DEFAULT", True)
 
     draw()
     yield from wait_until(lambda: bpy.context.scene.rosy.strokes.made and status().current is None)
@@ -356,8 +331,7 @@ def test_edited_strokes_are_replaced_on_request():
 def test_bake_the_current_view():
     yield from fresh_scene()
     make_field()
-    with in_view():
-        bpy.ops.rosy.bake("EXEC_DEFAULT", True, camera="VIEW")
+    call_in_view(bpy.ops.rosy.bake, "EXEC_DEFAULT", True, camera="VIEW")
     (image,) = [image for image in bpy.data.images if image.name.lower().startswith("rosy")]
     assert tuple(image.size) == (view()[2].width, view()[2].height)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from window_steps import capture, in_view, open_tab, press, rosy, run_module, save_part, view
+from window_steps import call_in_view, capture, open_tab, press, rosy, run_module, save_part, view
 
 EXTENSION = "bl_ext.user_default.rosy"
 
@@ -81,8 +81,7 @@ def press_key(key):
 
 
 def test_preset_chosen_by_its_preview():
-    with in_view():
-        bpy.ops.ed.undo_push(message="before")
+    call_in_view(bpy.ops.ed.undo_push, message="before")
     x, y = point_on_preview()
     yield from click(x, y)
     yield 1.5
@@ -101,8 +100,7 @@ def test_preset_chosen_by_its_preview():
     move_to(400, 300)
     tones = preview_tones((yield from save_screenshot("presets-3-chosen")))
     assert (tones > 0.95).mean() > 0.25 and (tones < 0.3).mean() > 0.1, "no ink on paper"
-    with in_view():
-        bpy.ops.ed.undo()
+    call_in_view(bpy.ops.ed.undo)
     yield 0.3
     assert bpy.context.scene.rosy.preset_name == "default"
     assert bpy.context.scene.rosy.look.ink == "soft"
@@ -112,8 +110,7 @@ def test_preset_saved_by_a_dialog():
     settings = bpy.context.scene.rosy
     settings.look.length = 120
     move_to(400, 400)
-    with in_view():
-        bpy.ops.rosy.preset_save("INVOKE_DEFAULT", name="Mine", sentence="Long streaks")
+    call_in_view(bpy.ops.rosy.preset_save, "INVOKE_DEFAULT", name="Mine", sentence="Long streaks")
     yield 1.0
     yield from save_screenshot("presets-4-save")
     yield from press_key("RET")
@@ -124,8 +121,7 @@ def test_preset_saved_by_a_dialog():
 
 def test_preset_deleted_only_if_confirmed():
     for key, remaining in (("ESC", ["mine"]), ("RET", [])):
-        with in_view():
-            bpy.ops.rosy.preset_remove("INVOKE_DEFAULT")
+        call_in_view(bpy.ops.rosy.preset_remove, "INVOKE_DEFAULT")
         yield 1.0
         yield from save_screenshot(f"presets-9-delete-{key.lower()}")
         yield from press_key(key)

@@ -159,6 +159,12 @@ def in_view():
     return bpy.context.temp_override(window=window, area=area, region=region)
 
 
+def call_in_view(operator, *arguments, **settings):
+    """Call an operator in the 3D view, and return its result."""
+    with in_view():
+        return operator(*arguments, **settings)
+
+
 def wait_until(condition, seconds=TIMEOUT_SECONDS):
     """Yield until a condition holds."""
     deadline = time.monotonic() + seconds

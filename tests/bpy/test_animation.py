@@ -22,7 +22,7 @@ from rosy.rosy_addon.scene.bake_records import list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import frame_camera
 from rosy.rosy_addon.scene.files import picture_stem
 from rosy.rosy_addon.scene.pictures import OutputSettings
-from scenes import add_camera, contents, link, pixels, render
+from scenes import add_camera, contents, expect_error, link, pixels, render
 
 ROOT = Path(__file__).parents[2]
 
@@ -223,8 +223,7 @@ def test_half_floats(moving, tmp_path):
 
 
 def test_errors_name_the_frame(moving, tmp_path):
-    with pytest.raises(RosyError, match="need a folder"):
-        bake_animation(moving, [1])
+    expect_error("need a folder", bake_animation, moving, [1])
     monkey = bpy.data.objects["Suzanne"]
     monkey.keyframe_insert("location", frame=1)
     monkey.location.x = 500

@@ -14,7 +14,7 @@ from rosy.rosy_addon.scene import pictures as pictures_room
 from rosy.rosy_addon.scene.bake_records import has_pictures, list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import scene_cameras
 from rosy.rosy_addon.scene.pictures import show_bake
-from scenes import add_camera, contents, depsgraph, each_step, link, pixels
+from scenes import add_camera, contents, depsgraph, each_step, expect_error, link, pixels
 
 
 def material_of(obj):
@@ -151,8 +151,7 @@ def test_an_error_while_applying_leaves_nothing(scene, camera, monkey, monkeypat
         raise RosyError("no more")
 
     monkeypatch.setattr(pictures_room, "new_group", fails)
-    with pytest.raises(RosyError, match="no more"):
-        bake(scene)
+    expect_error("no more", bake, scene)
     assert contents() == before
 
 
@@ -168,8 +167,7 @@ def test_several_cameras(scene, camera, monkey):
     assert material_of(monkey).name == "RoSy Second"
     assert [entry.is_shown for entry in list_bakes(scene)] == [False, True]
     assert len(bpy.data.node_groups) == groups
-    with pytest.raises(RosyError, match="camera 'Third', only from 'Second', 'Camera'"):
-        show_bake(scene, "Third")
+    expect_error("camera 'Third', only from 'Second', 'Camera'", show_bake, scene, "Third")
 
 
 def test_warnings(scene, camera, monkey):

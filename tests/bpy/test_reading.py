@@ -6,7 +6,6 @@ import bmesh
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.field.directional_field import field_directions, field_from_directions
 from rosy.rosy_addon.field.frames import normalize
 from rosy.rosy_addon.field.generate import axis_field
@@ -29,6 +28,7 @@ from scenes import (
     assert_same_directions,
     contents,
     depsgraph,
+    expect_error,
     link,
     member_vectors,
     read_instances,
@@ -371,8 +371,7 @@ def test_marked_edges(scene, mark):
     mesh = bpy.context.object.data
     for edge in mesh.edges:
         edge.select = edge.use_edge_sharp = edge.use_seam = False
-    with pytest.raises(RosyError, match="has no edges of this kind"):
-        marked_edges(mesh, mark)
+    expect_error("has no edges of this kind", marked_edges, mesh, mark)
     for index in (3, 7):
         setattr(mesh.edges[index], EDGE_MARKS[mark][0], True)
     edges = marked_edges(mesh, mark)
@@ -390,8 +389,7 @@ def test_selected_edges_of_a_mesh_made_by_a_script(scene, repeated):
         faces = [tuple(face.vertices) for face in mesh.polygons]
         mesh = add_mesh("Repeated", vertices, faces, edges * 2).data
         assert len(mesh.edges) == count
-        with pytest.raises(RosyError, match="has no edges of this kind"):
-            marked_edges(mesh, "SELECTED")
+        expect_error("has no edges of this kind", marked_edges, mesh, "SELECTED")
     else:
         assert len(marked_edges(mesh, "SELECTED")) == count
 

@@ -79,16 +79,9 @@ def wait_for_final_pictures():
         session = session_module()._session
         final_downscale = session.progressive.renderer.downscale_factors[1]
         views = session.progressive.views.values()
-        return (
-            len(drawn) >= 3
-            and views
-            and all(
-                state.texture_key == state.requested_key
-                and state.downscale == final_downscale
-                and state.requested_key is not None
-                for state in views
-            )
-        )
+        keys_are_final = all(s.texture_key == s.requested_key is not None for s in views)
+        is_sharp = all(state.downscale == final_downscale for state in views)
+        return len(drawn) >= 3 and views and keys_are_final and is_sharp
 
     with redraws() as drawn:
         yield from wait_until(rests)
@@ -162,11 +155,8 @@ def visible_owners():
     space = view()[1].spaces.active
     depsgraph = bpy.context.evaluated_depsgraph_get()
     is_visible = rosy("rosy_addon.viewport.view3d").is_visible
-    return [
-        entry.owner
-        for entry in layer.instances
-        if is_visible(entry.visibility_object, depsgraph, space)
-    ]
+    shown = (e for e in layer.instances if is_visible(e.visibility_object, depsgraph, space))
+    return [entry.owner for entry in shown]
 
 
 def load_at_rest():

@@ -34,7 +34,8 @@ from window_steps import (
 )
 
 
-def make_field():
+def scene_with_field(size=(320, 240)):
+    yield from fresh_scene(size)
     call_in_view(bpy.ops.rosy.field_generate, "EXEC_DEFAULT", True, kind="curvature", degree=4)
 
 
@@ -74,8 +75,7 @@ def test_panel_without_field():
 
 
 def test_panel_with_field():
-    yield from fresh_scene(size=(640, 480))
-    make_field()
+    yield from scene_with_field(size=(640, 480))
     yield from save_screenshot("panel-2-field")
 
 
@@ -113,8 +113,7 @@ def count_dots(name):
 
 
 def test_bake_with_progress():
-    yield from fresh_scene(size=(800, 600))
-    make_field()
+    yield from scene_with_field(size=(800, 600))
     bpy.context.scene.rosy.look.method = "brute"  # slow enough to observe the progress
     yield from start_job(bpy.ops.rosy.bake)
     fractions = []
@@ -149,8 +148,7 @@ def test_panel_out_of_date():
 
 def test_eevee_shows_the_picture():
     """A render by EEVEE, which needs a window on most machines, shows the picture."""
-    yield from fresh_scene(size=(200, 150))
-    make_field()
+    yield from scene_with_field(size=(200, 150))
     scene = bpy.context.scene
     scene.rosy.look.shading = 0.0
     scene.view_settings.view_transform = "Standard"
@@ -177,8 +175,7 @@ def test_undo_after_bake():
     def state():
         return contents(), [pixels(image).tobytes() for image in bpy.data.images]
 
-    yield from fresh_scene(size=(64, 48))
-    make_field()
+    yield from scene_with_field(size=(64, 48))
     states = [state()]
     for seed in (1, 2):
         bpy.context.scene.rosy.look.seed = seed
@@ -196,8 +193,7 @@ def test_undo_after_bake():
 
 def interrupt(action, screenshot=None):
     """Start a long bake, call an action, and check that the bake ends and leaves nothing."""
-    yield from fresh_scene(size=(1600, 1200))
-    make_field()
+    yield from scene_with_field(size=(1600, 1200))
     bpy.context.scene.rosy.look.method = "brute"
     before = contents()
     yield from start_job(bpy.ops.rosy.bake)
@@ -231,8 +227,7 @@ def test_stop_when_the_scene_changes():
 
 def test_export_and_import_from_the_file_browser():
     """The file browser opens; after its confirmation the operators run as modal jobs."""
-    yield from fresh_scene()
-    make_field()
+    yield from scene_with_field()
     path = SHOTS / "browser.rosy"
     path.unlink(missing_ok=True)
     attributes = bpy.context.object.data.attributes
@@ -255,8 +250,7 @@ def test_export_and_import_from_the_file_browser():
 
 def test_turntable_encoded_by_another_blender():
     """Another Blender encodes an .mp4, and this one handles its events."""
-    yield from fresh_scene()
-    make_field()
+    yield from scene_with_field()
     path = SHOTS / "encoded.mp4"
     with in_view():
         started = bpy.ops.rosy.turntable(
@@ -282,8 +276,7 @@ def browser_params():
 
 def test_animation_asks_for_a_folder():
     """In a file that was never saved, Animation opens a file browser for the folder."""
-    yield from fresh_scene(size=(64, 48))
-    make_field()
+    yield from scene_with_field(size=(64, 48))
     folder = SHOTS / "frames"
     folder.mkdir(exist_ok=True)
     scene = bpy.context.scene
@@ -301,8 +294,7 @@ def test_animation_asks_for_a_folder():
 
 def test_edited_strokes_are_replaced_on_request():
     """Draw Strokes asks first; without an edit it does not."""
-    yield from fresh_scene()
-    make_field()
+    yield from scene_with_field()
     bpy.context.scene.rosy.strokes.spacing = 30.0
 
     def draw():
@@ -329,8 +321,7 @@ def test_edited_strokes_are_replaced_on_request():
 
 
 def test_bake_the_current_view():
-    yield from fresh_scene()
-    make_field()
+    yield from scene_with_field()
     call_in_view(bpy.ops.rosy.bake, "EXEC_DEFAULT", True, camera="VIEW")
     (image,) = [image for image in bpy.data.images if image.name.lower().startswith("rosy")]
     assert tuple(image.size) == (view()[2].width, view()[2].height)

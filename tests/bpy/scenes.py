@@ -42,6 +42,13 @@ def depsgraph():
     return bpy.context.evaluated_depsgraph_get()
 
 
+def reopen(path):
+    """Save and open the file, and return its scene."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    return bpy.context.scene
+
+
 def link(obj):
     """Put an object into the scene."""
     bpy.context.scene.collection.objects.link(obj)

@@ -87,14 +87,6 @@ def tee():
     return without(pipes, rod(0.45, 5), rod(0.45, 3, 0, (1.5, 0, 0)))
 
 
-def shaft():
-    steps = rod(0.7, 1, at=(0, 0, 0.5)), rod(0.5, 1.5, at=(0, 0, 1.7))
-    tip = rod(0.5, 0.4, at=(0, 0, 2.6), end=0.3)
-    return without(
-        union(rod(0.4, 2, at=(0, 0, -1)), *steps, tip), block(0.2, 0.4, 1, at=(0, 0.5, 2))
-    )
-
-
 def valve():
     return without(union(ball(1), rod(0.5, 3, 0), rod(0.3, 1.4, at=(0, 0, 1))), rod(0.35, 4, 0))
 
@@ -123,8 +115,8 @@ def common_part_of_cylinders():
 
 
 PARTS = (
-    *(crossing_cylinders, common_part_of_cylinders, nut, flange, tee, shaft, valve),
-    *(housing, rounded_box),
+    *(crossing_cylinders, common_part_of_cylinders, nut, flange, tee, valve, housing),
+    rounded_box,
 )
 
 

@@ -6,6 +6,7 @@ import bmesh
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix
 from rosy.rosy_addon.field.directional_field import field_directions, field_from_directions
 from rosy.rosy_addon.field.frames import normalize
 from rosy.rosy_addon.field.generate import axis_field
@@ -275,8 +276,6 @@ def turn_by_armature(obj, matrix):
     rig = bpy.context.object
     obj.vertex_groups.new(name="Bone").add(range(len(obj.data.vertices)), 1.0, "REPLACE")
     obj.modifiers.new("Armature", "ARMATURE").object = rig
-    from mathutils import Matrix
-
     rig.pose.bones["Bone"].matrix = Matrix(matrix).to_4x4() @ rig.pose.bones["Bone"].matrix
     bpy.context.view_layer.update()
 
@@ -284,8 +283,6 @@ def turn_by_armature(obj, matrix):
 @pytest.mark.parametrize("deform", [turn_by_shape_key, turn_by_armature])
 def test_the_field_follows_a_deformation(scene, camera, monkey, deform):
     """Rotated by a shape key or an armature, a mesh looks as if the object were rotated."""
-    from mathutils import Matrix
-
     rotation = Matrix.Rotation(0.7, 3, (0.3, 0.5, 0.8))
     monkey.rotation_mode = "QUATERNION"
     monkey.rotation_quaternion = rotation.to_quaternion()

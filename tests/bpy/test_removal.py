@@ -9,7 +9,7 @@ from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.scene.bake_records import has_pictures, list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import scene_cameras
 from rosy.rosy_addon.scene.pictures import show_bake
-from scenes import add_camera, add_field, add_plane, contents, link
+from scenes import add_camera, add_field, add_plane, contents, link, reopen
 from test_up_to_date import exclude, obj
 
 
@@ -86,9 +86,7 @@ def copy_modifier(tmp_path):
 
 
 def save_and_open(tmp_path):
-    path = str(tmp_path / "scene.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.open_mainfile(filepath=path)
+    reopen(tmp_path / "scene.blend")
 
 
 def bake_with_another_camera(tmp_path):
@@ -96,10 +94,8 @@ def bake_with_another_camera(tmp_path):
     bake(bpy.context.scene)
 
 
-ACTIONS = {
-    function.__name__: function
-    for function in (*(rename, unlink, copy_modifier, save_and_open, bake_with_another_camera),)
-}
+FUNCTIONS = rename, unlink, copy_modifier, save_and_open, bake_with_another_camera
+ACTIONS = {function.__name__: function for function in FUNCTIONS}
 ACTIONS |= {
     "nothing": lambda _: None,
     "duplicate": selected(bpy.ops.object.duplicate, "Sheet", "Plain"),

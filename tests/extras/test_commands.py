@@ -122,10 +122,8 @@ def test_missing_libraries(library, tmp_path):
     suffix = {"pyvista": "vtu", "meshio": "msh", "h5py": "med"}[library]
     (tmp_path / f"a.{suffix}").write_text("x")
     words = ("render", f"a.{suffix}", "-o", "a.png")
-    command, environment = (
-        [sys.executable, "-c", code, *words],
-        {"PYTHONPATH": str(ROOT), "PATH": ""},
-    )
+    command = [sys.executable, "-c", code, *words]
+    environment = {"PYTHONPATH": str(ROOT), "PATH": ""}
     streams = {"capture_output": True, "text": True}
     run = subprocess.run(command, cwd=tmp_path, env=environment, check=False, **streams)
     message = f"rosy: a.{suffix}: needs {library}: pip install rosyfields[io]\n"

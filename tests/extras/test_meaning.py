@@ -111,13 +111,3 @@ def test_borders_with_other_data_stay_apart():
 def test_bodies_that_touch_stay_apart():
     both = pv.Box().merge(pv.Box().translate((2.0, 0.0, 0.0)), merge_points=False)
     assert rf.Surface(both).euler_characteristic == 4
-
-
-def test_meshes_are_joined_on_request():
-    split = pv.Cylinder()  # its caps have vertices of their own
-    faces = split.regular_faces if split.is_all_triangles else list(split.irregular_faces)
-    apart = rf.Surface(split.points, faces)
-    assert (len(apart.vertices), apart.euler_characteristic) == (400, 2)
-    with pytest.warns(RosyWarning, match="200 vertices"):
-        joined = rf.Surface(split.points, faces, join=True)
-    assert (len(joined.vertices), joined.euler_characteristic) == (200, 2)

@@ -98,9 +98,8 @@ def test_parity_of_a_scene(rosy, card, scene, suzanne, kind):
     depsgraph = bpy.context.evaluated_depsgraph_get()
     instances = module_of(PACKAGE, "scene.scene_reader").read_scene(depsgraph).instances
     assert [instance.field is None for instance in instances] == [False, False, True]
-    view = module_of(PACKAGE, "scene.cameras").camera_of_object(
-        scene, depsgraph, camera, (512, 512)
-    )
+    cameras = module_of(PACKAGE, "scene.cameras")
+    view = cameras.camera_of_object(scene, depsgraph, camera, (512, 512))
     look = rosy.Look(shading=0.0)
     pair = draw_pair(rosy, card, instances, view, look)
     assert set(np.unique(pair.gbuffer.instance_id)) == {0, 1}

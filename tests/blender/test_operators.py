@@ -119,7 +119,7 @@ def add_ball_and_guide(add):
     ball.rotation_euler = (0.3, 0.2, 0.1)
     ball.scale = (2.0, 2.0, 2.0)
     bpy.context.view_layer.update()
-    guide = add(ball)
+    guide = add(arc_on(ball))
     bpy.context.view_layer.update()
     guide.select_set(True)
     ball.select_set(True)
@@ -135,26 +135,23 @@ def arc_on(ball):
     return local @ matrix[:3, :3].T + matrix[:3, 3]
 
 
-def add_curve(ball):
+def add_curve(points):
     curve = bpy.data.curves.new("Curve", "CURVE")
     curve.dimensions = "3D"
-    points = arc_on(ball)
     spline = curve.splines.new("POLY")
     spline.points.add(len(points) - 1)
     spline.points.foreach_set("co", np.c_[points, np.ones(len(points))].ravel())
     return add_object(curve)
 
 
-def add_hair(ball):
-    points = arc_on(ball)
+def add_hair(points):
     curves = bpy.data.hair_curves.new("Hair")
     curves.add_curves([len(points)])
     curves.position_data.foreach_set("vector", points.astype(np.float32).ravel())
     return add_object(curves)
 
 
-def add_grease_pencil(ball):
-    points = arc_on(ball)
+def add_grease_pencil(points):
     newer = hasattr(bpy.data, "grease_pencils_v3")
     pencil = (bpy.data.grease_pencils_v3 if newer else bpy.data.grease_pencils).new("Pencil")
     drawing = pencil.layers.new("Lines").frames.new(1).drawing

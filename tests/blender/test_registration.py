@@ -32,9 +32,7 @@ def snapshot():
         },
         "attributes": {name: set(dir(getattr(bpy.types, name))) for name in ID_TYPES},
         "handlers": {
-            name: [
-                getattr(handler, "__module__", "") for handler in getattr(bpy.app.handlers, name)
-            ]
+            name: [getattr(each, "__module__", "") for each in getattr(bpy.app.handlers, name)]
             for name in dir(bpy.app.handlers)
             if isinstance(getattr(bpy.app.handlers, name), list)
         },

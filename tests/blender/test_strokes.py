@@ -60,9 +60,7 @@ def coverage_of_svg(path, width, height, subpixels=6):
 @pytest.mark.parametrize(
     ("kind", "engine"), [("PENCIL", "BLENDER_WORKBENCH"), ("CURVES", "CYCLES")]
 )
-def test_renders_show_ink_where_the_file_has_it(
-    with_stroke_settings, scene, tmp_path, kind, engine
-):
+def test_renders_show_the_ink_of_the_file(with_stroke_settings, scene, tmp_path, kind, engine):
     path = tmp_path / "strokes.svg"
     assert bpy.ops.rosy.strokes(kind="FILE", filepath=str(path)) == {"FINISHED"}
     expected = coverage_of_svg(path, 160, 120)

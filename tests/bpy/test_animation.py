@@ -144,9 +144,7 @@ def test_cameras_and_scenes_have_files_of_their_own(moving, tmp_path):
 def test_names_of_files_are_short_and_differ_on_every_file_system(scene):
     names = ["\u1ebf", "e\u0302\u0301", "x" * 254 + "a", "x" * 254 + "b", "\u65e5" * 85]
     cameras = [add_camera(name) for name in names]  # Blender 4.2 cuts names to 63 bytes
-    stems = [picture_stem(name) for name in names] + [
-        picture_stem(camera.name) for camera in cameras
-    ]
+    stems = [picture_stem(name) for name in (*names, *(camera.name for camera in cameras))]
     assert all(len(stem.encode()) <= 200 for stem in stems)
     keys = {unicodedata.normalize("NFC", picture_stem(camera.name)) for camera in cameras}
     assert len(keys) == len(names)
@@ -271,9 +269,8 @@ def cluster():
 
 
 def test_a_cluster_renders_all_frames(file, tmp_path, cluster):
-    bake_animation(
-        bpy.context.scene, range(1, 11), settings=OutputSettings(folder=tmp_path / "one")
-    )
+    settings = OutputSettings(folder=tmp_path / "one")
+    bake_animation(bpy.context.scene, range(1, 11), settings=settings)
     address = cluster.scheduler_address
     process = start(file, tmp_path / "two", "--frames", "1-10", "--scheduler", address)
     deadline = time.monotonic() + 60

@@ -58,7 +58,7 @@ def test_the_image_holds_the_picture(scene, camera, monkey, tmp_path, store, ima
     assert len(list(tmp_path.iterdir())) == len(files)
 
 
-def test_a_relative_folder_is_that_of_the_working_directory(
+def test_folders_are_relative_to_the_working_directory(
     scene, camera, monkey, tmp_path, monkeypatch
 ):
     """Also after the .blend file was saved elsewhere, which moves relative paths."""

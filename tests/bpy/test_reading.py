@@ -160,9 +160,7 @@ def test_storage_forms_are_read_again(scene, monkey, form):
     again = read_mesh_field(mesh, nonfinite="zero")
     defined = again.magnitude > 0
     assert defined.mean() > 0.95 and again.degree == 4
-    z, expected = (
-        face_representation(surface, each_field)[defined] for each_field in (again, field)
-    )
+    z, expected = (face_representation(surface, each)[defined] for each in (again, field))
     np.testing.assert_allclose(z, expected, atol=1e-4)
 
 
@@ -224,9 +222,8 @@ def test_an_occluder_hides_pixels(scene, camera):
     near.location.y = -1.0
     graph = depsgraph()
     view = camera_of_object(scene, graph, camera)
-    all_pixels = len(
-        project([instance for instance in read_instances(graph) if instance.field], view).pixel
-    )
+    with_field = [instance for instance in read_instances(graph) if instance.field]
+    all_pixels = len(project(with_field, view).pixel)
     visible_pixels = len(project(read_instances(graph), view).pixel)
     assert 0 < visible_pixels < all_pixels
     add_field(near, kind="axis").rosy.include = False

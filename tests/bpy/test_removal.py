@@ -117,9 +117,7 @@ def user_contents():
     """Return the contents of the file, and the material of each face."""
     if bpy.context.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
-    indices = {
-        mesh.name: [polygon.material_index for polygon in mesh.polygons] for mesh in bpy.data.meshes
-    }
+    indices = {m.name: [face.material_index for face in m.polygons] for m in bpy.data.meshes}
     return contents() | indices
 
 

@@ -78,9 +78,8 @@ def test_attributes_of_all_domains(wall, domain, kind):
     face = np.repeat(np.arange(4), 4)
     element = {"POINT": corner, "FACE": face, "CORNER": np.arange(len(corner))}[domain]
     tone = tone_of(ToneRequest("attribute", "Ink")).values
-    np.testing.assert_allclose(
-        tone[:, 0], expected[element], atol=0.01 if kind == "BYTE_COLOR" else 1e-6
-    )
+    tolerance = 0.01 if kind == "BYTE_COLOR" else 1e-6
+    np.testing.assert_allclose(tone[:, 0], expected[element], atol=tolerance)
 
 
 def test_the_default_is_the_active_color_attribute(wall):
@@ -106,13 +105,10 @@ def test_missing_attributes(wall, monkey):
 
 
 def test_unsuitable_attributes(wall):
-    expect_error(
-        "object 'Plane', attribute 'rosy': expected", tone_of, ToneRequest("attribute", "rosy")
-    )
+    rosy, ink = (ToneRequest("attribute", name) for name in ("rosy", "Ink"))
+    expect_error("object 'Plane', attribute 'rosy': expected", tone_of, rosy)
     add_attribute(wall.data, "Ink", "POINT", "FLOAT", np.full(9, np.nan))
-    expect_error(
-        "attribute 'Ink': has values that are not finite", tone_of, ToneRequest("attribute", "Ink")
-    )
+    expect_error("attribute 'Ink': has values that are not finite", tone_of, ink)
 
 
 # --- images ---------------------------------------------------------------------------------------

@@ -68,8 +68,7 @@ def random_options(
                 words.append(name)
                 continue
             is_wild = rng.random() < wild
-            word = random_word(rng).replace("\0", "") if is_wild else ""
-            value = word if is_wild else _value(rng, action, command)
+            value = random_word(rng).replace("\0", "") if is_wild else _value(rng, action, command)
             words += [name, value] if rng.random() < 0.5 else [f"{name}={value}"]
     return words
 

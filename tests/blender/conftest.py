@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import math
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -69,6 +70,13 @@ def baked(with_field):
     """Suzanne with a field, baked from the scene's camera."""
     assert bpy.ops.rosy.bake() == {"FINISHED"}
     return with_field
+
+
+def run_blender(*arguments):
+    """Run another Blender without a window, and return its exit status and its output."""
+    command, streams = [bpy.app.binary_path, "-b", *arguments], {"capture_output": True}
+    process = subprocess.run(command, text=True, timeout=120, check=False, **streams)
+    return process.returncode, process.stdout + process.stderr
 
 
 def error_of(operator, *arguments, **settings):

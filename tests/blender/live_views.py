@@ -16,7 +16,7 @@ from mathutils import Euler
 sys.path.insert(0, str(Path(__file__).parent))
 from conftest import add_suzanne
 from monkey_checks import handlers
-from window_steps import capture, in_view, redraws, rosy, view, wait_until
+from window_steps import call_in_view, capture, in_view, redraws, rosy, view, wait_until
 
 #: Seconds for which a window at rest is measured, and CPU seconds that it may take in each of them:
 #: it looks for closed views, and draws no pixel.
@@ -33,8 +33,7 @@ def messages():
 
 
 def switch(show, **options):
-    with in_view():
-        assert bpy.ops.rosy.viewport(show=show, **options) == {"FINISHED"}
+    assert call_in_view(bpy.ops.rosy.viewport, show=show, **options) == {"FINISHED"}
 
 
 def bare_view():
@@ -80,16 +79,9 @@ def wait_for_final_pictures():
         session = session_module()._session
         final_downscale = session.progressive.renderer.downscale_factors[1]
         views = session.progressive.views.values()
-        return (
-            len(drawn) >= 3
-            and views
-            and all(
-                state.texture_key == state.requested_key
-                and state.downscale == final_downscale
-                and state.requested_key is not None
-                for state in views
-            )
-        )
+        keys_are_final = all(s.texture_key == s.requested_key is not None for s in views)
+        is_sharp = all(state.downscale == final_downscale for state in views)
+        return len(drawn) >= 3 and views and keys_are_final and is_sharp
 
     with redraws() as drawn:
         yield from wait_until(rests)
@@ -163,11 +155,8 @@ def visible_owners():
     space = view()[1].spaces.active
     depsgraph = bpy.context.evaluated_depsgraph_get()
     is_visible = rosy("rosy_addon.viewport.view3d").is_visible
-    return [
-        entry.owner
-        for entry in layer.instances
-        if is_visible(entry.visibility_object, depsgraph, space)
-    ]
+    shown = (e for e in layer.instances if is_visible(e.visibility_object, depsgraph, space))
+    return [entry.owner for entry in shown]
 
 
 def load_at_rest():

@@ -159,15 +159,9 @@ class Monkey:
         """Return a path that can be written, mostly one of a file with the suffix."""
         if suffix and self.chance(0.8):
             return str(self.folder / f"file{suffix}")
-        names = (
-            "pictures",
-            "pictures",
-            "a.svg",
-            *("field.rosy", "field.txt", "turn.gif"),
-            "preset.json",
-        )
+        names = ("pictures", "a.svg", "field.rosy", "field.txt", "turn.gif", "preset.json")
         paths = [str(self.folder / name) for name in names]
-        return self.pick([*paths, "//rosy/", "/proc/none", ""])
+        return self.pick([paths[0], *paths, "//rosy/", "/proc/none", ""])
 
 
 # --- choices --------------------------------------------------------------------------------------
@@ -334,10 +328,8 @@ def strokes(monkey: Monkey) -> None:
 def delete_or_rename_of_rosy(monkey: Monkey) -> None:
     """Change something that RoSy made, as the outliner does."""
     kinds = (bpy.data.images, bpy.data.materials, bpy.data.node_groups, bpy.data.objects)
-    owned = [
-        (kind, block) for kind in kinds for block in kind if is_owned(block) and not block.library
-    ]
-    chosen = monkey.pick(owned)
+    blocks = ((kind, block) for kind in kinds for block in kind)
+    chosen = monkey.pick(pair for pair in blocks if is_owned(pair[1]) and not pair[1].library)
     if chosen is None or not to_object_mode(monkey):
         return
     kind, block = chosen

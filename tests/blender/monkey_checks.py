@@ -79,13 +79,8 @@ def fingerprint() -> Fingerprint:
     layer = bpy.context.view_layer
     selected = [obj.name for obj in layer.objects if obj and obj.select_get() and not is_owned(obj)]
     active = _user_name(layer.objects.active)
-    state["context"] = (
-        bpy.context.scene.name,
-        layer.name,
-        bpy.context.mode,
-        active,
-        sorted(selected),
-    )
+    place = bpy.context.scene.name, layer.name, bpy.context.mode
+    state["context"] = (*place, active, sorted(selected))
     return state
 
 

@@ -75,23 +75,15 @@ def parse_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("which", choices=("stable", "latest"))
     parser.add_argument("zip", type=Path)
-    parser.add_argument(
-        "real_blender",
-        nargs="?",
-        type=Path,
-        default=REPOSITORY.parent / "shared/tools/real-blender",
-    )
+    real_blender = REPOSITORY.parent / "shared/tools/real-blender"
+    parser.add_argument("real_blender", nargs="?", type=Path, default=real_blender)
     parser.add_argument("--shots", type=Path, help="folder for the screenshots of the panel")
-    parser.add_argument(
-        "--windows",
-        default="panel,tools,presets,live,helper,first-bake",
-        help="which tests to run in a window, by default all; none for headless",
-    )
+    windows = ",".join(name for name in WINDOWS if name != "listing")
+    text = "which tests to run in a window, by default all; none for headless"
+    parser.add_argument("--windows", default=windows, help=text)
     parser.add_argument("--only-window", action="store_true")
     parser.add_argument("--steps", default="", help="names of the only steps to run in a window")
-    parser.add_argument(
-        "--many", action="store_true", help="take pictures for the documentation, too"
-    )
+    parser.add_argument("--many", action="store_true", help="take pictures for the documentation")
     parser.add_argument("--vulkan", action="store_true", help="draw with Vulkan instead of OpenGL")
     options, options.pytest = parser.parse_known_args()
     if not options.zip.is_file():

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import subprocess
-
 import bpy
 import numpy as np
-from conftest import pixels
+from conftest import pixels, run_blender
 
 
 def baked_images():
@@ -59,15 +57,9 @@ def test_the_saved_file_renders_without_the_extension(baked, scene, tmp_path):
     scene.render.filepath = str(tmp_path / "alone.png")
     path = tmp_path / "baked.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    options = ["-b", "--factory-startup", str(path), "--python-exit-code", "1"]
-    process = subprocess.run(
-        [bpy.app.binary_path, *options, "--python-expr", RENDER_ALONE],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    assert process.returncode == 0, process.stdout + process.stderr
+    options = ["--factory-startup", str(path), "--python-exit-code", "1"]
+    status, output = run_blender(*options, "--python-expr", RENDER_ALONE)
+    assert status == 0, output
     rendered = pixels(bpy.data.images.load(str(tmp_path / "alone.png")))
     np.testing.assert_array_equal(rendered, expected)
     assert expected[..., :3][expected[..., 3] > 0.9].std() > 0.1
@@ -112,14 +104,3 @@ def test_bake_animation(with_field, scene, tmp_path):
     assert times == [path.stat().st_mtime_ns for path in files]
     (record,) = scene.rosy.bakes
     assert record.frames == "2 to 3" and record.image.source == "SEQUENCE"
-
-
-def test_turntable(with_field, tmp_path):
-    for kind in (".gif", ".mp4"):
-        path = tmp_path / f"film{kind}"
-        settings = {"film": kind, "pictures": 4, "width": 48, "height": 32}
-        result = bpy.ops.rosy.turntable(filepath=str(path), **settings)
-        assert result == {"FINISHED"} and path.stat().st_size > 500
-    clip = bpy.data.movieclips.load(str(tmp_path / "film.mp4"))
-    assert clip.frame_duration == 4
-    assert len(bpy.data.scenes) == 1

@@ -76,19 +76,9 @@ def test_parity_of_uneven_lines(rosy, card, surface_of):
     surface = surface_of("torus")
     camera = camera_of_shape(rosy, "torus", surface, 2 * SIZE)
     instance = rosy.MeshInstance(surface, np.eye(4), rosy.generate(surface, "smoothest", 4))
-    look = rosy.Look(
-        ink="hatch",
-        hue="families",
-        anchor="surface",
-        shading=0.9,
-        line_width=2.5,
-        length=LENGTH,
-        supersampling=2,
-        breaks=0.6,
-        wobble=0.6,
-        paper_grain=0.4,
-        outline=1.5,
-    )
+    uneven = {"breaks": 0.6, "wobble": 0.6, "paper_grain": 0.4, "outline": 1.5}
+    lines = {"anchor": "surface", "shading": 0.9, "line_width": 2.5, "length": LENGTH, **uneven}
+    look = rosy.Look(ink="hatch", hue="families", supersampling=2, **lines)
     assert draw_pair(rosy, card, [instance], camera, look).likeness >= 0.98
 
 
@@ -108,9 +98,8 @@ def test_parity_of_a_scene(rosy, card, scene, suzanne, kind):
     depsgraph = bpy.context.evaluated_depsgraph_get()
     instances = module_of(PACKAGE, "scene.scene_reader").read_scene(depsgraph).instances
     assert [instance.field is None for instance in instances] == [False, False, True]
-    view = module_of(PACKAGE, "scene.cameras").camera_of_object(
-        scene, depsgraph, camera, (512, 512)
-    )
+    cameras = module_of(PACKAGE, "scene.cameras")
+    view = cameras.camera_of_object(scene, depsgraph, camera, (512, 512))
     look = rosy.Look(shading=0.0)
     pair = draw_pair(rosy, card, instances, view, look)
     assert set(np.unique(pair.gbuffer.instance_id)) == {0, 1}

@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-import subprocess
-
 import bpy
 import pytest
+from conftest import run_blender
 
 
 def command(*arguments, scene=None):
     """Run the command in a new Blender process, and return its exit status and its output."""
     file_arguments = [str(scene)] if scene else []
-    process = subprocess.run(
-        [bpy.app.binary_path, "-b", *file_arguments, "--command", "rosy", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    return process.returncode, process.stdout + process.stderr
+    return run_blender(*file_arguments, "--command", "rosy", *map(str, arguments))
 
 
 @pytest.fixture
@@ -45,22 +37,3 @@ def test_bad_input_is_one_line_and_status_2(saved, tmp_path):
     assert "Nobody" in line
     assert "Traceback" not in output
     assert not list(tmp_path.glob("*.png"))
-
-
-def test_strokes_of_the_file(saved, tmp_path):
-    bpy.context.scene.rosy.strokes.spacing = 9.0
-    bpy.ops.wm.save_mainfile()
-    bpy.ops.rosy.strokes(kind="FILE", filepath=str(tmp_path / "button.svg"))
-    status, output = command("strokes", "-o", tmp_path / "out.svg", scene=saved)
-    assert status == 0, output
-    assert (tmp_path / "out.svg").read_bytes() == (tmp_path / "button.svg").read_bytes()
-
-
-def test_render(with_field, tmp_path):
-    mesh = tmp_path / "suzanne.obj"
-    bpy.ops.wm.obj_export(filepath=str(mesh), export_materials=False)
-    picture = tmp_path / "suzanne.png"
-    options = ("--degree", 4, "--generate", "curvature", "--size", "64x64")
-    status, output = command("render", mesh, "-o", picture, *options)
-    assert status == 0, output
-    assert picture.read_bytes().startswith(b"\x89PNG")

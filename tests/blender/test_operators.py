@@ -119,7 +119,7 @@ def add_ball_and_guide(add):
     ball.rotation_euler = (0.3, 0.2, 0.1)
     ball.scale = (2.0, 2.0, 2.0)
     bpy.context.view_layer.update()
-    guide = add(ball)
+    guide = add(arc_on(ball))
     bpy.context.view_layer.update()
     guide.select_set(True)
     ball.select_set(True)
@@ -135,26 +135,23 @@ def arc_on(ball):
     return local @ matrix[:3, :3].T + matrix[:3, 3]
 
 
-def add_curve(ball):
+def add_curve(points):
     curve = bpy.data.curves.new("Curve", "CURVE")
     curve.dimensions = "3D"
-    points = arc_on(ball)
     spline = curve.splines.new("POLY")
     spline.points.add(len(points) - 1)
     spline.points.foreach_set("co", np.c_[points, np.ones(len(points))].ravel())
     return add_object(curve)
 
 
-def add_hair(ball):
-    points = arc_on(ball)
+def add_hair(points):
     curves = bpy.data.hair_curves.new("Hair")
     curves.add_curves([len(points)])
     curves.position_data.foreach_set("vector", points.astype(np.float32).ravel())
     return add_object(curves)
 
 
-def add_grease_pencil(ball):
-    points = arc_on(ball)
+def add_grease_pencil(points):
     newer = hasattr(bpy.data, "grease_pencils_v3")
     pencil = (bpy.data.grease_pencils_v3 if newer else bpy.data.grease_pencils).new("Pencil")
     drawing = pencil.layers.new("Lines").frames.new(1).drawing
@@ -207,28 +204,26 @@ def test_convert(suzanne):
 # --- combing ---------------------------------------------------------------------------------
 
 
-def stroke_of(points, pressure=1.0):
-    return [
-        {"name": "", "location": tuple(point), "pressure": pressure, "is_start": False}
-        for point in points
-    ]
+def stroke(start, stop):
+    """A stroke along the equator of a unit sphere."""
+    at_rest = {"name": "", "pressure": 1.0, "is_start": False}
+    angles = np.linspace(start, stop, 40)
+    return [{**at_rest, "location": (np.cos(angle), np.sin(angle), 0.0)} for angle in angles]
 
 
-def arc(start, stop, height=0.0):
-    """Points of a unit sphere."""
-    angle = np.linspace(start, stop, 40)
-    ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    return np.sqrt(1 - height**2) * ring + [0, 0, height]
+def face_centers(mesh):
+    """The centers of faces, and the azimuths of these."""
+    center = np.array([face.center for face in mesh.polygons])
+    return center, np.arctan2(center[:, 1], center[:, 0])
 
 
 def test_combed_field_runs_along_the_stroke_and_is_made_again_from_its_guides(scene):
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=5)
     mesh = bpy.context.object.data
     bpy.ops.rosy.field_generate(kind="axis", axis=(1.0, 1.0, 1.0), degree=2)
-    comb = {"stroke": stroke_of(arc(0.0, 1.0)), "radius": 0.15}
+    comb = {"stroke": stroke(0.0, 1.0), "radius": 0.15}
     assert bpy.ops.rosy.field_comb(**comb) == {"FINISHED"}
-    center = np.array([face.center for face in mesh.polygons])
-    azimuth = np.arctan2(center[:, 1], center[:, 0])
+    center, azimuth = face_centers(mesh)
     is_near = (np.abs(center[:, 2]) < 0.03) & (azimuth > 0.1) & (azimuth < 0.9)
     along = np.stack([-np.sin(azimuth), np.cos(azimuth), 0 * azimuth], axis=1)
 
@@ -256,13 +251,12 @@ def test_combing_goes_on_where_something_else_has_changed_the_field(scene):
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
     mesh = bpy.context.object.data
     bpy.ops.rosy.field_generate(kind="axis", degree=2)
-    bpy.ops.rosy.field_comb(stroke=stroke_of(arc(0.0, 1.0)), radius=0.3)
+    bpy.ops.rosy.field_comb(stroke=stroke(0.0, 1.0), radius=0.3)
     bpy.ops.rosy.field_generate(kind="axis", degree=2)
     new = member_vectors(mesh)
     # Far from the first stroke: its guides are of a field that was replaced.
-    bpy.ops.rosy.field_comb(stroke=stroke_of(arc(3.0, 4.0)), radius=0.1, reach=0.02)
-    center = np.array([face.center for face in mesh.polygons])
-    azimuth = np.arctan2(center[:, 1], center[:, 0])
+    bpy.ops.rosy.field_comb(stroke=stroke(3.0, 4.0), radius=0.1, reach=0.02)
+    center, azimuth = face_centers(mesh)
     is_first = (np.abs(center[:, 2]) < 0.1) & (np.abs(azimuth - 0.5) < 0.3)
     assert is_first.any()
     cosine = np.abs((new * member_vectors(mesh)).sum(axis=1)) / np.linalg.norm(new, axis=1) ** 2
@@ -272,10 +266,14 @@ def test_combing_goes_on_where_something_else_has_changed_the_field(scene):
 # --- singularities ---------------------------------------------------------------------------
 
 
+def sphere_with_field(**options):
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4, **options)
+    assert bpy.ops.rosy.field_generate(kind="smoothest", degree=4) == {"FINISHED"}
+    return bpy.context.object
+
+
 def test_singularities_as_points(scene):
-    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
-    ball = bpy.context.object
-    bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
+    ball = sphere_with_field()
     assert bpy.ops.rosy.singularities(show="BOTH") == {"FINISHED"}
     name = "Icosphere singularities"
     points = bpy.data.objects[name]
@@ -298,9 +296,7 @@ def test_singularities_are_where_their_points_are_moved(scene):
     """The points of a field, moved and changed, make a field with these singularities alone."""
     from bl_ext.user_default.rosy.rosy_addon.scene.singularity_points import read_singularities
 
-    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4, location=(1.0, 2.0, 0.0))
-    sphere = bpy.context.object
-    bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
+    sphere = sphere_with_field(location=(1.0, 2.0, 0.0))
     bpy.ops.rosy.singularities(show="POINTS")
     points = bpy.data.objects["Icosphere singularities"]
     count = len(points.data.attributes["index"].data)
@@ -330,19 +326,16 @@ def test_singularities_are_where_their_points_are_moved(scene):
 
 
 def editable_singularities(obj):
-    from bl_ext.user_default.rosy.rosy_addon.scene.singularity_points import (
-        read_editable_singularities,
-    )
+    from bl_ext.user_default.rosy.rosy_addon.scene import singularity_points
 
-    found = read_editable_singularities(obj, bpy.context.evaluated_depsgraph_get())
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    found = singularity_points.read_editable_singularities(obj, depsgraph)
     return dict(zip(found.vertex.tolist(), found.index.tolist(), strict=True)), found
 
 
 def test_a_singularity_is_moved(scene):
     """On the object's own mesh; its place is on the evaluated mesh."""
-    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
-    sphere = bpy.context.object
-    bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
+    sphere = sphere_with_field()
     sphere.modifiers.new("Subdivision", "SUBSURF").levels = 1
     cast = sphere.modifiers.new("Cast", "CAST")
     cast.factor, cast.use_radius_as_size, cast.size = 1.0, False, 3.0
@@ -370,8 +363,7 @@ def test_a_singularity_is_moved(scene):
 def test_opening_a_file_hides_singularities(scene):
     overlay = sys.modules["bl_ext.user_default.rosy.rosy_addon.ui.overlay"]
     handlers = len(bpy.app.handlers.load_pre)
-    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
-    bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
+    sphere_with_field()
     bpy.ops.rosy.singularities(show="OVERLAY")
     assert overlay.shown("Icosphere") and len(bpy.app.handlers.load_pre) == handlers + 1
     bpy.ops.wm.read_homefile(use_empty=True)

@@ -6,25 +6,9 @@ import bpy
 from conftest import EXTENSION
 
 #: Words that are small in titles, and property groups whose properties are controls.
-SMALL_WORDS = {
-    *(
-        "a",
-        "an",
-        "and",
-        "as",
-        "at",
-        "by",
-        "for",
-        "from",
-        "in",
-        "of",
-        "on",
-        "or",
-        "the",
-        "to",
-        "with",
-    )
-}
+SMALL_WORDS = frozenset(
+    ["a", "an", "and", "as", "at", "by", "for", "from", "in", "of", "on", "or", "the", "to", "with"]
+)
 VISIBLE_GROUPS = {"RosyLook", "RosyStrokes", "RosyScene", "RosyMesh", "RosyObject"}
 
 ID_TYPES = (
@@ -48,9 +32,7 @@ def snapshot():
         },
         "attributes": {name: set(dir(getattr(bpy.types, name))) for name in ID_TYPES},
         "handlers": {
-            name: [
-                getattr(handler, "__module__", "") for handler in getattr(bpy.app.handlers, name)
-            ]
+            name: [getattr(each, "__module__", "") for each in getattr(bpy.app.handlers, name)]
             for name in dir(bpy.app.handlers)
             if isinstance(getattr(bpy.app.handlers, name), list)
         },

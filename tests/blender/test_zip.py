@@ -9,14 +9,8 @@ import zipfile
 
 import pytest
 
-TOP_LEVEL = {
-    "LICENSE",
-    "__init__.py",
-    "blender_manifest.toml",
-    "operators",
-    "presets",
-    "rosy_addon",
-}
+TOP_LEVEL = {"blender_manifest.toml"}
+TOP_LEVEL |= {"LICENSE", "__init__.py", "operators", "presets", "rosy_addon"}
 #: The folder of the presets.
 PRESETS = "presets/"
 
@@ -33,17 +27,18 @@ REFUSED_MODULES = {
     *("pip", "ensurepip", "venv", "site", "importlib", "runpy", "imp", "pkgutil", "marshal"),
 }
 
+
+def in_worker(*names):
+    return {f"worker/{name}.py" for name in names}
+
+
 #: Modules that reviewers ask about, and the files that may use them: what RoSy starts is Blender or
 #: its own helpers in Blender's Python, and pickles and pipes are only between these. Of multiprocessing,
 #: only the connections are used: it neither starts nor finds processes.
 QUESTIONED_MODULES = {
-    "subprocess": {
-        *("worker/frame_workers.py", "worker/start.py", "worker/helper.py", "worker/program.py")
-    },
-    "pickle": {"worker/channel.py", "worker/__main__.py"},
-    "multiprocessing": {
-        *("worker/start.py", "worker/helper.py", "worker/channel.py", "worker/pool.py")
-    },
+    "subprocess": in_worker("frame_workers", "start", "helper", "program"),
+    "pickle": in_worker("channel", "__main__"),
+    "multiprocessing": in_worker("start", "helper", "channel", "pool"),
     "ctypes": {"core/memory.py"},
 }
 

@@ -22,13 +22,14 @@ from conftest import contents, pixels
 from run import is_running
 from window_steps import (
     RESULTS,
+    call_in_view,
     descendants,
     fresh_scene,
     in_view,
     preferences,
     press,
     rosy,
-    run_steps,
+    run_module,
     status,
     view,
     wait_until,
@@ -59,8 +60,7 @@ def helper_id():
 
 
 def start_bake():
-    with in_view():
-        assert bpy.ops.rosy.bake("INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
+    assert call_in_view(bpy.ops.rosy.bake, "INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
 
 
 def start_long_bake():
@@ -91,7 +91,7 @@ def wait_for_job():
     return longest
 
 
-def picture_from_the_helper():
+def test_picture_from_the_helper():
     """Blender reacts while the helper draws, and the picture is that of a script."""
     yield from suzanne((1280, 960))
     first = helper_id()
@@ -103,12 +103,11 @@ def picture_from_the_helper():
     assert longest < LARGEST_PAUSE * seconds, (longest, seconds)
     assert helper_id() == first and is_running(first)
     picture = baked_pixels()
-    with in_view():
-        bpy.ops.rosy.bake("EXEC_DEFAULT", True)
+    call_in_view(bpy.ops.rosy.bake, "EXEC_DEFAULT", True)
     np.testing.assert_array_equal(baked_pixels(), picture)
 
 
-def escape_ends_the_helper_at_once():
+def test_escape_ends_the_helper_at_once():
     yield from suzanne((1600, 1200))
     before = contents()
     yield from start_long_bake()
@@ -133,7 +132,7 @@ def escape_ends_the_helper_at_once():
     assert helper_id() not in (None, first), "there is no helper for the next job"
 
 
-def a_helper_that_is_killed():
+def test_a_helper_that_is_killed():
     """Another helper draws the picture. If that is killed as well, there is one message."""
     yield from suzanne((800, 600))
     yield from start_long_bake()
@@ -155,7 +154,7 @@ def a_helper_that_is_killed():
     assert_reported("has ended twice")
 
 
-def without_a_helper():
+def test_without_a_helper():
     """Blender waits for the picture if no process can be started, or the user wants none."""
     helper = rosy("rosy_addon.worker.helper")
     start_process = helper.start_module
@@ -203,7 +202,7 @@ def report_texts():
     return bpy.context.window_manager.clipboard.splitlines()
 
 
-def switched_off():
+def test_switched_off():
     """The helper ends with the extension."""
     yield from suzanne()
     start_bake()
@@ -215,7 +214,7 @@ def switched_off():
     yield 0.2
 
 
-def blender_is_killed():
+def test_blender_is_killed():
     """All processes end, while they draw a large picture together."""
     yield from suzanne((1920, 1440))
     bpy.context.scene.rosy.look.supersampling = 2
@@ -229,11 +228,4 @@ def blender_is_killed():
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-run_steps(
-    picture_from_the_helper,
-    escape_ends_the_helper_at_once,
-    a_helper_that_is_killed,
-    without_a_helper,
-    switched_off,
-    blender_is_killed,
-)
+run_module(globals())

@@ -15,6 +15,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from conftest import add_suzanne
 from window_steps import (
     SHOTS,
+    call_in_view,
     capture,
     in_view,
     open_tab,
@@ -56,15 +57,13 @@ def live():
     bpy.context.preferences.view.ui_scale = SCALE
     bpy.ops.wm.read_homefile(use_empty=True)
     yield 1.0
-    with in_view():
-        bpy.ops.screen.screen_full_area()
+    call_in_view(bpy.ops.screen.screen_full_area)
     yield 1.0
     with in_view():
         add_suzanne(3)
         bpy.ops.object.shade_smooth()
     yield from open_tab()
-    with in_view():
-        bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="form", degree=4)
+    call_in_view(bpy.ops.rosy.field_generate, "EXEC_DEFAULT", True, kind="form", degree=4)
     turn_view()
     session = rosy("rosy_addon.viewport.session")
     yield 2.0
@@ -75,16 +74,13 @@ def live():
 
 def baked():
     """The same mesh with a picture in ink, on its paper."""
-    with in_view():
-        bpy.ops.rosy.preset_apply(preset="engraving")
+    call_in_view(bpy.ops.rosy.preset_apply, preset="engraving")
     scene = bpy.context.scene
     scene.rosy.camera = "VIEW"
     scene.view_settings.view_transform = "Standard"
-    with in_view():
-        bpy.ops.rosy.bake("INVOKE_DEFAULT")
+    call_in_view(bpy.ops.rosy.bake, "INVOKE_DEFAULT")
     yield from wait_until(lambda: len(scene.rosy.bakes), PATIENCE)
-    with in_view():
-        bpy.ops.rosy.show_here()
+    call_in_view(bpy.ops.rosy.show_here)
     yield 10.0
     yield from save_view("window-baked")
 

@@ -34,19 +34,20 @@ from live_views import (
 )
 from window_steps import (
     SHOTS,
+    call_in_view,
     capture,
     in_view,
     preferences,
     redraws,
     rosy,
-    run_steps,
+    run_module,
     view,
     wait_until,
 )
 
 
 @live()
-def every_view_is_a_bake(monkey):
+def test_every_view_is_a_bake(monkey):
     """From several sides, perspective and orthographic."""
     views = ((0.0, -0.6, "PERSP"), (2.1, 0.2, "PERSP"), (4.2, -0.2, "ORTHO"))
     for azimuth, elevation, perspective in views:
@@ -55,7 +56,7 @@ def every_view_is_a_bake(monkey):
         yield from check_is_bake(f"live-view-{azimuth}")
 
 
-def off_restores_the_view():
+def test_off_restores_the_view():
     """Switched on and off again, the view is the same as before, pixel for pixel."""
     yield from fresh_scene()
     # Blender's own antialiasing continues over many redraws, and its result varies.
@@ -73,7 +74,7 @@ def off_restores_the_view():
     check_nothing_is_left()
 
 
-def surfaces_in_front_occlude():
+def test_surfaces_in_front_occlude():
     """An opaque cube covers the field; what the cube hides is not drawn over it."""
     yield from fresh_scene()
     with in_view():
@@ -90,7 +91,7 @@ def surfaces_in_front_occlude():
     switch("OFF")
 
 
-def paper_is_behind_everything():
+def test_paper_is_behind_everything():
     """The backdrop of a hatching: the whole view, the frame of a camera, nothing if it is off."""
     yield from fresh_scene(levels=0)
     scene, space = bpy.context.scene, view()[1].spaces.active
@@ -100,8 +101,7 @@ def paper_is_behind_everything():
     paper = np.array(list(bytes.fromhex(hex_color[1:]))) / 255
     scene.render.resolution_x = scene.render.resolution_y = 400
     scene.camera = add_camera("Camera", (0.0, -6.0, 1.0), (math.radians(80), 0.0, 0.0))
-    with in_view():
-        bpy.ops.mesh.primitive_cube_add(size=0.8, location=(0.0, -2.0, 0.3))
+    call_in_view(bpy.ops.mesh.primitive_cube_add, size=0.8, location=(0.0, -2.0, 0.3))
     switch("ON")
 
     def shows_paper(name):
@@ -132,7 +132,7 @@ def paper_is_behind_everything():
 
 
 @live()
-def only_visible_objects_are_drawn(monkey):
+def test_only_visible_objects_are_drawn(monkey):
     """Hidden objects, local view and wireframe; the frame of a camera."""
     space = view()[1].spaces.active
     with in_view():
@@ -142,13 +142,11 @@ def only_visible_objects_are_drawn(monkey):
     yield from check_is_bake("live-two-degrees")
     monkey.select_set(True)
     bpy.context.view_layer.objects.active = monkey
-    with in_view():
-        bpy.ops.view3d.localview(frame_selected=False)
+    call_in_view(bpy.ops.view3d.localview, frame_selected=False)
     yield from wait_for_final_pictures()
     torus = bpy.data.objects["Torus"]
     assert visible_owners() == [monkey]
-    with in_view():
-        bpy.ops.view3d.localview(frame_selected=False)
+    call_in_view(bpy.ops.view3d.localview, frame_selected=False)
     monkey.select_set(False)
     torus.hide_set(True)
     yield from wait_for_final_pictures()
@@ -166,7 +164,7 @@ def only_visible_objects_are_drawn(monkey):
     space.region_3d.view_perspective = "PERSP"
 
 
-def clipped_region():
+def test_clipped_region():
     """The side that Blender's clipping region cuts away is not drawn."""
     yield from fresh_scene()
     region = view()[2]
@@ -185,16 +183,14 @@ def clipped_region():
     assert changed[:, middle + 5 :].sum() > 2000
     assert changed[:, : middle - 5].sum() == 0
     switch("OFF")
-    with in_view():
-        bpy.ops.view3d.clip_border()
+    call_in_view(bpy.ops.view3d.clip_border)
     yield 0.5
 
 
 @live()
-def quad_view(monkey):
+def test_quad_view(monkey):
     """Four views in one, each from its own side."""
-    with in_view():
-        bpy.ops.screen.region_quadview()
+    call_in_view(bpy.ops.screen.region_quadview)
     yield 0.5
     _, area, _, _ = view()
     regions = [region for region in area.regions if region.type == "WINDOW"]
@@ -203,12 +199,11 @@ def quad_view(monkey):
     for region, region_3d in pairs:
         options = {"region": region, "region_3d": region_3d}
         yield from check_is_bake("live-quad", 0.97, **options)
-    with in_view():
-        bpy.ops.screen.region_quadview()
+    call_in_view(bpy.ops.screen.region_quadview)
 
 
 @live()
-def edits_are_followed(monkey):
+def test_edits_are_followed(monkey):
     """The look, the transform, modifiers, edit mode, sculpting and undo."""
     bpy.context.view_layer.objects.active = monkey
     bpy.context.scene.rosy.look.gain = 1.2
@@ -226,8 +221,7 @@ def edits_are_followed(monkey):
         bpy.ops.mesh.select_all(action="SELECT")
         bpy.ops.transform.resize(value=(1.0, 1.0, 1.08))
     yield from wait_for_final_pictures()
-    with in_view():
-        bpy.ops.object.mode_set(mode="OBJECT")
+    call_in_view(bpy.ops.object.mode_set, mode="OBJECT")
     yield from check_is_bake("live-after-edit")
     if bpy.app.version >= (5, 0):  # before, Blender crashes on this operator in a script
         with in_view():
@@ -243,7 +237,7 @@ def edits_are_followed(monkey):
 
 
 @live()
-def every_frame_is_drawn(monkey):
+def test_every_frame_is_drawn(monkey):
     """Every frame of an animation shows the mesh of that frame, also while it is played."""
     cast = monkey.modifiers.new("Cast", "CAST")
     for frame, factor in ((1, 0.0), (3, 0.6)):
@@ -261,15 +255,13 @@ def every_frame_is_drawn(monkey):
         steps.append((bpy.context.scene.frame_current, shows))
 
     with redraws(record):
-        with in_view():
-            bpy.ops.screen.animation_play()
+        call_in_view(bpy.ops.screen.animation_play)
         yield from wait_until(lambda: len({frame for frame, _ in steps}) >= 3 and len(steps) > 20)
-        with in_view():
-            bpy.ops.screen.animation_cancel(restore_frame=False)
+        call_in_view(bpy.ops.screen.animation_cancel, restore_frame=False)
     assert all(shows for _, shows in steps)
 
 
-def fallback_to_the_processor():
+def test_fallback_to_the_processor():
     """If the driver rejects a shader, the processor draws, and a message says so."""
     yield from fresh_scene()
     sources = rosy("rosy_addon.gpu.passes").ComputePass
@@ -299,7 +291,7 @@ def fallback_to_the_processor():
 
 
 @live(levels=0)
-def a_view_without_a_field_says_why_and_rests(monkey):
+def test_a_view_without_a_field_says_why_and_rests(monkey):
     """Each cause is named in the view; nothing is drawn again; later the field is back."""
     # Blender's own antialiasing continues over many redraws.
     bpy.context.preferences.system.viewport_aa = "OFF"
@@ -319,7 +311,7 @@ def a_view_without_a_field_says_why_and_rests(monkey):
     bpy.context.preferences.system.viewport_aa = "8"
 
 
-def two_windows_with_two_scenes_rest():
+def test_two_windows_with_two_scenes_rest():
     """Two scenes share a mesh with modifiers."""
     yield from fresh_scene(levels=1)
     bpy.context.preferences.system.viewport_aa = "OFF"
@@ -327,8 +319,7 @@ def two_windows_with_two_scenes_rest():
     second_scene = bpy.data.scenes.new("Second")
     second_scene.collection.objects.link(monkey)
     switch("ON")
-    with in_view():
-        bpy.ops.wm.window_new_main()
+    call_in_view(bpy.ops.wm.window_new_main)
     yield 0.5
     window = bpy.context.window_manager.windows[-1]
     window.scene = second_scene
@@ -351,7 +342,7 @@ def two_windows_with_two_scenes_rest():
     check_nothing_is_left()
 
 
-def the_first_field_is_shown():
+def test_the_first_field_is_shown():
     """Make Field makes its view live once, unless the user or the preferences do not want that."""
 
     def make_field(how="EXEC_DEFAULT"):
@@ -364,15 +355,13 @@ def the_first_field_is_shown():
             bpy.ops.wm.read_homefile(use_empty=True)
             yield 0.5
             preferences().live_first_field = wanted
-            with in_view():
-                make_field(how)
+            call_in_view(make_field, how)
             if wanted:
                 yield from wait_until(is_live)
             yield 0.5
             assert is_live() == wanted
         preferences().live_first_field = True
-        with in_view():
-            make_field()
+        call_in_view(make_field)
         assert not is_live(), "the second field came on"
         bpy.ops.wm.read_homefile(use_empty=True)
         yield 0.5
@@ -384,7 +373,7 @@ def the_first_field_is_shown():
     check_nothing_is_left()
 
 
-def live_views_are_remembered():
+def test_live_views_are_remembered():
     """A file shows its live views again if the scene says so, and only then."""
     yield from fresh_scene(levels=0)
     path = str(SHOTS / "remembered.blend")
@@ -414,7 +403,7 @@ def shown_phases():
 
 
 @live(levels=0)
-def streaks_drift_while_they_are_played(monkey):
+def test_streaks_drift_while_they_are_played(monkey):
     """Streaks drift by the button; nothing runs on afterwards."""
     bpy.context.scene.rosy.look.flow = 1.5
     yield from wait_for_final_pictures()
@@ -422,8 +411,7 @@ def streaks_drift_while_they_are_played(monkey):
     session = session_module()._session
 
     def play_or_pause():
-        with in_view():
-            assert bpy.ops.rosy.flow_play() == {"FINISHED"}
+        assert call_in_view(bpy.ops.rosy.flow_play) == {"FINISHED"}
 
     def has_timers():
         return any(map(bpy.app.timers.is_registered, session._timers.values()))
@@ -454,7 +442,7 @@ def streaks_drift_while_they_are_played(monkey):
     assert not has_timers()
 
 
-def nothing_is_left():
+def test_nothing_is_left():
     """Toggles and opened files free all textures; the extension stops the live view with it."""
     path = str(SHOTS / "leak.blend")
     yield from fresh_scene(levels=1)
@@ -476,21 +464,4 @@ def nothing_is_left():
     os.remove(path)
 
 
-run_steps(
-    every_view_is_a_bake,
-    off_restores_the_view,
-    surfaces_in_front_occlude,
-    paper_is_behind_everything,
-    only_visible_objects_are_drawn,
-    clipped_region,
-    quad_view,
-    edits_are_followed,
-    every_frame_is_drawn,
-    fallback_to_the_processor,
-    a_view_without_a_field_says_why_and_rests,
-    two_windows_with_two_scenes_rest,
-    the_first_field_is_shown,
-    live_views_are_remembered,
-    streaks_drift_while_they_are_played,
-    nothing_is_left,
-)
+run_module(globals())

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import sys
+from functools import partial
 from pathlib import Path
 
 import bpy
@@ -18,13 +19,14 @@ from conftest import add_camera, contents, pixels
 from monkey_checks import handlers
 from window_steps import (
     SHOTS,
+    call_in_view,
     capture,
     fresh_scene,
     in_view,
     preferences,
     press,
     rosy,
-    run_steps,
+    run_module,
     save_part,
     status,
     view,
@@ -32,15 +34,14 @@ from window_steps import (
 )
 
 
-def make_field():
-    with in_view():
-        bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="curvature", degree=4)
+def scene_with_field(size=(320, 240)):
+    yield from fresh_scene(size)
+    call_in_view(bpy.ops.rosy.field_generate, "EXEC_DEFAULT", True, kind="curvature", degree=4)
 
 
 def start_job(operator, **settings):
     """Start a job as its button does, and wait until it has made progress."""
-    with in_view():
-        assert operator("INVOKE_DEFAULT", True, **settings) == {"RUNNING_MODAL"}
+    assert call_in_view(operator, "INVOKE_DEFAULT", True, **settings) == {"RUNNING_MODAL"}
     yield from wait_until(lambda: status().current is None or status().current.fraction > 0.1)
     assert status().current is not None, "the job ended before it could be interrupted"
 
@@ -68,18 +69,17 @@ def save_screenshot(name, height=10_000):
 # The steps
 
 
-def panel_without_field():
+def test_panel_without_field():
     yield from fresh_scene()
     yield from save_screenshot("panel-1-no-field")
 
 
-def panel_with_field():
-    yield from fresh_scene(size=(640, 480))
-    make_field()
+def test_panel_with_field():
+    yield from scene_with_field(size=(640, 480))
     yield from save_screenshot("panel-2-field")
 
 
-def singularities_as_dots():
+def test_singularities_as_dots():
     """Dots of both signs are drawn while they are shown; otherwise there is no handler."""
     overlay = rosy("rosy_addon.ui.overlay")
     yield from fresh_scene()
@@ -89,13 +89,11 @@ def singularities_as_dots():
     assert not overlay.DRAW_HANDLERS
     yield from save_screenshot("panel-5-no-singularities")
     without = count_dots("panel-5-no-singularities")
-    with in_view():
-        assert bpy.ops.rosy.singularities(show="OVERLAY") == {"FINISHED"}
+    assert call_in_view(bpy.ops.rosy.singularities, show="OVERLAY") == {"FINISHED"}
     yield from save_screenshot("panel-6-singularities", 450)
     orange, blue = count_dots("panel-6-singularities") - without
     assert orange > 200 and blue > 200, (orange, blue)
-    with in_view():
-        bpy.ops.rosy.singularities(show="NONE")
+    call_in_view(bpy.ops.rosy.singularities, show="NONE")
     assert not overlay.DRAW_HANDLERS
     yield from save_screenshot("panel-7-hidden")
     assert np.abs(count_dots("panel-7-hidden") - without).max() < 100
@@ -109,17 +107,13 @@ def count_dots(name):
     region = view()[2]
     screen = screen[region.y : region.y + region.height, region.x : region.x + region.width // 2]
     red, green, blue = screen[..., 0], screen[..., 1], screen[..., 2]
-    return np.array(
-        [
-            np.count_nonzero((red > 0.8) & (green < 0.5) & (blue < 0.25)),
-            np.count_nonzero((blue > 0.8) & (red < 0.3) & (green < 0.5)),
-        ]
-    )
+    orange = (red > 0.8) & (green < 0.5) & (blue < 0.25)
+    is_blue = (blue > 0.8) & (red < 0.3) & (green < 0.5)
+    return np.array([np.count_nonzero(orange), np.count_nonzero(is_blue)])
 
 
-def bake_with_progress():
-    yield from fresh_scene(size=(800, 600))
-    make_field()
+def test_bake_with_progress():
+    yield from scene_with_field(size=(800, 600))
     bpy.context.scene.rosy.look.method = "brute"  # slow enough to observe the progress
     yield from start_job(bpy.ops.rosy.bake)
     fractions = []
@@ -132,37 +126,33 @@ def bake_with_progress():
     assert [image for image in bpy.data.images if image.name.lower().startswith("rosy")]
 
 
-def panel_with_picture():
+def test_panel_with_picture():
     view()[1].spaces.active.shading.type = "MATERIAL"
     yield 3.0
     yield from save_screenshot("panel-3-baked")
 
 
-def panel_out_of_date():
+def test_panel_out_of_date():
     scene = bpy.context.scene
     scene.camera.location.x += 0.5
     other = add_camera("Another Camera", (0.0, 5.0, 0.0), (math.pi / 2, 0.0, math.pi))
     yield 1.0
-    assert [
-        bake.stale_reason for bake in rosy("rosy_addon.scene.bake_records").list_bakes(scene)
-    ] == ["camera 'Camera' was changed"]
+    (info,) = rosy("rosy_addon.scene.bake_records").list_bakes(scene)
+    assert info.stale_reason == "camera 'Camera' was changed"
     scene.camera = other
-    with in_view():
-        bpy.ops.rosy.bake("EXEC_DEFAULT", True)
+    call_in_view(bpy.ops.rosy.bake, "EXEC_DEFAULT", True)
     scene.view_settings.view_transform = "Standard"
     view()[1].spaces.active.shading.type = "SOLID"
     yield from save_screenshot("panel-4-out-of-date")
 
 
-def eevee_shows_the_picture():
+def test_eevee_shows_the_picture():
     """A render by EEVEE, which needs a window on most machines, shows the picture."""
-    yield from fresh_scene(size=(200, 150))
-    make_field()
+    yield from scene_with_field(size=(200, 150))
     scene = bpy.context.scene
     scene.rosy.look.shading = 0.0
     scene.view_settings.view_transform = "Standard"
-    with in_view():
-        bpy.ops.rosy.bake("EXEC_DEFAULT", True)
+    call_in_view(bpy.ops.rosy.bake, "EXEC_DEFAULT", True)
     engines = scene.render.bl_rna.properties["engine"].enum_items_static.keys()
     scene.render.engine = next(name for name in engines if name.startswith("BLENDER_EEVEE"))
     scene.render.film_transparent, scene.render.filter_size = True, 0.0
@@ -179,35 +169,31 @@ def eevee_shows_the_picture():
     assert difference < 0.02, difference
 
 
-def undo_after_bake():
+def test_undo_after_bake():
     """Undo and redo restore the file, with all pixels, as it was before and after each of two bakes."""
 
     def state():
         return contents(), [pixels(image).tobytes() for image in bpy.data.images]
 
-    yield from fresh_scene(size=(64, 48))
-    make_field()
+    yield from scene_with_field(size=(64, 48))
     states = [state()]
     for seed in (1, 2):
         bpy.context.scene.rosy.look.seed = seed
-        with in_view():
-            bpy.ops.rosy.bake("INVOKE_DEFAULT", True)
+        call_in_view(bpy.ops.rosy.bake, "INVOKE_DEFAULT", True)
         yield from wait_until(lambda: status().current is None)
         yield 0.3
         states.append(state())
     assert states[0] != states[1] != states[2]
     undo, redo = bpy.ops.ed.undo, bpy.ops.ed.redo
     for operator, expected in ((undo, 1), (undo, 0), (redo, 1), (redo, 2)):
-        with in_view():
-            operator()
+        call_in_view(operator)
         yield 0.3
         assert state() == states[expected], expected
 
 
 def interrupt(action, screenshot=None):
     """Start a long bake, call an action, and check that the bake ends and leaves nothing."""
-    yield from fresh_scene(size=(1600, 1200))
-    make_field()
+    yield from scene_with_field(size=(1600, 1200))
     bpy.context.scene.rosy.look.method = "brute"
     before = contents()
     yield from start_job(bpy.ops.rosy.bake)
@@ -220,12 +206,12 @@ def interrupt(action, screenshot=None):
     return before
 
 
-def stop_with_escape():
+def test_stop_with_escape():
     before = yield from interrupt(lambda: press("ESC"), screenshot="baking")
     assert contents() == before
 
 
-def stop_when_the_scene_changes():
+def test_stop_when_the_scene_changes():
     """An object is deleted, the field undone, the scene changed, a file opened; RoSy is switched off."""
 
     def switch_off():
@@ -233,28 +219,15 @@ def stop_when_the_scene_changes():
             switch(module="bl_ext.user_default.rosy")
         preferences().live_first_field = False
 
-    for action in (
-        bpy.ops.object.delete,
-        bpy.ops.ed.undo,
-        lambda: bpy.ops.scene.new(type="EMPTY"),
-        switch_off,
-        None,
-    ):
-
-        def act(action=action):
-            if action is None:
-                bpy.ops.wm.read_homefile(use_empty=True)
-            else:
-                with in_view():
-                    action()
-
-        yield from interrupt(act)
+    actions = [bpy.ops.object.delete, bpy.ops.ed.undo, partial(bpy.ops.scene.new, type="EMPTY")]
+    for action in (*actions, switch_off):
+        yield from interrupt(partial(call_in_view, action))
+    yield from interrupt(partial(bpy.ops.wm.read_homefile, use_empty=True))
 
 
-def export_and_import_from_the_file_browser():
+def test_export_and_import_from_the_file_browser():
     """The file browser opens; after its confirmation the operators run as modal jobs."""
-    yield from fresh_scene()
-    make_field()
+    yield from scene_with_field()
     path = SHOTS / "browser.rosy"
     path.unlink(missing_ok=True)
     attributes = bpy.context.object.data.attributes
@@ -262,8 +235,7 @@ def export_and_import_from_the_file_browser():
         (bpy.ops.rosy.field_export, path.is_file),
         (bpy.ops.rosy.field_import, lambda: "rosy" in attributes),
     ):
-        with in_view():
-            assert operator("INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
+        assert call_in_view(operator, "INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
         yield 1.0
         params = browser_params()
         params.directory, params.filename = str(SHOTS).encode(), path.name
@@ -276,10 +248,9 @@ def export_and_import_from_the_file_browser():
         yield from job_ends()
 
 
-def turntable_encoded_by_another_blender():
+def test_turntable_encoded_by_another_blender():
     """Another Blender encodes an .mp4, and this one handles its events."""
-    yield from fresh_scene()
-    make_field()
+    yield from scene_with_field()
     path = SHOTS / "encoded.mp4"
     with in_view():
         started = bpy.ops.rosy.turntable(
@@ -303,16 +274,14 @@ def browser_params():
     raise AssertionError("there is no file browser")
 
 
-def animation_asks_for_a_folder():
+def test_animation_asks_for_a_folder():
     """In a file that was never saved, Animation opens a file browser for the folder."""
-    yield from fresh_scene(size=(64, 48))
-    make_field()
+    yield from scene_with_field(size=(64, 48))
     folder = SHOTS / "frames"
     folder.mkdir(exist_ok=True)
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 3, 4
-    with in_view():
-        assert bpy.ops.rosy.bake_animation("INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
+    assert call_in_view(bpy.ops.rosy.bake_animation, "INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
     yield 1.0
     browser_params().directory = str(folder).encode()
     yield 0.5
@@ -323,15 +292,13 @@ def animation_asks_for_a_folder():
     assert Path(scene.rosy.directory) == folder
 
 
-def edited_strokes_are_replaced_on_request():
+def test_edited_strokes_are_replaced_on_request():
     """Draw Strokes asks first; without an edit it does not."""
-    yield from fresh_scene()
-    make_field()
+    yield from scene_with_field()
     bpy.context.scene.rosy.strokes.spacing = 30.0
 
     def draw():
-        with in_view():
-            bpy.ops.rosy.strokes("INVOKE_DEFAULT", True)
+        call_in_view(bpy.ops.rosy.strokes, "INVOKE_DEFAULT", True)
 
     draw()
     yield from wait_until(lambda: bpy.context.scene.rosy.strokes.made and status().current is None)
@@ -353,29 +320,11 @@ def edited_strokes_are_replaced_on_request():
     yield from job_ends()
 
 
-def bake_the_current_view():
-    yield from fresh_scene()
-    make_field()
-    with in_view():
-        bpy.ops.rosy.bake("EXEC_DEFAULT", True, camera="VIEW")
+def test_bake_the_current_view():
+    yield from scene_with_field()
+    call_in_view(bpy.ops.rosy.bake, "EXEC_DEFAULT", True, camera="VIEW")
     (image,) = [image for image in bpy.data.images if image.name.lower().startswith("rosy")]
     assert tuple(image.size) == (view()[2].width, view()[2].height)
 
 
-run_steps(
-    panel_without_field,
-    panel_with_field,
-    singularities_as_dots,
-    bake_with_progress,
-    panel_with_picture,
-    panel_out_of_date,
-    eevee_shows_the_picture,
-    undo_after_bake,
-    stop_with_escape,
-    stop_when_the_scene_changes,
-    export_and_import_from_the_file_browser,
-    turntable_encoded_by_another_blender,
-    animation_asks_for_a_folder,
-    edited_strokes_are_replaced_on_request,
-    bake_the_current_view,
-)
+run_module(globals())

@@ -11,7 +11,7 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from window_steps import capture, in_view, open_tab, press, rosy, run_steps, save_part, view
+from window_steps import call_in_view, capture, open_tab, press, rosy, run_module, save_part, view
 
 EXTENSION = "bl_ext.user_default.rosy"
 
@@ -53,7 +53,7 @@ def preview_tones(sidebar):
     return sidebar[low : low + 100, left : left + 100].mean(axis=2)
 
 
-def panel_with_previews():
+def test_panel_with_previews():
     bpy.ops.preferences.addon_disable(module=EXTENSION)
     rosy("rosy_addon.ui.look_panels").VIEW3D_PT_rosy_look.bl_options = set()
     bpy.ops.preferences.addon_enable(module=EXTENSION)
@@ -80,9 +80,8 @@ def press_key(key):
     yield 0.5
 
 
-def preset_chosen_by_its_preview():
-    with in_view():
-        bpy.ops.ed.undo_push(message="before")
+def test_preset_chosen_by_its_preview():
+    call_in_view(bpy.ops.ed.undo_push, message="before")
     x, y = point_on_preview()
     yield from click(x, y)
     yield 1.5
@@ -101,19 +100,17 @@ def preset_chosen_by_its_preview():
     move_to(400, 300)
     tones = preview_tones((yield from save_screenshot("presets-3-chosen")))
     assert (tones > 0.95).mean() > 0.25 and (tones < 0.3).mean() > 0.1, "no ink on paper"
-    with in_view():
-        bpy.ops.ed.undo()
+    call_in_view(bpy.ops.ed.undo)
     yield 0.3
     assert bpy.context.scene.rosy.preset_name == "default"
     assert bpy.context.scene.rosy.look.ink == "soft"
 
 
-def preset_saved_by_a_dialog():
+def test_preset_saved_by_a_dialog():
     settings = bpy.context.scene.rosy
     settings.look.length = 120
     move_to(400, 400)
-    with in_view():
-        bpy.ops.rosy.preset_save("INVOKE_DEFAULT", name="Mine", sentence="Long streaks")
+    call_in_view(bpy.ops.rosy.preset_save, "INVOKE_DEFAULT", name="Mine", sentence="Long streaks")
     yield 1.0
     yield from save_screenshot("presets-4-save")
     yield from press_key("RET")
@@ -122,10 +119,9 @@ def preset_saved_by_a_dialog():
     assert not library().is_changed(settings)
 
 
-def preset_deleted_only_if_confirmed():
+def test_preset_deleted_only_if_confirmed():
     for key, remaining in (("ESC", ["mine"]), ("RET", [])):
-        with in_view():
-            bpy.ops.rosy.preset_remove("INVOKE_DEFAULT")
+        call_in_view(bpy.ops.rosy.preset_remove, "INVOKE_DEFAULT")
         yield 1.0
         yield from save_screenshot(f"presets-9-delete-{key.lower()}")
         yield from press_key(key)
@@ -133,7 +129,7 @@ def preset_deleted_only_if_confirmed():
     yield from save_screenshot("presets-10-deleted")
 
 
-def previews_are_freed_with_the_extension():
+def test_previews_are_freed_with_the_extension():
     yield from wait_for_previews()
     previews = library()._LIBRARY.previews
     assert len(previews) == len(library().entries())
@@ -143,10 +139,4 @@ def previews_are_freed_with_the_extension():
     bpy.ops.preferences.addon_enable(module=EXTENSION)
 
 
-run_steps(
-    panel_with_previews,
-    preset_chosen_by_its_preview,
-    preset_saved_by_a_dialog,
-    preset_deleted_only_if_confirmed,
-    previews_are_freed_with_the_extension,
-)
+run_module(globals())

@@ -40,13 +40,22 @@ ONLY = os.environ.get("ROSY_STEPS", "").split(",")
 MANY = bool(os.environ.get("ROSY_MANY"))
 
 
+def run_module(module):
+    """Run the functions of a module whose names start with test_, in their order."""
+    run_steps(*(value for name, value in module.items() if name.startswith("test_")))
+
+
+def step_name(step):
+    return step.__name__.removeprefix("test_")
+
+
 def run_steps(*steps):
     """Run steps as soon as there is a window, write their results, and end Blender.
 
     If `ONLY` has names, other steps are left out.
     """
     if any(ONLY):
-        steps = [step for step in steps if step.__name__ in ONLY]
+        steps = [step for step in steps if step_name(step) in ONLY]
     bpy.context.preferences.view.show_splash = False
     bpy.context.preferences.view.show_statusbar_stats = False
     bpy.context.preferences.view.smooth_view = 0
@@ -83,7 +92,7 @@ def _run_all(steps):
             yield from step()
         except Exception:
             error = traceback.format_exc()
-        results[step.__name__.replace("_", " ")] = error, round(time.monotonic() - start, 1)
+        results[step_name(step).replace("_", " ")] = error, round(time.monotonic() - start, 1)
         RESULTS.write_text(json.dumps(results))
     results["the end"] = "", 0.0
     RESULTS.write_text(json.dumps(results))
@@ -148,6 +157,12 @@ def in_view():
     """Return a context in which operators find the 3D view."""
     window, area, region, _ = view()
     return bpy.context.temp_override(window=window, area=area, region=region)
+
+
+def call_in_view(operator, *arguments, **settings):
+    """Call an operator in the 3D view, and return its result."""
+    with in_view():
+        return operator(*arguments, **settings)
 
 
 def wait_until(condition, seconds=TIMEOUT_SECONDS):

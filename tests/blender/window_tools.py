@@ -15,7 +15,16 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
-from window_steps import fresh_scene, in_view, redraw_view, rosy, run_steps, view, wait_until
+from window_steps import (
+    call_in_view,
+    fresh_scene,
+    in_view,
+    redraw_view,
+    rosy,
+    run_steps,
+    view,
+    wait_until,
+)
 
 
 def annotations_guide_a_field():
@@ -93,8 +102,7 @@ def singularities_dragged_with_the_tool():
     moved = shown_singularities()
     assert math.isclose(bpy.context.window_manager.operators[-1].reach, 0.3, rel_tol=1e-6)
     assert source not in moved and len(moved) == len(before)
-    with in_view():
-        bpy.ops.ed.undo()
+    call_in_view(bpy.ops.ed.undo)
     yield 0.3
     assert shown_singularities() == before
     yield from drag((-1.15, -0.9, 0.0), (0.2, -0.9, -0.3))  # beside them: selects
@@ -105,8 +113,7 @@ def singularities_dragged_with_the_tool():
     yield from wait_until(lambda: shown_singularities() != before)
     added = dict(shown_singularities().items() - before.items())
     assert sorted(added.values()) == [-1, 1]
-    with in_view():
-        bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
+    call_in_view(bpy.ops.wm.tool_set_by_id, name="builtin.select_box")
 
 
 def field_combed_with_the_tool():
@@ -154,12 +161,10 @@ def comb():
     settings = {"radius": operator.radius, "strength": operator.strength}
     undo, redo = bpy.ops.ed.undo, bpy.ops.ed.redo
     for operator, expected in ((undo, before), (redo, combed), (undo, before)):
-        with in_view():
-            operator()
+        call_in_view(operator)
         yield 0.3
         assert field_bytes() == expected
-    with in_view():
-        bpy.ops.rosy.field_comb("EXEC_DEFAULT", True, stroke=stroke, **settings)
+    call_in_view(bpy.ops.rosy.field_comb, "EXEC_DEFAULT", True, stroke=stroke, **settings)
     assert field_bytes() == combed
     yield from move_mouse((-0.4, -0.9, -0.2), "LEFTMOUSE", "PRESS")
     yield from move_mouse((0.3, -0.9, -0.3))

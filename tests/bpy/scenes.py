@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+import pytest
 from harness.blender_data import contents, member_vectors, pixels  # noqa: F401
 from mathutils import Vector
+from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.field.generate import GeneratorSettings, generate
 from rosy.rosy_addon.scene.look_inputs import FIELDS_ONLY
 from rosy.rosy_addon.scene.mesh_fields import write_mesh_field
@@ -13,6 +15,12 @@ from rosy.rosy_addon.scene.meshes import mesh_surface
 from rosy.rosy_addon.scene.scene_reader import read_scene
 from rosy.rosy_addon.scene.visible_objects import shown_instances
 from rosy.rosy_addon.worker.job import Call
+
+
+def expect_error(match, function, *arguments, **options):
+    """Call a function, which raises a RosyError with this text."""
+    with pytest.raises(RosyError, match=match):
+        function(*arguments, **options)
 
 
 def each_step(steps):
@@ -32,6 +40,13 @@ def each_step(steps):
 
 def depsgraph():
     return bpy.context.evaluated_depsgraph_get()
+
+
+def reopen(path):
+    """Save and open the file, and return its scene."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    return bpy.context.scene
 
 
 def link(obj):

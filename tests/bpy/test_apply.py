@@ -14,7 +14,7 @@ from rosy.rosy_addon.scene import pictures as pictures_room
 from rosy.rosy_addon.scene.bake_records import has_pictures, list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import scene_cameras
 from rosy.rosy_addon.scene.pictures import show_bake
-from scenes import add_camera, contents, depsgraph, each_step, link, pixels
+from scenes import add_camera, contents, depsgraph, each_step, expect_error, link, pixels, reopen
 
 
 def material_of(obj):
@@ -30,11 +30,8 @@ def material_of(obj):
 def test_bakes_survive_saving(scene, camera, monkey, tmp_path):
     (baked,) = bake(scene)
     before = pixels(baked.image)
-    path = str(tmp_path / "scene.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.open_mainfile(filepath=path)
+    scene = reopen(tmp_path / "scene.blend")
     np.testing.assert_array_equal(pixels(bpy.data.images["RoSy Camera"]), before)
-    scene = bpy.context.scene
     assert [(bake.camera, bake.stale_reason) for bake in list_bakes(scene)] == [("Camera", "")]
     assert material_of(bpy.data.objects["Suzanne"]).name == "RoSy Camera"
 
@@ -61,7 +58,7 @@ def test_the_image_holds_the_picture(scene, camera, monkey, tmp_path, store, ima
     assert len(list(tmp_path.iterdir())) == len(files)
 
 
-def test_a_relative_folder_is_that_of_the_working_directory(
+def test_folders_are_relative_to_the_working_directory(
     scene, camera, monkey, tmp_path, monkeypatch
 ):
     """Also after the .blend file was saved elsewhere, which moves relative paths."""
@@ -70,8 +67,7 @@ def test_a_relative_folder_is_that_of_the_working_directory(
     (baked,) = bake(scene)
     expected = pixels(baked.image)
     (tmp_path / "files").mkdir()
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "files/scene.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "files/scene.blend"))
+    reopen(tmp_path / "files/scene.blend")
     np.testing.assert_array_equal(pixels(bpy.data.images["RoSy Camera"]), expected)
 
 
@@ -151,8 +147,7 @@ def test_an_error_while_applying_leaves_nothing(scene, camera, monkey, monkeypat
         raise RosyError("no more")
 
     monkeypatch.setattr(pictures_room, "new_group", fails)
-    with pytest.raises(RosyError, match="no more"):
-        bake(scene)
+    expect_error("no more", bake, scene)
     assert contents() == before
 
 
@@ -168,8 +163,7 @@ def test_several_cameras(scene, camera, monkey):
     assert material_of(monkey).name == "RoSy Second"
     assert [entry.is_shown for entry in list_bakes(scene)] == [False, True]
     assert len(bpy.data.node_groups) == groups
-    with pytest.raises(RosyError, match="camera 'Third', only from 'Second', 'Camera'"):
-        show_bake(scene, "Third")
+    expect_error("camera 'Third', only from 'Second', 'Camera'", show_bake, scene, "Third")
 
 
 def test_warnings(scene, camera, monkey):

@@ -29,12 +29,14 @@ from scenes import (
     aim,
     contents,
     depsgraph,
+    expect_error,
     link,
     member_vectors,
     set_vectors,
 )
 from test_live_reading import LOSSES
 from test_reading import add_directions
+from test_up_to_date import put
 
 
 def assert_refused(*words, **options):
@@ -52,15 +54,12 @@ def assert_refused(*words, **options):
 def test_no_field(scene, camera):
     plane = add_plane()
     assert_refused("no visible object has a RoSy field")
-    with pytest.raises(RosyError, match="object 'Plane' has no attribute 'rosy'"):
-        field_objects(bpy.context.view_layer, ["Plane"])
-    with pytest.raises(RosyError, match="there is no object 'Plain'"):
-        field_objects(bpy.context.view_layer, ["Plain"])
-    with pytest.raises(RosyError, match="'Camera' is not a mesh, but of type Camera"):
-        field_objects(bpy.context.view_layer, ["Camera"])
+    layer = bpy.context.view_layer
+    expect_error("object 'Plane' has no attribute 'rosy'", field_objects, layer, ["Plane"])
+    expect_error("there is no object 'Plain'", field_objects, layer, ["Plain"])
+    expect_error("'Camera' is not a mesh, but of type Camera", field_objects, layer, ["Camera"])
     add_field(plane, kind="axis").hide_render = True
-    with pytest.raises(RosyError, match=r"'Plane' is hidden in renders .*: show it"):
-        field_objects(bpy.context.view_layer, ["Plane"])
+    expect_error(r"'Plane' is hidden in renders .*: show it", field_objects, layer, ["Plane"])
 
 
 def test_more_memory_than_there_is(scene, camera, monkey, monkeypatch):
@@ -119,8 +118,7 @@ def test_no_faces(scene, camera, vertices, edges, reason):
     obj = add_mesh("Bare", vertices, [], edges)
     obj.data.attributes.new("rosy", "FLOAT_VECTOR", "FACE")
     assert_refused("object 'Bare'", "no faces", reason)
-    with pytest.raises(RosyError, match="object 'Bare': the mesh has no faces"):
-        mesh_surface(obj.data)
+    expect_error("object 'Bare': the mesh has no faces", mesh_surface, obj.data)
 
 
 def test_messages_name_the_object_and_not_its_mesh(scene):
@@ -137,12 +135,10 @@ def test_messages_name_the_object_and_not_its_mesh(scene):
             lambda: read_face_scalars(mesh, "weight"),
             lambda: marked_edges(mesh, "SHARP"),
         ):
-            with pytest.raises(RosyError, match=f"^{name}"):
-                read()
+            expect_error(f"^{name}", read)
     for obj in (first, second):
         bpy.data.objects.remove(obj)
-    with pytest.raises(RosyError, match=r"^mesh 'Data' has no attribute 'rosy'"):
-        read_mesh_field(mesh)
+    expect_error(r"^mesh 'Data' has no attribute 'rosy'", read_mesh_field, mesh)
 
 
 @pytest.mark.parametrize(
@@ -162,10 +158,6 @@ def test_odd_meshes_are_drawn(scene, camera, vertices, faces, edges):
     assert bake(scene)
 
 
-def hide(monkey):
-    monkey.hide_viewport = True
-
-
 def roll_vectors(monkey):
     set_vectors(monkey.data, member_vectors(monkey.data)[:, [1, 2, 0]])
 
@@ -175,16 +167,8 @@ def store_too_many_directions(monkey):
     add_directions(monkey.data, 13)
 
 
-def move_away(monkey):
-    monkey.location.x = 100.0
-
-
 def put_a_wall_in_front(monkey):
     add_plane("Wall", size=3.0).location.y = -3.0
-
-
-def use_a_panoramic_camera(monkey):
-    bpy.context.scene.camera.data.type = "PANO"
 
 
 def lose_the_camera(monkey):
@@ -202,12 +186,12 @@ def use_an_odd_name(monkey):
     [
         *((lose, ("'Suzanne'", *words)) for lose, words in LOSSES.values()),
         (lose_the_camera, ("scene 'Scene' has no active camera",)),
-        (hide, ("'Suzanne'", "hidden in the viewport")),
+        (put("Suzanne:hide_viewport", True), ("'Suzanne'", "hidden in the viewport")),
         (roll_vectors, ("'Suzanne', attribute 'rosy'", "not tangent to the surface", "off, face")),
         (store_too_many_directions, ("'Suzanne'", "13 attributes", "at most 12")),
-        (move_away, ("'Camera'", "Suzanne", "outside the frame")),
+        (put("Suzanne:location", (100.0, 0.0, 0.0)), ("'Camera'", "Suzanne", "outside the frame")),
         (put_a_wall_in_front, ("'Camera'", "Suzanne", "hidden behind")),
-        (use_a_panoramic_camera, ("camera 'Camera' is panoramic",)),
+        (put("Camera:data.type", "PANO"), ("camera 'Camera' is panoramic",)),
         (use_an_odd_name, (r"line\nbreak\t\x1b[31m",)),
     ],
 )
@@ -233,8 +217,7 @@ def test_impossible_options_are_refused(scene, camera, monkey, options, words):
 
 @pytest.mark.parametrize("degree", [0, -1, 1000])
 def test_degree(scene, monkey, degree):
-    with pytest.raises(RosyError, match=f"degree {degree} is not"):
-        read_mesh_field(monkey.data, degree=degree)
+    expect_error(f"degree {degree} is not", read_mesh_field, monkey.data, degree=degree)
     monkey.data.rosy.degree = degree
     assert 1 <= monkey.data.rosy.degree <= 12
 
@@ -249,41 +232,36 @@ def test_a_mesh_around_the_camera_is_drawn(scene, camera):
 
 
 def test_writing(scene, monkey):
-    surface = mesh_surface(monkey.data)
-    field = generate(surface, "axis", 4)
-    before = contents()
-    with pytest.raises(RosyError, match="'Suzanne' has 500 faces, but the field has 499"):
-        write_mesh_field(monkey.data, RosyField(4, field.vectors[1:]))
-    with pytest.raises(RosyError, match=r"'UVMap' of another type \(FLOAT2 on CORNER"):
-        write_mesh_field(monkey.data, field, "UVMap")
-    with pytest.raises(RosyError, match="'position' of another type"):
-        write_mesh_field(monkey.data, field, "position")
+    mesh = monkey.data
+    field = generate(mesh_surface(mesh), "axis", 4)
+    before, short = contents(), RosyField(4, field.vectors[1:])
+    expect_error("'Suzanne' has 500 faces, but the field has 499", write_mesh_field, mesh, short)
+    for name, words in (("UVMap", r"type \(FLOAT2 on CORNER"), ("position", "type")):
+        expect_error(f"'{name}' of another {words}", write_mesh_field, mesh, field, name)
     bpy.context.view_layer.objects.active = monkey
     bpy.ops.object.mode_set(mode="EDIT")
-    with pytest.raises(RosyError, match="'Suzanne' is in edit mode"):
-        write_mesh_field(monkey.data, field)
+    expect_error("'Suzanne' is in edit mode", write_mesh_field, monkey.data, field)
     bpy.ops.object.mode_set(mode="OBJECT")
     assert contents() == before
 
 
 def test_guide_objects(scene, monkey):
-    with pytest.raises(RosyError, match="has no attribute 'flow' to follow: choose a vector"):
-        guide_vectors(monkey.data, "flow", mesh_surface(monkey.data))
+    mesh, message = monkey.data, "has no attribute 'flow' to follow: choose a vector"
+    expect_error(message, guide_vectors, mesh, "flow", mesh_surface(mesh))
     spline = bpy.data.curves.new("Line", "CURVE").splines.new("POLY")
     line = link(bpy.data.objects.new("Line", bpy.data.curves["Line"]))
     spline.points.add(1)
     spline.points[0].co.x = np.nan
-    with pytest.raises(RosyError, match="object 'Line' has a point that is not finite"):
-        guide_strokes_and_empties([line], monkey)
+    message = "object 'Line' has a point that is not finite"
+    expect_error(message, guide_strokes_and_empties, [line], monkey)
     monkey.scale.x = 0.0
     bpy.context.view_layer.update()
-    with pytest.raises(RosyError, match="object 'Suzanne' has a scale of zero"):
-        guide_strokes_and_empties([line], monkey)
+    expect_error("object 'Suzanne' has a scale of zero", guide_strokes_and_empties, [line], monkey)
 
 
 def test_a_scene_without_annotations(scene, monkey):
-    with pytest.raises(RosyError, match="has no annotation to follow: draw one on the mesh"):
-        annotation_strokes(scene, monkey)
+    message = "has no annotation to follow: draw one on the mesh"
+    expect_error(message, annotation_strokes, scene, monkey)
 
 
 @pytest.mark.skipif(hasattr(bpy.types, "Annotation"), reason="scripts cannot make annotations")
@@ -368,8 +346,7 @@ def test_linked_mesh_can_be_drawn_but_not_written(library):
     (baked,) = bake(bpy.context.scene)
     assert baked.objects == (obj,)
     field = read_mesh_field(mesh)
-    with pytest.raises(RosyError, match=r"mesh 'Suzanne' is linked from .*library\.blend"):
-        write_mesh_field(mesh, field)
+    expect_error(r"mesh 'Suzanne' is linked from .*library\.blend", write_mesh_field, mesh, field)
 
 
 def test_cameras_of_one_name(library):
@@ -395,17 +372,12 @@ def test_missing_libraries_are_named(library):
     suzanne = scene.objects["Suzanne"]
     missing = "library .*library.blend is missing: relink it"
     for name in ("Suzanne", "Local"):
-        with pytest.raises(RosyError, match=f"object '{name}': its {missing}"):
-            field_objects(layer, [name])
-    with pytest.raises(RosyError, match=f"object 'Suzanne': its {missing}"):
-        camera_of_object(scene, depsgraph(), suzanne)
+        expect_error(f"object '{name}': its {missing}", field_objects, layer, [name])
+    expect_error(f"object 'Suzanne': its {missing}", camera_of_object, scene, depsgraph(), suzanne)
     with pytest.raises(RosyError, match=f"object 'Suzanne': its {missing}"):
         guide_strokes_and_empties([suzanne], scene.objects["Local"])
-    assert_refused(
-        "no visible object has a RoSy field: relink the missing library", "library.blend"
-    )
-    with pytest.raises(RosyError, match="there is no object 'Head': relink the missing library"):
-        field_objects(layer, ["Head"])
+    assert_refused("visible object has a RoSy field: relink the missing library", "library.blend")
+    expect_error("no object 'Head': relink the missing library", field_objects, layer, ["Head"])
 
 
 def test_override_can_be_drawn(library):

@@ -27,6 +27,11 @@ def rosy(capsys):
     return run
 
 
+def succeed(rosy, *words) -> None:
+    status, _, errors = rosy(*words)
+    assert status == 0, errors
+
+
 def error_line(errors: str) -> str:
     """Return the line of an error, which is the only one."""
     (line,) = [line for line in errors.splitlines() if line.startswith("rosy: ")]
@@ -44,16 +49,8 @@ def saved(monkey, camera, tmp_path):
 
 def test_bake_writes_the_picture_and_keeps_the_file(saved, tmp_path):
     before = saved.read_bytes()
-    command = [
-        sys.executable,
-        "-m",
-        "rosy_addon",
-        "bake",
-        str(saved),
-        "--out",
-        str(tmp_path / "out"),
-    ]
-    command += ["--size", "96x64", "--set", "length=10"]
+    words = ("bake", saved, "--out", tmp_path / "out", "--size", "96x64", "--set", "length=10")
+    command = [sys.executable, "-m", "rosy_addon", *map(str, words)]
     process = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert process.returncode == 0, process.stderr
     (picture,) = (tmp_path / "out").iterdir()
@@ -66,8 +63,7 @@ def test_bake_writes_the_picture_and_keeps_the_file(saved, tmp_path):
 
 def test_bake_from_all_cameras_and_save(saved, rosy):
     options = ("--all-cameras", "--preset", "plaid", "--save", "--object", "Suzanne")
-    status, _, errors = rosy("bake", saved, *options)
-    assert status == 0, errors
+    succeed(rosy, "bake", saved, *options)
     bpy.ops.wm.open_mainfile(filepath=str(saved))
     assert sorted(record.name for record in bpy.context.scene.rosy.bakes) == ["Camera", "Side"]
     assert [modifier.type for modifier in bpy.data.objects["Suzanne"].modifiers] == ["NODES"]
@@ -92,8 +88,7 @@ def test_pictures_below_the_folder_of_the_file(monkey, camera, tmp_path, rosy):
     scene, path = bpy.context.scene, tmp_path / "suzanne.blend"
     scene.rosy.store, scene.rosy.directory = "SAVED", "//pictures"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    status, _, errors = rosy("bake", path, "--save")
-    assert status == 0, errors
+    succeed(rosy, "bake", path, "--save")
     assert (tmp_path / "pictures" / "RoSy_Camera.png").is_file()
 
 
@@ -161,8 +156,7 @@ def test_options_override_the_settings_of_the_scene(with_stroke_settings, rosy, 
     changes = "distance=0.5", "light=none", "taper=0", "overshoot=0"
     options = [word for change in changes for word in ("--set", change)]
     options += ["--plotter", "--colors", "red,blue"]
-    status, _, errors = rosy("strokes", with_stroke_settings, "-o", tmp_path / "out.svg", *options)
-    assert status == 0, errors
+    succeed(rosy, "strokes", with_stroke_settings, "-o", tmp_path / "out.svg", *options)
     settings = bpy.context.scene.rosy.strokes
     settings.unit, settings.distance, settings.light = "world", 0.5, "none"
     settings.taper, settings.overshoot = 0.0, 0.0
@@ -178,8 +172,7 @@ def test_strokes_on_selected_objects_only(with_stroke_settings, rosy, tmp_path):
     words = "strokes", with_stroke_settings, "-o", tmp_path / "out.svg"
     status, _, errors = rosy(*words)
     assert status == 2 and "no selected object has a field" in errors
-    status, _, errors = rosy(*words, "--object", "Suzanne")
-    assert status == 0, errors
+    succeed(rosy, *words, "--object", "Suzanne")
 
 
 def test_strokes_of_frames(with_stroke_settings, rosy, tmp_path):
@@ -189,11 +182,9 @@ def test_strokes_of_frames(with_stroke_settings, rosy, tmp_path):
         monkey.keyframe_insert("rotation_euler", frame=frame)
     bpy.ops.wm.save_mainfile()
     options = "strokes", with_stroke_settings, "--set", "spacing=20", "--size", "120x90"
-    status, _, errors = rosy(*options, "--frames", "1-3:2", "-o", tmp_path / "out-###.svg")
-    assert status == 0, errors
+    succeed(rosy, *options, "--frames", "1-3:2", "-o", tmp_path / "out-###.svg")
     drawn = sorted(tmp_path.glob("out-*.svg"))
     assert [path.name for path in drawn] == ["out-001.svg", "out-003.svg"]
     assert drawn[0].read_bytes() != drawn[1].read_bytes()
-    status, _, errors = rosy(*options, "--frames", "3", "-o", tmp_path / "alone.svg")
-    assert status == 0, errors
+    succeed(rosy, *options, "--frames", "3", "-o", tmp_path / "alone.svg")
     assert (tmp_path / "alone.svg").read_bytes() == drawn[1].read_bytes()

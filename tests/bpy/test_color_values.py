@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from rosy.rosy_addon.compositor.look import Look
-from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.jobs.bake_texture import bake_texture
 from rosy.rosy_addon.scene.bake_records import list_bakes
 from rosy.rosy_addon.scene.look_inputs import ReadRequest
 from rosy.rosy_addon.scene.read_view import read_turntable
 from rosy.rosy_addon.scene.scene_reader import read_scene
-from scenes import add_uv, depsgraph
+from scenes import add_uv, depsgraph, expect_error
 
 
 def set_values(mesh, values, name="Angle"):
@@ -36,12 +35,9 @@ def test_numbers_that_are_not_finite_are_none(wall, monkey):
 def test_mistakes_are_one_line_that_lists_the_attributes(wall):
     set_values(wall.data, np.zeros(4), name="Error")
     only = "'Error'$"
-    with pytest.raises(RosyError, match=f"^'Plane': there is no attribute 'Angel' .*only {only}"):
-        read_scene(depsgraph(), None, ReadRequest(color_attribute="Angel"))
-    with pytest.raises(RosyError, match=f"^'Plane': choose an attribute for the colors.*: {only}"):
-        read_scene(depsgraph(), None, ReadRequest(color_attribute=""))
-    with pytest.raises(RosyError, match="object 'Plane', attribute 'rosy': expected a number"):
-        read_scene(depsgraph(), None, ReadRequest(color_attribute="rosy"))
+    expect_error(f"^'Plane': there is no attribute 'Angel' .*only {only}", values_of, "Angel", wall)
+    expect_error(f"^'Plane': choose an attribute for the colors.*: {only}", values_of, "", wall)
+    expect_error("object 'Plane', attribute 'rosy': expected a number", values_of, "rosy", wall)
 
 
 @pytest.fixture
@@ -69,8 +65,7 @@ def test_textures(scene, colored):
     assert "'Plane' was changed" in info.stale_reason
     bake_texture(scene, [colored])
     scene.rosy.color_attribute = ""
-    with pytest.raises(RosyError, match="choose an attribute"):
-        bake_texture(scene, [colored])
+    expect_error("choose an attribute", bake_texture, scene, [colored])
     # The thresholds of hatching have no color.
     scene.rosy.look.ink = "hatch"
     bake_texture(scene, [colored])
@@ -79,7 +74,6 @@ def test_textures(scene, colored):
 def test_relit_hatching_needs_no_numbers(scene, colored):
     scene.rosy.color_attribute = "none"
     scene.rosy.look.ink = "hatch"
-    with pytest.raises(RosyError, match="no attribute 'none'"):
-        bake(scene)
+    expect_error("no attribute 'none'", bake, scene)
     scene.rosy.relight = True
     bake(scene)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.projection.project import project
 from rosy.rosy_addon.scene.cameras import camera_of_object
@@ -18,6 +17,7 @@ from scenes import (
     aim,
     assert_same_directions,
     depsgraph,
+    expect_error,
     member_vectors,
     read_instances,
     read_live,
@@ -173,8 +173,6 @@ def test_one_bad_object_is_left_out_by_name(scene, camera, monkey, broken):
 
 
 def test_a_bad_object_that_was_asked_for_is_an_error(scene, camera, monkey, broken):
-    with pytest.raises(RosyError, match=r"'Broken'.*not tangent"):
-        bake(scene, objects=[monkey, broken])
+    expect_error(r"'Broken'.*not tangent", bake, scene, objects=[monkey, broken])
     monkey.rosy.include = False
-    with pytest.raises(RosyError, match=r"'Broken'.*not tangent"):
-        bake(scene)
+    expect_error(r"'Broken'.*not tangent", bake, scene)

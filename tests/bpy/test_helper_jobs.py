@@ -103,9 +103,6 @@ def test_files_are_the_same(scene, camera, monkey, run_with, tmp_path):
             scene, monkey, folder / "a.gif", count=3, rate=10.0, size=(64, 48), view_angles=(0, 20)
         )
         run_with(where, turntable)
-        files[where] = {
-            path.relative_to(folder): path.read_bytes()
-            for path in sorted(folder.rglob("*"))
-            if path.is_file()
-        }
+        paths = [path for path in folder.rglob("*") if path.is_file()]
+        files[where] = {path.relative_to(folder): path.read_bytes() for path in paths}
     assert len(files["helper"]) == 5 and files["in place"] == files["helper"]

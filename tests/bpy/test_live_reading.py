@@ -98,10 +98,8 @@ def test_a_field_that_nodes_change_is_that_of_a_bake(monkey):
     store = group.nodes["Store Named Attribute"]
     store.data_type, store.domain = "FLOAT_VECTOR", "FACE"
     store.inputs["Name"].default_value = "rosy"
-    named, normal = (
-        group.nodes.new(kind)
-        for kind in ("GeometryNodeInputNamedAttribute", "GeometryNodeInputNormal")
-    )
+    named = group.nodes.new("GeometryNodeInputNamedAttribute")
+    normal = group.nodes.new("GeometryNodeInputNormal")
     named.data_type = "FLOAT_VECTOR"
     named.inputs["Name"].default_value = "rosy"
     cross = group.nodes.new("ShaderNodeVectorMath")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 from rosy.rosy_addon.compositor.look import Look
-from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.preset_files import store
 from rosy.rosy_addon.preset_files.store import Preset, preset_keys, save_preset
 from rosy.rosy_addon.scene.look_properties import read_look
 from rosy.rosy_addon.ui import preset_library
+from scenes import expect_error
 
 LOOK = Look(ink="hatch", gain=1.23456789, guiding_angle=0.1, ink_color="#ABCDEF", seed=7)
 
@@ -82,8 +82,7 @@ def test_unreadable_files_do_not_hide_the_others(scene, user_folder):
     assert list(preset_library.entries()) == preset_keys()
     (load_error,) = preset_library.load_errors()
     assert "broken.json:1:" in load_error
-    with pytest.raises(RosyError, match=r"broken\.json:1:"):
-        preset_library.apply_preset(scene.rosy, "broken")
+    expect_error(r"broken\.json:1:", preset_library.apply_preset, scene.rosy, "broken")
 
 
 def test_presets_are_applied_by_name_and_by_path(scene, user_folder, tmp_path):

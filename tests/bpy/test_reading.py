@@ -6,7 +6,7 @@ import bmesh
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon.core.errors import RosyError
+from mathutils import Matrix
 from rosy.rosy_addon.field.directional_field import field_directions, field_from_directions
 from rosy.rosy_addon.field.frames import normalize
 from rosy.rosy_addon.field.generate import axis_field
@@ -29,6 +29,7 @@ from scenes import (
     assert_same_directions,
     contents,
     depsgraph,
+    expect_error,
     link,
     member_vectors,
     read_instances,
@@ -159,9 +160,7 @@ def test_storage_forms_are_read_again(scene, monkey, form):
     again = read_mesh_field(mesh, nonfinite="zero")
     defined = again.magnitude > 0
     assert defined.mean() > 0.95 and again.degree == 4
-    z, expected = (
-        face_representation(surface, each_field)[defined] for each_field in (again, field)
-    )
+    z, expected = (face_representation(surface, each)[defined] for each in (again, field))
     np.testing.assert_allclose(z, expected, atol=1e-4)
 
 
@@ -223,9 +222,8 @@ def test_an_occluder_hides_pixels(scene, camera):
     near.location.y = -1.0
     graph = depsgraph()
     view = camera_of_object(scene, graph, camera)
-    all_pixels = len(
-        project([instance for instance in read_instances(graph) if instance.field], view).pixel
-    )
+    with_field = [instance for instance in read_instances(graph) if instance.field]
+    all_pixels = len(project(with_field, view).pixel)
     visible_pixels = len(project(read_instances(graph), view).pixel)
     assert 0 < visible_pixels < all_pixels
     add_field(near, kind="axis").rosy.include = False
@@ -275,8 +273,6 @@ def turn_by_armature(obj, matrix):
     rig = bpy.context.object
     obj.vertex_groups.new(name="Bone").add(range(len(obj.data.vertices)), 1.0, "REPLACE")
     obj.modifiers.new("Armature", "ARMATURE").object = rig
-    from mathutils import Matrix
-
     rig.pose.bones["Bone"].matrix = Matrix(matrix).to_4x4() @ rig.pose.bones["Bone"].matrix
     bpy.context.view_layer.update()
 
@@ -284,8 +280,6 @@ def turn_by_armature(obj, matrix):
 @pytest.mark.parametrize("deform", [turn_by_shape_key, turn_by_armature])
 def test_the_field_follows_a_deformation(scene, camera, monkey, deform):
     """Rotated by a shape key or an armature, a mesh looks as if the object were rotated."""
-    from mathutils import Matrix
-
     rotation = Matrix.Rotation(0.7, 3, (0.3, 0.5, 0.8))
     monkey.rotation_mode = "QUATERNION"
     monkey.rotation_quaternion = rotation.to_quaternion()
@@ -371,8 +365,7 @@ def test_marked_edges(scene, mark):
     mesh = bpy.context.object.data
     for edge in mesh.edges:
         edge.select = edge.use_edge_sharp = edge.use_seam = False
-    with pytest.raises(RosyError, match="has no edges of this kind"):
-        marked_edges(mesh, mark)
+    expect_error("has no edges of this kind", marked_edges, mesh, mark)
     for index in (3, 7):
         setattr(mesh.edges[index], EDGE_MARKS[mark][0], True)
     edges = marked_edges(mesh, mark)
@@ -390,8 +383,7 @@ def test_selected_edges_of_a_mesh_made_by_a_script(scene, repeated):
         faces = [tuple(face.vertices) for face in mesh.polygons]
         mesh = add_mesh("Repeated", vertices, faces, edges * 2).data
         assert len(mesh.edges) == count
-        with pytest.raises(RosyError, match="has no edges of this kind"):
-            marked_edges(mesh, "SELECTED")
+        expect_error("has no edges of this kind", marked_edges, mesh, "SELECTED")
     else:
         assert len(marked_edges(mesh, "SELECTED")) == count
 

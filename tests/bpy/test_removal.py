@@ -9,7 +9,7 @@ from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.scene.bake_records import has_pictures, list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import scene_cameras
 from rosy.rosy_addon.scene.pictures import show_bake
-from scenes import add_camera, add_field, add_plane, contents, link
+from scenes import add_camera, add_field, add_plane, contents, link, reopen
 from test_up_to_date import exclude, obj
 
 
@@ -41,28 +41,14 @@ def select(*names):
     bpy.context.view_layer.objects.active = obj(names[-1])
 
 
-def nothing(tmp_path):
-    pass
+def selected(operator, *names):
+    """An action: call an operator for some objects."""
 
+    def act(tmp_path):
+        select(*names)
+        operator()
 
-def duplicate(tmp_path):
-    select("Sheet", "Plain")
-    bpy.ops.object.duplicate()
-
-
-def join(tmp_path):
-    select("Plain", "Sheet")
-    bpy.ops.object.join()
-
-
-def delete(tmp_path):
-    select("Plain")
-    bpy.ops.object.delete()
-
-
-def delete_camera(tmp_path):
-    select("Second")
-    bpy.ops.object.delete()
+    return act
 
 
 def rename(tmp_path):
@@ -81,24 +67,12 @@ def apply(*names):
     return change
 
 
-def apply_and_duplicate(tmp_path):
-    apply("Sheet", "Plain")(tmp_path)
-    duplicate(tmp_path)
+def apply_and(action):
+    def change(tmp_path):
+        apply("Sheet", "Plain")(tmp_path)
+        action(tmp_path)
 
-
-def apply_and_join(tmp_path):
-    apply("Plain")(tmp_path)
-    join(tmp_path)
-
-
-def apply_and_edit(tmp_path):
-    apply("Plain")(tmp_path)
-    bpy.ops.object.mode_set(mode="EDIT")
-
-
-def apply_and_bake_again(tmp_path):
-    apply("Plain")(tmp_path)
-    bake(bpy.context.scene)
+    return change
 
 
 def unlink(tmp_path):
@@ -112,9 +86,7 @@ def copy_modifier(tmp_path):
 
 
 def save_and_open(tmp_path):
-    path = str(tmp_path / "scene.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.open_mainfile(filepath=path)
+    reopen(tmp_path / "scene.blend")
 
 
 def bake_with_another_camera(tmp_path):
@@ -122,28 +94,30 @@ def bake_with_another_camera(tmp_path):
     bake(bpy.context.scene)
 
 
-ACTIONS = {
-    function.__name__: function
-    for function in (
-        *(nothing, duplicate, join, delete, delete_camera, rename, apply_and_duplicate),
-        *(apply_and_join, apply_and_edit, apply_and_bake_again, unlink, copy_modifier),
-        *(save_and_open, bake_with_another_camera),
-    )
+FUNCTIONS = rename, unlink, copy_modifier, save_and_open, bake_with_another_camera
+ACTIONS = {function.__name__: function for function in FUNCTIONS}
+ACTIONS |= {
+    "nothing": lambda _: None,
+    "duplicate": selected(bpy.ops.object.duplicate, "Sheet", "Plain"),
+    "join": selected(bpy.ops.object.join, "Plain", "Sheet"),
+    "delete": selected(bpy.ops.object.delete, "Plain"),
+    "delete_camera": selected(bpy.ops.object.delete, "Second"),
 }
+ACTIONS |= {f"apply and {name}": apply_and(ACTIONS[name]) for name in ("duplicate", "join")}
+ACTIONS["apply and edit"] = apply_and(lambda _: bpy.ops.object.mode_set(mode="EDIT"))
+ACTIONS["apply and bake again"] = apply_and(lambda _: bake(bpy.context.scene))
 ACTIONS |= {"apply": apply("Sheet", "Plain"), "apply one": apply("Plain")}
 ACTIONS["exclude"] = lambda _: exclude("Plain")(bpy.context.scene)
 
 #: Actions on the modifiers of the user, or on RoSy's alone, without a picture.
-NEEDS_PICTURE = ("copy_modifier", "apply_and_bake_again", "bake_with_another_camera")
+NEEDS_PICTURE = ("copy_modifier", "apply and bake again", "bake_with_another_camera")
 
 
 def user_contents():
     """Return the contents of the file, and the material of each face."""
     if bpy.context.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
-    indices = {
-        mesh.name: [polygon.material_index for polygon in mesh.polygons] for mesh in bpy.data.meshes
-    }
+    indices = {m.name: [face.material_index for face in m.polygons] for m in bpy.data.meshes}
     return contents() | indices
 
 
@@ -159,8 +133,8 @@ def test_remove_leaves_what_the_user_has_made(name, store, tmp_path):
         action(tmp_path)
     elif name == "copy_modifier":
         link(add_plane("Copy").copy())
-    elif name == "apply_and_bake_again":
-        apply("Plain")(tmp_path)
+    elif name == "apply and bake again":
+        ACTIONS["apply"](tmp_path)
     expected = user_contents()
     scene = build()
     scene.rosy.store, scene.rosy.directory = store, str(tmp_path / "pictures")

@@ -7,13 +7,12 @@ import json
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.jobs.bake_texture import bake_texture
 from rosy.rosy_addon.scene.bake_records import list_bakes, remove_bakes
 from rosy.rosy_addon.scene.pictures import show_bake
 from rosy.rosy_addon.surface_texture import line_order
-from scenes import add_field, contents, depsgraph, render
+from scenes import add_field, contents, depsgraph, expect_error, render, reopen
 
 
 @pytest.fixture
@@ -149,9 +148,7 @@ def test_tiles_are_pictures_of_their_own(scene, textured, tmp_path):
     name = textured.name
     bpy.ops.object.light_add(type="SUN", rotation=(1.2, 0.0, 0.0))
     bpy.context.object.data.energy = 5.0
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
-    scene = bpy.context.scene
+    scene = reopen(tmp_path / "saved.blend")
     (image,) = (image for image in bpy.data.images if image.source == "TILED")
     assert all(file.filepath.startswith("//RoSy ") for file in image.packed_files)
     packed = render(scene, tmp_path / "packed.exr", samples=1)
@@ -190,8 +187,7 @@ def test_light_can_be_baked(scene, textured):
     """The hatching is then ink, and depends on the lights and on where the object is."""
     scene.rosy.look.ink, scene.rosy.look.shading = "hatch", 1.0
     scene.rosy.texture_bake_light = True
-    with pytest.raises(RosyError, match="'Scene' has no lights"):
-        bake_texture(scene, [textured])
+    expect_error("'Scene' has no lights", bake_texture, scene, [textured])
     lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "SUN"))
     scene.collection.objects.link(lamp)
     means = []

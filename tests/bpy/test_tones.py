@@ -21,7 +21,7 @@ from rosy.rosy_addon.scene.look_inputs import (
 )
 from rosy.rosy_addon.scene.pictures import read_output_settings
 from rosy.rosy_addon.scene.scene_reader import SceneReader, read_scene
-from scenes import add_field, add_mesh, add_uv, depsgraph, read_live
+from scenes import add_field, add_mesh, add_uv, depsgraph, expect_error, read_live
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
@@ -78,9 +78,8 @@ def test_attributes_of_all_domains(wall, domain, kind):
     face = np.repeat(np.arange(4), 4)
     element = {"POINT": corner, "FACE": face, "CORNER": np.arange(len(corner))}[domain]
     tone = tone_of(ToneRequest("attribute", "Ink")).values
-    np.testing.assert_allclose(
-        tone[:, 0], expected[element], atol=0.01 if kind == "BYTE_COLOR" else 1e-6
-    )
+    tolerance = 0.01 if kind == "BYTE_COLOR" else 1e-6
+    np.testing.assert_allclose(tone[:, 0], expected[element], atol=tolerance)
 
 
 def test_the_default_is_the_active_color_attribute(wall):
@@ -102,16 +101,14 @@ def test_missing_attributes(wall, monkey):
         read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("attribute", "Pain")))
     for name in ("'Pain'", "'Paint'", "'Plane'", "'Suzanne'"):
         assert name in str(caught.value)
-    with pytest.raises(RosyError, match="no color attribute"):
-        read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("attribute")))
+    expect_error("no color attribute", tone_of, ToneRequest("attribute"))
 
 
 def test_unsuitable_attributes(wall):
-    with pytest.raises(RosyError, match="object 'Plane', attribute 'rosy': expected"):
-        read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("attribute", "rosy")))
+    rosy, ink = (ToneRequest("attribute", name) for name in ("rosy", "Ink"))
+    expect_error("object 'Plane', attribute 'rosy': expected", tone_of, rosy)
     add_attribute(wall.data, "Ink", "POINT", "FLOAT", np.full(9, np.nan))
-    with pytest.raises(RosyError, match="attribute 'Ink': has values that are not finite"):
-        read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("attribute", "Ink")))
+    expect_error("attribute 'Ink': has values that are not finite", tone_of, ink)
 
 
 # --- images ---------------------------------------------------------------------------------------
@@ -131,12 +128,10 @@ def test_luminance_of_images():
 
 
 def test_missing_images_and_uv_maps(wall):
-    with pytest.raises(RosyError, match="'Plane': choose an image for the tone"):
-        read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("image")))
+    expect_error("'Plane': choose an image for the tone", tone_of, ToneRequest("image"))
     wall.rosy.tone_image = add_image()
     bpy.context.view_layer.update()
-    with pytest.raises(RosyError, match="object 'Plane' has no UV map: unwrap"):
-        read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("image")))
+    expect_error("object 'Plane' has no UV map: unwrap", tone_of, ToneRequest("image"))
     add_uv(wall.data)
     tone = tone_of(ToneRequest("image"))
     np.testing.assert_allclose(
@@ -144,8 +139,7 @@ def test_missing_images_and_uv_maps(wall):
     )
     assert tone.values.min() == 0 and tone.values.max() == 1
     wall.rosy.tone_uv_map = "Other"
-    with pytest.raises(RosyError, match="no UV map 'Other'"):
-        read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("image")))
+    expect_error("no UV map 'Other'", tone_of, ToneRequest("image"))
 
 
 # --- pictures -------------------------------------------------------------------------------------

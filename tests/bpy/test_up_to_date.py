@@ -5,6 +5,7 @@ A change either changes what the next bake gives, and the panel says so, or neit
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import bmesh
@@ -42,12 +43,9 @@ def build(tmp_path):
     sheet.modifiers.new("Wave", "WAVE").show_viewport = False
     plain = add_field(add_plane("Plain", size=0.4, cuts=2), kind="axis")
     plain.location = (0.9, 0.0, 0.9)
-    in_front = add_plane("In Front", size=0.25)
-    in_front.location = (-0.4, -1.0, 0.2)
-    behind = add_plane("Behind", size=3.0)
-    behind.location = (0.0, 2.0, 0.0)
-    aside = add_plane("Aside", size=0.2)
-    aside.location = (30.0, -1.0, 0.0)
+    add_plane("In Front", size=0.25).location = (-0.4, -1.0, 0.2)
+    add_plane("Behind", size=3.0).location = (0.0, 2.0, 0.0)
+    add_plane("Aside", size=0.2).location = (30.0, -1.0, 0.0)
     lamp = link(bpy.data.objects.new("Key", bpy.data.lights.new("Key", "POINT")))
     lamp.data.energy = 300.0
     lamp.location = (2.0, -3.0, 3.0)
@@ -156,10 +154,6 @@ def instanced(scene):
     copies.location = (-1.6, 0.0, 0.0)
 
 
-def hatched(scene):
-    scene.rosy.look.ink = "hatch"
-
-
 def relit(scene):
     """Hatching by the light of the scene, whatever the light is."""
     scene.rosy.look.ink, scene.rosy.look.light, scene.rosy.relight = "hatch", "scene", True
@@ -178,28 +172,15 @@ def put(path, value):
     def change(scene):
         owner, _, rest = path.partition(":")
         target = obj(owner) if rest else scene
-        *parents, name = (rest or owner).split(".")
-        for parent in parents:
-            target = getattr(target, parent)
-        setattr(target, name, value)
+        parent, _, name = (rest or owner).rpartition(".")
+        setattr(target.path_resolve(parent) if parent else target, name, value)
 
     return change
 
 
-def shape_key(scene):
-    obj("Sheet").data.shape_keys.key_blocks["Bent"].value = 0.5
-
-
-def modifier(scene):
-    obj("Sheet").modifiers["Wave"].show_viewport = True
-
-
-def subdivide_more(scene):
-    obj("Plain").modifiers["Subdivision"].levels = 2
-
-
-def modifier_of_render(scene):
-    obj("Plain").modifiers["Subdivision"].render_levels = 4
+bend = partial(put, 'Sheet:data.shape_keys.key_blocks["Bent"].value')
+SUBDIVISION, WAVE = 'Plain:modifiers["Subdivision"]', 'Sheet:modifiers["Wave"]'
+hatched = put("rosy.look.ink", "hatch")
 
 
 def add_occluder(x):
@@ -286,10 +267,6 @@ def exclude(name):
     return change
 
 
-def turn_lamp(scene):
-    obj("Key").rotation_euler.x += 1.0
-
-
 def frame(number):
     return lambda scene: scene.frame_set(number)
 
@@ -302,18 +279,14 @@ def there_and_back(scene):
     obj("Plain").location.x = 0.9
 
 
-def bent(scene):
-    obj("Sheet").data.shape_keys.key_blocks["Bent"].value = 1.0
-
-
 #: The change, what is prepared before the first bake, and the word of the panel; "" if the picture
 #: stays the same.
 TABLE = {
     # objects
-    "shape key": (shape_key, None, "'Sheet' was changed"),
-    "modifier switched on": (modifier, None, "'Sheet' was changed"),
-    "modifier setting": (subdivide_more, subdivided, "'Plain' was changed"),
-    "render setting of a modifier": (modifier_of_render, subdivided, ""),
+    "shape key": (bend(0.5), None, "'Sheet' was changed"),
+    "modifier switched on": (put(f"{WAVE}.show_viewport", True), None, "'Sheet' was changed"),
+    "modifier setting": (put(f"{SUBDIVISION}.levels", 2), subdivided, "'Plain' was changed"),
+    "render setting of a modifier": (put(f"{SUBDIVISION}.render_levels", 4), subdivided, ""),
     "object moved": (move("Plain", 0.1, 0.0, 0.0), None, "'Plain' was moved"),
     "object moved there and back": (there_and_back, None, ""),
     "parent moved": (move("Parent", 0.1, 0.0, 0.0), None, "'Sheet' was moved"),
@@ -336,7 +309,7 @@ TABLE = {
     "object added": (add_field_object, None, "'New' was added"),
     "collection excluded": (exclude("Plain"), None, "'Plain' is not visible"),
     "object renamed": (put("Plain:name", "Other"), None, ""),
-    "smooth shading": (shade_smooth("Sheet"), bent, "'Sheet' was changed"),
+    "smooth shading": (shade_smooth("Sheet"), bend(1.0), "'Sheet' was changed"),
     "instances moved": (move("Copies", 0.2, 0.0, 0.0), instanced, "'Plain' was moved"),
     "instances removed": (delete("Copies"), instanced, "'Plain' was"),
     "frame of an animation": (frame(6), animated, "'Plain' was moved"),
@@ -351,7 +324,7 @@ TABLE = {
     # lights
     "lamp energy": (put("Key:data.energy", 900.0), scene_lights, "light 'Key' was changed"),
     "lamp moved": (move("Key", -2.0, 0.0, 0.0), scene_lights, "light 'Key' was changed"),
-    "lamp turned": (turn_lamp, scene_lights, ""),
+    "lamp turned": (put("Key:rotation_euler", (1.0, 0.0, 0.0)), scene_lights, ""),
     "lamp renamed": (put("Key:name", "Lamp"), scene_lights, ""),
     "lamp added": (add_light, scene_lights, "light 'Fill' was added"),
     "lamp deleted": (delete("Key"), scene_lights, "light 'Key' was deleted"),
@@ -399,10 +372,8 @@ TABLE = {
 
 def bake_word(scene):
     """Return what the panel says about the picture, in a scene that is watched and in one that is not."""
-    (watched,), (info,) = (
-        list_bakes(scene, for_panel=for_panel, automatic_device=automatic_device)
-        for for_panel in (True, False)
-    )
+    (watched,) = list_bakes(scene, for_panel=True, automatic_device=automatic_device)
+    (info,) = list_bakes(scene, automatic_device=automatic_device)
     assert not info.unknown_reason
     assert watched.stale_reason == info.stale_reason
     return info.stale_reason
@@ -421,27 +392,22 @@ def given(scene):
     (record,) = scene.rosy.bakes
     image = record.image
     modifiers = [m for other in scene.objects for m in other.modifiers if m.type == "NODES"]
-    groups = [
-        (
-            [np.round(tuple(each.matrix), 5).tolist() for each in group.rosy.projections],
-            sum(modifier.node_group == group for modifier in modifiers),
-        )
-        for group in bpy.data.node_groups
-    ]
-    sockets = [
-        (node.bl_idname, getattr(socket, "default_value", ""))
-        for node in record.material.node_tree.nodes
-        for socket in node.inputs
-    ]
+    groups = []
+    for group in bpy.data.node_groups:
+        matrices = [np.round(tuple(each.matrix), 5).tolist() for each in group.rosy.projections]
+        groups.append((matrices, sum(modifier.node_group == group for modifier in modifiers)))
+    material = []
+    for node in record.material.node_tree.nodes:
+        for socket in node.inputs:
+            value = getattr(socket, "default_value", "")
+            value = value if isinstance(value, str) else np.round(value, 5).tolist()
+            material.append((node.bl_idname, value))
     return {
         "pixels": pixels(image).tobytes(),
         "size": tuple(image.size),
         "float": image.is_float,
         "packed": image.packed_file is not None,
-        "material": [
-            (kind, value if isinstance(value, str) else np.round(value, 5).tolist())
-            for kind, value in sockets
-        ],
+        "material": material,
         "groups": sorted(groups),
     }
 

@@ -122,14 +122,10 @@ def test_missing_libraries(library, tmp_path):
     suffix = {"pyvista": "vtu", "meshio": "msh", "h5py": "med"}[library]
     (tmp_path / f"a.{suffix}").write_text("x")
     words = ("render", f"a.{suffix}", "-o", "a.png")
-    run = subprocess.run(
-        [sys.executable, "-c", code, *words],
-        cwd=tmp_path,
-        env={"PYTHONPATH": str(ROOT), "PATH": ""},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    command = [sys.executable, "-c", code, *words]
+    environment = {"PYTHONPATH": str(ROOT), "PATH": ""}
+    streams = {"capture_output": True, "text": True}
+    run = subprocess.run(command, cwd=tmp_path, env=environment, check=False, **streams)
     message = f"rosy: a.{suffix}: needs {library}: pip install rosyfields[io]\n"
     assert (run.returncode, run.stdout, run.stderr) == (2, "", message)
 
@@ -248,10 +244,7 @@ def test_film_of_fields_errors(rosy, turning, monkeypatch):
         ("square.obj field1.rosy cross.rosy", "field 2 of 2 has degree 4, but the one before it 1"),
         ("square.obj field1.rosy none.rosy", "none.rosy: cannot be read: no such file"),
         ("field1.rosy field2.rosy", "field1.rosy: is not a mesh file: name the mesh first"),
-        (
-            "square.obj field1.rosy field2.rosy --array U",
-            "--array applies only to files of simulations",
-        ),
+        ("square.obj field1.rosy field2.rosy --array U", "applies only to files of simulations"),
     ):
         status, output, errors = rosy("film", *files.split(), "-o", "a.gif")
         assert (status, output) == (2, "") and message in errors and errors.count("\n") == 1

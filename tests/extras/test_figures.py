@@ -201,9 +201,7 @@ def test_formulas(fields, tmp_path, error_of):
 
 
 def test_what_a_figure_refuses(fields, error_of):
-    other = rf.Surface(
-        pv.Icosphere(nsub=1).points, pv.Icosphere(nsub=1).faces.reshape(-1, 4)[:, 1:]
-    )
+    other = rf.Surface(pv.Icosphere(nsub=1))
     for arguments, message in (
         ({"parts": ("legend",)}, "choose fields, differences, table"),
         ({"parts": ()}, "needs parts"),
@@ -221,9 +219,8 @@ def test_what_a_figure_refuses(fields, error_of):
 def test_the_command(tmp_path, rosy, fields, surface):
     pv.PolyData.from_regular_faces(surface.vertices, surface.faces).save(tmp_path / "ball.ply")
     words = ("compare", tmp_path / "ball.ply", "Ours=smoothest", "form", "--dpi", 50)
-    status, output, errors = rosy(
-        *words, "-o", tmp_path / "a.pdf", "--caption", "A ball", "--degree", 2
-    )
+    options = "-o", tmp_path / "a.pdf", "--caption", "A ball", "--degree", 2
+    status, output, errors = rosy(*words, *options)
     assert (status, errors) == (0, "") and "Ours" in output
     assert len(re.findall(rb"/Type /Page\b", (tmp_path / "a.pdf").read_bytes())) == 2
     assert rosy(*words, "-o", tmp_path / "a.png", "--set", "supersampling=1")[0] == 0

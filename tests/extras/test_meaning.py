@@ -21,6 +21,14 @@ ORDERS = {
 }
 
 
+def with_tensor(mesh, values, names):
+    """A mesh with one face, and a tensor on it whose components have names."""
+    mesh.cell_data["s"] = np.array([values])
+    for index, name in enumerate(names):
+        mesh.cell_data.VTKObject.GetArray("s").SetComponentName(index, name)
+    return mesh
+
+
 def components(names):
     digits = str.maketrans("123", "XYZ")
     axes = [["XYZ".index(c) for c in name.translate(digits)[-2:]] for name in names]
@@ -46,10 +54,7 @@ def test_names_of_components_decide(name, tmp_path, recwarn):
             file["CHA/s"].attrs["NOM"] = np.bytes_("".join(f"{n:16}" for n in names))
     else:
         mesh = pv.PolyData(POINTS, [4, 0, 1, 2, 3]).cast_to_unstructured_grid()
-        mesh.cell_data["s"] = rows
-        for index, component in enumerate(names):
-            mesh.cell_data.VTKObject.GetArray("s").SetComponentName(index, component)
-        mesh.save(path)
+        with_tensor(mesh, rows[0], names).save(path)
     surface = rf.Surface(path)
     assert off_axis(surface, rf.from_array(surface)) < 1e-4
     assert not [w for w in recwarn if issubclass(w.category, RosyWarning)]
@@ -57,8 +62,7 @@ def test_names_of_components_decide(name, tmp_path, recwarn):
 
 def test_components_without_names_are_in_the_order_of_vtk():
     mesh = pv.PolyData(POINTS, [4, 0, 1, 2, 3])
-    mesh.cell_data["s"] = components(("XX", "YY", "ZZ", "XY", "YZ", "XZ"))[None]
-    surface = rf.Surface(mesh)
+    surface = rf.Surface(with_tensor(mesh, components(("XX", "YY", "ZZ", "XY", "YZ", "XZ")), ()))
     with pytest.warns(RosyWarning, match="have no names"):
         field = rf.from_array(surface)
     assert off_axis(surface, field) < 1e-4
@@ -67,11 +71,9 @@ def test_components_without_names_are_in_the_order_of_vtk():
 def test_a_tensor_in_the_plane():
     """[[3, 1], [1, -1]] has its major line at atan(1/2) / 2, in memory as in a file."""
     mesh = pv.PolyData([[0.0, 0, 0], [1, 0, 0], [1, 1, 0]], [3, 0, 1, 2])
-    mesh.cell_data["s"] = np.array([[3.0, 1.0, -1.0]])
-    for index, component in enumerate(("XX", "XY", "YY")):
-        mesh.cell_data.VTKObject.GetArray("s").SetComponentName(index, component)
-    path_mesh = rf.Surface(mesh.cast_to_unstructured_grid())
-    x, y, _ = rf.from_array(path_mesh).directions[0, 0]
+    with_tensor(mesh, (3.0, 1.0, -1.0), ("XX", "XY", "YY"))
+    surface = rf.Surface(mesh.cast_to_unstructured_grid())
+    x, y, _ = rf.from_array(surface).directions[0, 0]
     assert np.isclose(np.tan(2 * np.arctan2(y, x)), 0.5)
 
 
@@ -107,17 +109,5 @@ def test_borders_with_other_data_stay_apart():
 
 
 def test_bodies_that_touch_stay_apart():
-    cube = pv.Box()
-    other = cube.translate((2.0, 0.0, 0.0))
-    both = cube.merge(other, merge_points=False)
+    both = pv.Box().merge(pv.Box().translate((2.0, 0.0, 0.0)), merge_points=False)
     assert rf.Surface(both).euler_characteristic == 4
-
-
-def test_meshes_are_joined_on_request():
-    split = pv.Cylinder()  # its caps have vertices of their own
-    faces = split.regular_faces if split.is_all_triangles else [f for f in split.irregular_faces]
-    assert rf.Surface(split.points, faces).euler_characteristic == 2
-    assert len(rf.Surface(split.points, faces).vertices) == 400
-    with pytest.warns(RosyWarning, match="200 vertices"):
-        joined = rf.Surface(split.points, faces, join=True)
-    assert (len(joined.vertices), joined.euler_characteristic) == (200, 2)

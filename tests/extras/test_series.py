@@ -68,9 +68,10 @@ def write_numbered(folder, mesh):
     return sorted(folder.glob("step_*.vtu"))
 
 
-@pytest.mark.parametrize(
-    "write", [write_pvd, write_series, write_xdmf, write_text_xdmf, write_numbered]
-)
+WRITERS = write_pvd, write_series, write_xdmf, write_text_xdmf, write_numbered
+
+
+@pytest.mark.parametrize("write", WRITERS)
 def test_series(write, tmp_path, sphere):
     paths = write(tmp_path, sphere)
     times = [None] * 3 if write is write_numbered else TIMES

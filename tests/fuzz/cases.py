@@ -67,9 +67,8 @@ def make_case(category: str, seed: int, folder: Path) -> Case:
 _OUTPUTS = {
     "render": (".png",),
     "strokes": (".svg", ".svg", ".ply", ".obj", ".csv"),
-    "field": (
-        *(".rosy", ".rawfield", ".txt", ".npy", ".obj", ".sings"),
-        *(".npz", ".vtp", ".vtu", ".ply"),
+    "field": tuple(
+        [".rosy", ".rawfield", ".txt", ".npy", ".obj", ".sings", ".npz", ".vtp", ".vtu", ".ply"]
     ),
     "turntable": (".gif",),
 }

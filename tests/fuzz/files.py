@@ -141,13 +141,11 @@ def png_bytes(rng: Generator, size: tuple[int, int] | None = None) -> bytes:
     chunks += [(b"IDAT", compressed[half:]), (b"IEND", b"")]
     if rng.random() < 0.05:
         del chunks[rng.integers(len(chunks))]
-    return b"\x89PNG\r\n\x1a\n" + b"".join(
-        struct.pack(">I", len(content))
-        + kind
-        + content
-        + struct.pack(">I", zlib.crc32(kind + content))
-        for kind, content in chunks
-    )
+    data = b"\x89PNG\r\n\x1a\n"
+    for kind, content in chunks:
+        data += struct.pack(">I", len(content)) + kind + content
+        data += struct.pack(">I", zlib.crc32(kind + content))
+    return data
 
 
 _OTHER_VALUES = (None, [], {}, [1], "", "nan", True, -1, 10**400, 1e308, "\x1b[31m", "\u202e", 0.1)

@@ -10,6 +10,7 @@ from numpy.random import Generator
 
 #: Points (V, 3), and the faces as tuples of vertex indices.
 Polygons = tuple[np.ndarray, list[tuple[int, ...]]]
+Writer = Callable[[Generator, np.ndarray, list], bytes]
 
 
 def random_mesh(rng: Generator, *, faults: int | None = None) -> Polygons:
@@ -28,9 +29,8 @@ def _sheet(rng: Generator) -> Polygons:
     height, angle = v.ravel() / (rows - 1), 2 * np.pi * u.ravel() / columns
     around, radius = 2 * np.pi * v.ravel() / rows, np.ones(columns * rows)
     if kind == 0:
-        points = np.stack(
-            [u.ravel(), v.ravel(), rng.choice([0.0, 0.3]) * rng.normal(size=columns * rows)], axis=1
-        )
+        bumps = rng.choice([0.0, 0.3]) * rng.normal(size=columns * rows)
+        points = np.stack([u.ravel(), v.ravel(), bumps], axis=1)
     else:
         radius = (radius, rng.choice([0.0, 0.3, 1.0], rows)[v.ravel()], 1 + 0.4 * np.cos(around))[
             kind % 3
@@ -203,11 +203,11 @@ def _ply(rng: Generator, points: np.ndarray, faces: list) -> bytes:
     table = np.zeros(len(points), dtype=[("xyz", end + _PLY_TYPES[real], 3), ("rgb", "u1", 3)])
     with np.errstate(over="ignore"):
         table["xyz"], table["rgb"] = points, tones
-    body = b"".join(
-        np.array(len(f), end + _PLY_TYPES[count]).tobytes() + np.array(f, end + "i4").tobytes()
-        for f in faces
-    )
-    return head + table.tobytes() + body
+    data = head + table.tobytes()
+    for face in faces:
+        data += np.array(len(face), end + _PLY_TYPES[count]).tobytes()
+        data += np.array(face, end + "i4").tobytes()
+    return data
 
 
 def _stl(rng: Generator, points: np.ndarray, faces: list) -> bytes:
@@ -224,9 +224,4 @@ def _stl(rng: Generator, points: np.ndarray, faces: list) -> bytes:
 
 
 #: The writer of each extension.
-WRITERS: dict[str, Callable[[Generator, np.ndarray, list], bytes]] = {
-    ".obj": _obj,
-    ".off": _off,
-    ".ply": _ply,
-    ".stl": _stl,
-}
+WRITERS: dict[str, Writer] = {".obj": _obj, ".off": _off, ".ply": _ply, ".stl": _stl}

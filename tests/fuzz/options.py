@@ -67,11 +67,8 @@ def random_options(
             if action.nargs == 0:
                 words.append(name)
                 continue
-            value = (
-                random_word(rng).replace("\0", "")
-                if rng.random() < wild
-                else _value(rng, action, command)
-            )
+            is_wild = rng.random() < wild
+            value = random_word(rng).replace("\0", "") if is_wild else _value(rng, action, command)
             words += [name, value] if rng.random() < 0.5 else [f"{name}={value}"]
     return words
 

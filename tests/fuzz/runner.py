@@ -45,8 +45,9 @@ def main() -> int:
     parser.add_argument(
         "--category", action="append", choices=list(CATEGORIES), help="by default all of them"
     )
+    folder = Path("dist/fuzz")
     parser.add_argument(
-        "--keep", type=Path, default=Path("dist/fuzz"), help="folder for the cases with faults"
+        "--keep", type=Path, default=folder, help="folder for the cases with faults"
     )
     parser.add_argument("--verbose", action="store_true", help="print the outcome of every case")
     options = parser.parse_args()

@@ -32,9 +32,8 @@ def test_trimesh_keeps_colors_and_attributes():
 def test_trimesh_textures_and_scenes():
     trimesh = pytest.importorskip("trimesh")
     uv = SQUARE[:, :2] * 0.5
-    mesh = trimesh.Trimesh(
-        SQUARE, TRIANGLES, visual=trimesh.visual.TextureVisuals(uv=uv), process=False
-    )
+    visual = trimesh.visual.TextureVisuals(uv=uv)
+    mesh = trimesh.Trimesh(SQUARE, TRIANGLES, visual=visual, process=False)
     np.testing.assert_array_equal(rf.Surface(mesh).uv, uv[TRIANGLES.ravel()])
     scene = trimesh.Scene()
     scene.add_geometry(mesh)

@@ -37,9 +37,8 @@ PICTURES = {
 def test_a_notebook_runs_and_shows_its_pictures(path, tmp_path, monkeypatch):
     notebook = nbformat.read(path, as_version=4)
     for cell in code_cells(notebook):
-        assert not cell.outputs and cell.execution_count is None, (
-            "clear the outputs before a commit"
-        )
+        is_clear = not cell.outputs and cell.execution_count is None
+        assert is_clear, "clear the outputs before a commit"
     run(notebook, tmp_path, monkeypatch)
     executed = ROOT / "dist/notebooks" / path.name
     executed.parent.mkdir(parents=True, exist_ok=True)

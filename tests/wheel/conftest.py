@@ -23,9 +23,8 @@ ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "PYTHON
 
 def run(*command, folder, env=ENVIRONMENT) -> subprocess.CompletedProcess[str]:
     """Run a command in a folder, and return its status and output."""
-    return subprocess.run(
-        [str(part) for part in command], cwd=folder, env=env, capture_output=True, text=True
-    )
+    words = list(map(str, command))
+    return subprocess.run(words, cwd=folder, env=env, capture_output=True, text=True)
 
 
 def write_torus(path: Path) -> None:

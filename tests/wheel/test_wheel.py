@@ -6,7 +6,6 @@ import ast
 import doctest
 import pkgutil
 import re
-import shutil
 import subprocess
 import sys
 from importlib.metadata import distribution
@@ -98,12 +97,6 @@ def test_every_public_name():
     assert not {*rosyfields.__all__} & {*submodules(api)}
 
 
-def test_star_import():
-    code = "from rosyfields import *\nimport rosyfields\n"
-    code += "print(*(set(rosyfields.__all__) - globals().keys()))"
-    assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == ""
-
-
 def test_files_of_the_package():
     assert (PACKAGE / "py.typed").is_file()
     presets = {path.name for path in (PACKAGE / "presets").iterdir()}
@@ -128,11 +121,6 @@ def test_nothing_imports_the_name_of_the_tree():
                 names = [node.value] if re.fullmatch(r"[\w.]+", node.value) else []
             roots = {name.split(".")[0] for name in names}
             assert not roots & {"rosy_addon", "operators"}, f"{path}, line {node.lineno}"
-
-
-def test_command():
-    command = shutil.which("rosyfields", path=ENVIRONMENT["PATH"])
-    assert Path(command).parent == Path(sys.executable).parent
 
 
 @pytest.mark.parametrize(

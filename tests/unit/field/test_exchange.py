@@ -142,9 +142,9 @@ def test_opposite_directions_are_a_field_of_degree_2(tmp_path):
 def test_rosy_files_without_a_degree(degree, tmp_path):
     vectors = axis_field(BALL, 4, (0.3, -0.2, 1.0)).vectors
     np.savetxt(tmp_path / "a.rosy", vectors, header=str(len(vectors)), comments="")
-    loaded = load_field(tmp_path / "a.rosy", BALL, degree)
-    assert loaded.field.degree == (degree or 4) and np.allclose(loaded.field.vectors, vectors)
-    assert ("no degree is stated" in loaded.note) == (degree is None)
+    field, note = load_field(tmp_path / "a.rosy", BALL, degree)
+    assert field.degree == (degree or 4) and np.allclose(field.vectors, vectors)
+    assert ("no degree is stated" in note) == (degree is None)
 
 
 def test_tensors_are_distinguished_from_three_directions(tmp_path):

@@ -23,13 +23,12 @@ SIDE, CLOSE = 400, 128
 def write() -> None:
     """Draw closeups of singularities, where the LIC methods differ, enlarged by 2."""
     inner = slice((SIDE - CLOSE) // 2, (SIDE + CLOSE) // 2)
-    rows = []
+    rows: list[list[Panel]] = []
     for degree, index, name in ((3, 1, "1/3"), (4, 1, "1/4"), (4, -1, "-1/4"), (6, -1, "-1/6")):
         angles = np.angle(singularity(index)(points(SIDE))) / degree
-        row = []
+        rows.append([])
         for method in ("brute", "members", "sheets"):
             rgba = compose_planar(angles, degree, replace(PLAIN, method=method)).rgba
             shown = magnified(display(rgba)[inner, inner], 2)
-            row.append(Panel(shown, f"{method}, N = {degree}, index {name}"))
-        rows.append(row)
+            rows[-1].append(Panel(shown, f"{method}, N = {degree}, index {name}"))
     save(sheet(rows), IMAGES / "performance-singularities.png")

@@ -14,9 +14,9 @@ from .formats.polygons import Polygons, offsets_from_sizes
 from .polygon_arrays import next_corners
 
 #: Vertices on borders coincide if they are nearer to each other than this, relative to the longest side of the
-#: bounding box. Rounding of coordinates to float32 moves them by less.
+#: bounding box of the borders; they stay apart beyond four times this distance. Rounding of coordinates to
+#: float32 moves them by less.
 TOLERANCE = 1e-6
-
 
 #: Names, in lower case, of arrays that may differ where vertices are joined: normals and texture coordinates.
 SHADING_NAMES = ("normals", "normal", "texture coordinates", "tcoords", "uv")

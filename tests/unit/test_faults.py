@@ -9,6 +9,7 @@ from conftest import ROOT
 
 def test_every_fault_applies_to_the_code():
     faults = tomllib.loads((ROOT / "tests/faults.toml").read_text(encoding="utf-8"))["fault"]
+    assert len(faults) > 50
     for fault in faults:
         text = (ROOT / fault["file"]).read_text(encoding="utf-8")
         assert text.count(fault["find"]) == 1, fault["name"]

@@ -388,7 +388,8 @@ def test_indices_are_fractions_or_units(error_of):
     units = rf.prescribed(surface, dict.fromkeys(range(8), 1), 4)
     fractions = rf.prescribed(surface, dict.fromkeys(range(8), 0.25), 4)
     assert (units.vectors == fractions.vectors).all() and (fractions.singularities.index == 1).all()
-    assert "0.3 at vertex 0 is not a" in error_of(rf.prescribed, surface, {0: 0.3, 1: 1.7}, 4)
+    message = error_of(rf.prescribed, surface, {0: 0.3, 1: 1.7}, 4)
+    assert "0.3 at vertex 0 is not a multiple of 1/4" in message
 
 
 def test_tones_of_corners_and_of_vertices_draw_the_same_picture():

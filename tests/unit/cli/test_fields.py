@@ -153,7 +153,8 @@ def test_info_says_that_borders_coincide(tmp_path, capsys):
     quads = [(k, k + 1, k + 4, k + 3) for k in range(24) if k % 3 < 2]
     tube = write_obj(tmp_path / "tube.obj", points, quads)
     assert main(["info", str(tube), "--generate", "axis"]) == 0
-    assert "characteristic 1\n3 vertices on borders coincide" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "Euler characteristic 1\n3 vertices on borders coincide" in printed
     assert main(["info", str(tube), "--generate", "axis", "--join"]) == 0
     printed = capsys.readouterr()
     assert "Euler characteristic 0\nmagnitude" in printed.out and "were joined" in printed.err

@@ -60,7 +60,7 @@ LOOKS = {
     "magnitude as length": {"magnitude_length": True},
     "magnitude as both": BOTH | {"color_map": "magma"},
     "families, of a field without families": {"hue": "families"},
-    "oriented, three directions": {"fade": "tail", "degree": 3, "density": 0.05},
+    "oriented, three directions": {"fade": "tail", "degree": 3, "density": 0.03, "seed": 1},
     "supersampled color noise": {"supersampling": 2, "hue": "noise", "degree": 3},
     "guided, five directions": {"guiding_angle": -2.5, "degree": 5},
     "flat": {"display": "flat"},

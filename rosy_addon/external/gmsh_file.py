@@ -12,6 +12,7 @@ import numpy as np
 
 from ..core.errors import RosyError
 from ..core.file_io import read_bytes
+from ..field.formats.polygons import offsets_from_sizes
 
 #: The shapes of faces and volumes: the type of the linear cell in VTK, the number of its corners, which are the
 #: first nodes, and for each of Gmsh's types of this shape the number of all nodes.
@@ -80,7 +81,7 @@ def read_gmsh(path: Path) -> Any:
     corner_point = _find(node_tags, corner_tags)
     if (corner_point < 0).any():
         raise RosyError(f"{path}: cannot be read: an element has a node that is missing")
-    starts = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64)
+    starts = offsets_from_sizes(sizes)[:-1]
     grid = pyvista.UnstructuredGrid(np.insert(corner_point, starts, sizes), types, points)
     for name, data in sections:
         if name in (b"NodeData", b"ElementData"):

@@ -10,7 +10,7 @@ from ..core.cache import content_hash
 from ..core.errors import RosyError, counted
 from ..field.formats.polygons import Polygons, offsets_from_sizes
 from ..field.frames import dot
-from ..field.mesh_arrays import MeshArrays, as_matrices, component_names
+from ..field.mesh_arrays import MeshArrays, pyvista_arrays
 from ..field.polygon_arrays import face_area_vectors, mean_per_face
 
 #: VTK's types of surface cells, with the number of their corners. None: all points of the cell are corners.
@@ -111,19 +111,14 @@ def _without_copies(blocks: list[Any]) -> list[Any]:
 
 
 def _arrays(attributes: Any, index: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the numeric arrays of points or cells, by name, with the rows that `index` selects.
-
-    Arrays whose components have the names of a symmetric tensor become matrices; see `mesh_arrays.as_matrices`.
-    """
+    """Return the numeric arrays of points or cells, by name, with the rows that `index` selects."""
     normals, uv = attributes.active_normals_name, attributes.active_texture_coordinates_name
     skipped = {*_INTERNAL_ARRAYS, normals, uv}
-    found = {}
-    for name, values in attributes.items():
-        rows = np.asarray(values)
-        if name in skipped or rows.dtype.kind not in "fiu":
-            continue
-        found[name] = as_matrices(rows[index], component_names(attributes, name))
-    return found
+    return {
+        name: rows[index]
+        for name, rows in pyvista_arrays(attributes).items()
+        if name not in skipped and rows.dtype.kind in "fiu"
+    }
 
 
 def _surface_polygons(grid: Any, name: str) -> tuple[Polygons, np.ndarray, np.ndarray]:

@@ -308,12 +308,12 @@ def _from_pyvista(mesh: Any, name: str) -> MeshArrays:
     uv = None if uv is None or uv.shape[1] != 2 else np.asarray(uv)
     corner_vertex = np.asarray(cells.cell_connectivity)[np.repeat(is_face, sizes)]
     faces = corner_vertex, offsets_from_sizes(sizes[is_face])
-    vertex_data, face_data = map(_arrays_of_pyvista, (surface.point_data, surface.cell_data))
+    vertex_data, face_data = map(pyvista_arrays, (surface.point_data, surface.cell_data))
     face_data = {key: rows[is_face] for key, rows in face_data.items()}
     return MeshArrays(np.asarray(surface.points), *faces, uv, vertex_data, face_data)
 
 
-def _arrays_of_pyvista(attributes: Any) -> dict[str, NDArray[Any]]:
+def pyvista_arrays(attributes: Any) -> dict[str, NDArray[Any]]:
     """Return the arrays of PyVista's points or cells by name; tensors are matrices (see `as_matrices`)."""
     return {
         key: as_matrices(np.asarray(values), component_names(attributes, key))

@@ -46,9 +46,13 @@ def signed_power(base: np.ndarray, exponent: int) -> np.ndarray | int:
 
 
 def unit_complex(z: np.ndarray, otherwise: int = 0) -> np.ndarray:
-    """Return complex numbers divided by their moduli. Zeros are replaced by `otherwise`."""
+    """Return complex numbers divided by their moduli. Zeros are replaced by `otherwise`.
+
+    Subnormal numbers count as zeros, because their inverse overflows.
+    """
     modulus = np.abs(z)
-    return np.divide(z, modulus, out=np.full_like(z, otherwise), where=modulus > 0)
+    is_normal = modulus >= np.finfo(modulus.dtype).tiny
+    return np.divide(z, modulus, out=np.full_like(z, otherwise), where=is_normal)
 
 
 def complex_bincount(index: np.ndarray, weights: np.ndarray, count: int) -> np.ndarray:

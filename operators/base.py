@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
 from bpy.types import Context, Mesh, Object, Operator
 
-from ..rosy_addon.core.errors import REPORTED_ERRORS, RosyError, as_sentence, error_text
+from ..rosy_addon.core.errors import (
+    REPORTED_ERRORS,
+    RosyError,
+    RosyWarning,
+    as_sentence,
+    error_text,
+)
 from ..rosy_addon.field.rosy_field import RosyField
 from ..rosy_addon.scene.field_attributes import has_field
 from ..rosy_addon.scene.mesh_fields import assign_fields
@@ -67,6 +75,9 @@ class RosyOperator:
     #: The conditions, which are checked in this order.
     conditions: tuple[Condition, ...] = ()
 
+    #: The warnings that were reported.
+    _reported: frozenset[str] = frozenset()
+
     @classmethod
     def poll(cls, context: Context) -> bool:
         """Return whether all conditions hold.
@@ -91,7 +102,8 @@ class RosyOperator:
 
     def execute(self, context: Context) -> set[str]:
         try:
-            self.act(context)
+            with self.reporting_warnings():
+                self.act(context)
         except REPORTED_ERRORS as error:
             return self.report_error(error)
         return {"FINISHED"}
@@ -123,7 +135,26 @@ class RosyOperator:
     def report_warnings(self, *messages: str) -> None:
         """Report what the user should know about a result, each message once."""
         for message in dict.fromkeys(messages):
-            self.report({"WARNING"}, as_sentence(message))
+            if message not in self._reported:
+                self.report({"WARNING"}, as_sentence(message))
+        self._reported |= {*messages}
+
+    @contextmanager
+    def reporting_warnings(self) -> Iterator[None]:
+        """Context manager: report each `RosyWarning` of its block to the user."""
+        messages = []
+
+        def show(message: Warning | str, category: type[Warning], *rest: object) -> None:
+            if issubclass(category, RosyWarning):
+                messages.append(str(message))
+            else:
+                show_others(message, category, *rest)
+
+        with warnings.catch_warnings():
+            show_others, warnings.showwarning = warnings.showwarning, show
+            warnings.simplefilter("always", RosyWarning)
+            yield
+        self.report_warnings(*messages)
 
     def store_fields(
         self, context: Context, fields: dict[Mesh, RosyField], name: str | None = None

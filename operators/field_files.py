@@ -12,13 +12,15 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 from ..rosy_addon.core.errors import RosyError, counted
 from ..rosy_addon.core.file_io import check_writable, write_bytes
 from ..rosy_addon.field.directional_field import field_directions
-from ..rosy_addon.field.field_io import READ_SUFFIXES, LoadedField, field_file, load_field
+from ..rosy_addon.field.field_io import READ_SUFFIXES, field_file, load_field
+from ..rosy_addon.field.formats.feature_edges import EDGE_SUFFIXES, read_edges
 from ..rosy_addon.field.rosy_field import MAX_DEGREE, RosyField
 from ..rosy_addon.field.validate import VectorPolicy
 from ..rosy_addon.scene.field_attributes import field_degree
 from ..rosy_addon.scene.guides import read_combed_guides
+from ..rosy_addon.scene.mesh_fields import check_writable as check_writable_mesh
 from ..rosy_addon.scene.mesh_fields import read_mesh_field
-from ..rosy_addon.scene.meshes import mesh_label, mesh_surface
+from ..rosy_addon.scene.meshes import mark_sharp, mesh_label, mesh_surface
 from ..rosy_addon.ui.property_makers import choice, file_filter, integer, text
 from ..rosy_addon.worker.job import Call, Steps
 from .base import EDITABLE, selected_mesh_objects, sync_suffix
@@ -26,19 +28,24 @@ from .modal_job import ActiveMeshMixin, FileJobMixin
 
 
 class ROSY_OT_field_import(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, ImportHelper):
-    """Read the field of the active mesh from a file"""
+    """Read the field of the active mesh from a file, or mark the edges of a .sharp or .feature file as sharp"""
 
     bl_idname = "rosy.field_import"
     bl_label = "Import Field"
     conditions = EDITABLE
 
     filename_ext = ".rosy"
-    filter_glob: file_filter(*READ_SUFFIXES)
+    filter_glob: file_filter(*READ_SUFFIXES, *EDGE_SUFFIXES)
     degree: integer(
         "Degree",
         "Degree that the file must have, or degree of files that do not state it. 0: any, or 4",
         min=0,
         max=MAX_DEGREE,
+    )
+    second_file: text(
+        "Second File",
+        "File with the second direction of each cross, if each of two files has one",
+        subtype="FILE_PATH",
     )
     mesh_file: text(
         "Mesh File",
@@ -55,6 +62,15 @@ class ROSY_OT_field_import(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Im
             ("zero", "Skip", "Treat the field as undefined on those faces"),
         ],
     )
+    off_surface: choice(
+        "Off the Surface",
+        "Treatment of vectors that do not lie on the surface",
+        [
+            ("error", "Refuse", "Import nothing if they are more than 1 in 100"),
+            ("project", "Project", "Rotate them into the surface"),
+            ("undefined", "Skip", "Treat the field as undefined there"),
+        ],
+    )
     attribute: text(
         "Attribute",
         "Name of the mesh attribute that stores the field. An existing field is replaced",
@@ -65,13 +81,19 @@ class ROSY_OT_field_import(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Im
         """Ask for the settings if a file was dropped on the 3D view; otherwise ask for a file."""
         return None if self.skip_browser else self.invoke_popup(context)
 
-    def begin(self, context: bpy.types.Context) -> Steps[LoadedField]:
-        """Read the field from the file, then store it on the mesh."""
-        mesh = selected_mesh_objects(context)[0].data
-        surface = mesh_surface(mesh)
-        mesh_file = bpy.path.abspath(self.mesh_file) if self.mesh_file else None
+    def begin(self, context: bpy.types.Context) -> Steps[str]:
+        """Read the field or the edges from the file, then store them. The result is a message to the user."""
+        obj = selected_mesh_objects(context)[0]
+        mesh, surface = obj.data, mesh_surface(obj.data)
         path = bpy.path.abspath(self.filepath)
-        inputs = path, surface, self.degree or None, VectorPolicy(self.undefined)
+        if Path(path).suffix.lower() in EDGE_SUFFIXES:
+            check_writable_mesh(mesh)
+            count = mark_sharp(mesh, (yield Call(read_edges, (path, surface))))
+            return f"Marked {counted(count, 'edge')} of '{obj.name}' as sharp: Features can follow them"
+        mesh_file = bpy.path.abspath(self.mesh_file) if self.mesh_file else None
+        paths = [path, *([bpy.path.abspath(self.second_file)] if self.second_file else [])]
+        policy = VectorPolicy(self.undefined, self.off_surface)
+        inputs = paths, surface, self.degree or None, policy
         field, note = yield Call(partial(load_field, mesh=mesh_file), inputs, 0.0, 0.9)
         if field.direction_ratios is not None and field.source_directions is None:
             directions = yield Call(
@@ -79,14 +101,13 @@ class ROSY_OT_field_import(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Im
             )
             field = replace(field, source_directions=directions)
         self.store_fields(context, {mesh: field}, self.attribute)
-        return LoadedField(field, note)
+        if note:
+            self.report_warnings(note)
+        faces = counted(len(field.vectors), "face")
+        return f"Read a field of degree {field.degree} on {faces} of '{obj.name}'"
 
-    def finish(self, context: bpy.types.Context, result: LoadedField) -> None:
-        if result.note:
-            self.report_warnings(result.note)
-        obj = selected_mesh_objects(context)[0]
-        faces = counted(len(result.field.vectors), "face")
-        self.report_done(f"Read a field of degree {result.field.degree} on {faces} of '{obj.name}'")
+    def finish(self, context: bpy.types.Context, result: str) -> None:
+        self.report_done(result)
 
 
 class ROSY_FH_field(bpy.types.FileHandler):

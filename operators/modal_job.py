@@ -265,7 +265,8 @@ class ModalJobMixin(RosyOperator):
             job.stop("cancelled")
         elif job.stop_reason is None and event.type == "TIMER":
             try:
-                is_done = job.advance(context)
+                with self.reporting_warnings():
+                    is_done = job.advance(context)
             except REPORTED_ERRORS as error:
                 return self.report_error(error)
             if job.note:

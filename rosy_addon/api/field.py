@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,6 +23,7 @@ from ..field.validate import (
     validated_directions,
     validated_field,
 )
+from ..field.vertex_frames import in_space
 
 try:
     from ..external.simulation_files import SUFFIXES, read_simulation
@@ -47,9 +49,10 @@ def from_vectors(
     Parameters
     ----------
     surface : Surface
-    vectors : (F, 3) or (V, 3) array_like
+    vectors : (F, 3), (V, 3) or (V, 2) array_like
         Zero where the field is undefined. If there are as many faces as vertices, each vector belongs to a
-        face.
+        face. Rows of two numbers are x and y if all vertices have the same z. Otherwise they are vectors at the
+        vertices in the frames of geometry-central, as potpourri3d returns them. A `RosyWarning` says so.
     degree : int
         N, from 1 to 12: 1 for a vector field, 2 for a line field, 4 for a cross field.
     nonfinite : {"error", "zero"}
@@ -73,8 +76,12 @@ def from_vectors(
     1
     """
     array, source = np.asarray(vectors, dtype=np.float64), f"{surface.name}: vectors"
+    domain = None
     policy = VectorPolicy(nonfinite, off_surface).checked()
-    return Field.of(surface, validated_field(surface, array, degree, source, policy))
+    if array.shape[1:] == (2,):
+        array, domain, note = in_space(surface, array, source)
+        warn(f"{source}: {note}")
+    return Field.of(surface, validated_field(surface, array, degree, source, policy, domain))
 
 
 def from_angles(
@@ -296,7 +303,7 @@ def from_array(
 
 
 def read_field(
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
     surface: Surface,
     degree: int | None = None,
     *,
@@ -308,9 +315,10 @@ def read_field(
 
     Parameters
     ----------
-    path : path-like
+    path : path-like, or sequence of path-like
         ``.rosy``, ``.rawfield``, ``.obj`` (of fieldgen), ``.txt``, ``.vec``, ``.csv``, ``.npy``, ``.npz``,
-        ``.dmat``, ``.crossfield``, ``.ffield``, ``.vfield`` or ``.om``.
+        ``.dmat``, ``.crossfield``, ``.ffield``, ``.vfield`` or ``.om``. Several files with one vector per row
+        are the directions of one field, such as the two of a cross.
     surface : Surface
     degree : int, optional
         The required degree. By default, any degree is accepted. A file that states no degree has degree 4.

@@ -32,8 +32,8 @@ def add_mesh_options(parser: CommandParser) -> None:
 
 def add_field_options(parser: CommandParser) -> None:
     """Add the argument FIELD, and the options that generate a field."""
-    text = ", ".join(READ_SUFFIXES)
-    parser.add_argument("field", type=Path, nargs="?", metavar="FIELD", help=text)
+    text = f"{', '.join(READ_SUFFIXES)}; or two files with a direction of a cross in each row"
+    parser.add_argument("field", type=Path, nargs="*", metavar="FIELD", help=text, default=[])
     of_array = ", 1 for an array of vectors" if SIMULATION_READERS else ""
     parser.add_degree_option(
         f"degree of the field, 1 to 12; by default that of the field file{of_array}, or 4"
@@ -105,12 +105,13 @@ def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
     If the mesh is in a file of a simulation, the field is one of the arrays of this file, unless the options
     name a field file or a generator.
     """
-    if options.field is not None and options.generate is not None:
-        raise RosyError(f"{options.field}: give either a field file or --generate, not both")
+    if options.field and options.generate is not None:
+        raise RosyError(f"{options.field[0]}: give either a field file or --generate, not both")
     mesh, suffix = options.mesh, options.mesh.suffix.lower()
     is_simulation = suffix in SIMULATION_READERS
-    names = ("field", "generate", "strokes", "guides", "singularities", "edges")
+    names = ("generate", "strokes", "guides", "singularities", "edges")
     has_source = options.uv or any(getattr(options, name) is not None for name in names)
+    has_source = has_source or bool(options.field)
     if options.array is not None and not (is_simulation or suffix == ".ply"):
         raise RosyError(f"{mesh}: --array applies only to .ply files and files of simulations")
     if options.step is not None and not is_simulation:
@@ -119,7 +120,7 @@ def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
         raise RosyError(f"{mesh}: give either --array, or a field file or --generate")
     up, join = getattr(options, "up", None), getattr(options, "join", None)
     surface = api.Surface(mesh, up=up, step=options.step, join=join)
-    if options.field is not None:
+    if options.field:
         field = read_field(options, options.field, surface, options.degree)
     elif (is_simulation and not has_source) or options.array is not None:
         policies = {"nonfinite": options.nonfinite, "off_surface": options.off_surface}
@@ -129,8 +130,10 @@ def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
     return surface, field
 
 
-def read_field(options: Options, path: Path, surface: api.Surface, degree: int | None) -> api.Field:
-    """Read a field file, with the options that `add_field_file_options` adds."""
+def read_field(
+    options: Options, path: Path | list[Path], surface: api.Surface, degree: int | None
+) -> api.Field:
+    """Read one or several field files, with the options that `add_field_file_options` adds."""
     policies = {"nonfinite": options.nonfinite, "off_surface": options.off_surface}
     return api.read_field(path, surface, degree, **policies, mesh=options.field_mesh)
 

@@ -1,10 +1,11 @@
-"""Read `.msh` files of Gmsh in the format 4.1, whose data refer to nodes and elements by their tags.
+"""Read `.msh` files of Gmsh in the formats 4.1 and 2.2, whose data refer to nodes and elements by their tags.
 
 meshio assumes that data are complete and in the order of the file, and refuses nodes with parameters.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,14 @@ _CELLS = {
 #: Numbers of nodes of points and lines, which are left out.
 _LINES = {15: 1, 1: 2, 8: 3, 26: 4, 27: 5, 28: 6}
 
+_NODE_COUNTS = _LINES | {kind: nodes for kind, (_, _, nodes) in _CELLS.items()}
+
+#: The versions of the format that `read_gmsh` reads.
+VERSIONS = (b"2.2", b"4.1")
+
+#: In text of the format 2.2, this many elements at most are compared at once with the one before them.
+_RUN = 1000
+
 
 class _Section:
     """The numbers of a section, taken one after the other from text or binary data."""
@@ -55,14 +64,15 @@ class _Section:
         return values
 
 
-def is_gmsh_4(path: Path) -> bool:
-    """Return whether a file begins as a `.msh` file of the format 4.1."""
+def is_gmsh(path: Path) -> bool:
+    """Return whether a file begins as a `.msh` file of one of the `VERSIONS`."""
     with open(path, "rb") as file:
-        return file.read(200).split()[:2] == [b"$MeshFormat", b"4.1"]
+        first, version = [*file.read(200).split()[:2], b"", b""][:2]
+    return first == b"$MeshFormat" and version in VERSIONS
 
 
 def read_gmsh(path: Path) -> Any:
-    """Read a file of the format 4.1.
+    """Read a file of one of the `VERSIONS`.
 
     Returns
     -------
@@ -76,8 +86,10 @@ def read_gmsh(path: Path) -> Any:
     named = dict(sections)
     if not {b"Nodes", b"Elements"} <= set(named):
         raise RosyError(f"{path}: cannot be read: it has no nodes, or no elements")
-    node_tags, points = _nodes(_Section(named[b"Nodes"], is_text))
-    tags, sizes, types, corner_tags = _elements(_Section(named[b"Elements"], is_text))
+    is_old = named[b"MeshFormat"].split()[0] == b"2.2"
+    nodes, rows = (_nodes_2, _rows_2) if is_old else (_nodes, _rows)
+    node_tags, points = nodes(named[b"Nodes"], is_text)
+    tags, sizes, types, corner_tags = _elements(rows(named[b"Elements"], is_text))
     corner_point = _find(node_tags, corner_tags)
     if (corner_point < 0).any():
         raise RosyError(f"{path}: cannot be read: an element has a node that is missing")
@@ -109,8 +121,9 @@ def _sections(data: bytes) -> tuple[list[tuple[bytes, bytes]], bool]:
     return sections, dict(sections)[b"MeshFormat"].split()[1] == b"0"
 
 
-def _nodes(section: _Section) -> tuple[np.ndarray, np.ndarray]:
+def _nodes(data: bytes, is_text: bool) -> tuple[np.ndarray, np.ndarray]:
     """Return the tags and the (n, 3) positions of the nodes."""
+    section = _Section(data, is_text)
     block_count = section.take("<u8", 4)[0]
     tags, points = [np.empty(0, np.int64)], [np.empty((0, 3))]
     for _ in range(int(block_count)):
@@ -122,23 +135,87 @@ def _nodes(section: _Section) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(tags), np.concatenate(points)
 
 
-def _elements(section: _Section) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the tags of faces and volumes, the numbers of their corners, VTK's types, and the tags of nodes."""
-    block_count = section.take("<u8", 4)[0]
+def _nodes_2(data: bytes, is_text: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return the tags and the (n, 3) positions of the nodes, from the format 2.2."""
+    count, data = _counted(data)
+    if is_text:
+        table = _Section(data, is_text).take("<f8", 4 * count).reshape(count, 4)
+        return table[:, 0].astype(np.int64), table[:, 1:]
+    rows = np.frombuffer(data, [("tag", "<i4"), ("point", "<f8", (3,))], count)
+    return rows["tag"].astype(np.int64), rows["point"]
+
+
+def _rows(data: bytes, is_text: bool) -> Iterator[tuple[int, np.ndarray]]:
+    """Yield blocks of elements: their type, and rows of their tag and the tags of their nodes."""
+    section = _Section(data, is_text)
+    for _ in range(int(section.take("<u8", 4)[0])):
+        kind, count = int(section.take("<i4", 3)[2]), int(section.take("<u8", 1)[0])
+        columns = 1 + _node_count(kind)
+        yield kind, section.take("<u8", count * columns).reshape(count, columns).astype(np.int64)
+
+
+def _rows_2(data: bytes, is_text: bool) -> Iterator[tuple[int, np.ndarray]]:
+    """Yield blocks of elements as `_rows`, from the format 2.2.
+
+    A row has the tag of the element, in text also its type and a number n, then n numbers for groups, then the
+    tags of the nodes.
+    """
+    left, data = _counted(data)
+    if is_text:
+        numbers = np.array(data.split(), dtype=np.float64).astype(np.int64)
+    else:
+        numbers = np.frombuffer(data, "<i4", len(data) // 4).astype(np.int64)
+    position = 0
+    while left > 0:
+        if position + 3 > len(numbers):
+            raise ValueError("it ends too early")
+        first, second, groups = numbers[position : position + 3].tolist()
+        if is_text:
+            kind, count, leading = second, min(left, _RUN), 3
+        else:
+            kind, count, leading = first, second, 1
+            position += 3
+        nodes = _node_count(kind)
+        width = leading + groups + nodes
+        rows = numbers[position : position + count * width]
+        rows = rows[: len(rows) // width * width].reshape(-1, width)
+        if is_text:  # up to the first row of another type, or with another number of groups
+            rows = rows[np.logical_and.accumulate((rows[:, 1:3] == (kind, groups)).all(axis=1))]
+        if not len(rows):
+            raise ValueError("it ends too early")
+        yield kind, rows[:, [0, *range(width - nodes, width)]]
+        position, left = position + rows.size, left - len(rows)
+
+
+def _counted(data: bytes) -> tuple[int, bytes]:
+    """Return the number in the first line of a section of the format 2.2, and the lines after it."""
+    line, _, rest = data.partition(b"\n")
+    return int(line), rest
+
+
+def _node_count(kind: int) -> int:
+    """Return the number of nodes of an element of one of Gmsh's types."""
+    if kind not in _NODE_COUNTS:
+        raise ValueError(f"elements of type {kind} are not known")
+    return _NODE_COUNTS[kind]
+
+
+def _elements(
+    blocks: Iterator[tuple[int, np.ndarray]],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the tags of faces and volumes, the numbers of their corners, VTK's types, and the tags of nodes.
+
+    For the blocks, see `_rows`.
+    """
     tags, corner_tags = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
     sizes, types = [np.empty(0, np.int64)], [np.empty(0, np.uint8)]
-    for _ in range(int(block_count)):
-        kind = int(section.take("<i4", 3)[2])
-        count = int(section.take("<u8", 1)[0])
-        if kind not in _CELLS and kind not in _LINES:
-            raise ValueError(f"elements of type {kind} are not known")
-        cell_type, corners, nodes = _CELLS.get(kind, (0, 0, _LINES.get(kind, 0)))
-        rows = section.take("<u8", count * (1 + nodes)).reshape(count, 1 + nodes).astype(np.int64)
+    for kind, rows in blocks:
         if kind in _CELLS:
+            cell_type, corners, _ = _CELLS[kind]
             tags.append(rows[:, 0])
             corner_tags.append(rows[:, 1 : 1 + corners].ravel())
-            sizes.append(np.full(count, corners))
-            types.append(np.full(count, cell_type, np.uint8))
+            sizes.append(np.full(len(rows), corners))
+            types.append(np.full(len(rows), cell_type, np.uint8))
     return tuple(np.concatenate(parts) for parts in (tags, sizes, types, corner_tags))
 
 

@@ -24,7 +24,7 @@ import numpy as np
 from ..core.errors import RosyError, counted
 from ..core.file_io import check_readable, open_file, read_bytes
 from ..field.mesh_arrays import MeshArrays
-from .gmsh_file import is_gmsh_4, read_gmsh
+from .gmsh_file import is_gmsh, read_gmsh
 from .vtk_surface import surface_arrays
 
 #: Suffixes of files that VTK reads. Files of the second and third format may hold several time steps.
@@ -285,7 +285,7 @@ def _read_dataset(path: Path, index: int | None) -> Any:
         if suffix in MESHIO_SUFFIXES:
             import meshio
 
-            if suffix == ".msh" and is_gmsh_4(path):
+            if suffix == ".msh" and is_gmsh(path):
                 return read_gmsh(path)
             dataset = pyvista.from_meshio(meshio.read(path))
             if suffix == ".med":

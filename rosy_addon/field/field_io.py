@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -41,6 +41,7 @@ from .validate import (
     validated_directions,
     validated_field,
 )
+from .vertex_frames import in_space
 
 #: A face of the target mesh gets the field of the closest source face only within these limits: the distance
 #: relative to `Surface.extent` of the source, and the angle between the normals in radians.
@@ -93,13 +94,13 @@ class LoadedField(NamedTuple):
 
 
 def load_field(
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
     surface: Surface,
     degree: int | None = None,
     policy: VectorPolicy = STRICT,
     mesh: str | os.PathLike[str] | None = None,
 ) -> LoadedField:
-    """Read a field from a file and fit it to a mesh.
+    """Read a field from one or several files and fit it to a mesh.
 
     ============= ==================================================================
     `.rosy`       row count, degree N (or none), then rows x y z with one member vector each
@@ -107,8 +108,9 @@ def load_field(
     `.obj`        a mesh with the field in comments, as written by the program fieldgen
     `.txt` `.vec` rows of 3 numbers (one member vector), 3 N numbers (all N
     `.csv`        directions), 6 numbers (two directions that are nowhere opposite: the
-                  lines of a cross), or 9 numbers (a symmetric 3 x 3 tensor)
-    `.npy`        the same data as an array: (n, 3), (n, 3 N), (n, N, 3) or (n, 3, 3)
+                  lines of a cross), 9 numbers (a symmetric 3 x 3 tensor), or 2 numbers
+                  (a member vector at each vertex; see `vertex_frames.in_space`)
+    `.npy`        the same data as an array: (n, 3), (n, 3 N), (n, N, 3), (n, 3, 3) or (n, 2)
     `.npz`        the same as one of several arrays; see `formats.plain.read_npz`
     `.dmat`       the same as a matrix of libigl
     `.crossfield` crosses of libigl: a flag and two directions in each row
@@ -121,7 +123,8 @@ def load_field(
 
     Parameters
     ----------
-    path : path-like
+    path : path-like, or sequence of path-like
+        Several files with one vector per row are read together: vector k of a row is from file k.
     surface : Surface
         The mesh to which the field is fitted.
     degree : int, optional
@@ -145,19 +148,20 @@ def load_field(
         If the file is missing or malformed, has an unknown extension, has another degree, belongs to another
         mesh, or has vectors that are not tangent to the surface.
     """
-    path = Path(path)
-    reader = _READERS.get(path.suffix.lower())
-    if path.suffix.lower() in SINGULARITY_SUFFIXES:
-        raise RosyError(f"{path}: contains singularities, not directions: choose a field file")
-    if reader is None:
-        suffixes = _join_names(READ_SUFFIXES)
-        raise RosyError(f"{path}: is not a field file: its name must end in {suffixes}")
-    check_parsing_memory(path, NPY_MEMORY)
+    paths = [Path(p) for p in ([path] if isinstance(path, (str, os.PathLike)) else path)]
     with progress(0.0, 0.5):
-        raw = reader(path)
+        raws = [_read_rows(file) for file in paths]
+    path, raw = paths[0], raws[0]
+    if len(raws) > 1:
+        raw = replace(raw, values=_joined_rows(raws, paths), degree=None)
     raw, note = _with_degree(raw, path, degree)
     with progress(0.5, 0.6):
         source_surface = _source_surface(path, raw, surface, mesh)
+    if raw.values.shape[2] == 2:
+        target = surface if source_surface is None else source_surface
+        vectors, domain, frame_note = in_space(target, raw.values[:, 0], path.name)
+        raw = replace(raw, values=vectors[:, None], domain=domain)
+        note = "; ".join(filter(None, [note, frame_note]))
     if source_surface is None:
         with progress(0.6, 1.0):
             return LoadedField(field_from_raw(raw, surface, degree, str(path), policy), note)
@@ -171,6 +175,30 @@ def load_field(
         f"{Path(source_surface.name).name}"
     )
     return LoadedField(field, "; ".join(filter(None, [note, transferred])))
+
+
+def _read_rows(path: Path) -> RawField:
+    """Read the rows of a field file; raise a `RosyError` if it is not one."""
+    suffix = path.suffix.lower()
+    if suffix in SINGULARITY_SUFFIXES:
+        raise RosyError(f"{path}: contains singularities, not directions: choose a field file")
+    if suffix not in _READERS:
+        suffixes = _join_names(READ_SUFFIXES)
+        raise RosyError(f"{path}: is not a field file: its name must end in {suffixes}")
+    check_parsing_memory(path, NPY_MEMORY)
+    return _READERS[suffix](path)
+
+
+def _joined_rows(raws: list[RawField], paths: list[Path]) -> np.ndarray:
+    """Return (n, k, 3) vectors of k files with one vector in each of their n rows."""
+    count = len(raws[0].values)
+    for raw, path in zip(raws, paths, strict=True):
+        if raw.values.shape != (count, 1, 3):
+            raise RosyError(
+                f"{path}: has {counted(len(raw.values), 'row')} of {raw.columns} numbers, but files that are read "
+                f"together need one vector in each of {count:,} rows"
+            )
+    return np.concatenate([raw.values for raw in raws], axis=1)
 
 
 def _with_degree(raw: RawField, path: Path, degree: int | None) -> tuple[RawField, str]:

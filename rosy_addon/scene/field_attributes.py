@@ -6,7 +6,7 @@ undefined. The name of the attribute and the degree are in ``mesh.rosy``. These 
 
 - vectors on points or corners, averaged over each face;
 - ``dir0`` ... ``dir{N-1}``: N directions of each face or point, which need not be rotations of one
-  another;
+  another; or ``dir0`` and ``dir1``: one direction of each line of a cross;
 - a float on faces: the angle in radians between the face's first edge and a member,
   counterclockwise about the normal. The magnitude is 1. NaN is an error, or means undefined, as the parameter
   `nonfinite` of the reading function says.

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import warnings
 from functools import partial
 
 import numpy as np
 from bpy.types import Attribute, Mesh
 
 from ..core.cache import Cache
-from ..core.errors import RosyError, counted
+from ..core.errors import RosyError, RosyWarning, counted
 from ..core.progress import progress, report
 from ..field import validate
 from ..field.blocks import as_float64
-from ..field.directional_field import field_directions
+from ..field.directional_field import field_directions, with_opposites
+from ..field.field_io import HALF_CROSS_NOTE
 from ..field.frames import dot, normalize, tangent_frame
 from ..field.polygon_arrays import mean_per_face
 from ..field.representation import from_representation, to_representation
@@ -93,7 +95,7 @@ def read_mesh_field(
     degree = check_degree(field_degree(mesh) if degree is None else degree)
     if field_name not in mesh.attributes and "dir0" in mesh.attributes:
         with progress(0.5, 1.0):
-            return _field_from_directions(mesh, surface, nonfinite, label, cache)
+            return _field_from_directions(mesh, surface, degree, nonfinite, label, cache)
     attribute = mesh.attributes.get(field_name)
     if attribute is None:
         raise RosyError(
@@ -119,19 +121,23 @@ def read_mesh_field(
 
 
 def _field_from_directions(
-    mesh: Mesh, surface: Surface, nonfinite: str, label: str, cache: Cache | None
+    mesh: Mesh, surface: Surface, degree: int, nonfinite: str, label: str, cache: Cache | None
 ) -> RosyField:
-    """Read a field from the attributes ``dir0`` ... ``dir{N-1}``. Their number N is the degree."""
-    degree = 0
-    while f"dir{degree}" in mesh.attributes:
-        degree += 1
-    if degree > MAX_DEGREE:
+    """Read a field from the attributes ``dir0`` ... ``dir{N-1}``. Their number N is the degree.
+
+    Two attributes are the lines of a cross if their directions are nowhere opposite and `degree` is not 2. A
+    `RosyWarning` says so.
+    """
+    count = 0
+    while f"dir{count}" in mesh.attributes:
+        count += 1
+    if count > MAX_DEGREE:
         raise RosyError(
-            f"{label}: has {degree} attributes dir0, dir1 ..., but at most {MAX_DEGREE} are supported"
+            f"{label}: has {count} attributes dir0, dir1 ..., but at most {MAX_DEGREE} are supported"
         )
     domain = mesh.attributes["dir0"].domain
     directions = []
-    for index in range(degree):
+    for index in range(count):
         attribute = mesh.attributes[f"dir{index}"]
         source = f"{label}, attribute 'dir{index}'"
         attribute_type = (attribute.domain, attribute.data_type)
@@ -144,7 +150,10 @@ def _field_from_directions(
     directions = np.stack(directions, axis=1)
     if domain == "FACE":
         directions = follow_mesh(mesh, "dir0", directions, surface)
-    source = f"{label}, attributes dir0 to dir{degree - 1}"
+    source = f"{label}, attributes dir0 to dir{count - 1}"
+    directions = with_opposites(directions, 2 if degree == 2 else None)
+    if directions.shape[1] > count:
+        warnings.warn(f"{source}: {HALF_CROSS_NOTE}", RosyWarning, stacklevel=3)
     policy, element = validate.VectorPolicy(nonfinite), ELEMENTS[domain]
     build = partial(validate.validated_directions, surface, directions, source, policy, element)
     with progress(0.0, 1.0, "reading the field"):

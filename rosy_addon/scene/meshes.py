@@ -244,6 +244,15 @@ def marked_edges(mesh: Mesh, mark: str) -> np.ndarray:
     return _edge_vertices(mesh)[is_marked]
 
 
+def mark_sharp(mesh: Mesh, edges: np.ndarray) -> int:
+    """Mark edges as sharp, given by (K, 2) vertex indices. Return how many different ones there are."""
+    ends, wanted = (np.sort(pairs.astype(np.int64)) for pairs in (_edge_vertices(mesh), edges))
+    is_wanted = np.isin(ends @ [len(mesh.vertices), 1], wanted @ [len(mesh.vertices), 1])
+    mesh.edges.foreach_set("use_edge_sharp", _edge_flags(mesh, "use_edge_sharp") | is_wanted)
+    mesh.update()
+    return int(np.count_nonzero(is_wanted))
+
+
 def flush_edit_mode(mesh: Mesh) -> None:
     """Write the current state of editing to a mesh that is in edit mode. Do nothing otherwise."""
     if not mesh.is_editmode:

@@ -45,10 +45,11 @@ def write_view(path, kind, tags, values):
     gmsh.view.write(view, str(path))
 
 
-@pytest.mark.parametrize("parameters", [0, 1])
+@pytest.mark.parametrize("version, parameters", [(2.2, 0), (4.1, 0), (4.1, 1)])
 @pytest.mark.parametrize("order", [1, 2])
-def test_data_of_some_elements(parameters, order, model, tmp_path, recwarn):
+def test_data_of_some_elements(version, parameters, order, model, tmp_path, recwarn):
     """Rows in any order and on a part of the elements: each vector is on its own triangle."""
+    gmsh.option.setNumber("Mesh.MshFileVersion", version)
     gmsh.option.setNumber("Mesh.SaveParametric", parameters)
     model.mesh.setOrder(order)
     tags, normals = triangles(model)

@@ -1,7 +1,8 @@
 """Read and write fields as plain tables of numbers: text, `.npy` and `.npz` files.
 
-A row holds one of the N member vectors (3 numbers), all N directions (3 N numbers), one direction of each line
-of a cross (6 numbers; see `directional_field.with_opposites`) or a symmetric tensor (9 numbers).
+A row holds one of the N member vectors (3 numbers, or 2; see `vertex_frames.in_space`), all N directions (3 N
+numbers), one direction of each line of a cross (6 numbers; see `directional_field.with_opposites`) or a symmetric
+tensor (9 numbers).
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ _FIELD_NAMES, _MESH_NAMES = ("directions", "Q"), (("vertices", "faces"), ("V", "
 
 
 def read_text(path: Path) -> RawField:
-    """Read a text file with rows of 3, 3 N or 9 numbers.
+    """Read a text file with rows of 2, 3, 3 N or 9 numbers.
 
     Numbers are separated by commas or white space. ``#`` starts a comment. The first line may have words or
     the number of rows, and each row may begin with its number, from 0 or 1. Rows of a center, two
@@ -107,7 +108,7 @@ def _check_npy_size(data: bytes) -> None:
 
 
 def read_npy(path: Path) -> RawField:
-    """Read an `.npy` array of shape (n, 3), (n, 3 N), (n, N, 3) or, for tensors, (n, 3, 3).
+    """Read an `.npy` array of shape (n, 2), (n, 3), (n, 3 N), (n, N, 3) or, for tensors, (n, 3, 3).
 
     Raises
     ------
@@ -128,7 +129,7 @@ def _load_npy(data: bytes, source: str) -> Any:
 
 
 def _array_field(values: Any, source: str) -> RawField:
-    """Return an array of shape (n, 3 N), (n, N, 3) or (n, 3, 3) as a `RawField`."""
+    """Return an array of shape (n, 2), (n, 3 N), (n, N, 3) or (n, 3, 3) as a `RawField`."""
     if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu":
         raise RosyError(f"{source}: does not contain an array of real numbers")
     if values.ndim not in (2, 3) or not len(values) or (values.ndim == 3 and values.shape[2] != 3):
@@ -234,8 +235,8 @@ def npy_bytes(directions: np.ndarray) -> bytes:
 
 
 def _check_columns(source: str, columns: int) -> None:
-    """Raise a `RosyError` unless a row has 3 N numbers for a degree N from 1 to `MAX_DEGREE`."""
-    if columns % 3 or not 3 <= columns <= 3 * MAX_DEGREE:
+    """Raise a `RosyError` unless a row has 2 numbers, or 3 N for a degree N from 1 to `MAX_DEGREE`."""
+    if columns != 2 and (columns % 3 or not 3 <= columns <= 3 * MAX_DEGREE):
         raise RosyError(
             f"{source}: has {counted(columns, 'number')} per row, expected 3 for each of up to {MAX_DEGREE} directions"
         )
@@ -246,7 +247,7 @@ def raw_field(values: np.ndarray) -> RawField:
 
     Rows of 9 values are tensors if all of them are symmetric 3 x 3 matrices, and 3 directions otherwise.
     """
-    matrices = values.reshape(len(values), -1, 3)
+    matrices = values.reshape(len(values), -1, 2 if values.shape[1] == 2 else 3)
     if values.shape[1] == 9 and _are_symmetric(matrices):
         return RawField(matrices, 4, tensors=True)
     return RawField(matrices)

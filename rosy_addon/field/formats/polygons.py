@@ -41,7 +41,7 @@ class RawField:
     ----------
     values : (n, k, 3) float64 ndarray
         k vectors for each row of the file: one of the N member vectors (k = 1), all N directions (k = N), or
-        the rows of a tensor (k = 3).
+        the rows of a tensor (k = 3). Or (n, 1, 2): members as two numbers; see `vertex_frames.in_space`.
     degree : int or None
         N; None if the file does not state it. It is then k, unless k is 1.
     header_count : int or None
@@ -63,7 +63,7 @@ class RawField:
 
     @property
     def columns(self) -> int:
-        """Count of numbers in each row of the file: 3 k."""
+        """Count of numbers in each row of the file, such as 3 k."""
         return int(np.prod(self.values.shape[1:]))
 
 

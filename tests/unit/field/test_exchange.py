@@ -172,7 +172,7 @@ def test_a_signalling_nan_in_an_array_is_named(tmp_path, error_of):
 
 DAMAGED = {
     "a.txt": ("1 2 3\n1 2\n", "a.txt:2: the row has 2 numbers, the rows above have 3"),
-    "b.txt": ("1 2\n3 4\n", "has 2 numbers per row"),
+    "b.txt": ("1 2 3 4\n3 4 5 6\n", "has 4 numbers per row"),
     "c.txt": ("", "contains no numbers"),
     "d.txt": ("1 2 x\n", "d.txt:1: expected a number (part of a vector), found 'x'"),
     "e.txt": ("1 2 3\n", "contains 1 row, but sphere has"),

@@ -141,20 +141,12 @@ class RosyOperator:
 
     @contextmanager
     def reporting_warnings(self) -> Iterator[None]:
-        """Context manager: report each `RosyWarning` of its block to the user."""
-        messages = []
-
-        def show(message: Warning | str, category: type[Warning], *rest: object) -> None:
-            if issubclass(category, RosyWarning):
-                messages.append(str(message))
-            else:
-                show_others(message, category, *rest)
-
-        with warnings.catch_warnings():
-            show_others, warnings.showwarning = warnings.showwarning, show
+        """Context manager: report each `RosyWarning` of its block to the user. Drop other warnings."""
+        with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", RosyWarning)
             yield
-        self.report_warnings(*messages)
+        kept = (each for each in caught if issubclass(each.category, RosyWarning))
+        self.report_warnings(*(str(each.message) for each in kept))
 
     def store_fields(
         self, context: Context, fields: dict[Mesh, RosyField], name: str | None = None

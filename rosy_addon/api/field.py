@@ -14,7 +14,7 @@ from ..field.array_field import SurfaceArrays, array_field
 from ..field.directional_field import tensor_field, with_opposites
 from ..field.field import Field
 from ..field.field_io import HALF_CROSS_NOTE, load_field
-from ..field.mesh_arrays import SIMULATION_READERS
+from ..field.mesh_arrays import OBJECT_READERS, SIMULATION_READERS
 from ..field.rosy_field import RosyField, check_degree
 from ..field.surface import Surface
 from ..field.validate import (
@@ -27,10 +27,12 @@ from ..field.vertex_frames import in_space
 
 try:
     from ..external.simulation_files import SUFFIXES, read_simulation
+    from ..external.vtk_surface import dataset_arrays
 except ImportError:  # the extension for Blender
     pass
 else:
     SIMULATION_READERS.update(dict.fromkeys(SUFFIXES, read_simulation))
+    OBJECT_READERS["extract_surface"] = dataset_arrays
 
 
 def from_vectors(

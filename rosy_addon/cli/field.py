@@ -93,9 +93,9 @@ def run_info(options: Options) -> None:
 
 
 def _coinciding_vertices(surface: api.Surface) -> int:
-    """Return how many vertices on borders are at the position of others, and could be joined to them."""
+    """Return how many vertices on borders are at the position of others."""
     polygons = Polygons(surface.vertices, surface.corner_vertex, surface.face_start)
-    target = coinciding_borders(polygons, surface.vertex_data)
+    target = coinciding_borders(polygons, None)
     return int(np.count_nonzero(target != np.arange(len(target))))
 
 
@@ -139,7 +139,8 @@ def _format_info(facts: dict[str, Any]) -> str:
     ]
     if facts["coinciding_vertices"]:
         coinciding = counted(facts["coinciding_vertices"], "vertex", "vertices")
-        lines.insert(2, f"{coinciding} on borders coincide with others: --join joins them")
+        text = f"{coinciding} on borders coincide with others: --join joins those with equal data"
+        lines.insert(2, text)
     if not facts["is_rosy"]:
         lines.append("directions at free angles, not a RoSy")
     if "against" in facts:

@@ -31,9 +31,6 @@ MESHIO_CORNERS = {
     "quad": 4, "quad8": 4, "quad9": 4,
 }  # fmt: skip
 
-#: Numbers of VTK's cell types for faces: triangle, polygon, quad.
-VTK_FACES = (5, 7, 9)
-
 
 @dataclass(frozen=True, eq=False)
 class MeshArrays:
@@ -73,6 +70,10 @@ class MeshArrays:
 #: Functions that read files of simulations, by file suffix. Their arguments are the path and the time step.
 #: The Python package adds them; the Blender extension has none.
 SIMULATION_READERS: dict[str, Callable[[Path, int | None], MeshArrays]] = {}
+
+#: Functions that read mesh objects of other libraries, by an attribute that only these objects have. Their
+#: arguments are the object and its name for messages. The Python package adds them.
+OBJECT_READERS: dict[str, Callable[[Any, str], MeshArrays]] = {}
 
 
 def mesh_arrays(
@@ -227,8 +228,9 @@ def _arrays_of(mesh: Any, name: str) -> MeshArrays:
         return mesh
     if hasattr(mesh, "points") and isinstance(getattr(mesh, "cells", None), list):
         return _from_meshio(mesh, name)
-    if hasattr(mesh, "extract_surface"):
-        return _from_pyvista(mesh, name)
+    for attribute, read in OBJECT_READERS.items():
+        if hasattr(mesh, attribute):
+            return read(mesh, name)
     # Convert a scene of trimesh to a mesh, and a tensor mesh of Open3D to a legacy mesh.
     for conversion in ("to_mesh", "to_legacy"):
         if hasattr(mesh, conversion):
@@ -292,27 +294,6 @@ def _from_meshio(mesh: Any, name: str) -> MeshArrays:
     return MeshArrays(mesh.points, corner_vertex, face_start, None, vertex_data, face_data)
 
 
-def _from_pyvista(mesh: Any, name: str) -> MeshArrays:
-    """Return the arrays of the surface of a PyVista data set. The surface of a volume is its boundary."""
-    surface = mesh if hasattr(mesh, "faces") else _extracted_surface(mesh)
-    if surface.n_strips:
-        surface = surface.triangulate()
-    # Convert to an unstructured grid: it has the offsets of faces of different sizes, and the cell types,
-    # which tell faces from lines.
-    cells = surface.cast_to_unstructured_grid()
-    is_face = np.isin(cells.celltypes, VTK_FACES)
-    if not is_face.any():
-        raise RosyError(f"{name}: has no faces")
-    sizes = np.diff(cells.cell_offsets if hasattr(cells, "cell_offsets") else cells.offset)
-    uv = getattr(surface, "active_texture_coordinates", None)
-    uv = None if uv is None or uv.shape[1] != 2 else np.asarray(uv)
-    corner_vertex = np.asarray(cells.cell_connectivity)[np.repeat(is_face, sizes)]
-    faces = corner_vertex, offsets_from_sizes(sizes[is_face])
-    vertex_data, face_data = map(pyvista_arrays, (surface.point_data, surface.cell_data))
-    face_data = {key: rows[is_face] for key, rows in face_data.items()}
-    return MeshArrays(np.asarray(surface.points), *faces, uv, vertex_data, face_data)
-
-
 def pyvista_arrays(attributes: Any) -> dict[str, NDArray[Any]]:
     """Return the arrays of PyVista's points or cells by name; tensors are matrices (see `as_matrices`)."""
     return {
@@ -357,14 +338,6 @@ def as_matrices(rows: NDArray[Any], names: Sequence[str]) -> NDArray[Any]:
     if not axes or set(entries) - {-1} != set(range(len(names))):
         return rows
     return np.pad(rows, ((0, 0), (0, 1)))[:, entries]
-
-
-def _extracted_surface(mesh: Any) -> Any:
-    """Return the surface of a PyVista grid: its faces, and the boundary of its volume cells."""
-    try:
-        return mesh.extract_surface(algorithm="dataset_surface")
-    except TypeError:  # before PyVista 0.47, there was no other algorithm
-        return mesh.extract_surface()
 
 
 def _without_copied_faces(arrays: MeshArrays) -> tuple[MeshArrays, int]:

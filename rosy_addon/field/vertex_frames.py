@@ -7,20 +7,15 @@ import numpy as np
 from ..core.errors import RosyError
 from .corner_fans import corner_angles
 from .frames import dot, normalize
-from .polygon_arrays import next_corners
 from .surface import Surface
 from .validate import checked_domain, vertex_normals
 
 #: Notes about rows of two numbers.
 FLAT_NOTE = "rows have two numbers; they are read as x and y, because the mesh is flat"
-FRAME_NOTE = (
-    "rows have two numbers; they are read as vectors at the vertices, in the frames of geometry-central"
-)
+FRAME_NOTE = "rows have two numbers; they are read as vectors at the vertices, in the frames of geometry-central"
 
 
-def in_space(
-    surface: Surface, rows: np.ndarray, source: str
-) -> tuple[np.ndarray, str | None, str]:
+def in_space(surface: Surface, rows: np.ndarray, source: str) -> tuple[np.ndarray, str | None, str]:
     """Return vectors in object space that are given by two numbers each.
 
     Parameters
@@ -75,7 +70,7 @@ def vertex_frames(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     RosyError
         If the faces at a vertex are not one fan, so that its edges have no order.
     """
-    vertex, following = surface.corner_vertex, next_corners(surface.face_start)
+    vertex, following = surface.corner_vertex, surface.next_corner
     normal, angle = vertex_normals(surface), corner_angles(surface)
     count, corners = len(surface.vertices), np.arange(len(vertex))
     previous = np.empty_like(following)

@@ -70,7 +70,7 @@ def test_pyvista_strips_grids_and_texture_coordinates():
     grid.cell_data["number"] = np.arange(6)
     surface = rf.Surface(grid)
     np.testing.assert_array_equal(surface.face_data["number"], np.arange(6))
-    with pytest.raises(rf.RosyError, match="has no faces"):
+    with pytest.raises(rf.RosyError, match="has no surface"):
         rf.Surface(pyvista.Line())
 
 

@@ -119,7 +119,7 @@ DAMAGED = {
     "b.dmat": (b"3 2\n1\n2\n", "declares 6 numbers, but contains 2"),
     "c.dmat": (b"0 0\n3 2\n" + bytes(40), "declares 6 numbers, but contains 5"),
     "d.dmat": (b"3 1\n1\nx\n2\n", "d.dmat:3: expected a number"),
-    "e.dmat": (b"2 1\n1\n2\n", "has 2 numbers per row"),
+    "e.dmat": (b"4 1\n5\n1\n2\n3\n", "has 4 numbers per row"),
     "f.dmat": (b"3 0\n", "contains no numbers"),
     "a.crossfield": (b"3 1\n", "a.crossfield:1: expected '2' and the number of rows"),
     "b.crossfield": (b"2 1\n0 1 2\n", "b.crossfield:2: expected 7 numbers, found 3 words"),

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,9 +11,9 @@ from bpy.types import Context, Mesh, Object, Operator
 from ..rosy_addon.core.errors import (
     REPORTED_ERRORS,
     RosyError,
-    RosyWarning,
     as_sentence,
     error_text,
+    telling_warnings,
 )
 from ..rosy_addon.field.rosy_field import RosyField
 from ..rosy_addon.scene.field_attributes import has_field
@@ -102,7 +100,7 @@ class RosyOperator:
 
     def execute(self, context: Context) -> set[str]:
         try:
-            with self.reporting_warnings():
+            with telling_warnings(self.report_warnings):
                 self.act(context)
         except REPORTED_ERRORS as error:
             return self.report_error(error)
@@ -138,15 +136,6 @@ class RosyOperator:
             if message not in self._reported:
                 self.report({"WARNING"}, as_sentence(message))
         self._reported |= {*messages}
-
-    @contextmanager
-    def reporting_warnings(self) -> Iterator[None]:
-        """Context manager: report each `RosyWarning` of its block to the user. Drop other warnings."""
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always", RosyWarning)
-            yield
-        kept = (each for each in caught if issubclass(each.category, RosyWarning))
-        self.report_warnings(*(str(each.message) for each in kept))
 
     def store_fields(
         self, context: Context, fields: dict[Mesh, RosyField], name: str | None = None

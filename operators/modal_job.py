@@ -15,7 +15,7 @@ import bpy
 from bpy.types import ID, Context, Event, Object, WorkSpace
 from bpy_extras.io_utils import ExportHelper
 
-from ..rosy_addon.core.errors import REPORTED_ERRORS, as_sentence
+from ..rosy_addon.core.errors import REPORTED_ERRORS, as_sentence, telling_warnings
 from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.ui import job_status
 from ..rosy_addon.ui.preferences import uses_helper
@@ -265,7 +265,7 @@ class ModalJobMixin(RosyOperator):
             job.stop("cancelled")
         elif job.stop_reason is None and event.type == "TIMER":
             try:
-                with self.reporting_warnings():
+                with telling_warnings(self.report_warnings):
                     is_done = job.advance(context)
             except REPORTED_ERRORS as error:
                 return self.report_error(error)

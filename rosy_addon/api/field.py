@@ -26,13 +26,12 @@ from ..field.validate import (
 from ..field.vertex_frames import in_space
 
 try:
-    from ..external.simulation_files import SUFFIXES, read_simulation
-    from ..external.vtk_surface import dataset_arrays
+    from ..external.simulation_files import SUFFIXES, read_object, read_simulation
 except ImportError:  # the extension for Blender
     pass
 else:
     SIMULATION_READERS.update(dict.fromkeys(SUFFIXES, read_simulation))
-    OBJECT_READERS["extract_surface"] = dataset_arrays
+    OBJECT_READERS.update(dict.fromkeys(("extract_surface", "cells_dict"), read_object))
 
 
 def from_vectors(

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import REPORTED_ERRORS, error_text
+from ..core.errors import REPORTED_ERRORS, error_text, telling_warnings
 from ..rendering.turntable import Encoder
 from .bake import add_bake_command
 from .field import add_compare_command, add_field_command, add_info_command
 from .options import CommandParser, Options
 from .pictures import add_render_command, add_texture_command, add_turntable_command
 from .presets import add_presets_command
-from .streams import discard_output, output_stream, print_error, printed_warnings
+from .streams import discard_output, output_stream, print_error
 from .strokes import add_strokes_command
 
 #: Commands that may need Blender.
@@ -87,7 +87,7 @@ def main(
     try:
         parser = _build_parser(prog, extras)
         options = parser.parse_args(_join_negative_values(arguments), Options())
-        with printed_warnings():
+        with telling_warnings(print_error):
             options.run(options)
         output_stream().flush()
     except REPORTED_ERRORS as error:

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Any, TextIO
+from typing import TextIO
 
-from ..core.errors import RosyWarning, escape_unsafe
+from ..core.errors import escape_unsafe
 
 #: The stream that commands print to. None: `sys.stdout`.
 _own_output: TextIO | None = None
@@ -60,18 +57,3 @@ def discard_output() -> None:
     descriptor = os.open(os.devnull, os.O_WRONLY)
     os.dup2(descriptor, output_stream().fileno())
     os.close(descriptor)
-
-
-@contextmanager
-def printed_warnings() -> Iterator[None]:
-    """Context manager: print each `RosyWarning` of its block to the error stream. Drop other warnings."""
-
-    def show(message: Warning | str, category: type[Warning], *_: Any) -> None:
-        if issubclass(category, RosyWarning):
-            print_error(str(message))
-
-    with warnings.catch_warnings():
-        # A warning with the same text from the same line of code is printed only once.
-        warnings.simplefilter("default", RosyWarning)
-        warnings.showwarning = show
-        yield

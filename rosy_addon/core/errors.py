@@ -1,6 +1,9 @@
 """Exceptions whose messages are shown to the user, and functions that word messages."""
 
 import re
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 #: Characters that could change how a terminal shows a message: control characters except tab and newline, and
 #: characters that change the direction of text. Names in files may contain them.
@@ -31,6 +34,21 @@ class RosyError(ValueError):
 
 class RosyWarning(UserWarning):
     """A warning about a result, with a message of one line for the user."""
+
+
+@contextmanager
+def telling_warnings(tell: Callable[[str], None]) -> Iterator[None]:
+    """Context manager: call `tell` with the text of each `RosyWarning` of its block. Drop other warnings."""
+
+    def show(message: Warning | str, category: type[Warning], *_: object) -> None:
+        if issubclass(category, RosyWarning):
+            tell(str(message))
+
+    with warnings.catch_warnings():
+        # A warning with the same text from the same line of code is told only once.
+        warnings.simplefilter("default", RosyWarning)
+        warnings.showwarning = show
+        yield
 
 
 class NothingInViewError(RosyError):

@@ -159,6 +159,27 @@ def read_simulation(path: str | os.PathLike[str], step: int | None = None) -> Me
     return replace(arrays, note=f"{path}: the last of {len(steps)} steps was read{text}")
 
 
+def read_object(mesh: Any, name: str) -> MeshArrays:
+    """Read the surface of a data set of PyVista or a mesh of meshio, as that of a file; see `read_simulation`.
+
+    Parameters
+    ----------
+    mesh : pyvista.DataSet or meshio.Mesh
+    name : str
+        Name of the object, for messages.
+
+    Raises
+    ------
+    RosyError
+        If the object has no surface, or PyVista is not installed.
+    """
+    with _reporting(Path(name)):
+        import pyvista
+
+        dataset = mesh if hasattr(mesh, "extract_surface") else pyvista.from_meshio(mesh)
+        return surface_arrays([dataset], name, False, False)
+
+
 def list_steps(paths: Sequence[str | os.PathLike[str]]) -> list[Step]:
     """Return the steps of a series, without reading their meshes.
 

@@ -41,11 +41,6 @@ _INTERNAL_ARRAYS = (
 )
 
 
-def dataset_arrays(dataset: Any, name: str) -> MeshArrays:
-    """Return the surface of one of PyVista's data sets, with its arrays; `name` is its name in messages."""
-    return surface_arrays([dataset], name, False, False)
-
-
 def surface_arrays(datasets: list, name: str, has_parts: bool, repeats_blocks: bool) -> MeshArrays:
     """Return the surface of the datasets of a time step, with the arrays at its points and cells.
 
@@ -165,7 +160,7 @@ def _surface_cells(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray, np.nd
     face_cell : (F,) int64 ndarray
         Index of the cell of each face.
     """
-    connectivity, offset = np.asarray(grid.cell_connectivity), _offsets(grid)
+    connectivity, offset = np.asarray(grid.cell_connectivity), np.asarray(grid.offset)
     corner_count = np.diff(offset)
     for cell_type, count in _CORNERS_OF_SURFACE_CELL.items():
         if count is not None:
@@ -212,7 +207,7 @@ def _boundary(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray, np.ndarray
     face_cell = volume_cells[surface_cell]
     points = np.asarray(grid.points, dtype=np.float64)
     cell_points = points[np.asarray(grid.cell_connectivity)]
-    cell_center = mean_per_face(cell_points, _offsets(grid))[surface_cell]
+    cell_center = mean_per_face(cell_points, np.asarray(grid.offset))[surface_cell]
     # Cells may be inside out. So each face is oriented to point away from the center of its cell.
     outward = mean_per_face(points[corner_point], face_start) - cell_center
     area_vectors = face_area_vectors(*Polygons(points, corner_point, face_start))
@@ -228,11 +223,6 @@ def _boundary(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray, np.ndarray
     position = np.where(np.repeat(is_inward[order], sizes), mirrored, position)
     corner_point = corner_point[np.repeat(face_start[:-1][order], sizes) + position]
     return corner_point, ordered_start, face_cell[order]
-
-
-def _offsets(grid: Any) -> np.ndarray:
-    """Return the index of the first corner of each cell, and the number of corners at the end."""
-    return np.asarray(grid.cell_offsets if hasattr(grid, "cell_offsets") else grid.offset)
 
 
 def _ranks(start: np.ndarray) -> np.ndarray:
@@ -255,7 +245,7 @@ def _linear_volume_cells(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray,
         linear_type[is_type], sizes[is_type] = linear, count
     # In this array, the number of points of a cell comes before its points.
     start = offsets_from_sizes(sizes + 1)
-    first = np.repeat(_offsets(grid)[cells], sizes + 1)
+    first = np.repeat(np.asarray(grid.offset)[cells], sizes + 1)
     position = np.maximum(_ranks(start) - 1, 0)
     connectivity = np.asarray(grid.cell_connectivity)[first + position]
     connectivity[start[:-1]] = sizes

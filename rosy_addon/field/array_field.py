@@ -264,6 +264,8 @@ def array_field(
         if policy.off_surface == "error":
             tangential = _tangential_on_faces(surface, vectors, raw.domain, degree)
         if tangential is not None:
+            text = f"{source}: its vectors are off the surface; their tangential parts are read"
+            warnings.warn(text, RosyWarning, stacklevel=3)
             raw = replace(raw, values=tangential[:, None], domain="face")
     with progress(0.5, 1.0):
         return field_from_raw(raw, surface, degree, source, policy)

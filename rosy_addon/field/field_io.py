@@ -82,6 +82,9 @@ HALF_CROSS_NOTE = (
     "Give the degree 2 for two directions as they are"
 )
 
+#: Note about rows that may belong to the faces or to the vertices.
+AMBIGUOUS_ROWS_NOTE = "there are as many vertices as faces; the rows are read as those of faces"
+
 #: Peak memory in bytes per byte of an .npy file, until its field is made.
 NPY_MEMORY = 4
 
@@ -155,26 +158,30 @@ def load_field(
     if len(raws) > 1:
         raw = replace(raw, values=_joined_rows(raws, paths), degree=None)
     raw, note = _with_degree(raw, path, degree)
+    notes = [note]
     with progress(0.5, 0.6):
         source_surface = _source_surface(path, raw, surface, mesh)
     if raw.values.shape[2] == 2:
         target = surface if source_surface is None else source_surface
-        vectors, domain, frame_note = in_space(target, raw.values[:, 0], path.name)
+        vectors, domain, frame_note = in_space(target, raw.values[:, 0], str(path))
         raw = replace(raw, values=vectors[:, None], domain=domain)
-        note = "; ".join(filter(None, [note, frame_note]))
+        notes.append(f"{path.name}: {frame_note}")
     if source_surface is None:
+        if raw.domain is None and len(raw.values) == surface.face_count == len(surface.vertices):
+            notes.append(f"{path.name}: {AMBIGUOUS_ROWS_NOTE}")
         with progress(0.6, 1.0):
-            return LoadedField(field_from_raw(raw, surface, degree, str(path), policy), note)
+            field = field_from_raw(raw, surface, degree, str(path), policy)
+        return LoadedField(field, "; ".join(filter(None, notes)))
     with progress(0.6, 0.7):
         field = field_from_raw(raw, source_surface, degree, str(path), policy)
     with progress(0.7, 1.0):
         field = transfer_field(source_surface, field, surface, str(path))
-    transferred = (
+    notes.append(
         f"{path.name}: the field has {counted(source_surface.face_count, 'face')}, but the mesh has "
         f"{surface.face_count:,}; the field was transferred by position from "
         f"{Path(source_surface.name).name}"
     )
-    return LoadedField(field, "; ".join(filter(None, [note, transferred])))
+    return LoadedField(field, "; ".join(filter(None, notes)))
 
 
 def _read_rows(path: Path) -> RawField:

@@ -24,13 +24,6 @@ from .formats.polygons import Polygons, offsets_from_sizes
 from .joining import coinciding_borders, without_repeats
 from .mesh_io import READERS, read_polygons
 
-#: Number of corners of each type of surface cell in meshio. Cells of second order have further points, which
-#: are left out.
-MESHIO_CORNERS = {
-    "triangle": 3, "triangle6": 3, "triangle7": 3,
-    "quad": 4, "quad8": 4, "quad9": 4,
-}  # fmt: skip
-
 
 @dataclass(frozen=True, eq=False)
 class MeshArrays:
@@ -226,8 +219,6 @@ def _arrays_of(mesh: Any, name: str) -> MeshArrays:
     """
     if isinstance(mesh, MeshArrays):
         return mesh
-    if hasattr(mesh, "points") and isinstance(getattr(mesh, "cells", None), list):
-        return _from_meshio(mesh, name)
     for attribute, read in OBJECT_READERS.items():
         if hasattr(mesh, attribute):
             return read(mesh, name)
@@ -267,31 +258,6 @@ def _vertex_colors(mesh: Any) -> NDArray[np.float64]:
     if getattr(visual, "kind", None) == "vertex":
         return np.asarray(visual.vertex_colors) / 255.0
     return np.asarray(getattr(mesh, "vertex_colors", np.empty((0, 3))), dtype=np.float64)
-
-
-def _from_meshio(mesh: Any, name: str) -> MeshArrays:
-    """Return the arrays of a mesh of meshio: its surface cells, with their data."""
-    corners, sizes, kept = [], [], []
-    for index, block in enumerate(mesh.cells):
-        count = MESHIO_CORNERS.get(block.type)
-        if block.type == "polygon":
-            count = np.shape(block.data)[1]
-        if count is None or not len(block.data):
-            continue
-        kept.append(index)
-        corners.append(np.asarray(block.data)[:, :count].ravel())
-        sizes.append(np.full(len(block.data), count))
-    if not kept:
-        found = ", ".join(sorted({block.type for block in mesh.cells})) or "none"
-        raise RosyError(f"{name}: has no triangles, quads or polygons, only these cells: {found}")
-    vertex_data = {key: np.asarray(values) for key, values in mesh.point_data.items()}
-    face_data = {
-        key: np.concatenate([np.asarray(blocks[index]) for index in kept])
-        for key, blocks in mesh.cell_data.items()
-    }
-    face_start = offsets_from_sizes(np.concatenate(sizes))
-    corner_vertex = np.concatenate(corners)
-    return MeshArrays(mesh.points, corner_vertex, face_start, None, vertex_data, face_data)
 
 
 def pyvista_arrays(attributes: Any) -> dict[str, NDArray[Any]]:

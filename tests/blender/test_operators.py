@@ -383,6 +383,27 @@ def test_exports_and_imports(suzanne, tmp_path):
             np.testing.assert_array_equal(member_vectors(suzanne.data), before)
 
 
+def test_what_is_imported_from_other_programs(suzanne, tmp_path):
+    """A cross in two files, with vectors off the surface; and feature edges."""
+    mesh = suzanne.data
+    normals = np.array([polygon.normal for polygon in mesh.polygons])
+    axis = np.cross(normals, (0.1, 0.2, 1.0))
+    other = np.cross(normals, axis)
+    axis[:50] = normals[:50]
+    paths = [str(tmp_path / name) for name in ("a.csv", "b.csv")]
+    for path, rows in zip(paths, (axis, other), strict=True):
+        np.savetxt(path, rows, delimiter=",")
+    files = {"filepath": paths[0], "second_file": paths[1], "undefined": "zero"}
+    with pytest.raises(RuntimeError, match="vectors are not tangent"):
+        bpy.ops.rosy.field_import(**files)
+    assert bpy.ops.rosy.field_import(**files, off_surface="undefined") == {"FINISHED"}
+    assert mesh.rosy.degree == 4
+    assert np.flatnonzero(~member_vectors(mesh).any(axis=1)).tolist() == list(range(50))
+    (tmp_path / "a.feature").write_text("2\n0,0\n7,1\n")
+    assert bpy.ops.rosy.field_import(filepath=str(tmp_path / "a.feature")) == {"FINISHED"}
+    assert sum(edge.use_edge_sharp for edge in mesh.edges) == 2
+
+
 def test_a_file_of_the_mesh_before_it_was_triangulated(suzanne, tmp_path):
     bpy.ops.rosy.field_generate(kind="axis", degree=4, axis=(0.2, 0.3, 1.0))
     path = tmp_path / "a.rosy"

@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
+from rosy.rosy_addon.core.errors import RosyWarning
 from rosy.rosy_addon.field.directional_field import field_directions, field_from_directions
 from rosy.rosy_addon.field.frames import normalize
 from rosy.rosy_addon.field.generate import axis_field
@@ -18,7 +19,7 @@ from rosy.rosy_addon.scene.cameras import camera_of_object
 from rosy.rosy_addon.scene.evaluated_field import TEMP_FIELD_ATTRIBUTE
 from rosy.rosy_addon.scene.field_attributes import has_field
 from rosy.rosy_addon.scene.mesh_fields import read_mesh_field, write_mesh_field
-from rosy.rosy_addon.scene.meshes import EDGE_MARKS, marked_edges, mesh_surface
+from rosy.rosy_addon.scene.meshes import EDGE_MARKS, mark_sharp, marked_edges, mesh_surface
 from rosy.rosy_addon.scene.read_view import read_lights
 from rosy.rosy_addon.scene.visible_objects import field_objects
 from scenes import (
@@ -178,6 +179,15 @@ def test_directions_replace_an_earlier_field(scene):
     again = read_mesh_field(plane.data)
     np.testing.assert_allclose(again.direction_ratios, field.direction_ratios, atol=1e-6)
     assert plane.data.rosy.degree == 3
+
+
+def test_two_directions_are_the_lines_of_a_cross(scene):
+    mesh = add_plane(cuts=2).data
+    for name, axis in zip(("dir0", "dir1"), mesh_surface(mesh).face_frames, strict=True):
+        set_vectors(mesh, axis, name)
+    with pytest.warns(RosyWarning, match="dir0 to dir1: rows have two directions that are nowhere"):
+        assert read_mesh_field(mesh).degree == 4
+    assert read_mesh_field(mesh, degree=2).degree == 2
 
 
 # --- scenes ----------------------------------------------------------------------------------
@@ -370,6 +380,9 @@ def test_marked_edges(scene, mark):
         setattr(mesh.edges[index], EDGE_MARKS[mark][0], True)
     edges = marked_edges(mesh, mark)
     np.testing.assert_array_equal(edges, [list(mesh.edges[index].vertices) for index in (3, 7)])
+    if mark == "SHARP":
+        assert mark_sharp(mesh, np.array([*edges[:1, ::-1], mesh.edges[5].vertices])) == 2
+        assert len(marked_edges(mesh, mark)) == 3
 
 
 @pytest.mark.parametrize("repeated", [False, True])

@@ -11,6 +11,7 @@ import rosy_addon as rf
 meshio = pytest.importorskip("meshio")
 trimesh = pytest.importorskip("trimesh")
 igl = pytest.importorskip("igl")
+potpourri3d = pytest.importorskip("potpourri3d")
 
 
 @pytest.fixture
@@ -64,3 +65,30 @@ def test_matrices_of_libigl(ascii_, surface, tmp_path):
         field = rf.read_field(tmp_path / "a.dmat", surface)
     assert field.degree == 4
     assert field.directions == pytest.approx(cross, abs=1e-6)
+
+
+@pytest.mark.parametrize("is_open", [False, True])
+def test_vectors_of_geometry_central_at_vertices(is_open, sphere, tmp_path):
+    """Two numbers in a frame that depends on the order of faces, given by potpourri3d in space as well."""
+    faces = np.random.default_rng(0).permutation(sphere.regular_faces)
+    faces = np.roll(
+        faces[sphere.points[faces][:, :, 2].mean(axis=1) > -0.1 - 9 * (not is_open)], 1, axis=1
+    )
+    vertices, faces = np.unique(faces, return_inverse=True)
+    surface = rf.Surface(sphere.points[vertices] * [1.0, 1.4, 0.7], faces.reshape(-1, 3))
+    solver = potpourri3d.MeshVectorHeatSolver(surface.vertices, surface.faces)
+    rows = solver.transport_tangent_vectors([0, 90], [[1.0, 0.0], [0.3, 0.5]])
+    x, y, _ = solver.get_tangent_frames()
+    expected = rf.from_vectors(surface, rows[:, :1] * x + rows[:, 1:] * y, 1)
+    np.savetxt(tmp_path / "a.csv", rows, delimiter=",")
+    with pytest.warns(rf.RosyWarning, match="in the frames of geometry-central"):
+        fields = rf.from_vectors(surface, rows, 1), rf.read_field(tmp_path / "a.csv", surface, 1)
+    for field in fields:
+        assert field.vectors == pytest.approx(expected.vectors, abs=1e-9)
+
+
+def test_frames_need_one_fan_of_faces(error_of):
+    bow_tie = rf.Surface(
+        [[0, 0, 0], [1, 0, 0], [0, 1, 1], [-1, 0, 0], [0, -1, 1]], [[0, 1, 2], [0, 3, 4]]
+    )
+    assert "are not one fan" in error_of(rf.from_vectors, bow_tie, np.ones((5, 2)), 1)

@@ -101,6 +101,10 @@ def test_grids_that_close_onto_themselves(where, rounding, tmp_path):
     assert rf.smoothest(surface, 4).singularities.index.sum() == 8
 
 
+def test_texture_coordinates_keep_no_seam():
+    assert rf.Surface(pv.Superquadric()).euler_characteristic == 2
+
+
 def test_borders_with_other_data_stay_apart():
     """An angle that is 0 on one side of a seam and 360 on the other."""
     grid = ball_of_longitudes()

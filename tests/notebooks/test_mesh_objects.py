@@ -81,7 +81,7 @@ def test_meshio_concatenates_cells_and_their_data():
     surface = rf.Surface(mesh)
     np.testing.assert_array_equal(surface.faces, TRIANGLES)
     np.testing.assert_array_equal(surface.face_data["number"], [2, 3])
-    with pytest.raises(rf.RosyError, match="only these cells: line"):
+    with pytest.raises(rf.RosyError, match="has no surface"):
         rf.Surface(meshio.Mesh(SQUARE, [("line", [[0, 1]])]))
 
 

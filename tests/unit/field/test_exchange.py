@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from field_helpers import angle_differences, read_damaged, read_field, write_off
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from field_helpers import angle_differences, read_field, write_off
 from shapes import from_triangles, icosphere, plane, rebuilt, torus
 
 from rosy_addon.core.errors import RosyError
@@ -132,6 +130,32 @@ def test_two_directions_that_are_nowhere_opposite_are_a_cross(kind, ending, tmp_
         assert load_field(path, BALL, 2).field.degree == 2
 
 
+def test_the_directions_of_a_cross_in_two_files(tmp_path, error_of):
+    cross = field_directions(BALL, axis_field(BALL, 4, (0.3, -0.2, 1.0)))
+    paths = [tmp_path / "alpha.csv", tmp_path / "beta.csv"]
+    for path, rows in zip(paths, cross.swapaxes(0, 1), strict=False):
+        np.savetxt(path, rows, delimiter=",", header="x,y,z", comments="")
+    loaded = load_field(paths, BALL)
+    assert np.allclose(field_directions(BALL, loaded.field), cross, atol=1e-12)
+    assert "alpha.csv: rows have two directions that are nowhere opposite" in loaded.note
+    paths[1].write_text("1 0 0\n")
+    message = error_of(load_field, paths, BALL)
+    assert "beta.csv: has 1 row of 3 numbers, but files" in message
+
+
+def test_rows_that_fit_the_faces_and_the_vertices(tmp_path):
+    surface = torus(8, 6)
+    np.savetxt(tmp_path / "a.txt", surface.face_frames[0])
+    assert "as many vertices as faces" in load_field(tmp_path / "a.txt", surface, 4).note
+
+
+def test_two_numbers_on_a_flat_mesh_are_x_and_y(tmp_path):
+    flat = plane(3, 3)
+    np.savetxt(tmp_path / "a.txt", np.tile((0.6, 0.8), (flat.face_count, 1)))
+    field, note = load_field(tmp_path / "a.txt", flat, 1)
+    assert np.allclose(field.vectors, (0.6, 0.8, 0.0)) and "because the mesh is flat" in note
+
+
 def test_opposite_directions_are_a_field_of_degree_2(tmp_path):
     vectors = axis_field(BALL, 2, (0.3, -0.2, 1.0)).vectors
     np.save(tmp_path / "a.npy", np.stack([vectors, -vectors], axis=1))
@@ -168,36 +192,6 @@ def test_a_signalling_nan_in_an_array_is_named(tmp_path, error_of):
     values.view("<u4")[2, 0] = 0x7F800001
     np.save(tmp_path / "a.npy", values)
     assert "not finite, the first on face 2" in error_of(read_field, tmp_path / "a.npy", BALL)
-
-
-DAMAGED = {
-    "a.txt": ("1 2 3\n1 2\n", "a.txt:2: the row has 2 numbers, the rows above have 3"),
-    "b.txt": ("1 2 3 4\n3 4 5 6\n", "has 4 numbers per row"),
-    "c.txt": ("", "contains no numbers"),
-    "d.txt": ("1 2 x\n", "d.txt:1: expected a number (part of a vector), found 'x'"),
-    "e.txt": ("1 2 3\n", "contains 1 row, but sphere has"),
-    "f.npy": ("hello", "is not a valid .npy file"),
-}
-
-
-@pytest.mark.parametrize("name", DAMAGED)
-def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
-    text, expected = DAMAGED[name]
-    (tmp_path / name).write_text(text)
-    message = error_of(read_field, tmp_path / name, BALL)
-    assert expected in message and str(tmp_path / name) in message and "\n" not in message
-
-
-DAMAGED_SUFFIXES = [".rosy", ".rawfield", ".obj", ".txt", ".npy"]
-
-
-@pytest.mark.slow
-@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.binary(max_size=200), st.integers(0, 300), st.sampled_from(DAMAGED_SUFFIXES))
-def test_random_damage_raises_only_rosy_errors(tmp_path, garbage, offset, ending):
-    path = tmp_path / f"damaged{ending}"
-    write_field(path, axis_field(BALL, 4), BALL)
-    read_damaged(path, path.read_bytes(), garbage, offset, lambda path: read_field(path, BALL))
 
 
 # --- by position -----------------------------------------------------------------------------

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+
 import numpy as np
 import pytest
 from field_helpers import read_damaged, read_field
@@ -11,7 +13,7 @@ from shapes import icosphere
 
 from rosy_addon.core.errors import RosyError
 from rosy_addon.field.directional_field import field_directions
-from rosy_addon.field.field_io import load_field
+from rosy_addon.field.field_io import field_file, load_field
 from rosy_addon.field.frames import normalize
 from rosy_addon.field.generate import axis_field
 
@@ -41,6 +43,12 @@ def crossfield_bytes(rows):
     return (f"2 {len(rows)}\n" + "".join(lines)).encode()
 
 
+def archive_bytes(**arrays):
+    file = io.BytesIO()
+    np.savez_compressed(file, **arrays)
+    return file.getvalue()
+
+
 FLAGGED = np.column_stack([np.arange(len(HALVES)) % 2, HALVES])
 FILES = {
     "text.dmat": dmat_bytes(HALVES),
@@ -49,6 +57,7 @@ FILES = {
     "numbers.dmat": dmat_bytes(np.column_stack([np.arange(len(HALVES)), HALVES])),
     "a.crossfield": crossfield_bytes(HALVES),
     "a.ffield": frames_bytes(HALVES),
+    "compressed.npz": archive_bytes(Q=HALVES),
     "a.csv": "".join(",".join(map(repr, row)) + "\n" for row in HALVES.tolist()).encode(),
 }
 
@@ -127,6 +136,13 @@ DAMAGED = {
     "d.crossfield": (b"2 5\n0 1 0 0 0 1 0\n", "declares 5 rows"),
     "a.ffield": (b"target frame\n", "expected the header of a frame field"),
     "b.ffield": (b"", "expected the header of a frame field"),
+    "a.txt": (b"1 2 3\n1 2\n", "a.txt:2: the row has 2 numbers, the rows above have 3"),
+    "b.txt": (b"1 2 3 4\n3 4 5 6\n", "has 4 numbers per row"),
+    "c.txt": (b"", "contains no numbers"),
+    "d.txt": (b"1 2 x\n", "d.txt:1: expected a number (part of a vector), found 'x'"),
+    "e.txt": (b"1 2 3\n", "contains 1 row, but sphere has"),
+    "f.txt": (b"1 2\n", "contains 1 row, but sphere has"),
+    "f.npy": (b"hello", "is not a valid .npy file"),
     "a.npz": (b"hello", "is not a valid .npz file"),
     "b.npz": (_archive(a=CROSS, b=CROSS), "several arrays can be the field; call it 'directions'"),
     "c.npz": (_archive(a=np.arange(3)), "no array can be the field"),
@@ -146,14 +162,13 @@ def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
     assert expected in message and str(tmp_path / name) in message and "\n" not in message
 
 
+WRITTEN = ["a.rosy", "a.rawfield", "a.obj", "a.txt", "a.npy"]
+
+
 @pytest.mark.slow
-@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.binary(max_size=60), st.integers(0, 300), st.sampled_from([*FILES, "a.npz"]))
+@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.binary(max_size=200), st.integers(0, 300), st.sampled_from([*FILES, *WRITTEN]))
 def test_random_damage_raises_only_rosy_errors(tmp_path, garbage, offset, name):
     path = tmp_path / name
-    if name == "a.npz":
-        np.savez_compressed(path, Q=CROSS)
-        data = path.read_bytes()
-    else:
-        data = FILES[name]
+    data = FILES[name] if name in FILES else field_file(path, axis_field(BALL, 4), BALL)
     read_damaged(path, data, garbage, offset, lambda path: read_field(path, BALL))

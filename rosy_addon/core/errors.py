@@ -4,6 +4,7 @@ import re
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 #: Characters that could change how a terminal shows a message: control characters except tab and newline, and
 #: characters that change the direction of text. Names in files may contain them.
@@ -38,15 +39,20 @@ class RosyWarning(UserWarning):
 
 @contextmanager
 def telling_warnings(tell: Callable[[str], None]) -> Iterator[None]:
-    """Context manager: call `tell` with the text of each `RosyWarning` of its block. Drop other warnings."""
+    """Context manager: call `tell` with the text of each `RosyWarning` of its block. Drop other warnings.
 
-    def show(message: Warning | str, category: type[Warning], *_: object) -> None:
-        if issubclass(category, RosyWarning):
-            tell(str(message))
+    Warnings with the same text are told once.
+    """
+    told = set()
+
+    def show(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+        text = str(message)
+        if issubclass(category, RosyWarning) and text not in told:
+            told.add(text)
+            tell(text)
 
     with warnings.catch_warnings():
-        # A warning with the same text from the same line of code is told only once.
-        warnings.simplefilter("default", RosyWarning)
+        warnings.simplefilter("always", RosyWarning)
         warnings.showwarning = show
         yield
 

@@ -233,7 +233,8 @@ def array_field(
             )
         return field_from_raw(raw, surface, degree, arrays.name, policy)
     found = find_array(arrays, name)
-    source = f"{arrays.name}: array '{found.name}'"
+    array = f"array '{found.name}'"  # without the file, so that warnings are the same for all steps
+    source = f"{arrays.name}: {array}"
     if not _can_be_field(arrays, found.columns):
         kind = "scalars" if found.columns == 1 else f"{found.columns} numbers for each element"
         raise RosyError(
@@ -248,7 +249,7 @@ def array_field(
         )
     if found.columns == 6:
         warnings.warn(
-            f"{source}: its components have no names; they are read in VTK's order XX, YY, ZZ, XY, YZ, XZ",
+            f"{array}: its components have no names; they are read in VTK's order XX, YY, ZZ, XY, YZ, XZ",
             RosyWarning,
             stacklevel=3,
         )
@@ -264,7 +265,7 @@ def array_field(
         if policy.off_surface == "error":
             tangential = _tangential_on_faces(surface, vectors, raw.domain, degree)
         if tangential is not None:
-            text = f"{source}: its vectors are off the surface; their tangential parts are read"
+            text = f"{array}: its vectors are off the surface; their tangential parts are read"
             warnings.warn(text, RosyWarning, stacklevel=3)
             raw = replace(raw, values=tangential[:, None], domain="face")
     with progress(0.5, 1.0):

@@ -111,10 +111,13 @@ def mesh_arrays(
     arrays = replace(arrays, vertices=points, uv=uv)
     is_grid = suffix in SIMULATION_READERS or (faces is None and not is_path)
     if join or (join is None and (is_grid or suffix == ".stl")):
-        arrays, count = _with_joined_borders(arrays)
+        arrays, count, left_out = _with_joined_borders(arrays)
         if count and suffix != ".stl":
             text = f"{name}: {counted(count, 'vertex', 'vertices')} on borders coincided with others and "
             text += "were joined (join=False or --no-join keeps them apart)"
+            warnings.warn(text, RosyWarning, stacklevel=3)
+        if left_out:
+            text = f"{name}: {counted(left_out, 'face')} with fewer than three different corners were left out"
             warnings.warn(text, RosyWarning, stacklevel=3)
     if join:
         arrays, count = _without_copied_faces(arrays)
@@ -124,8 +127,8 @@ def mesh_arrays(
     return arrays
 
 
-def _with_joined_borders(arrays: MeshArrays) -> tuple[MeshArrays, int]:
-    """Join the vertices that `coinciding_borders` finds.
+def _with_joined_borders(arrays: MeshArrays) -> tuple[MeshArrays, int, int]:
+    """Join the vertices that `coinciding_borders` finds, and leave out faces that are then an edge or a point.
 
     Parameters
     ----------
@@ -136,19 +139,20 @@ def _with_joined_borders(arrays: MeshArrays) -> tuple[MeshArrays, int]:
     -------
     joined : MeshArrays
         Without the vertices that have been joined to others. A joined vertex has the data of the first one.
-    count : int
-        Number of vertices that have been joined to others.
+    count, left_out : int
+        Numbers of vertices that have been joined to others, and of faces that have been left out.
     """
     target = coinciding_borders(arrays.polygons, arrays.vertex_data)
     kept = target == np.arange(len(target))
     count = int((~kept).sum())
-    if not count:
-        return arrays, 0
     corner_vertex, face_start, corner, face = without_repeats(target, arrays.polygons)
+    left_out = arrays.polygons.face_count - len(face)
+    if not (count or left_out):
+        return arrays, 0, 0
     number = np.cumsum(kept) - 1
     arrays = _with_faces(arrays, number[corner_vertex], face_start, corner, face)
     data = _selected_rows(arrays.vertex_data, kept, len(target))
-    return replace(arrays, vertices=arrays.vertices[kept], vertex_data=data), count
+    return replace(arrays, vertices=arrays.vertices[kept], vertex_data=data), count, left_out
 
 
 def _with_faces(arrays: MeshArrays, vertex: Any, start: Any, corner: Any, face: Any) -> MeshArrays:

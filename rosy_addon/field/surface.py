@@ -83,7 +83,8 @@ class Surface:
     join : bool, optional
         Whether to join vertices on borders that are at the same position (within 1e-6 of the longest side) and
         have the same data, such as at the seam and the poles of a grid of longitudes and latitudes. By default
-        only for files of simulations, objects of other libraries and .stl files. If it is True, faces that
+        only for files of simulations, objects of other libraries and .stl files. Faces with fewer than three
+        different corners are then left out, and a `RosyWarning` says so. If it is True, faces that
         have the same corners as others, as on a two-sided sheet, are removed; otherwise a `RosyWarning` says
         that there are some.
 

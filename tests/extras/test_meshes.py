@@ -67,6 +67,10 @@ def test_boundary_of_a_volume(tmp_path, box):
     surface = Surface(mesh)
     assert surface.face_count == 6 * 9 * 2 and len(surface.vertices) == 4**3 - 2**3
     assert total_area(mesh) == pytest.approx(6)
+    of_object, of_file = rf.Surface(box), rf.Surface(tmp_path / "box.vtu")
+    assert of_object.content_key == of_file.content_key == surface.content_key
+    assert of_object.name == "surface" and of_file.name == str(tmp_path / "box.vtu")
+    assert np.array_equal(of_object.face_data["number"], mesh.face_data["number"])
     assert ((surface.face_center - 0.5) * surface.face_normal).sum(axis=1) == pytest.approx(0.5)
     tetrahedra = box.cells_dict[pv.CellType.TETRA][mesh.face_data["number"]]
     of_face = mesh.vertices[triangles_of(mesh)]

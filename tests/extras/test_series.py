@@ -12,6 +12,7 @@ import pyvista as pv
 from extras.exodus import write_exodus
 from extras.rotations import rotation
 
+import rosy_addon as rf
 from rosy_addon.external.simulation_files import list_steps, read_simulation
 
 #: The times of the steps. The rotation has the speed 1 + time.
@@ -139,3 +140,25 @@ def test_series_without_files(tmp_path, error_of):
         assert error_of(list_steps, [tmp_path / name]).endswith(f"{name}: lists no files")
     (tmp_path / "a.vtu.series").write_text('{"files": [{"name": "none.vtu", "time": 0}]}')
     assert "none.vtu: cannot be read" in error_of(list_steps, [tmp_path / "a.vtu.series"])
+
+
+def test_the_step_of_a_series(sphere, tmp_path, recwarn, error_of):
+    """The last one, with a warning in the caller's file; or the given one, without."""
+    entries = ""
+    for number in range(1, 4):
+        sphere.point_data["rotation"] = np.asarray(sphere["rotation"]) * number
+        sphere.save(tmp_path / f"{number}.vtp")
+        entries += f'<DataSet timestep="{number}" file="{number}.vtp"/>'
+    path = tmp_path / "a.pvd"
+    path.write_text(f'<VTKFile type="Collection"><Collection>{entries}</Collection></VTKFile>')
+    last = rf.from_array(rf.Surface(path))
+    (warning,) = recwarn.list
+    assert warning.category is rf.RosyWarning and warning.filename == __file__
+    assert str(warning.message) == f"{path}: the last of 3 steps was read, time 3"
+    recwarn.clear()
+    surface = rf.Surface(path, name="ball", up="y", step=1)
+    assert (surface.name, surface.up) == ("ball", "y")
+    first = rf.from_array(surface)
+    assert last.magnitude == pytest.approx(6 * first.magnitude, rel=1e-5)
+    assert "has no step 4, only 3 steps" in error_of(rf.Surface, path, step=4)
+    assert not recwarn.list

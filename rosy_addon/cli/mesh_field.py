@@ -109,9 +109,8 @@ def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
         raise RosyError(f"{options.field[0]}: give either a field file or --generate, not both")
     mesh, suffix = options.mesh, options.mesh.suffix.lower()
     is_simulation = suffix in SIMULATION_READERS
-    names = ("generate", "strokes", "guides", "singularities", "edges")
-    has_source = options.uv or any(getattr(options, name) is not None for name in names)
-    has_source = has_source or bool(options.field)
+    names = ("field", "generate", "strokes", "guides", "singularities", "edges")
+    has_source = options.uv or any(getattr(options, name) not in (None, []) for name in names)
     if options.array is not None and not (is_simulation or suffix == ".ply"):
         raise RosyError(f"{mesh}: --array applies only to .ply files and files of simulations")
     if options.step is not None and not is_simulation:

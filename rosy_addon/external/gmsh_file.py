@@ -39,8 +39,9 @@ _NODE_COUNTS = _LINES | {kind: nodes for kind, (_, _, nodes) in _CELLS.items()}
 #: The versions of the format that `read_gmsh` reads.
 VERSIONS = (b"2.2", b"4.1")
 
-#: In text of the format 2.2, this many elements at most are compared at once with the one before them.
-_RUN = 1000
+#: In text of the format 2.2, this many rows at most are compared at once to find elements of one type. With 100,
+#: an element takes 0.6 microseconds, or 12 if types alternate; with 1000, 0.6 and 30.
+_RUN = 100
 
 
 class _Section:

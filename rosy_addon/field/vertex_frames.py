@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.errors import RosyError
+from .blocks import mask
 from .corner_fans import corner_angles
 from .frames import dot, normalize
 from .surface import Surface
@@ -80,11 +81,9 @@ def vertex_frames(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     to_left = twin[previous]  # the corner of the same vertex in the next face, counter-clockwise
     corner = np.full(count, -1)
     corner[vertex] = corners
-    is_first = np.ones(len(vertex), dtype=bool)
-    is_first[to_left[to_left >= 0]] = False
+    is_first = ~mask(len(vertex), to_left[to_left >= 0])
     corner[vertex[is_first]] = corners[is_first]
-    is_border = np.zeros(count, dtype=bool)
-    is_border[vertex[is_first]] = True
+    is_border = mask(count, vertex[is_first])
     total = np.bincount(vertex, angle, count)
     scale = np.where(is_border, np.pi, 2 * np.pi) / np.where(total > 0, total, 1.0)
     start, at = corner.copy(), np.flatnonzero(corner >= 0)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+import re
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +13,7 @@ from ..core.cache import content_hash
 from ..core.errors import RosyError, counted
 from ..field.formats.polygons import Polygons, offsets_from_sizes
 from ..field.frames import dot
-from ..field.mesh_arrays import MeshArrays, pyvista_arrays
+from ..field.mesh_arrays import MeshArrays
 from ..field.polygon_arrays import face_area_vectors, mean_per_face
 
 #: VTK's types of surface cells, with the number of their corners. None: all points of the cell are corners.
@@ -113,14 +116,53 @@ def _without_copies(blocks: list[Any]) -> list[Any]:
 
 
 def _arrays(attributes: Any, index: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the numeric arrays of points or cells, by name, with the rows that `index` selects."""
+    """Return the numeric arrays of points or cells, by name, with the rows that `index` selects.
+
+    Tensors whose components have names are matrices; see `_as_matrices`.
+    """
     normals, uv = attributes.active_normals_name, attributes.active_texture_coordinates_name
     skipped = {*_INTERNAL_ARRAYS, normals, uv}
-    return {
-        name: rows[index]
-        for name, rows in pyvista_arrays(attributes).items()
-        if name not in skipped and rows.dtype.kind in "fiu"
-    }
+    arrays = {}
+    for name, values in attributes.items():
+        rows = np.asarray(values)
+        if name not in skipped and rows.dtype.kind in "fiu":
+            array = attributes.VTKObject.GetAbstractArray(name)
+            components = range(array.GetNumberOfComponents())
+            names = [array.GetComponentName(k) or "" for k in components]
+            arrays[name] = _as_matrices(rows, names)[index]
+    return arrays
+
+
+def _as_matrices(rows: np.ndarray, names: Sequence[str]) -> np.ndarray:
+    """Return rows of the components of symmetric tensors as 3 x 3 matrices, row by row, if their names tell.
+
+    Names of components end in two axes, such as ``XY`` or ``SIXY``, or in two digits, such as ``S12``. Three
+    or four components are a tensor in the plane of x and y; its other elements are 0.
+
+    Parameters
+    ----------
+    rows : (n, ...) ndarray
+    names : sequence of str
+        The name of each component.
+
+    Returns
+    -------
+    (n, 9) ndarray
+        `rows` itself if the names are not those of the components of a tensor.
+    """
+    digits = str.maketrans("123", "XYZ")
+    pairs = [tuple(re.findall("[XYZ]", name.upper().translate(digits))[-2:]) for name in names]
+    axes = {3: "XY", 4: "XY", 6: "XYZ", 9: "XYZ"}.get(len(names), "")
+    entries = []
+    for pair in itertools.product("XYZ", repeat=2):
+        found = [k for k, named in enumerate(pairs) if named in (pair, pair[::-1])]
+        exact = [k for k in found if pairs[k] == pair]
+        if not found and set(pair) <= set(axes):
+            return rows
+        entries.append((exact or found or [-1])[0])
+    if not axes or set(entries) - {-1} != set(range(len(names))):
+        return rows
+    return np.pad(rows, ((0, 0), (0, 1)))[:, entries]
 
 
 def _surface_polygons(grid: Any, name: str) -> tuple[Polygons, np.ndarray, np.ndarray]:

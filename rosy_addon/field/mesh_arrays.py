@@ -5,9 +5,7 @@ Such libraries are meshio, PyVista, trimesh and Open3D. None of them is imported
 
 from __future__ import annotations
 
-import itertools
 import os
-import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -262,52 +260,6 @@ def _vertex_colors(mesh: Any) -> NDArray[np.float64]:
     if getattr(visual, "kind", None) == "vertex":
         return np.asarray(visual.vertex_colors) / 255.0
     return np.asarray(getattr(mesh, "vertex_colors", np.empty((0, 3))), dtype=np.float64)
-
-
-def pyvista_arrays(attributes: Any) -> dict[str, NDArray[Any]]:
-    """Return the arrays of PyVista's points or cells by name; tensors are matrices (see `as_matrices`)."""
-    return {
-        key: as_matrices(np.asarray(values), component_names(attributes, key))
-        for key, values in attributes.items()
-    }
-
-
-def component_names(attributes: Any, name: str) -> list[str]:
-    """Return the names of the components of one of PyVista's arrays; empty strings if they have none."""
-    array = attributes.VTKObject.GetAbstractArray(name)
-    return [array.GetComponentName(k) or "" for k in range(array.GetNumberOfComponents())]
-
-
-def as_matrices(rows: NDArray[Any], names: Sequence[str]) -> NDArray[Any]:
-    """Return rows of the components of symmetric tensors as 3 x 3 matrices, row by row, if their names tell.
-
-    Names of components end in two axes, such as ``XY`` or ``SIXY``, or in two digits, such as ``S12``. Three
-    or four components are a tensor in the plane of x and y; its other elements are 0.
-
-    Parameters
-    ----------
-    rows : (n, ...) ndarray
-    names : sequence of str
-        The name of each component.
-
-    Returns
-    -------
-    (n, 9) ndarray
-        `rows` itself if the names are not those of the components of a tensor.
-    """
-    digits = str.maketrans("123", "XYZ")
-    pairs = [tuple(re.findall("[XYZ]", name.upper().translate(digits))[-2:]) for name in names]
-    axes = {3: "XY", 4: "XY", 6: "XYZ", 9: "XYZ"}.get(len(names), "")
-    entries = []
-    for pair in itertools.product("XYZ", repeat=2):
-        found = [k for k, named in enumerate(pairs) if named in (pair, pair[::-1])]
-        exact = [k for k in found if pairs[k] == pair]
-        if not found and set(pair) <= set(axes):
-            return rows
-        entries.append((exact or found or [-1])[0])
-    if not axes or set(entries) - {-1} != set(range(len(names))):
-        return rows
-    return np.pad(rows, ((0, 0), (0, 1)))[:, entries]
 
 
 def _without_copied_faces(arrays: MeshArrays) -> tuple[MeshArrays, int]:

@@ -31,7 +31,7 @@ GENERATORS = ("form", "smoothest", "curvature", "features", "uv")
 
 def add_field_command(subparsers: Any) -> None:
     """Add the command `field`."""
-    parser = add_subcommand(subparsers, "field", run_field)
+    parser = add_subcommand(subparsers, run_field)
     add_mesh_options(parser)
     parser.add_output_option("OUT", ", ".join(WRITE_SUFFIXES))
     text = "convert to this degree, a multiple or a divisor of the field's"
@@ -63,7 +63,7 @@ def run_field(options: Options) -> None:
 
 def add_info_command(subparsers: Any) -> None:
     """Add the command `info`."""
-    parser = add_subcommand(subparsers, "info", run_info)
+    parser = add_subcommand(subparsers, run_info)
     add_mesh_options(parser)
     parser.add_switch("--json", "print one JSON object")
     text = "compare with another field file, or with a file of singularities (.sings)"
@@ -169,7 +169,7 @@ def _format_comparison(against: dict[str, Any]) -> str:
 
 def add_compare_command(subparsers: Any) -> None:
     """Add the command `compare`."""
-    parser = add_subcommand(subparsers, "compare", run_compare, api.figure)
+    parser = add_subcommand(subparsers, run_compare, api.figure)
     suffixes = [*READERS, *SIMULATION_READERS]
     parser.add_argument("mesh", type=Path, metavar="MESH", help=", ".join(suffixes))
     text = (

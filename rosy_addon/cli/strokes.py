@@ -35,7 +35,7 @@ MESH_FILES, SCENES, PICTURES = "mesh files", ".blend files", ".svg files"
 
 def add_strokes_command(subparsers: Any) -> None:
     """Add the command `strokes`."""
-    parser = add_subcommand(subparsers, "strokes", run_strokes)
+    parser = add_subcommand(subparsers, run_strokes)
     parser.description += " For a .blend file, the defaults are the settings of the scene."
     text = f"{', '.join(READERS)} or .blend; in Blender, by default, the open file"
     parser.add_argument("mesh", nargs="?", type=Path, metavar="MESH|SCENE.blend", help=text)

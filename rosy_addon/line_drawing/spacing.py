@@ -20,7 +20,6 @@ from ..field.frames import dot, normalize
 from ..field.surface import Surface
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
-from ..projection.pixel_blocks import part_of
 from ..projection.vector_components import cofactor_matrix
 from .stroke_set import Strokes
 from .tangent_mesh import TangentMesh, unit
@@ -83,10 +82,6 @@ class CornerSpacing:
     mean: np.ndarray | None = None
     double: np.ndarray | None = None
     is_directional: np.ndarray | None = None
-
-    def take(self, kept: np.ndarray) -> CornerSpacing:
-        """Return the spacing on the triangles for which `kept`, (T,) bool, is true."""
-        return part_of(self, kept)
 
     def at(self, triangle: np.ndarray, weights: np.ndarray, direction: np.ndarray) -> np.ndarray:
         """Return (n,) float64: the spacing at points of triangles, for strokes in given directions.

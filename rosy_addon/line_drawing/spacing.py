@@ -142,13 +142,10 @@ def _curvature(mesh: TangentMesh) -> np.ndarray:
 
     It is the largest difference between the normals at both ends of an edge, over the length of the edge.
     """
-    curvature = np.zeros(len(mesh.points))
-    for first, second in ((0, 1), (1, 2), (2, 0)):
-        turn = mesh.corner_normal[:, first] - mesh.corner_normal[:, second]
-        edge = mesh.points[:, first] - mesh.points[:, second]
-        squared_length = np.maximum(dot(edge, edge), 1e-300)
-        curvature = np.maximum(curvature, np.sqrt(dot(turn, turn) / squared_length))
-    return curvature
+    turn = mesh.corner_normal - np.roll(mesh.corner_normal, -1, axis=1)
+    edge = mesh.points - np.roll(mesh.points, -1, axis=1)
+    squared_length = np.maximum(dot(edge, edge), 1e-300)
+    return np.sqrt(dot(turn, turn) / squared_length).max(axis=1)
 
 
 # --- by tone and curvature ------------------------------------------------------------------------------

@@ -33,13 +33,8 @@ def test_angles_are_those_of_the_nearest_members(degree):
     surface = torus(16, 10)
     one, other = rf.form(surface, degree), rf.along_axis(surface, (1, 2, 3), degree=degree)
     difference = rf.compare([one, other]).differences["field 2"]
-    for face, (a, b) in enumerate(
-        zip(
-            members(surface, one.vectors, degree),
-            members(surface, other.vectors, degree),
-            strict=True,
-        )
-    ):
+    directions = (members(surface, field.vectors, degree) for field in (one, other))
+    for face, (a, b) in enumerate(zip(*directions, strict=True)):
         a, b = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in (a, b))
         nearest = np.arctan2(np.linalg.norm(np.cross(a[0], b), axis=1), b @ a[0]).min()
         assert np.isclose(difference.angle[face], nearest, atol=1e-6)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .. import api
-from ..api.figures import LINES, check_figure_path, load_drawing
+from ..api.figures import LIMITS, LINES, check_figure_path, load_drawing
 from ..api.generators import GENERATOR_FUNCTIONS
 from ..core.errors import RosyError, counted
 from ..field.convert import Conversion, convert
@@ -196,10 +196,10 @@ def _add_layout_options(parser: CommandParser) -> None:
     """Add the options for the layout and the texts of the figure of a comparison."""
     text = "lines that are drawn over differences (%(default)s)"
     parser.add_argument("--lines", choices=LINES, help=text)
-    add, count, inches = parser.add_value, int_between(1, 100), float_between(0.5, 100.0)
+    add, count, inches = parser.add_value, int_between(1, 100), float_between(*LIMITS["width"])
     add("--columns", "N", "panels side by side; by default at most 3", count)
     add("--width", "INCHES", "width of the figure (%(default)g)", inches)
-    add("--dpi", "N", "resolution of the pictures (%(default)d)", int_between(10, 2400))
+    add("--dpi", "N", "resolution of the pictures (%(default)d)", int_between(*LIMITS["dpi"]))
     add("--caption", "TEXT", "text below the fields")
     add("--scale-bar", "UNIT", "draw a scale bar, in this unit of the coordinates")
     add("--color-label", "TEXT", "title of the color bar; by default the name of what is shown")

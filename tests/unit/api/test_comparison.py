@@ -9,6 +9,7 @@ import sys
 
 import numpy as np
 import pytest
+from field_helpers import write_off
 from shapes import icosphere, torus
 
 import rosy_addon as rf
@@ -105,11 +106,7 @@ def test_nothing_to_compare(sphere):
 
 
 def test_the_command(sphere, tmp_path, capfd):
-    mesh, field = tmp_path / "sphere.off", tmp_path / "turned.rosy"
-    rows = [" ".join(map(str, row)) for row in sphere.vertices.tolist()]
-    rows += [" ".join(map(str, (3, *face))) for face in sphere.faces.tolist()]
-    head = ["OFF", f"{len(sphere.vertices)} {sphere.face_count} 0"]
-    mesh.write_text("\n".join([*head, *rows]))
+    mesh, field = write_off(tmp_path / "sphere.off", sphere), tmp_path / "turned.rosy"
     rf.smoothest(rf.Surface(mesh), degree=6).rotated(0.05).save(field)
     assert main(["compare", str(mesh), "Ours=smoothest", str(field), "--format", "json"]) == 0
     ours, turned = json.loads(capfd.readouterr().out)

@@ -93,18 +93,17 @@ def _draw_scene_strokes(options: Options) -> None:
 
     The settings of the scene apply unless an option overrides them.
     """
-    frames = [None] if options.frames is None else list(parse_frames(options.frames))
+    frames = [] if options.frames is None else parse_frames(options.frames)
     output = options.output
     if len(frames) > 1 and "#" not in output.name:
         raise RosyError(f"{output}: several frames need # in the file name for the frame number")
     scene = open_scene(options, "strokes", options.mesh)
+    if options.frames is None:
+        _draw_frame_strokes(options, scene, output)
     for frame in frames:
-        if frame is None:
-            _draw_frame_strokes(options, scene, options.output)
-            continue
         scene.frame_set(frame)
         try:
-            _draw_frame_strokes(options, scene, _path_of_frame(options.output, frame))
+            _draw_frame_strokes(options, scene, _path_of_frame(output, frame))
         except RosyError as error:
             raise RosyError(f"frame {frame}: {error}") from None
 

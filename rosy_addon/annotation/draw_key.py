@@ -77,7 +77,7 @@ def draw_key(
     for box in layout.strokes:
         _draw_rectangle(rgba, box, text)
     for dot in layout.dots:
-        draw_dot(rgba, np.array((dot.x, dot.y)), dot.radius, dot.outline, dot.index)
+        draw_dot(rgba, dot)
     is_dark = text.sum() < plate.sum()
     for line in layout.texts:
         triangles = text_triangles(line.text) * layout.text_size + (line.left, line.baseline)

@@ -12,7 +12,7 @@ from ..field.blocks import blocks_by_count, concatenated_ranges
 from . import arrow_marks, singularity_marks
 from .arrow_marks import NOTCH, WIDTH, ArrowMarks
 from .index_labels import HALO, HALO_COLOR, LABEL_COLOR, Label, placed_labels, stroke_width
-from .singularity_marks import SingularityMarks
+from .singularity_marks import Dot, SingularityMarks
 
 #: Number of dots that are drawn between two reports of the progress, and number of pixels of arrowheads that
 #: are drawn at once.
@@ -65,39 +65,27 @@ def draw_marks(rgba: np.ndarray, marks: SingularityMarks) -> np.ndarray:
         if number % DOTS_PER_BLOCK == 0:
             report(number / len(marks), "drawing singularities")
         opacity = 1.0 if is_visible else singularity_marks.HIDDEN_OPACITY
-        draw_dot(rgba, center, radius, outline, int(index), opacity)
+        draw_dot(rgba, Dot(*center, radius, outline, int(index)), opacity)
     for label in placed_labels(marks):
         _draw_label(rgba, label, marks.size)
     return rgba
 
 
-def draw_dot(
-    rgba: np.ndarray,
-    center: np.ndarray,
-    radius: float,
-    outline: float,
-    index: int,
-    opacity: float = 1.0,
-) -> None:
+def draw_dot(rgba: np.ndarray, dot: Dot, opacity: float = 1.0) -> None:
     """Draw the dot of a singularity over a picture, in place.
 
     Parameters
     ----------
     rgba : (H, W, 4) float32 ndarray
         Picture: linear, not premultiplied, rows from the bottom.
-    center : (2,) float ndarray
-        Center of the dot, pixels from the lower left.
-    radius, outline : float
-        Radius without the outline, and width of the outline, pixels.
-    index : int
-        Index of the singularity. Its sign sets the color.
+    dot : Dot
     opacity : float
     """
-    outer = radius + outline
+    center, outer = np.array((dot.x, dot.y)), dot.radius + dot.outline
     part, x, y = window(rgba, center - outer - 1, center + outer + 1)
-    distance = np.hypot(x - center[0], y - center[1])
-    inner = np.clip(radius + 0.5 - distance, 0, 1)[..., None].astype(np.float32)
-    fill = _linear_color(singularity_marks.COLOR_BY_SIGN[int(np.sign(index))])
+    distance = np.hypot(x - dot.x, y - dot.y)
+    inner = np.clip(dot.radius + 0.5 - distance, 0, 1)[..., None].astype(np.float32)
+    fill = _linear_color(singularity_marks.COLOR_BY_SIGN[int(np.sign(dot.index))])
     line = _linear_color(singularity_marks.OUTLINE_COLOR)
     draw_over(part, line + inner * (fill - line), opacity * np.clip(outer + 0.5 - distance, 0, 1))
 
@@ -129,11 +117,8 @@ def _distance_to_segments(x: np.ndarray, y: np.ndarray, segments: np.ndarray) ->
     `segments` holds the (n, 2, 2) ends of the segments.
     """
     nearest = np.full(x.shape, np.inf)
-    for (ax, ay), (bx, by) in segments.tolist():
-        dx, dy = bx - ax, by - ay
-        length = dx * dx + dy * dy or 1.0
-        along = np.clip(((x - ax) * dx + (y - ay) * dy) / length, 0, 1)
-        np.minimum(nearest, np.hypot(x - ax - along * dx, y - ay - along * dy), out=nearest)
+    for start, end in segments:
+        np.minimum(nearest, _edge_distance(x, y, start, end)[0], out=nearest)
     return nearest
 
 
@@ -218,13 +203,13 @@ def head_outline(size: float) -> np.ndarray:
 
 
 def _edge_distance(
-    along: np.ndarray, across: np.ndarray, start: np.ndarray, end: np.ndarray
+    x: np.ndarray, y: np.ndarray, start: np.ndarray, end: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the distances from points to an edge, and whether points are to its left or on it.
 
-    `along` and `across` are the two coordinates of the points, `start` and `end` the ends of the edge.
+    `x` and `y` are the coordinates of the points, in any shape, and `start` and `end` the ends of the edge.
     """
     dx, dy = end - start
-    px, py = along - start[0], across - start[1]
-    share = np.clip((px * dx + py * dy) / (dx * dx + dy * dy), 0, 1)
+    px, py = x - start[0], y - start[1]
+    share = np.clip((px * dx + py * dy) / (dx * dx + dy * dy or 1.0), 0, 1)
     return np.hypot(px - share * dx, py - share * dy), dx * py - dy * px >= 0

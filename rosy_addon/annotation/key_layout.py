@@ -16,7 +16,7 @@ import numpy as np
 from ..field.singularities import format_index
 from .key_contents import ColorScale, IndexCount, PictureKey
 from .round_numbers import MINUS, tick_labels
-from .singularity_marks import OUTLINE, dot_diameters
+from .singularity_marks import OUTLINE, Dot, dot_diameters
 
 #: Text size if none is given, as a fraction of the smaller side of the frame. It is at least `MIN_TEXT_SIZE`
 #: pixels.
@@ -97,17 +97,6 @@ class PlacedText:
     baseline: float
 
 
-@dataclass(frozen=True)
-class PlacedDot:
-    """A dot of the legend: center, radius and outline width in pixels, and its singularity index times N."""
-
-    x: float
-    y: float
-    radius: float
-    outline: float
-    index: int
-
-
 @dataclass
 class KeyLayout:
     """Positions of all parts of a key, in pixels from the lower left corner of the frame.
@@ -122,7 +111,7 @@ class KeyLayout:
         Lines of text.
     strokes : list of Box
         Lines, as thin rectangles, in the color of the text.
-    dots : list of PlacedDot
+    dots : list of Dot
         Dots of the legend.
     color_bar : Box or None
         Rectangle of the colors, with the first color at the bottom; None: no color bar.
@@ -132,7 +121,7 @@ class KeyLayout:
     plates: list[Box] = field(default_factory=list)
     texts: list[PlacedText] = field(default_factory=list)
     strokes: list[Box] = field(default_factory=list)
-    dots: list[PlacedDot] = field(default_factory=list)
+    dots: list[Dot] = field(default_factory=list)
     color_bar: Box | None = None
 
     @property
@@ -312,7 +301,7 @@ class _Arrangement:
         for entry, label, diameter, row in rows:
             y = top - row / 2
             radius = diameter / 2 - outline
-            self.result.dots.append(PlacedDot(left + column / 2, y, radius, outline, entry.index))
+            self.result.dots.append(Dot(left + column / 2, y, radius, outline, entry.index))
             self._add_text(label, left + column + DOT_GAP * size, y - CAP_HEIGHT / 2 * size)
             top -= row + ROW_GAP * size
         return self.result.plates[-1][3]

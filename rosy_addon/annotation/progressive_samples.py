@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..field.blocks import concatenated_ranges
+from ..field.copied_faces import SPLIT_MIX_GAMMA, split_mix
 from ..field.surface import Surface
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
@@ -274,12 +275,8 @@ def _random_offsets(shuffle: np.ndarray) -> np.ndarray:
 
 
 def _random_bits(count: int) -> np.ndarray:
-    """Return (count,) uint64 pseudorandom numbers: SplitMix64 hashes of 0, 1, 2 and so on."""
-    bits = np.arange(1, count + 1, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
-    for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
-        bits ^= bits >> np.uint64(shift)
-        bits *= np.uint64(factor)
-    return bits ^ (bits >> np.uint64(31))
+    """Return (count,) uint64 pseudorandom numbers: the sequence of SplitMix64 from the seed 0."""
+    return split_mix(np.arange(count, dtype=np.uint64) * SPLIT_MIX_GAMMA)
 
 
 def _shuffle_bits(shuffle: np.ndarray, depth: int) -> np.ndarray:

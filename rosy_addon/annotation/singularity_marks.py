@@ -32,6 +32,20 @@ OUTLINE = 0.2
 HIDDEN_OPACITY = 0.3
 
 
+@dataclass(frozen=True)
+class Dot:
+    """A dot of a singularity: center, radius without outline, and width of the outline, in pixels; and the index.
+
+    Coordinates are measured from the lower left corner of the frame. The index is in units of 1 / N.
+    """
+
+    x: float
+    y: float
+    radius: float
+    outline: float
+    index: int
+
+
 @dataclass(frozen=True, eq=False)
 class SingularityMarks:
     """K singularities in a picture, which are drawn as dots.

@@ -14,7 +14,6 @@ from ..compositor.shading import lights_of
 from ..core.file_io import write_bytes
 from ..field.field import Field
 from ..field.surface import Surface
-from ..field.up_axis import UP_AXIS_MATRIX
 from ..line_drawing.pipeline import StrokeDrawing, draw_instances
 from ..line_drawing.polyline_files import check_drawing_suffix, polyline_file
 from ..line_drawing.style import StrokeStyle
@@ -91,10 +90,10 @@ class Drawing:
         """
         suffix = check_drawing_suffix(path)
         if suffix == ".svg":
-            write_bytes(path, self.svg.encode())
-            return
-        to_mesh = UP_AXIS_MATRIX[self._up].T
-        write_bytes(path, polyline_file(suffix, self._strokes, self._camera, self._pen, to_mesh))
+            contents = self.svg.encode()
+        else:
+            contents = polyline_file(suffix, self._strokes, self._camera, self._pen, self._up)
+        write_bytes(path, contents)
 
 
 def strokes(

@@ -21,7 +21,7 @@ from .streams import print_line
 
 def add_bake_command(subparsers: Any, has_cluster: bool) -> None:
     """Add the command `bake`, with --scheduler if it can run on a cluster."""
-    parser = add_subcommand(subparsers, "bake", run_bake)
+    parser = add_subcommand(subparsers, run_bake)
     text = "Blender file; by default the open one"
     parser.add_argument("scene", nargs="?", type=Path, metavar="SCENE.blend", help=text)
     parser.add_object_option("objects to draw; by default all with a field")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .. import api
-from ..api.figures import LINES, check_figure_path, load_drawing
+from ..api.figures import LIMITS, LINES, check_figure_path, load_drawing
 from ..api.generators import GENERATOR_FUNCTIONS
 from ..core.errors import RosyError, counted
 from ..field.convert import Conversion, convert
@@ -31,7 +31,7 @@ GENERATORS = ("form", "smoothest", "curvature", "features", "uv")
 
 def add_field_command(subparsers: Any) -> None:
     """Add the command `field`."""
-    parser = add_subcommand(subparsers, "field", run_field)
+    parser = add_subcommand(subparsers, run_field)
     add_mesh_options(parser)
     parser.add_output_option("OUT", ", ".join(WRITE_SUFFIXES))
     text = "convert to this degree, a multiple or a divisor of the field's"
@@ -63,7 +63,7 @@ def run_field(options: Options) -> None:
 
 def add_info_command(subparsers: Any) -> None:
     """Add the command `info`."""
-    parser = add_subcommand(subparsers, "info", run_info)
+    parser = add_subcommand(subparsers, run_info)
     add_mesh_options(parser)
     parser.add_switch("--json", "print one JSON object")
     text = "compare with another field file, or with a file of singularities (.sings)"
@@ -170,7 +170,7 @@ def _format_comparison(against: dict[str, Any]) -> str:
 
 def add_compare_command(subparsers: Any) -> None:
     """Add the command `compare`."""
-    parser = add_subcommand(subparsers, "compare", run_compare, api.figure)
+    parser = add_subcommand(subparsers, run_compare, api.figure)
     suffixes = [*READERS, *SIMULATION_READERS]
     parser.add_argument("mesh", type=Path, metavar="MESH", help=", ".join(suffixes))
     text = (
@@ -197,10 +197,10 @@ def _add_layout_options(parser: CommandParser) -> None:
     """Add the options for the layout and the texts of the figure of a comparison."""
     text = "lines that are drawn over differences (%(default)s)"
     parser.add_argument("--lines", choices=LINES, help=text)
-    add, count, inches = parser.add_value, int_between(1, 100), float_between(0.5, 100.0)
+    add, count, inches = parser.add_value, int_between(1, 100), float_between(*LIMITS["width"])
     add("--columns", "N", "panels side by side; by default at most 3", count)
     add("--width", "INCHES", "width of the figure (%(default)g)", inches)
-    add("--dpi", "N", "resolution of the pictures (%(default)d)", int_between(10, 2400))
+    add("--dpi", "N", "resolution of the pictures (%(default)d)", int_between(*LIMITS["dpi"]))
     add("--caption", "TEXT", "text below the fields")
     add("--scale-bar", "UNIT", "draw a scale bar, in this unit of the coordinates")
     add("--color-label", "TEXT", "title of the color bar; by default the name of what is shown")

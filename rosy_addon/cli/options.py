@@ -299,24 +299,21 @@ class Options(argparse.Namespace):
 
 
 def add_subcommand(
-    subparsers: Any,
-    name: str,
-    run: Callable[[Options], None],
-    function: Callable[..., Any] | None = None,
+    subparsers: Any, run: Callable[[Options], None], function: Callable[..., Any] | None = None
 ) -> CommandParser:
     """Add a command, and return its parser.
 
     Parameters
     ----------
     subparsers : argparse action
-    name : str
     run : function
-        Function that runs the command. The first line of its docstring is the help of the command.
+        Function that runs the command: ``run_NAME``, where NAME is the name of the command. The first line of
+        its docstring is the help of the command.
     function : function, optional
         A function of `api` that the command calls with its options; see `api_arguments`. The defaults of its
         keyword parameters are the defaults of the options.
     """
-    text = run.__doc__.splitlines()[0]
+    name, text = run.__name__.removeprefix("run_"), run.__doc__.splitlines()[0]
     parser = subparsers.add_parser(name, help=text, description=text)
     if function is not None:
         parser.set_defaults(**inspect.getfullargspec(function).kwonlydefaults)

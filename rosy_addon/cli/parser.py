@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import REPORTED_ERRORS, error_text, telling_warnings
+from ..core.file_io import os_error_text
 from ..rendering.turntable import Encoder
 from .bake import add_bake_command
 from .field import add_compare_command, add_field_command, add_info_command
@@ -101,7 +102,7 @@ def main(
         return EXIT_BROKEN_PIPE
     except OSError as error:
         where = error.filename or "standard output"
-        print_error(f"{where}: {(error.strerror or str(error)).lower()}")
+        print_error(f"{where}: {os_error_text(error)}")
         discard_output()
         return EXIT_OUTPUT_ERROR
     except SystemExit as exit_request:  # argparse: 0 after the help, 2 for a usage error

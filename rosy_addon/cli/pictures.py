@@ -19,7 +19,7 @@ from .streams import print_line
 
 def add_render_command(subparsers: Any) -> None:
     """Add the command `render`."""
-    parser = add_subcommand(subparsers, "render", run_render, api.render)
+    parser = add_subcommand(subparsers, run_render, api.render)
     add_mesh_options(parser)
     parser.add_output_option("OUT.png")
     parser.add_picture_options()
@@ -37,7 +37,7 @@ def run_render(options: Options) -> None:
 
 def add_turntable_command(subparsers: Any) -> None:
     """Add the command `turntable`."""
-    parser = add_subcommand(subparsers, "turntable", run_turntable, api.turntable)
+    parser = add_subcommand(subparsers, run_turntable, api.turntable)
     add_mesh_options(parser)
     parser.add_output_option("OUT.mp4|OUT.gif")
     text = "pictures in a full turn (%(default)d)"
@@ -94,7 +94,7 @@ def video_encoder(options: Options) -> Encoder | None:
 
 def add_texture_command(subparsers: Any) -> None:
     """Add the command `texture`."""
-    parser = add_subcommand(subparsers, "texture", run_texture, api.texture)
+    parser = add_subcommand(subparsers, run_texture, api.texture)
     add_mesh_options(parser)
     text = f"{UDIM_TOKEN} in the name stands for the number of a tile: each has a file of its own"
     parser.add_output_option("OUT.png", text)

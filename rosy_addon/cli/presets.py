@@ -13,7 +13,7 @@ from .streams import print_error, print_line
 
 def add_presets_command(subparsers: Any) -> None:
     """Add the command `presets`."""
-    parser = add_subcommand(subparsers, "presets", run_presets)
+    parser = add_subcommand(subparsers, run_presets)
     parser.add_switch("--json", "print a JSON list of objects")
 
 

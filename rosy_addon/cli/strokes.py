@@ -35,7 +35,7 @@ MESH_FILES, SCENES, PICTURES = "mesh files", ".blend files", ".svg files"
 
 def add_strokes_command(subparsers: Any) -> None:
     """Add the command `strokes`."""
-    parser = add_subcommand(subparsers, "strokes", run_strokes)
+    parser = add_subcommand(subparsers, run_strokes)
     parser.description += " For a .blend file, the defaults are the settings of the scene."
     text = f"{', '.join(READERS)} or .blend; in Blender, by default, the open file"
     parser.add_argument("mesh", nargs="?", type=Path, metavar="MESH|SCENE.blend", help=text)
@@ -93,18 +93,17 @@ def _draw_scene_strokes(options: Options) -> None:
 
     The settings of the scene apply unless an option overrides them.
     """
-    frames = [None] if options.frames is None else list(parse_frames(options.frames))
+    frames = [] if options.frames is None else parse_frames(options.frames)
     output = options.output
     if len(frames) > 1 and "#" not in output.name:
         raise RosyError(f"{output}: several frames need # in the file name for the frame number")
     scene = open_scene(options, "strokes", options.mesh)
+    if options.frames is None:
+        _draw_frame_strokes(options, scene, output)
     for frame in frames:
-        if frame is None:
-            _draw_frame_strokes(options, scene, options.output)
-            continue
         scene.frame_set(frame)
         try:
-            _draw_frame_strokes(options, scene, _path_of_frame(options.output, frame))
+            _draw_frame_strokes(options, scene, _path_of_frame(output, frame))
         except RosyError as error:
             raise RosyError(f"frame {frame}: {error}") from None
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
-from dataclasses import fields, is_dataclass
+from dataclasses import is_dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -107,7 +107,7 @@ def content_hash(*parts: object) -> bytes:
     return hasher.digest()
 
 
-def _array_bytes(obj: object, visited: set[int]) -> int:
+def _array_bytes(obj: Any, visited: set[int]) -> int:
     """Return the size of all arrays in an object in bytes. Objects that were visited before are not counted.
 
     `visited` holds the ids of visited objects and is updated. For a view of an array, the size of the whole
@@ -118,12 +118,10 @@ def _array_bytes(obj: object, visited: set[int]) -> int:
     visited.add(id(obj))
     if isinstance(obj, np.ndarray):
         return obj.nbytes if obj.base is None else _array_bytes(obj.base, visited)
-    if isinstance(obj, (list, tuple)):
-        return sum(_array_bytes(part, visited) for part in obj)
     if isinstance(obj, dict):
-        return sum(_array_bytes(part, visited) for part in obj.values())
-    if is_dataclass(obj):
-        # vars() adds cached properties, which are not fields.
-        attributes = {field.name: getattr(obj, field.name) for field in fields(obj)} | vars(obj)
-        return sum(_array_bytes(part, visited) for part in attributes.values())
-    return 0
+        obj = obj.values()
+    elif is_dataclass(obj):
+        obj = vars(obj).values()  # with cached properties, which are not fields
+    elif not isinstance(obj, (list, tuple)):
+        return 0
+    return sum(_array_bytes(part, visited) for part in obj)

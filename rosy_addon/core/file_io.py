@@ -71,7 +71,7 @@ def open_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     RosyError
         If the file is missing, is not a regular file, or cannot be read.
     """
-    with _system_errors(path, "cannot be read"):
+    with system_errors(path, "cannot be read"):
         if not stat.S_ISREG(os.stat(path).st_mode) and not os.path.isdir(path):
             raise RosyError(f"{path}: cannot be read: it is not a regular file")
         with open(path, "rb") as file:
@@ -79,7 +79,7 @@ def open_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
 
 
 @contextmanager
-def _system_errors(path: str | os.PathLike[str], what: str) -> Iterator[None]:
+def system_errors(path: str | os.PathLike[str], what: str) -> Iterator[None]:
     """Context manager: raise errors of the operating system as `RosyError`.
 
     The message consists of the path, what went wrong (`what`, for example "cannot be read") and the reason.
@@ -219,7 +219,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
         If the path exists and is not a regular file, if its name is too long, if its folder is missing, or if
         the folder or the file is not writable.
     """
-    with _system_errors(path, "cannot be written"):
+    with system_errors(path, "cannot be written"):
         target = Path(os.path.realpath(path))
         # From Python 3.14 on, the methods of Path hide errors, such as a name that is too long.
         with suppress(FileNotFoundError, NotADirectoryError):
@@ -252,7 +252,7 @@ def check_folder(folder: str | os.PathLike[str]) -> None:
         raise RosyError(
             f"{folder}: Blender takes the backslash in its path for a separator: choose another folder"
         )
-    with _system_errors(folder, "cannot be written"):
+    with system_errors(folder, "cannot be written"):
         try:
             if not stat.S_ISDIR(os.stat(folder).st_mode):
                 raise RosyError(f"{folder}: is not a folder")
@@ -275,7 +275,7 @@ def make_folder(folder: str | os.PathLike[str]) -> None:
     RosyError
         If a folder cannot be created.
     """
-    with _system_errors(folder, "cannot be created"):
+    with system_errors(folder, "cannot be created"):
         os.makedirs(folder, exist_ok=True)
 
 

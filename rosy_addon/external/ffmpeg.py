@@ -19,11 +19,9 @@ def find_encoder() -> Encoder | None:
     if program is None:
         try:
             from imageio_ffmpeg import get_ffmpeg_exe
-        except ImportError:
-            return None
-        try:
+
             program = get_ffmpeg_exe()
-        except RuntimeError:  # the package has no program for this system
+        except (ImportError, RuntimeError):  # no package, or it has no program for this system
             return None
 
     def encode(folder: Path, count: int, size: tuple[int, int], fps: float, path: Path) -> None:

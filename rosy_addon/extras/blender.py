@@ -23,13 +23,13 @@ import tempfile
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import Any, BinaryIO, TextIO
+from typing import BinaryIO, TextIO
 
 from ..cli.options import Options, user_presets_folder
 from ..core.errors import RosyError
 from ..rendering.turntable import Encoder
 from ..worker.program import run_program
-from ..worker.start import Guarded
+from ..worker.start import guarded, inheriting
 
 #: The oldest version of Blender that RoSy runs in.
 OLDEST_VERSION = (4, 2)
@@ -243,7 +243,7 @@ def run_job(program: str, arguments: Sequence[str]) -> int:
         log = stack.enter_context(tempfile.TemporaryFile())
         report = stack.enter_context(tempfile.TemporaryFile("a+b", buffering=0))
         descriptors = [_copy(sys.stdout, 1, stack), _copy(sys.stderr, 2, stack), report.fileno()]
-        handles, inheritance = _inheritance(descriptors)
+        handles = _handles(descriptors)
         job = {
             "package": PACKAGE,
             "folder": str(PACKAGE_FOLDER),
@@ -261,17 +261,15 @@ def run_job(program: str, arguments: Sequence[str]) -> int:
             stderr=subprocess.STDOUT,
             # A sandboxed Blender (Flatpak, Snap) has other folders of user data.
             env=os.environ | {"ROSY_PRESETS": str(user_presets_folder())},
-            **inheritance,
+            **inheriting(handles),
         )
-        stack.enter_context(Guarded(process))
-        try:
-            process.wait()
-        except KeyboardInterrupt:
-            _stop(process, report)
-            if len(_report_words(report)) < 2:
-                raise
-        finally:
-            _stop(process, report)
+        with guarded(process):
+            try:
+                process.wait()
+            except KeyboardInterrupt:
+                _interrupt(process, report)
+                if len(_report_words(report)) < 2:
+                    raise
         words = _report_words(report)
         if len(words) < 2:
             raise RosyError(f"{program}: {_failure(process.returncode, log)}")
@@ -298,42 +296,25 @@ def _encoding(stream: TextIO | None) -> tuple[str, str]:
     return encoding, getattr(stream, "errors", None) or "backslashreplace"
 
 
-def _inheritance(descriptors: Sequence[int]) -> tuple[list[int], dict[str, Any]]:
-    """Return what a child process needs to inherit file descriptors.
-
-    Returns
-    -------
-    numbers : list of int
-        The descriptors in the child process; on Windows, their handles.
-    arguments : dict
-        Keyword arguments of `subprocess.Popen`.
-    """
+def _handles(descriptors: list[int]) -> list[int]:
+    """Return file descriptors as a child process inherits them: unchanged; on Windows, their handles."""
     if sys.platform != "win32":
-        return list(descriptors), {"pass_fds": tuple(descriptors)}
+        return descriptors
     import msvcrt
 
-    handles = [msvcrt.get_osfhandle(descriptor) for descriptor in descriptors]
-    for handle in handles:
-        os.set_handle_inheritable(handle, True)
-    startup = subprocess.STARTUPINFO(lpAttributeList={"handle_list": handles})
-    return handles, {"startupinfo": startup}
+    return [msvcrt.get_osfhandle(descriptor) for descriptor in descriptors]
 
 
-def _stop(process: subprocess.Popen[bytes], report: BinaryIO) -> None:
-    """End Blender if it still runs: interrupt the command, and kill it if that does not help.
+def _interrupt(process: subprocess.Popen[bytes], report: BinaryIO) -> None:
+    """Interrupt the command that Blender runs, and wait for its end, but not for long.
 
-    Before the command has begun, Blender ignores interrupts, so it is killed at once.
+    Before the command has begun, Blender ignores interrupts, so nothing is done.
     """
-    if process.poll() is not None:
-        return
     if _report_words(report):
         if sys.platform != "win32":  # on Windows, Ctrl-C has reached Blender already
             process.send_signal(signal.SIGINT)
         with suppress(subprocess.TimeoutExpired, KeyboardInterrupt):
             process.wait(STOP_SECONDS)
-            return
-    process.kill()
-    process.wait()
 
 
 def _report_words(report: BinaryIO) -> list[bytes]:

@@ -29,7 +29,7 @@ from ..rendering.turntable import check_video_path
 
 def add_film_command(subparsers: Any) -> None:
     """Add the command `film`."""
-    parser = add_subcommand(subparsers, "film", run_film, api.film)
+    parser = add_subcommand(subparsers, run_film, api.film)
     parser.description += (
         " Files whose names differ only in numbers are shown in the order of the numbers."
     )

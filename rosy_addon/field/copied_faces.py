@@ -6,6 +6,9 @@ import numpy as np
 
 from ..core.errors import counted
 
+#: Difference of successive states of the generator SplitMix64.
+SPLIT_MIX_GAMMA = np.uint64(0x9E3779B97F4A7C15)
+
 
 def copied_faces(
     vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray
@@ -15,7 +18,7 @@ def copied_faces(
     bits = (np.asarray(vertices, dtype=np.float64) + 0.0).view(np.uint64)
     key = np.zeros(len(bits), dtype=np.uint64)
     for column in bits.T:
-        key = _mixed(key ^ column)
+        key = split_mix(key ^ column)
     is_copy = np.ones(len(face_start) - 1, dtype=bool)
     total = np.add.reduceat(key[corner_vertex], face_start[:-1])
     is_copy[np.unique(total, return_index=True)[1]] = False
@@ -33,9 +36,12 @@ def copies_note(name: str, *polygons: np.ndarray) -> str:
     )
 
 
-def _mixed(key: np.ndarray) -> np.ndarray:
-    """Return a hash of uint64 numbers: the finalizer of SplitMix64 (Steele et al., OOPSLA 2014)."""
-    key = key + np.uint64(0x9E3779B97F4A7C15)
+def split_mix(key: np.ndarray) -> np.ndarray:
+    """Return a hash of uint64 numbers: the next output of SplitMix64 (Steele et al., OOPSLA 2014).
+
+    For the multiples 0, 1, 2 and so on of `SPLIT_MIX_GAMMA`, the hashes are a pseudorandom sequence.
+    """
+    key = key + SPLIT_MIX_GAMMA
     key = (key ^ key >> np.uint64(30)) * np.uint64(0xBF58476D1CE4E5B9)
     key = (key ^ key >> np.uint64(27)) * np.uint64(0x94D049BB133111EB)
     return key ^ key >> np.uint64(31)

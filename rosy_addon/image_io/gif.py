@@ -95,10 +95,9 @@ def lzw_compress(data: bytes) -> bytes:
             bit_buffer >>= 8 * full_bytes
             bit_count -= 8 * full_bytes
         prefix = byte
-    bit_buffer |= prefix << bit_count
-    bit_count += code_bits
-    bit_buffer |= end_code << bit_count
-    bit_count += code_bits
+    for code in (prefix, end_code):
+        bit_buffer |= code << bit_count
+        bit_count += code_bits
     return bytes(out + bit_buffer.to_bytes((bit_count + 7) // 8, "little"))
 
 

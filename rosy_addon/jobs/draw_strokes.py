@@ -12,7 +12,7 @@ from ..compositor.shading import lights_of
 from ..core.cache import BAKE_CACHE
 from ..core.errors import RosyError
 from ..core.file_io import check_writable, write_bytes
-from ..line_drawing.drawing_outputs import drawing_curves, drawing_file
+from ..line_drawing.drawing_outputs import StrokeInput, drawing_curves, drawing_file
 from ..line_drawing.pipeline import StrokeDrawing
 from ..line_drawing.polyline_files import check_drawing_suffix
 from ..line_drawing.style import StrokeStyle
@@ -116,12 +116,12 @@ def draw_strokes(
     is_following = kind == "CURVES" and settings.follow
     followed = _followed_instance(scene_data) if is_following else None
     lights = lights_of(style, read_lights(depsgraph, view.view))
-    inputs = scene_data.instances, view, style, pen, lights
+    inputs = StrokeInput(scene_data.instances, view, style, pen, lights)
     if kind == "FILE":
-        drawing, contents = yield Call(drawing_file, (suffix, *inputs))
+        drawing, contents = yield Call(drawing_file, (suffix, inputs))
         write_bytes(path, contents)
         return StrokeResult(view.name, drawing, path=path, notes=scene_data.warnings)
-    drawing, curves = yield Call(drawing_curves, (*inputs, followed), 0.0, 0.97)
+    drawing, curves = yield Call(drawing_curves, (inputs, followed), 0.0, 0.97)
     yield Step(0.97, "storing the strokes")
     # The strokes move with the drawn object, if there is only one.
     parent = scene_data.objects[0] if len(scene_data.objects) == 1 else None

@@ -11,7 +11,7 @@ import numpy as np
 from ..core.cache import BAKE_CACHE
 from ..core.progress import progress
 from ..field.frames import dot
-from ..field.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
+from ..field.up_axis import UP_AXIS_BY_SUFFIX
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from .pipeline import StrokeDrawing, draw_instances
@@ -76,61 +76,58 @@ class StrokeGeometry:
     attachment: SurfaceAttachment | None = None
 
 
-def drawing_file(
-    suffix: str,
-    instances: Sequence[MeshInstance],
-    camera: Camera,
-    style: StrokeStyle,
-    pen: Pen,
-    lights: Sequence[Any],
-) -> tuple[StrokeDrawing, bytes]:
+class StrokeInput(NamedTuple):
+    """What a drawing of strokes shows, and how it is drawn.
+
+    Attributes
+    ----------
+    instances, camera, style, lights
+        Parameters of `draw_instances`.
+    pen : Pen
+        Width, in pixels of the camera, and colors of the strokes.
+    """
+
+    instances: Sequence[MeshInstance]
+    camera: Camera
+    style: StrokeStyle
+    pen: Pen
+    lights: Sequence[Any]
+
+
+def drawing_file(suffix: str, inputs: StrokeInput) -> tuple[StrokeDrawing, bytes]:
     """Draw mesh instances with strokes. Return the drawing and the contents of its file.
 
     Parameters
     ----------
     suffix : str
         Suffix that sets the format of the file: .svg, or a format of `polyline_file`.
-    instances, camera, style, lights
-        Parameters of `draw_instances`.
-    pen : Pen
-        Width and colors of the strokes.
+    inputs : StrokeInput
     """
     is_svg = suffix == ".svg"
-    drawing = _draw(instances, camera, style, lights, clip_to_frame=is_svg)
+    drawing = _draw(inputs, clip_to_frame=is_svg)
     with progress(OUTPUT_START, 1.0, OUTPUT_LABEL):
         if is_svg:
-            return drawing, svg_text(drawing.strokes, camera, pen, drawing.marks).encode()
-        matrix = UP_AXIS_MATRIX[UP_AXIS_BY_SUFFIX.get(suffix, "z")].T
-        return drawing, polyline_file(suffix, drawing.strokes, camera, pen, matrix)
+            text = svg_text(drawing.strokes, inputs.camera, inputs.pen, drawing.marks)
+            return drawing, text.encode()
+        up = UP_AXIS_BY_SUFFIX.get(suffix, "z")
+        return drawing, polyline_file(suffix, drawing.strokes, inputs.camera, inputs.pen, up)
 
 
 def drawing_curves(
-    instances: Sequence[MeshInstance],
-    camera: Camera,
-    style: StrokeStyle,
-    pen: Pen,
-    lights: Sequence[Any],
-    follows: MeshInstance | None,
+    inputs: StrokeInput, follows: MeshInstance | None
 ) -> tuple[StrokeDrawing, StrokeGeometry]:
     """Draw mesh instances with strokes. Return the drawing and its curves from `stroke_geometry`."""
-    drawing = _draw(instances, camera, style, lights, clip_to_frame=False)
+    drawing = _draw(inputs, clip_to_frame=False)
     with progress(OUTPUT_START, 1.0, OUTPUT_LABEL):
-        return drawing, stroke_geometry(drawing, camera, pen, follows)
+        return drawing, stroke_geometry(drawing, inputs.camera, inputs.pen, follows)
 
 
-def _draw(
-    instances: Sequence[MeshInstance],
-    camera: Camera,
-    style: StrokeStyle,
-    lights: Sequence[Any],
-    *,
-    clip_to_frame: bool,
-) -> StrokeDrawing:
+def _draw(inputs: StrokeInput, *, clip_to_frame: bool) -> StrokeDrawing:
     """Draw mesh instances with strokes, using the cache that all bakes of this process share."""
+    instances, camera, style, _, lights = inputs
+    shared = {"clip_to_frame": clip_to_frame, "cache": BAKE_CACHE}
     with progress(0.0, OUTPUT_START):
-        drawing = draw_instances(
-            instances, camera, style, lights=lights, clip_to_frame=clip_to_frame, cache=BAKE_CACHE
-        )
+        drawing = draw_instances(instances, camera, style, lights=lights, **shared)
     BAKE_CACHE.evict_over_limit()
     return drawing
 

@@ -77,6 +77,16 @@ class _Corners(NamedTuple):
     normals: np.ndarray
     flat: np.ndarray
 
+    @classmethod
+    def of(cls, instance: MeshInstance) -> _Corners:
+        """Return the corners of an instance in world space. Normals are unit vectors."""
+        surface = instance.surface
+        linear = np.asarray(instance.matrix, dtype=np.float64)[:3, :3]
+        points = instance.world_points()[surface.triangle_vertex]
+        normals = normalize(surface.corner_normal @ cofactor_matrix(linear).T)
+        flat = normalize(np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]))
+        return cls(points, normals[surface.triangles], flat)
+
 
 def outline_strokes(instance: MeshInstance, camera: Camera) -> Strokes:
     """Extract the silhouettes, creases and borders of a mesh instance.
@@ -98,12 +108,7 @@ def outline_strokes(instance: MeshInstance, camera: Camera) -> Strokes:
         Strokes in world space, with the families `OUTLINE_KINDS`. Members and spacings are 0, weights are
         NaN.
     """
-    surface = instance.surface
-    matrix = np.asarray(instance.matrix, dtype=np.float64)
-    points = instance.world_points()[surface.triangle_vertex]
-    normals = normalize(surface.corner_normal @ cofactor_matrix(matrix[:3, :3]).T)
-    flat = normalize(np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]))
-    corners = _Corners(points, normals[surface.triangles], flat)
+    surface, corners = instance.surface, _Corners.of(instance)
     vertex = surface.triangle_vertex.ravel()
     with progress(0.0, 0.3, "finding outlines"):
         edges = build_edges(vertex, np.arange(0, len(vertex) + 1, 3, dtype=np.int32))
@@ -118,7 +123,7 @@ def outline_strokes(instance: MeshInstance, camera: Camera) -> Strokes:
     smooth = _smooth_silhouettes(corners, camera)
     sharp = _sharp_silhouettes(corners, a[is_blunt], b[is_blunt], camera)
     silhouettes = Segments(*(np.concatenate(pair) for pair in zip(smooth, sharp, strict=True)))
-    angle = angle_between(flat[starts // 3], flat[b[is_crease] // 3])
+    angle = angle_between(corners.flat[starts // 3], corners.flat[b[is_crease] // 3])
     salience = _pixel_salience(creases, angle, camera)
     silhouettes = _strokes(silhouettes, SILHOUETTES, surface)
     creases = _strokes(creases, CREASES, surface, salience)
@@ -368,22 +373,16 @@ class _OutlineTest:
     depth_buffer : DepthBuffer
     first_triangle : int
         Index of the first triangle of the instance in the depth buffer.
-    triangle_vertex, triangles : (T, 3) int32 ndarray
-        Vertices and face corners of the triangles of the instance.
-    points : (V, 3) float64 ndarray
-        Vertices in world space.
-    normals : (C, 3) float64 ndarray
-        Shading normals at the face corners, in world space.
+    triangle_vertex : (T, 3) int32 ndarray
+        Vertices of the triangles of the instance.
+    corners : _Corners
     """
 
     def __init__(self, instance: MeshInstance, index: int, depth_buffer: DepthBuffer) -> None:
-        surface = instance.surface
         self.depth_buffer = depth_buffer
         self.first_triangle = depth_buffer.start[index]
-        self.triangle_vertex, self.triangles = surface.triangle_vertex, surface.triangles
-        self.points = instance.world_points()
-        matrix = np.asarray(instance.matrix, dtype=np.float64)
-        self.normals = surface.corner_normal @ cofactor_matrix(matrix[:3, :3]).T
+        self.triangle_vertex = instance.surface.triangle_vertex
+        self.corners = _Corners.of(instance)
 
     def is_visible(self, block: Strokes, point: np.ndarray, pixels: np.ndarray) -> np.ndarray:
         """Return (m,) bool: whether points of outlines are visible. Parameters are as in `visible_runs`."""
@@ -413,10 +412,10 @@ class _OutlineTest:
         camera) grows toward the camera. There the surface itself does not hide its silhouette. Elsewhere, and
         in triangles that no silhouette crosses, the tolerance is -1, so that all triangles are tested.
         """
-        a, b, c = (self.points[self.triangle_vertex[triangle, k]] for k in range(3))
+        a, b, c = self.corners.points[triangle].transpose(1, 0, 2)
         to_eye = self.depth_buffer.camera.view_directions((a + b + c) / 3)
-        normal = normalize(self.normals[self.triangles[triangle]])
-        fa, fb, fc = facing = np.stack([dot(normal[:, k], to_eye) for k in range(3)])
+        normals = self.corners.normals[triangle]
+        fa, fb, fc = facing = np.stack([dot(normals[:, k], to_eye) for k in range(3)])
         u, v = b - a, c - a
         uu, uv, vv = dot(u, u), dot(u, v), dot(v, v)
         along_u, along_v = dot(u, to_eye), dot(v, to_eye)

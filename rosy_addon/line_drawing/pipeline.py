@@ -18,6 +18,7 @@ from ..core.memory import check_memory
 from ..core.progress import progress, report
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
+from ..projection.pixel_blocks import part_of
 from .arrowheads import arrowheads
 from .crossings import with_crossing_gaps
 from .families import label_families
@@ -289,7 +290,7 @@ def _part_to_trace(
     if view.depth_buffer is not None:
         seen = seen_triangles(instance, index, view.depth_buffer)
         kept = triangles_near(part.mesh, seen[part.triangle], spacing.values)
-        part, spacing = part.take(kept), spacing.take(kept)
+        part, spacing = part.take(kept), part_of(spacing, kept)
     return (part, spacing) if part.mesh.z.any() else None
 
 

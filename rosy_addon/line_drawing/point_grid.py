@@ -97,7 +97,7 @@ class PointGrid:
         self.levels.update(np.unique(level).tolist())
         first = self.point_count
         self.point_count += len(points)
-        self.point_slot = _grow_to(self.point_slot, self.point_count, 0)
+        self.point_slot = grow_to(self.point_slot, self.point_count, 0)
         index = np.arange(first, self.point_count, dtype=np.int32)
         cell = self.cell * LEVEL_RATIO ** level.astype(np.float64)
         key = self._hash_cells(np.floor(points / cell[:, None]).astype(np.int64), level)
@@ -115,9 +115,9 @@ class PointGrid:
         block = np.where(block_ordinal == 0, last_block[group], new_block)
         # Link the first new block of a cell to the block that was its last one, and others to the one before.
         count, self.block_count = self.block_count, self.block_count + int(new_blocks.sum())
-        self.next_block = _grow_to(self.next_block, self.block_count, -1)
-        self.point_index = _grow_to(self.point_index, self.block_count, -1)
-        self.position = _grow_to(self.position, self.block_count, np.nan)
+        self.next_block = grow_to(self.next_block, self.block_count, -1)
+        self.point_index = grow_to(self.point_index, self.block_count, -1)
+        self.position = grow_to(self.position, self.block_count, np.nan)
         self.next_block[count : self.block_count] = np.arange(count, self.block_count) - 1
         grows = new_blocks > 0
         self.next_block[first_new_block[grows]] = last_block[grows]
@@ -262,7 +262,7 @@ def _reached_cells(
     return is_reached
 
 
-def _grow_to(values: np.ndarray, count: int, fill: float) -> np.ndarray:
+def grow_to(values: np.ndarray, count: int, fill: float) -> np.ndarray:
     """Double the length of an array until it has `count` rows; new rows hold `fill`."""
     while count > len(values):
         values = np.concatenate([values, np.full_like(values, fill)])

@@ -12,6 +12,7 @@ import numpy as np
 from ..core.errors import RosyError
 from ..core.progress import progress, report
 from ..field.blocks import row_blocks
+from ..field.up_axis import UP_AXIS_MATRIX
 from ..projection.camera import Camera
 from .stroke_set import Strokes
 from .svg import Pen, simplify_mask
@@ -39,9 +40,7 @@ _PLY_EDGE = np.dtype([("vertex1", "<i4"), ("vertex2", "<i4")])
 _PLY_TYPE_NAMES = {"f8": "double", "f4": "float", "i4": "int"}
 
 
-def polyline_file(
-    suffix: str, strokes: Strokes, camera: Camera, pen: Pen, matrix: np.ndarray | None = None
-) -> bytes:
+def polyline_file(suffix: str, strokes: Strokes, camera: Camera, pen: Pen, up: str) -> bytes:
     """Return the contents of a file with strokes as 3D polylines.
 
     Points on straight lines are left out; see `simplify_strokes`.
@@ -56,8 +55,8 @@ def polyline_file(
         Camera that sets the length of a pixel.
     pen : Pen
         Width of the strokes. Its other attributes are not used.
-    matrix : (4, 4) ndarray, optional
-        Rotation and translation from world space to the space of the file.
+    up : str
+        Axis that points up in the space of the file, as in `UP_AXIS_MATRIX`. In world space, z points up.
 
     Returns
     -------
@@ -67,7 +66,7 @@ def polyline_file(
         strokes = simplify_strokes(strokes, camera)
     strokes = strokes.select(np.argsort(strokes.family, kind="stable"))
     width = pen.width * pixel_size(strokes.points, camera) * strokes.width
-    matrix = np.eye(4) if matrix is None else matrix
+    matrix = UP_AXIS_MATRIX[up].T
     points = strokes.points @ matrix[:3, :3].T + matrix[:3, 3]
     normals = strokes.normal @ matrix[:3, :3].T
     contents = {".csv": _csv, ".obj": _obj, ".ply": _ply}[suffix]
@@ -135,7 +134,7 @@ def _obj(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.nd
     In this format, lines cannot refer to normals, so normal n belongs to vertex n. Widths are stored as
     texture coordinates with one component. The parameters are as in `_csv`.
     """
-    first_of_closed, kept = _without_repeated_points(strokes)
+    kept, number = _numbered_points(strokes)
     rows = np.flatnonzero(kept)
     blocks = [
         b"# Each normal and each texture coordinate, the width, is that of the vertex of the same number\n"
@@ -147,8 +146,7 @@ def _obj(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.nd
             report((index + block.start / max(len(rows), 1)) / 4, "writing strokes")
             lines = (form % tuple(row) for row in values[rows[block]].tolist())
             blocks.append("".join(lines).encode())
-    number = np.cumsum(kept)
-    number[~kept] = number[first_of_closed]
+    number += 1
     text, family = [], -1
     for stroke, (first, last) in enumerate(pairwise(strokes.start.tolist())):
         if strokes.family[stroke] != family:
@@ -164,14 +162,12 @@ def _ply(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.nd
 
     The parameters are as in `_csv`.
     """
-    first_of_closed, kept = _without_repeated_points(strokes)
+    kept, number = _numbered_points(strokes)
     stroke = strokes.stroke
     vertex = np.zeros(int(kept.sum()), dtype=_PLY_VERTEX)
     columns = (*points.T, *normals.T, width, stroke, strokes.family[stroke])
     for name, values in zip(_PLY_VERTEX.names, columns, strict=True):
         vertex[name] = values[kept]
-    number = np.cumsum(kept) - 1
-    number[~kept] = number[first_of_closed]
     last = np.flatnonzero(stroke[1:] == stroke[:-1]) + 1
     edge = np.zeros(len(last), dtype=_PLY_EDGE)
     edge["vertex1"], edge["vertex2"] = number[last - 1], number[last]
@@ -185,11 +181,13 @@ def _ply(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.nd
     return text.encode() + vertex.tobytes() + edge.tobytes()
 
 
-def _without_repeated_points(strokes: Strokes) -> tuple[np.ndarray, np.ndarray]:
-    """Return the indices of the first points of closed strokes, and (n,) bool: which points are kept.
+def _numbered_points(strokes: Strokes) -> tuple[np.ndarray, np.ndarray]:
+    """Return (n,) bool: which points are kept, and (n,) int64: the number of each point in a file, from 0.
 
-    All points are kept except for the last points of closed strokes, which repeat their first points.
+    All points are kept except for the last points of closed strokes, which have the number of the first ones.
     """
     kept = np.ones(len(strokes.points), dtype=bool)
     kept[strokes.start[1:][strokes.closed] - 1] = False
-    return strokes.start[:-1][strokes.closed], kept
+    number = np.cumsum(kept) - 1
+    number[~kept] = number[strokes.start[:-1][strokes.closed]]
+    return kept, number

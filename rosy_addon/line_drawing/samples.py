@@ -14,7 +14,7 @@ import numpy as np
 
 from ..core.errors import RosyError
 from ..field.frames import transport
-from .point_grid import PointGrid
+from .point_grid import PointGrid, grow_to
 from .spacing import CornerSpacing
 from .surface_particles import SurfaceParticles
 from .tangent_mesh import TangentMesh
@@ -62,10 +62,8 @@ class ColumnTable:
         """
         first, self.count = self.count, self.count + row_count
         for name in self._column_names:
-            column = getattr(self, name)
-            while self.count > len(column):
-                column = np.concatenate([column, np.zeros_like(column)])
-                setattr(self, name, column)
+            column = grow_to(getattr(self, name), self.count, 0)
+            setattr(self, name, column)
             if name in values:
                 column[first : self.count] = values[name]
         return np.arange(first, self.count)

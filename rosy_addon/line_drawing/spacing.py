@@ -20,7 +20,6 @@ from ..field.frames import dot, normalize
 from ..field.surface import Surface
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
-from ..projection.pixel_blocks import part_of
 from ..projection.vector_components import cofactor_matrix
 from .stroke_set import Strokes
 from .tangent_mesh import TangentMesh, unit
@@ -84,10 +83,6 @@ class CornerSpacing:
     double: np.ndarray | None = None
     is_directional: np.ndarray | None = None
 
-    def take(self, kept: np.ndarray) -> CornerSpacing:
-        """Return the spacing on the triangles for which `kept`, (T,) bool, is true."""
-        return part_of(self, kept)
-
     def at(self, triangle: np.ndarray, weights: np.ndarray, direction: np.ndarray) -> np.ndarray:
         """Return (n,) float64: the spacing at points of triangles, for strokes in given directions.
 
@@ -147,13 +142,10 @@ def _curvature(mesh: TangentMesh) -> np.ndarray:
 
     It is the largest difference between the normals at both ends of an edge, over the length of the edge.
     """
-    curvature = np.zeros(len(mesh.points))
-    for first, second in ((0, 1), (1, 2), (2, 0)):
-        turn = mesh.corner_normal[:, first] - mesh.corner_normal[:, second]
-        edge = mesh.points[:, first] - mesh.points[:, second]
-        squared_length = np.maximum(dot(edge, edge), 1e-300)
-        curvature = np.maximum(curvature, np.sqrt(dot(turn, turn) / squared_length))
-    return curvature
+    turn = mesh.corner_normal - np.roll(mesh.corner_normal, -1, axis=1)
+    edge = mesh.points - np.roll(mesh.points, -1, axis=1)
+    squared_length = np.maximum(dot(edge, edge), 1e-300)
+    return np.sqrt(dot(turn, turn) / squared_length).max(axis=1)
 
 
 # --- by tone and curvature ------------------------------------------------------------------------------

@@ -9,7 +9,6 @@ import numpy as np
 
 from ..field.blocks import concatenated_ranges
 from ..field.frames import dot, normalize
-from .tangent_mesh import TangentMesh
 
 #: The attributes of `Strokes` that have a row for each point.
 POINT_COLUMNS = ("points", "face", "triangle", "weights", "normal", "member", "spacing", "width")
@@ -240,46 +239,6 @@ class Strokes:
             closed=self.closed[first:stop],
             free_ends=self.free_end_mask[first:stop],
             normal=normalize(divided.normal),
-        )
-
-    @staticmethod
-    def on_mesh(
-        mesh: TangentMesh,
-        count: np.ndarray,
-        triangle: np.ndarray,
-        weights: np.ndarray,
-        direction: np.ndarray,
-        spacing: np.ndarray,
-        closed: bool = False,
-    ) -> Strokes:
-        """Make strokes from points that were traced on a mesh. All strokes are in one family.
-
-        Parameters
-        ----------
-        mesh : TangentMesh
-        count : (S,) ndarray of int
-            Number of points of each stroke.
-        triangle, weights, direction : (n, ...) ndarray
-            Triangles and barycentric coordinates of the points, and unit directions of the strokes in
-            the frames of the triangles.
-        spacing : (n,) ndarray
-            Required spacing at the points, in world space.
-        closed : bool
-            Whether all strokes are closed, or none.
-        """
-        return Strokes(
-            points=mesh.points_at(triangle, weights),
-            start=np.concatenate([[0], np.cumsum(count)]),
-            family=np.zeros(len(count), dtype=np.int32),
-            names=("family 1",),
-            face=mesh.face[triangle],
-            triangle=triangle,
-            weights=weights,
-            normal=mesh.shading_normals_at(triangle, weights),
-            member=mesh.to_world(triangle, direction),
-            spacing=spacing,
-            width=np.ones(len(triangle)),
-            closed=np.full(len(count), closed),
         )
 
     @staticmethod

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..annotation.singularity_settings import singularity_dots_choice, singularity_size_number
 from ..core.errors import RosyError
-from ..core.settings import check_settings, choice, number, settings_of, switch
+from ..core.settings import check_settings, choice, fraction, number, settings_of, switch
 
 
 @dataclass(frozen=True)
@@ -56,34 +56,26 @@ class StrokeStyle:
         },
         panel="density",
     )
-    layering: float = number(
+    layering: float = fraction(
         0.3,
-        0.0,
-        1.0,
         "Difference in darkness between the tones at which successive families begin",
         panel="density",
         applies=lambda style: style.light != "none",
     )
-    swell: float = number(
+    swell: float = fraction(
         0.0,
-        0.0,
-        1.0,
         "Amount by which the light changes the width of strokes instead of their distance. 1: evenly "
         "spaced strokes, as in an engraving",
         panel="density",
         applies=lambda style: style.light != "none",
     )
-    curvature: float = number(
+    curvature: float = fraction(
         0.0,
-        0.0,
-        1.0,
         "Amount by which strokes are closer together where the surface is more curved",
         panel="density",
     )
-    gaps: float = number(
+    gaps: float = fraction(
         0.0,
-        0.0,
-        1.0,
         "Gap in the lower of two crossing strokes, as a multiple of the spacing",
         unit="spacings",
         panel="ends",

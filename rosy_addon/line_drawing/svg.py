@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -56,6 +57,10 @@ PATHS_PER_REPORT = 1000
 
 #: Largest distance in pixels between a removed point and the simplified polyline.
 SIMPLIFY_TOLERANCE_PX = 0.06
+
+#: A cell of a grid over a drawing, and the ends of strokes in each cell, as indices.
+_Cell = tuple[int, int]
+_Grid = dict[_Cell, set[int]]
 
 
 @dataclass(frozen=True)
@@ -386,52 +391,42 @@ def plotter_order(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.n
     """
     count = len(first)
     ends = np.concatenate([first, last])
-    if not count:
-        return np.empty(0, dtype=np.int64), np.empty(0, dtype=bool)
-    low, extent = ends.min(axis=0), np.maximum(np.ptp(ends, axis=0), 1e-9)
+    low, extent = ends.min(axis=0), max(np.ptp(ends, axis=0).max(), 1e-9)
     cell_count = max(int(np.sqrt(count)), 1)
-    cell_size = extent.max() / cell_count
-    cell = np.minimum(((ends - low) / extent.max() * cell_count).astype(np.int64), cell_count - 1)
-    grid: dict[tuple[int, int], set[int]] = {}
+    cell = np.minimum(((ends - low) / extent * cell_count).astype(np.int64), cell_count - 1)
     keys = [tuple(key) for key in cell.tolist()]
+    grid: _Grid = {}
     for end_index, key in enumerate(keys):
         grid.setdefault(key, set()).add(end_index)
     positions = ends.tolist()
-    current, order, is_reversed = low.tolist(), [], []
-    current_cell = (0, 0)
-    for _ in range(count):
-        if len(order) % PATHS_PER_REPORT == 0:
-            report(len(order) / count, "ordering strokes")
-        nearest = _nearest_end(grid, positions, current, current_cell, cell_count, cell_size)
-        stroke = nearest % count
-        order.append(stroke)
-        is_reversed.append(nearest >= count)
-        for end_index in (stroke, stroke + count):
+    current, current_cell, chosen = low.tolist(), (0, 0), []
+    for number in range(count):
+        if number % PATHS_PER_REPORT == 0:
+            report(number / count, "ordering strokes")
+        nearest = _nearest_end(grid, positions, current, current_cell, extent / cell_count)
+        far_end = (nearest + count) % (2 * count)
+        for end_index in (nearest, far_end):
             grid[keys[end_index]].discard(end_index)
-        far_end = stroke if nearest >= count else stroke + count
         current, current_cell = positions[far_end], keys[far_end]
-    return np.array(order), np.array(is_reversed)
+        chosen.append(nearest)
+    is_last, order = np.divmod(chosen, count)
+    return order, is_last > 0
 
 
 def _nearest_end(
-    grid: dict[tuple[int, int], set[int]],
-    positions: list[list[float]],
-    current: list[float],
-    current_cell: tuple[int, int],
-    cell_count: int,
-    cell_size: float,
+    grid: _Grid, positions: list[list[float]], current: list[float], cell: _Cell, cell_size: float
 ) -> int:
     """Return the index of the end that is nearest to the position `current`.
 
-    `grid` holds the indices of the remaining ends in each cell, and `positions` the positions of all ends.
-    The grid has at most `cell_count` cells along each axis, and `cell_size` is the side of a cell in the unit
-    of the positions. Rings of cells around `current_cell` are searched until no nearer end is possible.
+    `positions` are the positions of all ends, of which one or more are left in the grid. `cell` is the cell of
+    `current`, and `cell_size` the side of a cell in the unit of the positions. Rings of cells around `cell`
+    are searched until no nearer end is possible.
     """
     best, best_distance = -1, np.inf
-    for ring in range(cell_count + 1):
-        if best >= 0 and best_distance <= (max(ring - 1, 0) * cell_size) ** 2:
+    for ring in itertools.count():
+        if best_distance <= (max(ring - 1, 0) * cell_size) ** 2:
             break
-        for key in _ring_cells(current_cell, ring):
+        for key in _ring_cells(cell, ring):
             for end_index in sorted(grid.get(key, ())):
                 x, y = positions[end_index]
                 distance = (x - current[0]) ** 2 + (y - current[1]) ** 2
@@ -440,7 +435,7 @@ def _nearest_end(
     return best
 
 
-def _ring_cells(center: tuple[int, int], radius: int) -> list[tuple[int, int]]:
+def _ring_cells(center: _Cell, radius: int) -> list[_Cell]:
     """Return the grid cells on a square ring around a cell. The radius of the ring is in cells."""
     x, y = center
     if not radius:

@@ -206,13 +206,45 @@ def collect(placer: StreamlinePlacer) -> Strokes:
     rank = np.concatenate([rank, np.where(is_seed, 0.0, -last_backward - 1.5)])
     stroke = np.concatenate([stroke, stroke_ids])
     order = np.lexsort((rank, stroke))
-    stroke = stroke[order]
     triangle = np.concatenate([triangle, first_triangle])[order].astype(np.int32)
     weights = np.concatenate([weights, first_weights])[order]
     direction = np.concatenate([direction * sign, first_direction])[order]
-    count = np.bincount(np.searchsorted(stroke_ids, stroke), minlength=len(stroke_ids))
-    spacing = placer.spacing.at(triangle, weights, direction)
-    return Strokes.on_mesh(placer.mesh, count, triangle, weights, direction, spacing)
+    points = triangle, weights, direction
+    return _strokes_on_mesh(placer.mesh, placer.spacing, stroke[order], points)
+
+
+def _strokes_on_mesh(
+    mesh: TangentMesh, spacing: CornerSpacing, stroke: np.ndarray, points: tuple[np.ndarray, ...]
+) -> Strokes:
+    """Make open strokes from n points that were traced on a mesh. All strokes are in one family.
+
+    Parameters
+    ----------
+    mesh : TangentMesh
+    spacing : CornerSpacing
+        Required spacing on the mesh.
+    stroke : (n,) ndarray of int
+        The stroke of each point, as an ascending number. Not all numbers have to occur.
+    points : tuple of (n, ...) ndarray
+        Triangles and barycentric coordinates of the points, and unit directions of the strokes in the frames
+        of the triangles.
+    """
+    triangle, weights, direction = points
+    count = np.unique(stroke, return_counts=True)[1]
+    return Strokes(
+        points=mesh.points_at(triangle, weights),
+        start=np.concatenate([[0], np.cumsum(count)]),
+        family=np.zeros(len(count), dtype=np.int32),
+        names=("family 1",),
+        face=mesh.face[triangle],
+        triangle=triangle,
+        weights=weights,
+        normal=mesh.shading_normals_at(triangle, weights),
+        member=mesh.to_world(triangle, direction),
+        spacing=spacing.at(*points),
+        width=np.ones(len(triangle)),
+        closed=np.zeros(len(count), dtype=bool),
+    )
 
 
 # --- closed strokes ---------------------------------------------------------------------------------
@@ -271,9 +303,9 @@ def close_loops(mesh: TangentMesh, strokes: Strokes, spacing: CornerSpacing) -> 
     triangle = np.concatenate([start.triangle, path.triangle[keep]])[order]
     weights = np.concatenate([start.weights, path.end_weights[keep]])[order]
     direction = np.concatenate([start.member, path.direction[keep]])[order]
-    count = np.bincount(particle, minlength=len(candidates))[closes]
-    spacings = spacing.at(triangle, weights, direction)
-    loops = Strokes.on_mesh(mesh, count, triangle, weights, direction, spacings, closed=True)
+    points = triangle, weights, direction
+    loops = _strokes_on_mesh(mesh, spacing, particle[order], points)
+    loops = replace(loops, closed=np.ones(len(loops), dtype=bool))
     return Strokes.join([strokes.select(is_open), loops])
 
 

@@ -84,14 +84,13 @@ def _over_background(rgba: np.ndarray, look: Look) -> np.ndarray:
 
 
 @cache
-def _trefoil_mesh(
-    tube_radius: float = 0.66, segments: int = 300, sides: int = 40
-) -> tuple[Surface, RosyField]:
+def _trefoil_mesh() -> tuple[Surface, RosyField]:
     """Build a thick tube around a trefoil knot, and its field of principal curvature directions (degree 4).
 
     The tube has positive and negative curvature, occludes itself, and has normals in all
     directions.
     """
+    tube_radius, segments, sides = 0.66, 300, 40
     t = np.arange(segments) * (2 * np.pi / segments)
     curve, tangent = _trefoil_curve(t)
     # The knot winds around a circle of radius 2. The vector from the nearest point of that circle

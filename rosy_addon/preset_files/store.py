@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 from ..compositor.look import Look
 from ..core.errors import RosyError
-from ..core.file_io import make_folder, os_error_text, read_bytes, write_bytes
+from ..core.file_io import make_folder, read_bytes, system_errors, write_bytes
 from ..core.settings import settings_of
 from ..image_io.png import write_png
 from .preview import draw_preview
@@ -122,12 +122,11 @@ def user_preset_files(user_folder: Path | None) -> dict[str, Path]:
     """
     if user_folder is None:
         return {}
-    try:
-        names = sorted(os.listdir(user_folder))
-    except FileNotFoundError:
-        return {}
-    except (OSError, ValueError) as error:
-        raise RosyError(f"{user_folder}: presets cannot be read: {os_error_text(error)}") from error
+    with system_errors(user_folder, "presets cannot be read"):
+        try:
+            names = sorted(os.listdir(user_folder))
+        except FileNotFoundError:
+            return {}
     paths = [user_folder / name for name in names if name.endswith(".json")]
     return {path.stem: path for path in paths if os.path.isfile(path)}
 
@@ -371,10 +370,8 @@ def _user_file(key: str, user_folder: Path) -> Path:
 
 def _delete_file(path: Path) -> None:
     """Delete a file if it exists. Raise RosyError if it cannot be deleted."""
-    try:
+    with system_errors(path, "cannot be deleted"):
         path.unlink(missing_ok=True)
-    except OSError as reason:
-        raise RosyError(f"{path}: cannot be deleted: {os_error_text(reason)}") from None
 
 
 def _read_json_object(path: str | os.PathLike[str]) -> dict[str, Any]:

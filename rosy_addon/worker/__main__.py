@@ -35,9 +35,8 @@ class _Reporter:
             return
         self._next_time = now + REPORT_SECONDS
         try:
-            has_ended = (
-                self._channel.connection.poll()
-            )  # during a call, the parent sends nothing, but may end
+            # During a call, the parent sends nothing, but may end.
+            has_ended = self._channel.connection.poll()
             self._channel.send(("progress", fraction, label))
         except OSError:
             has_ended = True

@@ -12,11 +12,11 @@ import reprlib
 import subprocess
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from ..core.errors import RosyError
-from .start import Guarded, GuardedFolder
+from .start import GuardedFolder, guarded
 
 #: Largest frame number in Blender.
 MAX_FRAME = 1_048_574
@@ -97,7 +97,7 @@ def run_local(command: Sequence[str], frames: Sequence[int], process_count: int)
         for index in range(process_count):
             worker = _Worker(command, frames[index::process_count], folder / f"{index}.log")
             workers.append(worker)
-            stack.enter_context(Guarded(worker.process))
+            stack.enter_context(guarded(worker.process))
             stack.callback(worker.stop)
         running = list(workers)
         while running:
@@ -156,15 +156,11 @@ class _Worker:
         return texts
 
     def stop(self) -> None:
-        """End the process if it still runs."""
+        """Ask the process to end if it still runs, and wait for that, but not for long."""
         self._log.close()
-        if self.process.poll() is None:
-            self.process.terminate()
-            try:
-                self.process.wait(STOP_SECONDS)
-            except subprocess.TimeoutExpired:
-                self.process.kill()
-                self.process.wait()
+        self.process.terminate()
+        with suppress(subprocess.TimeoutExpired):
+            self.process.wait(STOP_SECONDS)
 
 
 def format_frames(frames: Sequence[int]) -> str:

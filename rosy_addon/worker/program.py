@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 
 from .job import Step, Steps, job
-from .start import Guarded
+from .start import guarded
 
 #: Longest wait for the end of the program in each step of the job, in seconds.
 WAIT_SECONDS = 0.02
@@ -36,15 +36,10 @@ def run_program(command: Sequence[str], label: str) -> Steps[tuple[int, str]]:
         process = subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT
         )
-        try:
-            with Guarded(process):
-                while process.poll() is None:
-                    yield Step(0.0, label)
-                    with suppress(subprocess.TimeoutExpired):
-                        process.wait(WAIT_SECONDS)
-        finally:
-            if process.poll() is None:
-                process.kill()
-                process.wait()
+        with guarded(process):
+            while process.poll() is None:
+                yield Step(0.0, label)
+                with suppress(subprocess.TimeoutExpired):
+                    process.wait(WAIT_SECONDS)
         log.seek(0)
         return process.returncode, log.read().decode(errors="replace")

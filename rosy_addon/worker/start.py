@@ -12,8 +12,8 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from multiprocessing import connection
 from multiprocessing.connection import Connection, Pipe
 from pathlib import Path
@@ -57,14 +57,6 @@ def start_module(
     # package.
     folders = [*sys.path, str(Path(__file__).parents[2])]
     end, other_end = Pipe()
-    options: dict[str, Any] = {}
-    if sys.platform == "win32":
-        os.set_handle_inheritable(other_end.fileno(), True)
-        handles = {"handle_list": [other_end.fileno()]}
-        options["startupinfo"] = subprocess.STARTUPINFO(lpAttributeList=handles)
-        options["creationflags"] = subprocess.CREATE_NO_WINDOW
-    else:
-        options["pass_fds"] = [other_end.fileno()]
     try:
         with other_end:
             process = subprocess.Popen(
@@ -73,12 +65,25 @@ def start_module(
                 env=os.environ | {"PYTHONPATH": os.pathsep.join(folders)} | (environment or {}),
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
-                **options,
+                creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+                **inheriting([other_end.fileno()]),
             )
     except OSError:
         end.close()
         raise
     return process, end
+
+
+def inheriting(handles: Sequence[int]) -> dict[str, Any]:
+    """Return the keyword arguments of `subprocess.Popen` with which a process inherits handles.
+
+    `handles` are file descriptors; on Windows, they are handles of the system.
+    """
+    if sys.platform != "win32":
+        return {"pass_fds": tuple(handles)}
+    for handle in handles:
+        os.set_handle_inheritable(handle, True)
+    return {"startupinfo": subprocess.STARTUPINFO(lpAttributeList={"handle_list": handles})}
 
 
 def own_end(handle: str) -> Connection:
@@ -91,22 +96,19 @@ def own_end(handle: str) -> Connection:
     return kind(int(handle))
 
 
-class Guarded:
-    """Context manager: during the block, another process is killed if this process ends for any reason.
+@contextmanager
+def guarded(process: subprocess.Popen[Any]) -> Iterator[None]:
+    """Context manager: kill another process if it still runs after the block.
 
-    Parameters
-    ----------
-    process : subprocess.Popen
+    It is also killed if this process ends during the block, for any reason.
     """
-
-    def __init__(self, process: subprocess.Popen[Any]) -> None:
-        self._pid = process.pid
-
-    def __enter__(self) -> None:
-        _tell_guard("watch", self._pid)
-
-    def __exit__(self, *_: object) -> None:
-        _tell_guard("leave", self._pid)
+    _tell_guard("watch", process.pid)
+    try:
+        yield
+    finally:
+        process.kill()  # does nothing if it has ended
+        process.wait()
+        _tell_guard("leave", process.pid)
 
 
 class GuardedFolder(TemporaryDirectory[str]):

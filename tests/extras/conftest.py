@@ -6,23 +6,9 @@ import numpy as np
 import pytest
 import pyvista as pv
 from extras.rotations import rotation
+from harness.errors import error_of as error_of
 
-from rosy_addon.core.errors import RosyError
 from rosy_addon.extras.command_line import main
-
-
-@pytest.fixture
-def error_of():
-    """A function that makes a call and returns the text of its RosyError, a single line."""
-
-    def catch(function, *arguments, **keywords) -> str:
-        with pytest.raises(RosyError) as caught:
-            function(*arguments, **keywords)
-        message = str(caught.value)
-        assert "\n" not in message
-        return message
-
-    return catch
 
 
 @pytest.fixture

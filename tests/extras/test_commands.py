@@ -10,7 +10,7 @@ from pathlib import Path
 import imageio_ffmpeg
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageSequence
 
 from rosy_addon import api as rf
 from rosy_addon.api.films import Film
@@ -152,18 +152,13 @@ def test_film(suffix, rosy, growing, tmp_path):
     if suffix == ".gif":
         with Image.open(output) as gif:
             assert gif.n_frames == 20 and gif.info["duration"] == 100
-            frames = [_seek(gif, number) for number in range(20)]
+            frames = [np.asarray(each.convert("RGB")) for each in ImageSequence.Iterator(gif)]
     else:
         reader = imageio_ffmpeg.read_frames(str(output))
         assert next(reader)["size"] == (64, 64)
         frames = [np.frombuffer(data, np.uint8).reshape(64, 64, 3) for data in reader]
     covered = [np.count_nonzero(frame.min(axis=2) < 230) for frame in frames]
     assert len(covered) == 20 and (np.diff(covered) > 0).all()
-
-
-def _seek(gif, number):
-    gif.seek(number)
-    return np.asarray(gif.convert("RGB"))
 
 
 def test_film_has_one_camera_and_one_range(growing):
@@ -208,11 +203,9 @@ def test_film_errors(rosy, growing, tmp_path):
 @pytest.fixture
 def turning(tmp_path):
     """A square and 12 fields on it, each in a file of its own."""
-    surface = rf.Surface([[0, 0, 0], [1, 0, 0], [1, 0, -1], [0, 0, -1]], [[0, 1, 2, 3]], up="y")
-    (tmp_path / "square.obj").write_text(
-        "v 0 0 0\nv 1 0 0\nv 1 0 -1\nv 0 0 -1\nf 1 2 3 4\n", encoding="utf-8"
-    )
-    field = rf.along_axis(surface, (1, 0, 0), 1)
+    mesh = tmp_path / "square.obj"
+    mesh.write_text("v 0 0 0\nv 1 0 0\nv 1 0 -1\nv 0 0 -1\nf 1 2 3 4\n", encoding="utf-8")
+    field = rf.along_axis(rf.Surface(mesh), (1, 0, 0), 1)
     for number in range(1, 13):
         field.rotated(np.radians(number)).save(tmp_path / f"field{number}.rosy")
     return tmp_path

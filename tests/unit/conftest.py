@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from harness.errors import error_of as error_of
 from hypothesis import settings
 
-from rosy_addon.core.errors import RosyError
 from rosy_addon.worker.helper import Helper
 
 #: Machines may be busy, so hypothesis has no deadline for an example.
@@ -45,17 +45,3 @@ def helper():
     helper = Helper()
     yield helper
     helper.close()
-
-
-@pytest.fixture
-def error_of():
-    """A function that makes a call and returns the text of its RosyError, a single line."""
-
-    def catch(function, *arguments, **keywords) -> str:
-        with pytest.raises(RosyError) as caught:
-            function(*arguments, **keywords)
-        message = str(caught.value)
-        assert "\n" not in message
-        return message
-
-    return catch

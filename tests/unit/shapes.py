@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import awkward
 import numpy as np
 from numpy.typing import ArrayLike
@@ -54,12 +56,8 @@ def globe(rows: int = 24, columns: int = 48) -> Surface:
     """A sphere of meridians and parallels; its poles are the first and the last vertex."""
     polar = np.linspace(0, np.pi, rows + 1)[1:-1, None]
     azimuth = np.arange(columns) * 2 * np.pi / columns
-    rings = np.stack(
-        np.broadcast_arrays(
-            np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)
-        ),
-        axis=-1,
-    ).reshape(-1, 3)
+    x, y = np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth)
+    rings = np.stack([x, y, np.cos(polar) + 0 * x], axis=-1).reshape(-1, 3)
     vertices = np.concatenate([[[0, 0, 1]], rings, [[0, 0, -1]]])
     number = 1 + np.arange((rows - 1) * columns).reshape(rows - 1, columns)
     following = np.roll(number, -1, axis=1)
@@ -107,21 +105,10 @@ def icosphere(subdivisions: int = 3, radius: float = 1.0) -> Surface:
     vertices = np.array([np.roll(p, shift) for shift in range(3) for p in ends], dtype=float)
     distance = np.linalg.norm(vertices[:, None] - vertices[None], axis=2)
     is_adjacent = np.isclose(distance, 2.0)
-    triangles = np.array(
-        [
-            (a, b, c)
-            for a in range(12)
-            for b in range(a + 1, 12)
-            for c in range(b + 1, 12)
-            if is_adjacent[a, b] and is_adjacent[b, c] and is_adjacent[a, c]
-        ]
-    )
-    inward = np.einsum(
-        "fi,fi->f",
-        np.cross(*(vertices[triangles[:, k]] - vertices[triangles[:, 0]] for k in (1, 2))),
-        vertices[triangles[:, 0]],
-    )
-    triangles[inward < 0] = triangles[inward < 0][:, ::-1]
+    triples = np.array(list(combinations(range(12), 3)))
+    triangles = triples[is_adjacent[triples, np.roll(triples, 1, axis=1)].all(axis=1)]
+    is_inward = np.linalg.det(vertices[triangles]) < 0
+    triangles[is_inward] = triangles[is_inward][:, ::-1]
     for _ in range(subdivisions):
         edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
         edges, midpoint = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)

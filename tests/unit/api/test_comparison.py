@@ -9,6 +9,7 @@ import sys
 
 import numpy as np
 import pytest
+from field_helpers import write_off
 from shapes import icosphere, torus
 
 import rosy_addon as rf
@@ -33,13 +34,8 @@ def test_angles_are_those_of_the_nearest_members(degree):
     surface = torus(16, 10)
     one, other = rf.form(surface, degree), rf.along_axis(surface, (1, 2, 3), degree=degree)
     difference = rf.compare([one, other]).differences["field 2"]
-    for face, (a, b) in enumerate(
-        zip(
-            members(surface, one.vectors, degree),
-            members(surface, other.vectors, degree),
-            strict=True,
-        )
-    ):
+    directions = (members(surface, field.vectors, degree) for field in (one, other))
+    for face, (a, b) in enumerate(zip(*directions, strict=True)):
         a, b = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in (a, b))
         nearest = np.arctan2(np.linalg.norm(np.cross(a[0], b), axis=1), b @ a[0]).min()
         assert np.isclose(difference.angle[face], nearest, atol=1e-6)
@@ -110,11 +106,7 @@ def test_nothing_to_compare(sphere):
 
 
 def test_the_command(sphere, tmp_path, capfd):
-    mesh, field = tmp_path / "sphere.off", tmp_path / "turned.rosy"
-    rows = [" ".join(map(str, row)) for row in sphere.vertices.tolist()]
-    rows += [" ".join(map(str, (3, *face))) for face in sphere.faces.tolist()]
-    head = ["OFF", f"{len(sphere.vertices)} {sphere.face_count} 0"]
-    mesh.write_text("\n".join([*head, *rows]))
+    mesh, field = write_off(tmp_path / "sphere.off", sphere), tmp_path / "turned.rosy"
     rf.smoothest(rf.Surface(mesh), degree=6).rotated(0.05).save(field)
     assert main(["compare", str(mesh), "Ours=smoothest", str(field), "--format", "json"]) == 0
     ours, turned = json.loads(capfd.readouterr().out)

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from listeners import CancelledError
-from PIL import Image
+from PIL import Image, ImageSequence
 from shapes import icosphere, placed, torus
 
 from rosy_addon.compositor.look import Look
@@ -39,11 +39,7 @@ BALL = MeshInstance(icosphere(2), np.eye(4), axis_field(icosphere(2), 2))
 
 def decode_frames(data):
     gif = Image.open(io.BytesIO(data))
-    frames = []
-    for index in range(gif.n_frames):
-        gif.seek(index)
-        frames.append(np.asarray(gif.convert("RGB")))
-    return gif, frames
+    return gif, [np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(gif)]
 
 
 @settings(max_examples=40)

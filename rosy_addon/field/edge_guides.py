@@ -14,7 +14,9 @@ from .representation import edge_unfolding, power, to_representation
 from .sparse_multigrid import from_edges
 from .surface import Surface
 
-#: Distance along edges over which their directions are averaged, relative to the size of the surface.
+#: Distance along edges over which their directions are averaged, relative to the size of the surface. With half of it,
+#: the steps of voxels of 1 % are followed (572 singularities on a tee); with twice, some edges at 45 degrees of a part
+#: that is remeshed with quads are not.
 JAG_LENGTH = 0.01
 
 #: A guide is removed if N times its angle from the average has a smaller cosine than `MIN_COSINE`, or if the length
@@ -62,8 +64,8 @@ def coherent_edge_guides(surface: Surface, ends: np.ndarray, degree: int) -> np.
     halfedges = surface.edges.halfedges
     a, b = halfedges[touches[surface.corner_face[halfedges]].all(axis=1)].T
     length, distance = edge_lengths(surface, a, b)
-    weight = np.minimum(length / np.maximum(distance, length / MAX_EDGE_RATIO), MAX_EDGE_RATIO)
-    weight *= JAG_LENGTH**2
+    least = np.maximum(length / MAX_EDGE_RATIO, np.finfo(float).tiny)
+    weight = JAG_LENGTH**2 * length / np.maximum(distance, least)
     number = np.cumsum(touches) - 1
     source, target = number[surface.corner_face[a]], number[surface.corner_face[b]]
     mass = np.where(z != 0, surface.face_area, 0.0)[touches]

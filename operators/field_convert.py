@@ -114,7 +114,7 @@ class ROSY_OT_field_convert(_FieldsJobMixin, Operator):
     )
     pair_distance: fraction(
         "Cancel Pairs",
-        "Remove pairs of singularities with opposite indices that are nearer than this fraction of "
+        "Remove singularities whose indices sum to 0 and that are nearer than this fraction of "
         "the size of the mesh",
         soft_max=0.2,
     )

@@ -16,11 +16,12 @@ import numpy as np
 from ..core.cache import Cache
 from ..core.progress import progress
 from ..field.singularities import find_singularities
+from ..field.singularity_changes import CLUSTER_REACH, cluster_singularities
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.pixel_blocks import part_of
 from ..projection.visible_vertices import project_vertices
-from .singularity_settings import shows_hidden_singularities, shows_indices
+from .singularity_settings import shows_clusters, shows_hidden_singularities, shows_indices
 
 #: Display colors of dots by the sign of the index, and display color of their outlines.
 COLOR_BY_SIGN, OUTLINE_COLOR = {1: "#eb5a14", -1: "#2864eb"}, "#141414"
@@ -143,7 +144,7 @@ def singularity_marks(
         if instance.field is not None:
             part = 0.5 / len(instances)
             with progress(number * part, (number + 1) * part):
-                vertex, index = cached_singularities(instance, cache)
+                vertex, index = shown_singularities(instance, settings, cache)
             degrees.append(np.full(len(vertex), instance.field.degree))
         vertices.append(vertex)
         indices.append(index)
@@ -162,14 +163,32 @@ def singularity_marks(
     ).part(kept)
 
 
-def cached_singularities(instance: MeshInstance, cache: Cache) -> tuple[np.ndarray, np.ndarray]:
-    """Return the vertices and the indices of the singularities of an instance, from the cache if possible.
+def shown_singularities(
+    instance: MeshInstance, settings: Any, cache: Cache
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the vertices and the indices of the dots of an instance: its singularities, or clusters of them.
 
     The instance must have a field. All deformations of a mesh have the same singularities. The result is a
-    pair of (K,) int32 arrays; indices are in units of 1 / N.
+    pair of (K,) int32 arrays; indices are in units of 1 / N. `settings` is a look or a stroke style.
     """
     surface, field = instance.surface, instance.field
-    return cache.get_or_create(
+    found = cache.get_or_create(
         ("singularities", surface.rest_shape_key, field),
         partial(find_singularities, surface.in_rest_shape(), field),
+    )
+    return clusters_of(instance, found, cache) if shows_clusters(settings) else found
+
+
+def clusters_of(
+    instance: MeshInstance, found: tuple[np.ndarray, np.ndarray], cache: Cache
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the singularities of an instance, of which those within `CLUSTER_REACH` are read as one.
+
+    `found` holds all singularities. The result, which is from the cache if possible, is explained in
+    `cluster_singularities`.
+    """
+    surface = instance.surface.in_rest_shape()
+    return cache.get_or_create(
+        ("clusters", surface.rest_shape_key, instance.field),
+        partial(cluster_singularities, surface, *found, CLUSTER_REACH * surface.extent),
     )

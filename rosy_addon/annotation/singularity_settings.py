@@ -22,7 +22,12 @@ def shows_hidden_singularities(settings: Any) -> bool:
 
 def shows_indices(settings: Any) -> bool:
     """Return whether the indices of singularities are written beside their dots."""
-    return settings.singularity_dots.endswith("indices")
+    return settings.singularity_dots.endswith("indices") or shows_clusters(settings)
+
+
+def shows_clusters(settings: Any) -> bool:
+    """Return whether singularities that are near to each other are drawn as one dot."""
+    return settings.singularity_dots == "clusters"
 
 
 def singularity_dots_choice(**place: Any) -> Any:
@@ -36,11 +41,14 @@ def singularity_dots_choice(**place: Any) -> Any:
             "none": "None",
             "visible": "Those that the camera sees",
             "visible_indices": "Those that the camera sees, with their indices",
+            "clusters": "Those that the camera sees, with their indices. Singularities within 2 % of the size of "
+            "the mesh are one dot, with the sum of their indices",
             "all": "All, with fainter dots for hidden ones",
             "all_indices": "All, with the indices of visible ones",
         },
         option_labels={
             "visible_indices": "Visible, with Indices",
+            "clusters": "Visible Clusters",
             "all_indices": "All, with Indices",
         },
         panel_label="Show",

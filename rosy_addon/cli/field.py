@@ -41,7 +41,7 @@ def add_field_command(subparsers: Any) -> None:
     share = float_between(0.0, 10.0)
     text = "diffuse the field over this fraction of the size of the mesh"
     parser.add_value("--smooth", "SHARE", text, share, default=0.0)
-    text = "remove pairs of singularities with opposite indices that are nearer than this fraction of the size of the mesh"
+    text = "remove singularities that are nearer than this fraction of the size of the mesh and whose indices sum to 0"
     parser.add_value("--cancel-pairs", "SHARE", text, share, default=0.0)
     text = "replace the lengths of the vectors; the curvature is in 1 / unit of the mesh"
     parser.add_argument("--magnitude", choices=list(MAGNITUDES), help=text)
@@ -66,6 +66,8 @@ def add_info_command(subparsers: Any) -> None:
     parser = add_subcommand(subparsers, run_info)
     add_mesh_options(parser)
     parser.add_switch("--json", "print one JSON object")
+    text = "read singularities as one if they are within this fraction of the size of the mesh"
+    parser.add_value("--cluster", "SHARE", text, float_between(0.0, 10.0), default=0.0)
     text = "compare with another field file, or with a file of singularities (.sings)"
     parser.add_value("--against", "FILE", text, Path)
 
@@ -74,6 +76,7 @@ def run_info(options: Options) -> None:
     """Describe a mesh and its field, and compare the field with another one."""
     surface, field = load_mesh_and_field(options)
     magnitude = field.magnitude
+    found = field.clusters(options.cluster) if options.cluster else field.singularities
     facts = {
         "degree": field.degree,
         "vertices": len(surface.vertices),
@@ -85,7 +88,7 @@ def run_info(options: Options) -> None:
         "is_rosy": field.is_rosy,
         "energy": field.energy,
         "ties": count_ties(surface, field),
-        "singularities": np.stack(field.singularities, axis=1).tolist(),
+        "singularities": np.stack(found, axis=1).tolist(),
     }
     if options.against is not None:
         facts["against"] = _compare(options, field)

@@ -19,7 +19,7 @@ from .field_io import write_field
 from .representation import face_representation, to_representation
 from .rosy_field import RosyField
 from .singularities import find_singularities
-from .singularity_changes import move_index
+from .singularity_changes import cluster_singularities, move_index
 from .surface import Surface, is_same_surface
 
 
@@ -145,17 +145,37 @@ class Field(RosyField):
         """
         return self._converted(Conversion(smoothing_length=reach))
 
-    def without_pairs(self, reach: float) -> Field:
-        """Return the field without pairs of singularities that are near to each other.
+    def clusters(self, reach: float) -> Singularities:
+        """Return the singularities, with those that are near to each other read as one.
 
-        The singularities of a pair have opposite indices, so they cancel. Other singularities, and
-        directions far from the pairs, do not change. A pair is kept if the faces near it are too large to
+        Its index is the sum of theirs, and it is left out if that is 0. So the sum of all indices is the same.
+
+        Parameters
+        ----------
+        reach : float
+            Largest distance from a singularity to the next one of its cluster, along edges, as a fraction of the
+            longest side of the bounding box of the mesh.
+
+        Examples
+        --------
+        >>> import rosyfields as rf
+        >>> bunny = rf.Surface("bunny.obj")  # doctest: +SKIP
+        >>> rf.form(bunny).clusters(0.02)  # doctest: +SKIP
+        """
+        surface, found = self.surface, self.singularities
+        return Singularities(*cluster_singularities(surface, *found, reach * surface.extent))
+
+    def without_pairs(self, reach: float) -> Field:
+        """Return the field without singularities that are near to each other and whose indices sum to 0.
+
+        These are pairs with opposite indices, and then clusters of the others. Other singularities, and
+        directions far from the removed ones, do not change. A group is kept if the faces near it are too large to
         remove it: the field would then turn by pi / N or more from one face to the next.
 
         Parameters
         ----------
         reach : float
-            Largest distance between the singularities of a pair, along edges, as a fraction of the longest
+            Largest distance from a singularity to the next one of its group, along edges, as a fraction of the longest
             side of the bounding box of the mesh.
 
         Raises

@@ -15,10 +15,10 @@ from ..core.progress import progress, report
 from .conjugate_gradient import conjugate_gradient
 from .connection import laplacian
 from .creases import weighted_median
+from .edge_guides import coherent_edge_guides
 from .feature_curvature import NoisyCurvature, noisy_curvature, of_unit_extent
 from .frames import dot, normalize
 from .guided_system import GuidedSystem, guided_field
-from .guides import guides_from_edges
 from .representation import from_representation, unit_complex
 from .rosy_field import RosyField, check_degree
 from .smoothest import smoothest_field
@@ -95,7 +95,7 @@ def form(surface: Surface, degree: int) -> RosyField:
     with progress(0.2, 0.5):
         guides, confidence = _curvature_guides(measured, degree)
     report(0.5, "finding guides")
-    edge_guides = guides_from_edges(surface, measured.salient_ends, degree)
+    edge_guides = coherent_edge_guides(surface, measured.salient_ends, degree)
     at_edge = edge_guides.any(axis=1)
     if at_edge.any():
         with progress(0.5, 0.55):

@@ -1,4 +1,4 @@
-"""Change singularities of a field: move them by hand, and cancel pairs with opposite indices."""
+"""Change singularities of a field: move them by hand, cancel near ones, and read near ones as one."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import numpy as np
 
 from ..core.errors import RosyError
 from ..core.progress import progress, report
-from .blocks import concatenated_ranges, mask, neighbors_of_nodes
+from .blocks import bincount_rows, concatenated_ranges, mask, neighbors_of_nodes
+from .connectivity import connected_components
 from .prescribed import TurningError, change_singularities
 from .rosy_field import RosyField
 from .singularities import find_singularities, first_pairs
@@ -17,6 +18,9 @@ OUTSIDE = -1
 
 #: Smallest distance over which a change of the directions falls off, relative to `Surface.extent`.
 MIN_REACH = 0.01
+
+#: Distance along edges within which pictures show singularities as one, relative to `Surface.extent`.
+CLUSTER_REACH = 0.02
 
 #: Text that is shown with the progress bar.
 LABEL = "pairing singularities"
@@ -91,10 +95,11 @@ def _distance(surface: Surface, ends: np.ndarray) -> float:
 
 
 def cancel_pairs(surface: Surface, field: RosyField, max_distance: float) -> RosyField:
-    """Return the field without nearby pairs of singularities that have opposite indices.
+    """Return the field without nearby singularities whose indices sum to 0.
 
-    Directions change most near a removed pair, and less with the distance from it. All other singularities
-    stay. A pair is kept if the field without it would turn by pi / N or more between two faces.
+    Pairs with opposite indices are removed first, and then the clusters of all others whose sum is 0, such as +2/4
+    and two of -1/4. Directions change most near removed singularities, and less with the distance from them. All
+    other singularities stay. A group is kept if the field without it would turn by pi / N or more between two faces.
 
     Parameters
     ----------
@@ -102,12 +107,13 @@ def cancel_pairs(surface: Surface, field: RosyField, max_distance: float) -> Ros
     field : RosyField
         A field whose directions are rotationally symmetric.
     max_distance : float
-        Largest length of the shortest path along edges between the vertices of a pair, in object space.
+        Largest length of the shortest path along edges between the vertices of a pair, or from a singularity to
+        the next one of its cluster, in object space.
 
     Returns
     -------
     RosyField
-        The new field; the same object if it has no such pairs.
+        The new field; the same object if it has no such singularities.
 
     Raises
     ------
@@ -118,36 +124,96 @@ def cancel_pairs(surface: Surface, field: RosyField, max_distance: float) -> Ros
     with progress(0.0, 0.2):
         vertex, index = find_singularities(surface, field)
     with progress(0.2, 0.4):
-        pairs = opposite_pairs(surface, vertex, index, max_distance)
+        group = _opposite_groups(surface, vertex, index, max_distance)
     start = 0.4
-    while len(pairs):
-        chosen = pairs.ravel()
+    while (group >= 0).any():
+        chosen = np.flatnonzero(group >= 0)
         try:
             with progress(start, 1.0):
                 return change_singularities(
                     surface, field, vertex[chosen], -index[chosen], max_distance
                 )
         except TurningError as error:
-            pairs = pairs[~_are_near(surface, vertex[pairs], error.vertices)]
+            is_near = _are_near(surface, vertex[chosen], error.vertices)
+            group[np.isin(group, group[chosen[is_near]])] = -1
         start = 0.5 * (start + 1.0)
     return field
 
 
-def _are_near(surface: Surface, pairs: np.ndarray, vertices: np.ndarray) -> np.ndarray:
-    """Return (P,) bool: which of the (P, 2) pairs of vertices are nearest to the given other vertices.
+def _opposite_groups(
+    surface: Surface, vertex: np.ndarray, index: np.ndarray, max_distance: float
+) -> np.ndarray:
+    """Return (K,) int64 numbers of groups of nearby singularities whose indices sum to 0; -1 for all others.
 
-    The distance of a pair is the number of rings of faces from the given vertices to the nearer vertex of the
-    pair. All pairs with the smallest distance are marked.
+    The groups are pairs of opposite indices (`opposite_pairs`), and clusters of the rest (`cluster_numbers`).
+    """
+    pairs = opposite_pairs(surface, vertex, index, max_distance)
+    group = np.full(len(vertex), -1)
+    group[pairs] = np.arange(len(pairs))[:, None]
+    rest = np.flatnonzero(group < 0)
+    cluster = cluster_numbers(surface, vertex[rest], max_distance)
+    is_zero = np.bincount(cluster, index[rest])[cluster] == 0
+    group[rest[is_zero]] = len(pairs) + cluster[is_zero]
+    return group
+
+
+def cluster_numbers(surface: Surface, vertex: np.ndarray, max_distance: float) -> np.ndarray:
+    """Return the (K,) int64 number of the cluster of each of K vertices, from 0 without gaps.
+
+    Two vertices are in a cluster if a path along edges connects them whose parts between given vertices are at most
+    `max_distance` long, in object space.
+    """
+    first, second, _ = _near(surface, vertex, max_distance)
+    root = connected_components(len(vertex), np.stack([first, second], axis=1))
+    return np.unique(root, return_inverse=True)[1].astype(np.int64)
+
+
+def cluster_singularities(
+    surface: Surface, vertex: np.ndarray, index: np.ndarray, max_distance: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Read nearby singularities as one, with the sum of their indices. Clusters whose sum is 0 are left out.
+
+    Noise divides the singularity at a pole into several, such as five of +1/4 around one of -1/4.
+
+    Parameters
+    ----------
+    surface : Surface
+    vertex, index : (K,) int ndarray
+        Vertices and indices of the singularities.
+    max_distance : float
+        See `cluster_numbers`.
+
+    Returns
+    -------
+    vertex, index : (n,) int32 ndarray
+        For each cluster, its vertex nearest to the mean position of its vertices, in ascending order, and the sum of
+        its indices. The sum of all indices does not change.
+    """
+    cluster = cluster_numbers(surface, vertex, max_distance)
+    point, total = surface.vertices[vertex], np.bincount(cluster, index).astype(np.int32)
+    mean = bincount_rows(cluster, point, len(total)) / np.bincount(cluster)[:, None]
+    order = np.lexsort((np.linalg.norm(point - mean[cluster], axis=1), cluster))
+    nearest = order[np.unique(cluster[order], return_index=True)[1]]
+    vertex, index = vertex[nearest[total != 0]], total[total != 0]
+    order = np.argsort(vertex)
+    return vertex[order], index[order]
+
+
+def _are_near(surface: Surface, places: np.ndarray, vertices: np.ndarray) -> np.ndarray:
+    """Return (n,) bool: which of the n vertices `places` are nearest to the given other vertices.
+
+    The distance of a vertex is the number of rings of faces from the given vertices to it. All with the smallest
+    distance are marked.
     """
     is_near = mask(len(surface.vertices), vertices)
     corner_vertex, corner_face = surface.corner_vertex, surface.corner_face
-    while not is_near[pairs].any():
+    while not is_near[places].any():
         touches = mask(surface.face_count, corner_face[is_near[corner_vertex]])
         before = int(is_near.sum())
         is_near[corner_vertex[touches[corner_face]]] = True
         if int(is_near.sum()) == before:
-            return np.ones(len(pairs), dtype=bool)
-    return is_near[pairs].any(axis=1)
+            return np.ones(len(places), dtype=bool)
+    return is_near[places]
 
 
 def opposite_pairs(

@@ -10,7 +10,7 @@ import numpy as np
 from ..annotation.arrow_marks import ArrowMarks, arrow_marks
 from ..annotation.draw_marks import draw_arrows, draw_marks
 from ..annotation.key_contents import PictureKey, sorted_indices
-from ..annotation.singularity_marks import cached_singularities, singularity_marks
+from ..annotation.singularity_marks import shown_singularities, singularity_marks
 from ..annotation.singularity_settings import shows_singularities
 from ..compositor.look import Look
 from ..compositor.look_units import pixel_look
@@ -110,7 +110,7 @@ def sequence_key(instances: Sequence[MeshInstance], look: Look) -> PictureKey:
     if shows_singularities(look):
         for number, instance in enumerate(fields):
             with progress(number / len(fields), (number + 1) / len(fields)):
-                _, index = cached_singularities(instance, cache)
+                _, index = shown_singularities(instance, look, cache)
             kinds.append(np.stack([index, np.full(len(index), instance.field.degree)], axis=1))
     return PictureKey(
         color_scale_of(look, fixed_color_range(look)),

@@ -19,7 +19,11 @@ from ..annotation import arrow_marks, singularity_marks
 from ..annotation.arrow_marks import ArrowMarks
 from ..annotation.draw_marks import head_outline
 from ..annotation.index_labels import MAX_LABELS, place_indices
-from ..annotation.singularity_settings import shows_hidden_singularities, shows_indices
+from ..annotation.singularity_settings import (
+    shows_clusters,
+    shows_hidden_singularities,
+    shows_indices,
+)
 from ..compositor.look import Look
 from ..core.cache import Cache
 from ..core.color import from_hex
@@ -149,13 +153,15 @@ def look_up_singularities(
 
 
 def singularity_dots(
-    instance: MeshInstance, cache: Cache, clip_planes: np.ndarray | None
+    instance: MeshInstance, look: Look, cache: Cache, clip_planes: np.ndarray | None
 ) -> SingularityDots | None:
     """Return the singularities of an instance with a field, without those that clip planes cut away.
 
     Parameters
     ----------
     instance : MeshInstance
+    look : Look
+        Decides whether near singularities are one dot.
     cache : Cache
         Stores the singularities of fields.
     clip_planes : (6, 4) float64 ndarray or None
@@ -169,6 +175,8 @@ def singularity_dots(
     found = look_up_singularities(instance, cache)
     if isinstance(found, Preparation):
         return None
+    if shows_clusters(look):
+        found = singularity_marks.clusters_of(instance, found, cache)
     vertex, index = found
     points = instance.world_points()[vertex]
     kept = ~is_cut_away(points, clip_planes)
@@ -203,7 +211,7 @@ def draw_singularities(
 ) -> None:
     """Draw the dots of a view, and store in its overlay those that get labels."""
     found = [
-        singularity_dots(instance, cache, view_input.clip_planes)
+        singularity_dots(instance, look, cache, view_input.clip_planes)
         for instance in view_input.instances
         if instance.field is not None
     ]

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 from harness.stroke_tracing import planar_strokes
-from shapes import globe, icosphere, instance_of, torus
+from shapes import globe, icosphere, instance_of, plane, torus
 
 from rosy_addon.annotation.draw_marks import draw_marks
 from rosy_addon.annotation.index_labels import (
@@ -17,15 +17,24 @@ from rosy_addon.annotation.index_labels import (
     text_segments,
     text_width,
 )
-from rosy_addon.annotation.singularity_marks import COLOR_BY_SIGN, OUTLINE, SingularityMarks
+from rosy_addon.annotation.singularity_marks import (
+    COLOR_BY_SIGN,
+    OUTLINE,
+    SingularityMarks,
+    shown_singularities,
+    singularity_marks,
+)
 from rosy_addon.compositor.look import Look
+from rosy_addon.core.cache import Cache
 from rosy_addon.core.color import from_hex, to_linear
+from rosy_addon.field.prescribed import prescribed_field
 from rosy_addon.field.singularities import find_singularities, format_index
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.svg import svg_text
 from rosy_addon.line_drawing.visibility import project_to_pixels
 from rosy_addon.projection.camera import look_at, perspective_camera
+from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
@@ -133,6 +142,19 @@ def test_visible_singularities_of_a_mesh_have_dots_at_their_vertices():
             near |= np.hypot(x - dot_x, y - dot_y) < 12
     assert near.any()
     np.testing.assert_array_equal(picture[~near], without[~near])
+
+
+def test_clusters_have_one_dot_with_the_sum_of_their_indices():
+    """Singularities two edges apart are 1.6 % of the size apart."""
+    surface = plane(128, 128)
+    vertex, index = [60 * 129 + 64, 70 * 129 + 64, 100 * 129 + 20, 102 * 129 + 20], [1, 1, 1, -1]
+    field = prescribed_field(surface, 4, vertex, index)
+    instance = MeshInstance(surface, np.eye(4), field)
+    for kind, expected in (("visible", vertex), ("clusters", vertex[:2])):
+        shown, _ = shown_singularities(instance, Look(singularity_dots=kind), Cache())
+        assert shown.tolist() == expected
+    dots = singularity_marks([instance], CAMERA, Look(singularity_dots="clusters"))
+    assert len(dots) == 2 and dots.has_labels
 
 
 @pytest.mark.slow

@@ -107,6 +107,8 @@ def test_info_compares(sphere, tmp_path):
     facts = facts_of(sphere, made, "--against", turned)
     assert np.isclose(facts["against"]["mean"], 5) and np.isclose(facts["against"]["max"], 5)
     assert facts["is_rosy"] and facts["energy"] > 4 * np.pi * 4
+    (_, total), *others = facts_of(sphere, made, "--cluster", 10)["singularities"]
+    assert total == 8 and not others
     facts = facts_of(sphere, turned, "--against", sings)
     assert facts["against"] == {"same": 8, "only_here": [], "only_there": []}
     assert "off by 5 degrees on average" in rosy("info", sphere, made, "--against", turned).stdout

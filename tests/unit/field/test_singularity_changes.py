@@ -14,7 +14,12 @@ from rosy_addon.field.prescribed import change_singularities, prescribed_field
 from rosy_addon.field.representation import face_representation
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
-from rosy_addon.field.singularity_changes import OUTSIDE, move_index, opposite_pairs
+from rosy_addon.field.singularity_changes import (
+    OUTSIDE,
+    cluster_singularities,
+    move_index,
+    opposite_pairs,
+)
 
 #: Many faces meet at its poles, so that they can have large indices.
 BALL = globe(32, 64)
@@ -117,6 +122,44 @@ def test_pairs_are_the_nearest_along_edges():
     for steps, expected in ((1.9, []), (2, [near]), (3, [near, far]), (30, [near, far])):
         pairs = opposite_pairs(surface, vertex, index, (steps + 0.01) * step)
         assert sorted(pairs.tolist()) == expected
+
+
+def test_clusters_are_joined_along_edges():
+    """A chain of steps of two edges is one cluster. A sum of 0 vanishes, and no sum gets lost."""
+    surface, step = plane(20, 20), 0.1
+    points = np.array([(2, 2), (2, 4), (4, 4), (10, 10), (10, 12), (15, 15)])
+    vertex, index = points @ (21, 1), np.array([1, 1, -3, 1, -1, 2])
+    for steps, expected in (
+        (1.9, dict(zip(vertex.tolist(), index.tolist(), strict=True))),
+        (2, {vertex[1]: -1, vertex[5]: 2}),
+        (9, {vertex[1]: -1, vertex[4]: 2}),
+        (30, {vertex[3]: 1}),
+    ):
+        found = cluster_singularities(surface, vertex, index, (steps + 0.01) * step)
+        assert dict(zip(*found, strict=True)) == expected
+
+
+def test_a_pole_that_noise_divides_is_one_cluster():
+    """Five of +1/4 around one of -1/4 are a pole of index 1, with the singularity in the middle as its place."""
+    far = len(BALL.vertices) - 1
+    around = 0.2 * np.stack([f(2 * np.pi * np.arange(5) / 5) for f in (np.cos, np.sin)], axis=1)
+    middle, *ring = (nearest_vertex((1, y, z)) for y, z in ((0, 0), *around))
+    field = prescribed_field(BALL, 4, [far, middle, *ring], [4, -1, *[1] * 5])
+    found = find_singularities(BALL, field)
+    assert len(found[0]) == 7 and found[1].sum() == 4 * BALL.euler_characteristic
+    clusters = cluster_singularities(BALL, *found, 0.4)
+    assert dict(zip(*clusters, strict=True)) == {middle: 4, far: 4}
+
+
+def test_a_cluster_that_sums_to_zero_is_cancelled():
+    """+2/4 between two of -1/4 has no opposite, but the three together have no index."""
+    middle, *sides = (nearest_vertex((1, y, 0)) for y in (0, -0.4, 0.4))
+    poles = [0, len(BALL.vertices) - 1]
+    field = prescribed_field(BALL, 4, [*poles, middle, *sides], [4, 4, 2, -1, -1])
+    assert len(find_singularities(BALL, field)[0]) == 5
+    assert convert(BALL, field, Conversion(pair_distance=0.05)) is field
+    clean = convert(BALL, field, Conversion(pair_distance=0.4))
+    assert indices(BALL, clean) == dict.fromkeys(poles, 4)
 
 
 @pytest.mark.parametrize("degree", [1, 4])

@@ -22,7 +22,7 @@ from ..rosy_addon.ui.property_makers import choice, integer, text, toggle
 from ..rosy_addon.viewport import session
 from ..rosy_addon.worker.job import Steps
 from .base import IDLE, IN_3D_VIEW, VISIBLE_FIELD, Condition, RosyOperator
-from .modal_job import DialogJobMixin, ModalJobMixin
+from .modal_job import ModalJobMixin
 
 
 class ROSY_OT_bake(ModalJobMixin, bpy.types.Operator):
@@ -69,7 +69,7 @@ def view_camera(context: bpy.types.Context) -> Camera:
     return camera_of_view(region, area.spaces.active.region_3d)
 
 
-class ROSY_OT_bake_animation(DialogJobMixin, bpy.types.Operator):
+class ROSY_OT_bake_animation(ModalJobMixin, bpy.types.Operator):
     """Draw the fields at every frame, save the pictures to a folder, and play them back on the meshes. Frames that are up to date are kept, so a run that was stopped with ESC can be continued"""
 
     bl_idname = "rosy.bake_animation"

@@ -108,13 +108,17 @@ class RosyOperator:
         self.report({"ERROR"}, as_sentence(error_text(error)))
         return {"CANCELLED"}
 
-    def report_operator_error(self, error: RuntimeError) -> set[str]:
-        """Report the error of another operator that this one has called.
+    def call(self, operator: Callable[..., set[str]], **settings: object) -> set[str]:
+        """Call another operator, as its button does, and report its errors.
 
-        Return the result of an operator that has failed.
+        Return the result of this operator.
         """
-        self.report({"ERROR"}, str(error).strip().removeprefix("Error: "))
-        return {"CANCELLED"}
+        try:
+            result = operator("INVOKE_DEFAULT", **settings)
+        except RuntimeError as error:  # the called operator has reported it
+            self.report({"ERROR"}, str(error).strip().removeprefix("Error: "))
+            return {"CANCELLED"}
+        return {"CANCELLED"} if result == {"CANCELLED"} else {"FINISHED"}
 
     def report_done(self, message: str) -> None:
         """Report what the operator has done."""

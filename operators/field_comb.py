@@ -202,11 +202,12 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         Return the result of the operator.
         """
         try:
-            if self._job.finish(context):
-                return {"FINISHED"}
+            self._job.finish(context)
         except REPORTED_ERRORS as error:
             self._take_back()
             return self.report_error(error)
+        if self._job.is_done:
+            return {"FINISHED"}
         self._take_back()
         return {"CANCELLED"}
 

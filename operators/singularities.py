@@ -164,14 +164,13 @@ class ROSY_OT_drag_singularity(RosyOperator, bpy.types.Operator):
             self.cancel(context)
             if target is None or target == source:
                 return {"CANCELLED"}
-            index = 1 if self.make_pair else 0
-            try:
-                bpy.ops.rosy.field_singularities(
-                    "INVOKE_DEFAULT", source=source, target=target, index=index, reach=self.reach
-                )
-            except RuntimeError as error:  # the called operator has reported it
-                return self.report_operator_error(error)
-            return {"FINISHED"}
+            return self.call(
+                bpy.ops.rosy.field_singularities,
+                source=source,
+                target=target,
+                index=1 if self.make_pair else 0,
+                reach=self.reach,
+            )
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:

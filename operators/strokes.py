@@ -14,10 +14,10 @@ from ..rosy_addon.ui.property_makers import choice, file_filter, text, toggle
 from ..rosy_addon.worker.job import Steps
 from .bake import view_camera
 from .base import IDLE, OBJECT_MODE, VISIBLE_FIELD, Condition, RosyOperator, sync_suffix
-from .modal_job import DialogJobMixin
+from .modal_job import ModalJobMixin
 
 
-class ROSY_OT_strokes(DialogJobMixin, bpy.types.Operator):
+class ROSY_OT_strokes(ModalJobMixin, bpy.types.Operator):
     """Draw evenly spaced strokes along the fields of the meshes, as seen from the camera"""
 
     bl_idname = "rosy.strokes"

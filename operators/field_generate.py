@@ -21,7 +21,7 @@ from ..rosy_addon.scene.look_properties import read_settings
 from ..rosy_addon.scene.meshes import EDGE_MARKS, marked_edges, mesh_surface, read_uvs
 from ..rosy_addon.ui.operator_settings import draw_generator_settings, draw_settings
 from ..rosy_addon.ui.property_makers import choice, integer, setting_properties, text
-from ..rosy_addon.worker.job import Call, Steps
+from ..rosy_addon.worker.job import Call, Steps, shares
 from .base import EDITABLE, selected_mesh_objects
 from .modal_job import ModalJobMixin
 
@@ -131,8 +131,7 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
                 errors.append(error)
                 continue
             inputs.append((mesh, surface, settings))
-        for index, (mesh, surface, settings) in enumerate(inputs):
-            start, stop = (0.9 * done / len(inputs) for done in (index, index + 1))
+        for (mesh, surface, settings), start, stop in shares(inputs, 0.9):
             try:
                 field = yield Call(generate, (surface, settings, self.degree), start, stop)
             except NoFeaturesError as error:

@@ -19,7 +19,7 @@ from ..scene.pictures import apply_texture, check_targets, read_output_settings
 from ..scene.read_view import read_lights, read_texture_input, scene_depsgraph
 from ..scene.texture_nodes import Hatching
 from ..surface_texture.draw import TextureSettings, draw_texture_images, texture_colors_values
-from ..worker.job import Call, Step, Steps, job
+from ..worker.job import Call, Step, Steps, job, shares
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +80,7 @@ def bake_texture(scene: Scene, objects: Sequence[Object]) -> Steps[list[TextureR
     has_colors = texture_colors_values(look, content)
     color_attribute = color_attribute_of(scene, look) if has_colors else None
     drawn = []
-    for index, (obj, uv_map) in enumerate(uv_maps.items()):
-        start, stop = (0.98 * done / len(objects) for done in (index, index + 1))
+    for (obj, uv_map), start, stop in shares(uv_maps.items(), 0.98):
         instance, uv = read_texture_input(
             scene, depsgraph, obj, uv_map, BAKE_CACHE, color_attribute
         )

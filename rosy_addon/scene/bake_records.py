@@ -20,10 +20,9 @@ from ..annotation.key_contents import PictureKey
 from ..compositor.look import Look
 from ..core.errors import RosyError
 from ..projection.camera import Camera
-from .camera_planes import update_backdrops
 from .cameras import FRAME_CAMERAS, CameraSource, frame_camera
 from .datablocks import delete_owned, delete_unused, removable_modifiers, rosy_modifiers
-from .keys import update_keys
+from .keys import update_camera_planes
 from .look_properties import read_look
 from .picture_nodes import (
     has_applied_picture,
@@ -397,8 +396,7 @@ def remove_bakes(scene: Scene) -> RemovalCounts:
             remove_applied_picture(obj.data)
     _clean_unused_meshes()
     image_count = _remove_records(scene)
-    update_backdrops(scene)
-    update_keys(scene)
+    update_camera_planes(scene)
     return RemovalCounts(len(objects), image_count + delete_unused())
 
 

@@ -21,11 +21,11 @@ from .datablocks import check_not_missing
 from .face_values import read_face_vectors
 from .field_attributes import (
     ANGLE_TYPE,
-    CHECK_TOLERANCE,
     VECTOR_TYPE,
     attribute_name,
     check_attribute_type,
     follow_mesh,
+    have_checks,
     is_face_vector_field,
     store_attribute,
     store_rest_shape,
@@ -265,10 +265,7 @@ def read_combed_guides(mesh: Mesh, surface: Surface) -> np.ndarray:
     if not are_stored or checks is None:
         return guides
     values = follow_mesh(mesh, GUIDE_ATTRIBUTE, values.astype(np.float64), surface)
-    length = np.abs(field).max(axis=1)
-    with np.errstate(invalid="ignore"):
-        is_current = np.abs(vector_checks(field) - checks) <= CHECK_TOLERANCE * length
-        is_current &= np.isfinite(values).all(axis=1)
+    is_current = have_checks(field, checks) & np.isfinite(values).all(axis=1)
     guides[is_current] = values[is_current]
     return guides
 

@@ -253,7 +253,7 @@ def _default_name(mesh: Mesh, form: str) -> str:
 
 def write_mesh_field(
     mesh: Mesh, field: RosyField, name: str = DEFAULT_FIELD_NAME, form: str = "VECTOR"
-) -> Attribute:
+) -> None:
     """Store a field on a mesh. An existing field in an attribute with the same name is replaced.
 
     Parameters
@@ -267,11 +267,6 @@ def write_mesh_field(
         "DIRECTIONS". A vector attribute with the name `name` is removed then, because it would be read
         instead of the directions. If a RoSy field is stored as "DIRECTIONS", such an attribute is kept.
 
-    Returns
-    -------
-    bpy.types.Attribute
-        The attribute of the field; for "DIRECTIONS", the first one.
-
     Raises
     ------
     RosyError
@@ -283,13 +278,11 @@ def write_mesh_field(
     --------
     read_mesh_field : The inverse.
     """
-    name = name or DEFAULT_FIELD_NAME
-    _check_storable(mesh, field, name, form)
-    return _store(mesh, field, name, form)
+    assign_fields({mesh: field}, name or DEFAULT_FIELD_NAME, form)
 
 
-def _store(mesh: Mesh, field: RosyField, name: str, form: str) -> Attribute:
-    """Store a field that `_check_storable` has checked. Return its attribute, or the first of several."""
+def _store(mesh: Mesh, field: RosyField, name: str, form: str) -> None:
+    """Store a field that `_check_storable` has checked."""
     if form == "DIRECTIONS" or field.direction_ratios is not None:
         attribute = _write_directions(mesh, field, name)
     elif form == "ANGLE":
@@ -299,16 +292,14 @@ def _store(mesh: Mesh, field: RosyField, name: str, form: str) -> Attribute:
         attribute = store_attribute(mesh, name, ANGLE_TYPE, angle)
     else:
         attribute = store_attribute(mesh, name, VECTOR_TYPE, field.vectors)
+    stored_name = attribute.name
     if attribute.data_type == VECTOR_TYPE:
-        stored_name = attribute.name
         store_rest_shape(mesh, stored_name)
-        attribute = mesh.attributes[stored_name]  # other new attributes may have moved it in memory
     if has_rosy_properties():
         mesh.rosy.degree = field.degree
-        if attribute.name == name:
+        if stored_name == name:
             mesh.rosy.attribute = name
     mesh.update()
-    return attribute
 
 
 def overwrite_vectors(mesh: Mesh, vectors: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from bpy.types import ID, Image, Material, Mesh, Node, NodeTree, Object
 
 from ..projection.camera import Camera
 from ..rendering.picture_images import NEUTRAL_GRAY
-from .datablocks import KEY_TAG, OWNED_TAG, is_editable, rosy_modifiers
+from .datablocks import KEY_TAG, OWNED_TAG, Track, is_editable, rosy_modifiers
 from .meshes import read_attribute
 from .node_builder import NodeBuilder, new_empty_material, new_modifier_group
 from .texture_nodes import Hatching, hatching_shader
@@ -69,7 +69,7 @@ class OutputSettings:
 def new_material(
     image: Image,
     camera: Camera,
-    created: list[ID],
+    track: Track,
     settings: OutputSettings,
     hatching: Hatching | None = None,
 ) -> Material:
@@ -88,14 +88,14 @@ def new_material(
         The picture. The material gets the name of this image.
     camera : Camera
         The camera from which the picture was drawn.
-    created : list of bpy.types.ID
-        The new datablocks are appended; see `datablocks.rollback_on_error`.
+    track : function
+        Called with each new datablock; see `datablocks.rollback_on_error`.
     settings : OutputSettings
     hatching : Hatching, optional
         How hatching is drawn. Given if the image has thresholds of ink instead of colors.
     """
     material, build = new_empty_material(image.name)
-    created.append(material)
+    track(material)
     is_inside = None
     if settings.window_coordinates:
         coordinates = build("ShaderNodeTexCoord").outputs["Window"]
@@ -110,7 +110,7 @@ def new_material(
         is_inside = build.math("LESS_THAN", max_abs_xy, w)
     image_node = build.frame_image(image, coordinates)
     if hatching is not None:
-        shader = hatching_shader(build, image_node, hatching, created)
+        shader = hatching_shader(build, image_node, hatching, track)
         if is_inside is not None:
             outside = build("ShaderNodeEmission", {"Color": _OUTSIDE_COLOR})
             shader = build.mix_shaders(is_inside, outside.outputs["Emission"], shader)

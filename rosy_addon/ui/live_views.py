@@ -8,8 +8,8 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.errors import RosyError
+from ..scene.app_handlers import add_handlers, remove_handlers
 from ..viewport import session
-from ..viewport.app_handlers import add_handlers, remove_handlers
 from .preferences import addon_preferences
 
 #: Scenes, by `session_uid`, in which the user has switched a live view off.
@@ -32,12 +32,11 @@ def start_with_first_field(context: bpy.types.Context) -> None:
     DeviceError
         If there is no graphics context.
     """
-    space, preferences = context.space_data, addon_preferences(context)
+    space = context.space_data
     if bpy.app.background or space is None or space.type != "VIEW_3D":
         return
-    if context.scene.session_uid in _declined_scenes:
-        return
-    if preferences is not None and preferences.live_first_field:
+    is_declined = context.scene.session_uid in _declined_scenes
+    if not is_declined and getattr(addon_preferences(context), "live_first_field", False):
         session.start(space)
 
 

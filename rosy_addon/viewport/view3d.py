@@ -67,11 +67,6 @@ def is_timeline_playing() -> bool:
     return any(window.screen.is_animation_playing for window in windows)
 
 
-def shows_surfaces(space: SpaceView3D) -> bool:
-    """Return whether the shading mode of a view shows surfaces. Wireframe shading does not."""
-    return space.shading.type in {"SOLID", "MATERIAL", "RENDERED"}
-
-
 def is_visible(obj: Object, depsgraph: Depsgraph, space: SpaceView3D) -> bool:
     """Return whether a view shows an object as a surface."""
     try:

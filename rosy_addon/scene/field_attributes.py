@@ -20,21 +20,16 @@ rotated with their faces.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import suppress
-from typing import TypeVar
 
 import numpy as np
 from bpy.types import Attribute, Mesh, Object
 
-from ..core.cache import Cache, content_hash
 from ..core.errors import RosyError
 from ..field.carry import carried_vectors
 from ..field.surface import Surface
 from .datablocks import has_rosy_properties
 from .meshes import read_attribute, read_collection, write_attribute
-
-Result = TypeVar("Result")
 
 DEFAULT_FIELD_NAME = "rosy"
 DEFAULT_DEGREE = 4
@@ -158,20 +153,6 @@ def store_attribute(
     attribute = get_or_create_attribute(mesh, name, data_type, domain)
     write_attribute(attribute, values)
     return attribute
-
-
-def cached_for_surface(
-    cache: Cache | None, surface: Surface, build: Callable[[], Result], *key_parts: object
-) -> Result:
-    """Return a result that is cached for a surface and other values, or build and cache it.
-
-    The key contains the id of the surface. So the cache also keeps the surface: no other object can then have
-    the same id.
-    """
-    if cache is None:
-        return build()
-    key = "field", id(surface), content_hash(*key_parts)
-    return cache.get_or_create(key, lambda: (surface, build()))[1]
 
 
 #: Coefficients of the checksum of a vector, which is a linear combination of its components. As it is linear,

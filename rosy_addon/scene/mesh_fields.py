@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from bpy.types import Attribute, Mesh
 
-from ..core.cache import Cache
+from ..core.cache import Cache, cached
 from ..core.errors import RosyError, counted
 from ..core.progress import progress, report
 from ..field import validate
@@ -24,7 +24,6 @@ from .field_attributes import (
     DEFAULT_FIELD_NAME,
     VECTOR_TYPE,
     attribute_name,
-    cached_for_surface,
     check_attribute_type,
     describe_type,
     field_degree,
@@ -115,7 +114,7 @@ def read_mesh_field(
 
     key_parts = "attribute", domain, data_type, values, degree, source, nonfinite
     with progress(0.5, 1.0, "reading the field"):
-        return cached_for_surface(cache, surface, build, *key_parts)
+        return cached(cache, build, surface, *key_parts)
 
 
 def _field_from_directions(
@@ -148,9 +147,7 @@ def _field_from_directions(
     policy, element = validate.VectorPolicy(nonfinite), ELEMENTS[domain]
     build = partial(validate.validated_directions, surface, directions, source, policy, element)
     with progress(0.0, 1.0, "reading the field"):
-        return cached_for_surface(
-            cache, surface, build, "directions", directions, source, *policy, element
-        )
+        return cached(cache, build, surface, "directions", directions, source, *policy, element)
 
 
 def _field_from_angles(

@@ -19,7 +19,7 @@ import bpy
 import numpy as np
 from bpy.types import Depsgraph, Mesh, Object
 
-from ..core.cache import Cache
+from ..core.cache import Cache, cached
 from ..core.errors import REPORTED_ERRORS, RosyError
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface, have_same_polygons
@@ -35,7 +35,7 @@ from .evaluated_field import (
     temp_attributes,
     topology_hash,
 )
-from .field_attributes import attribute_name, cached_for_surface, field_degree, is_face_vector_field
+from .field_attributes import attribute_name, field_degree, is_face_vector_field
 from .mesh_fields import read_mesh_field
 from .mesh_states import MeshStates, mesh_state_key, read_mesh_state
 from .meshes import REST_ATTRIBUTE, evaluated_mesh, mesh_surface, read_attribute
@@ -461,4 +461,4 @@ class SceneReader:
             return surface
         rest = np.asarray(rest, dtype=np.float64)
         with_rest = partial(surface.with_parts, rest_vertices=rest)
-        return cached_for_surface(self.cache, surface, with_rest, "rest", rest)
+        return cached(self.cache, with_rest, surface, "rest", rest)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 import bpy
@@ -57,20 +58,16 @@ def _save_live_views(*_: Any) -> None:
 @persistent
 def _restore_live_views(*_: Any) -> None:
     """After a file is loaded, make those views live that were live when it was saved."""
-    for window in bpy.context.window_manager.windows:
-        settings = window.scene.rosy
-        if not settings.remember_live:
-            continue
-        for line in settings.live_views.splitlines():
-            index, screen_name = line.split(" ", 1)
-            screen = bpy.data.screens.get(screen_name)
-            areas = screen.areas[int(index) : int(index) + 1] if screen is not None else ()
-            for area in areas:
-                if area.type == "VIEW_3D":
-                    try:
+    with suppress(RosyError):  # the graphics card can no longer be used
+        for window in bpy.context.window_manager.windows:
+            settings = window.scene.rosy
+            for line in settings.live_views.splitlines() if settings.remember_live else ():
+                index, screen_name = line.split(" ", 1)
+                screen = bpy.data.screens.get(screen_name)
+                areas = screen.areas[int(index) : int(index) + 1] if screen is not None else ()
+                for area in areas:
+                    if area.type == "VIEW_3D":
                         session.start(area.spaces.active)
-                    except RosyError:
-                        return  # the graphics card can no longer be used
 
 
 #: Handlers of Blender's events, by the names of their lists in `bpy.app.handlers`.

@@ -11,13 +11,6 @@ from . import job_status
 from .operator_settings import draw_settings
 from .sidebar import SidebarPanel, closed_panel, draw_progress, new_row, use_property_columns
 
-#: Icons of stroke objects by type. The type of Grease Pencil was renamed in Blender 4.3.
-STROKE_ICONS = {
-    "GREASEPENCIL": "OUTLINER_OB_GREASEPENCIL",
-    "GPENCIL": "OUTLINER_OB_GREASEPENCIL",
-    "CURVES": "OUTLINER_OB_CURVES",
-}
-
 #: Labels of the subpanels of strokes, with the names of their settings.
 STROKE_PANELS = {
     "Density": panel_settings(StrokeStyle, "density"),
@@ -61,7 +54,8 @@ class VIEW3D_PT_rosy_strokes(SidebarPanel, Panel):
         if objects:
             layout.operator("rosy.strokes_remove", icon="TRASH")
             for obj in objects:
-                layout.label(text=obj.name, icon=STROKE_ICONS[obj.type])
+                name = "CURVES" if obj.type == "CURVES" else "GREASEPENCIL"
+                layout.label(text=obj.name, icon=f"OUTLINER_OB_{name}")
 
 
 def _draw_stroke_settings(

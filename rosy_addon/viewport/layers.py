@@ -6,7 +6,6 @@ import math
 import time
 from collections.abc import Hashable
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -16,6 +15,7 @@ from bpy.types import Context, Depsgraph, Scene, ViewLayer
 from ..compositor.look import Look
 from ..compositor.target_tone import ReferenceRender
 from ..core.errors import REPORTED_ERRORS, RosyError, error_text
+from ..core.file_io import file_stamp
 from ..scene import look_inputs
 from ..scene.cameras import render_camera
 from ..scene.scene_reader import SceneInstance, SceneReader
@@ -218,7 +218,7 @@ class ReferenceImages:
         if look.tone != "picture":
             return None
         path = look_inputs.reference_path(scene)
-        file_key = path, _modified_time(path)
+        file_key = path, file_stamp(path)
         if scene.name not in self._images or self._images[scene.name][0] != file_key:
             self._images[scene.name] = file_key, None
         image = self._images[scene.name][1]
@@ -231,11 +231,3 @@ class ReferenceImages:
         if scene.name not in self._current or self._current[scene.name][0] != key:
             self._current[scene.name] = key, reference
         return self._current[scene.name][1]
-
-
-def _modified_time(path: Path) -> float | None:
-    """Return when a file was last modified, in seconds; None if it does not exist."""
-    try:
-        return path.stat().st_mtime
-    except OSError:
-        return None

@@ -32,7 +32,6 @@ UV_MAP_NAME = "UVMap"
 class ROSY_OT_bake_texture(ModalJobMixin, Operator):
     """Draw the field of the selected meshes as textures for their UV maps. Unlike a baked picture, a texture covers all sides of a mesh"""
 
-    bl_idname = "rosy.bake_texture"
     bl_label = "Bake Texture"
     bl_options = {"UNDO"}
     conditions = (IDLE, ACTIVE_FIELD)

@@ -59,13 +59,20 @@ EDITABLE_FIELD = (*EDITABLE, ACTIVE_FIELD)
 
 
 class RosyOperator:
-    """Mixin of all operators: checks their conditions, and reports errors as sentences."""
+    """Mixin of all operators: names them, checks their conditions, and reports errors as sentences.
+
+    The class ``ROSY_OT_bake`` is the operator ``bpy.ops.rosy.bake``.
+    """
 
     #: Blender's options: the operator is listed in the info editor, and can be undone.
     bl_options = {"REGISTER", "UNDO"}
 
     #: The conditions, which are checked in this order.
     conditions: tuple[Condition, ...] = ()
+
+    def __init_subclass__(cls, **options: object) -> None:
+        super().__init_subclass__(**options)
+        cls.bl_idname = f"rosy.{cls.__name__.removeprefix('ROSY_OT_')}"
 
     @classmethod
     def poll(cls, context: Context) -> bool:

@@ -39,7 +39,6 @@ class RosyStrokePoint(bpy.types.PropertyGroup):
 class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
     """Turn the field of the active mesh along a stroke, and keep the stroke as guides on the mesh"""
 
-    bl_idname = "rosy.field_comb"
     bl_label = "Comb Field"
     conditions = (
         IDLE,

@@ -84,7 +84,6 @@ class _FieldsJobMixin(ModalJobMixin):
 class ROSY_OT_field_convert(_FieldsJobMixin, Operator):
     """Change the degree of the fields of the selected meshes, rotate or smooth them, cancel singularities, or replace their magnitudes"""
 
-    bl_idname = "rosy.field_convert"
     bl_label = "Convert Field"
 
     degree: integer(
@@ -164,7 +163,6 @@ class ROSY_OT_field_convert(_FieldsJobMixin, Operator):
 class ROSY_OT_field_store(_FieldsJobMixin, Operator):
     """Store the fields of the selected meshes in another form, for Geometry Nodes and other programs"""
 
-    bl_idname = "rosy.field_store"
     bl_label = "Store Field"
 
     form: choice(

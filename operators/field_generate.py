@@ -67,7 +67,6 @@ def _search_attributes(_operator: Any, context: Context, _typed: str) -> list[st
 class ROSY_OT_field_generate(ModalJobMixin, Operator):
     """Generate a field on the selected meshes"""
 
-    bl_idname = "rosy.field_generate"
     bl_label = "Make Field"
     conditions = EDITABLE
 

@@ -334,7 +334,7 @@ class ActiveMeshMixin:
 class FileJobMixin(ModalJobMixin):
     """Mixin of operators that ask for a file, unless `skip_browser` is set.
 
-    By default, it is a file to write.
+    By default, it is a file to write, and the result of the job is its path.
     """
 
     skip_browser: toggle(
@@ -347,3 +347,6 @@ class FileJobMixin(ModalJobMixin):
 
     def take_answer(self, context: Context) -> None:
         self.skip_browser = True
+
+    def finish(self, context: Context, result: Any) -> None:
+        self.report_done(f"Wrote {result}")

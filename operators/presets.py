@@ -50,7 +50,6 @@ def _target_preset(operator: Any, context: bpy.types.Context) -> str:
 class ROSY_OT_preset_apply(RosyOperator, bpy.types.Operator):
     """Replace the look of the scene with the look of this preset"""
 
-    bl_idname = "rosy.preset_apply"
     bl_label = "Apply Preset"
 
     preset: text(
@@ -97,7 +96,6 @@ class _DescribedPreset(_PresetOperator):
 class ROSY_OT_preset_save(_DescribedPreset, bpy.types.Operator):
     """Save the look of this scene as one of your presets"""
 
-    bl_idname = "rosy.preset_save"
     bl_label = "Save Preset"
     confirm_text = "Save"
 
@@ -133,7 +131,6 @@ def _is_user_preset(name: str) -> bool:
 class ROSY_OT_preset_rename(_DescribedPreset, bpy.types.Operator):
     """Change the name or the description of one of your presets"""
 
-    bl_idname = "rosy.preset_rename"
     bl_label = "Rename Preset"
     confirm_text = "Rename"
     conditions = (HAS_USER_PRESETS,)
@@ -155,7 +152,6 @@ class ROSY_OT_preset_rename(_DescribedPreset, bpy.types.Operator):
 class ROSY_OT_preset_remove(_PresetOperator, bpy.types.Operator):
     """Delete one of your presets. The look of the scene does not change"""
 
-    bl_idname = "rosy.preset_remove"
     bl_label = "Delete Preset"
     conditions = (HAS_USER_PRESETS,)
 
@@ -183,7 +179,6 @@ class ROSY_OT_preset_remove(_PresetOperator, bpy.types.Operator):
 class ROSY_OT_preset_import(_PresetOperator, bpy.types.Operator, ImportHelper):
     """Add a preset from a file to your presets"""
 
-    bl_idname = "rosy.preset_import"
     bl_label = "Import Preset"
 
     filename_ext = ".json"
@@ -200,7 +195,6 @@ class ROSY_OT_preset_import(_PresetOperator, bpy.types.Operator, ImportHelper):
 class ROSY_OT_preset_export(_PresetOperator, bpy.types.Operator, ExportHelper):
     """Write a preset to a file that others can import"""
 
-    bl_idname = "rosy.preset_export"
     bl_label = "Export Preset"
 
     filename_ext = ".json"

@@ -28,7 +28,6 @@ SIDE = {"subtype": "PIXEL", "default": 512, "min": 16, "max": 8192}
 class ROSY_OT_turntable(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, ExportHelper):
     """Render a turntable video of the active mesh with its field, with the look of the scene"""
 
-    bl_idname = "rosy.turntable"
     bl_label = "Turntable"
     bl_options = {"REGISTER"}
     conditions = (IDLE, ACTIVE_FIELD)
@@ -79,6 +78,3 @@ class ROSY_OT_turntable(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Expor
             still=self.still,
             workers=worker_count(context),
         )
-
-    def finish(self, context: bpy.types.Context, result: Path) -> None:
-        self.report_done(f"Wrote {result}")

@@ -16,14 +16,8 @@ from .node_builder import new_emissive_material
 from .picture_nodes import shown_materials
 from .read_view import scene_depsgraph
 
-#: Settings of an object that are switched off on planes: all rays except camera rays pass through them.
-HIDDEN_FROM = (
-    "visible_diffuse",
-    "visible_glossy",
-    "visible_transmission",
-    "visible_volume_scatter",
-    "visible_shadow",
-)
+#: Kinds of rays that pass through planes: all except camera rays.
+HIDDEN_FROM = ("diffuse", "glossy", "transmission", "volume_scatter", "shadow")
 
 
 def pictured_cameras(scene: bpy.types.Scene) -> dict[bpy.types.Object, bpy.types.PropertyGroup]:
@@ -97,8 +91,8 @@ def add_camera_plane(
     scale = camera.matrix_world.to_scale()
     obj.matrix_parent_inverse = Matrix.Diagonal((*scale, 1.0)).inverted_safe()
     obj.hide_select = True
-    for visibility in HIDDEN_FROM:
-        setattr(obj, visibility, False)
+    for ray in HIDDEN_FROM:
+        setattr(obj, f"visible_{ray}", False)
     return obj
 
 

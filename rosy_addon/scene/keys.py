@@ -32,7 +32,7 @@ from .cameras import camera_of_object
 from .datablocks import KEY_TAG, rollback_on_error
 from .look_properties import read_look
 from .meshes import read_collection, vertex_positions
-from .node_builder import new_empty_material
+from .node_builder import first_node, new_empty_material
 from .read_view import scene_depsgraph
 
 #: Distance of the plane of a key from the camera, as a multiple of the distance of the near clip plane.
@@ -196,8 +196,7 @@ def _world_color(world: World | None) -> np.ndarray | None:
     """Return the (3,) linear color of a world; None if nodes vary it. Without a world it is black."""
     if world is None:
         return np.zeros(3, dtype=np.float32)
-    nodes = world.node_tree.nodes if world.node_tree is not None and world.use_nodes else ()
-    node = next((node for node in nodes if node.bl_idname == "ShaderNodeBackground"), None)
+    node = first_node(world.node_tree if world.use_nodes else None, "ShaderNodeBackground")
     if node is None:
         return np.array(world.color, dtype=np.float32)
     color, strength = node.inputs["Color"], node.inputs["Strength"]

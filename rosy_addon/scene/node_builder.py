@@ -10,6 +10,12 @@ import numpy as np
 from bpy.types import Image, Material, Node, NodeSocket, NodeTree
 
 
+def first_node(tree: NodeTree | None, kind: str) -> Node | None:
+    """Return the first node of a type in a node tree; None if there is none, or no tree."""
+    nodes = () if tree is None else tree.nodes
+    return next((node for node in nodes if node.bl_idname == kind), None)
+
+
 class NodeBuilder:
     """A builder that adds nodes to a node tree, laid out in rows from left to right.
 

@@ -18,7 +18,7 @@ from ..projection.camera import Camera
 from ..rendering.picture_images import NEUTRAL_GRAY
 from .datablocks import KEY_TAG, OWNED_TAG, Track, is_editable, rosy_modifiers
 from .meshes import read_attribute
-from .node_builder import NodeBuilder, new_empty_material, new_modifier_group
+from .node_builder import NodeBuilder, first_node, new_empty_material, new_modifier_group
 from .texture_nodes import Hatching, hatching_shader
 
 #: Name of the modifier that shows a picture.
@@ -133,12 +133,10 @@ def set_sequence_frames(material: Material, first: int, last: int) -> None:
 
     `first` and `last` are the numbers of the first and the last file.
     """
-    for node in material.node_tree.nodes:
-        if node.bl_idname == "ShaderNodeTexImage":
-            image_user = node.image_user
-            image_user.frame_start, image_user.frame_offset = first, first - 1
-            image_user.frame_duration = last - first + 1
-            image_user.use_auto_refresh = True
+    image_user = image_node(material).image_user
+    image_user.frame_start, image_user.frame_offset = first, first - 1
+    image_user.frame_duration = last - first + 1
+    image_user.use_auto_refresh = True
 
 
 def _clip_position(build: NodeBuilder, view_projection: np.ndarray) -> Node:
@@ -206,16 +204,13 @@ def projections_of_group(group: NodeTree) -> dict[Material, np.ndarray | None]:
 
 def material_of_group(group: NodeTree) -> Material | None:
     """Return the material that a node group of `new_group` assigns; None if it assigns none."""
-    for node in group.nodes:
-        if node.bl_idname == "GeometryNodeSetMaterial":
-            return node.inputs["Material"].default_value
-    return None
+    node = first_node(group, "GeometryNodeSetMaterial")
+    return None if node is None else node.inputs["Material"].default_value
 
 
 def image_node(material: Material) -> Node | None:
     """Return the image texture node of a material that shows a picture; None if there is none."""
-    nodes = material.node_tree.nodes if material.node_tree is not None else ()
-    return next((node for node in nodes if node.bl_idname == "ShaderNodeTexImage"), None)
+    return first_node(material.node_tree, "ShaderNodeTexImage")
 
 
 def set_picture_modifier(

@@ -317,7 +317,8 @@ def library(scene, tmp_path):
     collection.objects.link(bpy.context.object)
     path = tmp_path / "library.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    empty_scene(64).camera = add_camera()
+    scene = empty_scene(64)
+    scene.camera = add_camera()
     return path
 
 

@@ -10,7 +10,7 @@ from rosy.rosy_addon.scene.bake_records import has_pictures, list_bakes, remove_
 from rosy.rosy_addon.scene.cameras import scene_cameras
 from rosy.rosy_addon.scene.pictures import show_bake
 from scenes import add_camera, add_field, add_plane, contents, empty_scene, link, reopen
-from test_up_to_date import exclude, obj
+from test_up_to_date import deferred, exclude, obj
 
 
 def build(folder=None):
@@ -39,14 +39,11 @@ def select(*names):
     bpy.context.view_layer.objects.active = obj(names[-1])
 
 
-def selected(operator, *names):
+@deferred
+def selected(tmp_path, operator, *names):
     """An action: call an operator for some objects."""
-
-    def act(tmp_path):
-        select(*names)
-        operator()
-
-    return act
+    select(*names)
+    operator()
 
 
 def rename(tmp_path):
@@ -55,22 +52,18 @@ def rename(tmp_path):
     bpy.context.scene.name = "Shot"
 
 
-def apply(*names):
-    def change(tmp_path):
-        for name in names:
-            select(name)
-            for modifier in list(obj(name).modifiers):
-                bpy.ops.object.modifier_apply(modifier=modifier.name)
-
-    return change
+@deferred
+def apply(tmp_path, *names):
+    for name in names:
+        select(name)
+        for modifier in list(obj(name).modifiers):
+            bpy.ops.object.modifier_apply(modifier=modifier.name)
 
 
-def apply_and(action):
-    def change(tmp_path):
-        apply("Sheet", "Plain")(tmp_path)
-        action(tmp_path)
-
-    return change
+@deferred
+def apply_and(tmp_path, action):
+    apply("Sheet", "Plain")(tmp_path)
+    action(tmp_path)
 
 
 def unlink(tmp_path):

@@ -55,9 +55,9 @@ def obj(name):
     return bpy.data.objects[name]
 
 
-def change_of_scene(function):
-    """Decorator: make a function of a scene and others a function of the others, which returns the change."""
-    return lambda *others, **options: lambda scene: function(scene, *others, **options)
+def deferred(function):
+    """Decorator: called with all arguments but the first, the function returns a function of the first."""
+    return lambda *others, **options: lambda first: function(first, *others, **options)
 
 
 def scene_lights(scene):
@@ -108,7 +108,7 @@ def tone_image(scene):
         obj(name).rosy.tone_image = image
 
 
-@change_of_scene
+@deferred
 def write_reference(scene, value):
     rgba = np.ones((SIZE, SIZE, 4), dtype=np.float32)
     rgba[: SIZE // 2, :, :3] = value
@@ -159,12 +159,12 @@ def relit(scene):
     scene.rosy.look.ink, scene.rosy.look.light, scene.rosy.relight = "hatch", "scene", True
 
 
-@change_of_scene
+@deferred
 def move(scene, name, *offset):
     obj(name).matrix_world = Matrix.Translation(offset) @ obj(name).matrix_world
 
 
-@change_of_scene
+@deferred
 def put(scene, path, value):
     """Set a property, given by its path from the scene or, after an object's name, from it."""
     owner, _, rest = path.partition(":")
@@ -178,7 +178,7 @@ SUBDIVISION, WAVE = 'Plain:modifiers["Subdivision"]', 'Sheet:modifiers["Wave"]'
 hatched = put("rosy.look.ink", "hatch")
 
 
-@change_of_scene
+@deferred
 def add_occluder(scene, x):
     add_plane("Wall", size=0.3).location = (x, -1.5, 0.1)
 
@@ -197,7 +197,7 @@ def add_light(scene):
     lamp.rotation_euler.x = 1.0
 
 
-@change_of_scene
+@deferred
 def edit_mode(scene, name, *, and_back=False):
     bpy.context.view_layer.objects.active = obj(name)
     bpy.ops.object.mode_set(mode="EDIT")
@@ -238,14 +238,14 @@ def other_attribute(scene):
     obj("Plain").data.attributes.new("rosy_weight", "FLOAT", "FACE")
 
 
-@change_of_scene
+@deferred
 def shade_smooth(scene, name):
     mesh = obj(name).data
     mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))
     mesh.update()
 
 
-@change_of_scene
+@deferred
 def exclude(scene, name):
     collection = bpy.data.collections.new("Away")
     scene.collection.children.link(collection)

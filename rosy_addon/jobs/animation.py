@@ -229,8 +229,7 @@ def _sequence_result(
     """Return the result of an image sequence, given its frames and the arguments of `bake_animation`."""
     first, last = drawn[0], drawn[-1]
     path = _path_of_frame(settings, first.name, cameras, first.frame)
-    size = last.camera.width, last.camera.height
-    sequence = pictures.ImageSequence(first.name, path, first.frame, last.frame, *size)
+    sequence = pictures.ImageSequence(first.name, path, first.frame, last.frame)
     rendered, skipped = (
         tuple(one.frame for one in drawn if one.up_to_date == up_to_date)
         for up_to_date in (False, True)

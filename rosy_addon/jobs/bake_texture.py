@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from bpy.types import Depsgraph, Image, Object, Scene
+from bpy.types import Image, Object, Scene
 
-from ..compositor.shading import Light
 from ..core.cache import BAKE_CACHE
 from ..core.errors import RosyError
 from ..scene.look_inputs import color_attribute_of
@@ -71,7 +70,11 @@ def bake_texture(scene: Scene, objects: Sequence[Object]) -> Steps[list[TextureR
     }
     check_targets(objects, settings)
     depsgraph = scene_depsgraph(scene)
-    lights = _lights_to_bake(scene, depsgraph) if bakes_light(scene.rosy, look) else None
+    lights = None
+    if bakes_light(scene.rosy, look):
+        lights = read_lights(depsgraph, np.eye(4))  # in world space
+        if not lights:
+            raise RosyError(f"scene '{scene.name}' has no lights: add one, or turn Bake Light off")
     is_udim = scene.rosy.texture_udim
     drift = drift_in_scene(scene, look, scene.frame_current_final)
     texture_settings = TextureSettings(
@@ -99,17 +102,3 @@ def bake_texture(scene: Scene, objects: Sequence[Object]) -> Steps[list[TextureR
         )
         results.append(TextureResult(obj, image, (texture.note,) if texture.note else ()))
     return results
-
-
-def _lights_to_bake(scene: Scene, depsgraph: Depsgraph) -> list[Light]:
-    """Return the lights of a scene, in world space.
-
-    Raises
-    ------
-    RosyError
-        If the scene has no lights.
-    """
-    lights = read_lights(depsgraph, np.eye(4))
-    if not lights:
-        raise RosyError(f"scene '{scene.name}' has no lights: add one, or turn Bake Light off")
-    return lights

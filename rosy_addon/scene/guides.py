@@ -258,12 +258,12 @@ def read_combed_guides(mesh: Mesh, surface: Surface) -> np.ndarray:
         other than combing since the guides were stored.
     """
     guides = np.zeros((surface.face_count, 3))
-    values = read_attribute(mesh, GUIDE_ATTRIBUTE, np.float32, 3)
     checks = read_attribute(mesh, FIELD_CHECK_ATTRIBUTE, np.float32, 1)
-    field = read_attribute(mesh, attribute_name(mesh), np.float32, 3)
     are_stored = is_face_vector_field(mesh, GUIDE_ATTRIBUTE) and is_face_vector_field(mesh)
     if not are_stored or checks is None:
         return guides
+    names = GUIDE_ATTRIBUTE, attribute_name(mesh)
+    values, field = (read_attribute(mesh, name, np.float32, 3) for name in names)
     values = follow_mesh(mesh, GUIDE_ATTRIBUTE, values.astype(np.float64), surface)
     is_current = have_checks(field, checks) & np.isfinite(values).all(axis=1)
     guides[is_current] = values[is_current]

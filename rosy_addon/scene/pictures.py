@@ -85,16 +85,12 @@ class ImageSequence:
         File of the first frame.
     first, last : int
         Frame numbers, both included.
-    width, height : int
-        Pixels.
     """
 
     name: str
     path: Path
     first: int
     last: int
-    width: int
-    height: int
 
 
 def read_output_settings(scene: Scene, folder: Path | None = None) -> OutputSettings:
@@ -241,7 +237,7 @@ def apply_sequence(
         material,
         source,
         states,
-        size=(sequence.width, sequence.height),
+        size=(camera.width, camera.height),
         key=key,
         frame_range=f"{sequence.first} to {sequence.last}",
     )

@@ -211,7 +211,7 @@ class ViewportSession:
         render, now = bpy.context.scene.render, time.monotonic()
         rate = render.fps / render.fps_base
         if view3d.is_timeline_playing():
-            self.flow_clock.skip(now)
+            self.flow_clock.play(now)
         elif (
             self._has_shown_flow
             and not self.progressive.is_rendering

@@ -121,7 +121,7 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
         A mesh without features to follow, or on which the field is undefined everywhere, is left out and
         reported. If no other mesh is selected, an error is raised.
         """
-        inputs, fields, errors = [], {}, []
+        inputs, fields, fields_on_surfaces, errors = [], {}, [], []
         for mesh in self.required_data(context):
             surface = mesh_surface(mesh)
             try:
@@ -142,14 +142,13 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
                 errors.append(RosyError(f"{surface.name}: {kind} {reason}"))
                 continue
             fields[mesh] = field
+            fields_on_surfaces.append((surface, field))
             for warning in (orientation_warning, copies_warning):
                 if note := (yield Call(warning, (surface,), stop, stop, "checking the mesh")):
                     self.report_warnings(note)
         if not fields:
             raise errors[0]
         self.report_warnings(*map(str, errors))
-        surfaces = {mesh: surface for mesh, surface, _ in inputs}
-        fields_on_surfaces = [(surfaces[mesh], field) for mesh, field in fields.items()]
         # To count singularities must not take longer than to generate the field.
         face_count = sum(surface.face_count for surface, _ in fields_on_surfaces)
         is_cheap = self.kind not in FAST_KINDS or face_count <= MAX_FAST_FACES

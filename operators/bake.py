@@ -22,13 +22,12 @@ from ..rosy_addon.ui.property_makers import choice, integer, text, toggle
 from ..rosy_addon.viewport import session
 from ..rosy_addon.worker.job import Steps
 from .base import IDLE, IN_3D_VIEW, VISIBLE_FIELD, Condition, RosyOperator
-from .modal_job import DialogJobMixin, ModalJobMixin
+from .modal_job import ModalJobMixin
 
 
 class ROSY_OT_bake(ModalJobMixin, bpy.types.Operator):
     """Draw the fields of the scene from the chosen camera, and apply the picture to the meshes"""
 
-    bl_idname = "rosy.bake"
     bl_label = "Bake"
     bl_options = {"UNDO"}
     conditions = (IDLE, VISIBLE_FIELD)
@@ -69,10 +68,9 @@ def view_camera(context: bpy.types.Context) -> Camera:
     return camera_of_view(region, area.spaces.active.region_3d)
 
 
-class ROSY_OT_bake_animation(DialogJobMixin, bpy.types.Operator):
+class ROSY_OT_bake_animation(ModalJobMixin, bpy.types.Operator):
     """Draw the fields at every frame, save the pictures to a folder, and play them back on the meshes. Frames that are up to date are kept, so a run that was stopped with ESC can be continued"""
 
-    bl_idname = "rosy.bake_animation"
     bl_label = "Bake Animation"
     bl_options = {"UNDO"}
     conditions = (IDLE, VISIBLE_FIELD)
@@ -139,7 +137,6 @@ class ROSY_OT_bake_animation(DialogJobMixin, bpy.types.Operator):
 class ROSY_OT_occlusion(ModalJobMixin, bpy.types.Operator):
     """Compute the ambient occlusion of all meshes with a field, store it as an attribute, and use it as the tone"""
 
-    bl_idname = "rosy.occlusion"
     bl_label = "Tone by Occlusion"
     conditions = (IDLE, VISIBLE_FIELD)
 
@@ -168,7 +165,6 @@ class ROSY_OT_occlusion(ModalJobMixin, bpy.types.Operator):
 class ROSY_OT_show(RosyOperator, bpy.types.Operator):
     """Show the picture that was baked from this camera on the meshes"""
 
-    bl_idname = "rosy.show"
     bl_label = "Show Picture"
     conditions = (IDLE,)
 
@@ -181,7 +177,6 @@ class ROSY_OT_show(RosyOperator, bpy.types.Operator):
 class ROSY_OT_show_here(RosyOperator, bpy.types.Operator):
     """Show the baked pictures in this 3D view: with materials, and without the live fields over them"""
 
-    bl_idname = "rosy.show_here"
     bl_label = "Show the Picture Here"
     bl_options = {"REGISTER"}
     conditions = (IN_3D_VIEW,)
@@ -196,7 +191,6 @@ class ROSY_OT_show_here(RosyOperator, bpy.types.Operator):
 class ROSY_OT_remove(RosyOperator, bpy.types.Operator):
     """Remove the pictures of this scene, and the modifiers and materials that show them. Fields are kept"""
 
-    bl_idname = "rosy.remove"
     bl_label = "Remove Pictures"
     conditions = (
         IDLE,

@@ -6,8 +6,7 @@ Meshes without a UV map are unwrapped with Blender's Smart UV Project, if the us
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import bpy
@@ -21,7 +20,7 @@ from ..rosy_addon.scene.field_attributes import has_field
 from ..rosy_addon.ui.property_makers import toggle
 from ..rosy_addon.worker.job import Step, Steps
 from .base import ACTIVE_FIELD, IDLE, selected_mesh_objects
-from .modal_job import DialogJobMixin
+from .modal_job import ModalJobMixin
 
 #: Largest angle between the faces of a chart in radians, and distance between charts in UV units.
 ANGLE, MARGIN = math.radians(66), 0.003
@@ -30,10 +29,9 @@ ANGLE, MARGIN = math.radians(66), 0.003
 UV_MAP_NAME = "UVMap"
 
 
-class ROSY_OT_bake_texture(DialogJobMixin, Operator):
+class ROSY_OT_bake_texture(ModalJobMixin, Operator):
     """Draw the field of the selected meshes as textures for their UV maps. Unlike a baked picture, a texture covers all sides of a mesh"""
 
-    bl_idname = "rosy.bake_texture"
     bl_label = "Bake Texture"
     bl_options = {"UNDO"}
     conditions = (IDLE, ACTIVE_FIELD)
@@ -135,7 +133,14 @@ def _unwrapped(context: Context, mesh: Mesh) -> np.ndarray:
     A copy of the mesh is unwrapped, because Blender's operator needs a visible object, and changes which
     faces are hidden and selected.
     """
-    with _only_selected_copy(context, mesh) as copy:
+    active, selected = context.view_layer.objects.active, list(context.selected_objects)
+    copy = bpy.data.objects.new("RoSy Unwrapping", mesh.copy())
+    try:
+        context.scene.collection.objects.link(copy)
+        for obj in selected:
+            obj.select_set(False)
+        copy.select_set(True)
+        context.view_layer.objects.active = copy
         bpy.ops.object.mode_set(mode="EDIT")
         bpy.ops.mesh.reveal(select=False)
         bpy.ops.mesh.select_all(action="SELECT")
@@ -145,21 +150,6 @@ def _unwrapped(context: Context, mesh: Mesh) -> np.ndarray:
         if copy.data.uv_layers:
             copy.data.uv_layers[0].data.foreach_get("uv", uv)
         return uv
-
-
-@contextmanager
-def _only_selected_copy(context: Context, mesh: Mesh) -> Iterator[Object]:
-    """Context manager: yield a temporary object with a copy of a mesh, the only one that is selected."""
-    active = context.view_layer.objects.active
-    selected = list(context.selected_objects)
-    copy = bpy.data.objects.new("RoSy Unwrapping", mesh.copy())
-    try:
-        context.scene.collection.objects.link(copy)
-        for obj in selected:
-            obj.select_set(False)
-        copy.select_set(True)
-        context.view_layer.objects.active = copy
-        yield copy
     finally:
         data = copy.data
         bpy.data.objects.remove(copy)

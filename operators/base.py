@@ -65,7 +65,10 @@ EDITABLE_FIELD = (*EDITABLE, ACTIVE_FIELD)
 
 
 class RosyOperator:
-    """Mixin of all operators: checks their conditions, and reports errors as sentences."""
+    """Mixin of all operators: names them, checks their conditions, and reports errors as sentences.
+
+    The class ``ROSY_OT_bake`` is the operator ``bpy.ops.rosy.bake``.
+    """
 
     #: Blender's options: the operator is listed in the info editor, and can be undone.
     bl_options = {"REGISTER", "UNDO"}
@@ -75,6 +78,10 @@ class RosyOperator:
 
     #: The warnings that were reported.
     _reported: frozenset[str] = frozenset()
+
+    def __init_subclass__(cls, **options: object) -> None:
+        super().__init_subclass__(**options)
+        cls.bl_idname = f"rosy.{cls.__name__.removeprefix('ROSY_OT_')}"
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -118,13 +125,17 @@ class RosyOperator:
         self.report({"ERROR"}, as_sentence(error_text(error)))
         return {"CANCELLED"}
 
-    def report_operator_error(self, error: RuntimeError) -> set[str]:
-        """Report the error of another operator that this one has called.
+    def call(self, operator: Callable[..., set[str]], **settings: object) -> set[str]:
+        """Call another operator, as its button does, and report its errors.
 
-        Return the result of an operator that has failed.
+        Return the result of this operator.
         """
-        self.report({"ERROR"}, str(error).strip().removeprefix("Error: "))
-        return {"CANCELLED"}
+        try:
+            result = operator("INVOKE_DEFAULT", **settings)
+        except RuntimeError as error:  # the called operator has reported it
+            self.report({"ERROR"}, str(error).strip().removeprefix("Error: "))
+            return {"CANCELLED"}
+        return {"CANCELLED"} if result == {"CANCELLED"} else {"FINISHED"}
 
     def report_done(self, message: str) -> None:
         """Report what the operator has done."""

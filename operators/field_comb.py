@@ -39,7 +39,6 @@ class RosyStrokePoint(bpy.types.PropertyGroup):
 class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
     """Turn the field of the active mesh along a stroke, and keep the stroke as guides on the mesh"""
 
-    bl_idname = "rosy.field_comb"
     bl_label = "Comb Field"
     conditions = (
         IDLE,
@@ -202,11 +201,12 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         Return the result of the operator.
         """
         try:
-            if self._job.finish(context):
-                return {"FINISHED"}
+            self._job.finish(context)
         except REPORTED_ERRORS as error:
             self._take_back()
             return self.report_error(error)
+        if self._job.is_done:
+            return {"FINISHED"}
         self._take_back()
         return {"CANCELLED"}
 

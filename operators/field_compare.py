@@ -24,7 +24,6 @@ def _search_fields(_operator: Any, context: Context, _typed: str) -> list[str]:
 class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, Operator):
     """Compute the angle between the field of the active mesh and another one, store it as an attribute, and color the lines by it"""
 
-    bl_idname = "rosy.field_compare"
     bl_label = "Compare"
 
     other: text(

@@ -20,7 +20,7 @@ from ..rosy_addon.scene.mesh_fields import STORAGE_FORMS, assign_fields, read_me
 from ..rosy_addon.scene.meshes import mesh_surface
 from ..rosy_addon.ui.operator_settings import draw_convert_settings, draw_settings
 from ..rosy_addon.ui.property_makers import choice, fraction, integer, real, text
-from ..rosy_addon.worker.job import Call, Step, Steps, part
+from ..rosy_addon.worker.job import Call, Step, Steps, part, shares
 from .base import EDITABLE_FIELD, selected_mesh_objects
 from .modal_job import ModalJobMixin
 
@@ -74,9 +74,8 @@ class _FieldsJobMixin(ModalJobMixin):
 
         `begin` returns the steps of the job for a mesh.
         """
-        meshes, results = list(self.required_data(context)), {}
-        for index, mesh in enumerate(meshes):
-            start, stop = index / len(meshes), (index + 1) / len(meshes)
+        results = {}
+        for mesh, start, stop in shares(self.required_data(context)):
             results[mesh] = yield from part(begin(mesh), start, stop)
         yield Step(1.0, "storing the fields")
         return results
@@ -85,7 +84,6 @@ class _FieldsJobMixin(ModalJobMixin):
 class ROSY_OT_field_convert(_FieldsJobMixin, Operator):
     """Change the degree of the fields of the selected meshes, rotate or smooth them, cancel singularities, or replace their magnitudes"""
 
-    bl_idname = "rosy.field_convert"
     bl_label = "Convert Field"
 
     degree: integer(
@@ -165,7 +163,6 @@ class ROSY_OT_field_convert(_FieldsJobMixin, Operator):
 class ROSY_OT_field_store(_FieldsJobMixin, Operator):
     """Store the fields of the selected meshes in another form, for Geometry Nodes and other programs"""
 
-    bl_idname = "rosy.field_store"
     bl_label = "Store Field"
 
     form: choice(

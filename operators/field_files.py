@@ -30,7 +30,6 @@ from .modal_job import ActiveMeshMixin, FileJobMixin
 class ROSY_OT_field_import(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, ImportHelper):
     """Read the field of the active mesh from a file, or mark the edges of a .sharp or .feature file as sharp"""
 
-    bl_idname = "rosy.field_import"
     bl_label = "Import Field"
     conditions = EDITABLE
 
@@ -113,7 +112,6 @@ class ROSY_OT_field_import(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Im
 class ROSY_FH_field(bpy.types.FileHandler):
     """Import field files that are dropped on the 3D view."""
 
-    bl_idname = "ROSY_FH_field"
     bl_label = "RoSy field"
     bl_import_operator = "rosy.field_import"
     bl_file_extensions = ".rosy;.rawfield"
@@ -147,7 +145,6 @@ GUIDE_FORMATS = (".rosy", ".rawfield", ".txt", ".npy")
 class ROSY_OT_field_export(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, ExportHelper):
     """Write the field of the active mesh to a file"""
 
-    bl_idname = "rosy.field_export"
     bl_label = "Export Field"
     bl_options = {"REGISTER"}
     cancel_note = "no file was written"
@@ -199,6 +196,3 @@ class ROSY_OT_field_export(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Ex
         check_writable(path)
         write_bytes(path, (yield Call(field_file, (path, field, surface))))
         return path
-
-    def finish(self, context: bpy.types.Context, result: Path) -> None:
-        self.report_done(f"Wrote {result}")

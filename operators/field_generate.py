@@ -21,7 +21,7 @@ from ..rosy_addon.scene.look_properties import read_settings
 from ..rosy_addon.scene.meshes import EDGE_MARKS, marked_edges, mesh_surface, read_uvs
 from ..rosy_addon.ui.operator_settings import draw_generator_settings, draw_settings
 from ..rosy_addon.ui.property_makers import choice, integer, setting_properties, text
-from ..rosy_addon.worker.job import Call, Steps
+from ..rosy_addon.worker.job import Call, Steps, shares
 from .base import EDITABLE, selected_mesh_objects
 from .modal_job import ModalJobMixin
 
@@ -67,7 +67,6 @@ def _search_attributes(_operator: Any, context: Context, _typed: str) -> list[st
 class ROSY_OT_field_generate(ModalJobMixin, Operator):
     """Generate a field on the selected meshes"""
 
-    bl_idname = "rosy.field_generate"
     bl_label = "Make Field"
     conditions = EDITABLE
 
@@ -122,7 +121,7 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
         A mesh without features to follow, or on which the field is undefined everywhere, is left out and
         reported. If no other mesh is selected, an error is raised.
         """
-        inputs, fields, errors = [], {}, []
+        inputs, fields, fields_on_surfaces, errors = [], {}, [], []
         for mesh in self.required_data(context):
             surface = mesh_surface(mesh)
             try:
@@ -131,8 +130,7 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
                 errors.append(error)
                 continue
             inputs.append((mesh, surface, settings))
-        for index, (mesh, surface, settings) in enumerate(inputs):
-            start, stop = (0.9 * done / len(inputs) for done in (index, index + 1))
+        for (mesh, surface, settings), start, stop in shares(inputs, 0.9):
             try:
                 field = yield Call(generate, (surface, settings, self.degree), start, stop)
             except NoFeaturesError as error:
@@ -144,14 +142,13 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
                 errors.append(RosyError(f"{surface.name}: {kind} {reason}"))
                 continue
             fields[mesh] = field
+            fields_on_surfaces.append((surface, field))
             for warning in (orientation_warning, copies_warning):
                 if note := (yield Call(warning, (surface,), stop, stop, "checking the mesh")):
                     self.report_warnings(note)
         if not fields:
             raise errors[0]
         self.report_warnings(*map(str, errors))
-        surfaces = {mesh: surface for mesh, surface, _ in inputs}
-        fields_on_surfaces = [(surfaces[mesh], field) for mesh, field in fields.items()]
         # To count singularities must not take longer than to generate the field.
         face_count = sum(surface.face_count for surface, _ in fields_on_surfaces)
         is_cheap = self.kind not in FAST_KINDS or face_count <= MAX_FAST_FACES

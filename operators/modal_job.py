@@ -16,11 +16,11 @@ from bpy.types import ID, Context, Event, Object, WorkSpace
 from bpy_extras.io_utils import ExportHelper
 
 from ..rosy_addon.core.errors import REPORTED_ERRORS, as_sentence, telling_warnings
+from ..rosy_addon.scene.app_handlers import add_handlers, remove_handlers
 from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.ui import job_status
 from ..rosy_addon.ui.preferences import uses_helper
 from ..rosy_addon.ui.property_makers import toggle
-from ..rosy_addon.viewport.app_handlers import add_handlers, remove_handlers
 from ..rosy_addon.viewport.view3d import redraw_sidebars
 from ..rosy_addon.worker.helper import HELPER, HelperLostError
 from ..rosy_addon.worker.job import Step, Steps, run
@@ -43,6 +43,9 @@ INTERRUPT_REASONS = {
 
 #: Warning if no helper process can be started. It is shown once.
 NO_HELPER = "Blender waits while RoSy computes, as no other process can be started"
+
+#: Reason for the end of a job that has a result.
+DONE = "done"
 
 #: The running job, or None.
 _current_job: Job | None = None
@@ -102,48 +105,44 @@ class Job:
         _current_job = self
         self._show_progress(context, Step(0.0, "starting"))
 
-    def advance(self, context: Context) -> bool:
-        """Poll the helper process, and run steps of the job until it waits for the helper process again.
+    @property
+    def is_done(self) -> bool:
+        """Whether the job has ended with a result."""
+        return self.stop_reason == DONE
 
-        Returns
-        -------
-        bool
-            True if the job is done. False if it is still running or was stopped.
+    def advance(self, context: Context) -> None:
+        """Poll the helper process, and run steps of the job until it waits for the helper process again.
 
         Raises
         ------
         RosyError
             If the job raises an error. It is stopped then.
         """
-        if (reason := self._abort_reason(context)) is not None:
-            self.stop(reason)
-            return False
         deadline = time.monotonic() + SLICE_SECONDS
         try:
+            if (reason := self._abort_reason(context)) is not None:
+                self.stop(reason)
+                return
             while self._runner.poll() and time.monotonic() < deadline:
                 with self._waiting(context) if self._runner.is_in_place else nullcontext():
                     self._runner.advance()
                 self._show_progress(context, self._runner.step)
-        except StopIteration as done:
-            self.result = done.value
-            self.stop("done")
-            return True
+            self._show_progress(context, self._runner.step)
+        except StopIteration as end:
+            self.result = end.value
+            self.stop(DONE)
         except ReferenceError:
             self.stop("required data was deleted")
-            return False
         except BaseException:
             self.stop("an error")
             raise
-        self._show_progress(context, self._runner.step)
-        return False
 
-    def finish(self, context: Context) -> bool:
-        """Run until the job is done or stopped, and return whether it is done."""
+    def finish(self, context: Context) -> None:
+        """Run until the job is done or stopped."""
+        self.advance(context)
         while self.stop_reason is None:
-            if self.advance(context):
-                return True
             HELPER.wait(SLICE_SECONDS)
-        return False
+            self.advance(context)
 
     @contextmanager
     def _waiting(self, context: Context) -> Iterator[None]:
@@ -161,17 +160,20 @@ class Job:
             context.window.cursor_modal_restore()
 
     def _abort_reason(self, context: Context) -> str | None:
-        """Return why the job cannot continue; None if it can."""
-        try:
-            if context.scene != self.scene:
-                return "another scene was chosen"
-            if context.view_layer != self.view_layer:  # jobs use the depsgraph of the view layer
-                return "another view layer was chosen"
-            for data_block in self.required_data:
-                if isinstance(data_block, Object) and not data_block.users_scene:
-                    return f"'{data_block.name}' was deleted"
-        except ReferenceError:
-            return "required data was deleted"
+        """Return why the job cannot continue; None if it can.
+
+        Raises
+        ------
+        ReferenceError
+            If required data was deleted.
+        """
+        if context.scene != self.scene:
+            return "another scene was chosen"
+        if context.view_layer != self.view_layer:  # jobs use the depsgraph of the view layer
+            return "another view layer was chosen"
+        for data_block in self.required_data:
+            if isinstance(data_block, Object) and not data_block.users_scene:
+                return f"'{data_block.name}' was deleted"
         return None
 
     def _show_progress(self, context: Context, step: Step | None) -> None:
@@ -219,9 +221,15 @@ class Job:
 
 
 class ModalJobMixin(RosyOperator):
-    """Mixin of operators that run a job. It implements act, invoke, modal and cancel."""
+    """Mixin of operators that run a job, and may ask the user something before.
+
+    It implements act, invoke, execute, modal and cancel. Blender frees an operator when its dialog or file
+    browser is confirmed. So the operator is then called a second time, with the answer in its properties, to
+    do the work.
+    """
 
     _job: Job | None = None
+    _has_asked = False
 
     #: Sentence for the user that says in which state the scene or files are after the job was cancelled.
     cancel_note = "nothing was changed"
@@ -243,6 +251,19 @@ class ModalJobMixin(RosyOperator):
         """
         return field_objects(context.view_layer)
 
+    def ask(self, context: Context, event: Event) -> set[str] | None:
+        """Open a dialog or a file browser, and return the result of the operator. None if nothing is asked.
+
+        Raises
+        ------
+        RosyError
+            The message is reported to the user.
+        """
+        return None
+
+    def take_answer(self, context: Context) -> None:
+        """Set the properties for the second call of the operator, so that it does not ask again."""
+
     def finish(self, context: Context, result: Any) -> None:
         """Report the result of the job to the user."""
 
@@ -253,11 +274,26 @@ class ModalJobMixin(RosyOperator):
         if bpy.app.background or context.window is None:
             return self.execute(context)
         try:
+            if (question := self.ask(context, event)) is not None:
+                self._has_asked = True
+                return question
             self._job = Job(context, self.begin(context), self.required_data(context))
         except REPORTED_ERRORS as error:
             return self.report_error(error)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
+
+    def execute(self, context: Context) -> set[str]:
+        if not self._has_asked:
+            return super().execute(context)
+        self.take_answer(context)
+        names = self.properties.bl_rna.properties.keys()
+        settings = {
+            name: getattr(self, name)
+            for name in names
+            if name != "rna_type" and self.properties.is_property_set(name)
+        }
+        return self.call(getattr(bpy.ops.rosy, type(self).bl_idname.partition(".")[2]), **settings)
 
     def modal(self, context: Context, event: Event) -> set[str]:
         job = self._job
@@ -266,13 +302,13 @@ class ModalJobMixin(RosyOperator):
         elif job.stop_reason is None and event.type == "TIMER":
             try:
                 with telling_warnings(self.report_warnings):
-                    is_done = job.advance(context)
+                    job.advance(context)
             except REPORTED_ERRORS as error:
                 return self.report_error(error)
             if job.note:
                 self.report_warnings(job.note)
                 job.note = ""
-            if is_done:
+            if job.is_done:
                 self.finish(context, job.result)
                 return {"FINISHED"}
         if job.stop_reason is not None:
@@ -296,62 +332,10 @@ class ActiveMeshMixin:
         return obj, obj.data
 
 
-class DialogJobMixin(ModalJobMixin):
-    """Mixin of operators that may ask the user something before they run their job.
-
-    Blender frees an operator when its dialog or file browser is confirmed. So the operator is called a second
-    time, with the answer in its properties, to do the work.
-    """
-
-    _has_asked = False
-
-    def ask(self, context: Context, event: Event) -> set[str] | None:
-        """Open a dialog or a file browser, and return the result of the operator. None if nothing is asked.
-
-        Raises
-        ------
-        RosyError
-            The message is reported to the user.
-        """
-        raise NotImplementedError
-
-    def take_answer(self, context: Context) -> None:
-        """Set the properties for the second call of the operator, so that it does not ask again."""
-
-    def invoke(self, context: Context, event: Event) -> set[str]:
-        if bpy.app.background or context.window is None:
-            return self.execute(context)
-        try:
-            result = self.ask(context, event)
-        except REPORTED_ERRORS as error:
-            return self.report_error(error)
-        if result is None:
-            return super().invoke(context, event)
-        self._has_asked = True
-        return result
-
-    def execute(self, context: Context) -> set[str]:
-        if not self._has_asked:
-            return super().execute(context)
-        self.take_answer(context)
-        names = self.properties.bl_rna.properties.keys()
-        settings = {
-            name: getattr(self, name)
-            for name in names
-            if name != "rna_type" and self.properties.is_property_set(name)
-        }
-        operator = getattr(bpy.ops.rosy, type(self).bl_idname.partition(".")[2])
-        try:
-            result = operator("INVOKE_DEFAULT", **settings)
-        except RuntimeError as error:  # the second call has reported it
-            return self.report_operator_error(error)
-        return {"CANCELLED"} if result == {"CANCELLED"} else {"FINISHED"}
-
-
-class FileJobMixin(DialogJobMixin):
+class FileJobMixin(ModalJobMixin):
     """Mixin of operators that ask for a file, unless `skip_browser` is set.
 
-    By default, it is a file to write.
+    By default, it is a file to write, and the result of the job is its path.
     """
 
     skip_browser: toggle(
@@ -364,3 +348,6 @@ class FileJobMixin(DialogJobMixin):
 
     def take_answer(self, context: Context) -> None:
         self.skip_browser = True
+
+    def finish(self, context: Context, result: Any) -> None:
+        self.report_done(f"Wrote {result}")

@@ -36,6 +36,12 @@ def _replace_property() -> Any:
     return toggle("Replace Existing", "Replace your preset of the same name", options={"SKIP_SAVE"})
 
 
+class _PresetOperator(RosyOperator):
+    """Mixin of operators on files of presets, which cannot be undone."""
+
+    bl_options = {"REGISTER"}
+
+
 def _target_preset(operator: Any, context: bpy.types.Context) -> str:
     """Return the key of the preset that an operator acts on. By default, it is the preset of the scene."""
     return operator.preset or context.scene.rosy.preset_name
@@ -44,7 +50,6 @@ def _target_preset(operator: Any, context: bpy.types.Context) -> str:
 class ROSY_OT_preset_apply(RosyOperator, bpy.types.Operator):
     """Replace the look of the scene with the look of this preset"""
 
-    bl_idname = "rosy.preset_apply"
     bl_label = "Apply Preset"
 
     preset: text(
@@ -58,7 +63,7 @@ class ROSY_OT_preset_apply(RosyOperator, bpy.types.Operator):
         preset_library.apply_preset(context.scene.rosy, self.preset)
 
 
-class _DescribedPreset(RosyOperator):
+class _DescribedPreset(_PresetOperator):
     """Mixin of operators that ask for the name and the description of a preset."""
 
     #: Label of the button that confirms the dialog.
@@ -91,9 +96,7 @@ class _DescribedPreset(RosyOperator):
 class ROSY_OT_preset_save(_DescribedPreset, bpy.types.Operator):
     """Save the look of this scene as one of your presets"""
 
-    bl_idname = "rosy.preset_save"
     bl_label = "Save Preset"
-    bl_options = {"REGISTER"}
     confirm_text = "Save"
 
     replace: _replace_property()
@@ -128,9 +131,7 @@ def _is_user_preset(name: str) -> bool:
 class ROSY_OT_preset_rename(_DescribedPreset, bpy.types.Operator):
     """Change the name or the description of one of your presets"""
 
-    bl_idname = "rosy.preset_rename"
     bl_label = "Rename Preset"
-    bl_options = {"REGISTER"}
     confirm_text = "Rename"
     conditions = (HAS_USER_PRESETS,)
 
@@ -148,12 +149,10 @@ class ROSY_OT_preset_rename(_DescribedPreset, bpy.types.Operator):
         redraw()
 
 
-class ROSY_OT_preset_remove(RosyOperator, bpy.types.Operator):
+class ROSY_OT_preset_remove(_PresetOperator, bpy.types.Operator):
     """Delete one of your presets. The look of the scene does not change"""
 
-    bl_idname = "rosy.preset_remove"
     bl_label = "Delete Preset"
-    bl_options = {"REGISTER"}
     conditions = (HAS_USER_PRESETS,)
 
     preset: _preset_property(preset_library.search_user_presets)
@@ -177,12 +176,10 @@ class ROSY_OT_preset_remove(RosyOperator, bpy.types.Operator):
         redraw()
 
 
-class ROSY_OT_preset_import(RosyOperator, bpy.types.Operator, ImportHelper):
+class ROSY_OT_preset_import(_PresetOperator, bpy.types.Operator, ImportHelper):
     """Add a preset from a file to your presets"""
 
-    bl_idname = "rosy.preset_import"
     bl_label = "Import Preset"
-    bl_options = {"REGISTER"}
 
     filename_ext = ".json"
     filter_glob: file_filter(".json")
@@ -195,12 +192,10 @@ class ROSY_OT_preset_import(RosyOperator, bpy.types.Operator, ImportHelper):
         redraw()
 
 
-class ROSY_OT_preset_export(RosyOperator, bpy.types.Operator, ExportHelper):
+class ROSY_OT_preset_export(_PresetOperator, bpy.types.Operator, ExportHelper):
     """Write a preset to a file that others can import"""
 
-    bl_idname = "rosy.preset_export"
     bl_label = "Export Preset"
-    bl_options = {"REGISTER"}
 
     filename_ext = ".json"
     filter_glob: file_filter(".json")

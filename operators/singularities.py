@@ -25,7 +25,6 @@ from .modal_job import ActiveMeshMixin, ModalJobMixin
 class ROSY_OT_singularities(RosyOperator, bpy.types.Operator):
     """Show the singularities of the fields of the selected meshes: orange for positive index, blue for negative index"""
 
-    bl_idname = "rosy.singularities"
     bl_label = "Singularities"
     conditions = (IDLE, ACTIVE_FIELD)
 
@@ -88,7 +87,6 @@ def _reach() -> Any:
 class ROSY_OT_field_singularities(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
     """Move a singularity of the active mesh's field to another vertex, merge it with another one, split it, or make a pair"""
 
-    bl_idname = "rosy.field_singularities"
     bl_label = "Move Singularity"
 
     source: integer(
@@ -126,7 +124,6 @@ class ROSY_OT_field_singularities(ActiveMeshMixin, ModalJobMixin, bpy.types.Oper
 class ROSY_OT_drag_singularity(RosyOperator, bpy.types.Operator):
     """Drag a singularity along the surface, onto another one to merge them, or with Ctrl from any vertex to make a pair"""
 
-    bl_idname = "rosy.drag_singularity"
     bl_label = "Drag Singularity"
     bl_options = {"INTERNAL"}
     conditions = (IN_3D_VIEW, *ActiveMeshMixin.conditions)
@@ -164,14 +161,13 @@ class ROSY_OT_drag_singularity(RosyOperator, bpy.types.Operator):
             self.cancel(context)
             if target is None or target == source:
                 return {"CANCELLED"}
-            index = 1 if self.make_pair else 0
-            try:
-                bpy.ops.rosy.field_singularities(
-                    "INVOKE_DEFAULT", source=source, target=target, index=index, reach=self.reach
-                )
-            except RuntimeError as error:  # the called operator has reported it
-                return self.report_operator_error(error)
-            return {"FINISHED"}
+            return self.call(
+                bpy.ops.rosy.field_singularities,
+                source=source,
+                target=target,
+                index=1 if self.make_pair else 0,
+                reach=self.reach,
+            )
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:

@@ -14,13 +14,12 @@ from ..rosy_addon.ui.property_makers import choice, file_filter, text, toggle
 from ..rosy_addon.worker.job import Steps
 from .bake import view_camera
 from .base import IDLE, OBJECT_MODE, VISIBLE_FIELD, Condition, RosyOperator, sync_suffix
-from .modal_job import DialogJobMixin
+from .modal_job import ModalJobMixin
 
 
-class ROSY_OT_strokes(DialogJobMixin, bpy.types.Operator):
+class ROSY_OT_strokes(ModalJobMixin, bpy.types.Operator):
     """Draw evenly spaced strokes along the fields of the meshes, as seen from the camera"""
 
-    bl_idname = "rosy.strokes"
     bl_label = "Draw Strokes"
     bl_options = {"UNDO"}
     conditions = (OBJECT_MODE, IDLE, VISIBLE_FIELD)
@@ -118,7 +117,6 @@ class ROSY_OT_strokes(DialogJobMixin, bpy.types.Operator):
 class ROSY_OT_strokes_remove(RosyOperator, bpy.types.Operator):
     """Remove the stroke objects of this scene. Fields, pictures and files are kept"""
 
-    bl_idname = "rosy.strokes_remove"
     bl_label = "Remove Strokes"
     conditions = (
         IDLE,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from math import degrees
 from pathlib import Path
 
@@ -17,7 +16,7 @@ from ..rosy_addon.ui.preferences import worker_count
 from ..rosy_addon.ui.property_makers import choice, file_filter, integer, real, toggle
 from ..rosy_addon.worker.job import Steps
 from .base import ACTIVE_FIELD, IDLE, selected_mesh_objects, sync_suffix
-from .modal_job import FileJobMixin
+from .modal_job import ActiveMeshMixin, FileJobMixin
 
 #: Azimuth of the first picture, in degrees.
 AZIMUTH = -25.0
@@ -26,10 +25,9 @@ AZIMUTH = -25.0
 SIDE = {"subtype": "PIXEL", "default": 512, "min": 16, "max": 8192}
 
 
-class ROSY_OT_turntable(FileJobMixin, bpy.types.Operator, ExportHelper):
+class ROSY_OT_turntable(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, ExportHelper):
     """Render a turntable video of the active mesh with its field, with the look of the scene"""
 
-    bl_idname = "rosy.turntable"
     bl_label = "Turntable"
     bl_options = {"REGISTER"}
     conditions = (IDLE, ACTIVE_FIELD)
@@ -80,9 +78,3 @@ class ROSY_OT_turntable(FileJobMixin, bpy.types.Operator, ExportHelper):
             still=self.still,
             workers=worker_count(context),
         )
-
-    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
-        return selected_mesh_objects(context)[:1]
-
-    def finish(self, context: bpy.types.Context, result: Path) -> None:
-        self.report_done(f"Wrote {result}")

@@ -14,7 +14,6 @@ from .base import IN_3D_VIEW, Condition, RosyOperator
 class ROSY_OT_viewport(RosyOperator, Operator):
     """Draw the fields of all meshes in this 3D view at every redraw, without baking"""
 
-    bl_idname = "rosy.viewport"
     bl_label = "Live Fields"
     bl_options = {"REGISTER"}
     conditions = (IN_3D_VIEW,)
@@ -54,7 +53,6 @@ class ROSY_OT_viewport(RosyOperator, Operator):
 class ROSY_OT_flow_play(RosyOperator, Operator):
     """Let the streaks in live views drift, or stop them, without Blender's timeline"""
 
-    bl_idname = "rosy.flow_play"
     bl_label = "Play Flow"
     bl_options = {"REGISTER"}
     conditions = (

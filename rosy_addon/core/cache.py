@@ -94,6 +94,23 @@ class Cache:
 BAKE_CACHE = Cache()
 
 
+def cached(cache: Cache | None, create: Callable[[], Result], *parts: object) -> Result:
+    """Return what `create` returns, from a cache if one is given.
+
+    Parameters
+    ----------
+    cache : Cache or None
+    create : callable
+        See `Cache.get_or_create`.
+    *parts : object
+        The key: all inputs on which the result depends. Arrays are replaced by their `content_hash`.
+    """
+    if cache is None:
+        return create()
+    key = tuple(content_hash(part) if isinstance(part, np.ndarray) else part for part in parts)
+    return cache.get_or_create(key, create)
+
+
 def content_hash(*parts: object) -> bytes:
     """Return a SHA-1 digest of arrays (shape, dtype, bytes) and of other objects (their repr)."""
     hasher = hashlib.sha1(usedforsecurity=False)  # many processors have instructions for SHA-1

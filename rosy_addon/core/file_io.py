@@ -267,6 +267,15 @@ def check_folder(folder: str | os.PathLike[str]) -> None:
     check_writable(Path(folder) / "picture.png")
 
 
+def file_stamp(path: Path) -> tuple[int, ...]:
+    """Return the time and the size of a file or folder, which change with it; empty if it does not exist."""
+    try:
+        status = path.stat()
+    except OSError:
+        return ()
+    return status.st_mtime_ns, status.st_size
+
+
 def make_folder(folder: str | os.PathLike[str]) -> None:
     """Create a folder and its parents if they are missing.
 

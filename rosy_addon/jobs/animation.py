@@ -30,18 +30,17 @@ from ..rendering.marks import sequence_key
 from ..rendering.view_input import ViewInput
 from ..scene import pictures
 from ..scene.blender_images import frame_path, write_frame
-from ..scene.camera_planes import update_backdrops
 from ..scene.cameras import CameraSource, frame_camera
 from ..scene.evaluated_field import temp_attributes
 from ..scene.files import picture_stem
-from ..scene.keys import update_keys
+from ..scene.keys import update_camera_planes
 from ..scene.look_inputs import nonfinite_policy
 from ..scene.look_properties import drift_in_scene, read_look
 from ..scene.picture_state import PictureState, read_picture_states
 from ..scene.read_view import read_views, scene_depsgraph
 from ..scene.scene_reader import SceneData
 from ..scene.visible_objects import field_objects
-from ..worker.job import Call, Step, Steps, job, part
+from ..worker.job import Call, Step, Steps, job, part, shares
 
 #: Suffix of a sidecar file, after the name of the picture.
 SIDECAR_SUFFIX = ".rosy.txt"
@@ -166,8 +165,7 @@ def bake_animation(
                 pictures.apply_sequence(
                     scene, scene_data, sequence, camera, settings, source, states, key
                 )
-            update_backdrops(scene)
-            update_keys(scene)
+            update_camera_planes(scene)
         return results
 
 
@@ -231,8 +229,7 @@ def _sequence_result(
     """Return the result of an image sequence, given its frames and the arguments of `bake_animation`."""
     first, last = drawn[0], drawn[-1]
     path = _path_of_frame(settings, first.name, cameras, first.frame)
-    size = last.camera.width, last.camera.height
-    sequence = pictures.ImageSequence(first.name, path, first.frame, last.frame, *size)
+    sequence = pictures.ImageSequence(first.name, path, first.frame, last.frame)
     rendered, skipped = (
         tuple(one.frame for one in drawn if one.up_to_date == up_to_date)
         for up_to_date in (False, True)
@@ -274,9 +271,8 @@ def _frame_steps(
     cache.evict_unused()
     states = read_picture_states(scene, depsgraph, sources, scene_data.mesh_states, is_frame=True)
     drawn = []
-    for index, view in enumerate(views):
+    for (view, state), start, stop in shares(zip(views, states, strict=True)):
         view = replace(view, drift=drift_in_scene(scene, look, frame))
-        start, stop = index / len(sources), (index + 1) / len(sources)
         name = scene.name if cameras is None else view.camera.name
         path = _path_of_frame(settings, name, cameras, frame)
         sidecar = path.with_name(path.name + SIDECAR_SUFFIX)
@@ -297,7 +293,7 @@ def _frame_steps(
             sidecar.unlink(missing_ok=True)
             write_frame(path, image_data)
             write_bytes(sidecar, _sidecar_text(input_hash, path))
-        state = replace(states[index], device=device)
+        state = replace(state, device=device)
         drawn.append(_Frame(name, frame, view.camera, up_to_date, state))
     return scene_data, drawn
 

@@ -12,13 +12,12 @@ from ..compositor.look import Look, is_hatched
 from ..core.cache import BAKE_CACHE
 from ..gpu.select import image_steps, select_device
 from ..scene import pictures
-from ..scene.camera_planes import update_backdrops
 from ..scene.cameras import CameraSource, render_camera
-from ..scene.keys import update_keys
+from ..scene.keys import update_camera_planes
 from ..scene.look_properties import drift_in_scene, read_look
 from ..scene.picture_state import read_picture_states
 from ..scene.read_view import read_views, scene_depsgraph
-from ..worker.job import Step, Steps, job, part
+from ..worker.job import Step, Steps, job, part, shares
 
 
 @job
@@ -83,17 +82,16 @@ def bake(
     states = read_picture_states(scene, depsgraph, sources, scene_data.mesh_states)
     device = select_device(settings.device, look)
     drawings = []
-    for index, view in enumerate(views):
+    for (view, source, state), start, stop in shares(
+        zip(views, sources, states, strict=True), 0.97
+    ):
         view = replace(view, draws_thresholds=draws_thresholds, drift=drift)
         steps = image_steps(view, device, settings.as_float, workers=workers)
-        start, stop = (0.97 * done / len(sources) for done in (index, index + 1))
         picture, image_data = yield from part(steps, start, stop)
-        state = replace(states[index], device=device)
-        drawings.append((view, picture, image_data, sources[index], state))
+        drawings.append((view, picture, image_data, source, replace(state, device=device)))
     yield Step(0.97, "applying the pictures")
     results = [
         pictures.apply_picture(scene, scene_data, settings, *drawing) for drawing in drawings
     ]
-    update_backdrops(scene)
-    update_keys(scene)
+    update_camera_planes(scene)
     return results

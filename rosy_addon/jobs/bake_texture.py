@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from bpy.types import Depsgraph, Image, Object, Scene
+from bpy.types import Image, Object, Scene
 
-from ..compositor.shading import Light
 from ..core.cache import BAKE_CACHE
 from ..core.errors import RosyError
 from ..scene.look_inputs import color_attribute_of
@@ -19,7 +18,7 @@ from ..scene.pictures import apply_texture, check_targets, read_output_settings
 from ..scene.read_view import read_lights, read_texture_input, scene_depsgraph
 from ..scene.texture_nodes import Hatching
 from ..surface_texture.draw import TextureSettings, draw_texture_images, texture_colors_values
-from ..worker.job import Call, Step, Steps, job
+from ..worker.job import Call, Step, Steps, job, shares
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +70,11 @@ def bake_texture(scene: Scene, objects: Sequence[Object]) -> Steps[list[TextureR
     }
     check_targets(objects, settings)
     depsgraph = scene_depsgraph(scene)
-    lights = _lights_to_bake(scene, depsgraph) if bakes_light(scene.rosy, look) else None
+    lights = None
+    if bakes_light(scene.rosy, look):
+        lights = read_lights(depsgraph, np.eye(4))  # in world space
+        if not lights:
+            raise RosyError(f"scene '{scene.name}' has no lights: add one, or turn Bake Light off")
     is_udim = scene.rosy.texture_udim
     drift = drift_in_scene(scene, look, scene.frame_current_final)
     texture_settings = TextureSettings(
@@ -80,8 +83,7 @@ def bake_texture(scene: Scene, objects: Sequence[Object]) -> Steps[list[TextureR
     has_colors = texture_colors_values(look, content)
     color_attribute = color_attribute_of(scene, look) if has_colors else None
     drawn = []
-    for index, (obj, uv_map) in enumerate(uv_maps.items()):
-        start, stop = (0.98 * done / len(objects) for done in (index, index + 1))
+    for (obj, uv_map), start, stop in shares(uv_maps.items(), 0.98):
         instance, uv = read_texture_input(
             scene, depsgraph, obj, uv_map, BAKE_CACHE, color_attribute
         )
@@ -100,17 +102,3 @@ def bake_texture(scene: Scene, objects: Sequence[Object]) -> Steps[list[TextureR
         )
         results.append(TextureResult(obj, image, (texture.note,) if texture.note else ()))
     return results
-
-
-def _lights_to_bake(scene: Scene, depsgraph: Depsgraph) -> list[Light]:
-    """Return the lights of a scene, in world space.
-
-    Raises
-    ------
-    RosyError
-        If the scene has no lights.
-    """
-    lights = read_lights(depsgraph, np.eye(4))
-    if not lights:
-        raise RosyError(f"scene '{scene.name}' has no lights: add one, or turn Bake Light off")
-    return lights

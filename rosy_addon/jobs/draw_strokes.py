@@ -19,6 +19,7 @@ from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen
 from ..projection.gbuffer import MeshInstance
 from ..scene.cameras import CameraSource, render_camera, render_size, resolve_camera
+from ..scene.files import absolute_path
 from ..scene.look_inputs import ReadRequest, nonfinite_policy
 from ..scene.read_view import read_lights, scene_depsgraph
 from ..scene.scene_reader import SceneData, read_scene
@@ -107,7 +108,9 @@ def draw_strokes(
     style = read_stroke_style(settings) if style is None else style
     pen = read_pen(settings) if pen is None else pen
     if kind == "FILE":
-        path, suffix = _drawing_path(settings.filepath if path is None else path)
+        path = absolute_path(str(settings.filepath if path is None else path))
+        suffix = check_drawing_suffix(path)
+        check_writable(path)
     depsgraph = scene_depsgraph(scene)
     source = render_camera(scene) if camera is None else camera
     view = resolve_camera(scene, depsgraph, source, render_size(scene) if size is None else size)
@@ -129,25 +132,6 @@ def draw_strokes(
     obj = store_strokes(scene, kind, curves, view.name, parent, collection, vertex_count)
     notes = (*scene_data.warnings, *_notes(scene, obj, style))
     return StrokeResult(view.name, drawing, obj, notes=notes)
-
-
-def _drawing_path(path: Path | str) -> tuple[Path, str]:
-    """Return the absolute path of a file of strokes, and its suffix.
-
-    ``//`` stands for the folder of the .blend file.
-
-    Raises
-    ------
-    RosyError
-        If the path starts with ``//`` and the .blend file was never saved, if the suffix is not supported, or
-        if the file cannot be written.
-    """
-    if str(path).startswith("//") and not bpy.data.filepath:
-        raise RosyError(f"{path}: save the .blend file first, or choose an absolute path")
-    path = Path(bpy.path.abspath(str(path)))
-    suffix = check_drawing_suffix(path)
-    check_writable(path)
-    return path, suffix
 
 
 def _followed_instance(scene_data: SceneData) -> MeshInstance:

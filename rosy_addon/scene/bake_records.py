@@ -7,8 +7,7 @@ An object that was appended from another file may show a picture for which this 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -20,10 +19,9 @@ from ..annotation.key_contents import PictureKey
 from ..compositor.look import Look
 from ..core.errors import RosyError
 from ..projection.camera import Camera
-from .camera_planes import update_backdrops
 from .cameras import FRAME_CAMERAS, CameraSource, frame_camera
 from .datablocks import delete_owned, delete_unused, removable_modifiers, rosy_modifiers
-from .keys import update_keys
+from .keys import update_camera_planes
 from .look_properties import read_look
 from .picture_nodes import (
     has_applied_picture,
@@ -390,15 +388,23 @@ def _reached_objects(scene: Scene) -> set[Object]:
 def remove_bakes(scene: Scene) -> RemovalCounts:
     """Remove baked pictures, backdrops and keys (legends) from a scene. Fields and saved files are kept."""
     objects = baked_objects(scene)
-    with _object_mode(objects):
+    # A picture that the user has applied, by applying RoSy's modifier, cannot be removed in edit mode.
+    is_editing = bpy.context.mode == "EDIT_MESH" and any(
+        obj.mode == "EDIT" and has_applied_picture(obj.data) for obj in objects
+    )
+    if is_editing:
+        bpy.ops.object.mode_set(mode="OBJECT")
+    try:
         for obj in objects:
             for modifier in removable_modifiers(obj):
                 obj.modifiers.remove(modifier)
             remove_applied_picture(obj.data)
+    finally:
+        if is_editing:
+            bpy.ops.object.mode_set(mode="EDIT")
     _clean_unused_meshes()
     image_count = _remove_records(scene)
-    update_backdrops(scene)
-    update_keys(scene)
+    update_camera_planes(scene)
     return RemovalCounts(len(objects), image_count + delete_unused())
 
 
@@ -427,21 +433,3 @@ def _remove_records(scene: Scene) -> int:
         if camera is not None and not bpy.data.user_map(subset={camera})[camera]:
             bpy.data.objects.remove(camera)
     return image_count
-
-
-@contextmanager
-def _object_mode(objects: Sequence[Object]) -> Iterator[None]:
-    """Context manager: leave edit mode during a block if an edited object has an applied picture.
-
-    A picture is applied if the user has applied RoSy's modifier; see `remove_applied_picture`.
-    """
-    is_editing = bpy.context.mode == "EDIT_MESH" and any(
-        obj.mode == "EDIT" and has_applied_picture(obj.data) for obj in objects
-    )
-    if is_editing:
-        bpy.ops.object.mode_set(mode="OBJECT")
-    try:
-        yield
-    finally:
-        if is_editing:
-            bpy.ops.object.mode_set(mode="EDIT")

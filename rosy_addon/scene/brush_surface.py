@@ -114,7 +114,9 @@ class BrushSurface:
         # The deformation of a face is taken from its first triangle.
         rest = surface.vertices
         vertex = surface.triangle_vertex[np.searchsorted(surface.triangle_face, near)]
-        half_length = DASH_LENGTH / 2 * np.sqrt(_double_areas(rest, vertex))
+        a, b, c = (rest[column] for column in vertex.T)
+        double_area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        half_length = DASH_LENGTH / 2 * np.sqrt(double_area)
         center = self._shown_center[near]
         dashes = []
         for angle in angles:
@@ -137,13 +139,6 @@ class BrushSurface:
     def _shown_center(self) -> np.ndarray:
         """Centers of the faces on the evaluated mesh, (F, 3) float64."""
         return mean_per_face(self._shown[self._surface.corner_vertex], self._surface.face_start)
-
-
-def _double_areas(points: np.ndarray, vertex: np.ndarray) -> np.ndarray:
-    """Return twice the areas, (n,), of triangles that are given by (n, 3) vertex indices."""
-    a, b, c = (points[column] for column in vertex.T)
-    cross = np.cross(b - a, c - a)
-    return np.sqrt(dot(cross, cross))
 
 
 def _deformed(

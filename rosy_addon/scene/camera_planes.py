@@ -10,20 +10,14 @@ from ..compositor.look import is_hatched
 from ..core.color import from_hex, to_linear
 from ..projection.camera import Camera
 from .cameras import FRAME_CAMERAS, camera_of_object
-from .datablocks import delete_owned, rollback_on_error
+from .datablocks import Track, delete_owned, rollback_on_error
 from .look_properties import read_look
 from .node_builder import new_emissive_material
 from .picture_nodes import shown_materials
 from .read_view import scene_depsgraph
 
-#: Settings of an object that are switched off on planes: all rays except camera rays pass through them.
-HIDDEN_FROM = (
-    "visible_diffuse",
-    "visible_glossy",
-    "visible_transmission",
-    "visible_volume_scatter",
-    "visible_shadow",
-)
+#: Kinds of rays that pass through planes: all except camera rays.
+HIDDEN_FROM = ("diffuse", "glossy", "transmission", "volume_scatter", "shadow")
 
 
 def pictured_cameras(scene: bpy.types.Scene) -> dict[bpy.types.Object, bpy.types.PropertyGroup]:
@@ -42,13 +36,10 @@ def pictured_cameras(scene: bpy.types.Scene) -> dict[bpy.types.Object, bpy.types
     return cameras
 
 
-def remove_camera_planes(scene: bpy.types.Scene, tag: str) -> list[bpy.types.Image]:
-    """Delete the planes of a scene that have the custom property `tag`, with their meshes and materials.
+def remove_camera_planes(scene: bpy.types.Scene, tag: str) -> None:
+    """Delete the planes of a scene that have the custom property `tag`.
 
-    Returns
-    -------
-    list of bpy.types.Image
-        Images of the deleted materials. Only images without any user are returned.
+    Their meshes, materials and images are deleted as well if nothing else uses them.
     """
     images = []
     for obj in [obj for obj in scene.objects if obj.get(tag)]:
@@ -61,7 +52,9 @@ def remove_camera_planes(scene: bpy.types.Scene, tag: str) -> list[bpy.types.Ima
                 nodes = material.node_tree.nodes
                 images += [node.image for node in nodes if hasattr(node, "image")]
                 delete_owned(material)
-    return [image for image in dict.fromkeys(images) if image is not None and not image.users]
+    for image in dict.fromkeys(images):
+        if image is not None and not image.users:
+            delete_owned(image)
 
 
 def add_camera_plane(
@@ -71,7 +64,7 @@ def add_camera_plane(
     tag: str,
     corners: np.ndarray,
     material: bpy.types.Material,
-    created: list[bpy.types.ID],
+    track: Track,
 ) -> bpy.types.Object:
     """Add a plane, parented to a camera.
 
@@ -84,15 +77,13 @@ def add_camera_plane(
     corners : (4, 3) float ndarray
         Corners of the plane in camera space, counter-clockwise.
     material : bpy.types.Material
-    created : list of bpy.types.ID
-        The new datablocks are appended; see `datablocks.rollback_on_error`.
+    track : function
+        Called with each new datablock; see `datablocks.rollback_on_error`.
     """
-    mesh = bpy.data.meshes.new(name)
-    created.append(mesh)
+    mesh = track(bpy.data.meshes.new(name))
     mesh.from_pydata(corners.tolist(), [], [(0, 1, 2, 3)])
     mesh.materials.append(material)
-    obj = bpy.data.objects.new(name, mesh)
-    created.append(obj)
+    obj = track(bpy.data.objects.new(name, mesh))
     obj[tag] = True
     scene.collection.objects.link(obj)
     obj.parent = camera
@@ -100,8 +91,8 @@ def add_camera_plane(
     scale = camera.matrix_world.to_scale()
     obj.matrix_parent_inverse = Matrix.Diagonal((*scale, 1.0)).inverted_safe()
     obj.hide_select = True
-    for visibility in HIDDEN_FROM:
-        setattr(obj, visibility, False)
+    for ray in HIDDEN_FROM:
+        setattr(obj, f"visible_{ray}", False)
     return obj
 
 
@@ -157,10 +148,9 @@ def _add_backdrop(scene: bpy.types.Scene, camera: bpy.types.Object, paper: str) 
     name = f"RoSy Backdrop {camera.name}"
     view = camera_of_object(scene, scene_depsgraph(scene), camera)
     corners = frame_corners(view, DISTANCE * camera.data.clip_end, OVERSIZE)
-    with rollback_on_error() as created:
+    with rollback_on_error() as track:
         color = (*to_linear(from_hex(paper)).tolist(), 1.0)
-        material = new_emissive_material(name, color, scene.rosy.emission)
-        created.append(material)
+        material = track(new_emissive_material(name, color, scene.rosy.emission))
         material.diffuse_color = color  # in views with Solid shading
         material.use_backface_culling = True
-        add_camera_plane(scene, camera, name, BACKDROP_TAG, corners, material, created)
+        add_camera_plane(scene, camera, name, BACKDROP_TAG, corners, material, track)

@@ -19,7 +19,7 @@ from ..field.surface import have_same_polygons
 from ..projection.ambient_occlusion import DIRECTION_COUNT, ambient_occlusion
 from ..projection.gbuffer import MeshInstance
 from ..surface_texture.line_order import corner_tangents
-from ..worker.job import Call, Steps, call_steps, job
+from ..worker.job import Call, Steps, call_steps, job, shares
 from .field_attributes import VECTOR_TYPE, attribute_name, check_attribute_type, store_attribute
 from .guides import GUIDE_ATTRIBUTE
 from .look_inputs import ReadRequest
@@ -111,10 +111,10 @@ def other_field_names(mesh: Mesh) -> list[str]:
 
 
 @job
-def store_difference(
-    mesh: Mesh, other: str, name: str = DIFFERENCE_ATTRIBUTE
-) -> Steps[tuple[str, int, FieldComparison]]:
+def store_difference(mesh: Mesh, other: str) -> Steps[tuple[str, int, FieldComparison]]:
     """Compute the angle between the field of a mesh and another field, and store it on the faces.
+
+    The attribute is `DIFFERENCE_ATTRIBUTE`, in degrees.
 
     Parameters
     ----------
@@ -122,8 +122,6 @@ def store_difference(
     other : str
         Name of the attribute with the other field. It is read with the degree of the mesh's field. If the
         name is empty, the only attribute of `other_field_names` is used.
-    name : str
-        Name of the attribute in which the angles are stored, in degrees.
 
     Returns
     -------
@@ -147,12 +145,12 @@ def store_difference(
         choice = " or ".join(f"'{known}'" for known in names)
         hint = f"choose {choice}" if choice else "make one with another name of the attribute"
         raise RosyError(f"{label}: needs another field to compare with: {hint}")
-    check_attribute_type(mesh, name, "FLOAT")
+    check_attribute_type(mesh, DIFFERENCE_ATTRIBUTE, "FLOAT")
     surface = mesh_surface(mesh, label)
     field = read_mesh_field(mesh, surface=surface)
     other_field = read_mesh_field(mesh, other, field.degree, surface)
     comparison = yield Call(compare_fields, (surface, field, other_field))
-    store_attribute(mesh, name, "FLOAT", np.degrees(comparison.difference.angle))
+    store_attribute(mesh, DIFFERENCE_ATTRIBUTE, "FLOAT", np.degrees(comparison.difference.angle))
     mesh.update()
     return other, field.degree, comparison
 
@@ -162,24 +160,20 @@ def store_difference(
 
 @job
 def store_occlusion(
-    depsgraph: Depsgraph,
-    objects: Sequence[Object],
-    name: str = OCCLUSION_ATTRIBUTE,
-    direction_count: int = DIRECTION_COUNT,
+    depsgraph: Depsgraph, objects: Sequence[Object], direction_count: int = DIRECTION_COUNT
 ) -> Steps[None]:
     """Compute the ambient occlusion of objects, and store it on their meshes, for use as their tone.
 
     All objects that are visible in renders of the view layer occlude. If the modifiers of an object keep its
     faces, occlusion is computed on the evaluated mesh, otherwise on the original mesh. It is stored on the
-    original mesh, from which modifiers copy attributes to the evaluated mesh.
+    original mesh, from which modifiers copy attributes to the evaluated mesh. The attribute is
+    `OCCLUSION_ATTRIBUTE`, a float on corners: the visible fraction of the sky, from 0 to 1.
 
     Parameters
     ----------
     depsgraph : bpy.types.Depsgraph
     objects : sequence of bpy.types.Object
         Original objects with a field.
-    name : str
-        Name of the attribute, a float on corners: the visible fraction of the sky, from 0 to 1.
     direction_count : int
         Number of light directions.
 
@@ -191,15 +185,14 @@ def store_occlusion(
     """
     for obj in objects:
         check_writable(obj.data)
-        check_attribute_type(obj.data, name, "FLOAT", "CORNER")
+        check_attribute_type(obj.data, OCCLUSION_ATTRIBUTE, "FLOAT", "CORNER")
     scene_data = read_scene(depsgraph, objects, ReadRequest("zero"))
     values_by_mesh: dict[Mesh, np.ndarray] = {}
-    for index, obj in enumerate(objects):
-        start, stop = index / len(objects), (index + 1) / len(objects)
+    for obj, start, stop in shares(objects):
         inputs = *_with_original_faces(scene_data, obj), direction_count
         values_by_mesh[obj.data] = yield Call(ambient_occlusion, inputs, start, stop)
     for mesh, values in values_by_mesh.items():
-        store_attribute(mesh, name, "FLOAT", values, "CORNER")
+        store_attribute(mesh, OCCLUSION_ATTRIBUTE, "FLOAT", values, "CORNER")
         mesh.update()
 
 

@@ -6,13 +6,16 @@ of a linked object is missing, Blender keeps a placeholder in its place.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Literal
+from typing import Any, Literal
 
 import bpy
 
 from ..core.errors import RosyError
+
+#: The function of `rollback_on_error`, which takes and returns a datablock.
+Track = Callable[[Any], Any]
 
 #: Custom property on every datablock that RoSy created.
 OWNED_TAG = "rosy_made"
@@ -50,15 +53,20 @@ def user_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
 
 
 @contextmanager
-def rollback_on_error() -> Iterator[list[bpy.types.ID]]:
-    """Context manager: yield a list to which the caller appends new datablocks.
+def rollback_on_error() -> Iterator[Track]:
+    """Context manager: yield a function that the caller calls with each new datablock, and that returns it.
 
     At the end of the block they are tagged as created by RoSy. If the block raises an error, they are
     deleted.
     """
     created: list[bpy.types.ID] = []
+
+    def track(datablock: Any) -> Any:
+        created.append(datablock)
+        return datablock
+
     try:
-        yield created
+        yield track
         for datablock in created:
             datablock[OWNED_TAG] = True
     except BaseException:

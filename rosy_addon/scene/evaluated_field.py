@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from bpy.types import Depsgraph, Mesh, Object
 
-from ..core.cache import Cache, content_hash
+from ..core.cache import Cache, cached, content_hash
 from ..core.errors import RosyError
 from ..core.progress import report
 from ..field.blocks import as_float64
@@ -21,7 +21,6 @@ from .datablocks import is_editable, user_modifiers
 from .field_attributes import (
     VECTOR_TYPE,
     attribute_name,
-    cached_for_surface,
     field_degree,
     field_values,
     follow_mesh,
@@ -127,12 +126,13 @@ def read_evaluated_field(
         ratios = np.stack(columns, axis=1) if columns else None
         return RosyField(layout.degree, vectors, ratios, layout.family_count)
 
-    key_parts = values, original_normals, *ratio_parts, layout, source, nonfinite
-    if cache is None or surface.rest_vertices is None:
-        return cached_for_surface(cache, surface, build, "evaluated", *key_parts)
-    # The field depends only on the rest shape, so the key leaves out the deformed shape of each frame.
-    shape = surface.rest_vertices, surface.corner_vertex, surface.face_start
-    return cache.get_or_create(("evaluated field", content_hash(*shape, *key_parts)), build)
+    shape: tuple[object, ...] = (surface,)
+    if (
+        surface.rest_vertices is not None
+    ):  # the field does not depend on the deformed shape of each frame
+        shape = surface.rest_vertices, surface.corner_vertex, surface.face_start
+    inputs = values, original_normals, *ratio_parts, layout, source, nonfinite
+    return cached(cache, build, "evaluated field", *shape, *inputs)
 
 
 def _transport(

@@ -20,20 +20,16 @@ rotated with their faces.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TypeVar
+from contextlib import suppress
 
 import numpy as np
 from bpy.types import Attribute, Mesh, Object
 
-from ..core.cache import Cache, content_hash
 from ..core.errors import RosyError
 from ..field.carry import carried_vectors
 from ..field.surface import Surface
 from .datablocks import has_rosy_properties
 from .meshes import read_attribute, read_collection, write_attribute
-
-Result = TypeVar("Result")
 
 DEFAULT_FIELD_NAME = "rosy"
 DEFAULT_DEGREE = 4
@@ -159,20 +155,6 @@ def store_attribute(
     return attribute
 
 
-def cached_for_surface(
-    cache: Cache | None, surface: Surface, build: Callable[[], Result], *key_parts: object
-) -> Result:
-    """Return a result that is cached for a surface and other values, or build and cache it.
-
-    The key contains the id of the surface. So the cache also keeps the surface: no other object can then have
-    the same id.
-    """
-    if cache is None:
-        return build()
-    key = "field", id(surface), content_hash(*key_parts)
-    return cache.get_or_create(key, lambda: (surface, build()))[1]
-
-
 #: Coefficients of the checksum of a vector, which is a linear combination of its components. As it is linear,
 #: it stays right when Blender interpolates attributes.
 CHECK_COEFFICIENTS = np.array([1.0, 1.618034, 2.718282])
@@ -196,14 +178,9 @@ def store_rest_shape(mesh: Mesh, name: str) -> None:
     rest_name, check_name = _attribute_names(name)
     vectors = read_attribute(mesh, name, np.float32, 3)
     positions = read_attribute(mesh, "position", np.float32, 3)
-    try:
-        get_or_create_attribute(mesh, rest_name, VECTOR_TYPE, "POINT")
-        get_or_create_attribute(mesh, check_name, ANGLE_TYPE)
-    except RosyError:
-        return
-    # Values are written after both attributes exist, as a new attribute may move the others in memory.
-    write_attribute(mesh.attributes[rest_name], positions)
-    write_attribute(mesh.attributes[check_name], vector_checks(vectors))
+    with suppress(RosyError):
+        store_attribute(mesh, rest_name, VECTOR_TYPE, positions, "POINT")
+        store_attribute(mesh, check_name, ANGLE_TYPE, vector_checks(vectors))
 
 
 def follow_mesh(mesh: Mesh, name: str, vectors: np.ndarray, surface: Surface) -> np.ndarray:
@@ -240,12 +217,16 @@ def follow_mesh(mesh: Mesh, name: str, vectors: np.ndarray, surface: Surface) ->
     if np.array_equal(stored_positions, positions):
         return vectors
     first = vectors.reshape(len(vectors), -1, 3)[:, 0]
-    with np.errstate(invalid="ignore", over="ignore"):
-        length = np.abs(first).max(axis=1)
-        is_stored = np.abs(vector_checks(first) - checks) <= CHECK_TOLERANCE * length
+    is_stored = have_checks(first, checks).reshape(-1, *(1 for _ in vectors.shape[1:]))
     carried = carried_vectors(surface.in_rest_shape(), stored_positions, vectors)
-    is_stored = is_stored.reshape(-1, *(1 for _ in vectors.shape[1:]))
     return np.where(is_stored, carried, vectors)
+
+
+def have_checks(vectors: np.ndarray, checks: np.ndarray) -> np.ndarray:
+    """Return which of (F, 3) vectors have their stored (F,) checksums, as (F,) bool."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        length = np.abs(vectors).max(axis=1)
+        return np.abs(vector_checks(vectors) - checks) <= CHECK_TOLERANCE * length
 
 
 def vector_checks(vectors: np.ndarray) -> np.ndarray:

@@ -129,10 +129,21 @@ def output_folder(scene: bpy.types.Scene) -> Path:
     directory = scene.rosy.directory
     if not directory.strip():
         raise RosyError(f"scene '{scene.name}' has no folder for pictures: choose one (Output)")
-    if directory.startswith("//") and not bpy.data.filepath:
-        raise RosyError(f"{directory}: save the .blend file first, or choose an absolute path")
     # Made absolute, as Blender would later interpret a path relative to the working directory in another way.
-    return Path(bpy.path.abspath(directory)).absolute()
+    return absolute_path(directory).absolute()
+
+
+def absolute_path(path: str) -> Path:
+    """Return a path in which ``//`` at the start is replaced by the folder of the .blend file.
+
+    Raises
+    ------
+    RosyError
+        If the path starts with ``//`` and the .blend file was never saved.
+    """
+    if path.startswith("//") and not bpy.data.filepath:
+        raise RosyError(f"{path}: save the .blend file first, or choose an absolute path")
+    return Path(bpy.path.abspath(path))
 
 
 def is_beside_blend(folder: Path) -> bool:

@@ -21,11 +21,11 @@ from .datablocks import check_not_missing
 from .face_values import read_face_vectors
 from .field_attributes import (
     ANGLE_TYPE,
-    CHECK_TOLERANCE,
     VECTOR_TYPE,
     attribute_name,
     check_attribute_type,
     follow_mesh,
+    have_checks,
     is_face_vector_field,
     store_attribute,
     store_rest_shape,
@@ -258,17 +258,14 @@ def read_combed_guides(mesh: Mesh, surface: Surface) -> np.ndarray:
         other than combing since the guides were stored.
     """
     guides = np.zeros((surface.face_count, 3))
-    values = read_attribute(mesh, GUIDE_ATTRIBUTE, np.float32, 3)
     checks = read_attribute(mesh, FIELD_CHECK_ATTRIBUTE, np.float32, 1)
-    field = read_attribute(mesh, attribute_name(mesh), np.float32, 3)
     are_stored = is_face_vector_field(mesh, GUIDE_ATTRIBUTE) and is_face_vector_field(mesh)
     if not are_stored or checks is None:
         return guides
+    names = GUIDE_ATTRIBUTE, attribute_name(mesh)
+    values, field = (read_attribute(mesh, name, np.float32, 3) for name in names)
     values = follow_mesh(mesh, GUIDE_ATTRIBUTE, values.astype(np.float64), surface)
-    length = np.abs(field).max(axis=1)
-    with np.errstate(invalid="ignore"):
-        is_current = np.abs(vector_checks(field) - checks) <= CHECK_TOLERANCE * length
-        is_current &= np.isfinite(values).all(axis=1)
+    is_current = have_checks(field, checks) & np.isfinite(values).all(axis=1)
     guides[is_current] = values[is_current]
     return guides
 

@@ -27,7 +27,7 @@ from ..compositor.look import Look, has_tone_inks
 from ..compositor.streak_statistics import MAX_SOFTNESS, MIN_SOFTNESS
 from ..compositor.target_tone import MIN_TONE_RANGE
 from ..core.color import from_hex, to_linear
-from .datablocks import OWNED_TAG
+from .datablocks import OWNED_TAG, Track
 from .node_builder import NodeBuilder, Number
 
 #: Name of the node group.
@@ -71,15 +71,14 @@ _INPUTS = (
 )
 
 
-def hatching_group(created: list[bpy.types.ID]) -> bpy.types.NodeTree:
-    """Return the node group in the open .blend file. A missing one is created and appended to `created`."""
+def hatching_group(track: Track) -> bpy.types.NodeTree:
+    """Return the node group in the open .blend file. If there is none, it is created, and `track` called."""
     for group in bpy.data.node_groups:
         is_own = group.library is None and group.get(OWNED_TAG)
         is_hatching = group.bl_idname == "ShaderNodeTree" and group.name.startswith(GROUP_NAME)
         if is_own and is_hatching:
             return group
-    created.append(_new_hatching_group())
-    return created[-1]
+    return track(_new_hatching_group())
 
 
 def set_hatching_look(node: bpy.types.Node, look: Look, line_count: int) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import bpy
 import numpy as np
@@ -19,12 +21,18 @@ from ..core.errors import RosyError
 from ..projection.camera import Camera
 from ..rendering.picture_images import picture_image
 from .blender_images import new_image
-from .camera_planes import add_camera_plane, frame_corners, pictured_cameras, remove_camera_planes
+from .camera_planes import (
+    add_camera_plane,
+    frame_corners,
+    pictured_cameras,
+    remove_camera_planes,
+    update_backdrops,
+)
 from .cameras import camera_of_object
-from .datablocks import KEY_TAG, delete_owned, rollback_on_error
+from .datablocks import KEY_TAG, rollback_on_error
 from .look_properties import read_look
 from .meshes import read_collection, vertex_positions
-from .node_builder import new_empty_material
+from .node_builder import first_node, new_empty_material
 from .read_view import scene_depsgraph
 
 #: Distance of the plane of a key from the camera, as a multiple of the distance of the near clip plane.
@@ -43,46 +51,55 @@ FOOT, INCH = 0.3048, 0.0254
 DARK_BACKGROUND = 0.18
 
 
+#: A function that returns the triangles of a text; see `text_triangles`.
+TextShapes = Callable[[str], np.ndarray]
+
+
+def update_camera_planes(scene: Scene) -> None:
+    """Replace the backdrops and the keys of a scene by the ones that its settings ask for."""
+    update_backdrops(scene)
+    update_keys(scene)
+
+
 def update_keys(scene: Scene) -> None:
     """Replace the keys of a scene by the ones that its settings ask for.
 
     If keys are switched on, a key is added for each of `pictured_cameras`. It explains the picture as it was
     baked, whatever the settings are now.
     """
-    for image in remove_camera_planes(scene, KEY_TAG):
-        delete_owned(image)
+    remove_camera_planes(scene, KEY_TAG)
     if not scene.rosy.key:
         return
-    fonts = FontShapes()
+    triangles = cache(text_triangles)
     for camera, record in pictured_cameras(scene).items():
         try:
-            _add_key(scene, camera, record, fonts)
+            _add_key(scene, camera, record, triangles)
         except RosyError:
             continue  # the camera was made panoramic after the bake
 
 
-def _add_key(scene: Scene, camera: Object, record: PropertyGroup, fonts: FontShapes) -> None:
+def _add_key(scene: Scene, camera: Object, record: PropertyGroup, triangles: TextShapes) -> None:
     """Add a plane with a key, parented to a camera. Nothing is added if the key would be empty."""
     view = camera_of_object(scene, scene_depsgraph(scene), camera)
-    picture = _draw(scene, view, record, fonts)
+    picture = _draw(scene, view, record, triangles)
     if picture is None:
         return
     name = f"RoSy Key {camera.name}"
     corners = frame_corners(view, DISTANCE * camera.data.clip_start)
     image_data = picture_image(picture, as_float=False)
-    with rollback_on_error() as created:
-        image = new_image(name, image_data)
-        created.append(image)
-        material = _new_material(name, image, scene.rosy.emission or 1.0)
-        created.append(material)
-        obj = add_camera_plane(scene, camera, name, KEY_TAG, corners, material, created)
+    with rollback_on_error() as track:
+        image = track(new_image(name, image_data))
+        material = track(_new_material(name, image, scene.rosy.emission or 1.0))
+        obj = add_camera_plane(scene, camera, name, KEY_TAG, corners, material, track)
     # With Solid shading, 3D views would draw the plane opaque, so only its bounds are drawn.
     obj.display_type = "BOUNDS"
     for probe in ("hide_probe_volume", "hide_probe_sphere", "hide_probe_plane"):
         setattr(obj, probe, True)
 
 
-def _draw(scene: Scene, view: Camera, record: PropertyGroup, fonts: FontShapes) -> Picture | None:
+def _draw(
+    scene: Scene, view: Camera, record: PropertyGroup, triangles: TextShapes
+) -> Picture | None:
     """Draw a key as a picture that fills the frame of the camera. Return None if the key would be empty."""
     settings = scene.rosy
     shrink = min(1.0, MAX_SIDE / max(view.width, view.height))
@@ -100,11 +117,15 @@ def _draw(scene: Scene, view: Camera, record: PropertyGroup, fonts: FontShapes) 
         _scale_bar(scene, view, width) if settings.key_scale else None,
         _lines(settings.key_caption),
     )
-    layout = lay_out_key(parts, (width, height), fonts.width, settings.key_size * shrink)
+
+    def width_of(text: str) -> float:
+        return float(triangles(text)[..., 0].max(initial=0.0))
+
+    layout = lay_out_key(parts, (width, height), width_of, settings.key_size * shrink)
     if not layout.plates:
         return None
     rgba = np.zeros((height, width, 4), dtype=np.float32)
-    draw_key(rgba, layout, scale, fonts.triangles, _key_colors(scene))
+    draw_key(rgba, layout, scale, triangles, _key_colors(scene))
     return Picture(rgba)
 
 
@@ -175,8 +196,7 @@ def _world_color(world: World | None) -> np.ndarray | None:
     """Return the (3,) linear color of a world; None if nodes vary it. Without a world it is black."""
     if world is None:
         return np.zeros(3, dtype=np.float32)
-    nodes = world.node_tree.nodes if world.node_tree is not None and world.use_nodes else ()
-    node = next((node for node in nodes if node.bl_idname == "ShaderNodeBackground"), None)
+    node = first_node(world.node_tree if world.use_nodes else None, "ShaderNodeBackground")
     if node is None:
         return np.array(world.color, dtype=np.float32)
     color, strength = node.inputs["Color"], node.inputs["Strength"]
@@ -209,29 +229,11 @@ def _new_material(name: str, image: Image, strength: float) -> Material:
 CURVE_RESOLUTION = 6
 
 
-class FontShapes:
-    """A cache of texts as triangles, in Blender's built-in font."""
+def text_triangles(text: str) -> np.ndarray:
+    """Return (n, 3, 2) triangles of a text of font size 1, in Blender's built-in font.
 
-    def __init__(self) -> None:
-        self._shapes: dict[str, np.ndarray] = {}
-
-    def triangles(self, text: str) -> np.ndarray:
-        """Return (n, 3, 2) triangles of a text of font size 1.
-
-        Its left end and baseline are at the origin.
-        """
-        if text not in self._shapes:
-            self._shapes[text] = _text_triangles(text)
-        return self._shapes[text]
-
-    def width(self, text: str) -> float:
-        """Return the width of a text of font size 1."""
-        triangles = self.triangles(text)
-        return float(triangles[..., 0].max()) if len(triangles) else 0.0
-
-
-def _text_triangles(text: str) -> np.ndarray:
-    """Return (n, 3, 2) triangles of a text of font size 1, moved so that the smallest x is 0."""
+    Its left end and baseline are at the origin.
+    """
     fonts = set(bpy.data.fonts)
     curve = bpy.data.curves.new("RoSy text", type="FONT")
     created: list[ID] = [curve]

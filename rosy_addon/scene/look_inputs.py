@@ -18,7 +18,7 @@ from bpy.types import Depsgraph, Image, Mesh, Object, Scene
 
 from ..compositor.look import Look, colors_values
 from ..compositor.target_tone import ReferenceRender
-from ..core.cache import Cache, content_hash
+from ..core.cache import Cache, cached, content_hash
 from ..core.color import luminance, to_linear
 from ..core.errors import RosyError
 from ..core.file_io import check_readable
@@ -137,10 +137,7 @@ def read_tone(
             return None
         values = read_uvs(mesh, owner.rosy.tone_uv_map, label)
         image = image_luminance(tone_image)
-    if cache is None:
-        return SurfaceTone(values, image)
-    key = "tone", content_hash(values, image)
-    return cache.get_or_create(key, lambda: SurfaceTone(values, image))
+    return cached(cache, lambda: SurfaceTone(values, image), "tone", values, image)
 
 
 def tone_digest(mesh: Mesh, owner: Object, tone_request: ToneRequest | None) -> bytes:
@@ -195,9 +192,7 @@ def read_color_values(
     source = f"{label}, attribute '{attribute.name}'"
     values = corner_scalars(attribute, mesh, source).astype(np.float32)
     values[~np.isfinite(values)] = np.nan
-    if cache is None:
-        return values
-    return cache.get_or_create(("color values", content_hash(values)), lambda: values)
+    return cached(cache, lambda: values, "color values", values)
 
 
 def color_values_digest(mesh: Mesh, name: str | None) -> bytes:

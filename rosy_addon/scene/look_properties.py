@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import bpy
 
 from ..compositor.flow import Drift, drift_at
 from ..compositor.look import Look
 from ..core.color import alpha_from_hex, from_hex, to_hex
 from ..core.settings import Color, Number, Numbers, Setting, settings_of
-
-if TYPE_CHECKING:
-    import bpy
 
 
 def read_look(settings: Any) -> Look:

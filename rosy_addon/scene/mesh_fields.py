@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from bpy.types import Attribute, Mesh
 
-from ..core.cache import Cache
+from ..core.cache import Cache, cached
 from ..core.errors import RosyError, RosyWarning, counted
 from ..core.progress import progress, report
 from ..field import validate
@@ -26,7 +26,6 @@ from .field_attributes import (
     DEFAULT_FIELD_NAME,
     VECTOR_TYPE,
     attribute_name,
-    cached_for_surface,
     check_attribute_type,
     describe_type,
     field_degree,
@@ -117,7 +116,7 @@ def read_mesh_field(
 
     key_parts = "attribute", domain, data_type, values, degree, source, nonfinite
     with progress(0.5, 1.0, "reading the field"):
-        return cached_for_surface(cache, surface, build, *key_parts)
+        return cached(cache, build, surface, *key_parts)
 
 
 def _field_from_directions(
@@ -157,9 +156,7 @@ def _field_from_directions(
     policy, element = validate.VectorPolicy(nonfinite), ELEMENTS[domain]
     build = partial(validate.validated_directions, surface, directions, source, policy, element)
     with progress(0.0, 1.0, "reading the field"):
-        return cached_for_surface(
-            cache, surface, build, "directions", directions, source, *policy, element
-        )
+        return cached(cache, build, surface, "directions", directions, source, *policy, element)
 
 
 def _field_from_angles(
@@ -262,7 +259,7 @@ def _default_name(mesh: Mesh, form: str) -> str:
 
 def write_mesh_field(
     mesh: Mesh, field: RosyField, name: str = DEFAULT_FIELD_NAME, form: str = "VECTOR"
-) -> Attribute:
+) -> None:
     """Store a field on a mesh. An existing field in an attribute with the same name is replaced.
 
     Parameters
@@ -276,11 +273,6 @@ def write_mesh_field(
         "DIRECTIONS". A vector attribute with the name `name` is removed then, because it would be read
         instead of the directions. If a RoSy field is stored as "DIRECTIONS", such an attribute is kept.
 
-    Returns
-    -------
-    bpy.types.Attribute
-        The attribute of the field; for "DIRECTIONS", the first one.
-
     Raises
     ------
     RosyError
@@ -292,13 +284,11 @@ def write_mesh_field(
     --------
     read_mesh_field : The inverse.
     """
-    name = name or DEFAULT_FIELD_NAME
-    _check_storable(mesh, field, name, form)
-    return _store(mesh, field, name, form)
+    assign_fields({mesh: field}, name or DEFAULT_FIELD_NAME, form)
 
 
-def _store(mesh: Mesh, field: RosyField, name: str, form: str) -> Attribute:
-    """Store a field that `_check_storable` has checked. Return its attribute, or the first of several."""
+def _store(mesh: Mesh, field: RosyField, name: str, form: str) -> None:
+    """Store a field that `_check_storable` has checked."""
     if form == "DIRECTIONS" or field.direction_ratios is not None:
         attribute = _write_directions(mesh, field, name)
     elif form == "ANGLE":
@@ -308,16 +298,14 @@ def _store(mesh: Mesh, field: RosyField, name: str, form: str) -> Attribute:
         attribute = store_attribute(mesh, name, ANGLE_TYPE, angle)
     else:
         attribute = store_attribute(mesh, name, VECTOR_TYPE, field.vectors)
+    stored_name = attribute.name
     if attribute.data_type == VECTOR_TYPE:
-        stored_name = attribute.name
         store_rest_shape(mesh, stored_name)
-        attribute = mesh.attributes[stored_name]  # other new attributes may have moved it in memory
     if has_rosy_properties():
         mesh.rosy.degree = field.degree
-        if attribute.name == name:
+        if stored_name == name:
             mesh.rosy.attribute = name
     mesh.update()
-    return attribute
 
 
 def overwrite_vectors(mesh: Mesh, vectors: np.ndarray) -> np.ndarray:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 
 import bpy
 import numpy as np
 from bpy.types import Attribute, Mesh, Object, bpy_prop_collection
 
-from ..core.cache import Cache, content_hash
+from ..core.cache import Cache, cached, content_hash
 from ..core.errors import NoFeaturesError, RosyError
 from ..core.progress import progress
 from ..field.connectivity import smooth_fans
@@ -76,24 +77,18 @@ def mesh_surface(
     if occluder_only:
         topology["flat_faces"] = np.ones(len(mesh.polygons), dtype=bool)
 
-    def build_fans() -> np.ndarray:
-        return smooth_fans(vertices, **topology)
-
     def build() -> Surface:
         with progress(0.0, 0.7):
-            if cache is None:
-                fans = build_fans()
-            else:  # by the topology alone, which a deformation does not change
-                fans = cache.get_or_create(("fans", content_hash(*topology.values())), build_fans)
+            # Cached by the topology alone, which a deformation does not change.
+            build_fans = partial(smooth_fans, vertices, **topology)
+            fans = cached(cache, build_fans, "fans", *topology.values())
         parts = {**topology, **_triangles(mesh), "corner_fan": fans}
         parts["corner_normal"] = _corner_normals(mesh) if custom_normals is None else custom_normals
         with progress(0.7, 1.0):
             return build_surface(vertices, name=name, **parts)
 
-    if cache is None:
-        return build()
-    shape_hash = content_hash(vertices, *topology.values(), custom_normals)
-    return cache.get_or_create(("surface", name, occluder_only, shape_hash), build)
+    shape = vertices, *topology.values(), custom_normals
+    return cached(cache, build, "surface", name, occluder_only, *shape)
 
 
 def no_faces_error(mesh: Mesh, name: str) -> RosyError:

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import bpy
 import numpy as np
 from bpy.types import Image, Material, Node, NodeSocket, NodeTree
+
+
+def first_node(tree: NodeTree | None, kind: str) -> Node | None:
+    """Return the first node of a type in a node tree; None if there is none, or no tree."""
+    nodes = () if tree is None else tree.nodes
+    return next((node for node in nodes if node.bl_idname == kind), None)
 
 
 class NodeBuilder:
@@ -96,6 +102,11 @@ def enabled_output(node: Node) -> NodeSocket:
     return next(socket for socket in node.outputs if socket.enabled)
 
 
+def _operator(operation: str) -> Callable[[Number, Number | float], Number]:
+    """Return the method of a number that combines it with another one by a math node."""
+    return lambda number, other: number._math(operation, number, other)
+
+
 class Number:
     """A number that nodes compute. Arithmetic with it adds math nodes to the tree.
 
@@ -112,37 +123,21 @@ class Number:
         sockets = [value.socket if isinstance(value, Number) else value for value in values]
         return Number(self.build, self.build.math(operation, *sockets))
 
-    def __add__(self, other: Number | float) -> Number:
-        return self._math("ADD", self, other)
-
-    def __sub__(self, other: Number | float) -> Number:
-        return self._math("SUBTRACT", self, other)
+    __add__ = _operator("ADD")
+    __sub__ = _operator("SUBTRACT")
+    __mul__ = _operator("MULTIPLY")
+    __truediv__ = _operator("DIVIDE")
+    __pow__ = _operator("POWER")
+    __gt__ = _operator("GREATER_THAN")
 
     def __rsub__(self, other: float) -> Number:
         return self._math("SUBTRACT", other, self)
 
-    def __mul__(self, other: Number | float) -> Number:
-        return self._math("MULTIPLY", self, other)
-
-    def __truediv__(self, other: Number | float) -> Number:
-        return self._math("DIVIDE", self, other)
-
     def __rtruediv__(self, other: float) -> Number:
         return self._math("DIVIDE", other, self)
 
-    def __pow__(self, other: Number | float) -> Number:
-        return self._math("POWER", self, other)
-
-    def __gt__(self, other: Number | float) -> Number:
-        return self._math("GREATER_THAN", self, other)
-
-    def at_least(self, other: Number | float) -> Number:
-        """Return the larger of this number and another."""
-        return self._math("MAXIMUM", self, other)
-
-    def at_most(self, other: Number | float) -> Number:
-        """Return the smaller of this number and another."""
-        return self._math("MINIMUM", self, other)
+    #: The larger, and the smaller, of this number and another.
+    at_least, at_most = _operator("MAXIMUM"), _operator("MINIMUM")
 
     def square_root(self) -> Number:
         """Return the square root of this number, which must not be negative."""

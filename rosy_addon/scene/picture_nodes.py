@@ -16,9 +16,9 @@ from bpy.types import ID, Image, Material, Mesh, Node, NodeTree, Object
 
 from ..projection.camera import Camera
 from ..rendering.picture_images import NEUTRAL_GRAY
-from .datablocks import KEY_TAG, OWNED_TAG, is_editable, rosy_modifiers
+from .datablocks import KEY_TAG, OWNED_TAG, Track, is_editable, rosy_modifiers
 from .meshes import read_attribute
-from .node_builder import NodeBuilder, new_empty_material, new_modifier_group
+from .node_builder import NodeBuilder, first_node, new_empty_material, new_modifier_group
 from .texture_nodes import Hatching, hatching_shader
 
 #: Name of the modifier that shows a picture.
@@ -69,7 +69,7 @@ class OutputSettings:
 def new_material(
     image: Image,
     camera: Camera,
-    created: list[ID],
+    track: Track,
     settings: OutputSettings,
     hatching: Hatching | None = None,
 ) -> Material:
@@ -88,14 +88,14 @@ def new_material(
         The picture. The material gets the name of this image.
     camera : Camera
         The camera from which the picture was drawn.
-    created : list of bpy.types.ID
-        The new datablocks are appended; see `datablocks.rollback_on_error`.
+    track : function
+        Called with each new datablock; see `datablocks.rollback_on_error`.
     settings : OutputSettings
     hatching : Hatching, optional
         How hatching is drawn. Given if the image has thresholds of ink instead of colors.
     """
     material, build = new_empty_material(image.name)
-    created.append(material)
+    track(material)
     is_inside = None
     if settings.window_coordinates:
         coordinates = build("ShaderNodeTexCoord").outputs["Window"]
@@ -110,7 +110,7 @@ def new_material(
         is_inside = build.math("LESS_THAN", max_abs_xy, w)
     image_node = build.frame_image(image, coordinates)
     if hatching is not None:
-        shader = hatching_shader(build, image_node, hatching, created)
+        shader = hatching_shader(build, image_node, hatching, track)
         if is_inside is not None:
             outside = build("ShaderNodeEmission", {"Color": _OUTSIDE_COLOR})
             shader = build.mix_shaders(is_inside, outside.outputs["Emission"], shader)
@@ -133,12 +133,10 @@ def set_sequence_frames(material: Material, first: int, last: int) -> None:
 
     `first` and `last` are the numbers of the first and the last file.
     """
-    for node in material.node_tree.nodes:
-        if node.bl_idname == "ShaderNodeTexImage":
-            image_user = node.image_user
-            image_user.frame_start, image_user.frame_offset = first, first - 1
-            image_user.frame_duration = last - first + 1
-            image_user.use_auto_refresh = True
+    image_user = image_node(material).image_user
+    image_user.frame_start, image_user.frame_offset = first, first - 1
+    image_user.frame_duration = last - first + 1
+    image_user.use_auto_refresh = True
 
 
 def _clip_position(build: NodeBuilder, view_projection: np.ndarray) -> Node:
@@ -206,16 +204,13 @@ def projections_of_group(group: NodeTree) -> dict[Material, np.ndarray | None]:
 
 def material_of_group(group: NodeTree) -> Material | None:
     """Return the material that a node group of `new_group` assigns; None if it assigns none."""
-    for node in group.nodes:
-        if node.bl_idname == "GeometryNodeSetMaterial":
-            return node.inputs["Material"].default_value
-    return None
+    node = first_node(group, "GeometryNodeSetMaterial")
+    return None if node is None else node.inputs["Material"].default_value
 
 
 def image_node(material: Material) -> Node | None:
     """Return the image texture node of a material that shows a picture; None if there is none."""
-    nodes = material.node_tree.nodes if material.node_tree is not None else ()
-    return next((node for node in nodes if node.bl_idname == "ShaderNodeTexImage"), None)
+    return first_node(material.node_tree, "ShaderNodeTexImage")
 
 
 def set_picture_modifier(

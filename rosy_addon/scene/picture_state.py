@@ -174,12 +174,9 @@ class SceneState:
         if is_relit:
             look = unlit_look(look)
         settings = applied_settings(look, self._lacks_tone)
-        output = {name: getattr(scene.rosy, name) for name in OUTPUT_PROPERTIES}
-        output["relight"] = is_relit
+        output = _used_output(scene.rosy, OUTPUT_PROPERTIES) | {"relight": is_relit}
         if is_frame:
             del output["placement"]  # frames always fill the frame of the camera
-        if output["store"] == "PACKED":
-            del output["directory"]
         occluders = self._relevant_occluders(camera, settings["shadows"])
         has_reference = settings["tone"] == "picture"
         return PictureState(
@@ -290,9 +287,6 @@ def read_texture_state(scene: Scene, depsgraph: Depsgraph, obj: Object) -> Pictu
                 uv_parts.append(read_uvs(evaluated, obj.rosy.texture_uv_map, obj.name))
             except RosyError as error:
                 uv_parts.append(str(error))
-    output = {name: getattr(settings, name) for name in TEXTURE_OUTPUT}
-    if output["store"] == "PACKED":
-        del output["directory"]
     if settings.texture_content == "LOOK":
         names = [name for name in TEXTURE_SETTINGS if settings_of(Look)[name].applies(look)]
     else:
@@ -304,13 +298,19 @@ def read_texture_state(scene: Scene, depsgraph: Depsgraph, obj: Object) -> Pictu
         look={name: getattr(look, name) for name in names},
         size=[settings.texture_size, settings.texture_size],
         camera=digest(*uv_parts),
-        output=output,
+        output=_used_output(settings, TEXTURE_OUTPUT),
         device="cpu",
         objects={obj.name_full: [place, digest(*shape)]},
         occluders={},
         lights=lights,
         reference="",
     )
+
+
+def _used_output(settings: PropertyGroup, names: Iterable[str]) -> dict:
+    """Return settings of a scene by name, without the folder if pictures are packed."""
+    is_packed = settings.store == "PACKED"
+    return {name: getattr(settings, name) for name in names if name != "directory" or not is_packed}
 
 
 def _uses_lights(look: Look) -> bool:

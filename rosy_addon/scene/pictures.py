@@ -17,7 +17,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from bpy.types import ID, Image, Material, NodeTree, Object, Scene
+from bpy.types import Image, Material, NodeTree, Object, Scene
 
 from ..annotation.key_contents import PictureKey
 from ..compositor.picture import Picture
@@ -85,16 +85,12 @@ class ImageSequence:
         File of the first frame.
     first, last : int
         Frame numbers, both included.
-    width, height : int
-        Pixels.
     """
 
     name: str
     path: Path
     first: int
     last: int
-    width: int
-    height: int
 
 
 def read_output_settings(scene: Scene, folder: Path | None = None) -> OutputSettings:
@@ -186,12 +182,11 @@ def apply_picture(
         texture_nodes.Hatching(view.look, picture.line_count) if view.draws_thresholds else None
     )
     name, stem = f"{NAME_PREFIX}{camera.name}", _image_stem(settings, camera.name)
-    with datablocks.rollback_on_error() as created:
-        image = new_image(name, image_data, is_color=hatching is None, stem=stem)
-        created.append(image)
-        material = picture_nodes.new_material(image, camera, created, settings, hatching)
+    with datablocks.rollback_on_error() as track:
+        image = track(new_image(name, image_data, is_color=hatching is None, stem=stem))
+        material = picture_nodes.new_material(image, camera, track, settings, hatching)
         matrices = _object_to_clip_matrices(scene_data, camera)
-        node_groups = _new_groups(material, matrices, created)
+        node_groups = _new_groups(material, matrices, track)
     size, key = image_size(image_data), picture_key(view.look, picture)
     store_record(scene, camera.name, image, material, source, {None: state}, size=size, key=key)
     _show_on_objects(node_groups)
@@ -229,13 +224,12 @@ def apply_sequence(
         Contents of the key (legend) of the pictures.
     """
     settings = replace(settings, window_coordinates=True)
-    with datablocks.rollback_on_error() as created:
-        image = load_sequence(sequence.path, settings.as_float)
-        created.append(image)
+    with datablocks.rollback_on_error() as track:
+        image = track(load_sequence(sequence.path, settings.as_float))
         image.name = f"{NAME_PREFIX}{sequence.name}"
-        material = picture_nodes.new_material(image, camera, created, settings)
+        material = picture_nodes.new_material(image, camera, track, settings)
         picture_nodes.set_sequence_frames(material, sequence.first, sequence.last)
-        node_groups = _new_groups(material, dict.fromkeys(scene_data.objects), created)
+        node_groups = _new_groups(material, dict.fromkeys(scene_data.objects), track)
     store_record(
         scene,
         sequence.name,
@@ -243,7 +237,7 @@ def apply_sequence(
         material,
         source,
         states,
-        size=(sequence.width, sequence.height),
+        size=(camera.width, camera.height),
         key=key,
         frame_range=f"{sequence.first} to {sequence.last}",
     )
@@ -294,17 +288,15 @@ def apply_texture(
     first = next(iter(tiles.values()))
     is_color = content == "look" and hatching is None
     create, image_data = (new_tiled_image, tiles) if is_udim else (new_image, first)
-    with datablocks.rollback_on_error() as created:
-        image = create(name, image_data, is_color=is_color, stem=stem)
-        created.append(image)
+    with datablocks.rollback_on_error() as track:
+        image = track(create(name, image_data, is_color=is_color, stem=stem))
         add_shader = texture_nodes.color_shader
         if content == "anisotropy":
             add_shader = partial(texture_nodes.brushed_metal_shader, uv_map=uv_map)
         elif hatching is not None:
-            add_shader = partial(texture_nodes.hatching_shader, hatching=hatching, created=created)
-        material = texture_nodes.new_texture_material(name, image, uv_map, add_shader)
-        created.append(material)
-        node_groups = _new_groups(material, {obj: None}, created)
+            add_shader = partial(texture_nodes.hatching_shader, hatching=hatching, track=track)
+        material = track(texture_nodes.new_texture_material(name, image, uv_map, add_shader))
+        node_groups = _new_groups(material, {obj: None}, track)
     size = image_size(first)
     store_record(scene, obj.name, image, material, obj, {None: state}, size=size, is_texture=True)
     # The object can still show its pictures, but no longer an earlier texture.
@@ -318,14 +310,13 @@ def _image_stem(settings: OutputSettings, name: str, kind: str = "camera") -> Pa
 
 
 def _new_groups(
-    material: Material, matrices: Mapping[Object, np.ndarray | None], created: list[ID]
+    material: Material, matrices: Mapping[Object, np.ndarray | None], track: datablocks.Track
 ) -> dict[Object, NodeTree]:
     """Create the node groups that show a picture on objects; see `new_group`."""
-    node_groups = {}
-    for obj, matrix in matrices.items():
-        node_groups[obj] = new_group(f"RoSy {obj.name}", material, matrix)
-        created.append(node_groups[obj])
-    return node_groups
+    return {
+        obj: track(new_group(f"RoSy {obj.name}", material, matrix))
+        for obj, matrix in matrices.items()
+    }
 
 
 def _show_on_objects(node_groups: Mapping[Object, NodeTree], *, keep_textures: bool = True) -> None:

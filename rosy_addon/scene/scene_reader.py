@@ -19,7 +19,7 @@ import bpy
 import numpy as np
 from bpy.types import Depsgraph, Mesh, Object
 
-from ..core.cache import Cache
+from ..core.cache import Cache, cached
 from ..core.errors import REPORTED_ERRORS, RosyError
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface, have_same_polygons
@@ -35,7 +35,7 @@ from .evaluated_field import (
     temp_attributes,
     topology_hash,
 )
-from .field_attributes import attribute_name, cached_for_surface, field_degree, is_face_vector_field
+from .field_attributes import attribute_name, field_degree, is_face_vector_field
 from .mesh_fields import read_mesh_field
 from .mesh_states import MeshStates, mesh_state_key, read_mesh_state
 from .meshes import REST_ATTRIBUTE, evaluated_mesh, mesh_surface, read_attribute
@@ -220,24 +220,24 @@ class SceneReader:
         # MAX_ATTEMPTS.
         self._attempts: dict[str, int] = {}
 
-    def invalidate(self, names: set[str] | None = None, *, topology_changed: bool = True) -> None:
+    def invalidate(self, names: set[str], *, topology_changed: bool = True) -> None:
         """Mark objects as changed, so that the next call of `read` reads them again.
 
         Parameters
         ----------
-        names : set of str, optional
-            Full names of the changed objects. By default all objects.
+        names : set of str
+            Full names of the changed objects.
         topology_changed : bool
             Whether faces or fields may have changed. False: only positions of vertices have changed.
         """
-        for key in [key for key in self._meshes if names is None or key[0] in names]:
+        for key in [key for key in self._meshes if key[0] in names]:
             del self._meshes[key]
-        for key in [key for key in self._topologies if names is None or key[0] in names]:
+        for key in [key for key in self._topologies if key[0] in names]:
             if topology_changed or isinstance(self._topologies[key], Exception):
                 del self._topologies[key]
-        for by_name in (self._attempts, self.errors):
-            for name in [name for name in by_name if names is None or name in names]:
-                del by_name[name]
+        for name in names:
+            self._attempts.pop(name, None)
+            self.errors.pop(name, None)
 
     def read(
         self,
@@ -461,4 +461,4 @@ class SceneReader:
             return surface
         rest = np.asarray(rest, dtype=np.float64)
         with_rest = partial(surface.with_parts, rest_vertices=rest)
-        return cached_for_surface(self.cache, surface, with_rest, "rest", rest)
+        return cached(self.cache, with_rest, surface, "rest", rest)

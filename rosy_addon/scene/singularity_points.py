@@ -168,11 +168,10 @@ def read_singularity_points(
     own_points = next(iter(_point_objects(scene, obj)), None)
     source = scene.objects.get(name) if name else own_points
     if source is None:
-        missing = f"object '{obj.name}': has no points"
-        if name:
-            missing = f"object '{name}' is not in this scene"
+        is_missing = f"'{name}' is not in this scene" if name else f"'{obj.name}': has no points"
         raise RosyError(
-            f"{missing}: press Singularities to get points, then move them and change their index"
+            f"object {is_missing}: press Singularities to get points, then move them and change their "
+            "index"
         )
     index = None
     if has_points(source):

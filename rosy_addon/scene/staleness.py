@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import atexit
 import time
-from typing import Any
 
 import bpy
 
+from .app_handlers import add_handlers, remove_handlers
 from .picture_state import MeshStates, PictureState, SceneState, settings_key
 
 #: Digests of objects or lights by name, as in the attributes of `PictureState`.
@@ -45,6 +45,7 @@ class SceneStateCache:
         self._key: tuple | None = None
         self._is_outdated = True
         self._next_reading = 0.0
+        self._handlers = dict.fromkeys(_WATCHED_EVENTS, self.note_changes)
 
     def get(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> SceneState:
         """Return the state of the view layer of a depsgraph.
@@ -57,7 +58,8 @@ class SceneStateCache:
         if key != self._key or not self._is_watching():
             self.clear()
             self._key = key
-            self._watch()
+            add_handlers(self._handlers)
+            atexit.register(self.clear)  # Blender's Python module requires that no handler is left
         is_due = self._is_outdated and time.monotonic() >= self._next_reading
         if self._scene_state is None or is_due:
             start = time.monotonic()
@@ -72,7 +74,9 @@ class SceneStateCache:
         is_behind = self._is_watching() and self._is_outdated
         return max(self._next_reading - time.monotonic(), 0.01) if is_behind else 0.0
 
-    def note_changes(self, depsgraph: bpy.types.Depsgraph | None) -> None:
+    def note_changes(
+        self, _scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None
+    ) -> None:
         """Forget the states of meshes that have changed. If there is no depsgraph, all may have changed."""
         self._is_outdated = True
         if depsgraph is None:
@@ -90,33 +94,16 @@ class SceneStateCache:
         """Forget everything, and remove the handlers."""
         self._mesh_states.clear()
         self._scene_state, self._key, self._is_outdated = None, None, True
-        if self._is_watching():
-            for name in _WATCHED_EVENTS:
-                getattr(bpy.app.handlers, name).remove(_note_changes)
+        remove_handlers(self._handlers)
         atexit.unregister(self.clear)
 
-    def _watch(self) -> None:
-        """Add the handlers. They are removed when Python exits, as Blender's Python module requires."""
-        for name in _WATCHED_EVENTS:
-            getattr(bpy.app.handlers, name).append(_note_changes)
-        atexit.register(self.clear)
-
-    @staticmethod
-    def _is_watching() -> bool:
+    def _is_watching(self) -> bool:
         """Return whether the handlers exist. Blender removes them when it loads a file."""
-        return _note_changes in bpy.app.handlers.depsgraph_update_post
+        return self.note_changes in bpy.app.handlers.depsgraph_update_post
 
 
 #: The cache that all panels of this Blender process share. It is cleared by `unregister`.
 SCENE_STATES = SceneStateCache()
-
-
-def _note_changes(_scene: Any, depsgraph: bpy.types.Depsgraph | None = None) -> None:
-    """Note changes of a depsgraph: the handler of all `_WATCHED_EVENTS`.
-
-    After an undo there is no depsgraph.
-    """
-    SCENE_STATES.note_changes(depsgraph)
 
 
 def difference(recorded: PictureState, present: PictureState, source: str) -> str:

@@ -20,8 +20,8 @@ from .datablocks import OWNED_TAG, STROKES_TAG
 from .meshes import write_attribute
 from .node_builder import NodeBuilder, enabled_output, new_emissive_material, new_modifier_group
 
-#: A function that is called with each new datablock and the name that it should have.
-RegisterDatablock = Callable[[ID, str], None]
+#: A function that is called with each new datablock and the name that it should have. It returns the datablock.
+RegisterDatablock = Callable[[Any, str], Any]
 
 #: Name of the attribute of curves with the color of their family of strokes, linear RGBA.
 INK_ATTRIBUTE = "ink"
@@ -42,8 +42,7 @@ def new_curves(name: str, geometry: StrokeGeometry, frame: int, register: Regist
     register : callable
         Called with each new datablock and its name.
     """
-    data = bpy.data.hair_curves.new(name)
-    register(data, name)
+    data = register(bpy.data.hair_curves.new(name), name)
     strokes = geometry.strokes
     data.add_curves(np.diff(strokes.start).tolist())
     colors = np.array([[*to_linear(from_hex(color)), 1.0] for color in geometry.colors])
@@ -67,9 +66,7 @@ def new_curves(name: str, geometry: StrokeGeometry, frame: int, register: Regist
         weights, height = geometry.attachment.weights, geometry.attachment.height
         set_attribute(data, WEIGHTS_ATTRIBUTE, "FLOAT_VECTOR", "POINT", weights)
         set_attribute(data, HEIGHT_ATTRIBUTE, "FLOAT", "POINT", height)
-    material = new_emissive_material(name, INK_ATTRIBUTE)
-    register(material, name)
-    data.materials.append(material)
+    data.materials.append(register(new_emissive_material(name, INK_ATTRIBUTE), name))
     return data
 
 
@@ -110,8 +107,7 @@ def new_grease_pencil(
         Called with each new datablock and its name.
     """
     collection = getattr(bpy.data, "grease_pencils_v3", bpy.data.grease_pencils)
-    data = collection.new(name)
-    register(data, name)
+    data = register(collection.new(name), name)
     data.stroke_depth_order = "3D"
     add_strokes = _add_to_drawing if has_grease_pencil_drawings() else _add_to_frame
     strokes = geometry.strokes
@@ -120,9 +116,8 @@ def new_grease_pencil(
     ]
     for material_index, layer_name in enumerate(dict.fromkeys(layer_names)):
         color = geometry.colors[layer_names.index(layer_name)]
-        material = _new_material(f"RoSy {layer_name}", color)
-        register(material, f"RoSy {layer_name}")
-        data.materials.append(material)
+        material_name = f"RoSy {layer_name}"
+        data.materials.append(register(_new_material(material_name, color), material_name))
         layer = data.layers.new(layer_name)
         layer.use_lights = False
         stroke_mask = (np.array(layer_names) == layer_name)[strokes.family]

@@ -116,18 +116,17 @@ def store_strokes(
     """
     name, first_frame = f"RoSy Strokes {camera}", min(scene.frame_start, scene.frame_current)
     final_names: dict[ID, str] = {}
-    with rollback_on_error() as created:
+    with rollback_on_error() as track:
 
-        def register(datablock: ID, final_name: str) -> None:
-            created.append(datablock)
+        def register(datablock: ID, final_name: str) -> ID:
             final_names[datablock] = final_name
+            return track(datablock)
 
         data = DATA_BUILDERS[kind](name, geometry, first_frame, register)
         record = _find_record(scene, kind, camera)
         obj = None if record is None else record.thing
         if obj is None:
-            obj = bpy.data.objects.new(name, data)
-            created.append(obj)
+            obj = track(bpy.data.objects.new(name, data))
             is_usable = collection is not None and is_editable(collection)
             (collection if is_usable else scene.collection).objects.link(obj)
             obj.visible_shadow = False
@@ -161,8 +160,7 @@ def remove_strokes(scene: Scene) -> int:
     """
     objects = stroke_objects(scene)
     for record in scene.rosy.strokes.made:
-        if record.thing is not None:
-            _delete_object(record.thing)
+        _delete_object(record.thing)
     scene.rosy.strokes.made.clear()
     return len(objects)
 
@@ -191,19 +189,20 @@ def _store_record(scene: Scene, kind: str, camera: str, obj: Object) -> None:
     records = scene.rosy.strokes.made
     for index in reversed(range(len(records))):
         record = records[index]
-        if record.thing is None or record.thing.name not in scene.objects:
-            if record.thing is not None:
-                _delete_object(record.thing)
-            records.remove(index)
-        elif (record.kind, record.name) == (kind, camera):
+        is_gone = record.thing is None or record.thing.name not in scene.objects
+        if is_gone:
+            _delete_object(record.thing)
+        if is_gone or (record.kind, record.name) == (kind, camera):
             records.remove(index)
     record = records.add()
     record.name, record.kind, record.thing = camera, kind, obj
     record.digest = _digest(obj.data)
 
 
-def _delete_object(obj: Object) -> None:
+def _delete_object(obj: Object | None) -> None:
     """Delete an object with strokes, and its data if RoSy created them and nothing else uses them."""
+    if obj is None:
+        return
     data = obj.data
     stroke_data.stop_following(obj)
     bpy.data.objects.remove(obj)

@@ -6,10 +6,11 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from bpy.types import ID, Image, Material, Node, NodeSocket
+from bpy.types import Image, Material, Node, NodeSocket
 
 from ..compositor.look import Look
 from ..core.color import alpha_from_hex
+from .datablocks import Track
 from .hatching_nodes import hatching_group, set_hatching_look
 from .node_builder import NodeBuilder, new_empty_material
 
@@ -61,7 +62,7 @@ def color_shader(build: NodeBuilder, image_node: Node) -> NodeSocket:
 
 
 def hatching_shader(
-    build: NodeBuilder, image_node: Node, hatching: Hatching, created: list[ID]
+    build: NodeBuilder, image_node: Node, hatching: Hatching, track: Track
 ) -> NodeSocket:
     """Add nodes that draw hatching from an image of thresholds. The darker the surface, the denser it is.
 
@@ -74,8 +75,8 @@ def hatching_shader(
     image_node : bpy.types.Node
         Image texture node with the thresholds; see `compositor.ink_thresholds`.
     hatching : Hatching
-    created : list of bpy.types.ID
-        The node group of hatching is appended if it is new; see `datablocks.rollback_on_error`.
+    track : function
+        Called with the node group of hatching if it is new; see `datablocks.rollback_on_error`.
 
     Returns
     -------
@@ -95,7 +96,7 @@ def hatching_shader(
     tone = build.mix("FLOAT", 0.0, occlusion.outputs["AO"], luminance.outputs["Val"])
     build.connect(light.outputs["Alpha"], tone.node.inputs["Factor"])
     inputs = {"Thresholds": image_color, "Spread": image_node.outputs["Alpha"], "Tone": tone}
-    ink = build("ShaderNodeGroup", inputs, node_tree=hatching_group(created))
+    ink = build("ShaderNodeGroup", inputs, node_tree=hatching_group(track))
     set_hatching_look(ink, look, hatching.line_count)
     paper_alpha = alpha_from_hex(look.paper_color)
     color = ink.outputs["Color" if paper_alpha == 1 else "Ink"]

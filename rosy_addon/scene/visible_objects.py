@@ -54,17 +54,13 @@ def rendered_instances(depsgraph: Depsgraph, targets: Collection[Object]) -> Ins
 
 
 def shown_instances(depsgraph: Depsgraph, *, include_occluders: bool) -> Instances:
-    """Return the instances of meshes that are visible in 3D views: all, or only meshes with a field."""
-    meshes = (
-        (instance, _draws_field(instance.object.original))
-        for instance in depsgraph.object_instances
-        if instance.object.type == "MESH" and instance.show_self
-    )
-    return (
-        (instance, draws_field)
-        for instance, draws_field in meshes
-        if draws_field or (include_occluders and not instance.object.original.get(OWNED_TAG))
-    )
+    """Yield the instances of meshes that are visible in 3D views: all, or only meshes with a field."""
+    for instance in depsgraph.object_instances:
+        if instance.object.type == "MESH" and instance.show_self:
+            obj = instance.object.original
+            draws_field = _draws_field(obj)
+            if draws_field or (include_occluders and not obj.get(OWNED_TAG)):
+                yield instance, draws_field
 
 
 def _is_rendered(instance: DepsgraphObjectInstance, visible_objects: set[Object]) -> bool:

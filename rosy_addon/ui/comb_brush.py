@@ -26,9 +26,8 @@ DASH_WIDTH = 1.5
 
 def draw_settings(layout: UILayout, settings: Any) -> None:
     """Draw the settings that the operator and the tool have in common, in a panel."""
-    layout.prop(settings, "exact")
-    layout.prop(settings, "reach")
-    layout.prop(settings, "front_faces")
+    for name in ("exact", "reach", "front_faces"):
+        layout.prop(settings, name)
     layout.row(heading="Mirror").prop(settings, "mirror", toggle=True, text="")
 
 

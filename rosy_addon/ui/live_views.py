@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 import bpy
 from bpy.app.handlers import persistent
 
 from ..core.errors import RosyError
+from ..scene.app_handlers import add_handlers, remove_handlers
 from ..viewport import session
-from ..viewport.app_handlers import add_handlers, remove_handlers
 from .preferences import addon_preferences
 
 #: Scenes, by `session_uid`, in which the user has switched a live view off.
@@ -32,12 +33,11 @@ def start_with_first_field(context: bpy.types.Context) -> None:
     DeviceError
         If there is no graphics context.
     """
-    space, preferences = context.space_data, addon_preferences(context)
+    space = context.space_data
     if bpy.app.background or space is None or space.type != "VIEW_3D":
         return
-    if context.scene.session_uid in _declined_scenes:
-        return
-    if preferences is not None and preferences.live_first_field:
+    is_declined = context.scene.session_uid in _declined_scenes
+    if not is_declined and getattr(addon_preferences(context), "live_first_field", False):
         session.start(space)
 
 
@@ -58,20 +58,16 @@ def _save_live_views(*_: Any) -> None:
 @persistent
 def _restore_live_views(*_: Any) -> None:
     """After a file is loaded, make those views live that were live when it was saved."""
-    for window in bpy.context.window_manager.windows:
-        settings = window.scene.rosy
-        if not settings.remember_live:
-            continue
-        for line in settings.live_views.splitlines():
-            index, screen_name = line.split(" ", 1)
-            screen = bpy.data.screens.get(screen_name)
-            areas = screen.areas[int(index) : int(index) + 1] if screen is not None else ()
-            for area in areas:
-                if area.type == "VIEW_3D":
-                    try:
+    with suppress(RosyError):  # the graphics card can no longer be used
+        for window in bpy.context.window_manager.windows:
+            settings = window.scene.rosy
+            for line in settings.live_views.splitlines() if settings.remember_live else ():
+                index, screen_name = line.split(" ", 1)
+                screen = bpy.data.screens.get(screen_name)
+                areas = screen.areas[int(index) : int(index) + 1] if screen is not None else ()
+                for area in areas:
+                    if area.type == "VIEW_3D":
                         session.start(area.spaces.active)
-                    except RosyError:
-                        return  # the graphics card can no longer be used
 
 
 #: Handlers of Blender's events, by the names of their lists in `bpy.app.handlers`.

@@ -85,8 +85,8 @@ class VIEW3D_MT_rosy_presets(Menu):
     def draw(self, context: Context) -> None:
         layout, settings = self.layout, context.scene.rosy
         entry = preset_library.active_entry(settings)
-        row = layout.row()
-        row.enabled = entry is not None and preset_library.is_changed(settings)
+        is_changed = entry is not None and preset_library.is_changed(settings)
+        row = sidebar.new_row(layout, enabled=is_changed)
         button = row.operator("rosy.preset_apply", text="Reset to Preset", icon="LOOP_BACK")
         button.preset = settings.preset_name
         layout.separator()
@@ -97,8 +97,7 @@ class VIEW3D_MT_rosy_presets(Menu):
         column.operator("rosy.preset_remove", text="Delete...", icon="TRASH")
         layout.separator()
         layout.operator("rosy.preset_import", text="Import...", icon="IMPORT")
-        row = layout.row()
-        row.enabled = entry is not None
+        row = sidebar.new_row(layout, enabled=entry is not None)
         row.operator("rosy.preset_export", text="Export...", icon="EXPORT")
         for error in preset_library.load_errors():
             layout.label(text=as_sentence(error), icon="ERROR")
@@ -139,9 +138,7 @@ def _make_settings_panel(
                 _draw_tone_source(column, context)
         unused = _unused_output(settings)
         for name in names:
-            row = column.row()
-            row.active = name not in unused
-            row.prop(settings, name)
+            sidebar.new_row(column, active=name not in unused).prop(settings, name)
             if name == "relight" and name not in unused and settings.relight:
                 sidebar.draw_cycles_hint(column, context)
         if "tone" in look_names:
@@ -175,9 +172,7 @@ def _draw_setting(column: UILayout, look: PropertyGroup, setting: Setting) -> No
         column.prop(look, setting.name, text=label)
         return
     split = column.split(factor=LONG_LABEL_FACTOR)
-    label_row = split.row()
-    label_row.alignment = "RIGHT"
-    label_row.label(text=label)
+    sidebar.new_row(split, alignment="RIGHT").label(text=label)
     split.use_property_split = False
     split.prop(look, setting.name, text="")
 
@@ -207,8 +202,7 @@ def _draw_tone_source(column: UILayout, context: Context) -> None:
         owner = settings if hasattr(settings, name) else getattr(mesh_object, "rosy", None)
         if owner is None:
             continue
-        row = column.row()
-        row.active = settings.look.tone == source
+        row = sidebar.new_row(column, active=settings.look.tone == source)
         if name == "tone_image":
             row.template_ID(owner, name, open="image.open", text="Image")
         else:
@@ -233,9 +227,7 @@ class VIEW3D_PT_rosy_look_key(sidebar.SidebarPanel, Panel):
         for part, names in KEY_PARTS.items():
             column.prop(settings, part)
             for name in names:
-                row = column.row()
-                row.active = getattr(settings, part)
-                row.prop(settings, name)
+                sidebar.new_row(column, active=getattr(settings, part)).prop(settings, name)
         draw_settings(column, settings, "key_caption", "key_size")
         if settings.key and settings.key_bar and _range_may_differ(settings):
             hint = "For numbers on the color bar of animations, set Color > Top Value"

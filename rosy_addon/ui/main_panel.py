@@ -97,8 +97,7 @@ def _draw_new_field(layout: UILayout, context: Context) -> None:
     """Draw the settings of the generator and the buttons that make or import a field."""
     settings = context.window_manager.operator_properties_last("rosy.field_generate")
     draw_generator_settings(layout.column(), settings)
-    row = layout.row()
-    row.scale_y = 1.5
+    row = sidebar.new_row(layout, scale_y=1.5)
     row.operator("rosy.field_generate", icon="FORCE_VORTEX")
     if settings.kind == "curvature" and settings.degree % 2:
         row.enabled = False
@@ -133,8 +132,7 @@ def _draw_bakes(layout: UILayout, context: Context) -> None:
         layout.prop(context.scene.rosy, "camera")
         if len(objects) > 1:
             layout.label(text=f"Draws {len(objects)} objects")
-    row = layout.row()
-    row.scale_y = 1.5
+    row = sidebar.new_row(layout, scale_y=1.5)
     row.operator("rosy.bake", text=bake_label(bake_infos), icon="RENDER_STILL")
     row = layout.row(align=True)
     row.operator("rosy.bake_animation", text="Animation", icon="RENDER_ANIMATION")

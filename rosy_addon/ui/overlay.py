@@ -14,12 +14,12 @@ import bpy
 import numpy as np
 
 from ..core.errors import RosyError
+from ..scene.app_handlers import add_handlers, remove_handlers
 from ..scene.singularity_points import (
     Singularities,
     read_editable_singularities,
     read_singularities,
 )
-from ..viewport.app_handlers import add_handlers, remove_handlers
 from ..viewport.overlays import SingularityDots, draw_dots, draw_labels
 from ..viewport.view3d import redraw, to_world
 
@@ -78,11 +78,6 @@ def refresh(context: bpy.types.Context, meshes: Container[bpy.types.Mesh]) -> No
             hide(name)
 
 
-def _clear_on_load(*_: Any) -> None:
-    """Hide all singularities before a file is loaded, because its objects may have the same names."""
-    hide()
-
-
 def _read_again(*_: Any) -> None:
     """Compute all shown singularities again after an undo or redo, which may have changed the fields."""
     context = bpy.context
@@ -90,7 +85,11 @@ def _read_again(*_: Any) -> None:
 
 
 #: Handlers of Blender's events while something is shown, by the names of their lists in `bpy.app.handlers`.
-_APP_HANDLERS = {"load_pre": _clear_on_load, "undo_post": _read_again, "redo_post": _read_again}
+#: Objects of a file that is loaded may have the names of those before.
+_APP_HANDLERS = {
+    **dict.fromkeys(("undo_post", "redo_post"), _read_again),
+    "load_pre": lambda *_: hide(),
+}
 
 
 def shown(object_name: str) -> Singularities | None:

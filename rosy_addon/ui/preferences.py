@@ -63,20 +63,17 @@ class ROSY_AP_preferences(AddonPreferences):
 
 def addon_preferences(context: Context) -> ROSY_AP_preferences | None:
     """Return the preferences; None if RoSy does not run as an extension."""
-    addon = context.preferences.addons.get(EXTENSION_ID)
-    return None if addon is None else addon.preferences
+    return getattr(context.preferences.addons.get(EXTENSION_ID), "preferences", None)
 
 
 def worker_count(context: Context) -> int:
     """Return the number of processes that draw a large picture. 0 means one for each processor core."""
-    preferences = addon_preferences(context)
-    return 0 if preferences is None else preferences.workers
+    return getattr(addon_preferences(context), "workers", 0)
 
 
 def uses_helper(context: Context) -> bool:
     """Return whether jobs compute in a helper process, and not in Blender's process."""
-    preferences = addon_preferences(context)
-    return preferences is None or preferences.use_helper
+    return getattr(addon_preferences(context), "use_helper", True)
 
 
 def apply_preferences(context: Context) -> None:

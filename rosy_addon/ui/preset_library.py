@@ -10,6 +10,7 @@ import bpy
 import bpy.utils.previews
 
 from ..core.errors import RosyError
+from ..core.file_io import file_stamp
 from ..preset_files import store
 from ..scene.files import user_presets_folder
 from ..scene.look_properties import apply_look, matches_look
@@ -52,7 +53,7 @@ class _PresetLibrary:
         change when files are added or removed. Edited files are looked for every `REFRESH_SECONDS`.
         """
         user_folder = user_presets_folder()
-        folder_keys = (user_folder, _stat_key(user_folder), _stat_key(store.SHIPPED_FOLDER))
+        folder_keys = (user_folder, file_stamp(user_folder), file_stamp(store.SHIPPED_FOLDER))
         if folder_keys == self.folder_keys and time.monotonic() < self.checked_at + REFRESH_SECONDS:
             return
         self.folder_keys, self.checked_at = folder_keys, time.monotonic()
@@ -63,7 +64,8 @@ class _PresetLibrary:
             user_files, load_errors = {}, [str(error)]
         paths = store.merge_preset_files(user_files)
         file_keys = {
-            path: (_stat_key(path), _stat_key(store.preview_path(path))) for path in paths.values()
+            path: (file_stamp(path), file_stamp(store.preview_path(path)))
+            for path in paths.values()
         }
         if file_keys == self.file_keys:
             return
@@ -85,7 +87,7 @@ class _PresetLibrary:
         for key, entry in self.entries.items():
             image_path = store.preview_path(entry.path)
             if image_path.is_file():
-                preview_names[key] = f"{image_path} {_stat_key(image_path)}"
+                preview_names[key] = f"{image_path} {file_stamp(image_path)}"
                 if preview_names[key] not in self.previews:
                     self.previews.load(preview_names[key], str(image_path), "IMAGE")
         for name in set(self.previews) - set(preview_names.values()):
@@ -189,15 +191,6 @@ def set_enum_index(settings: Any, index: int) -> None:
     if entry is not None:
         apply_look(settings, entry.preset.look)
         settings.preset_name = key
-
-
-def _stat_key(path: Path) -> tuple[int, ...]:
-    """Return a key that changes when a file or folder changes. It is empty if the path does not exist."""
-    try:
-        status = path.stat()
-    except OSError:
-        return ()
-    return status.st_mtime_ns, status.st_size
 
 
 def register() -> None:

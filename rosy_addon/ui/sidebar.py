@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
+from typing import Any
 
 from bpy.types import Context, UILayout
 
@@ -30,6 +31,14 @@ def use_property_columns(layout: UILayout) -> None:
     """Let a layout show labels and values in two columns, without buttons for keyframes."""
     layout.use_property_split = True
     layout.use_property_decorate = False
+
+
+def new_row(layout: UILayout, **settings: Any) -> UILayout:
+    """Add a row to a layout, set its properties, such as ``active`` and ``scale_y``, and return it."""
+    row = layout.row()
+    for name, value in settings.items():
+        setattr(row, name, value)
+    return row
 
 
 def draw_wrapped(

@@ -9,14 +9,7 @@ from ..line_drawing.style import StrokeStyle
 from ..scene.stroke_objects import stroke_objects
 from . import job_status
 from .operator_settings import draw_settings
-from .sidebar import SidebarPanel, closed_panel, draw_progress, use_property_columns
-
-#: Icons of stroke objects by type. The type of Grease Pencil was renamed in Blender 4.3.
-STROKE_ICONS = {
-    "GREASEPENCIL": "OUTLINER_OB_GREASEPENCIL",
-    "GPENCIL": "OUTLINER_OB_GREASEPENCIL",
-    "CURVES": "OUTLINER_OB_CURVES",
-}
+from .sidebar import SidebarPanel, closed_panel, draw_progress, new_row, use_property_columns
 
 #: Labels of the subpanels of strokes, with the names of their settings.
 STROKE_PANELS = {
@@ -56,14 +49,13 @@ class VIEW3D_PT_rosy_strokes(SidebarPanel, Panel):
             draw_progress(layout)
             return
         objects = stroke_objects(context.scene)
-        row = layout.row()
-        row.scale_y = 1.5
         text = "Draw Strokes..." if settings.kind == "FILE" else "Draw Strokes"
-        row.operator("rosy.strokes", text=text, icon="GREASEPENCIL")
+        new_row(layout, scale_y=1.5).operator("rosy.strokes", text=text, icon="GREASEPENCIL")
         if objects:
             layout.operator("rosy.strokes_remove", icon="TRASH")
             for obj in objects:
-                layout.label(text=obj.name, icon=STROKE_ICONS[obj.type])
+                name = "CURVES" if obj.type == "CURVES" else "GREASEPENCIL"
+                layout.label(text=obj.name, icon=f"OUTLINER_OB_{name}")
 
 
 def _draw_stroke_settings(
@@ -77,10 +69,9 @@ def _draw_stroke_settings(
         "paper": not settings.plotter,
     }
     for name in names:
-        row = column.row()
         is_style = name in descriptions
-        row.active = descriptions[name].applies(settings) if is_style else active.get(name, True)
-        row.prop(settings, name)
+        applies = descriptions[name].applies(settings) if is_style else active.get(name, True)
+        new_row(column, active=applies).prop(settings, name)
 
 
 CLASSES = (VIEW3D_PT_rosy_strokes,)

@@ -10,11 +10,11 @@ from bpy_extras import view3d_utils
 from mathutils import Vector
 
 from ..core.cache import BAKE_CACHE
+from ..scene.app_handlers import add_handlers, remove_handlers
 from ..scene.brush_surface import BrushSurface
 from ..scene.field_attributes import attribute_name, field_degree, is_face_vector_field
 from ..scene.guides import GUIDE_ATTRIBUTE, STROKE_FIRMNESS
 from ..scene.meshes import mesh_surface, read_attribute
-from .app_handlers import add_handlers, remove_handlers
 from .view3d import to_world
 
 

@@ -27,16 +27,16 @@ class FlowClock:
         self._time = 0.0
 
     def play(self, now: float) -> None:
-        """Start the clock. `now` is the current time, in seconds of a monotonic clock."""
+        """Start the clock, or let it count on from now.
+
+        `now` is the current time, in seconds of a monotonic clock. Frames before it that have not been counted
+        are left out.
+        """
         self.is_playing, self._time = True, now
 
     def pause(self) -> None:
         """Stop the clock. The number of frames is kept."""
         self.is_playing = False
-
-    def skip(self, now: float) -> None:
-        """Do not count the frames between the last count and now."""
-        self._time = now
 
     def advance(self, now: float, rate: float) -> bool:
         """Count the frames until now, at a rate in frames per second. Return whether time has passed."""

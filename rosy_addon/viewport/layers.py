@@ -6,7 +6,6 @@ import math
 import time
 from collections.abc import Hashable
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -16,6 +15,7 @@ from bpy.types import Context, Depsgraph, Scene, ViewLayer
 from ..compositor.look import Look
 from ..compositor.target_tone import ReferenceRender
 from ..core.errors import REPORTED_ERRORS, RosyError, error_text
+from ..core.file_io import file_stamp
 from ..scene import look_inputs
 from ..scene.cameras import render_camera
 from ..scene.scene_reader import SceneInstance, SceneReader
@@ -37,21 +37,16 @@ class LayerState:
     reader : SceneReader
     instances : list of SceneInstance
         The instances at the last reading.
-    stale : bool
-        Whether the instances must be read again.
-    request : ReadRequest or None
-        The request with which the instances were read.
-    has_occluders : bool
-        Whether meshes without a field were read too, as occluders.
+    request : tuple of (ReadRequest, bool), or None
+        The request with which the instances were read, and whether meshes without a field were read too, as
+        occluders. None if the instances must be read again.
     is_starting : bool
         Whether the layer has not been read completely yet. Until then it is read in slices of time.
     """
 
     reader: SceneReader = field(default_factory=SceneReader)
     instances: list[SceneInstance] = field(default_factory=list)
-    stale: bool = True
-    request: look_inputs.ReadRequest | None = None
-    has_occluders: bool = False
+    request: tuple[look_inputs.ReadRequest, bool] | None = None
     is_starting: bool = True
 
 
@@ -83,15 +78,14 @@ class LayerStates:
             self._layers[key] = LayerState()
             return self._layers[key]
         layer = self._layers[key]
-        request = look_inputs.read_request(context.scene, look)
-        if layer.stale or (layer.request, layer.has_occluders) != (request, include_occluders):
+        request = look_inputs.read_request(context.scene, look), include_occluders
+        if layer.request != request:
             layer.instances = layer.reader.read(
                 shown_instances(depsgraph, include_occluders=include_occluders),
-                request,
+                request[0],
                 deadline=time.monotonic() + SLICE_SECONDS if layer.is_starting else math.inf,
             )
-            layer.stale = not layer.reader.is_complete
-            layer.request, layer.has_occluders = request, include_occluders
+            layer.request = request if layer.reader.is_complete else None
             if layer.reader.is_complete and not layer.reader.has_unresolved:
                 layer.is_starting = False
         return layer
@@ -145,7 +139,7 @@ class LayerStates:
             if scene_name == scene.name and (is_relevant or depsgraph is None):
                 layer.reader.invalidate(changed_names, topology_changed=False)
                 layer.reader.invalidate(remeshed_names)
-                layer.stale = True
+                layer.request = None
 
     def resolve_topologies(self) -> bool:
         """Read data that cannot be read while Blender draws, for all windows, during one slice of time.
@@ -167,7 +161,7 @@ class LayerStates:
                 with bpy.context.temp_override(window=window):
                     depsgraph = bpy.context.evaluated_depsgraph_get()
                     layer.reader.resolve_topologies(depsgraph, deadline)
-                layer.stale = True
+                layer.request = None
                 if layer.reader.has_unresolved:
                     return False
             return True
@@ -224,7 +218,7 @@ class ReferenceImages:
         if look.tone != "picture":
             return None
         path = look_inputs.reference_path(scene)
-        file_key = path, _modified_time(path)
+        file_key = path, file_stamp(path)
         if scene.name not in self._images or self._images[scene.name][0] != file_key:
             self._images[scene.name] = file_key, None
         image = self._images[scene.name][1]
@@ -237,11 +231,3 @@ class ReferenceImages:
         if scene.name not in self._current or self._current[scene.name][0] != key:
             self._current[scene.name] = key, reference
         return self._current[scene.name][1]
-
-
-def _modified_time(path: Path) -> float | None:
-    """Return when a file was last modified, in seconds; None if it does not exist."""
-    try:
-        return path.stat().st_mtime
-    except OSError:
-        return None

@@ -9,7 +9,6 @@ from collections.abc import Callable, Hashable
 from dataclasses import replace
 from functools import partial
 from itertools import chain
-from typing import Any
 
 import bpy
 from bpy.types import Area, Context, Depsgraph, Scene, SpaceView3D
@@ -22,13 +21,13 @@ from ..core.errors import REPORTED_ERRORS, DeviceError, RosyError, counted, erro
 from ..gpu.background import draw_background
 from ..gpu.select import look_in_view, select_viewport_renderer
 from ..rendering.view_input import ViewInput
+from ..scene.app_handlers import add_handlers, remove_handlers
 from ..scene.cameras import camera_of_view
 from ..scene.look_inputs import check_sources, read_request
 from ..scene.look_properties import drift_in_scene, read_look
 from ..scene.read_view import read_lights
 from ..worker.helper import Helper
 from . import overlays, view3d
-from .app_handlers import add_handlers, remove_handlers
 from .flow_clock import FlowClock
 from .layers import LayerState, LayerStates, ReferenceImages
 from .overlays import ViewOverlay
@@ -100,7 +99,7 @@ class ViewportSession:
             "frame_change_post": self.layers.invalidate,
             "undo_post": self.layers.forget,
             "redo_post": self.layers.forget,
-            "load_pre": self._on_load,
+            "load_pre": lambda *_: stop(),
         }
         add_handlers(self._app_handlers)
         #: The methods that timers call. Blender identifies a timer by its function object, and each access to
@@ -158,9 +157,6 @@ class ViewportSession:
 
     # --- handlers and timers ---------------------------------------------------------------------
 
-    def _on_load(self, *_: Any) -> None:
-        stop()
-
     def _drop_closed_views(self) -> float | None:
         """Timer: remove views that were closed, and stop the session if no view is left.
 
@@ -215,7 +211,7 @@ class ViewportSession:
         render, now = bpy.context.scene.render, time.monotonic()
         rate = render.fps / render.fps_base
         if view3d.is_timeline_playing():
-            self.flow_clock.skip(now)
+            self.flow_clock.play(now)
         elif (
             self._has_shown_flow
             and not self.progressive.is_rendering
@@ -244,7 +240,7 @@ class ViewportSession:
         overlay = self._overlays[pointers]
         overlay.problem = overlay.labeled = None
         try:
-            if not view3d.shows_surfaces(context.space_data):
+            if context.space_data.shading.type == "WIREFRAME":
                 raise RosyError("fields are not drawn in wireframe shading: choose another shading")
             self._draw_view(context, overlay)
         except DeviceError as error:

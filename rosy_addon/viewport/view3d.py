@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from bpy.types import Context, Depsgraph, Object, RegionView3D, SpaceView3D
+from bpy.types import Area, Context, Depsgraph, Object, RegionView3D, SpaceView3D
 
 from ..compositor.look import Look, is_hatched
 from ..core.color import from_hex, to_linear
@@ -35,6 +35,12 @@ def open_view3d_spaces() -> list[SpaceView3D]:
     ]
 
 
+def shown_areas() -> list[Area]:
+    """Return the areas of all windows that show a 3D view."""
+    screens = [window.screen for window in bpy.context.window_manager.windows]
+    return [area for screen in screens for area in screen.areas if area.type == "VIEW_3D"]
+
+
 def redraw(spaces: set[int] | None = None) -> None:
     """Tag 3D views for a redraw.
 
@@ -43,33 +49,23 @@ def redraw(spaces: set[int] | None = None) -> None:
     spaces : set of int, optional
         Pointers of the `SpaceView3D` to redraw. By default, all visible views are redrawn.
     """
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D" and (
-                spaces is None or area.spaces.active.as_pointer() in spaces
-            ):
-                area.tag_redraw()
+    for area in shown_areas():
+        if spaces is None or area.spaces.active.as_pointer() in spaces:
+            area.tag_redraw()
 
 
 def redraw_sidebars() -> None:
     """Tag the sidebars of all 3D views for a redraw."""
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                for region in area.regions:
-                    if region.type == "UI":
-                        region.tag_redraw()
+    for area in shown_areas():
+        for region in area.regions:
+            if region.type == "UI":
+                region.tag_redraw()
 
 
 def is_timeline_playing() -> bool:
     """Return whether Blender plays an animation in one of its windows."""
     windows = bpy.context.window_manager.windows
     return any(window.screen.is_animation_playing for window in windows)
-
-
-def shows_surfaces(space: SpaceView3D) -> bool:
-    """Return whether the shading mode of a view shows surfaces. Wireframe shading does not."""
-    return space.shading.type in {"SOLID", "MATERIAL", "RENDERED"}
 
 
 def is_visible(obj: Object, depsgraph: Depsgraph, space: SpaceView3D) -> bool:

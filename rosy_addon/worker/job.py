@@ -7,12 +7,13 @@ that Blender stays responsive.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from functools import update_wrapper
 from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
 
 from ..core.progress import progress, report
 
+Item = TypeVar("Item")
 Result = TypeVar("Result")
 Arguments = ParamSpec("Arguments")
 
@@ -140,6 +141,21 @@ def part(
         return end.value
     finally:
         steps.close()
+
+
+def shares(items: Iterable[Item], stop: float = 1.0) -> Iterator[tuple[Item, float, float]]:
+    """Iterate over what a job works on, each item with the progress of the job when it begins and ends.
+
+    Parameters
+    ----------
+    items : iterable
+        All items take the same share of the job.
+    stop : float
+        Progress of the job when the last item ends, 0 to 1.
+    """
+    items = list(items)
+    for index, item in enumerate(items):
+        yield item, stop * index / len(items), stop * (index + 1) / len(items)
 
 
 class Job(Generic[Arguments, Result]):

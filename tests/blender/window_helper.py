@@ -24,12 +24,12 @@ from window_steps import (
     RESULTS,
     call_in_view,
     descendants,
-    fresh_scene,
-    in_view,
     preferences,
     press,
     rosy,
     run_module,
+    scene_with_field,
+    start_job,
     status,
     view,
     wait_until,
@@ -43,14 +43,6 @@ STOP_SECONDS = 0.2
 
 #: Longest time without a reaction, relative to that of a bake. Windows are drawn in software here.
 LARGEST_PAUSE = 0.4
-
-
-def suzanne(size=(320, 240)):
-    """Create a scene with Suzanne, her field and a camera."""
-    yield from fresh_scene(size)
-    with in_view():
-        bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="curvature", degree=4)
-        bpy.ops.ed.undo_push(message="field")
 
 
 def helper_id():
@@ -67,9 +59,7 @@ def start_long_bake():
     """Start a bake that no other one has prepared, and wait until the helper is at work."""
     look = bpy.context.scene.rosy.look
     look.method, look.seed = "brute", look.seed + 1
-    start_bake()
-    yield from wait_until(lambda: status().current is None or status().current.fraction > 0.1)
-    assert status().current is not None, "the job ended before it could be interrupted"
+    yield from start_job(bpy.ops.rosy.bake)
 
 
 def baked_pixels():
@@ -93,7 +83,7 @@ def wait_for_job():
 
 def test_picture_from_the_helper():
     """Blender reacts while the helper draws, and the picture is that of a script."""
-    yield from suzanne((1280, 960))
+    yield from scene_with_field((1280, 960))
     first = helper_id()
     assert first is not None, "the panel has not started the helper"
     start = time.monotonic()
@@ -108,7 +98,7 @@ def test_picture_from_the_helper():
 
 
 def test_escape_ends_the_helper_at_once():
-    yield from suzanne((1600, 1200))
+    yield from scene_with_field((1600, 1200))
     before = contents()
     yield from start_long_bake()
     first, job_class, stopped = helper_id(), rosy("operators.modal_job").Job, []
@@ -134,13 +124,13 @@ def test_escape_ends_the_helper_at_once():
 
 def test_a_helper_that_is_killed():
     """Another helper draws the picture. If that is killed as well, there is one message."""
-    yield from suzanne((800, 600))
+    yield from scene_with_field((800, 600))
     yield from start_long_bake()
     first = helper_id()
     os.kill(first, signal.SIGKILL)
     yield from wait_for_job()
     assert helper_id() not in (None, first) and baked_pixels().shape == (600, 800, 4)
-    yield from suzanne((1600, 1200))
+    yield from scene_with_field((1600, 1200))
     before = contents()
     yield from start_long_bake()
     first = helper_id()
@@ -162,7 +152,7 @@ def test_without_a_helper():
     def refuse(*_, **__):
         raise OSError("too many processes")
 
-    yield from suzanne()
+    yield from scene_with_field()
     helper.HELPER.close()
     helper.start_module = refuse
     try:
@@ -204,7 +194,7 @@ def report_texts():
 
 def test_switched_off():
     """The helper ends with the extension."""
-    yield from suzanne()
+    yield from scene_with_field()
     start_bake()
     yield from wait_for_job()
     first, name = helper_id(), "bl_ext.user_default.rosy"
@@ -216,7 +206,7 @@ def test_switched_off():
 
 def test_blender_is_killed():
     """All processes end, while they draw a large picture together."""
-    yield from suzanne((1920, 1440))
+    yield from scene_with_field((1920, 1440))
     bpy.context.scene.rosy.look.supersampling = 2
     yield from start_long_bake()
     processes = descendants()

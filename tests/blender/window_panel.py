@@ -28,22 +28,12 @@ from window_steps import (
     rosy,
     run_module,
     save_part,
+    scene_with_field,
+    start_job,
     status,
     view,
     wait_until,
 )
-
-
-def scene_with_field(size=(320, 240)):
-    yield from fresh_scene(size)
-    call_in_view(bpy.ops.rosy.field_generate, "EXEC_DEFAULT", True, kind="curvature", degree=4)
-
-
-def start_job(operator, **settings):
-    """Start a job as its button does, and wait until it has made progress."""
-    assert call_in_view(operator, "INVOKE_DEFAULT", True, **settings) == {"RUNNING_MODAL"}
-    yield from wait_until(lambda: status().current is None or status().current.fraction > 0.1)
-    assert status().current is not None, "the job ended before it could be interrupted"
 
 
 def job_ends():

@@ -146,6 +146,19 @@ def fresh_scene(size=(320, 240)):
         bpy.ops.ed.undo_push(message="fresh scene")
 
 
+def scene_with_field(size=(320, 240)):
+    """Create a scene with Suzanne, her field and a camera."""
+    yield from fresh_scene(size)
+    call_in_view(bpy.ops.rosy.field_generate, "EXEC_DEFAULT", True, kind="curvature", degree=4)
+
+
+def start_job(operator, **settings):
+    """Start a job as its button does, and wait until it has made progress."""
+    assert call_in_view(operator, "INVOKE_DEFAULT", True, **settings) == {"RUNNING_MODAL"}
+    yield from wait_until(lambda: status().current is None or status().current.fraction > 0.1)
+    assert status().current is not None, "the job ended before it could be interrupted"
+
+
 def press(key):
     """Press and release a key over the window that has opened last, such as a file browser."""
     window = bpy.context.window_manager.windows[-1]

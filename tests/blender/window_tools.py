@@ -27,6 +27,15 @@ from window_steps import (
 )
 
 
+def fresh_sphere():
+    """Create a scene in which a sphere is the only object."""
+    yield from fresh_scene()
+    with in_view():
+        bpy.ops.object.select_all(action="SELECT")
+        bpy.ops.object.delete()
+        bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24)
+
+
 def annotations_guide_a_field():
     """A stroke of the Annotate tool across the middle of a sphere, drawn on its surface."""
     yield from fresh_scene()
@@ -75,11 +84,8 @@ def annotations_guide_a_field():
 
 def singularities_dragged_with_the_tool():
     """Move one, undo that, and drag a new pair apart with Ctrl."""
-    yield from fresh_scene()
+    yield from fresh_sphere()
     with in_view():
-        bpy.ops.object.select_all(action="SELECT")
-        bpy.ops.object.delete()
-        bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24)
         # Four singularities are around the middle of the view. The smoothest field has them anywhere, as
         # Blender orders the faces differently each time: also below the sidebar or the navigation gizmo.
         bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="axis", degree=4, axis=(0, 1, 0))
@@ -119,11 +125,8 @@ def singularities_dragged_with_the_tool():
 def field_combed_with_the_tool():
     """Comb a mesh with modifiers, and undo, replay and take back strokes; in Object Mode and in Sculpt Mode."""
     for mode, tool in (("OBJECT", "rosy.comb_tool"), ("SCULPT", "rosy.comb_sculpt_tool")):
-        yield from fresh_scene()
+        yield from fresh_sphere()
         with in_view():
-            bpy.ops.object.select_all(action="SELECT")
-            bpy.ops.object.delete()
-            bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24)
             bpy.context.object.modifiers.new("Subdivision", "SUBSURF")
             bpy.context.object.modifiers.new("Wave", "CAST").factor = -0.2
             bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="smoothest", degree=4)

@@ -40,10 +40,9 @@ def empty_cache():
 @pytest.fixture
 def scene():
     """An empty scene, 128 x 128 pixels, view transform Standard."""
-    bpy.ops.wm.read_homefile(use_empty=True)
-    scene = bpy.context.scene
-    scene.render.resolution_x = scene.render.resolution_y = 128
-    scene.render.resolution_percentage = 100
+    from scenes import empty_scene
+
+    scene = empty_scene(128)
     scene.view_settings.view_transform = "Standard"
     return scene
 

@@ -38,6 +38,15 @@ def each_step(steps):
         steps.close()
 
 
+def empty_scene(size):
+    """Open an empty file, and return its scene, which renders squares of `size` pixels."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    scene = bpy.context.scene
+    scene.render.resolution_x = scene.render.resolution_y = size
+    scene.render.resolution_percentage = 100
+    return scene
+
+
 def depsgraph():
     return bpy.context.evaluated_depsgraph_get()
 

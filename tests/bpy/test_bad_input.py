@@ -29,6 +29,7 @@ from scenes import (
     aim,
     contents,
     depsgraph,
+    empty_scene,
     expect_error,
     link,
     member_vectors,
@@ -316,9 +317,7 @@ def library(scene, tmp_path):
     collection.objects.link(bpy.context.object)
     path = tmp_path / "library.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    bpy.ops.wm.read_homefile(use_empty=True)
-    scene = bpy.context.scene
-    scene.render.resolution_x = scene.render.resolution_y = 64
+    scene = empty_scene(64)
     scene.camera = add_camera()
     return path
 

@@ -18,6 +18,7 @@ from rosy.rosy_addon.scene import scene_reader
 from rosy.rosy_addon.scene.cameras import camera_of_object
 from rosy.rosy_addon.scene.evaluated_field import TEMP_FIELD_ATTRIBUTE
 from rosy.rosy_addon.scene.field_attributes import has_field
+from rosy.rosy_addon.scene.guides import read_combed_guides
 from rosy.rosy_addon.scene.mesh_fields import read_mesh_field, write_mesh_field
 from rosy.rosy_addon.scene.meshes import EDGE_MARKS, mark_sharp, marked_edges, mesh_surface
 from rosy.rosy_addon.scene.read_view import read_lights
@@ -105,6 +106,7 @@ def test_angles(scene):
     field = read_mesh_field(plane.data)
     # The face points to -y. Seen from there, x points to the right and z up.
     np.testing.assert_allclose(field.vectors, [[np.cos(np.pi / 6), 0, 0.5]], atol=1e-6)
+    assert not read_combed_guides(plane.data, mesh_surface(plane.data)).any()
 
 
 def add_directions(mesh, degree, angle_offset=0.0, length_factor=1.0):

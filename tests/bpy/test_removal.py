@@ -9,15 +9,13 @@ from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.scene.bake_records import has_pictures, list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import scene_cameras
 from rosy.rosy_addon.scene.pictures import show_bake
-from scenes import add_camera, add_field, add_plane, contents, link, reopen
-from test_up_to_date import exclude, obj
+from scenes import add_camera, add_field, add_plane, contents, empty_scene, link, reopen
+from test_up_to_date import deferred, exclude, obj
 
 
 def build(folder=None):
     """Build a scene of two meshes with fields, materials and modifiers, and two cameras."""
-    bpy.ops.wm.read_homefile(use_empty=True)
-    scene = bpy.context.scene
-    scene.render.resolution_x = scene.render.resolution_y = 24
+    scene = empty_scene(24)
     scene.camera = add_camera("Camera", (0.0, -5.0, 0.5))
     add_camera("Second", (3.0, -4.0, 1.0))
     own = [bpy.data.materials.new(name) for name in ("Own", "Other")]
@@ -41,14 +39,11 @@ def select(*names):
     bpy.context.view_layer.objects.active = obj(names[-1])
 
 
-def selected(operator, *names):
+@deferred
+def selected(tmp_path, operator, *names):
     """An action: call an operator for some objects."""
-
-    def act(tmp_path):
-        select(*names)
-        operator()
-
-    return act
+    select(*names)
+    operator()
 
 
 def rename(tmp_path):
@@ -57,22 +52,18 @@ def rename(tmp_path):
     bpy.context.scene.name = "Shot"
 
 
-def apply(*names):
-    def change(tmp_path):
-        for name in names:
-            select(name)
-            for modifier in list(obj(name).modifiers):
-                bpy.ops.object.modifier_apply(modifier=modifier.name)
-
-    return change
+@deferred
+def apply(tmp_path, *names):
+    for name in names:
+        select(name)
+        for modifier in list(obj(name).modifiers):
+            bpy.ops.object.modifier_apply(modifier=modifier.name)
 
 
-def apply_and(action):
-    def change(tmp_path):
-        apply("Sheet", "Plain")(tmp_path)
-        action(tmp_path)
-
-    return change
+@deferred
+def apply_and(tmp_path, action):
+    apply("Sheet", "Plain")(tmp_path)
+    action(tmp_path)
 
 
 def unlink(tmp_path):
@@ -150,14 +141,10 @@ def test_remove_leaves_what_the_user_has_made(name, store, tmp_path):
 @pytest.mark.parametrize("applied", [False, True], ids=["modifier", "applied"])
 def test_an_appended_object(applied, tmp_path):
     """It brings its picture, which the panel lists and Remove removes."""
+    path = baked_file(tmp_path, *(["Plain"] if applied else []))
     scene = build()
     bake(scene)
-    if applied:
-        apply("Plain")(tmp_path)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "baked.blend"))
-    scene = build()
-    bake(scene)
-    append(tmp_path / "baked.blend")
+    append(path)
     appended = obj("Plain.001")
     infos = list_bakes(scene)
     assert [(info.width, info.height, info.is_shown) for info in infos] == [(24, 24, True)] * 2
@@ -171,19 +158,24 @@ def test_an_appended_object(applied, tmp_path):
     assert {material.name[:3] for material in bpy.data.materials} == {"Own", "Oth"}
 
 
-def append(path):
-    with bpy.data.libraries.load(str(path)) as (_, target):
+def baked_file(tmp_path, *applied):
+    """Return the path of a .blend file with pictures, which are applied to the objects of these names."""
+    bake(build())
+    apply(*applied)(tmp_path)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "baked.blend"))
+    return tmp_path / "baked.blend"
+
+
+def append(path, **options):
+    with bpy.data.libraries.load(str(path), **options) as (_, target):
         target.objects = ["Plain"]
-    for appended in target.objects:
-        link(appended)
+    link(target.objects[0])
 
 
 def test_an_appended_object_takes_part_in_the_next_bake(tmp_path):
+    path = baked_file(tmp_path)
     scene = build()
-    bake(scene)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "baked.blend"))
-    scene = build()
-    append(tmp_path / "baked.blend")
+    append(path)
     (info,) = list_bakes(scene)
     assert info.unknown_reason == "baked in another file or scene"
     bake(scene)
@@ -205,13 +197,9 @@ def test_a_camera_that_is_still_in_use_stays():
 
 
 def test_a_linked_object_is_left_alone(tmp_path):
+    path = baked_file(tmp_path)
     scene = build()
-    bake(scene)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "baked.blend"))
-    scene = build()
-    with bpy.data.libraries.load(str(tmp_path / "baked.blend"), link=True) as (_, target):
-        target.objects = ["Plain"]
-    link(target.objects[0])
+    append(path, link=True)
     before = contents()
     assert not has_pictures(scene) and not list_bakes(scene)
     remove_bakes(scene)

@@ -36,6 +36,7 @@ def textured(scene, torus):
 
 
 def stale_reason(scene):
+    bpy.context.view_layer.update()
     (info,) = list_bakes(scene)
     assert info.is_texture
     return info.stale_reason
@@ -62,7 +63,6 @@ def test_what_makes_a_texture_out_of_date(scene, textured):
     bend = textured.modifiers.new("Bend", "SIMPLE_DEFORM")
     textured.modifiers.move(textured.modifiers.find(bend.name), 0)
     scene.rosy.look.shading = 0.1
-    bpy.context.view_layer.update()
     assert stale_reason(scene) == ""
     for owner, name, value, expected in (
         (scene.rosy.look, "line_width", 3.0, "look"),
@@ -76,12 +76,10 @@ def test_what_makes_a_texture_out_of_date(scene, textured):
         assert stale_reason(scene) == ""
     textured.data.uv_layers.active.uv[0].vector = (0.4, 0.45)
     textured.data.update_tag()
-    bpy.context.view_layer.update()
     assert "the UV map" in stale_reason(scene)
     bake_texture(scene, [textured])
     assert stale_reason(scene) == ""
     add_field(textured, kind="axis")
-    bpy.context.view_layer.update()
     assert "field" in stale_reason(scene)
 
 
@@ -200,10 +198,8 @@ def test_light_can_be_baked(scene, textured):
         assert stale_reason(scene) == ""
     assert means[0] < 0.6 * means[1]
     lamp.rotation_euler.x = 0.5
-    bpy.context.view_layer.update()
     assert stale_reason(scene) == "light 'Lamp' was changed"
     lamp.rotation_euler.x, textured.location.x = 0.0, 1.0
-    bpy.context.view_layer.update()
     assert stale_reason(scene) == f"'{textured.name}' was moved"
 
 

@@ -21,17 +21,14 @@ from rosy.rosy_addon.projection.camera import look_at, perspective_camera
 from rosy.rosy_addon.scene import staleness
 from rosy.rosy_addon.scene.bake_records import list_bakes
 from rosy.rosy_addon.scene.cameras import VIEW_NAME
-from scenes import add_camera, add_field, add_plane, link, pixels, set_vectors
+from scenes import add_camera, add_field, add_plane, empty_scene, link, pixels, set_vectors
 
 SIZE = 40
 
 
 def build(tmp_path):
     """Build the scene of the table: what may be changed in it, by name."""
-    bpy.ops.wm.read_homefile(use_empty=True)
-    scene = bpy.context.scene
-    scene.render.resolution_x = scene.render.resolution_y = SIZE
-    scene.render.resolution_percentage = 100
+    scene = empty_scene(SIZE)
     scene.camera = add_camera("Camera", (0.0, -5.0, 0.5))
     parent = link(bpy.data.objects.new("Parent", None))
     sheet = add_field(add_plane("Sheet", size=0.9, cuts=4), kind="axis")
@@ -56,6 +53,11 @@ def build(tmp_path):
 
 def obj(name):
     return bpy.data.objects[name]
+
+
+def deferred(function):
+    """Decorator: called with all arguments but the first, the function returns a function of the first."""
+    return lambda *others, **options: lambda first: function(first, *others, **options)
 
 
 def scene_lights(scene):
@@ -106,13 +108,11 @@ def tone_image(scene):
         obj(name).rosy.tone_image = image
 
 
-def write_reference(value):
-    def change(scene):
-        rgba = np.ones((SIZE, SIZE, 4), dtype=np.float32)
-        rgba[: SIZE // 2, :, :3] = value
-        write_png(Path(scene.rosy.tone_picture), rgba)
-
-    return change
+@deferred
+def write_reference(scene, value):
+    rgba = np.ones((SIZE, SIZE, 4), dtype=np.float32)
+    rgba[: SIZE // 2, :, :3] = value
+    write_png(Path(scene.rosy.tone_picture), rgba)
 
 
 def tone_picture(scene):
@@ -159,23 +159,18 @@ def relit(scene):
     scene.rosy.look.ink, scene.rosy.look.light, scene.rosy.relight = "hatch", "scene", True
 
 
-def move(name, *offset):
-    def change(scene):
-        obj(name).matrix_world = Matrix.Translation(offset) @ obj(name).matrix_world
-
-    return change
+@deferred
+def move(scene, name, *offset):
+    obj(name).matrix_world = Matrix.Translation(offset) @ obj(name).matrix_world
 
 
-def put(path, value):
+@deferred
+def put(scene, path, value):
     """Set a property, given by its path from the scene or, after an object's name, from it."""
-
-    def change(scene):
-        owner, _, rest = path.partition(":")
-        target = obj(owner) if rest else scene
-        parent, _, name = (rest or owner).rpartition(".")
-        setattr(target.path_resolve(parent) if parent else target, name, value)
-
-    return change
+    owner, _, rest = path.partition(":")
+    target = obj(owner) if rest else scene
+    parent, _, name = (rest or owner).rpartition(".")
+    setattr(target.path_resolve(parent) if parent else target, name, value)
 
 
 bend = partial(put, 'Sheet:data.shape_keys.key_blocks["Bent"].value')
@@ -183,11 +178,9 @@ SUBDIVISION, WAVE = 'Plain:modifiers["Subdivision"]', 'Sheet:modifiers["Wave"]'
 hatched = put("rosy.look.ink", "hatch")
 
 
-def add_occluder(x):
-    def change(scene):
-        add_plane("Wall", size=0.3).location = (x, -1.5, 0.1)
-
-    return change
+@deferred
+def add_occluder(scene, x):
+    add_plane("Wall", size=0.3).location = (x, -1.5, 0.1)
 
 
 def add_field_object(scene):
@@ -204,14 +197,12 @@ def add_light(scene):
     lamp.rotation_euler.x = 1.0
 
 
-def edit_mode(name, *, and_back=False):
-    def change(scene):
-        bpy.context.view_layer.objects.active = obj(name)
-        bpy.ops.object.mode_set(mode="EDIT")
-        if and_back:
-            bpy.ops.object.mode_set(mode="OBJECT")
-
-    return change
+@deferred
+def edit_mode(scene, name, *, and_back=False):
+    bpy.context.view_layer.objects.active = obj(name)
+    bpy.ops.object.mode_set(mode="EDIT")
+    if and_back:
+        bpy.ops.object.mode_set(mode="OBJECT")
 
 
 def move_vertex_in_edit_mode(scene):
@@ -247,24 +238,20 @@ def other_attribute(scene):
     obj("Plain").data.attributes.new("rosy_weight", "FLOAT", "FACE")
 
 
-def shade_smooth(name):
-    def change(scene):
-        mesh = obj(name).data
-        mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))
-        mesh.update()
-
-    return change
+@deferred
+def shade_smooth(scene, name):
+    mesh = obj(name).data
+    mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))
+    mesh.update()
 
 
-def exclude(name):
-    def change(scene):
-        collection = bpy.data.collections.new("Away")
-        scene.collection.children.link(collection)
-        collection.objects.link(obj(name))
-        scene.collection.objects.unlink(obj(name))
-        bpy.context.view_layer.layer_collection.children["Away"].exclude = True
-
-    return change
+@deferred
+def exclude(scene, name):
+    collection = bpy.data.collections.new("Away")
+    scene.collection.children.link(collection)
+    collection.objects.link(obj(name))
+    scene.collection.objects.unlink(obj(name))
+    bpy.context.view_layer.layer_collection.children["Away"].exclude = True
 
 
 def frame(number):

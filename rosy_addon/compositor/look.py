@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from ..annotation.singularity_settings import singularity_dots_choice, singularity_size_number
-from ..core.errors import RosyError
 from ..core.settings import (
-    Numbers,
     Stage,
     always,
     check_settings,
@@ -19,8 +17,8 @@ from ..core.settings import (
     fraction,
     number,
     numbers,
-    settings_of,
     switch,
+    with_settings,
 )
 
 
@@ -488,10 +486,4 @@ class Look:
         RosyError
             If there is no such setting, or its value is not allowed.
         """
-        known, changes = settings_of(Look), dict(settings)
-        for name, value in settings.items():
-            if name not in known:
-                raise RosyError(f"a look has no setting '{name}': choose {', '.join(known)}")
-            if isinstance(known[name], Numbers) and isinstance(value, list):
-                changes[name] = tuple(value)
-        return replace(self, **changes)
+        return with_settings(self, settings)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from ..annotation.singularity_settings import singularity_dots_choice, singularity_size_number
-from ..core.errors import RosyError
-from ..core.settings import check_settings, choice, number, settings_of, switch
+from ..core.settings import check_settings, choice, fraction, number, switch, with_settings
 
 
 @dataclass(frozen=True)
@@ -56,34 +55,26 @@ class StrokeStyle:
         },
         panel="density",
     )
-    layering: float = number(
+    layering: float = fraction(
         0.3,
-        0.0,
-        1.0,
         "Difference in darkness between the tones at which successive families begin",
         panel="density",
         applies=lambda style: style.light != "none",
     )
-    swell: float = number(
+    swell: float = fraction(
         0.0,
-        0.0,
-        1.0,
         "Amount by which the light changes the width of strokes instead of their distance. 1: evenly "
         "spaced strokes, as in an engraving",
         panel="density",
         applies=lambda style: style.light != "none",
     )
-    curvature: float = number(
+    curvature: float = fraction(
         0.0,
-        0.0,
-        1.0,
         "Amount by which strokes are closer together where the surface is more curved",
         panel="density",
     )
-    gaps: float = number(
+    gaps: float = fraction(
         0.0,
-        0.0,
-        1.0,
         "Gap in the lower of two crossing strokes, as a multiple of the spacing",
         unit="spacings",
         panel="ends",
@@ -139,10 +130,6 @@ class StrokeStyle:
         RosyError
             If there is no such setting, or its value is not allowed.
         """
-        known = settings_of(StrokeStyle)
-        unknown = [name for name in settings if name not in known]
-        if unknown:
-            raise RosyError(f"unknown setting '{unknown[0]}' of strokes: choose {', '.join(known)}")
         if settings.keys() & {"spacing", "distance"}:
             settings = {"unit": "world" if "distance" in settings else "pixels"} | settings
-        return replace(self, **settings)
+        return with_settings(self, settings)

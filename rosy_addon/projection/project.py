@@ -17,6 +17,7 @@ from ..core.cache import Cache
 from ..core.errors import NothingInViewError, RosyError, counted
 from ..core.memory import raise_mmap_threshold
 from ..core.progress import progress, report
+from ..field.formats.polygons import offsets_from_sizes
 from ..field.frames import transform_components
 from .barycentrics import LABEL, barycentrics
 from .camera import Camera, pixel_rays, z_at_depth
@@ -297,7 +298,7 @@ def _triangles_with_field(instances: MeshInstances) -> np.ndarray:
 def first_triangles(instances: MeshInstances) -> np.ndarray:
     """Return the index of the first triangle of each instance, counted over all instances, (B,) int32."""
     counts = [len(instance.surface.triangles) for instance in instances]
-    return np.cumsum([0, *counts[:-1]]).astype(np.int32)
+    return offsets_from_sizes(counts)[:-1].astype(np.int32)
 
 
 def _split_triangles(

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..core.progress import report
 from ..field.blocks import blocks_by_count, concatenated_ranges
+from ..field.formats.polygons import offsets_from_sizes
 from .camera import Camera
 from .gbuffer import MeshInstances
 from .project import all_triangles, first_triangles
@@ -86,7 +87,7 @@ def project_vertices(
     """
     report(0.0, LABEL)
     scene = _Scene.of(instances, camera, clip_planes)
-    first = np.cumsum([0, *(len(instance.surface.vertices) for instance in instances[:-1])])
+    first = offsets_from_sizes([len(instance.surface.vertices) for instance in instances])[:-1]
     vertex = np.concatenate(
         [start + np.asarray(part, np.intp) for start, part in zip(first, vertices, strict=True)]
     )

@@ -12,7 +12,7 @@ from ..core.cache import Cache
 from ..core.color import map_colors, to_linear
 from ..core.progress import progress, report
 from ..projection.gbuffer import GBuffer
-from ..projection.pixel_blocks import BLOCK_PIXELS
+from ..projection.pixel_blocks import BLOCK_PIXELS, reported_blocks
 from .color_values import map_positions, value_ends, value_ranges
 from .contrast import blend_gain, scale_contrast, supersampling_gain
 from .covering import scatter_rows
@@ -36,7 +36,6 @@ from .look import Look, colors_magnitude, colors_values, is_even, is_hatched, un
 from .look_units import PixelLook, pixel_look
 from .picture import Picture, common_color_range
 from .pixel_field import PixelField, entries_of_rows
-from .reported_blocks import reported_blocks
 from .shading import Light
 from .stages import ComposeStages
 from .streak_statistics import look_streak_statistics

@@ -35,6 +35,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.progress import progress
+from ..projection.pixel_blocks import reported_blocks
 from .contrast import normalize_variance
 from .covering import Covering, build_covering, member_lines
 from .filter_kernel import full_sample_count, kernel_weights
@@ -44,7 +45,6 @@ from .lic_images import LicImages, lic_images, magnitude_step_limits
 from .look import has_flow
 from .look_units import PixelLook
 from .pixel_field import PixelField
-from .reported_blocks import reported_blocks
 from .streamline_origins import Origins, Sheets
 
 #: The doublings end when the weights of further steps are below this. Averages are divided by the sum of

@@ -9,14 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from ..core.progress import progress
+from ..projection.pixel_blocks import reported_blocks
 from .image_noise import (
     BLOCK_ROWS,
     NOISE_MEAN,
+    NoiseSettings,
     TileRectangle,
     box_radius,
     cached_tiles,
@@ -25,7 +26,6 @@ from .image_noise import (
     tile_rectangle,
 )
 from .look_units import PixelLook
-from .reported_blocks import reported_blocks
 
 #: Standard deviation of the finest of the blurs whose differences are the frequency bands, in
 #: line widths, and its minimum in pixels.
@@ -97,8 +97,8 @@ def picture_paper_grain(
     return heights
 
 
-def surface_paper_grain_args(look: PixelLook) -> dict[str, Any]:
-    """Return the parameters of `surface_noise` for paper grain that is anchored to surfaces.
+def surface_paper_grain_settings(look: PixelLook) -> NoiseSettings:
+    """Return the settings of the noise for paper grain that is anchored to surfaces.
 
     The noise has `PAPER_GRAIN_CHANNELS` channels. Their standard deviation is
     `StreakStatistics.paper_grain_std`.
@@ -108,13 +108,8 @@ def surface_paper_grain_args(look: PixelLook) -> dict[str, Any]:
     look : PixelLook
     """
     cell = max(SURFACE_CELL_WIDTHS * look.line_width, MIN_SURFACE_CELL_PIXELS * look.supersampling)
-    return {
-        "cell": cell,
-        "seed": look.seed ^ SEED_SALT,
-        "channels": PAPER_GRAIN_CHANNELS,
-        "density": 0.5,
-        "high_pass": HIGH_PASS_CELLS * cell,
-    }
+    seed = look.seed ^ SEED_SALT
+    return NoiseSettings(cell, seed, PAPER_GRAIN_CHANNELS, high_pass=HIGH_PASS_CELLS * cell)
 
 
 def surface_paper_grain(noise: np.ndarray, std: float, line_count: int) -> np.ndarray:
@@ -123,7 +118,7 @@ def surface_paper_grain(noise: np.ndarray, std: float, line_count: int) -> np.nd
     Parameters
     ----------
     noise : (P, K) float32 ndarray
-        Noise with the mean `NOISE_MEAN`, made with `surface_paper_grain_args`.
+        Noise with the mean `NOISE_MEAN`, made with `surface_paper_grain_settings`.
     std : float
         Standard deviation of the noise: `StreakStatistics.paper_grain_std`.
     line_count : int

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..projection.pixel_blocks import reported_blocks
 from .image_noise import NOISE_MEAN
 from .pixel_field import PixelField, pixel_window
-from .reported_blocks import reported_blocks
 
 #: Radius of the disc in line widths: spots are then about as wide as lines.
 DISC_WIDTHS = 1.0
@@ -59,8 +59,6 @@ def undirected_texture(
         everywhere.
     """
     undefined = np.flatnonzero(field.representation == 0)
-    if not len(undefined):
-        return None
     offsets = disc_offsets(line_width)
     cell, shape = pixel_window(field.pixel, field.width, int(np.abs(offsets).max()))
     # Sums of noise and of samples, as complex numbers.

@@ -13,7 +13,7 @@ from ..compositor.family_hues import PALETTE
 from ..compositor.hatching import has_paper_grain
 from ..compositor.image_noise import image_noise
 from ..compositor.inks import ink_count, inks_of
-from ..compositor.lic import noise_args
+from ..compositor.lic import noise_settings
 from ..compositor.look import is_even, is_hatched
 from ..compositor.look_units import PixelLook
 from ..compositor.paper_grain import line_offset, picture_paper_grain
@@ -101,8 +101,9 @@ def picture_grain(
 
 def picture_noise(resources: GpuResources, size: tuple[int, int], look: PixelLook) -> Any:
     """Return a texture of the noise of `image_noise.image_noise` for a frame of this size."""
-    settings = noise_args(look)
-    return _pixel_texture(resources, "noise", settings, size, partial(image_noise, **settings))
+    settings = noise_settings(look)
+    values = partial(image_noise, settings=settings)
+    return _pixel_texture(resources, "noise", settings, size, values)
 
 
 def _pixel_texture(

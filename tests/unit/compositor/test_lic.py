@@ -11,7 +11,7 @@ from harness.streaks import correlation, orientation_spectrum, peaks, persistenc
 from planar_fields import KERNELS, pair_angle, pixel_centers, swirl_angle
 
 from rosy_addon.compositor.contrast import blend_gain, expected_std
-from rosy_addon.compositor.image_noise import image_noise
+from rosy_addon.compositor.image_noise import NoiseSettings, image_noise
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import pixel_look
 
@@ -35,7 +35,8 @@ def tone(angles, degree, look=PLAIN, **more):
 
 
 def make_noise(size, line_width=1.5, seed=0):
-    return image_noise(np.arange(size * size, dtype=np.int32), size, line_width, seed, 1)[:, 0]
+    pixel = np.arange(size * size, dtype=np.int32)
+    return image_noise(pixel, size, NoiseSettings(line_width, seed))[:, 0]
 
 
 def kernel_window(length, kernel):

@@ -444,14 +444,8 @@ def line_shares(
     onsets = _onset_darkness(field, lines.look, lines.even_lines)
     first_onset = np.minimum.reduce(onsets)
     delays = [onset - first_onset for onset in onsets]
-    shares = []
-    for darkness in 1 - transmittance:
-        weights = onset_weights(darkness, delays)
-        total = np.add.reduce(weights)
-        if len(transmittance) == 1:
-            shares = [weight / total for weight in weights]
-            break
-        shares.append(weights[len(shares)] / total)
+    rows = [onset_shares(darkness, delays) for darkness in 1 - transmittance]
+    shares = rows[0] if len(rows) == 1 else [row[line] for line, row in enumerate(rows)]
     undefined = field.representation == 0
     if undefined.any():
         for line, share in enumerate(shares):
@@ -459,8 +453,8 @@ def line_shares(
     return shares
 
 
-def onset_weights(darkness: np.ndarray, delays: Sequence[np.ndarray | float]) -> list[np.ndarray]:
-    """Compute the weight with which each line takes part in the hatching of a tone.
+def onset_shares(darkness: np.ndarray, delays: Sequence[np.ndarray | float]) -> list[np.ndarray]:
+    """Compute the share of the ink that each line takes in the hatching of a tone.
 
     Parameters
     ----------
@@ -472,10 +466,12 @@ def onset_weights(darkness: np.ndarray, delays: Sequence[np.ndarray | float]) ->
     Returns
     -------
     list of ndarray
-        Weight of each line, from 0 (does not take part) to 1.
+        Share of each line, from 0 (does not take part) to 1. The shares sum to 1.
     """
     extent = ONSET_RANGE + ONSET_LEAD
-    return [smoothstep((darkness - delay + ONSET_LEAD) / extent) for delay in delays]
+    weights = [smoothstep((darkness - delay + ONSET_LEAD) / extent) for delay in delays]
+    total = np.add.reduce(weights)
+    return [weight / total for weight in weights]
 
 
 def _onset_darkness(

@@ -22,7 +22,7 @@ from dataclasses import replace
 import numpy as np
 
 from .even_lines import COARSE_RATIO, EvenLines, resolved_share, uneven_width
-from .hatching import HatchedLines, line_ranks, onset_weights, soft_rank_of, standard_streak
+from .hatching import HatchedLines, line_ranks, onset_shares, soft_rank_of, standard_streak
 from .lic_images import LicImages
 from .look import Look
 from .look_units import PixelLook
@@ -290,9 +290,7 @@ def layer_shares(darkness: np.ndarray, layers: int, layering: float) -> list[np.
     layering : float
         The setting of the look: difference in darkness between the tones at which successive layers join.
     """
-    weights = onset_weights(darkness, [layer * layering for layer in range(layers)])
-    total = np.add.reduce(weights)
-    return [weight / total for weight in weights]
+    return onset_shares(darkness, [layer * layering for layer in range(layers)])
 
 
 def threshold_pixels(ordered: np.ndarray, resolved: np.ndarray | float = 1.0) -> np.ndarray:

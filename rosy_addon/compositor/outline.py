@@ -72,13 +72,11 @@ def outline_coverage(gbuffer: GBuffer, look: PixelLook, cache: Cache | None = No
     (P,) float32 ndarray
         0 to 1.
     """
+    with progress(0.0, 0.8 if gbuffer.samples is None else 0.3):
+        edges = _Edges(gbuffer, look, cache)
     if gbuffer.samples is None:
-        with progress(0.0, 0.8):
-            edges = _Edges(gbuffer, look, cache)
         with progress(0.8, 1.0):
             return edges.coverage()
-    with progress(0.0, 0.3):
-        edges = _Edges(gbuffer, look, cache)
     is_start = (edges.line_width > 0) | (gbuffer.coverage.own < 1)
     reach = int(np.ceil(look.outline)) + 1
     is_near = _dilated(gbuffer, is_start, reach)

@@ -187,7 +187,5 @@ def apply_tone_curve(tone: np.ndarray, look: Look) -> np.ndarray:
 def tone_curve(look: Look) -> tuple[float, float]:
     """Return (scale, black): a look maps a tone to (tone - black) * scale, and then applies the gamma."""
     black, white, _ = look.tone_levels
-    tone_range = white - black
-    if abs(tone_range) < MIN_TONE_RANGE:
-        tone_range = MIN_TONE_RANGE if tone_range >= 0 else -MIN_TONE_RANGE
+    tone_range = float(np.copysign(max(abs(white - black), MIN_TONE_RANGE), white - black))
     return 1 / tone_range, black

@@ -163,13 +163,12 @@ def _field_kind(degree: int, channels: Sequence[FieldChannel]) -> FieldKind:
     Harmonics between those of `channels` are added, so that their orders have no gaps. Of channels of
     families, only the first one is kept.
     """
-    harmonic_orders = [order for kind, order in channels if kind == "deviation"]
-    ordered: list[FieldChannel] = []
-    if harmonic_orders:
-        ordered = [("deviation", j) for j in range(min(harmonic_orders), max(harmonic_orders) + 1)]
+    orders = [order for kind, order in channels if kind == "deviation"]
+    all_orders = range(min(orders, default=0), max(orders, default=-1) + 1)
+    ordered: list[FieldChannel] = [("deviation", order) for order in all_orders]
     ordered += [channel for channel in channels if channel[0] == "family"][:1]
     # The symmetry depends on the harmonics that exist, not on those that fill gaps.
-    return FieldKind(degree, tuple(ordered), FieldSymmetry(degree, tuple(harmonic_orders)))
+    return FieldKind(degree, tuple(ordered), FieldSymmetry(degree, tuple(orders)))
 
 
 def mesh_buffers(

@@ -270,10 +270,7 @@ def _fill_triangles(
         values, index = faces, [face] * 3
         normals, phases = [faces.normal.take(face, axis=1)] * 3, None
     else:
-        values, index = (
-            fans,
-            [surface.corner_fan.take(corner).astype(np.intp) for corner in corners],
-        )
+        values, index = fans, surface.corner_fan.take(corners).astype(np.intp)
         normals, phases = _corner_normals(index, corners, fans, custom_normals)
     normals = [_fill_missing_normals(normal, geometric_normal) for normal in normals]
     x, y = tangent_frame_components(normals[0])

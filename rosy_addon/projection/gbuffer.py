@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..field.formats.polygons import offsets_from_sizes
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from .camera import Camera
@@ -250,13 +251,12 @@ class GBuffer:
             this instance included.
         """
         counts = np.bincount(self.instance_id)
-        ends = np.cumsum(counts) / len(self.pixel)
+        ends = offsets_from_sizes(counts) / len(self.pixel)
         instances = []
         for instance_id in np.flatnonzero(counts).tolist():
             blocks: list[slice | np.ndarray] = [*pixel_blocks(counts[instance_id])]
             if counts[instance_id] < len(self.pixel):
                 pixels = np.flatnonzero(self.instance_id == instance_id)
                 blocks = [pixels[block] for block in blocks]
-            start = ends[instance_id - 1] if instance_id else 0.0
-            instances.append((instance_id, blocks, (start, ends[instance_id])))
+            instances.append((instance_id, blocks, (ends[instance_id], ends[instance_id + 1])))
         return instances

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..core.progress import progress
 from ..field.frames import normalize
-from .camera import Camera, look_at, orthographic_camera, perspective_camera
+from .camera import Camera, look_at, orthographic_camera, perspective_camera, z_at_depth
 from .gbuffer import GBuffer, MeshInstances, with_field
 from .pixel_blocks import reported_blocks
 from .project import rasterize_instances
@@ -125,11 +125,8 @@ def render_depth_map(instances: MeshInstances, camera: Camera) -> np.ndarray:
     """Return the (H, W) float32 depths of the nearest surfaces along the camera axis; inf at empty pixels."""
     fragments = rasterize_instances(instances, camera)
     depth = np.full(camera.width * camera.height, np.inf, dtype=np.float32)
-    m_z, m_w = camera.projection[2, 2:]
-    if camera.is_perspective:
-        depth[fragments.pixel] = m_w / (fragments.depth + m_z)
-    else:
-        depth[fragments.pixel] = (fragments.depth - m_w) / -m_z
+    # The cameras of lights are not sheared, so the depth is the same for all rays.
+    depth[fragments.pixel] = -z_at_depth(camera, 0, 0, fragments.depth)
     return depth.reshape(camera.height, camera.width)
 
 

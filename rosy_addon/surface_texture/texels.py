@@ -276,8 +276,8 @@ def fill_margin(
         color.
     """
     height, width, channels = frame.height, frame.width, color.shape[1]
-    image = np.empty((height, width, channels), dtype=np.float32)
-    image[...] = color.mean(axis=0, dtype=np.float64)
+    mean = color.mean(axis=0, dtype=np.float64)
+    image = np.full((height, width, channels), mean, dtype=np.float32)
     flat = image.reshape(-1, channels)
     flat[field.pixel] = color
     filled = np.zeros(height * width, dtype=bool)

@@ -155,5 +155,6 @@ class ComposeStages:
 
     def _wobble_angle(self, look: PixelLook) -> np.ndarray:
         """Return the (Q,) float32 `wobble.wobble_angle` at all Q pixels of the G-buffer."""
-        key = "wobble", self._gbuffer, look.anchor, look.line_width, look.pixel_size
+        size = look.line_width, look.pixel_size, look.supersampling
+        key = "wobble", self._gbuffer, look.anchor, *size
         return self._cache.get_or_create(key, partial(wobble_angle, self._gbuffer, look))

@@ -237,11 +237,10 @@ def _write_records(
     `CornerField.magnitude`. Texels 7 and 8 contain `CornerField.representation`, and each channel has two
     further texels: six components are the real and imaginary parts at the three corners, the seventh is the
     result of `field_channel.rotation_order`, and the eighth is the layer of the channel (0 for the
-    representation). The three values for the
-    color map have one texel. Its last component is 1 if all three values are finite. The
-    `SurfaceTone.values` have two texels: each corner has two components. Of the `rest_positions`, x is in the fourth components of the positions, y in the fourth
-    components of the normals, and z in the last texel. `corners` has the (T, 3, 4) rows of
-    `MeshBuffers.corners`.
+    representation). The three values for the color map have one texel. Its last component is 1 if all three
+    values are finite. The `SurfaceTone.values` at the corners have two texels: each corner has two components.
+    Of the `rest_positions`, x is in the fourth components of the positions, y in the fourth components of the
+    normals, and z in the last texel. `corners` has the (T, 3, 4) rows of `MeshBuffers.corners`.
     """
     surface, tone, color_values = instance.surface, instance.tone, instance.color_values
     rest = rest_positions(surface)

@@ -91,7 +91,7 @@ class GpuRenderer(ViewportRenderer):
         check_method(look)
         check_tone(look, [instance.tone for instance in instances], view.reference)
         check_color_values(look, instances)
-        check_instances(instances, view.sample_camera)
+        check_instances(instances, view.sample_camera, look.display)
         yield from prepare_steps(self.resources.mesh_lookups(instances, look.display))
         items = self.upload(instances, look.display)
         rgba = self.device.read((yield from self.texture_steps(items, view)))

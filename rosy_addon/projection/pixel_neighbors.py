@@ -31,7 +31,7 @@ class PixelTable:
     ----------
     gbuffer : GBuffer
     margin : int
-        How far outside of the frame a place may be, in rows and columns. There are no pixels.
+        How far outside of the frame a place may be, in rows and columns. No pixels are there.
     """
 
     def __init__(self, gbuffer: GBuffer, margin: int) -> None:

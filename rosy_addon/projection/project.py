@@ -29,6 +29,9 @@ from .pixel_values import fill_pixels
 from .rasterized_samples import SampledTriangles, rasterize_samples
 from .rasterizer import Fragments, Rows, rasterize
 
+#: How a field is shown: averaged over smooth fans and interpolated, or constant on each face.
+DISPLAYS = ("smooth", "flat")
+
 
 def project(
     instances: MeshInstances,
@@ -64,12 +67,12 @@ def project(
     Raises
     ------
     RosyError
-        If no instance has a field, a field does not fit its surface or is not
+        If `display` is unknown, no instance has a field, a field does not fit its surface or is not
         finite, or a matrix is not finite.
     NothingInViewError
         If no surface with a field is visible.
     """
-    check_instances(instances, camera)
+    check_instances(instances, camera, display)
     raise_mmap_threshold()
     report(0.0, LABEL)
     sampled = None
@@ -221,15 +224,17 @@ def cached_project(
     )
 
 
-def check_instances(instances: MeshInstances, camera: Camera) -> None:
+def check_instances(instances: MeshInstances, camera: Camera, display: str) -> None:
     """Check that mesh instances can be projected.
 
     Raises
     ------
     RosyError
-        If no instance has a field, a field does not fit its surface or is not
+        If `display` is unknown, no instance has a field, a field does not fit its surface or is not
         finite, or a matrix is not finite.
     """
+    if display not in DISPLAYS:
+        raise RosyError(f"unknown display {display!r}: choose {', '.join(DISPLAYS)}")
     if all(instance.field is None for instance in instances):
         raise RosyError(f"camera '{camera.name}': no object has a RoSy field")
     for instance in instances:

@@ -86,7 +86,7 @@ def _draw_fields(
     check_tone(view.look, [instance.tone for instance in view.instances], view.reference)
     if not view.draws_thresholds:
         check_color_values(view.look, view.instances)
-    check_instances(view.instances, view.sample_camera)
+    check_instances(view.instances, view.sample_camera, view.look.display)
     workers = workers or core_count()
     groups = picture_groups(view, workers)
     while True:

@@ -57,10 +57,6 @@ def runge_kutta_lic(angle, noise, size, length, kernel):
     def inside(p):
         return (p.real >= 0) & (p.real < size) & (p.imag >= 0) & (p.imag < size)
 
-    def look_up(p):
-        column = np.clip(p.real.astype(int), 0, size - 1)
-        return noise[np.clip(p.imag.astype(int), 0, size - 1), column]
-
     total, count = noise.copy(), np.ones_like(noise)
     for sign in (1, -1):
         p, alive = start.copy(), np.ones(start.shape, dtype=bool)
@@ -71,7 +67,8 @@ def runge_kutta_lic(angle, noise, size, length, kernel):
             k3 = direction(p + h / 2 * k2)
             p = p + h / 6 * (k1 + 2 * k2 + 2 * k3 + direction(p + h * k3))
             alive &= inside(p)
-            total += weight * np.where(alive, look_up(p), 0)
+            row, column = (np.clip(part.astype(int), 0, size - 1) for part in (p.imag, p.real))
+            total += weight * np.where(alive, noise[row, column], 0)
             count += weight * alive
     return total / count
 

@@ -8,7 +8,6 @@ import numpy as np
 
 from ..core.errors import RosyError
 from ..projection.gbuffer import GBuffer, MeshInstance, with_field
-from ..projection.pixel_blocks import reported_blocks
 from ..projection.surface_sampling import surface_values
 from .look import Look, colors_values
 
@@ -106,7 +105,4 @@ def map_positions(gbuffer: GBuffer, look: Look) -> np.ndarray:
     """
     check_color_values(look, gbuffer.instances)
     low, scale = value_scale(look, value_ranges(gbuffer.instances))
-    positions = np.empty(len(gbuffer.pixel), dtype=np.float32)
-    for block in reported_blocks(len(positions), "finding colors"):
-        positions[block] = scaled_positions(surface_values(gbuffer.part(block)), low, scale)
-    return positions
+    return scaled_positions(surface_values(gbuffer), low, scale)

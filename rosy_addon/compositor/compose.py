@@ -355,11 +355,8 @@ def _tone_along_lines(layer: _Layer, strip: Strip) -> np.ndarray:
     channels[:, 0] = layer.tone
     look = layer.lines.look.for_means(overshoot_steps(layer.lines.look))
     (images,) = lic_lengths(layer.field, [look], channels, strip)
-    means = np.empty(images.members.shape[:2], dtype=np.float32)
-    for block in reported_blocks(means.shape[1], "finding tones", 1.0, 1.0):
-        centered = images.members[:, block] - np.float32(NOISE_MEAN)
-        scaled = np.float32(1 - NOISE_MEAN) * centered[..., 0]
-        means[:, block] = NOISE_MEAN + scaled / centered[..., 1]
+    centered = images.members - np.float32(NOISE_MEAN)
+    means = NOISE_MEAN + np.float32(1 - NOISE_MEAN) * centered[..., 0] / centered[..., 1]
     return np.clip(means, 0, 1, out=means)
 
 
@@ -372,12 +369,9 @@ def streak_tone(field: PixelField, look: PixelLook, images: LicImages) -> np.nda
         Display values, not clipped.
     """
     supersampled_gain = np.float32(supersampling_gain(look) if look.supersampling > 1 else 1)
-    tone = np.empty_like(images.blend)
-    for block in reported_blocks(len(tone), "blending lines"):
-        effective_samples = images.effective_samples[block]
-        gain = look.gain * blend_gain(field.line_count, effective_samples, look) * supersampled_gain
-        tone[block] = scale_contrast(images.blend[block], gain[:, None])
-    return tone
+    blended_gain = blend_gain(field.line_count, images.effective_samples, look)
+    gain = look.gain * blended_gain * supersampled_gain
+    return scale_contrast(images.blend, gain[:, None])
 
 
 def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: PixelLook) -> np.ndarray:

@@ -14,7 +14,6 @@ import numpy as np
 
 from ..core.cache import Cache
 from ..core.progress import progress, report
-from ..projection.pixel_blocks import reported_blocks
 from .filter_kernel import Kernel
 
 #: Mean and standard deviation of binary noise.
@@ -196,14 +195,12 @@ def image_noise(pixel: np.ndarray, width: int, settings: NoiseSettings) -> np.nd
     """
     cell, seed, channels, density, high_pass = settings
     rectangle = tile_rectangle(pixel, width)
+    index = rectangle.index(*np.divmod(pixel, np.int32(width)))
     noise = np.empty((len(pixel), channels), dtype=np.float32)
     for channel in range(channels):
         arguments = cell, seed, channel, density, high_pass
         with progress(channel / channels, (channel + 1) / channels):
-            tiles = cached_tiles(_noise_tiles, rectangle, *arguments)
-            for block in reported_blocks(len(pixel), STEP_LABEL, 1.0, 1.0):
-                index = rectangle.index(*np.divmod(pixel[block], np.int32(width)))
-                noise[block, channel] = tiles.take(index)
+            noise[:, channel] = cached_tiles(_noise_tiles, rectangle, *arguments).take(index)
     return noise
 
 

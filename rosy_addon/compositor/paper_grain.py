@@ -13,7 +13,6 @@ from functools import lru_cache
 import numpy as np
 
 from ..core.progress import progress
-from ..projection.pixel_blocks import reported_blocks
 from .image_noise import (
     BLOCK_ROWS,
     NOISE_MEAN,
@@ -88,13 +87,9 @@ def picture_paper_grain(
     offset = line_offset(line_width)
     rectangle = tile_rectangle(pixel, width, subpixels, extra_columns=(line_count - 1) * offset)
     tiles = cached_tiles(_grain_tiles, rectangle, line_width, seed)
-    heights = np.empty((line_count, len(pixel)), dtype=np.float32)
-    for block in reported_blocks(len(pixel), STEP_LABEL):
-        row, column = np.divmod(pixel[block], np.int32(width))
-        index = rectangle.index(row // subpixels, column // subpixels)
-        for line in range(line_count):
-            heights[line, block] = tiles.take(index + line * offset)
-    return heights
+    row, column = np.divmod(pixel, np.int32(width))
+    index = rectangle.index(row // subpixels, column // subpixels)
+    return np.stack([tiles.take(index + line * offset) for line in range(line_count)])
 
 
 def surface_paper_grain_settings(look: PixelLook) -> NoiseSettings:
@@ -130,10 +125,7 @@ def surface_paper_grain(noise: np.ndarray, std: float, line_count: int) -> np.nd
         Heights with mean 0 and standard deviation 1.
     """
     channel = np.arange(line_count) % PAPER_GRAIN_CHANNELS
-    heights = np.empty((line_count, len(noise)), dtype=np.float32)
-    for block in reported_blocks(len(noise), STEP_LABEL, 1.0, 1.0):
-        heights[:, block] = ((noise[block] - np.float32(NOISE_MEAN)) / np.float32(std)).T[channel]
-    return heights
+    return ((noise - np.float32(NOISE_MEAN)) / np.float32(std)).T.take(channel, axis=0)
 
 
 def line_offset(line_width: float) -> int:

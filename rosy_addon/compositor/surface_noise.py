@@ -117,15 +117,7 @@ def surface_noise(
     if high_pass:
         with progress(0.6, 1.0):
             _high_pass(gbuffer, total, BLUR_FACTOR * high_pass)
-    return noise_rows(total)
-
-
-def noise_rows(channels: np.ndarray) -> np.ndarray:
-    """Return (P, K) float32 noise with the mean `NOISE_MEAN`, given (K, P) channels with the mean 0."""
-    noise = np.empty(channels.shape[::-1], dtype=np.float32)
-    for block in reported_blocks(len(noise), STEP_LABEL, 1.0, 1.0):
-        noise[block] = channels[:, block].T + np.float32(NOISE_MEAN)
-    return noise
+    return np.add(total.T, np.float32(NOISE_MEAN), order="C")
 
 
 def solid_noise(
@@ -294,15 +286,13 @@ def _high_pass(gbuffer: GBuffer, channels: np.ndarray, sigma: float) -> None:
 
     `sigma` is its standard deviation in pixels. Pixels without a surface are ignored.
     """
-    count = len(gbuffer.pixel)
     # The empty margin is as wide as the support of the blur.
     cell, shape = pixel_window(gbuffer.pixel, gbuffer.camera.width, 3 * box_radius(sigma))
 
     def blurred_image(values: np.ndarray | None) -> np.ndarray:
         """Return the blurred image of `values` (by default 1) at the pixels and 0 elsewhere, flat."""
         image = np.zeros(shape, dtype=np.float32)
-        for block in reported_blocks(count, STEP_LABEL, 0.0, 0.0):
-            image.reshape(-1)[cell[block]] = 1 if values is None else values[block]
+        image.reshape(-1)[cell] = 1 if values is None else values
         return gaussian_blur(image, sigma).reshape(-1)
 
     images = len(channels) + 1
@@ -310,6 +300,4 @@ def _high_pass(gbuffer: GBuffer, channels: np.ndarray, sigma: float) -> None:
         weight = np.maximum(blurred_image(None).take(cell), 1e-3)
     for number, channel in enumerate(channels, start=1):
         with progress(number / images, (number + 1) / images):
-            blurred = blurred_image(channel)
-            for block in reported_blocks(count, STEP_LABEL, 1.0, 1.0):
-                channel[block] -= blurred.take(cell[block]) / weight[block]
+            channel -= blurred_image(channel).take(cell) / weight

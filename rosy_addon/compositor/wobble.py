@@ -142,19 +142,12 @@ def rotate_pixel_field(field: PixelField, angle: np.ndarray) -> PixelField:
     -------
     PixelField
     """
-    representation = np.empty(len(angle), dtype=np.complex64)
-    channels = {
-        channel: np.empty(len(angle), np.complex64) if channel[0] == "deviation" else values
-        for channel, values in field.channels.items()
-    }
-    for block in reported_blocks(len(angle), "bending lines"):
-        block_angle = angle[block].astype(np.float64)
-        phase = unit_phasor(field.degree * block_angle)
-        representation[block] = product(field.representation[block], phase)
-        for channel, values in field.channels.items():
-            if channel[0] == "deviation":
-                # A harmonic is a function of the angle of the member. The rotation of its phase gives rotated
-                # members the value of the members before.
-                phase = unit_phasor(-channel[1] * block_angle)
-                channels[channel][block] = product(values[block], phase)
+    angle, channels = angle.astype(np.float64), dict(field.channels)
+    for kind, order in field.channels:
+        if kind == "deviation":
+            # A harmonic is a function of the angle of the member. The rotation of its phase gives rotated
+            # members the value of the members before.
+            phase = unit_phasor(-order * angle)
+            channels[kind, order] = product(channels[kind, order], phase)
+    representation = product(field.representation, unit_phasor(field.degree * angle))
     return replace(field, representation=representation, channels=channels)

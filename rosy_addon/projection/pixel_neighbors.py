@@ -13,7 +13,7 @@ import numpy as np
 from ..core.progress import report
 from ..field.frames import dot_components, transport_components, view_frame
 from .gbuffer import GBuffer
-from .pixel_blocks import BLOCK_PIXELS, reported_blocks
+from .pixel_blocks import BLOCK_PIXELS
 
 #: Upper bound of the slope of a tangent plane against the picture, in pixels of depth per pixel.
 #: Corresponds to 88 degrees.
@@ -116,19 +116,15 @@ def neighbor_masks(gbuffer: GBuffer, crease_angle: float | None) -> np.ndarray:
     masks = np.full(count, 1 << 4, dtype=np.uint16)
     if not count:
         return masks
-    row, column = np.empty((2, count), dtype=np.int32)
-    left_column, right_column = gbuffer.camera.width, 0
-    for block in reported_blocks(count, label, 0.0, 0.1):
-        row[block], column[block] = np.divmod(gbuffer.pixel[block], np.int32(gbuffer.camera.width))
-        left_column = min(left_column, int(column[block].min()))
-        right_column = max(right_column, int(column[block].max()))
+    row, column = np.divmod(gbuffer.pixel, np.int32(gbuffer.camera.width))
+    left_column, right_column = int(column.min()), int(column.max())
     # One empty column on either side.
     width = right_column - left_column + 3
     min_normal_cosine = None if crease_angle is None else np.float32(np.cos(crease_angle))
     band_rows = max(BLOCK_PIXELS // width, 1)
     first_row, row_count = int(row[0]), int(row[-1] - row[0]) + 1
     for row_start in range(first_row, first_row + row_count, band_rows):
-        report(0.1 + 0.9 * (row_start - first_row) / row_count, label)
+        report((row_start - first_row) / row_count, label)
         # The grid has one more row: the first row of the next band, or an empty row.
         ends = np.array([row_start, row_start + band_rows + 1], row.dtype)
         first, stop = np.searchsorted(row, ends).tolist()

@@ -23,7 +23,7 @@ from .barycentrics import LABEL, barycentrics
 from .camera import Camera, pixel_rays, z_at_depth
 from .corner_field import cached_corner_field
 from .gbuffer import GBuffer, MeshInstance, MeshInstances, SurfacePoints, with_field
-from .pixel_blocks import pixel_blocks, reported_blocks
+from .pixel_blocks import reported_blocks
 from .pixel_coverage import pixel_coverage
 from .pixel_values import fill_pixels
 from .rasterized_samples import SampledTriangles, rasterize_samples
@@ -304,9 +304,7 @@ def _split_triangles(
     if len(instances) == 1:
         return np.zeros(len(triangle), dtype=np.int32), triangle
     first_triangle = first_triangles(instances)
-    instance_id = np.empty(len(triangle), dtype=np.int32)
-    for block in pixel_blocks(len(triangle)):
-        instance_id[block] = np.searchsorted(first_triangle, triangle[block], side="right") - 1
+    instance_id = np.searchsorted(first_triangle, triangle, side="right").astype(np.int32) - 1
     return instance_id, triangle - first_triangle[instance_id]
 
 

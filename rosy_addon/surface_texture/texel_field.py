@@ -13,9 +13,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..compositor.image_noise import BLUR_FACTOR, NoiseSettings
+from ..compositor.image_noise import BLUR_FACTOR, NOISE_MEAN, NoiseSettings
 from ..compositor.pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps
-from ..compositor.surface_noise import instance_hashes, noise_rows, solid_noise
+from ..compositor.surface_noise import instance_hashes, solid_noise
 from ..core.progress import progress, report
 from ..field.blocks import row_blocks
 from ..field.frames import dot
@@ -321,7 +321,7 @@ def texel_noise(on: TexelSurface, settings: NoiseSettings) -> np.ndarray:
         solid_noise(coordinates, size, block_hash, seed, density, out=total[:, block])
     if high_pass:
         _subtract_local_means(on, rest, total, BLUR_FACTOR * high_pass * step / scale)
-    return noise_rows(total)
+    return np.add(total.T, np.float32(NOISE_MEAN), order="C")
 
 
 def _subtract_local_means(

@@ -183,10 +183,8 @@ class _Edges:
         # The margin of the frame is wider than the lines.
         self._table = PixelTable(gbuffer, int(np.ceil(look.outline)) + 1)
         # Larger values of `_depth` are nearer to the camera.
-        self._depth, self._tolerance = np.empty((2, count), dtype=np.float32)
-        for block in reported_blocks(count, STEP_LABEL, 0.0, 0.2):
-            self._depth[block], _, _, self._tolerance[block] = depth_slopes(gbuffer, block)
-        with progress(0.2, 0.6, STEP_LABEL):
+        self._depth, _, _, self._tolerance = depth_slopes(gbuffer, slice(None))
+        with progress(0.0, 0.6, STEP_LABEL):
             #: The `neighbor_masks` of the surface, with links across creases.
             self._mask = neighbor_masks(gbuffer, None)
         self.line_width = np.zeros(count, dtype=np.float32)

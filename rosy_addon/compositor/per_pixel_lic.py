@@ -275,11 +275,9 @@ def neighbor_table(field: PixelField) -> np.ndarray:
     entry = np.full(field.height * field.width, count, dtype=np.int32)
     entry[field.pixel] = np.arange(count, dtype=np.int32)
     table = np.full((9, count + 1), count, dtype=np.int32)
-    for block in pixel_blocks(count):
-        pixel, mask = field.pixel[block], field.neighbor_mask[block]
-        for bit, (dx, dy) in enumerate(NEIGHBOR_OFFSETS):
-            linked = np.flatnonzero(mask >> bit & 1)
-            table[bit, block.start + linked] = entry[pixel[linked] + (dy * field.width + dx)]
+    for bit, (dx, dy) in enumerate(NEIGHBOR_OFFSETS):
+        linked = np.flatnonzero(field.neighbor_mask >> bit & 1)
+        table[bit, linked] = entry[field.pixel[linked] + (dy * field.width + dx)]
     return table
 
 

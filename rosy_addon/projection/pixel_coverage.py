@@ -100,14 +100,11 @@ def pixel_coverage(
     others = _other_samples(sampled, gbuffer.camera, side, instance, normal)
     count = len(gbuffer.pixel)
     table = PixelTable(gbuffer, 1)
-    columns = np.empty((6, count), dtype=np.float32)
-    for block in reported_blocks(count, LABEL, 0.0, 0.2):
-        columns[:2, block] = _centers(gbuffer.pixel[block], gbuffer.camera.width, 1)
-        columns[2:, block] = depth_slopes(gbuffer, block)
+    columns = *_centers(gbuffer.pixel, gbuffer.camera.width, 1), *depth_slopes(gbuffer, slice(None))
     entries = _Entries(*columns, gbuffer.instance_id, gbuffer.geometric_normal.T)
     entry = others.entry.copy()
     elsewhere = []
-    for block in reported_blocks(len(entry), LABEL, 0.2, 0.7):
+    for block in reported_blocks(len(entry), LABEL, 0.0, 0.7):
         shown = entries.shows(entry[block], others.part(block))
         elsewhere.append(block.start + np.flatnonzero(~shown))
     elsewhere = np.concatenate([np.empty(0, dtype=np.intp), *elsewhere])

@@ -23,10 +23,9 @@ from ..field.directional_field import evaluate_harmonics, field_symmetry
 from ..field.frames import dot
 from ..field.surface import Surface
 from ..projection.camera import Camera
-from ..projection.gbuffer import GBuffer, MeshInstance
+from ..projection.gbuffer import GBuffer, MeshInstance, SurfacePoints
 from ..projection.pixel_neighbors import screen_jacobians
 from ..projection.project import surface_points
-from ..projection.surface_points import SurfacePoints
 from ..projection.visible_vertices import ProjectedPoints, project_points
 from .progressive_samples import matrix_scale, progressive_samples, rest_areas, surface_samples
 

@@ -7,10 +7,9 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..core.errors import RosyError
-from ..projection.gbuffer import GBuffer, MeshInstance
+from ..projection.gbuffer import GBuffer, MeshInstance, with_field
 from ..projection.surface_sampling import surface_values
 from .look import Look, colors_values
-from .reported_blocks import reported_blocks
 
 #: Smallest difference between the color values at the bottom and at the top of the color map. If the
 #: difference is that small, the map is a step: larger values have the color at the top.
@@ -28,9 +27,7 @@ def check_color_values(look: Look, instances: Iterable[MeshInstance]) -> None:
     RosyError
         If the look shows color values, and no mesh instance with a field has any.
     """
-    if colors_values(look) and all(
-        instance.color_values is None for instance in instances if instance.field is not None
-    ):
+    if colors_values(look) and all(item.color_values is None for item in with_field(instances)):
         raise RosyError("hue 'values' needs numbers on the surface, but no object has any")
 
 
@@ -45,11 +42,8 @@ def value_range(values: np.ndarray) -> ValueRange:
 
 def value_ranges(instances: Iterable[MeshInstance]) -> list[ValueRange]:
     """Return the `value_range` of each mesh instance that has both a field and color values."""
-    return [
-        value_range(instance.color_values)
-        for instance in instances
-        if instance.field is not None and instance.color_values is not None
-    ]
+    colored = [instance.color_values for instance in with_field(instances)]
+    return [value_range(values) for values in colored if values is not None]
 
 
 def value_ends(look: Look, ranges: Iterable[ValueRange]) -> tuple[float, float]:
@@ -111,7 +105,4 @@ def map_positions(gbuffer: GBuffer, look: Look) -> np.ndarray:
     """
     check_color_values(look, gbuffer.instances)
     low, scale = value_scale(look, value_ranges(gbuffer.instances))
-    positions = np.empty(len(gbuffer.pixel), dtype=np.float32)
-    for block in reported_blocks(len(positions), "finding colors"):
-        positions[block] = scaled_positions(surface_values(gbuffer.part(block)), low, scale)
-    return positions
+    return scaled_positions(surface_values(gbuffer), low, scale)

@@ -12,7 +12,7 @@ from ..core.cache import Cache
 from ..core.color import map_colors, to_linear
 from ..core.progress import progress, report
 from ..projection.gbuffer import GBuffer
-from ..projection.pixel_blocks import BLOCK_PIXELS
+from ..projection.pixel_blocks import BLOCK_PIXELS, reported_blocks
 from .color_values import map_positions, value_ends, value_ranges
 from .contrast import blend_gain, scale_contrast, supersampling_gain
 from .covering import scatter_rows
@@ -36,7 +36,6 @@ from .look import Look, colors_magnitude, colors_values, is_even, is_hatched, un
 from .look_units import PixelLook, pixel_look
 from .picture import Picture, common_color_range
 from .pixel_field import PixelField, entries_of_rows
-from .reported_blocks import reported_blocks
 from .shading import Light
 from .stages import ComposeStages
 from .streak_statistics import look_streak_statistics
@@ -356,11 +355,8 @@ def _tone_along_lines(layer: _Layer, strip: Strip) -> np.ndarray:
     channels[:, 0] = layer.tone
     look = layer.lines.look.for_means(overshoot_steps(layer.lines.look))
     (images,) = lic_lengths(layer.field, [look], channels, strip)
-    means = np.empty(images.members.shape[:2], dtype=np.float32)
-    for block in reported_blocks(means.shape[1], "finding tones", 1.0, 1.0):
-        centered = images.members[:, block] - np.float32(NOISE_MEAN)
-        scaled = np.float32(1 - NOISE_MEAN) * centered[..., 0]
-        means[:, block] = NOISE_MEAN + scaled / centered[..., 1]
+    centered = images.members - np.float32(NOISE_MEAN)
+    means = NOISE_MEAN + np.float32(1 - NOISE_MEAN) * centered[..., 0] / centered[..., 1]
     return np.clip(means, 0, 1, out=means)
 
 
@@ -373,12 +369,9 @@ def streak_tone(field: PixelField, look: PixelLook, images: LicImages) -> np.nda
         Display values, not clipped.
     """
     supersampled_gain = np.float32(supersampling_gain(look) if look.supersampling > 1 else 1)
-    tone = np.empty_like(images.blend)
-    for block in reported_blocks(len(tone), "blending lines"):
-        effective_samples = images.effective_samples[block]
-        gain = look.gain * blend_gain(field.line_count, effective_samples, look) * supersampled_gain
-        tone[block] = scale_contrast(images.blend[block], gain[:, None])
-    return tone
+    blended_gain = blend_gain(field.line_count, images.effective_samples, look)
+    gain = look.gain * blended_gain * supersampled_gain
+    return scale_contrast(images.blend, gain[:, None])
 
 
 def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: PixelLook) -> np.ndarray:

@@ -28,10 +28,10 @@ import numpy as np
 
 from ..core.deterministic_trig import cos_sin, vector_angle
 from ..field.directional_field import evaluate_harmonics
+from ..projection.pixel_blocks import reported_blocks
 from .flow import forward_share
 from .look_units import PixelLook
 from .pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps, normalized, pixel_window
-from .reported_blocks import reported_blocks
 
 #: The largest value of an integer in `Covering.state_table`.
 INT16_MAX = 32767

@@ -24,13 +24,13 @@ from ..core.deterministic_trig import vector_angle
 from ..core.progress import progress
 from ..field.frames import transform_components
 from ..projection.gbuffer import GBuffer, MeshInstance
+from ..projection.pixel_blocks import part_of, reported_blocks
 from ..projection.pixel_values import view_plane_rotation
 from ..projection.surface_lines import SurfaceLines, cached_surface_lines
 from .look_units import PixelLook, instance_line_spacing
 from .paper_grain import PAPER_GRAIN_STRENGTH
 from .pixel_field import PixelField, all_members
-from .reported_blocks import reported_blocks
-from .streak_statistics import COVERAGE_STEPS, break_amount, smoothstep
+from .streak_statistics import COVERAGES, break_amount, smoothstep
 from .wobble import WOBBLE_STD
 
 #: Distances between lines on screen, in pixels of the picture, over which lines fade in.
@@ -85,8 +85,7 @@ class EvenLines:
 
     def part(self, extent: slice) -> EvenLines:
         """Return the evenly spaced lines at the pixels `extent`."""
-        arrays = self.streaks, self.period, self.growth, self.coarse_streaks
-        return EvenLines(*(None if values is None else values[..., extent] for values in arrays))
+        return part_of(self, (..., extent))
 
     def coverage(self, line: int, target_coverage: np.ndarray, look: PixelLook) -> np.ndarray:
         """Compute the coverage of each pixel by the lines of one direction of the field.
@@ -220,7 +219,7 @@ def uneven_width(
     amount = np.minimum(break_amount(target_coverage, look.breaks, look.wobble), MAX_BREAK_AMOUNT)
     # Scaled to the standard deviation 1, the `streaks` of even lines have a uniform distribution.
     scale = 1 / ((1 - amount) * math.sqrt(12))
-    width = np.interp(target_coverage, np.linspace(0, 1, COVERAGE_STEPS), look_width_table(look))
+    width = np.interp(target_coverage, COVERAGES, look_width_table(look))
     if break_streak is not None:
         width = width + scale * amount * break_streak
     if paper_grain is not None:
@@ -249,8 +248,7 @@ def _width_table(breaks: float, wobble: float, paper_grain_amplitude: float) -> 
     paper_grain_amplitude : float
         Standard deviation of the paper grain, in standard deviations of the streaks.
     """
-    coverage = np.linspace(0, 1, COVERAGE_STEPS)
-    amount = np.minimum(break_amount(coverage, breaks, wobble), MAX_BREAK_AMOUNT)
+    amount = np.minimum(break_amount(COVERAGES, breaks, wobble), MAX_BREAK_AMOUNT)
     spread = np.sqrt(amount**2 + paper_grain_amplitude**2) / ((1 - amount) * math.sqrt(12))
     spread = np.maximum(spread, 1e-6)
     erf = np.vectorize(math.erf, otypes=[float])
@@ -263,7 +261,7 @@ def _width_table(breaks: float, wobble: float, paper_grain_amplitude: float) -> 
     low, high = -6 * spread, 1 + 6 * spread
     for _ in range(40):
         middle = 0.5 * (low + high)
-        is_low = ramp(middle) - ramp(middle - 1) < coverage
+        is_low = ramp(middle) - ramp(middle - 1) < COVERAGES
         low, high = np.where(is_low, middle, low), np.where(is_low, high, middle)
     return 0.5 * (low + high)
 
@@ -316,6 +314,48 @@ def even_lines(
     return EvenLines(streaks, period, growth if growth.any() else None, coarse_streaks)
 
 
+def line_phases(
+    lines: SurfaceLines,
+    place: tuple[np.ndarray, np.ndarray],
+    field: PixelField,
+    members: list[np.ndarray],
+    first_direction: np.ndarray,
+    step: np.ndarray | int = 1,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Evaluate the lines of a surface along each direction of the field, at n pixels or texels.
+
+    Parameters
+    ----------
+    lines : SurfaceLines
+    place : tuple of ndarray
+        Points of the surface, from ``lines.tree.locate``.
+    field : PixelField
+        The field at the n pixels.
+    members : list of (n,) complex64 ndarray
+        From `all_members`.
+    first_direction : (n,) int ndarray
+        The direction of `lines` that the first member is.
+    step : (n,) int ndarray or int
+        What is added to the number of the direction from one member to the next: 1, or -1 where the surface is
+        seen from behind.
+
+    Returns
+    -------
+    phases : (M, n) float32 ndarray
+        In distances between lines.
+    foreshortening : (M, n) float32 ndarray
+        Distance between lines on screen, relative to the distance on a surface that faces the eye.
+    """
+    across = np.abs((field.screen_jacobian[:, 0].conj() * field.screen_jacobian[:, 1]).imag)
+    phases, foreshortening = np.empty((2, field.line_count, len(across)), dtype=np.float32)
+    for line in range(field.line_count):
+        family = (first_direction + step * line) % field.degree % field.line_count
+        phases[line] = lines.pattern.evaluate(*place, family)
+        along = np.abs(field.to_screen(field.member_direction(members[line]), foreshorten=True))
+        foreshortening[line] = across / np.maximum(along, np.float32(1e-6))
+    return phases, foreshortening
+
+
 class _InstanceLines:
     """The evenly spaced lines of one mesh instance. All parameters but `instance` are as in `even_lines`."""
 
@@ -356,9 +396,8 @@ class _InstanceLines:
         growth : (n,) float32 ndarray
             See `EvenLines`; 0 where no further lines grow.
         """
-        instance, look = self._instance, self._look
-        geometry = instance.surface, instance.matrix, instance.field, look.display
-        lines = cached_surface_lines(*geometry, ratio * self._spacing, self._cache)
+        look, spacing = self._look, ratio * self._spacing
+        lines = cached_surface_lines(self._instance, look.display, spacing, self._cache)
         streaks, period = np.empty((2, self._field.line_count, len(pixels)), dtype=np.float32)
         growth = np.zeros(len(pixels), dtype=np.float32)
         for block in reported_blocks(len(pixels), STEP_LABEL, 1.0, 1.0):
@@ -411,16 +450,10 @@ class _InstanceLines:
         octaves = None
         if not look.pixel_size:
             octaves = np.maximum(np.log2(np.maximum(scale, np.float32(1e-9))), 0)
-        across = (field.screen_jacobian[:, 0].conj() * field.screen_jacobian[:, 1]).imag
         defined = (field.representation != 0) & (heading != 0)
-        phases, period = np.empty((2, field.line_count, len(entries)), dtype=np.float32)
-        for line in range(field.line_count):
-            family = (first_direction + step * line) % field.degree % field.line_count
-            phases[line] = lines.pattern.evaluate(leaf, weights, family)
-            along = np.abs(field.to_screen(field.member_direction(members[line]), foreshorten=True))
-            foreshortening = np.abs(across) / np.maximum(along, np.float32(1e-6))
-            period[line] = asked_pixels * scale * foreshortening * defined
-        return phases, period, octaves
+        place = leaf, weights
+        phases, foreshortening = line_phases(lines, place, field, members, first_direction, step)
+        return phases, asked_pixels * scale * foreshortening * defined, octaves
 
     def _heading_in_view(self, entries: np.ndarray, heading: np.ndarray) -> np.ndarray:
         """Return the (n,) complex64 directions in the view plane of headings on the surface.

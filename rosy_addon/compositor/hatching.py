@@ -31,7 +31,7 @@ from .look_units import PixelLook
 from .paper_grain import PAPER_GRAIN_STRENGTH
 from .pixel_field import PixelField, all_members
 from .streak_statistics import (
-    COVERAGE_STEPS,
+    COVERAGES,
     NO_INK,
     break_amount,
     break_steps,
@@ -115,15 +115,17 @@ class HatchedLines(NamedTuple):
         std = look_streak_statistics(self.look).break_std
         return standard_streak(self.break_images, line, std)[0]
 
-    def spots(self, line: int) -> np.ndarray:
-        """Return what is thresholded in place of a LIC image where the field is undefined.
+    def spots(self, line: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the pixels where the field is undefined, and what is thresholded there in place of a LIC image.
 
-        It is the undirected texture with standard deviation 1, plus the paper grain of the line, and below all
-        thresholds if no spots are drawn. The result is (P,) float32, NaN where the field is defined.
+        The pixels are (n,) indices. The (n,) float32 values are the undirected texture with standard deviation
+        1, plus the paper grain of the line, and below all thresholds if no spots are drawn.
         """
         below = 0 if undefined_drawing(self.look) == "texture" else np.float32(NO_INK)
         std = np.float32(look_streak_statistics(self.look).disc_std)
-        return self.undirected / std + self.relief(line) - below
+        spots = self.undirected / std + self.relief(line) - below
+        undefined = np.flatnonzero(~np.isnan(spots))
+        return undefined, spots[undefined]
 
     def target_tones(self, tone: np.ndarray) -> np.ndarray:
         """Return the target tones of lines: (M, P) `line_tones` if set, else the (P,) `tone` as (1, P)."""
@@ -161,10 +163,11 @@ class HatchedLines(NamedTuple):
             streak += self.relief(line)
             coverage = _above_threshold(streak, target_coverage, statistics.threshold, look, slope)
         if self.undirected is not None:
-            spots = self.spots(line)
-            undefined = np.flatnonzero(~np.isnan(spots))
-            thresholds = look_streak_statistics(look).disc_threshold
-            spots, target = spots[undefined], target_coverage[undefined]
+            undefined, spots = self.spots(line)
+            target, thresholds = (
+                target_coverage[undefined],
+                look_streak_statistics(look).disc_threshold,
+            )
             coverage[undefined] = _above_threshold(spots, target, thresholds, look)
         return coverage
 
@@ -223,8 +226,7 @@ def _render_one_ink(
     if not by_magnitude and position is None:
         transmittance = 1 - inks.required_coverage(inks.target_transmittance(transmittance), ink)
     bare_paper = np.ones_like(tone)
-    shares = line_shares(field, look, transmittance, lines.even_lines)
-    for line, share in enumerate(shares):
+    for line, share in enumerate(line_shares(field, lines, transmittance)):
         target_coverage = 1 - transmittance[line % len(transmittance)] ** share
         bare_paper *= 1 - lines.coverage(line, target_coverage)
     if lines.outline is not None:
@@ -247,8 +249,7 @@ def _render_many_inks(
     target_transmittance = inks.target_transmittance(transmittance)
     bare_paper = np.ones_like(tone)
     transmitted = np.ones((len(tone), 3), dtype=np.float32)
-    shares = line_shares(field, look, transmittance, lines.even_lines)
-    for line, share in enumerate(shares):
+    for line, share in enumerate(line_shares(field, lines, transmittance)):
         ink = inks.ink_at_tone(ink_indices[line], tone)
         line_transmittance = target_transmittance[line % len(target_transmittance)] ** share
         target_coverage = inks.required_coverage(line_transmittance, ink)
@@ -301,7 +302,7 @@ def _above_threshold(
         Change of the streak across the line, per pixel. Edges are then at least as soft as in a mean over a
         pixel.
     """
-    threshold = np.interp(target_coverage, np.linspace(0, 1, COVERAGE_STEPS), thresholds)
+    threshold = np.interp(target_coverage, COVERAGES, thresholds)
     half_width = np.float32(softness(look.crispness))
     if slope is not None:
         slope = np.float32(PIXEL_SOFTNESS) * slope
@@ -418,10 +419,7 @@ def soft_rank_of(rank: np.ndarray, rank_count: int) -> np.ndarray:
 
 
 def line_shares(
-    field: PixelField,
-    look: PixelLook,
-    transmittance: np.ndarray,
-    even_lines: EvenLines | None = None,
+    field: PixelField, lines: HatchedLines, transmittance: np.ndarray
 ) -> list[np.ndarray]:
     """Compute the share of the ink that each line takes.
 
@@ -431,12 +429,11 @@ def line_shares(
     Parameters
     ----------
     field : PixelField
-    look : PixelLook
-        Its `guiding_angle`, `layers` and `layering` are used.
+    lines : HatchedLines
+        The lines of the field at the same pixels. The shares depend on their look, and on their evenly spaced
+        lines if there are any.
     transmittance : (M, P) or (1, P) ndarray
         Target transmittance of all ink together, with a row for each line if lines have different targets.
-    even_lines : EvenLines, optional
-        Evenly spaced lines at the pixels of the field, if they are drawn.
 
     Returns
     -------
@@ -444,17 +441,11 @@ def line_shares(
         If all lines have the same target, the shares sum to 1 at each pixel. Where the field is
         undefined, the first line has the share 1.
     """
-    onsets = _onset_darkness(field, look, even_lines)
+    onsets = _onset_darkness(field, lines.look, lines.even_lines)
     first_onset = np.minimum.reduce(onsets)
     delays = [onset - first_onset for onset in onsets]
-    shares = []
-    for darkness in 1 - transmittance:
-        weights = onset_weights(darkness, delays)
-        total = np.add.reduce(weights)
-        if len(transmittance) == 1:
-            shares = [weight / total for weight in weights]
-            break
-        shares.append(weights[len(shares)] / total)
+    rows = [onset_shares(darkness, delays) for darkness in 1 - transmittance]
+    shares = rows[0] if len(rows) == 1 else [row[line] for line, row in enumerate(rows)]
     undefined = field.representation == 0
     if undefined.any():
         for line, share in enumerate(shares):
@@ -462,8 +453,8 @@ def line_shares(
     return shares
 
 
-def onset_weights(darkness: np.ndarray, delays: Sequence[np.ndarray | float]) -> list[np.ndarray]:
-    """Compute the weight with which each line takes part in the hatching of a tone.
+def onset_shares(darkness: np.ndarray, delays: Sequence[np.ndarray | float]) -> list[np.ndarray]:
+    """Compute the share of the ink that each line takes in the hatching of a tone.
 
     Parameters
     ----------
@@ -475,10 +466,12 @@ def onset_weights(darkness: np.ndarray, delays: Sequence[np.ndarray | float]) ->
     Returns
     -------
     list of ndarray
-        Weight of each line, from 0 (does not take part) to 1.
+        Share of each line, from 0 (does not take part) to 1. The shares sum to 1.
     """
     extent = ONSET_RANGE + ONSET_LEAD
-    return [smoothstep((darkness - delay + ONSET_LEAD) / extent) for delay in delays]
+    weights = [smoothstep((darkness - delay + ONSET_LEAD) / extent) for delay in delays]
+    total = np.add.reduce(weights)
+    return [weight / total for weight in weights]
 
 
 def _onset_darkness(

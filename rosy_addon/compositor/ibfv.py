@@ -35,6 +35,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.progress import progress
+from ..projection.pixel_blocks import reported_blocks
 from .contrast import normalize_variance
 from .covering import Covering, build_covering, member_lines
 from .filter_kernel import full_sample_count, kernel_weights
@@ -44,7 +45,6 @@ from .lic_images import LicImages, lic_images, magnitude_step_limits
 from .look import has_flow
 from .look_units import PixelLook
 from .pixel_field import PixelField
-from .reported_blocks import reported_blocks
 from .streamline_origins import Origins, Sheets
 
 #: The doublings end when the weights of further steps are below this. Averages are divided by the sum of
@@ -86,16 +86,10 @@ class StreakWaves:
 
     def images(self, phase: float) -> LicImages:
         """Return the LIC images at a phase of the flow, from 0 to 1."""
-        members = np.empty_like(self.constant)
-        turn = np.exp(2j * np.pi * phase)
-        real, imaginary = np.float32(turn.real), np.float32(turn.imag)
-        count = members.shape[1]
-        for line, member in enumerate(members):
-            for block in reported_blocks(count, "blending lines"):
-                np.add(self.constant[line, block], np.float32(NOISE_MEAN), out=member[block])
-                if self.wave is not None:
-                    wave = self.wave[line, block]
-                    member[block, 0] += wave.real * real - wave.imag * imaginary
+        members = self.constant + np.float32(NOISE_MEAN)
+        if self.wave is not None:
+            turn = np.complex64(np.exp(2j * np.pi * phase))
+            members[..., 0] += self.wave.real * turn.real - self.wave.imag * turn.imag
         return lic_images(members, self.effective_samples)
 
 

@@ -15,7 +15,6 @@ import numpy as np
 from ..core.cache import Cache
 from ..core.progress import progress, report
 from .filter_kernel import Kernel
-from .reported_blocks import reported_blocks
 
 #: Mean and standard deviation of binary noise.
 NOISE_MEAN, NOISE_STD = 0.5, 0.5
@@ -97,6 +96,29 @@ def hash_bits(
     return h >> np.uint32(8) < np.uint32(round(density * 2**24))
 
 
+class NoiseSettings(NamedTuple):
+    """Settings of noise that consists of random binary cells.
+
+    Attributes
+    ----------
+    cell : float
+        Side of a cell: in pixels, or in steps of streamlines on the texels of a texture.
+    seed : int
+    channels : int
+        Number of independent channels.
+    density : float
+        Fraction of cells that are bright.
+    high_pass : float
+        Variations wider than about this length, in the unit of `cell`, are removed. 0 leaves the noise white.
+    """
+
+    cell: float
+    seed: int
+    channels: int = 1
+    density: float = 0.5
+    high_pass: float = 0.0
+
+
 class TileRectangle(NamedTuple):
     """A rectangle of the picture that consists of whole tiles; rows from the bottom, in pixels."""
 
@@ -154,16 +176,7 @@ def cached_tiles(
     return image
 
 
-def image_noise(
-    pixel: np.ndarray,
-    width: int,
-    cell: float,
-    seed: int,
-    channels: int,
-    *,
-    density: float = 0.5,
-    high_pass: float = 0.0,
-) -> np.ndarray:
+def image_noise(pixel: np.ndarray, width: int, settings: NoiseSettings) -> np.ndarray:
     """Make noise that is anchored to the picture: random binary square cells, filtered to pixels.
 
     Parameters
@@ -172,15 +185,7 @@ def image_noise(
         Flat pixel indices, ascending.
     width : int
         Width of the frame in pixels.
-    cell : float
-        Side of a cell in pixels.
-    seed : int
-    channels : int
-        Number of independent channels.
-    density : float
-        Fraction of cells that are bright.
-    high_pass : float
-        Variations wider than about this many pixels are removed. 0 leaves the noise white.
+    settings : NoiseSettings
 
     Returns
     -------
@@ -188,15 +193,14 @@ def image_noise(
         The mean is `NOISE_MEAN`. The standard deviation of cells, before they are filtered, is
         `NOISE_STD`. With the density 0.5 and without a high pass, values are from 0 to 1.
     """
+    cell, seed, channels, density, high_pass = settings
     rectangle = tile_rectangle(pixel, width)
+    index = rectangle.index(*np.divmod(pixel, np.int32(width)))
     noise = np.empty((len(pixel), channels), dtype=np.float32)
     for channel in range(channels):
-        settings = cell, seed, channel, density, high_pass
+        arguments = cell, seed, channel, density, high_pass
         with progress(channel / channels, (channel + 1) / channels):
-            tiles = cached_tiles(_noise_tiles, rectangle, *settings)
-            for block in reported_blocks(len(pixel), STEP_LABEL, 1.0, 1.0):
-                index = rectangle.index(*np.divmod(pixel[block], np.int32(width)))
-                noise[block, channel] = tiles.take(index)
+            noise[:, channel] = cached_tiles(_noise_tiles, rectangle, *arguments).take(index)
     return noise
 
 

@@ -22,12 +22,12 @@ from dataclasses import replace
 import numpy as np
 
 from .even_lines import COARSE_RATIO, EvenLines, resolved_share, uneven_width
-from .hatching import HatchedLines, line_ranks, onset_weights, soft_rank_of, standard_streak
+from .hatching import HatchedLines, line_ranks, onset_shares, soft_rank_of, standard_streak
 from .lic_images import LicImages
 from .look import Look
 from .look_units import PixelLook
 from .pixel_field import PixelField
-from .streak_statistics import COVERAGE_STEPS, break_amount, look_streak_statistics
+from .streak_statistics import COVERAGES, break_amount, look_streak_statistics
 
 #: Number of lines whose thresholds are stored.
 MAX_LAYERS = 3
@@ -102,9 +102,8 @@ def line_thresholds(line: int, lines: HatchedLines) -> np.ndarray:
             break_streak += relief
         result = _streak_thresholds(streak, break_streak, lines.look, statistics.threshold)
     if lines.undirected is not None:
-        spots = lines.spots(line)
-        undefined = np.flatnonzero(~np.isnan(spots))
-        result[undefined] = _coverage_from(spots[undefined], statistics.disc_threshold)
+        undefined, spots = lines.spots(line)
+        result[undefined] = _coverage_from(spots, statistics.disc_threshold)
     return result
 
 
@@ -119,11 +118,10 @@ def _streak_thresholds(
     if break_streak is None:
         return _coverage_from(streak, table)
     difference = break_streak - streak
-    coverages = np.linspace(0, 1, COVERAGE_STEPS)
 
     def excess(coverage: np.ndarray) -> np.ndarray:
         amount = break_amount(coverage, look.breaks, look.wobble)
-        return streak + amount * difference - np.interp(coverage, coverages, table)
+        return streak + amount * difference - np.interp(coverage, COVERAGES, table)
 
     return _bisect(excess, len(streak))
 
@@ -148,8 +146,7 @@ def _coverage_from(streak: np.ndarray, table: np.ndarray) -> np.ndarray:
 
     `table` is `StreakStatistics.threshold`, or `disc_threshold` for the undirected texture.
     """
-    coverages = np.linspace(0, 1, COVERAGE_STEPS)
-    return np.interp(streak, table[::-1], coverages[::-1]).astype(np.float32)
+    return np.interp(streak, table[::-1], COVERAGES[::-1]).astype(np.float32)
 
 
 def _bisect(excess: Callable[[np.ndarray], np.ndarray], count: int) -> np.ndarray:
@@ -293,9 +290,7 @@ def layer_shares(darkness: np.ndarray, layers: int, layering: float) -> list[np.
     layering : float
         The setting of the look: difference in darkness between the tones at which successive layers join.
     """
-    weights = onset_weights(darkness, [layer * layering for layer in range(layers)])
-    total = np.add.reduce(weights)
-    return [weight / total for weight in weights]
+    return onset_shares(darkness, [layer * layering for layer in range(layers)])
 
 
 def threshold_pixels(ordered: np.ndarray, resolved: np.ndarray | float = 1.0) -> np.ndarray:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from ..core.progress import progress
 from .fast_lic import fast_lic
 from .flow import blend_channels, noise_channel_count
 from .ibfv import streak_waves, wave_images
-from .image_noise import NOISE_MEAN, image_noise
+from .image_noise import NOISE_MEAN, NoiseSettings, image_noise
 from .lic_images import LicImages
 from .look import has_flow
 from .look_units import PixelLook
@@ -59,7 +58,7 @@ def lic_lengths(
 
 def look_noise(field: PixelField, look: PixelLook) -> np.ndarray:
     """Return the (P, K) float32 image-space noise of a look at the pixels of a field."""
-    return image_noise(field.pixel, field.width, **noise_args(look))
+    return image_noise(field.pixel, field.width, noise_settings(look))
 
 
 def unconvolved_noise(noise: np.ndarray, look: PixelLook) -> np.ndarray:
@@ -70,12 +69,7 @@ def unconvolved_noise(noise: np.ndarray, look: PixelLook) -> np.ndarray:
     return mean + blend_channels(noise - mean, look.flow_phase)
 
 
-def noise_args(look: PixelLook) -> dict[str, Any]:
-    """Return the noise settings of a look as parameters of `image_noise` and `surface_noise`."""
-    return {
-        "cell": look.line_width,
-        "seed": look.seed,
-        "channels": noise_channel_count(look),
-        "density": look.density,
-        "high_pass": look.high_pass,
-    }
+def noise_settings(look: PixelLook) -> NoiseSettings:
+    """Return the settings of the noise that LIC averages along streamlines."""
+    channels = noise_channel_count(look)
+    return NoiseSettings(look.line_width, look.seed, channels, look.density, look.high_pass)

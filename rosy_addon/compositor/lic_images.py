@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..field.validate import MIN_COMPONENT
-from ..projection.pixel_blocks import pixel_blocks
 from .look import magnitude_range
 from .look_units import PixelLook
 from .pixel_field import PixelField
@@ -51,10 +50,7 @@ def lic_images(
     members: np.ndarray, effective_samples: np.ndarray, slopes: np.ndarray | None = None
 ) -> LicImages:
     """Make `LicImages`, whose blend is the mean of the member images. Parameters are its attributes."""
-    blend = np.empty(members.shape[1:], dtype=np.float32)
-    for block in pixel_blocks(len(blend)):
-        blend[block] = members[:, block].mean(axis=0)
-    return LicImages(members, blend, effective_samples, slopes)
+    return LicImages(members, members.mean(axis=0), effective_samples, slopes)
 
 
 def magnitude_step_limits(field: PixelField, look: PixelLook) -> np.ndarray | None:
@@ -64,11 +60,8 @@ def magnitude_step_limits(field: PixelField, look: PixelLook) -> np.ndarray | No
     """
     if not look.magnitude_length:
         return None
-    ends = magnitude_ends(look, field)
-    limits = np.empty(len(field.pixel), dtype=np.int32)
-    for block in pixel_blocks(len(limits)):
-        limits[block] = np.rint(look.length * relative_magnitude(field.part(block), ends))
-    return limits
+    magnitude = relative_magnitude(field, magnitude_ends(look, field))
+    return np.rint(look.length * magnitude).astype(np.int32)
 
 
 def relative_magnitude(field: PixelField, ends: tuple[float, float]) -> np.ndarray:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from ..annotation.singularity_settings import singularity_dots_choice, singularity_size_number
-from ..core.errors import RosyError
 from ..core.settings import (
-    Numbers,
     Stage,
     always,
     check_settings,
@@ -19,8 +17,8 @@ from ..core.settings import (
     fraction,
     number,
     numbers,
-    settings_of,
     switch,
+    with_settings,
 )
 
 
@@ -106,7 +104,11 @@ def _shading(panel: str, applies: Callable[[Any], bool] = always) -> dict[str, A
 def _pixel_length(
     default: float, high: float, text: str, low: float = 0.0, **description: Any
 ) -> Any:
-    """Return a dataclass field for a setting that is a length in pixels; see `Number.is_pixel_length`."""
+    """Return a dataclass field for a setting that is a length in pixels; see `Number.is_pixel_length`.
+
+    By default, it is in the panel "streaks".
+    """
+    description = {"panel": "streaks", **description}
     return number(default, low, high, text, is_pixel_length=True, **description)
 
 
@@ -189,7 +191,6 @@ class Look:
         8000,
         "Length of the streaks in pixels, in each direction",
         low=1,
-        panel="streaks",
         applies=_has_streaks,
     )
     fade: str = choice(
@@ -219,7 +220,6 @@ class Look:
         "Pixels that streaks drift along the field per frame, in animations and live views. Lines of fields "
         "of even degree drift toward the guiding angle, or both ways if they are perpendicular to it. 0: no "
         "drift",
-        panel="streaks",
         applies=_can_flow,
     )
     line_width: float = _pixel_length(
@@ -228,7 +228,6 @@ class Look:
         "Width of the streaks in pixels, which is the size of a cell of the noise",
         low=0.5,
         preview_low=0.75,
-        panel="streaks",
     )
     line_distance: float = _pixel_length(
         3.0,
@@ -236,7 +235,6 @@ class Look:
         "Distance between even lines in pixels. At half coverage, lines are half as wide",
         low=1.0,
         preview_low=1.5,
-        panel="streaks",
         applies=is_even,
     )
     density: float = number(
@@ -252,7 +250,6 @@ class Look:
         1024.0,
         "Remove noise variations wider than this many pixels, so that crossing streaks do not form "
         "clouds. 0: keep them, as in the paper",
-        panel="streaks",
     )
     detail: float = number(
         0.0,
@@ -488,10 +485,4 @@ class Look:
         RosyError
             If there is no such setting, or its value is not allowed.
         """
-        known, changes = settings_of(Look), dict(settings)
-        for name, value in settings.items():
-            if name not in known:
-                raise RosyError(f"a look has no setting '{name}': choose {', '.join(known)}")
-            if isinstance(known[name], Numbers) and isinstance(value, list):
-                changes[name] = tuple(value)
-        return replace(self, **changes)
+        return with_settings(self, settings)

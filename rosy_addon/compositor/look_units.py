@@ -12,7 +12,7 @@ import numpy as np
 from ..core.settings import Number, Stage, pixel_lengths, settings_of
 from ..field.symmetry import FieldSymmetry
 from ..projection.camera import Camera
-from ..projection.gbuffer import MeshInstance
+from ..projection.gbuffer import MeshInstance, with_field
 from .filter_kernel import KERNEL_OF_FADE, Kernel
 from .flow import MAX_AXIAL_STEPS, NO_DRIFT, Drift, cycle_distance
 from .look import Look, has_colored_noise, has_flow, magnitude_range
@@ -174,7 +174,7 @@ def pixel_look(
     is_antialiased : bool
         See `PixelLook`.
     """
-    bounds = [instance.world_bounds() for instance in instances if instance.field is not None]
+    bounds = [instance.world_bounds() for instance in with_field(instances)]
     scale = 1.0
     if look.unit_size and bounds:
         pixel = pixel_world_size(np.concatenate(bounds), camera)
@@ -297,10 +297,3 @@ def instance_line_spacing(look: PixelLook, camera: Camera, instance: MeshInstanc
     exact = look.line_distance * pixel_world_size(instance.world_bounds(), camera)
     step = np.rint(np.log2(exact) * SPACING_STEPS_PER_OCTAVE)
     return float(2 ** (step / SPACING_STEPS_PER_OCTAVE))
-
-
-def cell_size_args(look: PixelLook) -> dict[str, Any]:
-    """Return the parameters of `surface_noise` for the size of noise cells on the surface."""
-    if not look.pixel_size:
-        return {"pixel": 0.0, "smallest": 0.0}
-    return {"pixel": look.pixel_size, "smallest": float(look.supersampling)}

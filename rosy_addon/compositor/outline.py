@@ -18,12 +18,12 @@ from ..field.frames import dot
 from ..projection.crease_pixels import crease_pixels
 from ..projection.gbuffer import GBuffer
 from ..projection.outline_mesh import cached_outline_mesh
-from ..projection.pixel_neighbors import depth_slopes, neighbor_masks
+from ..projection.pixel_blocks import reported_blocks
+from ..projection.pixel_neighbors import PixelTable, depth_slopes, neighbor_masks
 from ..projection.project import project_samples
 from .look import crease_angle_of
 from .look_units import PixelLook
 from .pixel_field import pixel_window
-from .reported_blocks import reported_blocks
 
 #: Minimum depth difference at an occlusion, in multiples of the depth tolerance per pixel (see
 #: `pixel_neighbors.depth_slopes`).
@@ -72,13 +72,11 @@ def outline_coverage(gbuffer: GBuffer, look: PixelLook, cache: Cache | None = No
     (P,) float32 ndarray
         0 to 1.
     """
+    with progress(0.0, 0.8 if gbuffer.samples is None else 0.3):
+        edges = _Edges(gbuffer, look, cache)
     if gbuffer.samples is None:
-        with progress(0.0, 0.8):
-            edges = _Edges(gbuffer, look, cache)
         with progress(0.8, 1.0):
             return edges.coverage()
-    with progress(0.0, 0.3):
-        edges = _Edges(gbuffer, look, cache)
     is_start = (edges.line_width > 0) | (gbuffer.coverage.own < 1)
     reach = int(np.ceil(look.outline)) + 1
     is_near = _dilated(gbuffer, is_start, reach)
@@ -182,21 +180,11 @@ class _Edges:
         self._gbuffer, self._look = gbuffer, look
         self._count = count = len(gbuffer.pixel)
         self._defined = gbuffer.representation != 0
-        # The pixels are cells of a frame with an empty margin that is wider than the lines.
-        width, height = gbuffer.camera.width, gbuffer.camera.height
-        margin = int(np.ceil(look.outline)) + 1
-        self._stride = width + 2 * margin
-        self._entry_of_cell = np.full((height + 2 * margin) * self._stride, -1, dtype=np.int32)
-        self._cell = np.empty(count, dtype=np.int32)
+        # The margin of the frame is wider than the lines.
+        self._table = PixelTable(gbuffer, int(np.ceil(look.outline)) + 1)
         # Larger values of `_depth` are nearer to the camera.
-        self._depth, self._tolerance = np.empty((2, count), dtype=np.float32)
-        for block in reported_blocks(count, STEP_LABEL, 0.0, 0.2):
-            row, column = np.divmod(gbuffer.pixel[block], np.int32(width))
-            cell = (row + margin) * np.int32(self._stride) + column + np.int32(margin)
-            self._cell[block] = cell
-            self._entry_of_cell[cell] = np.arange(block.start, block.stop, dtype=np.int32)
-            self._depth[block], _, _, self._tolerance[block] = depth_slopes(gbuffer, block)
-        with progress(0.2, 0.6, STEP_LABEL):
+        self._depth, _, _, self._tolerance = depth_slopes(gbuffer, slice(None))
+        with progress(0.0, 0.6, STEP_LABEL):
             #: The `neighbor_masks` of the surface, with links across creases.
             self._mask = neighbor_masks(gbuffer, None)
         self.line_width = np.zeros(count, dtype=np.float32)
@@ -204,7 +192,7 @@ class _Edges:
         self._border = np.zeros(count, dtype=np.uint8)
         for instance_id in np.flatnonzero(np.bincount(gbuffer.instance_id)):
             with progress(0.6, 0.7, STEP_LABEL):
-                self._find_creases_and_parts(int(instance_id), cache, margin * (self._stride + 1))
+                self._find_creases_and_parts(int(instance_id), cache)
         with progress(0.7, 0.9, STEP_LABEL):
             self._find_occlusions()
         with progress(0.9, 1.0, STEP_LABEL):
@@ -222,7 +210,7 @@ class _Edges:
         depth_slack = np.float32(DEPTH_JUMP) * self._tolerance[edge]
         coverage = np.zeros(self._count, dtype=np.float32)
         for distance, dx, dy in _disc_offsets(int(np.ceil(look.outline))):
-            neighbor = self._neighbor(edge, dx, dy)
+            neighbor = self._table.beside(edge, dx, dy)
             paintable = neighbor >= 0
             paintable &= gbuffer.instance_id.take(neighbor) == gbuffer.instance_id[edge]
             slack = depth_slack * np.float32(max(distance, 1.0))
@@ -232,21 +220,15 @@ class _Edges:
             coverage[neighbor] = np.maximum(coverage[neighbor], pixel_coverage)
         return coverage
 
-    def _neighbor(self, entry: np.ndarray, dx: int, dy: int) -> np.ndarray:
-        """Return the indices of the pixels at the offset (dx, dy) from pixels; -1 where there is none."""
-        return self._entry_of_cell.take(self._cell[entry] + (dy * self._stride + dx))
-
     def _is_linked(self, entry: np.ndarray | slice, bit: int) -> np.ndarray:
         """Return whether the surface continues from each pixel to the neighbor of the given bit."""
         return self._mask[entry] >> np.uint16(bit) & 1 == 1
 
-    def _find_creases_and_parts(self, instance_id: int, cache: Cache | None, origin: int) -> None:
+    def _find_creases_and_parts(self, instance_id: int, cache: Cache | None) -> None:
         """Set the width of lines along the creases of an instance, and where its parts intersect.
 
         Parts are connected components of the mesh. A line is drawn where two of them intersect if their
         normals differ by the crease angle. The bit `PART_BORDER` is set at pixels next to another part.
-        `origin` is the number that the cell of the lower left pixel of the frame would have; the pixel may be
-        outside of the rectangle of the cells.
         """
         gbuffer, look, defined = self._gbuffer, self._look, self._defined
         instance = gbuffer.instances[instance_id]
@@ -257,8 +239,7 @@ class _Edges:
             points = mesh.crease_points(instance.surface, instance.matrix)
             points += np.asarray(instance.matrix, dtype=np.float64)[:3, 3]
             with progress(0.5, 0.8):
-                frame = self._entry_of_cell, origin, self._stride
-                marks = crease_pixels(gbuffer, instance_id, points, *frame)
+                marks = crease_pixels(gbuffer, instance_id, points, self._table)
             self.line_width[marks & defined] = look.outline / 2
         if mesh.triangle_part is None:
             return
@@ -267,7 +248,7 @@ class _Edges:
             entry = np.flatnonzero(gbuffer.instance_id[block] == instance_id) + block.start
             part = mesh.triangle_part.take(gbuffer.triangle[entry])
             for dx, dy, bit in NEIGHBORS_4:
-                neighbor = self._neighbor(entry, dx, dy)
+                neighbor = self._table.beside(entry, dx, dy)
                 pair = np.flatnonzero(neighbor >= 0)
                 pair = pair[gbuffer.instance_id[neighbor[pair]] == instance_id]
                 other = mesh.triangle_part.take(gbuffer.triangle[neighbor[pair]])
@@ -293,7 +274,7 @@ class _Edges:
                 inside &= (row + dy >= 0) & (row + dy < gbuffer.camera.height)
                 is_edge = inside & self._defined[block] & ~self._is_linked(block, bit)
                 edge = np.flatnonzero(is_edge) + block.start
-                neighbor = self._neighbor(edge, dx, dy)
+                neighbor = self._table.beside(edge, dx, dy)
                 jump_limit = np.float32(DEPTH_JUMP) * self._tolerance[edge]
                 jump = (depth.take(neighbor) - depth[edge]) / jump_limit
                 is_empty = neighbor < 0
@@ -318,14 +299,14 @@ class _Edges:
         for block in reported_blocks(self._count, STEP_LABEL):
             for dx, dy, bit in ((1, 0, 5), (0, 1, 7)):
                 first = np.flatnonzero(self._is_linked(block, bit)) + block.start
-                second = self._neighbor(first, dx, dy)
+                second = self._table.beside(first, dx, dy)
                 jump = np.abs(depth[second] - depth[first])
                 least = np.minimum(tolerance[first], tolerance[second])
                 steep = jump > np.float32(MIN_STEP) * least
                 first, second, jump = first[steep], second[steep], jump[steep]
                 is_step = np.ones(len(first), dtype=bool)
                 for near, side in ((first, -1), (second, 1)):
-                    neighbor = self._neighbor(near, side * dx, side * dy)
+                    neighbor = self._table.beside(near, side * dx, side * dy)
                     change = np.abs(depth.take(neighbor) - depth[near])
                     change[neighbor < 0] = 0
                     is_step &= jump > np.float32(STEP_RATIO) * change

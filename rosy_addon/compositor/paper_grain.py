@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from ..core.progress import progress
 from .image_noise import (
     BLOCK_ROWS,
     NOISE_MEAN,
+    NoiseSettings,
     TileRectangle,
     box_radius,
     cached_tiles,
@@ -25,7 +25,6 @@ from .image_noise import (
     tile_rectangle,
 )
 from .look_units import PixelLook
-from .reported_blocks import reported_blocks
 
 #: Standard deviation of the finest of the blurs whose differences are the frequency bands, in
 #: line widths, and its minimum in pixels.
@@ -88,17 +87,13 @@ def picture_paper_grain(
     offset = line_offset(line_width)
     rectangle = tile_rectangle(pixel, width, subpixels, extra_columns=(line_count - 1) * offset)
     tiles = cached_tiles(_grain_tiles, rectangle, line_width, seed)
-    heights = np.empty((line_count, len(pixel)), dtype=np.float32)
-    for block in reported_blocks(len(pixel), STEP_LABEL):
-        row, column = np.divmod(pixel[block], np.int32(width))
-        index = rectangle.index(row // subpixels, column // subpixels)
-        for line in range(line_count):
-            heights[line, block] = tiles.take(index + line * offset)
-    return heights
+    row, column = np.divmod(pixel, np.int32(width))
+    index = rectangle.index(row // subpixels, column // subpixels)
+    return np.stack([tiles.take(index + line * offset) for line in range(line_count)])
 
 
-def surface_paper_grain_args(look: PixelLook) -> dict[str, Any]:
-    """Return the parameters of `surface_noise` for paper grain that is anchored to surfaces.
+def surface_paper_grain_settings(look: PixelLook) -> NoiseSettings:
+    """Return the settings of the noise for paper grain that is anchored to surfaces.
 
     The noise has `PAPER_GRAIN_CHANNELS` channels. Their standard deviation is
     `StreakStatistics.paper_grain_std`.
@@ -108,13 +103,8 @@ def surface_paper_grain_args(look: PixelLook) -> dict[str, Any]:
     look : PixelLook
     """
     cell = max(SURFACE_CELL_WIDTHS * look.line_width, MIN_SURFACE_CELL_PIXELS * look.supersampling)
-    return {
-        "cell": cell,
-        "seed": look.seed ^ SEED_SALT,
-        "channels": PAPER_GRAIN_CHANNELS,
-        "density": 0.5,
-        "high_pass": HIGH_PASS_CELLS * cell,
-    }
+    seed = look.seed ^ SEED_SALT
+    return NoiseSettings(cell, seed, PAPER_GRAIN_CHANNELS, high_pass=HIGH_PASS_CELLS * cell)
 
 
 def surface_paper_grain(noise: np.ndarray, std: float, line_count: int) -> np.ndarray:
@@ -123,7 +113,7 @@ def surface_paper_grain(noise: np.ndarray, std: float, line_count: int) -> np.nd
     Parameters
     ----------
     noise : (P, K) float32 ndarray
-        Noise with the mean `NOISE_MEAN`, made with `surface_paper_grain_args`.
+        Noise with the mean `NOISE_MEAN`, made with `surface_paper_grain_settings`.
     std : float
         Standard deviation of the noise: `StreakStatistics.paper_grain_std`.
     line_count : int
@@ -135,10 +125,7 @@ def surface_paper_grain(noise: np.ndarray, std: float, line_count: int) -> np.nd
         Heights with mean 0 and standard deviation 1.
     """
     channel = np.arange(line_count) % PAPER_GRAIN_CHANNELS
-    heights = np.empty((line_count, len(noise)), dtype=np.float32)
-    for block in reported_blocks(len(noise), STEP_LABEL, 1.0, 1.0):
-        heights[:, block] = ((noise[block] - np.float32(NOISE_MEAN)) / np.float32(std)).T[channel]
-    return heights
+    return ((noise - np.float32(NOISE_MEAN)) / np.float32(std)).T.take(channel, axis=0)
 
 
 def line_offset(line_width: float) -> int:

@@ -129,12 +129,10 @@ def member_decomposition(field: PixelField, look: PixelLook, noise: np.ndarray) 
         return first
     with progress(0.5, 1.0):
         second = _one_set(field, look, noise, neighbors, angle + np.pi / field.degree)
-    for block in pixel_blocks(len(field.pixel)):
-        weight = _first_set_weight(field.part(block), look)
-        second.blend[block] += weight[:, None] * (first.blend[block] - second.blend[block])
-        samples = second.effective_samples[block]
-        samples += weight * (first.effective_samples[block] - samples)
-    return replace(first, blend=second.blend, effective_samples=second.effective_samples)
+    weight, samples = _first_set_weight(field, look), second.effective_samples
+    blend = second.blend + weight[:, None] * (first.blend - second.blend)
+    samples = samples + weight * (first.effective_samples - samples)
+    return replace(first, blend=blend, effective_samples=samples)
 
 
 def _one_set(
@@ -184,17 +182,13 @@ def _screen_space_members(field: PixelField, angle: float) -> np.ndarray:
     projected members are not 2 pi / N. The two sets of breaking points then come close to each
     other, and the weights do not match them.
     """
-    screen_members = np.empty((field.line_count, len(field.pixel)), dtype=np.complex64)
-    for block in pixel_blocks(len(field.pixel)):
-        part = field.part(block)
-        members = np.stack(
-            [part.to_screen(part.member_direction(member)) for member in all_members(part, 0.0)]
-        )
-        for line, out in enumerate(screen_members):
-            rotation = np.exp(-1j * (angle + 2 * np.pi * line / field.degree))
-            best_index = np.argmax((members * rotation).real, axis=0)
-            out[block] = np.take_along_axis(members, best_index[None], axis=0)[0]
-    return screen_members
+    _, members = _members_on_screen(field, 0.0, field.degree)
+    lines = []
+    for line in range(field.line_count):
+        rotation = np.exp(-1j * (angle + 2 * np.pi * line / field.degree))
+        best_index = np.argmax((members * rotation).real, axis=0)
+        lines.append(np.take_along_axis(members, best_index[None], axis=0)[0])
+    return np.stack(lines)
 
 
 def _members_on_screen(
@@ -214,14 +208,9 @@ def _members_on_screen(
     -------
     members, directions : (count, P) complex64 ndarray
     """
-    members, directions = np.empty((2, count, len(field.pixel)), dtype=np.complex64)
-    for block in pixel_blocks(len(field.pixel)):
-        part = field.part(block)
-        members[:, block] = all_members(part, angle)[:count]
-        for member, direction in zip(members, directions, strict=True):
-            in_plane = part.member_direction(member[block])
-            direction[block] = part.to_screen(in_plane)
-    return members, directions
+    members = all_members(field, angle)[:count]
+    directions = [field.to_screen(field.member_direction(member)) for member in members]
+    return np.stack(members), np.stack(directions)
 
 
 def convolve_members(
@@ -286,11 +275,9 @@ def neighbor_table(field: PixelField) -> np.ndarray:
     entry = np.full(field.height * field.width, count, dtype=np.int32)
     entry[field.pixel] = np.arange(count, dtype=np.int32)
     table = np.full((9, count + 1), count, dtype=np.int32)
-    for block in pixel_blocks(count):
-        pixel, mask = field.pixel[block], field.neighbor_mask[block]
-        for bit, (dx, dy) in enumerate(NEIGHBOR_OFFSETS):
-            linked = np.flatnonzero(mask >> bit & 1)
-            table[bit, block.start + linked] = entry[pixel[linked] + (dy * field.width + dx)]
+    for bit, (dx, dy) in enumerate(NEIGHBOR_OFFSETS):
+        linked = np.flatnonzero(field.neighbor_mask >> bit & 1)
+        table[bit, linked] = entry[field.pixel[linked] + (dy * field.width + dx)]
     return table
 
 
@@ -323,9 +310,7 @@ def direction_table(
     table = np.zeros((count + 1, 4), dtype=np.float32)
     table[:-1, 0], table[:-1, 1] = direction.real, direction.imag
     unit_direction, unit_member = np.zeros((2, count + 1), dtype=np.complex64)
-    for block in pixel_blocks(count):
-        unit_direction[block] = normalized(direction[block])
-        unit_member[block] = normalized(member[block])
+    unit_direction[:-1], unit_member[:-1] = normalized(direction), normalized(member)
     min_cosine = np.cos(np.pi / max(degree, 2))
     for block in pixel_blocks(count):
         conjugate, member_conjugate = unit_direction[block].conj(), unit_member[block].conj()

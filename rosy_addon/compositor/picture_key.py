@@ -46,9 +46,7 @@ def fixed_color_range(
     if colors_magnitude(look):
         ends = magnitude_range(look)
         return None if ends is None else distinct_ends(*ends)
-    if not colors_values(look):
-        return None
-    if not any(look.color_range) and not instances:
+    if not colors_values(look) or not (any(look.color_range) or instances):
         return None
     return value_ends(look, value_ranges(instances))
 

@@ -13,9 +13,8 @@ from ..field.directional_field import evaluate_harmonics
 from ..field.symmetry import FieldSymmetry
 from ..projection.field_channel import FieldChannel
 from ..projection.gbuffer import GBuffer
-from ..projection.pixel_blocks import BLOCK_PIXELS, part_of
+from ..projection.pixel_blocks import BLOCK_PIXELS, part_of, reported_blocks
 from ..projection.pixel_neighbors import neighbor_masks, screen_jacobians
-from .reported_blocks import reported_blocks
 
 #: Offsets (dx, dy) of the 3 x 3 neighbors, in the order of the bits of `neighbor_masks`.
 NEIGHBOR_OFFSETS = tuple((dx, dy) for dy in (-1, 0, 1) for dx in (-1, 0, 1))
@@ -148,8 +147,7 @@ class PixelField:
                 index = slice(first + extent.start, first + extent.stop)
             else:
                 index = first + extent
-        channels = {channel: values[extent] for channel, values in self.channels.items()}
-        return replace(part, channels=channels, gbuffer_index=index, seam_steps=None)
+        return replace(part, gbuffer_index=index, seam_steps=None)
 
     def member_direction(self, member: np.ndarray) -> np.ndarray:
         """Compute the directions of the field from the members of the RoSy that they deviate from.
@@ -223,23 +221,22 @@ def surface_pixel_field(gbuffer: GBuffer, degree: int, crease_angle: float | Non
         jacobians[block] = screen_jacobians(gbuffer.part(block))
         selected[block] = instance_selected[gbuffer.instance_id[block]]
     selected = slice(None) if selected.all() else np.flatnonzero(selected)
-    z = gbuffer.representation[selected]
-    pixel, camera, mask = gbuffer.pixel[selected], gbuffer.camera, mask[selected]
-    if not z.all():
-        with progress(0.9, 1.0):
-            mask = mask_undefined(mask, pixel, camera.width, camera.height, z != 0)
     channels = {channel: values[selected] for channel, values in gbuffer.channels.items()}
-    return PixelField(
+    field = PixelField(
         degree=degree,
-        width=camera.width,
-        height=camera.height,
-        pixel=pixel,
-        representation=z,
+        width=gbuffer.camera.width,
+        height=gbuffer.camera.height,
+        pixel=gbuffer.pixel[selected],
+        representation=gbuffer.representation[selected],
         screen_jacobian=jacobians[selected],
-        neighbor_mask=mask,
+        neighbor_mask=mask[selected],
         channels=_channels_of_degree(channels),
         gbuffer_index=selected,
     )
+    if field.representation.all():
+        return field
+    with progress(0.9, 1.0):
+        return without_undefined_neighbors(field)
 
 
 def _channels_of_degree(channels: dict[FieldChannel, np.ndarray]) -> dict[FieldChannel, np.ndarray]:
@@ -294,26 +291,19 @@ def pixel_window(pixel: np.ndarray, width: int, margin: int) -> tuple[np.ndarray
     return cell, (int(row[-1] - bottom) + 1 + margin, columns)
 
 
-def mask_undefined(
-    mask: np.ndarray, pixel: np.ndarray, width: int, height: int, defined: np.ndarray
-) -> np.ndarray:
-    """Clear the bits of neighbor masks for steps from or to pixels where the field is undefined.
+def without_undefined_neighbors(field: PixelField) -> PixelField:
+    """Return a field whose `neighbor_mask` links only pixels where the field is defined.
 
-    Parameters
-    ----------
-    mask : (P,) uint16 ndarray
-    pixel : (P,) int ndarray
-    width, height : int
-        Size of the frame. Pixels beyond it are undefined.
-    defined : (P,) bool ndarray
+    Pixels beyond the frame are undefined.
     """
-    is_defined = np.zeros((height + 2, width + 2), dtype=bool)
+    pixel, mask, width = field.pixel, field.neighbor_mask, field.width
+    is_defined = np.zeros((field.height + 2, width + 2), dtype=bool)
     row, column = np.divmod(pixel, np.int32(width))
-    is_defined[row + 1, column + 1] = defined
+    is_defined[row + 1, column + 1] = field.representation != 0
     result = np.empty_like(mask)
     band_rows = max(BLOCK_PIXELS // width, 1)
-    for start in range(0, height, band_rows):
-        report(start / height, "finding neighbors")
+    for start in range(0, field.height, band_rows):
+        report(start / field.height, "finding neighbors")
         padded = is_defined[start : start + band_rows + 2].astype(np.uint16)
         # Three neighbors of a row are three bits, in the order of `NEIGHBOR_OFFSETS`.
         row_bits = padded[:, :-2] | padded[:, 1:-1] << 1 | padded[:, 2:] << 2
@@ -321,7 +311,7 @@ def mask_undefined(
         open_bits *= padded[1:-1, 1:-1]
         band = entries_of_rows(pixel, width, (start, start + band_rows))
         result[band] = mask[band] & open_bits[row[band] - start, column[band]]
-    return result
+    return replace(field, neighbor_mask=result)
 
 
 def nearest_member(field: PixelField, guiding_angle: float) -> np.ndarray:

@@ -84,7 +84,7 @@ def diffuse(
     gbuffer: GBuffer,
     look: Look,
     lights: Sequence[Light] = (),
-    visibility: Sequence[np.ndarray] | None = None,
+    visibility: Sequence[np.ndarray] = (),
 ) -> np.ndarray:
     """Compute the diffuse lighting of each pixel by Lambert's law.
 
@@ -92,11 +92,12 @@ def diffuse(
     ----------
     gbuffer : GBuffer
     look : Look
-        Its `light`, `shadows` and `shading` are used. With a `shading` of 0 all pixels are 1.
+        Its `light` and `shading` are used. With a `shading` of 0 all pixels are 1.
     lights : sequence of Light
         Lights of the scene in camera space. Used if the light of the look is "scene".
     visibility : sequence of (P,) ndarray, optional
-        The fraction of each light that reaches each pixel. By default the result of `light_visibility`.
+        The fraction of each light that reaches each pixel, from `light_visibility`. By default, nothing casts
+        shadows.
 
     Returns
     -------
@@ -109,8 +110,6 @@ def diffuse(
         cosine = np.maximum(dot(gbuffer.normal, gbuffer.view_direction), 0)
         light = np.repeat(cosine[:, None], 3, axis=1)
     else:
-        if visibility is None:
-            visibility = light_visibility(gbuffer, look, lights)
         light = np.zeros((len(gbuffer.pixel), 3), dtype=np.float32)
         for index, source in enumerate(lights_of(look, lights)):
             irradiance = source.irradiance(gbuffer.position, gbuffer.normal)

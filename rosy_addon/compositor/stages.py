@@ -15,12 +15,13 @@ from ..projection.gbuffer import GBuffer
 from ..projection.surface_sampling import feature_curvatures
 from .even_lines import EvenLines, even_lines
 from .ibfv import streak_waves, wave_images
-from .lic import lic_lengths, look_noise, noise_args, unconvolved_noise
+from .image_noise import NoiseSettings
+from .lic import lic_lengths, look_noise, noise_settings, unconvolved_noise
 from .lic_images import LicImages
 from .look import crease_angle_of, has_flow
-from .look_units import PixelLook, cell_size_args
+from .look_units import PixelLook
 from .outline import OUTLINE_SETTINGS, outline_coverage
-from .paper_grain import picture_paper_grain, surface_paper_grain, surface_paper_grain_args
+from .paper_grain import picture_paper_grain, surface_paper_grain, surface_paper_grain_settings
 from .pixel_field import PixelField, surface_pixel_field
 from .streak_statistics import look_streak_statistics
 from .strips import Strip
@@ -64,11 +65,8 @@ class ComposeStages:
     def noise(self, field: PixelField, look: PixelLook) -> np.ndarray:
         """Return the (P, K) float32 noise of a look at the pixels of a field."""
         if look.anchor == "surface":
-            args = noise_args(look) | cell_size_args(look)
-            if look.detail:
-                args["detail"] = look.detail
-            return self._surface_noise(field, args)
-        key = "picture noise", self._gbuffer, field.degree, *sorted(noise_args(look).items())
+            return self._surface_noise(field, look, noise_settings(look), look.detail)
+        key = "picture noise", self._gbuffer, field.degree, noise_settings(look)
         return self._cache.get_or_create(key, partial(look_noise, field, look))
 
     def lic(
@@ -139,23 +137,24 @@ class ComposeStages:
         if look.anchor == "picture":
             width = look.line_width / subpixels
             return picture_paper_grain(field.pixel, field.width, width, look.seed, subpixels, lines)
-        args = surface_paper_grain_args(look) | cell_size_args(look)
-        std = look_streak_statistics(look).paper_grain_std
-        return surface_paper_grain(self._surface_noise(field, args), std, lines)
+        noise = self._surface_noise(field, look, surface_paper_grain_settings(look))
+        return surface_paper_grain(noise, look_streak_statistics(look).paper_grain_std, lines)
 
-    def _surface_noise(self, field: PixelField, args: dict[str, Any]) -> np.ndarray:
+    def _surface_noise(
+        self, field: PixelField, look: PixelLook, settings: NoiseSettings, detail: float = 0.0
+    ) -> np.ndarray:
         """Return the (P, K) float32 noise at the pixels of a field; see `surface_noise`."""
+        args = self._gbuffer, settings, look.pixel_size, look.supersampling, detail
 
         def compute() -> np.ndarray:
-            curvature = None
-            if "detail" in args:
-                curvature = feature_curvatures(self._gbuffer, self._mesh_cache)
-            return surface_noise(self._gbuffer, **args, curvature=curvature)
+            curvature = feature_curvatures(self._gbuffer, self._mesh_cache) if detail else None
+            return surface_noise(*args, curvature)
 
-        key = "surface noise", self._gbuffer, *sorted(args.items())
+        key = "surface noise", *args
         return self._cache.get_or_create(key, compute)[field.gbuffer_index]
 
     def _wobble_angle(self, look: PixelLook) -> np.ndarray:
         """Return the (Q,) float32 `wobble.wobble_angle` at all Q pixels of the G-buffer."""
-        key = "wobble", self._gbuffer, look.anchor, look.line_width, *cell_size_args(look).values()
+        size = look.line_width, look.pixel_size, look.supersampling
+        key = "wobble", self._gbuffer, look.anchor, *size
         return self._cache.get_or_create(key, partial(wobble_angle, self._gbuffer, look))

@@ -14,9 +14,9 @@ import numpy as np
 from ..core.cache import Cache
 from ..core.progress import report
 from .filter_kernel import Kernel
-from .image_noise import image_noise
+from .image_noise import NoiseSettings, image_noise
 from .look_units import PixelLook
-from .paper_grain import PAPER_GRAIN_STRENGTH, picture_paper_grain, surface_paper_grain_args
+from .paper_grain import PAPER_GRAIN_STRENGTH, picture_paper_grain, surface_paper_grain_settings
 from .surface_noise import OCTAVES, octave_weights
 from .undirected import disc_means
 
@@ -36,6 +36,9 @@ BREAK_LENGTH_WIDTHS, MAX_BREAK_FRACTION = 4.0, 0.4
 
 #: Number of coverages in tables of thresholds, and number of break amounts that are sampled.
 COVERAGE_STEPS, BREAK_LEVELS = 256, 17
+
+#: The coverages in tables of thresholds.
+COVERAGES = np.linspace(0, 1, COVERAGE_STEPS)
 
 #: Side of the sample of noise: in line widths, and its least value in pixels.
 SAMPLE_WIDTHS, MIN_SAMPLE_PIXELS = 64, 320
@@ -113,7 +116,8 @@ def _measured(look: PixelLook) -> StreakStatistics:
     )
     width = side + length_pixels
     anchored = look.anchor == "surface"
-    noise = _noise_sample((side, width), line_width, look.density, scale * look.high_pass, anchored)
+    settings = NoiseSettings(line_width, 1, density=look.density, high_pass=scale * look.high_pass)
+    noise = _noise_sample((side, width), settings, anchored)
     streaks, streak_std = _standardized(_line_means(noise, length_pixels, side, kernel))
     break_means = _line_means(noise, min(break_pixels, length_pixels), side, kernel)
     break_streaks, break_std = _standardized(break_means)
@@ -121,17 +125,16 @@ def _measured(look: PixelLook) -> StreakStatistics:
     paper_relief, paper_grain_std = 0.0, 1.0
     amplitude = PAPER_GRAIN_STRENGTH * look.paper_grain
     if amplitude and anchored:
-        args = surface_paper_grain_args(look)
-        lengths = scale * args["cell"], scale * args["high_pass"]
-        heights = _noise_sample(streaks.shape, lengths[0], args["density"], lengths[1], True)
+        grain = surface_paper_grain_settings(look)
+        lengths = {"cell": scale * grain.cell, "high_pass": scale * grain.high_pass}
+        heights = _noise_sample(streaks.shape, grain._replace(**lengths), True)
         paper_grain_std = float(heights.std())
         paper_relief = amplitude / paper_grain_std * (heights - heights.mean())
     elif amplitude:
         pixel = np.arange(streaks.size, dtype=np.int32)
         heights = picture_paper_grain(pixel, len(streaks[0]), line_width, 1)
         paper_relief = amplitude * heights[0].reshape(streaks.shape)
-    coverages = np.linspace(0, 1, COVERAGE_STEPS)
-    break_amounts = break_amount(coverages, look.breaks, look.wobble)
+    break_amounts = break_amount(COVERAGES, look.breaks, look.wobble)
     levels = BREAK_LEVELS if look.breaks else 1
     break_levels = np.linspace(break_amounts.min(), break_amounts.max(), levels)
     change = break_streaks - streaks
@@ -189,29 +192,26 @@ def _threshold_tables(samples: list[np.ndarray], half_width: float) -> np.ndarra
     thresholds = np.linspace(highest + half_width, lowest - half_width, 4 * COVERAGE_STEPS)
     middles = (edges[:-1] + edges[1:]) / 2
     ink_fraction = smoothstep((middles - thresholds[:, None]) / (2 * half_width) + 0.5)
-    coverages = np.linspace(0, 1, COVERAGE_STEPS)
     tables = []
     for sample in samples:
         histogram = np.histogram(sample, edges)[0] / sample.size
-        tables.append(np.interp(coverages, ink_fraction @ histogram, thresholds))
+        tables.append(np.interp(COVERAGES, ink_fraction @ histogram, thresholds))
     return np.array(tables)
 
 
-def _noise_sample(
-    shape: tuple[int, int], cell: float, density: float, high_pass: float, anchored: bool
-) -> np.ndarray:
+def _noise_sample(shape: tuple[int, int], settings: NoiseSettings, anchored: bool) -> np.ndarray:
     """Make a (H, W) image of `image_noise` or, if `anchored`, of `surface_noise` on a flat surface.
 
-    `cell` is the side of a cell in pixels. Noise on the surface is the blend of the octave with these cells,
-    and of the octaves with cells of half and of twice the size.
+    It has one channel, and always the same seed. Noise on the surface is the blend of the octave with the
+    given cells, and of the octaves with cells of half and of twice the size.
     """
     pixel = np.arange(shape[0] * shape[1], dtype=np.int32)
     octave_offsets = np.arange(OCTAVES) - OCTAVES // 2 if anchored else np.zeros(1)
     weights = octave_weights(octave_offsets) if anchored else (1.0,)
     noise = np.zeros(shape, dtype=np.float32)
     for octave_offset, weight in zip(octave_offsets, weights, strict=True):
-        cell_size = cell * 2.0**octave_offset
-        cells = image_noise(pixel, shape[1], cell_size, 1, 1, density=density, high_pass=high_pass)
+        octave = settings._replace(cell=settings.cell * 2.0**octave_offset, seed=1, channels=1)
+        cells = image_noise(pixel, shape[1], octave)
         noise += np.float32(weight) * cells.reshape(shape)
     return noise
 

@@ -9,13 +9,13 @@ import numpy as np
 
 from ..field.symmetry import FieldSymmetry
 from ..projection.camera import Camera
-from ..projection.gbuffer import MeshInstance
+from ..projection.gbuffer import MeshInstance, with_field
 from .hatching import has_breaks, has_outline, has_overshoot, has_paper_grain, overshoot_steps
 from .image_noise import MAX_MARGIN, high_pass_margin
 from .look import Look, is_even, magnitude_range, uses_magnitude
 from .look_units import PixelLook, pixel_look
 from .outline import FULL_MARK_LENGTH
-from .paper_grain import surface_paper_grain_args
+from .paper_grain import surface_paper_grain_settings
 from .streak_statistics import break_steps
 from .strips import OVERLAP_ROWS, Strip, streamline_margin
 from .undirected import disc_offsets
@@ -57,7 +57,7 @@ def divide_into_strips(
     """
     height, count = camera.height, 1
     if look.method == "sheets":
-        degrees = {field.degree for instance in instances if (field := instance.field) is not None}
+        degrees = {instance.field.degree for instance in with_field(instances)}
         lines = max((FieldSymmetry(degree, ()).line_count for degree in degrees), default=1)
         margin = _longest_margin(pixel_look(look, camera, instances))
         rows = STRIP_STATES / (2 * lines * camera.width)
@@ -91,7 +91,7 @@ def group_strips(
         Groups from the bottom. There is a single group if some result depends on all visible pixels, or if a
         result that all strips need should be computed by one process alone.
     """
-    fields = [instance.field for instance in instances if instance.field is not None]
+    fields = [instance.field for instance in with_field(instances)]
     if (
         is_even(look)
         or (uses_magnitude(look) and magnitude_range(look) is None)
@@ -116,7 +116,7 @@ def context_rows(look: Look, camera: Camera, instances: Sequence[MeshInstance]) 
     disc = int(np.abs(disc_offsets(look.line_width)).max())
     rows = max(_longest_margin(look), disc) + noise
     if has_paper_grain(look) and look.anchor == "surface":
-        rows = max(rows, high_pass_margin(surface_paper_grain_args(look)["high_pass"]))
+        rows = max(rows, high_pass_margin(surface_paper_grain_settings(look).high_pass))
     if has_outline(look):
         rows = max(rows, int(np.ceil(look.outline)) + 1 + FULL_MARK_LENGTH)
     return OVERLAP_ROWS + rows + NEIGHBOR_ROWS

@@ -18,10 +18,18 @@ import numpy as np
 
 from ..core.progress import progress
 from ..projection.gbuffer import GBuffer
+from ..projection.pixel_blocks import reported_blocks
 from ..projection.rest_coordinates import RestCoordinates, matrix_scale, rest_coordinates
-from .image_noise import BLUR_FACTOR, NOISE_MEAN, NOISE_STD, box_radius, gaussian_blur, hash_bits
+from .image_noise import (
+    BLUR_FACTOR,
+    NOISE_MEAN,
+    NOISE_STD,
+    NoiseSettings,
+    box_radius,
+    gaussian_blur,
+    hash_bits,
+)
 from .pixel_field import pixel_window
-from .reported_blocks import reported_blocks
 
 #: Offsets (dx, dy) in pixels of the samples of a pixel from its center, on a rotated grid.
 SUBPIXEL_OFFSETS = ((-0.375, -0.125), (0.125, -0.375), (0.375, 0.125), (-0.125, 0.375))
@@ -58,12 +66,7 @@ OCTAVE_OFFSET = 64
 
 def surface_noise(
     gbuffer: GBuffer,
-    cell: float,
-    seed: int,
-    channels: int,
-    *,
-    density: float,
-    high_pass: float,
+    settings: NoiseSettings,
     pixel: float = 0.0,
     smallest: float = 0.0,
     detail: float = 0.0,
@@ -75,17 +78,10 @@ def surface_noise(
     ----------
     gbuffer : GBuffer
         Its `instances` must be set.
-    cell : float
-        Approximate side of a cell on screen, in pixels.
-    seed : int
-    channels : int
-        Number of independent channels.
-    density : float
-        Fraction of cells that are bright.
-    high_pass : float
-        Variations wider than about this many pixels are removed. 0 leaves the noise white.
+    settings : NoiseSettings
+        The side of a cell is approximate.
     pixel : float
-        Size in Blender units that replaces a pixel as the unit of `cell`: cells then have a fixed
+        Size in Blender units that replaces a pixel as the unit of the side of a cell: cells then have a fixed
         size on the surface. 0 gives cells of a fixed size on screen.
     smallest : float
         Minimum side of a cell on screen, in pixels. Only used if `pixel` is not 0.
@@ -99,6 +95,7 @@ def surface_noise(
     (P, channels) float32 ndarray
         The mean is `NOISE_MEAN`, as for `image_noise`.
     """
+    cell, seed, channels, density, high_pass = settings
     with progress(0.0, 0.3):
         rest = rest_coordinates(gbuffer)
     units = instance_units(gbuffer, pixel)
@@ -120,10 +117,7 @@ def surface_noise(
     if high_pass:
         with progress(0.6, 1.0):
             _high_pass(gbuffer, total, BLUR_FACTOR * high_pass)
-    noise = np.empty(total.shape[::-1], dtype=np.float32)
-    for block in reported_blocks(len(noise), STEP_LABEL, 1.0, 1.0):
-        noise[block] = total[:, block].T + np.float32(NOISE_MEAN)
-    return noise
+    return np.add(total.T, np.float32(NOISE_MEAN), order="C")
 
 
 def solid_noise(
@@ -292,15 +286,13 @@ def _high_pass(gbuffer: GBuffer, channels: np.ndarray, sigma: float) -> None:
 
     `sigma` is its standard deviation in pixels. Pixels without a surface are ignored.
     """
-    count = len(gbuffer.pixel)
     # The empty margin is as wide as the support of the blur.
     cell, shape = pixel_window(gbuffer.pixel, gbuffer.camera.width, 3 * box_radius(sigma))
 
     def blurred_image(values: np.ndarray | None) -> np.ndarray:
         """Return the blurred image of `values` (by default 1) at the pixels and 0 elsewhere, flat."""
         image = np.zeros(shape, dtype=np.float32)
-        for block in reported_blocks(count, STEP_LABEL, 0.0, 0.0):
-            image.reshape(-1)[cell[block]] = 1 if values is None else values[block]
+        image.reshape(-1)[cell] = 1 if values is None else values
         return gaussian_blur(image, sigma).reshape(-1)
 
     images = len(channels) + 1
@@ -308,6 +300,4 @@ def _high_pass(gbuffer: GBuffer, channels: np.ndarray, sigma: float) -> None:
         weight = np.maximum(blurred_image(None).take(cell), 1e-3)
     for number, channel in enumerate(channels, start=1):
         with progress(number / images, (number + 1) / images):
-            blurred = blurred_image(channel)
-            for block in reported_blocks(count, STEP_LABEL, 1.0, 1.0):
-                channel[block] -= blurred.take(cell[block]) / weight[block]
+            channel -= blurred_image(channel).take(cell) / weight

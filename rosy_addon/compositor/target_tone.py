@@ -12,10 +12,10 @@ from ..core.cache import Cache
 from ..core.errors import RosyError
 from ..projection.camera import Camera
 from ..projection.gbuffer import GBuffer
+from ..projection.pixel_blocks import reported_blocks
 from ..projection.surface_sampling import surface_tones
 from ..projection.surface_tone import MipMap
 from .look import Look
-from .reported_blocks import reported_blocks
 from .shading import Light, diffuse, light_visibility
 
 #: Minimum difference between the tones that become white and black.
@@ -81,10 +81,7 @@ class ReferenceRender:
 
     def reprojection(self, camera: Camera) -> np.ndarray:
         """Return the (4, 4) float64 matrix from the view space of `camera` to clip space of the picture."""
-        rotation, translation = camera.view[:3, :3], camera.view[:3, 3]
-        camera_to_world = np.eye(4)
-        camera_to_world[:3, :3], camera_to_world[:3, 3] = rotation.T, -rotation.T @ translation
-        return self.camera.projection @ self.camera.view @ camera_to_world
+        return self.camera.projection @ self.camera.view @ camera.to_world
 
 
 def target_tone(
@@ -190,7 +187,5 @@ def apply_tone_curve(tone: np.ndarray, look: Look) -> np.ndarray:
 def tone_curve(look: Look) -> tuple[float, float]:
     """Return (scale, black): a look maps a tone to (tone - black) * scale, and then applies the gamma."""
     black, white, _ = look.tone_levels
-    tone_range = white - black
-    if abs(tone_range) < MIN_TONE_RANGE:
-        tone_range = MIN_TONE_RANGE if tone_range >= 0 else -MIN_TONE_RANGE
+    tone_range = float(np.copysign(max(abs(white - black), MIN_TONE_RANGE), white - black))
     return 1 / tone_range, black

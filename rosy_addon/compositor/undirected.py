@@ -11,7 +11,6 @@ import numpy as np
 
 from .image_noise import NOISE_MEAN
 from .pixel_field import PixelField, pixel_window
-from .reported_blocks import reported_blocks
 
 #: Radius of the disc in line widths: spots are then about as wide as lines.
 DISC_WIDTHS = 1.0
@@ -21,9 +20,6 @@ SAMPLE_COUNT = 32
 
 #: Angle between two samples of a sunflower spiral, radians.
 GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
-
-#: Label of all steps.
-STEP_LABEL = "drawing undirected texture"
 
 
 def disc_offsets(line_width: float) -> np.ndarray:
@@ -38,9 +34,7 @@ def disc_offsets(line_width: float) -> np.ndarray:
     return np.floor(np.float32(DISC_WIDTHS * line_width) * disc + np.float32(0.5)).astype(np.int32)
 
 
-def undirected_texture(
-    field: PixelField, noise: np.ndarray, line_width: float
-) -> np.ndarray | None:
+def undirected_texture(field: PixelField, noise: np.ndarray, line_width: float) -> np.ndarray:
     """Average the noise over a disc around each pixel where the field is undefined.
 
     Samples of the disc that are not at pixels of the field are left out.
@@ -54,26 +48,21 @@ def undirected_texture(
 
     Returns
     -------
-    (P,) float32 ndarray or None
-        The means, relative to `NOISE_MEAN`; NaN where the field is defined. None if it is defined
-        everywhere.
+    (P,) float32 ndarray
+        The means, relative to `NOISE_MEAN`; NaN where the field is defined.
     """
     undefined = np.flatnonzero(field.representation == 0)
-    if not len(undefined):
-        return None
     offsets = disc_offsets(line_width)
     cell, shape = pixel_window(field.pixel, field.width, int(np.abs(offsets).max()))
     # Sums of noise and of samples, as complex numbers.
     samples = np.zeros(shape, dtype=np.complex64).reshape(-1)
     samples[cell] = noise.mean(axis=1) - np.float32(NOISE_MEAN) + np.complex64(1j)
     texture = np.full(len(noise), np.nan, dtype=np.float32)
-    for block in reported_blocks(len(undefined), STEP_LABEL):
-        center = cell[undefined[block]]
-        total = np.zeros(len(center), dtype=np.complex64)
-        for dx, dy in offsets.tolist():
-            total += samples.take(center + (dy * shape[1] + dx))
-        # The disc around a lone pixel may have no samples.
-        texture[undefined[block]] = total.real / np.maximum(total.imag, 1)
+    center, total = cell[undefined], np.zeros(len(undefined), dtype=np.complex64)
+    for dx, dy in offsets.tolist():
+        total += samples.take(center + (dy * shape[1] + dx))
+    # The disc around a lone pixel may have no samples.
+    texture[undefined] = total.real / np.maximum(total.imag, 1)
     return texture
 
 

@@ -16,11 +16,11 @@ import numpy as np
 from ..core.deterministic_trig import cos_sin, unit_phasor
 from ..core.progress import progress
 from ..projection.gbuffer import GBuffer
+from ..projection.pixel_blocks import reported_blocks
 from ..projection.rest_coordinates import rest_coordinates
 from .look import is_hatched
-from .look_units import PixelLook, cell_size_args
+from .look_units import PixelLook
 from .pixel_field import PixelField, product
-from .reported_blocks import reported_blocks
 from .surface_noise import cell_scale, instance_units
 
 #: Number of plane waves in the sum.
@@ -78,9 +78,9 @@ def wobble_angle(gbuffer: GBuffer, look: PixelLook) -> np.ndarray:
     """
     count = len(gbuffer.pixel)
     line_width = np.float32(look.line_width)
-    cell_size, rest = cell_size_args(look), None
+    rest = None
     if look.anchor == "surface":
-        units = instance_units(gbuffer, cell_size["pixel"])
+        units = instance_units(gbuffer, look.pixel_size)
         with progress(0.0, 0.5):
             rest = rest_coordinates(gbuffer)
     angle = np.empty(count, dtype=np.float32)
@@ -90,7 +90,7 @@ def wobble_angle(gbuffer: GBuffer, look: PixelLook) -> np.ndarray:
             position = np.stack([column, row, 0 * row]).astype(np.float32)
             size = np.ones(len(row), dtype=np.float32)
         else:
-            block_rest, min_scale = rest.block(block), cell_size["smallest"] / look.line_width
+            block_rest, min_scale = rest.block(block), look.supersampling / look.line_width
             instance_id = gbuffer.instance_id[block]
             scale = cell_scale(units, instance_id, block_rest.pixel_size, min_scale)
             position, size = block_rest.at_offset(0, 0), block_rest.pixel_size * scale
@@ -142,19 +142,12 @@ def rotate_pixel_field(field: PixelField, angle: np.ndarray) -> PixelField:
     -------
     PixelField
     """
-    representation = np.empty(len(angle), dtype=np.complex64)
-    channels = {
-        channel: np.empty(len(angle), np.complex64) if channel[0] == "deviation" else values
-        for channel, values in field.channels.items()
-    }
-    for block in reported_blocks(len(angle), "bending lines"):
-        block_angle = angle[block].astype(np.float64)
-        phase = unit_phasor(field.degree * block_angle)
-        representation[block] = product(field.representation[block], phase)
-        for channel, values in field.channels.items():
-            if channel[0] == "deviation":
-                # A harmonic is a function of the angle of the member. The rotation of its phase gives rotated
-                # members the value of the members before.
-                phase = unit_phasor(-channel[1] * block_angle)
-                channels[channel][block] = product(values[block], phase)
+    angle, channels = angle.astype(np.float64), dict(field.channels)
+    for kind, order in field.channels:
+        if kind == "deviation":
+            # A harmonic is a function of the angle of the member. The rotation of its phase gives rotated
+            # members the value of the members before.
+            phase = unit_phasor(-order * angle)
+            channels[kind, order] = product(channels[kind, order], phase)
+    representation = product(field.representation, unit_phasor(field.degree * angle))
     return replace(field, representation=representation, channels=channels)

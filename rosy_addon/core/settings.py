@@ -16,12 +16,14 @@ from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum
 from functools import cache
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar
 
 from .errors import RosyError
 
 #: Texts that are accepted for switches on the command line, and their values.
 SWITCH_VALUES = {"true": True, "on": True, "1": True, "false": False, "off": False, "0": False}
+
+Settings = TypeVar("Settings", bound=Any)
 
 #: Smallest and largest allowed value of each number of a tuple, by the name of the number in the interface.
 Ranges = Mapping[str, tuple[float, float]]
@@ -291,6 +293,30 @@ def check_settings(settings: Any) -> None:
     """
     for name, setting in settings_of(type(settings)).items():
         setting.check(getattr(settings, name))
+
+
+def with_settings(settings: Settings, changes: Mapping[str, Any]) -> Settings:
+    """Return an object of a settings class with some settings changed.
+
+    Parameters
+    ----------
+    settings : object
+        An object of a settings class, such as a look.
+    changes : mapping of str to object
+        New values by the names of the settings. Tuples of numbers may be given as lists (from JSON).
+
+    Raises
+    ------
+    RosyError
+        If there is no such setting, or its value is not allowed.
+    """
+    known, values = settings_of(type(settings)), dict(changes)
+    for name, value in changes.items():
+        if name not in known:
+            raise RosyError(f"unknown setting '{name}': choose {', '.join(known)}")
+        if isinstance(known[name], Numbers) and isinstance(value, list):
+            values[name] = tuple(value)
+    return replace(settings, **values)
 
 
 def pixel_lengths(cls: type) -> list[Number]:

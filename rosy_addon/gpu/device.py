@@ -260,13 +260,10 @@ def _base_name(name: str) -> str:
 
 def _is_usable(gpu: Any) -> bool:
     """Return whether there is a graphics context. If Blender has no window, try to create a context."""
-    try:
+    with suppress(SystemError):
         gpu.capabilities.max_texture_size_get()
-    except SystemError:
-        if not hasattr(gpu, "init"):
-            return False
-        try:
-            gpu.init()
-        except SystemError:
-            return False
-    return True
+        return True
+    with suppress(SystemError, AttributeError):  # Blender before 5.2 has no `init`
+        gpu.init()
+        return True
+    return False

@@ -89,7 +89,7 @@ class Frame:
     @property
     def size(self) -> tuple[int, int]:
         """Width and height of the frame, in pixels."""
-        return self.camera.width, self.camera.height
+        return self.camera.size
 
     @property
     def box(self) -> Box:
@@ -249,9 +249,9 @@ def screen_box(item: DrawItem, camera: Camera) -> Box:
     if is_cut_off.all():
         return 0, 0, 0, 0
     if is_cut_off.any() or (clip[:, 3] <= 0).any():
-        return 0, 0, camera.width, camera.height
+        return 0, 0, *camera.size
     ends = clip[:, :2] / clip[:, 3:] * 0.5 + 0.5
-    size = np.array([camera.width, camera.height])
+    size = np.array(camera.size)
     low = np.clip(np.floor(ends.min(axis=0) * size), 0, size).astype(int)
     high = np.clip(np.ceil(ends.max(axis=0) * size), 0, size).astype(int)
     return int(low[0]), int(low[1]), int(high[0]), int(high[1])

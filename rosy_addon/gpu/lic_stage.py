@@ -11,7 +11,7 @@ from functools import partial
 from typing import Any
 
 from ..compositor.even_lines import COARSE_RATIO
-from ..compositor.lic import noise_args
+from ..compositor.flow import noise_channel_count
 from ..compositor.look import is_even, is_hatched, magnitude_range, uses_magnitude
 from ..compositor.look_units import instance_line_spacing
 from . import lookup_tables
@@ -180,7 +180,7 @@ def _unfold(frame: Frame, kind: FieldKind, box: Box) -> dict[str, Any]:
     same layers: x and y of the vector, and the derivatives of its angle along x and y, in radians per pixel.
     """
     lines = kind.line_count
-    cell_format = "RG32F" if noise_args(frame.look)["channels"] == 1 else "RGBA32F"
+    cell_format = "RG32F" if noise_channel_count(frame.look) == 1 else "RGBA32F"
     uniforms = direction_uniforms(kind, frame.look, frame.camera)
     covering = {
         "cells": frame.image("cells", cell_format),
@@ -194,7 +194,7 @@ def _unfold(frame: Frame, kind: FieldKind, box: Box) -> dict[str, Any]:
 
 def _noise_gradients(frame: Frame, box: Box, textures: dict[str, Any]) -> Any:
     """Return an image of the derivatives of the noise along x and y. Each layer has two noise channels."""
-    layers = 2 if noise_args(frame.look)["channels"] > 1 else 1
+    layers = 2 if noise_channel_count(frame.look) > 1 else 1
     gradients = frame.image("noise_gradients", "RGBA16F", layers)
     textures = {**textures, "noise_gradients": gradients}
     frame.run(ComputePass("noise_gradients"), box, textures, {"noise_layers": layers})

@@ -13,8 +13,8 @@ from ..compositor.family_hues import PALETTE
 from ..compositor.hatching import has_paper_grain
 from ..compositor.image_noise import image_noise
 from ..compositor.inks import ink_count, inks_of
-from ..compositor.lic import noise_args
-from ..compositor.look import is_even, is_hatched
+from ..compositor.lic import noise_settings
+from ..compositor.look import is_even
 from ..compositor.look_units import PixelLook
 from ..compositor.paper_grain import line_offset, picture_paper_grain
 from ..compositor.streak_statistics import look_streak_statistics
@@ -45,10 +45,8 @@ def thresholds(resources: GpuResources, look: PixelLook) -> Any:
 
     Row 0 contains `StreakStatistics.threshold` or, for evenly spaced lines, the widths from
     `even_lines.look_width_table`. Row 1 contains `StreakStatistics.disc_threshold`, for the texture where
-    the field is undefined. A look without hatching gets the placeholder `palette`.
+    the field is undefined. The look must have ink.
     """
-    if not is_hatched(look):
-        return palette(resources)
     statistics = look_streak_statistics(look)
     table = look_width_table(look) if is_even(look) else statistics.threshold
     rows = np.stack([table, statistics.disc_threshold])
@@ -59,10 +57,8 @@ def undirected_offsets(resources: GpuResources, look: PixelLook) -> Any:
     """Return a texture of sample positions in a disc, in the first two channels.
 
     They are `undirected.disc_offsets`: offsets in pixels from the center of the disc over which the noise is
-    averaged where the field is undefined. A look without hatching gets the placeholder `palette`.
+    averaged where the field is undefined.
     """
-    if not is_hatched(look):
-        return palette(resources)
     width = look.line_width
     return resources.lookup_texture("disc_offsets", width, lambda: disc_offsets(width)[None])
 
@@ -101,8 +97,9 @@ def picture_grain(
 
 def picture_noise(resources: GpuResources, size: tuple[int, int], look: PixelLook) -> Any:
     """Return a texture of the noise of `image_noise.image_noise` for a frame of this size."""
-    settings = noise_args(look)
-    return _pixel_texture(resources, "noise", settings, size, partial(image_noise, **settings))
+    settings = noise_settings(look)
+    values = partial(image_noise, settings=settings)
+    return _pixel_texture(resources, "noise", settings, size, values)
 
 
 def _pixel_texture(

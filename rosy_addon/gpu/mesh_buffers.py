@@ -10,17 +10,16 @@ import numpy as np
 from ..compositor.color_values import ValueRange, value_range
 from ..core.errors import RosyError
 from ..field.blocks import row_blocks
-from ..field.directional_field import field_harmonics
 from ..field.frames import transform_components
 from ..field.polygon_arrays import box_corners
 from ..field.rosy_field import RosyField
-from ..field.surface import Surface
 from ..field.symmetry import FieldSymmetry
 from ..projection.corner_field import CornerField, field_at_corners
-from ..projection.face_values import similarity_scale
+from ..projection.face_values import relative_channels, similarity_scale
 from ..projection.field_channel import FieldChannel, rotation_order
+from ..projection.gbuffer import MeshInstance
 from ..projection.rest_coordinates import rest_positions
-from ..projection.surface_tone import MipMap, SurfaceTone
+from ..projection.surface_tone import MipMap
 
 #: Exponent of the number of texels in a row of the record texture, a power of two (`ROW_TEXELS`).
 ROW_BITS = 13
@@ -116,14 +115,6 @@ def translation_matrix(vector: np.ndarray) -> np.ndarray:
     return matrix
 
 
-def field_channels(field: RosyField) -> list[FieldChannel]:
-    """Return the channels of a field besides the representation."""
-    channels: list[FieldChannel] = [("deviation", j) for j in field_harmonics(field)]
-    if field.family_count > 1:
-        channels.append(("family", field.family_count))
-    return channels
-
-
 @dataclass(frozen=True)
 class FieldKind:
     """The properties that all fields of one degree share in shaders, as constants.
@@ -162,7 +153,7 @@ def field_kinds(fields: Iterable[RosyField]) -> dict[int, FieldKind]:
     """Return a dict from each degree to its `FieldKind`, with the channels of all fields of this degree."""
     channels: dict[int, list[FieldChannel]] = {}
     for field in fields:
-        channels.setdefault(field.degree, []).extend(field_channels(field))
+        channels.setdefault(field.degree, []).extend(relative_channels(field))
     return {degree: _field_kind(degree, found) for degree, found in sorted(channels.items())}
 
 
@@ -172,50 +163,39 @@ def _field_kind(degree: int, channels: Sequence[FieldChannel]) -> FieldKind:
     Harmonics between those of `channels` are added, so that their orders have no gaps. Of channels of
     families, only the first one is kept.
     """
-    harmonic_orders = [order for kind, order in channels if kind == "deviation"]
-    ordered: list[FieldChannel] = []
-    if harmonic_orders:
-        ordered = [("deviation", j) for j in range(min(harmonic_orders), max(harmonic_orders) + 1)]
+    orders = [order for kind, order in channels if kind == "deviation"]
+    all_orders = range(min(orders, default=0), max(orders, default=-1) + 1)
+    ordered: list[FieldChannel] = [("deviation", order) for order in all_orders]
     ordered += [channel for channel in channels if channel[0] == "family"][:1]
     # The symmetry depends on the harmonics that exist, not on those that fill gaps.
-    return FieldKind(degree, tuple(ordered), FieldSymmetry(degree, tuple(harmonic_orders)))
+    return FieldKind(degree, tuple(ordered), FieldSymmetry(degree, tuple(orders)))
 
 
 def mesh_buffers(
-    surface: Surface,
-    linear: np.ndarray,
-    field: RosyField | None,
-    display: str,
-    channels: Sequence[FieldChannel] = (),
-    tone: SurfaceTone | None = None,
-    color_values: np.ndarray | None = None,
+    instance: MeshInstance, display: str, channels: Sequence[FieldChannel] = ()
 ) -> MeshBuffers:
     """Return a surface with its field, tone and values for the color map in the layout of the shaders.
 
     Parameters
     ----------
-    surface : Surface
-    linear : (3, 3) ndarray
-        The linear part from `split_matrix`.
-    field : RosyField or None
-        None for a mesh that only occludes.
+    instance : MeshInstance
+        The linear part of its matrix, from `split_matrix`, is applied.
     display : {"smooth", "flat"}
     channels : sequence of FieldChannel
         The channel in each layer of the image of field channels, the same for all fields of this degree.
-    tone : SurfaceTone, optional
-    color_values : (C,) float32 ndarray, optional
-        See `MeshInstance`.
 
     Raises
     ------
     RosyError
         If the surface has more than `MAX_TRIANGLES`.
     """
+    surface, field = instance.surface, instance.field
     if field is not None and len(surface.triangles) > MAX_TRIANGLES:
         raise RosyError(
             f"{surface.name}: has {len(surface.triangles)} triangles, but the graphics card draws at "
             f"most {MAX_TRIANGLES}: choose the processor"
         )
+    linear, _ = split_matrix(instance.matrix)
     points = transform_components(np.ascontiguousarray(surface.vertices.T), linear)
     bounds = box_corners(points[:, surface.used_vertices].T)
     center = bounds.mean(axis=0)
@@ -229,13 +209,12 @@ def mesh_buffers(
     if field is None:
         return MeshBuffers(*arrays)
     corner_field = field_at_corners(surface, linear, field, display)
-    tones = None if tone is None else tone.values[surface.triangles]
-    numbers = None if color_values is None else color_values[surface.triangles]
-    texels = record_texels(len(channels), tones is not None, numbers is not None)
+    has_tone, color_values = instance.tone is not None, instance.color_values
+    texels = record_texels(len(channels), has_tone, color_values is not None)
     rows, records = empty_records(count, texels)
-    _write_records(records, corners, surface, corner_field, channels, tones, numbers)
+    _write_records(records, corners, instance, corner_field, channels)
     values = () if color_values is None else (value_range(color_values), _values_texel(channels))
-    return MeshBuffers(*arrays, rows, texels, len(channels), tone is not None, *values)
+    return MeshBuffers(*arrays, rows, texels, len(channels), has_tone, *values)
 
 
 def empty_records(count: int, texels: int) -> tuple[np.ndarray, np.ndarray]:
@@ -248,11 +227,9 @@ def empty_records(count: int, texels: int) -> tuple[np.ndarray, np.ndarray]:
 def _write_records(
     records: np.ndarray,
     corners: np.ndarray,
-    surface: Surface,
+    instance: MeshInstance,
     corner_field: CornerField,
     channels: Sequence[FieldChannel],
-    tone: np.ndarray | None,
-    numbers: np.ndarray | None,
 ) -> None:
     """Fill the (T, texels, 4) float32 records, block by block of triangles.
 
@@ -260,13 +237,12 @@ def _write_records(
     `CornerField.magnitude`. Texels 7 and 8 contain `CornerField.representation`, and each channel has two
     further texels: six components are the real and imaginary parts at the three corners, the seventh is the
     result of `field_channel.rotation_order`, and the eighth is the layer of the channel (0 for the
-    representation). `numbers`, the (T, 3) values for the
-    color map, have one texel. Its last component is 1 if all three values are finite. `tone`, the
-    `SurfaceTone.values` at the corners, (T, 3, 1) or (T, 3, 2), has two texels: each corner has two
-    components. Of the `rest_positions`, x is in the fourth components of the positions, y in the fourth
-    components of the normals, and z in the last texel. `corners` has the (T, 3, 4) rows of
-    `MeshBuffers.corners`.
+    representation). The three values for the color map have one texel. Its last component is 1 if all three
+    values are finite. The `SurfaceTone.values` at the corners have two texels: each corner has two components.
+    Of the `rest_positions`, x is in the fourth components of the positions, y in the fourth components of the
+    normals, and z in the last texel. `corners` has the (T, 3, 4) rows of `MeshBuffers.corners`.
     """
+    surface, tone, color_values = instance.surface, instance.tone, instance.color_values
     rest = rest_positions(surface)
     channel_values = [corner_field.channels.get(channel) for channel in channels]
     for extent in row_blocks(len(records), RECORDS_PER_BLOCK):
@@ -290,15 +266,16 @@ def _write_records(
             _write_values(
                 part, texel, part_values, rotation_order(channel, corner_field.degree), layer
             )
-        if numbers is not None:
-            texel = _values_texel(channels)
-            known = np.isfinite(numbers[extent]).all(axis=1)
-            part[known, texel, :3] = numbers[extent][known]
+        if color_values is not None:
+            texel, numbers = _values_texel(channels), color_values[surface.triangles[extent]]
+            known = np.isfinite(numbers).all(axis=1)
+            part[known, texel, :3] = numbers[known]
             part[:, texel, 3] = known
         if tone is not None:
-            for corner in range(3):
+            for corner, triangle_corner in enumerate(surface.triangles[extent].T):
                 texel, column = records.shape[1] - 3 + corner // 2, corner % 2 * 2
-                part[:, texel, column : column + tone.shape[2]] = tone[extent, corner]
+                values = tone.values[triangle_corner]
+                part[:, texel, column : column + values.shape[1]] = values
 
 
 def record_texels(channel_count: int, has_tone: bool = False, has_values: bool = False) -> int:

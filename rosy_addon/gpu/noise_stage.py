@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..compositor.hatching import has_paper_grain
-from ..compositor.image_noise import BLUR_FACTOR, box_radius
-from ..compositor.lic import noise_args
-from ..compositor.look_units import cell_size_args
-from ..compositor.paper_grain import surface_paper_grain_args
+from ..compositor.image_noise import BLUR_FACTOR, NoiseSettings, box_radius
+from ..compositor.lic import noise_settings
+from ..compositor.paper_grain import surface_paper_grain_settings
 from ..compositor.surface_noise import instance_hashes
 from ..compositor.wobble import has_wobble
 from . import lookup_tables
@@ -43,12 +42,12 @@ def render_noise(frame: Frame) -> None:
     """
     look = frame.look
     if look.anchor == "surface":
-        settings = noise_args(look) | cell_size_args(look) | {"detail": look.detail}
-        frame.textures["noise"] = _surface_noise(frame, settings, "noise")
+        settings = noise_settings(look)
+        frame.textures["noise"] = _surface_noise(frame, settings, "noise", look.detail)
     else:
         frame.textures["noise"] = lookup_tables.picture_noise(frame.resources, frame.size, look)
     if has_paper_grain(look) and look.anchor == "surface":
-        settings = surface_paper_grain_args(look) | cell_size_args(look)
+        settings = surface_paper_grain_settings(look)
         frame.textures["paper_grain"] = _surface_noise(frame, settings, "paper_grain")
     _render_wobble(frame)
 
@@ -69,28 +68,28 @@ def _render_wobble(frame: Frame) -> None:
     frame.textures["wobble_angles"] = angles
 
 
-def _surface_noise(frame: Frame, settings: dict[str, Any], name: str) -> Any:
+def _surface_noise(frame: Frame, settings: NoiseSettings, name: str, detail: float = 0.0) -> Any:
     """Return an image of noise that moves with the surfaces, as `surface_noise.surface_noise` with numpy.
 
-    `settings` are the arguments of that function, and `name` is the name of the image.
+    `settings` and `detail` are arguments of that function, and `name` is the name of the image.
     """
     raw_noise = frame.image("raw_noise")
     frame.clear(raw_noise)
-    shared_uniforms = surface_noise_uniforms(settings)
+    shared_uniforms = surface_noise_uniforms(settings, frame.look, detail)
     names = [item.instance.surface.name for item in frame.items]
     hashes = instance_hashes(names).view(np.int32)
     for instance_id, item in frame.fields_in_view():
         curvature = lookup_tables.palette(frame.resources)
-        if settings.get("detail"):
+        if detail:
             curvature = frame.prepared["features", instance_id]
         textures = {"feature_curvature": curvature, "raw_noise": raw_noise}
         uniforms = {
             **shared_uniforms,
-            **surface_cell_uniforms(settings, item, frame.camera),
+            **surface_cell_uniforms(settings.cell, frame.look, item, frame.camera),
             "instance_hash": int(hashes[instance_id]),
         }
         frame.run_on_instance(ComputePass("surface_noise"), instance_id, textures, uniforms)
-    return _high_passed(frame, raw_noise, settings["high_pass"], name)
+    return _high_passed(frame, raw_noise, settings.high_pass, name)
 
 
 def _high_passed(frame: Frame, raw_noise: Any, high_pass: float, name: str) -> Any:

@@ -130,7 +130,7 @@ class GpuRenderer(ViewportRenderer):
             If the picture is too large for the device.
         """
         sample_camera = view.sample_camera
-        if max(sample_camera.width, sample_camera.height) > self.device.max_texture_size:
+        if max(sample_camera.size) > self.device.max_texture_size:
             raise RosyError(
                 f"a frame of {sample_camera.width} x {sample_camera.height} pixels, including supersampling, is "
                 f"too large for this graphics card (at most {self.device.max_texture_size}): choose "

@@ -12,7 +12,7 @@ import numpy as np
 from ..compositor.target_tone import ReferenceRender
 from ..core.errors import RosyError
 from ..field.surface import Surface
-from ..projection.gbuffer import MeshInstance
+from ..projection.gbuffer import MeshInstance, with_field
 from ..projection.rest_coordinates import matrix_scale
 from ..projection.surface_lines import rest_matrix
 from ..projection.surface_tone import MipMap
@@ -155,7 +155,7 @@ class GpuResources:
         self, instances: Sequence[MeshInstance], display: str
     ) -> list[Callable[[], GpuMesh | Preparation]]:
         """Return for each mesh instance a function that looks up its mesh; see `prepare_steps`."""
-        kinds = field_kinds(instance.field for instance in instances if instance.field is not None)
+        kinds = field_kinds(instance.field for instance in with_field(instances))
         return [partial(self._mesh, instance, display, kinds) for instance in instances]
 
     def upload(self, instances: Sequence[MeshInstance], display: str) -> list[DrawItem]:
@@ -167,7 +167,7 @@ class GpuResources:
             If a mesh has too many triangles for the device.
         """
         self._upload_count += 1
-        kinds = field_kinds(instance.field for instance in instances if instance.field is not None)
+        kinds = field_kinds(instance.field for instance in with_field(instances))
         meshes = run(prepare_steps(self.mesh_lookups(instances, display)))
         items = []
         for instance, mesh in zip(instances, meshes, strict=True):
@@ -238,7 +238,7 @@ class GpuResources:
         RosyError
             By the function `Preparation.send`, if the lines do not fit into a texture.
         """
-        surface, matrix, field = item.instance.surface, item.instance.matrix, item.instance.field
+        surface, field = item.instance.surface, item.instance.field
 
         def send(records: tuple[np.ndarray, int, int]) -> tuple[Any, int]:
             rows, node_count, triangle_count = records
@@ -246,8 +246,8 @@ class GpuResources:
             remedy = "choose wider lines, or the processor"
             return self._rows_texture(rows, surface, what, remedy), node_count
 
-        call = Call(line_records, (surface, matrix, field, display, spacing), label="spacing lines")
-        key = "lines", surface, field, rest_matrix(matrix).tobytes(), display, spacing
+        call = Call(line_records, (item.instance, display, spacing), label="spacing lines")
+        key = "lines", surface, field, rest_matrix(item.instance.matrix).tobytes(), display, spacing
         seconds = LINE_SECONDS * len(surface.triangles)
         return self._look_up(key, Preparation(call, seconds, send))
 
@@ -285,11 +285,9 @@ class GpuResources:
 
     def reference_atlas(self, reference: ReferenceRender) -> MipAtlas:
         """Return the mip map of a reference render's luminance, which the tone "picture" is sampled from."""
-        cached = self._lookup_textures.get("rendered")
-        if cached is None or cached[0] is not reference:
-            cached = reference, self._upload_atlas(reference.mip_map)
-            self._lookup_textures["rendered"] = cached
-        return cached[1]
+        if self._lookup_textures.get("rendered", (None,))[0] is not reference:
+            self._lookup_textures["rendered"] = reference, self._upload_atlas(reference.mip_map)
+        return self._lookup_textures["rendered"][1]
 
     def _look_up(self, key: Hashable, missing: Preparation, lifetime: int = TABLE_LIFETIME) -> Any:
         """Return the handle that is kept under a key or, if there is none, the preparation `missing`.
@@ -324,8 +322,7 @@ class GpuResources:
             return GpuMesh(buffers, self.device.batch(buffers.corners), records, atlas, instance)
 
         label = f"preparing the mesh of {surface.name}"
-        arguments = surface, linear, field, display, channels, tone, instance.color_values
-        call = Call(mesh_buffers, arguments, label=label)
+        call = Call(mesh_buffers, (instance, display, channels), label=label)
         sources = surface, field, tone, instance.color_values
         key = "mesh", *map(id, sources), linear.tobytes(), display, channels
         seconds = BUFFER_SECONDS * len(surface.triangles)

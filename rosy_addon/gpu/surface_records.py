@@ -9,8 +9,8 @@ import numpy as np
 
 from ..core.cache import BAKE_CACHE
 from ..field.feature_curvature import feature_curvature
-from ..field.rosy_field import RosyField
 from ..field.surface import Surface
+from ..projection.gbuffer import MeshInstance
 from ..projection.outline_mesh import cached_outline_mesh
 from ..projection.surface_lines import SurfaceLines, cached_surface_lines
 from .mesh_buffers import empty_records, to_texture_rows
@@ -20,16 +20,13 @@ MAX_TREE_DEPTH = 96
 
 
 def line_records(
-    surface: Surface, matrix: np.ndarray, field: RosyField, display: str, spacing: float
+    instance: MeshInstance, display: str, spacing: float
 ) -> tuple[np.ndarray, int, int]:
     """Compute the evenly spaced lines of a mesh instance with `surface_lines.cached_surface_lines`.
 
     Parameters
     ----------
-    surface : Surface
-    matrix : (4, 4) ndarray
-        Object to world space.
-    field : RosyField
+    instance : MeshInstance
     display : {"smooth", "flat"}
     spacing : float
         Distance between lines in world space, in Blender units.
@@ -43,7 +40,7 @@ def line_records(
     triangle_count : int
         Number of leaves: triangles on which the phase is linear.
     """
-    lines = cached_surface_lines(surface, matrix, field, display, spacing, BAKE_CACHE)
+    lines = cached_surface_lines(instance, display, spacing, BAKE_CACHE)
     BAKE_CACHE.evict_over_limit()
     return *line_rows(lines), len(lines.tree.leaf_root)
 

@@ -83,8 +83,7 @@ def _shadow_visibility(frame: Frame, light: dict[str, Any], box: Box) -> Any:
     images = [frame.image(f"shadow visibility {index}", "RGBA16F") for index in range(2)]
     instances = [item.instance for item in frame.items]
     for index, light_view in enumerate(light_cameras(instances, frame.camera, kind, vector)):
-        size = light_view.width, light_view.height
-        shadow_map = frame.resources.image("shadow_map", size)
+        shadow_map = frame.resources.image("shadow_map", light_view.size)
         batches = [(item.mesh.batch, shadow_uniforms(item, light_view)) for item in frame.items]
         frame.draw(RasterPass("shadow_map"), batches, shadow_map)
         textures = {

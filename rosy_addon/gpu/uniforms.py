@@ -11,7 +11,7 @@ from ..compositor.contrast import expected_std, streak_args
 from ..compositor.even_lines import FADE_PIXELS, MAX_EDGE_WIDTH, WOBBLE_SHIFT, crowded_pixels
 from ..compositor.family_hues import SOFTMAX_SHARPNESS
 from ..compositor.filter_kernel import full_sample_count
-from ..compositor.flow import channel_shifts, channel_weights
+from ..compositor.flow import channel_shifts, channel_weights, noise_channel_count
 from ..compositor.hatching import (
     ONSET_LEAD,
     ONSET_RANGE,
@@ -20,9 +20,8 @@ from ..compositor.hatching import (
     has_paper_grain,
     overshoot_steps,
 )
-from ..compositor.image_noise import NOISE_STD, streak_moments
+from ..compositor.image_noise import NOISE_STD, NoiseSettings, streak_moments
 from ..compositor.inks import ink_count, inks_of
-from ..compositor.lic import noise_args
 from ..compositor.lic_images import distinct_ends
 from ..compositor.look import (
     Look,
@@ -35,7 +34,7 @@ from ..compositor.look import (
     magnitude_range,
     undefined_drawing,
 )
-from ..compositor.look_units import PixelLook, cell_size_args, instance_line_spacing
+from ..compositor.look_units import PixelLook, instance_line_spacing
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, PAPER_GRAIN_STRENGTH, line_offset
 from ..compositor.shading import Light, lights_of
 from ..compositor.streak_statistics import (
@@ -83,15 +82,6 @@ def camera_uniforms(camera: Camera) -> dict[str, Any]:
     }
 
 
-def camera_to_pixels(camera: Camera) -> tuple[float, ...]:
-    """Return the (2, 2) matrix from displacements in the view plane to displacements on the screen, row by row.
-
-    Both are in the same unit: a square pixel at depth 1, as in `pixel_neighbors.screen_jacobians`.
-    """
-    scaled = camera.projection[:2, :2] * [[camera.width], [camera.height]]
-    return tuple((scaled / (2 * camera.pixels_per_unit)).ravel())
-
-
 def look_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
     """Return the uniforms of line integral convolution and ink that are computed from the look.
 
@@ -111,7 +101,7 @@ def look_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
         "full_samples": full_sample_count(look.length, kernel),
         "crossing_correlation": crossing,
         # Streaks that drift have one channel, although their noise has several.
-        "noise_channels": 1 if has_flow(look) else noise_args(look)["channels"],
+        "noise_channels": 1 if has_flow(look) else noise_channel_count(look),
         "family_count": kind.family_count if look.hue == "families" else 1,
         "family_channel": len(kind.channels) - 1,
         "hue_sharpness": SOFTMAX_SHARPNESS / expected_std(look),
@@ -214,12 +204,8 @@ def light_view_uniforms(light_view: Camera, camera: Camera) -> dict[str, Any]:
     of the light's clip space. The bias is in Blender units. If the light's camera is perspective, it is the
     bias at depth 1, which the shader multiplies by the depth.
     """
-    rotation, translation = camera.view[:3, :3], camera.view[:3, 3]
-    camera_to_world = np.eye(4)
-    camera_to_world[:3, :3], camera_to_world[:3, 3] = rotation.T, -rotation.T @ translation
-    camera_to_light = light_view.view @ camera_to_world
     return {
-        **matrix_rows("light_view", "xyz", camera_to_light[:3]),
+        **matrix_rows("light_view", "xyz", (light_view.view @ camera.to_world)[:3]),
         **matrix_rows("light_projection", "xy", light_view.projection[:2]),
         "light_is_perspective": int(light_view.is_perspective),
         "normal_bias": NORMAL_BIAS_PIXELS / light_view.pixels_per_unit,
@@ -250,7 +236,7 @@ def direction_uniforms(kind: FieldKind, look: PixelLook, camera: Camera) -> dict
     return {
         **covering_uniforms(kind),
         "min_normal_cosine": min_normal_cosine(look),
-        "camera_to_pixels": camera_to_pixels(camera),
+        "camera_to_pixels": tuple(camera.view_to_pixels.ravel()),
         "harmonic_count": len(orders),
         "first_harmonic": orders[0] if orders else 0,
         "wobble_strength": look.wobble if has_wobble(look) else 0.0,
@@ -272,37 +258,44 @@ def even_line_uniforms(look: PixelLook, item: DrawItem, camera: Camera) -> dict[
     }
 
 
-def surface_noise_uniforms(settings: dict[str, Any]) -> dict[str, Any]:
+def surface_noise_uniforms(
+    settings: NoiseSettings, look: PixelLook, detail: float
+) -> dict[str, Any]:
     """Return the uniforms of surface noise that all surfaces share.
 
     Parameters
     ----------
-    settings : dict
-        Arguments of `surface_noise.surface_noise`.
+    settings : NoiseSettings
+    look : PixelLook
+    detail : float
+        See `surface_noise.surface_noise`.
     """
-    density = settings["density"]
+    density = settings.density
     amplitude = NOISE_STD / np.sqrt(density * (1 - density)) / len(SUBPIXEL_OFFSETS)
     return {
         **matrix_rows("lattice", "xyz", np.pad(lattice_axes(), ((0, 0), (0, 1)))),
         "amplitude": amplitude,
         "density": density,
         "density_threshold": round(density * 2**24),
-        "noise_channels": settings["channels"],
-        "seed": settings["seed"],
-        "min_cell_scale": settings["smallest"] / settings["cell"],
+        "noise_channels": settings.channels,
+        "seed": settings.seed,
+        "min_cell_scale": look.supersampling / settings.cell,
         "feature_cells": FEATURE_CELLS / LATTICE_SCALE,
-        "max_bend": 1 / (1 - settings.get("detail", 0.0)),
+        "max_bend": 1 / (1 - detail),
     }
 
 
 def surface_cell_uniforms(
-    settings: dict[str, Any], item: DrawItem, camera: Camera
+    cell: float, look: PixelLook, item: DrawItem, camera: Camera
 ) -> dict[str, Any]:
-    """Return the uniforms for the size of the noise cells of one surface, in units of its object space."""
-    cell = settings["cell"] * LATTICE_SCALE
+    """Return the uniforms for the size of the noise cells of one surface, in units of its object space.
+
+    `cell` is the side of a cell in pixels.
+    """
+    cell = cell * LATTICE_SCALE
     return {
         "pixel_size": cell / (camera.pixels_per_unit * item.object_scale),
-        "cell_size": cell * settings["pixel"] / item.object_scale,
+        "cell_size": cell * look.pixel_size / item.object_scale,
     }
 
 
@@ -312,12 +305,11 @@ def wobble_uniforms(look: PixelLook, item: DrawItem, camera: Camera) -> dict[str
     It is in units of the object space of the item if the noise is anchored to surfaces, otherwise in pixels.
     """
     wavelength = look.line_width * MEAN_WAVELENGTH_WIDTHS
-    cell_size = cell_size_args(look)
     on_surface = look.anchor == "surface"
     pixels_per_object_unit = camera.pixels_per_unit * item.object_scale if on_surface else 1.0
     return {
         "on_surface": int(on_surface),
         "pixel_size": wavelength / pixels_per_object_unit,
-        "cell_size": wavelength * cell_size["pixel"] * on_surface / item.object_scale,
-        "min_cell_scale": cell_size["smallest"] / look.line_width,
+        "cell_size": wavelength * look.pixel_size * on_surface / item.object_scale,
+        "min_cell_scale": look.supersampling / look.line_width,
     }

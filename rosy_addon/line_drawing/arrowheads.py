@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..field.formats.polygons import offsets_from_sizes
 from ..field.frames import dot, normalize
 from .stroke_set import Strokes
 
@@ -43,7 +44,7 @@ def arrowheads(strokes: Strokes, distance: float, has_direction: np.ndarray) -> 
     count = np.zeros(len(strokes), dtype=np.int64)
     count[is_long] = np.maximum(np.rint((length / distance)[is_long] / spacing[is_long]), 1)
     stroke = np.repeat(np.arange(len(strokes)), count)
-    rank = np.arange(len(stroke)) - np.repeat(np.cumsum(count) - count, count)
+    rank = np.arange(len(stroke)) - np.repeat(offsets_from_sizes(count)[:-1], count)
     # Put all strokes one after another on one axis of arc length, for a single search.
     offset = np.concatenate([[0.0], np.cumsum(length + 1.0)[:-1]])
     place = offset[stroke] + (rank + 0.5) / count[stroke] * length[stroke]

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..core.progress import progress, report
 from ..field.blocks import blocks_by_count, concatenated_ranges
+from ..field.formats.polygons import offsets_from_sizes
 from ..field.frames import dot, normalize
 from .stroke_set import POINT_COLUMNS, Strokes
 
@@ -172,7 +173,7 @@ def _strip_keys(strokes: Strokes, segment_end: np.ndarray) -> tuple[np.ndarray, 
     strip_count = 2 + (extent[row, across] / strip_width).astype(np.int64)
     scale = np.maximum(extent[row, along], reach)
     scale[scale == 0] = 1
-    first_strip = np.cumsum(strip_count) - strip_count
+    first_strip = offsets_from_sizes(strip_count)[:-1]
     group = np.repeat(row, size)
     offset = middle - low[group]
     segment = np.arange(len(group))
@@ -306,7 +307,7 @@ def cut_intervals(
     cut = strokes.take_points(np.where(event == 0, order, 0))
     for name in POINT_COLUMNS:
         getattr(cut, name)[new] = getattr(inserted, name)
-    start = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=len(strokes)))])
+    start = offsets_from_sizes(np.bincount(owner, minlength=len(strokes)))
     with_cuts = replace(cut, normal=normalize(cut.normal), start=start)
     # Split at each interval, also where no point lies inside it.
     return with_cuts.runs_where(kept, split_labels=np.cumsum(event == -1), free_at_removed=False)

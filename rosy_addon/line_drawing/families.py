@@ -16,8 +16,9 @@ import numpy as np
 from ..core.progress import progress, report
 from ..field.connectivity import connected_components
 from ..field.frames import dot, normalize
+from ..field.representation import unit_complex
 from .stroke_set import Strokes
-from .tangent_mesh import TangentMesh, nearest_member, shared_edges, unit
+from .tangent_mesh import TangentMesh, nearest_member, shared_edges
 
 #: Guide directions in world space, in order of preference, if no camera gives one.
 GUIDE_AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
@@ -168,4 +169,4 @@ def _members_near_guide(mesh: TangentMesh, right: np.ndarray | None) -> np.ndarr
         is_usable = dot(projected, projected) > 0.1
         guide[is_usable] = normalize(projected[is_usable])
     guide_tangent = dot(guide, mesh.x) + 1j * dot(guide, mesh.y)
-    return _members_at_centers(mesh, unit(guide_tangent, np.ones_like(guide_tangent)))
+    return _members_at_centers(mesh, unit_complex(guide_tangent, otherwise=1))

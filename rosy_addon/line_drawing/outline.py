@@ -14,6 +14,7 @@ from ..core.progress import progress
 from ..field.blocks import mask
 from ..field.connectivity import build_edges
 from ..field.creases import find_creases
+from ..field.formats.polygons import offsets_from_sizes
 from ..field.frames import angle_between, dot, normalize
 from ..field.surface import Surface
 from ..projection.camera import Camera
@@ -246,7 +247,7 @@ def _strokes(
     triangle = segments.triangle[segment]
     return Strokes(
         points=segments.ends.reshape(-1, 3)[point],
-        start=np.cumsum([0, *(len(chain) // 2 + 1 for chain, _ in chains)]),
+        start=offsets_from_sizes([len(chain) // 2 + 1 for chain, _ in chains]),
         family=np.full(len(chains), family, dtype=np.int32),
         names=OUTLINE_KINDS,
         face=surface.triangle_face[triangle],

@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 
 from ..field.blocks import row_blocks
+from ..field.formats.polygons import offsets_from_sizes
 from ..field.frames import dot
 
 #: Factors of the three cell coordinates, and of the level, in the hash.
@@ -109,7 +110,7 @@ class PointGrid:
         # Fill the last block of each cell, then new blocks.
         chain_position = block_fill[group] + np.arange(len(points)) - group_start[group]
         new_blocks = (block_fill + group_size - 1) // BLOCK_SIZE
-        first_new_block = self.block_count + np.cumsum(new_blocks) - new_blocks
+        first_new_block = self.block_count + offsets_from_sizes(new_blocks)[:-1]
         block_ordinal = chain_position // BLOCK_SIZE
         new_block = first_new_block[group] + block_ordinal - 1
         block = np.where(block_ordinal == 0, last_block[group], new_block)

@@ -12,6 +12,7 @@ import numpy as np
 from ..core.errors import RosyError
 from ..core.progress import progress, report
 from ..field.blocks import row_blocks
+from ..field.formats.polygons import offsets_from_sizes
 from ..field.up_axis import UP_AXIS_MATRIX
 from ..projection.camera import Camera
 from .stroke_set import Strokes
@@ -89,7 +90,7 @@ def simplify_strokes(strokes: Strokes, camera: Camera) -> Strokes:
     pixels = strokes.points / min_pixel_length[:, None]
     features = np.column_stack([pixels, WIDTH_WEIGHT_PX * strokes.width])
     kept = simplify_mask(features, strokes.start, SIMPLIFY_TOLERANCE_PX)
-    start = np.concatenate([[0], np.cumsum(kept)])[strokes.start]
+    start = offsets_from_sizes(kept)[strokes.start]
     return replace(strokes.take_points(np.flatnonzero(kept)), start=start)
 
 

@@ -17,12 +17,13 @@ from ..core.color import REC709_LUMINANCE
 from ..field.blocks import bincount_rows
 from ..field.curvature import face_magnitude
 from ..field.frames import dot, normalize
+from ..field.representation import unit_complex
 from ..field.surface import Surface
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.vector_components import cofactor_matrix
 from .stroke_set import Strokes
-from .tangent_mesh import TangentMesh, unit
+from .tangent_mesh import TangentMesh
 from .visibility import pixel_size
 
 #: Largest and smallest factor by which tone and curvature change a spacing.
@@ -131,7 +132,7 @@ def spacing_in_picture(mesh: TangentMesh, camera: Camera, pixels: float) -> Corn
     limit = np.clip(np.sqrt(band), *MIN_COSINES)
     steepness = relative**2 * (1 / np.maximum(cosine, limit) ** 2 - 1)
     tangent = dot(to_eye, mesh.x[:, None]) + 1j * dot(to_eye, mesh.y[:, None])
-    double = steepness / 2 * unit(tangent, np.zeros_like(tangent)) ** 2
+    double = steepness / 2 * unit_complex(tangent) ** 2
     is_directional = (relative**2 + steepness > 1).any(axis=1)
     mean = relative**2 + steepness / 2
     return CornerSpacing(facing_values * factor, mean, double, is_directional)

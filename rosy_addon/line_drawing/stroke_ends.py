@@ -12,6 +12,7 @@ import numpy as np
 
 from ..core.progress import report
 from ..field.blocks import concatenated_ranges, row_blocks
+from ..field.formats.polygons import offsets_from_sizes
 from ..field.frames import dot, normalize
 from ..projection.camera import Camera
 from .point_grid import PointGrid
@@ -259,8 +260,7 @@ def _append_extensions(
     point, distance = point[order], distance[order]
     extended = strokes.take_points(point)
     extended.weights[distance > 0] = np.nan
-    counts = np.bincount(strokes.stroke[point], minlength=len(strokes))
-    start = np.concatenate([[0], np.cumsum(counts)])
+    start = offsets_from_sizes(np.bincount(strokes.stroke[point], minlength=len(strokes)))
     return replace(extended, points=points[order], start=start), distance
 
 

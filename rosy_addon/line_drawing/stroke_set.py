@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..field.blocks import concatenated_ranges
+from ..field.formats.polygons import offsets_from_sizes
 from ..field.frames import dot, normalize
 
 #: The attributes of `Strokes` that have a row for each point.
@@ -102,7 +103,7 @@ class Strokes:
         count = np.diff(self.start)[selection]
         return replace(
             self.take_points(concatenated_ranges(self.start[:-1][selection], count)),
-            start=np.concatenate([[0], np.cumsum(count)]),
+            start=offsets_from_sizes(count),
             family=self.family[selection],
             closed=self.closed[selection],
             free_ends=self.free_end_mask[selection],
@@ -175,7 +176,7 @@ class Strokes:
         is_whole = count[is_long] == np.diff(self.start)[owner]
         return replace(
             self.take_points(point),
-            start=np.concatenate([[0], np.cumsum(count[is_long])]),
+            start=offsets_from_sizes(count[is_long]),
             family=self.family[owner],
             closed=self.closed[owner] & is_whole,
             free_ends=np.where(ends == stroke_ends, self.free_end_mask[owner], free[outside]),
@@ -228,13 +229,13 @@ class Strokes:
         start = self.start[first : stop + 1]
         counts = counts[start[0] : start[-1]].astype(np.int64)
         counts[start[:-1] - start[0]] = 1
-        last = np.cumsum(counts) - 1
+        end = offsets_from_sizes(counts)
         row = np.repeat(np.arange(len(counts)), counts)
-        fraction = (np.arange(len(row)) - (last - counts)[row]) / counts[row]
+        fraction = (np.arange(len(row)) - (end[:-1] - 1)[row]) / counts[row]
         divided = self.between(row + start[0], fraction)
         return replace(
             divided,
-            start=np.concatenate([[0], last[start[1:] - start[0] - 1] + 1]),
+            start=end[start - start[0]],
             family=self.family[first:stop],
             closed=self.closed[first:stop],
             free_ends=self.free_end_mask[first:stop],
@@ -244,7 +245,7 @@ class Strokes:
     @staticmethod
     def join(blocks: Sequence[Strokes]) -> Strokes:
         """Return the strokes of several sets with the same families, one set after another."""
-        offsets = np.cumsum([0, *(len(block.points) for block in blocks)])
+        offsets = offsets_from_sizes([len(block.points) for block in blocks])
         names = (*POINT_COLUMNS, "family", "closed")
         columns = {
             name: np.concatenate([getattr(block, name) for block in blocks]) for name in names

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from ..annotation.singularity_settings import singularity_dots_choice, singularity_size_number
-from ..core.errors import RosyError
-from ..core.settings import check_settings, choice, fraction, number, settings_of, switch
+from ..core.settings import check_settings, choice, fraction, number, switch, with_settings
 
 
 @dataclass(frozen=True)
@@ -131,10 +130,6 @@ class StrokeStyle:
         RosyError
             If there is no such setting, or its value is not allowed.
         """
-        known = settings_of(StrokeStyle)
-        unknown = [name for name in settings if name not in known]
-        if unknown:
-            raise RosyError(f"unknown setting '{unknown[0]}' of strokes: choose {', '.join(known)}")
         if settings.keys() & {"spacing", "distance"}:
             settings = {"unit": "world" if "distance" in settings else "pixels"} | settings
-        return replace(self, **settings)
+        return with_settings(self, settings)

@@ -16,6 +16,7 @@ from ..annotation.singularity_marks import SingularityMarks
 from ..core.errors import RosyError
 from ..core.progress import progress, report
 from ..field.blocks import concatenated_ranges
+from ..field.formats.polygons import offsets_from_sizes
 from ..field.frames import dot
 from ..projection.camera import Camera
 from .outline import OUTLINE_KINDS
@@ -239,7 +240,7 @@ def _stroke_paths(pixels: np.ndarray, strokes: Strokes, width: float, color: str
     with progress(0.1, 0.5):
         features = np.column_stack([pixels, radius])
         kept = simplify_mask(features, strokes.start, SIMPLIFY_TOLERANCE_PX)
-    start = np.concatenate([[0], np.cumsum(kept)])[strokes.start]
+    start = offsets_from_sizes(kept)[strokes.start]
     points, radius = pixels[kept], radius[kept]
     min_radius = np.minimum.reduceat(radius, start[:-1])
     max_radius = np.maximum.reduceat(radius, start[:-1])
@@ -349,7 +350,7 @@ def simplify_mask(points: np.ndarray, start: np.ndarray, tolerance: float) -> np
     while len(first):
         report(1 - float((last - first).sum()) / len(points), "simplifying strokes")
         count = last - first - 1
-        begin = np.concatenate([[0], np.cumsum(count)[:-1]])
+        begin = offsets_from_sizes(count)[:-1]
         segment = np.repeat(np.arange(len(first)), count)
         point = concatenated_ranges(first + 1, count)
         origin = points[first][segment]

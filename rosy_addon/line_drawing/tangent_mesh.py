@@ -19,7 +19,7 @@ from ..core.progress import progress, report
 from ..field.connectivity import build_edges
 from ..field.directional_field import evaluate_harmonics, field_symmetry
 from ..field.frames import dot, normalize, transport
-from ..field.representation import power, signed_power
+from ..field.representation import power, signed_power, unit_complex
 from ..field.surface import Surface
 from ..projection.corner_field import cached_corner_field
 from ..projection.field_channel import REPRESENTATION, rotation_order
@@ -207,7 +207,8 @@ class TangentMesh:
             return member
         corners = [(j, values[triangle]) for j, values in self.harmonics]
         harmonics = [(j, np.einsum("nk,nk->n", weights, values)) for j, values in corners]
-        return unit(member * evaluate_harmonics(harmonics, member), member.copy())
+        direction = unit_complex(member * evaluate_harmonics(harmonics, member))
+        return np.where(direction == 0, member, direction)
 
 
 class SharedEdges(NamedTuple):
@@ -241,15 +242,6 @@ def shared_edges(mesh: TangentMesh) -> SharedEdges:
     triangle, edge = np.nonzero(mesh.neighbor > np.arange(len(mesh.neighbor))[:, None])
     neighbor = mesh.neighbor[triangle, edge].astype(np.intp)
     return SharedEdges(triangle, neighbor, edge, mesh.neighbor_edge[triangle, edge].astype(np.intp))
-
-
-def unit(values: np.ndarray, out: np.ndarray) -> np.ndarray:
-    """Return (n,) complex numbers divided by their moduli.
-
-    Where a number is zero, the value that `out` has there is returned. The result is written to `out`.
-    """
-    norm = np.abs(values)
-    return np.divide(values, norm, out=out, where=norm > 0)
 
 
 def nearest_member(reference: np.ndarray, z: np.ndarray, degree: int) -> np.ndarray:
@@ -424,7 +416,7 @@ def _rotations_to_planes(
         corner_axis = axis if k == 0 else transport(axis, corner_normal[:, 0], corner_normal[:, k])
         corner_axis = transport(corner_axis, corner_normal[:, k], normal)
         rotation = dot(corner_axis, x) + 1j * dot(corner_axis, y)
-        rotations[:, k] = unit(rotation, np.zeros_like(rotation))
+        rotations[:, k] = unit_complex(rotation)
     return rotations
 
 
@@ -448,7 +440,7 @@ def _connect(mesh: TangentMesh, surface: Surface, crease_angle: float | None) ->
     edge_a, edge_b = (a + 2) % 3, (b + 2) % 3
     along = mesh.points[triangle_a, (a + 1) % 3] - mesh.points[triangle_a, a % 3]
     edge_in_a = mesh.to_frame(triangle_a, along)
-    factor = unit(mesh.to_frame(triangle_b, along) * edge_in_a.conj(), np.ones_like(edge_in_a))
+    factor = unit_complex(mesh.to_frame(triangle_b, along) * edge_in_a.conj(), otherwise=1)
     for own, other, transported in (
         ((triangle_a, edge_a), (triangle_b, edge_b), factor),
         ((triangle_b, edge_b), (triangle_a, edge_a), factor.conj()),

@@ -9,6 +9,7 @@ import numpy as np
 from ..core.errors import RosyError
 from ..core.progress import progress, report
 from ..field.blocks import mask
+from ..field.formats.polygons import offsets_from_sizes
 from ..field.frames import dot, normalize
 from .lateral_neighbors import SeparationRules
 from .placement import StreamlinePlacer
@@ -233,7 +234,7 @@ def _strokes_on_mesh(
     count = np.unique(stroke, return_counts=True)[1]
     return Strokes(
         points=mesh.points_at(triangle, weights),
-        start=np.concatenate([[0], np.cumsum(count)]),
+        start=offsets_from_sizes(count),
         family=np.zeros(len(count), dtype=np.int32),
         names=("family 1",),
         face=mesh.face[triangle],

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate, pairwise
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from ..core.progress import progress, report
 from ..field.blocks import mask, row_blocks
+from ..field.formats.polygons import offsets_from_sizes
 from ..field.frames import dot, normalize
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
@@ -162,7 +163,7 @@ def visible_runs(
         return strokes
     clipped = []
     counts = pixel_counts(strokes, camera)
-    for first, stop in _stroke_blocks(np.cumsum(counts)[strokes.start[1:] - 1], BLOCK_POINTS):
+    for first, stop in _stroke_blocks(offsets_from_sizes(counts)[strokes.start[1:]], BLOCK_POINTS):
         report(first / len(strokes), "finding visible strokes")
         block = strokes.subdivided(counts, first, stop)
         pixels, _ = project_to_pixels(block.points, camera)
@@ -267,7 +268,7 @@ def rasterize_depth(instances: Sequence[MeshInstance], camera: Camera) -> DepthB
         corner_depth = corners[fragments.triangle[block], :, 2]
         depth.flat[fragments.pixel[block]] = -dot(fragments.barycentric[block], corner_depth)
     normal = normalize(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    start = tuple(accumulate((len(i.surface.triangles) for i in instances), initial=0))
+    start = tuple(offsets_from_sizes([len(i.surface.triangles) for i in instances]).tolist())
     return DepthBuffer(camera, start, triangle, depth, normal, dot(normal, corners[:, 0]))
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.progress import report
-from .pixel_blocks import pixel_blocks
+from .pixel_blocks import reported_blocks
 
 #: Largest sum of nonnegative barycentric coordinates that rounding explains. If the sum is larger, some
 #: coordinates were negative and set to 0, so the pixel center is outside of the triangle.
@@ -56,8 +55,7 @@ def barycentrics(
     corners = np.ascontiguousarray(triangles.T)
     weights = np.empty((3, len(pixel)), dtype=np.float32)
     front_facing = np.empty(len(pixel), dtype=bool)
-    for block in pixel_blocks(len(pixel)):
-        report(block.start / len(pixel), LABEL)
+    for block in reported_blocks(len(pixel), LABEL):
         row, column = np.divmod(pixel[block], np.int32(width))
         column, row = column + 0.5, row + 0.5
         offsets = []

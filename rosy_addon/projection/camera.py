@@ -85,6 +85,11 @@ class Camera:
         return self.view.tobytes(), self.projection.tobytes(), self.width, self.height
 
     @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the picture, in pixels."""
+        return self.width, self.height
+
+    @property
     def is_perspective(self) -> bool:
         """Whether the camera is perspective, not orthographic."""
         return bool(self.projection[3, 2] != 0.0)
@@ -124,6 +129,20 @@ class Camera:
     def scaled(self, factor: int) -> Camera:
         """Return the same camera with `factor` times the width and height in pixels."""
         return self.resized(self.width * factor, self.height * factor)
+
+    @property
+    def to_world(self) -> np.ndarray:
+        """Inverse of the view matrix, (4, 4) float64: from camera space to world space."""
+        return _view_from_axes(self.view[:3, :3].T, self.view[:3, 3])
+
+    @property
+    def view_to_pixels(self) -> np.ndarray:
+        """The (2, 2) float64 map from displacements in the view plane to displacements on screen.
+
+        It is relative to `pixels_per_unit`.
+        """
+        scaled = self.projection[:2, :2] * [[self.width], [self.height]]
+        return scaled / (2 * self.pixels_per_unit)
 
     @property
     def clip_to_camera_xy(self) -> np.ndarray:

@@ -85,8 +85,7 @@ class CornerField:
 
     def part(self, triangle: np.ndarray) -> CornerField:
         """Return the field and the normals of the triangles with (n,) indices."""
-        channels = {channel: values[:, triangle] for channel, values in self.channels.items()}
-        return replace(part_of(self, (..., triangle)), channels=channels)
+        return part_of(self, (..., triangle))
 
     def rotated(self, rotation: np.ndarray) -> CornerField:
         """Return a copy in another space: all vectors are rotated by a (3, 3) matrix."""
@@ -155,8 +154,7 @@ def cached_corner_field(
     """
     surface, field = instance.surface, instance.field
     create = partial(field_at_corners, surface, instance.matrix, field, display)
-    if cache is None:
-        return create()
+    cache = Cache() if cache is None else cache
     linear = np.ascontiguousarray(np.asarray(instance.matrix, dtype=np.float64)[:3, :3])
     return cache.get_or_create(("corner field", surface, field, linear.tobytes(), display), create)
 
@@ -272,10 +270,7 @@ def _fill_triangles(
         values, index = faces, [face] * 3
         normals, phases = [faces.normal.take(face, axis=1)] * 3, None
     else:
-        values, index = (
-            fans,
-            [surface.corner_fan.take(corner).astype(np.intp) for corner in corners],
-        )
+        values, index = fans, surface.corner_fan.take(corners).astype(np.intp)
         normals, phases = _corner_normals(index, corners, fans, custom_normals)
     normals = [_fill_missing_normals(normal, geometric_normal) for normal in normals]
     x, y = tangent_frame_components(normals[0])

@@ -10,7 +10,7 @@ from ..core.progress import report
 from ..field.blocks import blocks_by_count, concatenated_ranges
 from .camera import Camera
 from .gbuffer import GBuffer
-from .pixel_neighbors import depth_slopes
+from .pixel_neighbors import PixelTable, depth_slopes
 
 #: Smallest depth at which a segment is drawn, as a fraction of the depth of its farther end.
 MIN_RELATIVE_DEPTH = 1e-3
@@ -23,12 +23,7 @@ LINE_TOLERANCE = 2.0
 
 
 def crease_pixels(
-    gbuffer: GBuffer,
-    instance_id: int,
-    points: np.ndarray,
-    entry_of_cell: np.ndarray,
-    origin: int,
-    stride: int,
+    gbuffer: GBuffer, instance_id: int, points: np.ndarray, table: PixelTable
 ) -> np.ndarray:
     """Find the pixels next to visible edges.
 
@@ -42,11 +37,8 @@ def crease_pixels(
         Index of the instance that has the edges. Only pixels of this instance are found.
     points : (n, 2, 3) float64 ndarray
         The ends of the edges in world space.
-    entry_of_cell : (cells,) int32 ndarray
-        The frame with a margin, as a grid of cells, row by row: for each cell the index of its pixel in
-        the G-buffer, or -1 if the G-buffer does not contain it.
-    origin, stride : int
-        Index of the cell of the lower left pixel, and number of cells in a row.
+    table : PixelTable
+        The pixels of the G-buffer, with a margin of at least one pixel.
 
     Returns
     -------
@@ -59,7 +51,7 @@ def crease_pixels(
         lines = _on_screen(points[start : start + BLOCK_EDGES], gbuffer.camera)
         for axis in (0, 1):
             for row, column, offset, depth in _crossings(lines, axis, gbuffer.camera):
-                entry = entry_of_cell.take(origin + row * stride + column)
+                entry = table.at(row, column)
                 found = np.flatnonzero(entry >= 0)
                 found = found[gbuffer.instance_id[entry[found]] == instance_id]
                 entry = entry[found]
@@ -89,7 +81,7 @@ def _on_screen(points: np.ndarray, camera: Camera) -> np.ndarray:
         ends[row, low] += share * (ends[row, 1 - low] - ends[row, low])
     clip = ends @ projection[:, :3].T + projection[:, 3]
     screen = np.empty_like(ends)
-    screen[..., :2] = 0.5 * (clip[..., :2] / clip[..., 3:] + 1) * (camera.width, camera.height)
+    screen[..., :2] = 0.5 * (clip[..., :2] / clip[..., 3:] + 1) * camera.size
     screen[..., 2] = -1 / ends[..., 2] if camera.is_perspective else ends[..., 2]
     return screen
 
@@ -112,7 +104,7 @@ def _crossings(
         Depth of the crossing, as in `_on_screen`.
     """
     along, across = axis, 1 - axis
-    size = (camera.width, camera.height)
+    size = camera.size
     order = np.argsort(lines[:, :, across], axis=1)
     low, high = (lines[np.arange(len(lines)), order[:, end]] for end in (0, 1))
     first = np.clip(np.ceil(low[:, across] - 0.5), 0, size[across]).astype(np.int64)

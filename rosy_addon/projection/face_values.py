@@ -72,12 +72,8 @@ def face_values(
         Interior angle of the face at each of its corners, in radians. None without angles.
     """
     count = surface.face_count
-    relative_channels: dict[FieldChannel, np.ndarray] = {
-        ("deviation", j): values for j, values in field_harmonics(field).items()
-    }
-    if field.family_count > 1:
-        relative_channels["family", field.family_count] = np.ones(count)
-    names = REPRESENTATION, *relative_channels
+    relative = relative_channels(field)
+    names = REPRESENTATION, *relative
     channels = {channel: np.empty(count, dtype=np.complex64) for channel in names}
     normals, magnitude = np.empty((3, count), dtype=np.float32), np.empty(count, dtype=np.float32)
     faces = TangentValues(normals, channels, magnitude)
@@ -106,12 +102,22 @@ def face_values(
         magnitude[block] = rho * has_area
         for channel, out in faces.channels.items():
             rotation = signed_power(member, rotation_order(channel, field.degree))
-            values = rho if channel == REPRESENTATION else relative_channels[channel][block]
+            values = rho if channel == REPRESENTATION else relative[channel][block]
             out[block] = values * rotation * has_area
         if with_angles:
             for corner, angle in enumerate(polygon_angles(points)):
                 corner_angle[first_corner + corner] = angle
     return faces, corner_angle
+
+
+def relative_channels(field: RosyField) -> dict[FieldChannel, np.ndarray]:
+    """Return the channels of a field besides the representation: (F,) values relative to the stored members."""
+    channels: dict[FieldChannel, np.ndarray] = {
+        ("deviation", j): values for j, values in field_harmonics(field).items()
+    }
+    if field.family_count > 1:
+        channels["family", field.family_count] = np.ones(len(field.vectors))
+    return channels
 
 
 def _faces_by_size(face_start: np.ndarray) -> list[tuple[int, slice | np.ndarray]]:

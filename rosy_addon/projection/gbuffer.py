@@ -1,13 +1,14 @@
-"""The G-buffer, a flat list of the visible pixels of surfaces with a field; and mesh instances."""
+"""The G-buffer, a flat list of the visible pixels of surfaces with a field; mesh instances, and points on them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
+from ..field.formats.polygons import offsets_from_sizes
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from .camera import Camera
@@ -69,6 +70,45 @@ class MeshInstance:
 
 #: The mesh instances of a scene.
 MeshInstances = Sequence[MeshInstance]
+
+
+def with_field(instances: Iterable[MeshInstance]) -> list[MeshInstance]:
+    """Return the mesh instances that have a field."""
+    return [instance for instance in instances if instance.field is not None]
+
+
+class SurfacePoints(NamedTuple):
+    """P points on mesh instances.
+
+    Attributes
+    ----------
+    instance_id : (P,) int32 ndarray
+        Index of the mesh instance.
+    triangle : (P,) int32 ndarray
+        Index of the triangle of the instance's surface.
+    barycentric : (P, 3) float64 ndarray
+        Barycentric coordinates of the point in that triangle.
+    """
+
+    instance_id: np.ndarray
+    triangle: np.ndarray
+    barycentric: np.ndarray
+
+    def part(self, chosen: np.ndarray) -> SurfacePoints:
+        """Return the points that a mask or an array of indices selects."""
+        return SurfacePoints(*(column[chosen] for column in self))
+
+    @staticmethod
+    def of(instance_id: int, triangle: np.ndarray, barycentric: np.ndarray) -> SurfacePoints:
+        """Return points on one instance."""
+        return SurfacePoints(
+            np.full(len(triangle), instance_id, dtype=np.int32), triangle, barycentric
+        )
+
+    @staticmethod
+    def concatenate(parts: list[SurfacePoints]) -> SurfacePoints:
+        """Return the points of all parts, in their order."""
+        return SurfacePoints(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
 class PixelCoverage(NamedTuple):
@@ -196,8 +236,7 @@ class GBuffer:
 
     def part(self, extent: slice) -> GBuffer:
         """Return the G-buffer of some of the pixels, without a copy and without their samples."""
-        channels = {channel: values[extent] for channel, values in self.channels.items()}
-        return replace(part_of(self, extent), channels=channels, coverage=None, samples=None)
+        return replace(part_of(self, extent), coverage=None, samples=None)
 
     def instance_blocks(self) -> list[tuple[int, list[slice | np.ndarray], tuple[float, float]]]:
         """Return a tuple for each visible mesh instance, in the order of instances: its pixels, in blocks.
@@ -212,13 +251,12 @@ class GBuffer:
             this instance included.
         """
         counts = np.bincount(self.instance_id)
-        ends = np.cumsum(counts) / len(self.pixel)
+        ends = offsets_from_sizes(counts) / len(self.pixel)
         instances = []
         for instance_id in np.flatnonzero(counts).tolist():
             blocks: list[slice | np.ndarray] = [*pixel_blocks(counts[instance_id])]
             if counts[instance_id] < len(self.pixel):
                 pixels = np.flatnonzero(self.instance_id == instance_id)
                 blocks = [pixels[block] for block in blocks]
-            start = ends[instance_id - 1] if instance_id else 0.0
-            instances.append((instance_id, blocks, (start, ends[instance_id])))
+            instances.append((instance_id, blocks, (ends[instance_id], ends[instance_id + 1])))
         return instances

@@ -79,7 +79,6 @@ def cached_outline_mesh(
     if similarity_scale(linear) is not None:
         linear = np.eye(3)
     create = partial(outline_mesh, surface, linear, crease_angle)
-    if cache is None:
-        return create()
+    cache = Cache() if cache is None else cache
     shape_key = surface.rest_shape_key, content_hash(surface.corner_fan)
     return cache.get_or_create(("outline mesh", *shape_key, linear.tobytes(), crease_angle), create)

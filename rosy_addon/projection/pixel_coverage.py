@@ -11,16 +11,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.progress import report
 from .barycentrics import LABEL
 from .camera import Camera, pixel_rays, z_at_depth
 from .gbuffer import GBuffer, PixelCoverage, PixelSamples
-from .pixel_blocks import pixel_blocks
-from .pixel_neighbors import depth_slopes
+from .pixel_blocks import pixel_blocks, reported_blocks
+from .pixel_neighbors import PixelTable, depth_slopes
 from .rasterized_samples import SampledTriangles
 
 #: Smallest cosine between the normals of two triangles that show the same surface: 30 degrees.
 MIN_NORMAL_COSINE = np.float32(np.sqrt(0.75))
+
+#: Offsets (dx, dy) of the neighbors of a pixel, in the order in which they are tried. If two are equally near to
+#: a sample, the first one is taken.
+NEIGHBORS = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))
 
 
 class _OtherSamples(NamedTuple):
@@ -95,34 +98,22 @@ def pixel_coverage(
         Mesh instances and normals of ``sampled.other_triangle``; see `_OtherSamples`.
     """
     others = _other_samples(sampled, gbuffer.camera, side, instance, normal)
-    camera = gbuffer.camera
     count = len(gbuffer.pixel)
-    stride = np.int32(camera.width + 2)
-    entry_of_cell = np.full((camera.height + 2) * int(stride), -1, dtype=np.int32)
-    cell = np.empty(count, dtype=np.int32)
-    columns = np.empty((6, count), dtype=np.float32)
-    for block in pixel_blocks(count):
-        report(0.2 * block.start / count, LABEL)
-        row, column = np.divmod(gbuffer.pixel[block], np.int32(camera.width))
-        cell[block] = (row + 1) * stride + column + 1
-        entry_of_cell[cell[block]] = np.arange(block.start, block.stop, dtype=np.int32)
-        columns[:2, block] = _centers(gbuffer.pixel[block], camera.width, 1)
-        columns[2:, block] = depth_slopes(gbuffer, block)
+    table = PixelTable(gbuffer, 1)
+    columns = *_centers(gbuffer.pixel, gbuffer.camera.width, 1), *depth_slopes(gbuffer, slice(None))
     entries = _Entries(*columns, gbuffer.instance_id, gbuffer.geometric_normal.T)
     entry = others.entry.copy()
     elsewhere = []
-    for block in pixel_blocks(len(entry)):
-        report(0.2 + 0.5 * block.start / len(entry), LABEL)
+    for block in reported_blocks(len(entry), LABEL, 0.0, 0.7):
         shown = entries.shows(entry[block], others.part(block))
         elsewhere.append(block.start + np.flatnonzero(~shown))
     elsewhere = np.concatenate([np.empty(0, dtype=np.intp), *elsewhere])
-    for block in pixel_blocks(len(elsewhere)):
-        report(0.7 + 0.3 * block.start / len(elsewhere), LABEL)
+    for block in reported_blocks(len(elsewhere), LABEL, 0.7, 1.0):
         part = elsewhere[block]
-        sample, home = others.part(part), cell.take(entry[part])
+        sample, home = others.part(part), entry[part]
         nearest = np.full(len(part), np.inf, dtype=np.float32)
-        for step in (1, -1, stride, -stride, stride + 1, stride - 1, 1 - stride, -1 - stride):
-            neighbor = entry_of_cell.take(home + step)
+        for dx, dy in NEIGHBORS:
+            neighbor = table.beside(home, dx, dy)
             exists = np.flatnonzero(neighbor >= 0)
             exists = exists[entries.shows(neighbor[exists], sample.part(exists))]
             candidate = neighbor[exists]

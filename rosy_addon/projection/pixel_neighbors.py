@@ -13,7 +13,7 @@ import numpy as np
 from ..core.progress import report
 from ..field.frames import dot_components, transport_components, view_frame
 from .gbuffer import GBuffer
-from .pixel_blocks import BLOCK_PIXELS, pixel_blocks
+from .pixel_blocks import BLOCK_PIXELS
 
 #: Upper bound of the slope of a tangent plane against the picture, in pixels of depth per pixel.
 #: Corresponds to 88 degrees.
@@ -22,6 +22,33 @@ MAX_SLOPE = 30.0
 #: Largest deviation of the depth difference between neighbors from the prediction of the tangent planes,
 #: in pixels: on a surface that faces the eye, and its increase for each unit of slope.
 DEPTH_TOLERANCE, SLOPE_TOLERANCE = 0.5, 0.5
+
+
+class PixelTable:
+    """A table of the pixels of a G-buffer by their places in the frame, for steps from pixel to pixel.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+    margin : int
+        How far outside of the frame a place may be, in rows and columns. No pixels are there.
+    """
+
+    def __init__(self, gbuffer: GBuffer, margin: int) -> None:
+        width, height = gbuffer.camera.size
+        self._margin, self._stride = margin, width + 2 * margin
+        row, column = np.divmod(gbuffer.pixel, np.int32(width))
+        self._cell = (row + margin) * np.int32(self._stride) + column + np.int32(margin)
+        self._entry = np.full((height + 2 * margin) * self._stride, -1, dtype=np.int32)
+        self._entry[self._cell] = np.arange(len(self._cell), dtype=np.int32)
+
+    def beside(self, entry: np.ndarray, dx: int, dy: int) -> np.ndarray:
+        """Return the indices of the pixels at the offset (dx, dy) from pixels; -1 where there is none."""
+        return self._entry.take(self._cell[entry] + (dy * self._stride + dx))
+
+    def at(self, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+        """Return the indices of the pixels in rows and columns of the frame; -1 where there is none."""
+        return self._entry.take((row + self._margin) * self._stride + column + self._margin)
 
 
 def screen_jacobians(gbuffer: GBuffer) -> np.ndarray:
@@ -40,9 +67,7 @@ def screen_jacobians(gbuffer: GBuffer) -> np.ndarray:
         representation points along ``jacobians @ (cos t, sin t)`` on screen.
     """
     camera = gbuffer.camera
-    to_pixels = camera.projection[:2, :2] * [[camera.width], [camera.height]]
-    to_pixels /= 2 * camera.pixels_per_unit
-    to_pixels = to_pixels.astype(np.float32)
+    to_pixels = camera.view_to_pixels.astype(np.float32)
     jacobians = np.empty((2, len(gbuffer.pixel)), dtype=np.complex64)
     view_direction, normal = gbuffer.view_direction.T, gbuffer.normal.T
     ray = view_direction[:2] / view_direction[2] if camera.is_perspective else None
@@ -91,20 +116,15 @@ def neighbor_masks(gbuffer: GBuffer, crease_angle: float | None) -> np.ndarray:
     masks = np.full(count, 1 << 4, dtype=np.uint16)
     if not count:
         return masks
-    row, column = np.empty((2, count), dtype=np.int32)
-    left_column, right_column = gbuffer.camera.width, 0
-    for block in pixel_blocks(count):
-        report(0.1 * block.start / count, label)
-        row[block], column[block] = np.divmod(gbuffer.pixel[block], np.int32(gbuffer.camera.width))
-        left_column = min(left_column, int(column[block].min()))
-        right_column = max(right_column, int(column[block].max()))
+    row, column = np.divmod(gbuffer.pixel, np.int32(gbuffer.camera.width))
+    left_column, right_column = int(column.min()), int(column.max())
     # One empty column on either side.
     width = right_column - left_column + 3
     min_normal_cosine = None if crease_angle is None else np.float32(np.cos(crease_angle))
     band_rows = max(BLOCK_PIXELS // width, 1)
     first_row, row_count = int(row[0]), int(row[-1] - row[0]) + 1
     for row_start in range(first_row, first_row + row_count, band_rows):
-        report(0.1 + 0.9 * (row_start - first_row) / row_count, label)
+        report((row_start - first_row) / row_count, label)
         # The grid has one more row: the first row of the next band, or an empty row.
         ends = np.array([row_start, row_start + band_rows + 1], row.dtype)
         first, stop = np.searchsorted(row, ends).tolist()

@@ -17,17 +17,17 @@ from ..core.cache import Cache
 from ..core.errors import NothingInViewError, RosyError, counted
 from ..core.memory import raise_mmap_threshold
 from ..core.progress import progress, report
+from ..field.formats.polygons import offsets_from_sizes
 from ..field.frames import transform_components
 from .barycentrics import LABEL, barycentrics
 from .camera import Camera, pixel_rays, z_at_depth
 from .corner_field import cached_corner_field
-from .gbuffer import GBuffer, MeshInstance, MeshInstances
-from .pixel_blocks import pixel_blocks
+from .gbuffer import GBuffer, MeshInstance, MeshInstances, SurfacePoints, with_field
+from .pixel_blocks import reported_blocks
 from .pixel_coverage import pixel_coverage
 from .pixel_values import fill_pixels
 from .rasterized_samples import SampledTriangles, rasterize_samples
 from .rasterizer import Fragments, Rows, rasterize
-from .surface_points import SurfacePoints
 
 #: How a field is shown: averaged over smooth fans and interpolated, or constant on each face.
 DISPLAYS = ("smooth", "flat")
@@ -151,9 +151,7 @@ def project_samples(
     sample, home, shown, triangle = (values[order] for values in columns)
     clip, triangles = all_triangles(instances, camera)
     with progress(0.1, 0.3):
-        weights, front_facing = barycentrics(
-            clip, triangles, sample, triangle, camera.width, camera.height
-        )
+        weights, front_facing = barycentrics(clip, triangles, sample, triangle, *camera.size)
     z, w = np.einsum("nc,nck->kn", weights, clip[triangles[triangle], 2:])
     fragments = Fragments(sample, triangle, weights, front_facing, z / w)
     with progress(0.3, 0.5):
@@ -195,7 +193,7 @@ def surface_points(
     a, b, c = np.moveaxis(corners[..., (0, 1, 3)], 1, 0)
     front_facing = (a * np.cross(b, c)).sum(axis=1) > 0
     z, w = (points.barycentric[:, :, None] * corners[..., 2:]).sum(axis=1).T
-    size = np.array([camera.width, camera.height])
+    size = np.array(camera.size)
     column, row = np.clip(position.astype(np.int64), 0, size - 1).T
     pixel, triangle = (row * camera.width + column).astype(np.int32), triangle.astype(np.int32)
     barycentric = points.barycentric.astype(np.float32)
@@ -276,14 +274,10 @@ def _visible_samples(
     clip, triangles = all_triangles(instances, camera)
     has_field = _triangles_with_field(instances)
     with progress(0.0, 0.8):
-        sampled = rasterize_samples(
-            clip, triangles, has_field, camera.width, camera.height, samples, rows
-        )
+        sampled = rasterize_samples(clip, triangles, has_field, *camera.size, samples, rows)
     pixel, triangle = sampled.pixel, sampled.triangle
     with progress(0.8, 1.0):
-        weights, front_facing = barycentrics(
-            clip, triangles, pixel, triangle, camera.width, camera.height
-        )
+        weights, front_facing = barycentrics(clip, triangles, pixel, triangle, *camera.size)
     return Fragments(pixel, triangle, weights, front_facing, sampled.depth), sampled
 
 
@@ -297,7 +291,7 @@ def _triangles_with_field(instances: MeshInstances) -> np.ndarray:
 def first_triangles(instances: MeshInstances) -> np.ndarray:
     """Return the index of the first triangle of each instance, counted over all instances, (B,) int32."""
     counts = [len(instance.surface.triangles) for instance in instances]
-    return np.cumsum([0, *counts[:-1]]).astype(np.int32)
+    return offsets_from_sizes(counts)[:-1].astype(np.int32)
 
 
 def _split_triangles(
@@ -310,9 +304,7 @@ def _split_triangles(
     if len(instances) == 1:
         return np.zeros(len(triangle), dtype=np.int32), triangle
     first_triangle = first_triangles(instances)
-    instance_id = np.empty(len(triangle), dtype=np.int32)
-    for block in pixel_blocks(len(triangle)):
-        instance_id[block] = np.searchsorted(first_triangle, triangle[block], side="right") - 1
+    instance_id = np.searchsorted(first_triangle, triangle, side="right").astype(np.int32) - 1
     return instance_id, triangle - first_triangle[instance_id]
 
 
@@ -321,7 +313,7 @@ def rasterize_instances(instances: MeshInstances, camera: Camera, rows: Rows = N
 
     Triangles are counted over all instances, in their order.
     """
-    return rasterize(*all_triangles(instances, camera), camera.width, camera.height, rows)
+    return rasterize(*all_triangles(instances, camera), *camera.size, rows)
 
 
 def all_triangles(instances: MeshInstances, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
@@ -359,10 +351,10 @@ def raise_nothing_in_view(instances: MeshInstances, camera: Camera) -> None:
         Always. The message says whether the surfaces are hidden, cover no pixel, or are outside the
         frame.
     """
-    field_instances = [instance for instance in instances if instance.field is not None]
+    field_instances = with_field(instances)
     names = ", ".join(instance.surface.name for instance in field_instances)
     clip, triangles = all_triangles(field_instances, camera)
-    if len(rasterize(clip, triangles, camera.width, camera.height).pixel):
+    if len(rasterize(clip, triangles, *camera.size).pixel):
         reason = "hidden behind other objects"
     elif (np.abs(clip[triangles, :3]).max(axis=2) <= clip[triangles, 3]).any():
         reason = "seen exactly edge-on, or smaller than a pixel: turn the camera, or move it closer"
@@ -380,8 +372,7 @@ def _new_gbuffer(instances: MeshInstances, camera: Camera, fragments: Fragments)
     face = np.empty(count, dtype=np.int32)
     face_of_triangle = np.concatenate([instance.surface.triangle_face for instance in instances])
     position, view_direction = _empty_vectors(count), _empty_vectors(count)
-    for block in pixel_blocks(count):
-        report(block.start / count, LABEL)
+    for block in reported_blocks(count, LABEL):
         face[block] = face_of_triangle.take(fragments.triangle[block])
         x, y = pixel_rays(camera, fragments.pixel[block])
         z = z_at_depth(camera, x, y, fragments.depth[block]).astype(np.float32)

@@ -13,11 +13,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..core.progress import progress, report
+from ..core.progress import progress
 from ..field.frames import normalize
-from .camera import Camera, look_at, orthographic_camera, perspective_camera
-from .gbuffer import GBuffer, MeshInstances
-from .pixel_blocks import pixel_blocks
+from .camera import Camera, look_at, orthographic_camera, perspective_camera, z_at_depth
+from .gbuffer import GBuffer, MeshInstances, with_field
+from .pixel_blocks import reported_blocks
 from .project import rasterize_instances
 
 #: Width and height of the shadow maps of lights, in pixels.
@@ -60,9 +60,7 @@ def light_cameras(
     """
     camera_to_world = camera.view[:3, :3].T
     caster_points = np.concatenate([instance.world_bounds() for instance in instances])
-    receiver_points = np.concatenate(
-        [instance.world_bounds() for instance in instances if instance.field is not None]
-    )
+    receiver_points = np.concatenate([item.world_bounds() for item in with_field(instances)])
     vector = np.asarray(vector, dtype=np.float64)
     if kind == "sun":
         direction = camera_to_world @ vector
@@ -127,11 +125,8 @@ def render_depth_map(instances: MeshInstances, camera: Camera) -> np.ndarray:
     """Return the (H, W) float32 depths of the nearest surfaces along the camera axis; inf at empty pixels."""
     fragments = rasterize_instances(instances, camera)
     depth = np.full(camera.width * camera.height, np.inf, dtype=np.float32)
-    m_z, m_w = camera.projection[2, 2:]
-    if camera.is_perspective:
-        depth[fragments.pixel] = m_w / (fragments.depth + m_z)
-    else:
-        depth[fragments.pixel] = (fragments.depth - m_w) / -m_z
+    # The cameras of lights are not sheared, so the depth is the same for all rays.
+    depth[fragments.pixel] = -z_at_depth(camera, 0, 0, fragments.depth)
     return depth.reshape(camera.height, camera.width)
 
 
@@ -155,9 +150,7 @@ def shadow_visibility(gbuffer: GBuffer, cameras: Sequence[Camera]) -> np.ndarray
         rendered, done = (index + 0.5) / len(cameras), (index + 1) / len(cameras)
         with progress(index / len(cameras), rendered, LABEL):
             depth_map = render_depth_map(gbuffer.instances, camera)
-        for block in pixel_blocks(len(result)):
-            fraction = rendered + (done - rendered) * block.start / len(result)
-            report(fraction, LABEL)
+        for block in reported_blocks(len(result), LABEL, rendered, done):
             points = (gbuffer.position[block] - translation) @ rotation
             normals = gbuffer.normal[block] @ rotation
             result[block] *= visibility_from(camera, depth_map, points, normals)
@@ -194,7 +187,7 @@ def visibility_from(
     x, y = clip[:, 0] / divisor, clip[:, 1] / divisor
     in_frustum = np.flatnonzero((np.abs(x) <= 1) & (np.abs(y) <= 1) & (axial_depth > 0))
     visibility = np.ones(len(points), dtype=np.float32)
-    size = np.array([camera.width, camera.height])
+    size = np.array(camera.size)
     pixel = (np.stack([x[in_frustum], y[in_frustum]], axis=1) * 0.5 + 0.5) * size
     visibility[in_frustum] = _pcf_visibility(depth_map, pixel, axial_depth[in_frustum])
     return visibility

@@ -25,6 +25,7 @@ from ..field.surface import Surface
 from .corner_field import CornerField, field_at_corners, transport_phase
 from .face_values import SIMILARITY_EPS, similarity_scale
 from .field_channel import rotation_order
+from .gbuffer import MeshInstance
 from .rest_coordinates import matrix_scale
 from .vector_components import tangent_frame_components
 
@@ -77,9 +78,7 @@ def rest_matrix(matrix: np.ndarray) -> np.ndarray:
 
 
 def cached_surface_lines(
-    surface: Surface,
-    matrix: np.ndarray,
-    field: RosyField,
+    instance: MeshInstance,
     display: str,
     spacing: float,
     cache: Cache | None = None,
@@ -89,14 +88,12 @@ def cached_surface_lines(
 
     Lines are shared by all cameras, and by instances of equal size.
     """
-    stretch = rest_matrix(matrix)
-    scale = matrix_scale(matrix)
+    surface, field, cache = instance.surface, instance.field, Cache() if cache is None else cache
+    stretch, scale = rest_matrix(instance.matrix), matrix_scale(instance.matrix)
     # Rounded, as rotated matrices have rounding errors.
     spacing = float(f"{spacing / scale:.5g}")
     stretch = np.round(stretch / scale, 5)
     create = partial(surface_lines, surface, stretch, field, display, spacing, max_triangles)
-    if cache is None:
-        return create()
     # Deformations do not change what the lines depend on.
     normals = surface.corner_normal if surface.rest_vertices is None else None
     field_parts = field.degree, field.vectors, field.direction_ratios

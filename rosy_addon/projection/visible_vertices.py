@@ -15,11 +15,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.progress import report
-from ..field.blocks import blocks_by_count, concatenated_ranges
+from ..field.blocks import blocks_by_count, concatenated_ranges, mask
+from ..field.formats.polygons import offsets_from_sizes
 from .camera import Camera
-from .gbuffer import MeshInstances
+from .gbuffer import MeshInstances, SurfacePoints
 from .project import all_triangles, first_triangles
-from .surface_points import SurfacePoints
 
 #: Surfaces that are nearer to a point than this fraction of the size of the scene do not hide it.
 SAME_POINT = 1e-6
@@ -86,7 +86,7 @@ def project_vertices(
     """
     report(0.0, LABEL)
     scene = _Scene.of(instances, camera, clip_planes)
-    first = np.cumsum([0, *(len(instance.surface.vertices) for instance in instances[:-1])])
+    first = offsets_from_sizes([len(instance.surface.vertices) for instance in instances])[:-1]
     vertex = np.concatenate(
         [start + np.asarray(part, np.intp) for start, part in zip(first, vertices, strict=True)]
     )
@@ -160,7 +160,7 @@ def _project(
     is_in_view = (w > 0) & (np.abs(z) <= w) & ~is_cut_away(world, scene.clip_planes)
     ndc = np.full((len(clip), 2), np.nan)
     np.divide(np.stack([x, y], axis=1), w[:, None], out=ndc, where=(w > 0)[:, None])
-    position = (ndc + 1) * (0.5 * np.array([camera.width, camera.height]))
+    position = (ndc + 1) * (0.5 * np.array(camera.size))
     is_visible = is_in_view & (np.abs(ndc) <= 1).all(axis=1)
     distance = camera.depths(world)
     # A triangle nearer than the near plane, or beyond the far one, hides nothing.
@@ -294,9 +294,7 @@ class _Scene:
         if self.clip_planes is not None:
             hit = np.einsum("nk,nki->ni", weights, self.world[corner])
             hides &= ~is_cut_away(hit, self.clip_planes)
-        result = np.zeros(len(triangle), dtype=bool)
-        result[covers[hides]] = True
-        return result
+        return mask(len(triangle), covers[hides])
 
 
 def _grid_rows(y: np.ndarray, row_count: int) -> np.ndarray:

@@ -24,6 +24,7 @@ from ..core.errors import NothingInViewError, RosyError
 from ..core.memory import PIXEL_BYTES, PROCESS_BYTES, TRIANGLE_BYTES, check_memory, samples_memory
 from ..core.progress import progress
 from ..field.symmetry import FieldSymmetry
+from ..projection.gbuffer import with_field
 from ..projection.project import cached_project, check_instances, project, raise_nothing_in_view
 from ..worker.pool import POOL, core_count
 from .marks import with_marks
@@ -210,7 +211,7 @@ def picture_memory(view: ViewInput, groups: Sequence[Sequence[Strip]], workers: 
     """
     look, camera = view.look, view.shaded_camera
     lines = 1
-    for field in [instance.field for instance in view.instances if instance.field is not None]:
+    for field in [instance.field for instance in with_field(view.instances)]:
         is_rosy = field.direction_ratios is None
         lines = max(lines, FieldSymmetry(field.degree).line_count if is_rosy else field.degree)
     many_images = is_hatched(look) or noise_channel_count(look) > 1 or look.method != "sheets"

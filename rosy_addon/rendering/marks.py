@@ -18,7 +18,7 @@ from ..compositor.picture import Picture
 from ..compositor.picture_key import color_scale_of, fixed_color_range
 from ..core.cache import BAKE_CACHE, Cache
 from ..core.progress import progress
-from ..projection.gbuffer import MeshInstance
+from ..projection.gbuffer import MeshInstance, with_field
 from .view_input import ViewInput
 
 #: Length of an arrowhead, relative to the least distance between positions with arrowheads. At a position
@@ -106,7 +106,7 @@ def sequence_key(instances: Sequence[MeshInstance], look: Look) -> PictureKey:
     PictureKey
     """
     kinds, cache = [np.empty((0, 2), dtype=np.int64)], Cache()
-    fields = [instance for instance in instances if instance.field is not None]
+    fields = with_field(instances)
     if shows_singularities(look):
         for number, instance in enumerate(fields):
             with progress(number / len(fields), (number + 1) / len(fields)):

@@ -102,12 +102,11 @@ def with_bleed(rgba: np.ndarray) -> np.ndarray:
     """
     # Pad by one pixel, so that every pixel of the picture has eight neighbors.
     padded = np.pad(rgba, ((1, 1), (1, 1), (0, 0)))
-    height, width = padded.shape[:2]
+    width = padded.shape[1]
     is_filled = padded[..., 3].ravel() > 0
     pixels = padded.reshape(-1, 4)
     pixels[~is_filled, :3] = NEUTRAL_GRAY
-    is_inside = np.zeros((height, width), dtype=bool)
-    is_inside[1:-1, 1:-1] = True
+    is_inside = np.pad(np.ones(rgba.shape[:2], dtype=bool), 1).ravel()
     steps = (1, 0, -1)
     neighbor_offsets = [row * width + column for row in steps for column in steps if row or column]
     frontier = np.flatnonzero(is_filled)
@@ -115,7 +114,7 @@ def with_bleed(rgba: np.ndarray) -> np.ndarray:
         is_adjacent = np.zeros_like(is_filled)
         for offset in neighbor_offsets:
             is_adjacent[frontier + offset] = True
-        targets = np.flatnonzero(is_adjacent & ~is_filled & is_inside.ravel())
+        targets = np.flatnonzero(is_adjacent & ~is_filled & is_inside)
         total = np.zeros((len(targets), 3), dtype=np.float32)
         count = np.zeros((len(targets), 1), dtype=np.float32)
         for offset in neighbor_offsets:

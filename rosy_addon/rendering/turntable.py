@@ -195,7 +195,7 @@ def video_steps(
     with nullcontext("") if is_gif(path) else GuardedFolder() as name:
         folder = Path(name)
         for index, view in enumerate(views):
-            width, height = view.camera.width, view.camera.height
+            width, height = view.camera.size
             if is_gif(path) and not index:
                 check_memory(
                     GIF_BYTES * count * width * height,

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial, reduce
+from itertools import pairwise
 from typing import Any
 
 import bpy
@@ -14,6 +15,7 @@ import numpy as np
 from bpy.types import ID, Material, Modifier, Node, NodeSocket, NodeTree, Object
 
 from ..core.color import from_hex, to_linear
+from ..field.formats.polygons import offsets_from_sizes
 from ..line_drawing.drawing_outputs import StrokeGeometry
 from ..line_drawing.outline import OUTLINE_KINDS
 from .datablocks import OWNED_TAG, STROKES_TAG
@@ -171,8 +173,7 @@ def _add_to_frame(
     """
     line_width = int(np.clip(np.ceil(LEGACY_WIDTH_PER_UNIT * radius.max()), 1, MAX_LEGACY_WIDTH))
     pressure = radius * (LEGACY_WIDTH_PER_UNIT / line_width)
-    ends = np.cumsum(counts)
-    for start, end in zip((ends - counts).tolist(), ends.tolist(), strict=True):
+    for start, end in pairwise(offsets_from_sizes(counts).tolist()):
         stroke = frame.strokes.new()
         stroke.points.add(end - start)
         stroke.points.foreach_set("co", points[start:end].ravel())

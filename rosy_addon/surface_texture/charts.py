@@ -21,8 +21,9 @@ from ..core.errors import RosyError
 from ..core.progress import progress, report
 from ..field.connectivity import connected_components
 from ..field.frames import dot, transport
+from ..field.representation import unit_complex
 from ..field.surface import Surface
-from ..line_drawing.tangent_mesh import SharedEdges, TangentMesh, shared_edges, unit
+from ..line_drawing.tangent_mesh import SharedEdges, TangentMesh, shared_edges
 
 #: Two corners are at the same point of a UV map if their coordinates differ by at most this much.
 SAME_UV = 1e-6
@@ -129,7 +130,7 @@ def uv_charts(surface: Surface, mesh: TangentMesh, uv: np.ndarray) -> UvCharts:
         chart = connected_components(len(corner_uv), np.stack(edges[:2], axis=1))
     # The rotation of the polar decomposition turns this tangent to the u axis.
     mirrored = np.abs(conjugate) > np.abs(linear)
-    direction = _unit(np.where(mirrored, conjugate, linear.conj()))
+    direction = unit_complex(np.where(mirrored, conjugate, linear.conj()))
     with progress(0.4, 1.0):
         frame = _averaged_at_corners(surface, mesh, direction, edges)
     return UvCharts(corner_uv, linear, conjugate, gradient, chart, frame)
@@ -183,7 +184,7 @@ def uv_tangents(surface: Surface, mesh: TangentMesh, charts: UvCharts) -> np.nda
         Tangents in the frames of the triangles.
     """
     triangle = np.arange(len(charts.linear))
-    direction = _unit(charts.to_surface(triangle, np.ones(len(triangle))))
+    direction = unit_complex(charts.to_surface(triangle, np.ones(len(triangle))))
     edges = _chart_edges(mesh, charts.uv)
     return _averaged_at_corners(surface, mesh, direction, edges)
 
@@ -222,12 +223,7 @@ def _averaged_at_corners(
         tangent, normal = total[group[corner::3]], mesh.corner_normal[:, corner]
         tangent = tangent - dot(tangent, normal)[:, None] * normal
         tangent = transport(tangent, normal, mesh.normal)
-        frame[:, corner] = _unit(dot(tangent, mesh.x) + 1j * dot(tangent, mesh.y))
+        frame[:, corner] = unit_complex(dot(tangent, mesh.x) + 1j * dot(tangent, mesh.y))
     missing = frame == 0
     frame[missing] = np.repeat(direction, 3)[missing.ravel()]
     return frame
-
-
-def _unit(values: np.ndarray) -> np.ndarray:
-    """Return complex numbers divided by their moduli; 0 stays 0."""
-    return unit(values, np.zeros_like(values))

@@ -12,7 +12,7 @@ from ..compositor.color_values import check_color_values, scaled_positions, valu
 from ..compositor.compose import colorize, streak_tone
 from ..compositor.flow import NO_DRIFT, Drift, noise_channel_count
 from ..compositor.ink_thresholds import sharp_look
-from ..compositor.lic import lic_lengths, noise_args
+from ..compositor.lic import lic_lengths, noise_settings
 from ..compositor.lic_images import with_magnitude_range
 from ..compositor.look import (
     Look,
@@ -24,7 +24,6 @@ from ..compositor.look import (
 )
 from ..compositor.look_units import PixelLook, surface_pixel_look
 from ..compositor.pixel_field import PixelField
-from ..compositor.reported_blocks import reported_blocks
 from ..compositor.shading import Light
 from ..core.cache import BAKE_CACHE, Cache
 from ..core.errors import RosyError
@@ -40,6 +39,7 @@ from ..core.progress import progress
 from ..image_io.image_data import ImageData, image_of_pixels
 from ..line_drawing.tangent_mesh import TangentMesh, build_tangent_mesh
 from ..projection.gbuffer import MeshInstance
+from ..projection.pixel_blocks import reported_blocks
 from ..projection.surface_sampling import values_in_triangles
 from .charts import UvCharts, uv_charts
 from .hatching import lit_ink, thresholds
@@ -294,7 +294,7 @@ def _look_pixels(on: TexelSurface, field: PixelField, look: Look, drift: Drift) 
 def _colors(on: TexelSurface, field: PixelField, look: PixelLook) -> np.ndarray:
     """Return (P, 4) RGBA at texels: the linear colors of the field, and the opacity 1."""
     with progress(0.0, 0.3):
-        noise = texel_noise(on, **noise_args(look))
+        noise = texel_noise(on, noise_settings(look))
     with progress(0.3, 0.95):
         (images,) = lic_lengths(field, [look], noise)
     with progress(0.95, 0.97):

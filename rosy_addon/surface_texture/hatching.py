@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..compositor.even_lines import WOBBLE_SHIFT, EvenLines, resolved_share
+from ..compositor.even_lines import WOBBLE_SHIFT, EvenLines, line_phases, resolved_share
 from ..compositor.hatching import HatchedLines, has_breaks, has_paper_grain, line_images
 from ..compositor.ink_from_thresholds import ink_of_thresholds
 from ..compositor.ink_thresholds import (
@@ -19,12 +19,11 @@ from ..compositor.ink_thresholds import (
     threshold_pixels,
 )
 from ..compositor.inks import inks_of
-from ..compositor.lic import lic_lengths, noise_args, unconvolved_noise
+from ..compositor.lic import lic_lengths, noise_settings, unconvolved_noise
 from ..compositor.look import Look, is_even
 from ..compositor.look_units import PixelLook
-from ..compositor.paper_grain import surface_paper_grain, surface_paper_grain_args
+from ..compositor.paper_grain import surface_paper_grain, surface_paper_grain_settings
 from ..compositor.pixel_field import PixelField, all_members
-from ..compositor.reported_blocks import reported_blocks
 from ..compositor.shading import Light
 from ..compositor.streak_statistics import look_streak_statistics
 from ..compositor.target_tone import apply_tone_curve
@@ -32,6 +31,7 @@ from ..compositor.undirected import undirected_texture
 from ..compositor.wobble import WOBBLE_STD, has_wobble, rotate_pixel_field, solid_wobble_angle
 from ..core.color import LUMINANCE_WEIGHTS
 from ..core.progress import progress
+from ..projection.pixel_blocks import reported_blocks
 from ..projection.rest_coordinates import matrix_scale, rest_positions
 from ..projection.surface_lines import MAX_TRIANGLES, cached_surface_lines
 from .line_order import first_line_weights, line_order
@@ -153,7 +153,7 @@ def _lines(
     even_lines = noise = undirected = paper_grain = None
     if not is_spaced or has_breaks(look) or undefined:
         with progress(0.0, 0.3):
-            noise = texel_noise(on, **noise_args(look))
+            noise = texel_noise(on, noise_settings(look))
     if is_spaced:
         with progress(0.3, 0.6):
             even_lines = _even_lines(on, field, look, wobble_angle)
@@ -170,7 +170,7 @@ def _lines(
         undirected = undirected_texture(field, unconvolved_noise(noise, look), spot)
     if has_paper_grain(look):
         with progress(0.9, 1.0):
-            heights = texel_noise(on, **surface_paper_grain_args(look))
+            heights = texel_noise(on, surface_paper_grain_settings(look))
             paper_grain = surface_paper_grain(heights, std, field.line_count)
     return HatchedLines(
         look, images, break_images, paper_grain, undirected=undirected, even_lines=even_lines
@@ -192,34 +192,26 @@ def _even_lines(
     on: TexelSurface, field: PixelField, look: PixelLook, wobble_angle: np.ndarray | None
 ) -> EvenLines:
     """Return evenly spaced lines along the field, evaluated at the texels."""
-    instance, texels = on.instance, on.texels
+    texels = on.texels
     spacing = look.line_distance * on.step
     max_triangles = min(MAX_TRIANGLES, TRIANGLES_PER_TEXEL * len(texels))
     with progress(0.0, 0.8):
-        geometry = instance.surface, instance.matrix, instance.field, look.display
-        lines = cached_surface_lines(*geometry, spacing, on.cache, max_triangles)
+        lines = cached_surface_lines(on.instance, look.display, spacing, on.cache, max_triangles)
     triangles, corners = np.arange(len(on.mesh.points)), on.mesh.points
     sides = [on.mesh.to_frame(triangles, corners[:, k] - corners[:, 0]) for k in (1, 2)]
-    members = all_members(field, look.guiding_angle)
     streaks, period = np.empty((2, field.line_count, len(texels)), dtype=np.float32)
-    jacobian = field.screen_jacobian
-    area = np.abs((jacobian[:, 0].conj() * jacobian[:, 1]).imag)
     for block in reported_blocks(len(texels), LABEL, 0.8, 1.0):
         triangle, weights = texels.triangle[block], texels.barycentric[block]
-        leaf, in_leaf = lines.tree.locate(triangle, weights)
-        first, second = lines.heading.take(leaf, axis=1)
+        part, place = field.part(block), lines.tree.locate(triangle, weights)
+        members = all_members(part, look.guiding_angle)
+        first, second = lines.heading.take(place[0], axis=1)
         heading = first * sides[0].take(triangle) + second * sides[1].take(triangle)
-        member = members[0][block] * frames_at(on.charts, triangle, weights)
+        member = members[0] * frames_at(on.charts, triangle, weights)
         turn = np.angle(member * heading.conj()) * (field.degree / (2 * np.pi))
         direction = np.rint(turn).astype(np.int32)
-        part = field.part(block)
-        for line, out in enumerate(streaks):
-            along = part.to_screen(part.member_direction(members[line][block]), foreshorten=True)
-            across = area[block] / np.maximum(np.abs(along), np.float32(1e-6))
-            period[line, block] = look.line_distance * across
-            family = (direction + line) % field.degree % field.line_count
-            phase = lines.pattern.evaluate(leaf, in_leaf, family)
-            if wobble_angle is not None:
-                phase += np.float32(look.wobble * WOBBLE_SHIFT / WOBBLE_STD) * wobble_angle[block]
-            out[block] = 1 - 2 * np.abs(phase - np.rint(phase))
+        phases, foreshortening = line_phases(lines, place, part, members, direction)
+        period[:, block] = look.line_distance * foreshortening
+        if wobble_angle is not None:
+            phases += np.float32(look.wobble * WOBBLE_SHIFT / WOBBLE_STD) * wobble_angle[block]
+        streaks[:, block] = 1 - 2 * np.abs(phases - np.rint(phases))
     return EvenLines(streaks, period, growth=None)

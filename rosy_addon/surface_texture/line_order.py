@@ -32,7 +32,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compositor.reported_blocks import reported_blocks
 from ..core.progress import progress, report
 from ..field.bisection import BisectionTree, bisect
 from ..field.connection import build_connection
@@ -48,6 +47,7 @@ from ..line_drawing.tangent_mesh import (
     shared_edges,
 )
 from ..projection.gbuffer import MeshInstance
+from ..projection.pixel_blocks import reported_blocks
 from .charts import uv_tangents
 from .texels import TexelSurface
 

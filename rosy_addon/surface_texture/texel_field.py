@@ -13,17 +13,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..compositor.image_noise import BLUR_FACTOR, NOISE_MEAN
+from ..compositor.image_noise import BLUR_FACTOR, NOISE_MEAN, NoiseSettings
 from ..compositor.pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps
-from ..compositor.reported_blocks import reported_blocks
 from ..compositor.surface_noise import instance_hashes, solid_noise
 from ..core.progress import progress, report
 from ..field.blocks import row_blocks
 from ..field.frames import dot
 from ..field.representation import signed_power, unit_complex
 from ..line_drawing.surface_particles import SurfaceParticles, trace_geodesics
-from ..line_drawing.tangent_mesh import unit
 from ..projection.field_channel import REPRESENTATION, FieldChannel, rotation_order
+from ..projection.pixel_blocks import reported_blocks
 from ..projection.rest_coordinates import RestCoordinates, matrix_scale, rest_positions
 from .charts import UvCharts
 from .texels import TexelSurface, neighbor_places
@@ -223,7 +222,7 @@ def _seam_steps(
     weights = texels.barycentric[source].astype(np.float64)
     offset = np.array([dx + 1j * dy for dx, dy in NEIGHBOR_OFFSETS])[bit]
     tangent = charts.to_surface(triangle, offset / size)
-    length, ahead = np.abs(tangent), unit(tangent, np.ones_like(tangent))
+    length, ahead = np.abs(tangent), unit_complex(tangent, otherwise=1)
     frame = frames_at(charts, triangle, weights)
     start = SurfaceParticles(triangle, weights, frame.copy(), np.ones(len(source)))
     end, direction, walked = trace_geodesics(mesh, start, ahead, length)
@@ -285,21 +284,15 @@ def _nearest_texels(
 # --- noise -------------------------------------------------------------------------------------------
 
 
-def texel_noise(
-    on: TexelSurface, cell: float, seed: int, channels: int, density: float, high_pass: float
-) -> np.ndarray:
+def texel_noise(on: TexelSurface, settings: NoiseSettings) -> np.ndarray:
     """Make noise at texels that is fixed to the surface.
 
     Parameters
     ----------
     on : TexelSurface
         The P texels, and the surface that they show.
-    cell : float
-        Size of a cell of the noise, in steps of streamlines.
-    seed, channels, density
-        Seed, number of channels K and density of the noise; see `surface_noise`.
-    high_pass : float
-        Variations wider than this are removed, in steps of streamlines; 0: none are.
+    settings : NoiseSettings
+        Lengths are in steps of streamlines.
 
     Returns
     -------
@@ -307,6 +300,7 @@ def texel_noise(
         Noise with the mean `NOISE_MEAN`.
     """
     surface, charts, texels, step = on.instance.surface, on.charts, on.texels, on.step
+    cell, seed, channels, density, high_pass = settings
     # Length in world space of one Blender unit of object space.
     scale = matrix_scale(on.instance.matrix)
     rest = rest_positions(surface).astype(np.float32)
@@ -327,10 +321,7 @@ def texel_noise(
         solid_noise(coordinates, size, block_hash, seed, density, out=total[:, block])
     if high_pass:
         _subtract_local_means(on, rest, total, BLUR_FACTOR * high_pass * step / scale)
-    noise = np.empty(total.shape[::-1], dtype=np.float32)
-    for block in reported_blocks(len(noise), "making noise", 1.0, 1.0):
-        noise[block] = total[:, block].T + np.float32(NOISE_MEAN)
-    return noise
+    return np.add(total.T, np.float32(NOISE_MEAN), order="C")
 
 
 def _subtract_local_means(
@@ -359,7 +350,6 @@ def _subtract_local_means(
     stride = np.array([shape[1] * shape[2], shape[2], 1])
     area = np.abs(on.charts.density)
     area = np.divide(1, area, out=np.zeros(len(area)), where=area > 0)
-    blocks = row_blocks(len(texels), GRID_BLOCK)
 
     def cells(block: slice) -> tuple[np.ndarray, np.ndarray]:
         """Return the grid cells of texels and the positions in them.
@@ -371,8 +361,7 @@ def _subtract_local_means(
         return cell @ stride, np.clip(position - cell, 0, 1).astype(np.float32)
 
     sums = np.zeros((1 + len(channels), int(shape.prod())))
-    for number, block in enumerate(blocks):
-        report(0.7 + 0.15 * number / len(blocks), "making noise")
+    for block in reported_blocks(len(texels), "making noise", 0.7, 0.85, GRID_BLOCK):
         block = slice(block.start, block.stop, SAMPLE_STRIDE)
         first, place = cells(block)
         weight = area[texels.triangle[block]]
@@ -382,8 +371,7 @@ def _subtract_local_means(
             for values, out in zip(channels, sums[1:], strict=True):
                 out += np.bincount(point, share * values[block], sums.shape[1])
     means = (sums[1:] / np.maximum(sums[0], np.finfo(float).tiny)).astype(np.float32)
-    for number, block in enumerate(blocks):
-        report(0.85 + 0.15 * number / len(blocks), "making noise")
+    for block in reported_blocks(len(texels), "making noise", 0.85, 1.0, GRID_BLOCK):
         first, place = cells(block)
         for offset, share in _corner_shares(place, stride):
             for values, mean in zip(channels, means, strict=True):

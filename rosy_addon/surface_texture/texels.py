@@ -177,21 +177,21 @@ def texture_frame(charts: UvCharts, size: int, name: str, is_udim: bool = False)
     ranges = np.unique(np.stack([low_u, high_u, low_v, high_v], axis=1), axis=0)
     tiles = set()
     for first_u, last_u, first_v, last_v in ranges.tolist():
-        if (last_u - first_u + 1) * (last_v - first_v + 1) > MAX_TILES:
-            break
-        tiles |= {(u, v) for u in range(first_u, last_u + 1) for v in range(first_v, last_v + 1)}
-        if len(tiles) > MAX_TILES:
-            break
-    else:
-        if is_udim and any(not 0 <= u < TILES_PER_ROW or v < 0 for u, v in tiles):
+        count = (last_u - first_u + 1) * (last_v - first_v + 1)
+        if count <= MAX_TILES:
+            columns, rows = range(first_u, last_u + 1), range(first_v, last_v + 1)
+            tiles |= {(u, v) for u in columns for v in rows}
+        if max(count, len(tiles)) > MAX_TILES:
             raise RosyError(
-                f"{name}: its UV map reaches beyond the tiles that UDIM numbers: move its charts to "
-                f"u from 0 to {TILES_PER_ROW} and v above 0"
+                f"{name}: its UV map reaches over more than {MAX_TILES} tiles: scale it to u and v "
+                "from 0 to 1"
             )
-        return TextureFrame(size, tuple(sorted(tiles, key=lambda tile: tile[::-1])), is_udim)
-    raise RosyError(
-        f"{name}: its UV map reaches over more than {MAX_TILES} tiles: scale it to u and v from 0 to 1"
-    )
+    if is_udim and any(not 0 <= u < TILES_PER_ROW or v < 0 for u, v in tiles):
+        raise RosyError(
+            f"{name}: its UV map reaches beyond the tiles that UDIM numbers: move its charts to "
+            f"u from 0 to {TILES_PER_ROW} and v above 0"
+        )
+    return TextureFrame(size, tuple(sorted(tiles, key=lambda tile: tile[::-1])), is_udim)
 
 
 def rasterize_charts(charts: UvCharts, frame: TextureFrame, name: str) -> Texels:
@@ -276,8 +276,8 @@ def fill_margin(
         color.
     """
     height, width, channels = frame.height, frame.width, color.shape[1]
-    image = np.empty((height, width, channels), dtype=np.float32)
-    image[...] = color.mean(axis=0, dtype=np.float64)
+    mean = color.mean(axis=0, dtype=np.float64)
+    image = np.full((height, width, channels), mean, dtype=np.float32)
     flat = image.reshape(-1, channels)
     flat[field.pixel] = color
     filled = np.zeros(height * width, dtype=bool)

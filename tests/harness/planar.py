@@ -14,7 +14,7 @@ from rosy_addon.compositor.lic import lic_lengths, look_noise
 from rosy_addon.compositor.lic_images import LicImages
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import PixelLook, pixel_look
-from rosy_addon.compositor.pixel_field import PixelField, mask_undefined
+from rosy_addon.compositor.pixel_field import PixelField, without_undefined_neighbors
 from rosy_addon.compositor.strips import Strip
 from rosy_addon.core.cache import Cache
 from rosy_addon.core.deterministic_trig import unit_phasor
@@ -93,16 +93,16 @@ def planar_pixel_field(
     z = unit_phasor(np.where(defined, degree * angles, 0.0).ravel())
     z *= np.where(defined, rho, 0).astype(np.float32).ravel()
     pixel = np.arange(height * width, dtype=np.int32)
-    all_neighbors = np.full(len(pixel), 0b111_111_111, dtype=np.uint16)
-    return PixelField(
+    field = PixelField(
         degree=degree,
         width=width,
         height=height,
         pixel=pixel,
         representation=z,
         screen_jacobian=np.tile(np.array([1, 1j], dtype=np.complex64), (len(pixel), 1)),
-        neighbor_mask=mask_undefined(all_neighbors, pixel, width, height, z != 0),
+        neighbor_mask=np.full(len(pixel), 0b111_111_111, dtype=np.uint16),
     )
+    return without_undefined_neighbors(field)
 
 
 def compose_planar(

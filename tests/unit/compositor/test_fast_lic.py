@@ -37,10 +37,6 @@ def brute_force_images(field, look=LOOK, noise=None):
     return brute_force(field, pixel_look(look), make_noise(field) if noise is None else noise)
 
 
-def uniform_field(angle, degree, size=SIZE):
-    return planar_pixel_field(np.full((size, size), angle), degree)
-
-
 def singular_field(degree, size=SIZE):
     """A field with singularities of index 1 / N and -1 / N."""
     x, y = pixel_centers(size)
@@ -51,7 +47,8 @@ def singular_field(degree, size=SIZE):
     ("kernel", "degree"), [("box", 1), ("box", 2), ("taper", 1), ("taper", 2), ("ramp", 1)]
 )
 def test_averages_match_brute_force_if_noise_is_constant_across_streamlines(kernel, degree):
-    field, look = uniform_field(0.0, degree), replace(LOOK, **KERNELS[kernel])
+    field = planar_pixel_field(np.zeros((SIZE, SIZE)), degree)
+    look = replace(LOOK, **KERNELS[kernel])
     noise = np.tile(make_noise(field)[:SIZE], (SIZE, 1))
     actual, expected = fast_images(field, look, noise), brute_force_images(field, look, noise)
     np.testing.assert_allclose(actual.effective_samples, expected.effective_samples, rtol=1e-6)

@@ -25,7 +25,7 @@ from shapes import plane
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.even_lines import EvenLines
 from rosy_addon.compositor.family_hues import line_families
-from rosy_addon.compositor.hatching import line_ink_indices, line_shares
+from rosy_addon.compositor.hatching import HatchedLines, line_ink_indices, line_shares
 from rosy_addon.compositor.inks import LUMINANCE_WEIGHTS, inks_of
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import pixel_look
@@ -99,7 +99,7 @@ def test_shares_of_families_sum_to_one_and_are_continuous(degree, layers):
     look = Look(ink="hatch", layers=layers, guiding_angle=0.3)
     for tone in (0.02, 0.3, 0.7, 0.98):
         transmittance = np.full((1, angles.size), tone, dtype=np.float32)
-        shares = np.array(line_shares(field, pixel_look(look), transmittance))
+        shares = np.array(line_shares(field, HatchedLines(pixel_look(look)), transmittance))
         np.testing.assert_allclose(shares.sum(axis=0), 1, atol=1e-5)
         # Members jump where two are equally near the guiding angle, but the sorted shares do not.
         assert np.abs(np.diff(np.sort(shares, axis=0), axis=1)).max() < 0.03
@@ -117,7 +117,7 @@ def test_crowded_even_lines_are_drawn_last():
     period = np.array([[5.0, 1.5, 1.5], [5.0, 5.0, 1.5]], dtype=np.float32)
     lines = EvenLines(np.zeros((2, 3), dtype=np.float32), period, None)
     tone = np.full((1, 3), 0.9, dtype=np.float32)
-    first, second = line_shares(field, pixel_look(look), tone, lines)
+    first, second = line_shares(field, HatchedLines(pixel_look(look), even_lines=lines), tone)
     np.testing.assert_allclose(first + second, 1, atol=1e-6)
     assert first[0] > 0.95 and second[1] > 0.95 and abs(first[2] - first[0]) < 1e-6
 

@@ -11,7 +11,7 @@ from harness.streaks import correlation, orientation_spectrum, peaks, persistenc
 from planar_fields import KERNELS, pair_angle, pixel_centers, swirl_angle
 
 from rosy_addon.compositor.contrast import blend_gain, expected_std
-from rosy_addon.compositor.image_noise import image_noise
+from rosy_addon.compositor.image_noise import NoiseSettings, image_noise
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import pixel_look
 
@@ -35,7 +35,8 @@ def tone(angles, degree, look=PLAIN, **more):
 
 
 def make_noise(size, line_width=1.5, seed=0):
-    return image_noise(np.arange(size * size, dtype=np.int32), size, line_width, seed, 1)[:, 0]
+    pixel = np.arange(size * size, dtype=np.int32)
+    return image_noise(pixel, size, NoiseSettings(line_width, seed))[:, 0]
 
 
 def kernel_window(length, kernel):
@@ -56,10 +57,6 @@ def runge_kutta_lic(angle, noise, size, length, kernel):
     def inside(p):
         return (p.real >= 0) & (p.real < size) & (p.imag >= 0) & (p.imag < size)
 
-    def look_up(p):
-        column = np.clip(p.real.astype(int), 0, size - 1)
-        return noise[np.clip(p.imag.astype(int), 0, size - 1), column]
-
     total, count = noise.copy(), np.ones_like(noise)
     for sign in (1, -1):
         p, alive = start.copy(), np.ones(start.shape, dtype=bool)
@@ -70,7 +67,8 @@ def runge_kutta_lic(angle, noise, size, length, kernel):
             k3 = direction(p + h / 2 * k2)
             p = p + h / 6 * (k1 + 2 * k2 + 2 * k3 + direction(p + h * k3))
             alive &= inside(p)
-            total += weight * np.where(alive, look_up(p), 0)
+            row, column = (np.clip(part.astype(int), 0, size - 1) for part in (p.imag, p.real))
+            total += weight * np.where(alive, noise[row, column], 0)
             count += weight * alive
     return total / count
 

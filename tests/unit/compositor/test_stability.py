@@ -19,6 +19,7 @@ from hatched import (
 from scipy.ndimage import map_coordinates
 from shapes import placed, rebuilt
 
+from rosy_addon.compositor.image_noise import NoiseSettings
 from rosy_addon.compositor.surface_noise import instance_hashes, surface_noise
 from rosy_addon.core.color import to_display
 from rosy_addon.projection.project import project
@@ -124,7 +125,7 @@ def test_rest_coordinates_match_the_rest_shape():
 @pytest.mark.parametrize("distance", [3.0, 4.7, 11.0])
 def test_statistics_of_surface_noise(high_pass, distance):
     gbuffer = project([make_instance(tube())], make_camera(distance=distance, zoom=distance / 4))
-    noise = surface_noise(gbuffer, 2.0, 0, 3, density=0.3, high_pass=high_pass)
+    noise = surface_noise(gbuffer, NoiseSettings(2.0, 0, 3, 0.3, high_pass))
     assert np.abs(noise.mean(axis=0) - 0.5).max() < 0.02 and 0.3 < noise.std() < 0.5
     channels = np.corrcoef(noise.T)
     assert np.abs(channels[np.triu_indices(3, 1)]).max() < 0.03
@@ -138,7 +139,7 @@ def test_noise_of_a_mesh_far_from_its_origin_is_as_fine(offset):
     for moved_by in (0.0, offset):
         far = rebuilt(surface, points + moved_by)
         gbuffer = project([make_instance(far, matrix=placed(shift=-moved_by))], camera)
-        noises.append(surface_noise(gbuffer, 2.0, 0, 1, density=0.3, high_pass=0.0))
+        noises.append(surface_noise(gbuffer, NoiseSettings(2.0, 0, density=0.3)))
     assert np.corrcoef(noises[0].T, noises[1].T)[0, 1] > 0.99
 
 

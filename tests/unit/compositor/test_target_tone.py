@@ -279,12 +279,12 @@ def test_instances_without_a_field_cast_shadows():
     sun = light_at(camera, "sun", (0, 0.01, 1))
     bare, both = project([ground], camera), project([ground, ball], camera)
     shadows = replace(look, shadows=True)
-    assert diffuse(bare, shadows, [sun]).min() > 0.9
-    assert 0.01 < (diffuse(both, shadows, [sun])[:, 0] < 0.1).mean() < 0.2
-    assert diffuse(both, look, [sun]).min() > 0.9
+    assert target_tone(bare, shadows, [sun]).min() > 0.9
+    assert 0.01 < (target_tone(both, shadows, [sun])[:, 0] < 0.1).mean() < 0.2
+    assert target_tone(both, look, [sun]).min() > 0.9
 
 
 def test_the_headlight_casts_no_shadows():
     gbuffer = project([make_instance(BALL)], make_camera(64))
-    tones = (diffuse(gbuffer, Look(shadows=shadows)) for shadows in (True, False))
+    tones = (target_tone(gbuffer, Look(shadows=shadows)) for shadows in (True, False))
     np.testing.assert_array_equal(*tones)

@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter
 
 from rosy_addon.compositor.fast_lic import fast_lic
 from rosy_addon.compositor.hatching import HatchedLines, render_hatching
-from rosy_addon.compositor.image_noise import image_noise
+from rosy_addon.compositor.image_noise import NoiseSettings, image_noise
 from rosy_addon.compositor.lic import look_noise
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import pixel_look
@@ -75,7 +75,7 @@ def test_statistics_of_paper_grain(line_width):
     assert abs(np.corrcoef(first_grain.ravel(), second_grain.ravel())[0, 1]) < 0.03
     assert abs(first_grain.mean()) < 0.02 and first_grain.std() == pytest.approx(1, abs=0.03)
     assert gaussian_filter(first_grain, 16).std() < 0.12
-    streaks = image_noise(pixel, side, line_width, 0, 1)
+    streaks = image_noise(pixel, side, NoiseSettings(line_width, 0))
     assert abs(np.corrcoef(first_grain.ravel(), streaks[:, 0])[0, 1]) < 0.02
 
 

@@ -23,10 +23,11 @@ from rosy_addon.compositor.pixel_field import surface_pixel_field
 from rosy_addon.field.generate import axis_field
 from rosy_addon.gpu import mesh_buffers
 from rosy_addon.gpu.frame import is_empty, screen_box, union_box
-from rosy_addon.gpu.mesh_buffers import ROW_TEXELS, field_channels, field_kinds, split_matrix
+from rosy_addon.gpu.mesh_buffers import ROW_TEXELS, field_kinds, split_matrix
 from rosy_addon.gpu.mesh_buffers import mesh_buffers as build_mesh_buffers
 from rosy_addon.gpu.resources import DrawItem, GpuMesh
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
+from rosy_addon.projection.face_values import relative_channels
 
 ANGLES = st.floats(-3.2, 3.2)
 DISTORTIONS = [None, SHEAR, MIRROR, np.diag([1.0, 1.0, 2.0]), np.diag([1.0, 1.0, 0])]
@@ -75,7 +76,7 @@ def records_of(buffers, texels):
 def test_records_hold_the_values_of_numpy_at_the_corners(surface, degree, display):
     field = axis_field(surface, degree, AXIS)
     assume(np.abs(surface.vertices[:-1]).max() < 1e7)
-    buffers = build_mesh_buffers(surface, np.eye(3), field, display)
+    buffers = build_mesh_buffers(shown(surface, field), display)
     count = len(surface.triangles)
     corners = buffers.corners.reshape(count, 3, 4)
     np.testing.assert_array_equal(corners[..., 3], np.arange(count)[:, None] + np.zeros(3))
@@ -109,21 +110,21 @@ def test_channels_are_in_their_layers():
     field = perturbed_field(surface, 3, (1.0, 1.3, 0.8))
     (kind,) = field_kinds([field]).values()
     assert kind.channels == (("deviation", -1), ("deviation", 0), ("deviation", 1), ("family", 3))
-    buffers = build_mesh_buffers(surface, np.eye(3), field, "smooth", kind.channels)
+    buffers = build_mesh_buffers(shown(surface, field), "smooth", kind.channels)
     assert buffers.channel_count == 4
     records = records_of(buffers, 10 + 2 * 4)
     np.testing.assert_array_equal(records[0, 8:17:2, 2], [3, 1, 0, -1, 1])
     np.testing.assert_array_equal(records[0, 8:17:2, 3], [0, 0, 1, 2, 3])
     # A RoSy with the same channels has the constant harmonic 1, and no families.
     rosy = axis_field(surface, 3)
-    records = records_of(build_mesh_buffers(surface, np.eye(3), rosy, "smooth", kind.channels), 18)
+    records = records_of(build_mesh_buffers(shown(surface, rosy), "smooth", kind.channels), 18)
     for texel, value in ((9, 0), (11, 1), (15, 0)):
         assert (records[:, texel] == [value, 0, value, 0]).all()
 
 
 def test_records_that_are_written_in_blocks(monkeypatch):
     surface = icosphere(1)
-    arguments = surface, np.eye(3), smooth_field(surface, 4), "smooth"
+    arguments = shown(surface, smooth_field(surface, 4)), "smooth"
     at_once = build_mesh_buffers(*arguments)
     monkeypatch.setattr(mesh_buffers, "RECORDS_PER_BLOCK", 7)
     assert np.array_equal(build_mesh_buffers(*arguments).triangle_records, at_once.triangle_records)
@@ -132,9 +133,9 @@ def test_records_that_are_written_in_blocks(monkeypatch):
 def test_only_meshes_with_a_field_have_records_and_a_limit(error_of, monkeypatch):
     monkeypatch.setattr(mesh_buffers, "MAX_TRIANGLES", 79)
     surface = icosphere(1)
-    buffers = build_mesh_buffers(surface, np.eye(3), None, "smooth")
+    buffers = build_mesh_buffers(shown(surface), "smooth")
     assert buffers.triangle_records is None and buffers.texels_per_record == 0
-    message = error_of(build_mesh_buffers, surface, np.eye(3), axis_field(surface, 2), "smooth")
+    message = error_of(build_mesh_buffers, shown(surface, axis_field(surface, 2)), "smooth")
     assert "sphere" in message and "80" in message
 
 
@@ -151,7 +152,7 @@ def test_kinds_agree_with_the_pixel_field_of_numpy(name):
     (kind,) = field_kinds([field]).values()
     assert kind.line_count == pixel_field.line_count
     assert kind.symmetry.sheets_per_turn == pixel_field.symmetry.sheets_per_turn
-    assert set(pixel_field.channels) == set(field_channels(field)) <= set(kind.channels)
+    assert set(pixel_field.channels) == set(relative_channels(field)) <= set(kind.channels)
     orders = kind.harmonic_orders
     assert not orders or orders == list(range(orders[0], orders[-1] + 1))
 
@@ -168,7 +169,7 @@ def test_kinds_of_several_fields():
 
 
 def box_of(surface, shift, camera):
-    buffers = build_mesh_buffers(surface, np.eye(3), None, "smooth")
+    buffers = build_mesh_buffers(shown(surface), "smooth")
     instance = shown(surface, shift=shift)
     model_matrix = instance.matrix @ mesh_buffers.translation_matrix(buffers.center)
     mesh = GpuMesh(buffers, None, None, None, instance)

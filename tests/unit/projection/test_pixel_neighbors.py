@@ -18,15 +18,12 @@ pytestmark = pytest.mark.filterwarnings("error")
 OFFSETS = [(dx, dy) for dy in (-1, 0, 1) for dx in (-1, 0, 1)]
 
 
-def constant_field(surface):
-    return RosyField(4, np.tile([1.0, 0.3, 0.2], (surface.face_count, 1)))
-
-
 def project_surfaces(surfaces, camera, shifts=None):
     shifts = np.zeros((len(surfaces), 3)) if shifts is None else shifts
     instances = []
     for surface, shift in zip(surfaces, shifts, strict=True):
-        instances.append(MeshInstance(surface, moved(*shift), constant_field(surface)))
+        field = RosyField(4, np.tile([1.0, 0.3, 0.2], (surface.face_count, 1)))
+        instances.append(MeshInstance(surface, moved(*shift), field))
     return project(instances, camera)
 
 

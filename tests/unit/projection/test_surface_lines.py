@@ -23,6 +23,7 @@ from rosy_addon.core.cache import Cache
 from rosy_addon.field.directional_field import field_from_directions
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.surface import Surface
+from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.surface_lines import cached_surface_lines, rest_matrix, surface_lines
 
 #: Part of the surface on which distances between lines differ by at most `TOLERANCE`, where no line
@@ -236,7 +237,7 @@ def test_deformations_and_rotations_keep_the_lines():
     cache = Cache()
 
     def cached(surface, matrix):
-        return cached_surface_lines(surface, matrix, field, "smooth", 0.05, cache)
+        return cached_surface_lines(MeshInstance(surface, matrix, field), "smooth", 0.05, cache)
 
     def deformed(amount):
         return rebuilt(surface, surface.vertices * (1, 1, amount), rest_vertices=surface.vertices)

@@ -15,6 +15,7 @@ from ..core.progress import progress, report
 from .conjugate_gradient import conjugate_gradient
 from .connection import laplacian
 from .creases import weighted_median
+from .curvature import outer_sides
 from .feature_curvature import NoisyCurvature, noisy_curvature, of_unit_extent
 from .frames import dot, normalize
 from .guided_system import GuidedSystem, guided_field
@@ -150,6 +151,8 @@ def _curvature_guides(measured: NoisyCurvature, degree: int) -> tuple[np.ndarray
     confidence = modulus / curvature * (signal / np.maximum(signal + power, 1e-300))
     confidence = np.clip((confidence - MIN_CONFIDENCE) / (1 - MIN_CONFIDENCE), 0.0, 1.0)
     face_z = averages.face_means(confidence * unit_complex(z), 2)
+    if degree % 4:
+        face_z *= outer_sides(averages.surface, measured.mean)
     z = unit_complex(face_z) ** (degree // 2)
     return from_representation(z, averages.x, averages.y, degree), np.abs(face_z)
 

@@ -51,9 +51,9 @@ REACH = 0.04
 #: all meshes that were tried, and up to 100 with 0.05.
 EDGE_REACH = 0.2
 
-#: Relative norm of the residual at which the solver for the field stops. The directions that the field
-#: follows are not more exact than that.
-FIELD_TOLERANCE = 1e-4
+#: Relative norm of the residual at which the solver for the field stops. With 1e-4, the numbering of a mesh changes
+#: directions near singularities by up to 0.5 degrees, with 1e-6 by 0.005, in 3 % more time.
+FIELD_TOLERANCE = 1e-6
 
 
 def form(surface: Surface, degree: int) -> RosyField:

@@ -7,6 +7,7 @@ import heapq
 import numpy as np
 
 from .blocks import mask
+from .connectivity import build_edges
 from .frames import dot
 
 #: Largest sine of the turning angle at a flat corner. Reflex corners have negative sines.
@@ -100,8 +101,7 @@ def delaunay_triangles(
         rank = np.argsort(np.argsort(-gain, kind="stable"))
         best = np.full(len(active), len(gain))
         np.minimum.at(best, pairs.ravel(), np.repeat(rank, 2))
-        chosen = (gain > EQUAL_COTANGENTS) & (rank == best[pairs].min(axis=1))
-        chosen &= rank == best[pairs].max(axis=1)
+        chosen = (gain > EQUAL_COTANGENTS) & (best[pairs] == rank[:, None]).all(axis=1)
         if not chosen.any():
             break
         first, second = active[pairs[chosen].T]
@@ -120,17 +120,12 @@ def _diagonals(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     quads : (n, 4) int32 ndarray
         The four corners of both, counter-clockwise. The first and the third one are shared.
     """
-    tail = triangles.ravel()
-    head, opposite = np.roll(triangles, -1, axis=1).ravel(), np.roll(triangles, 1, axis=1).ravel()
-    stride = int(tail.max(initial=0)) + 1
-    key, reverse = tail.astype(np.int64) * stride + head, head.astype(np.int64) * stride + tail
-    order = np.argsort(key)
-    place = np.minimum(np.searchsorted(key, reverse, sorter=order), max(len(key) - 1, 0))
-    twin = order[place]
-    one = np.flatnonzero((key[twin] == reverse) & (tail < head))
-    two = twin[one]
-    quads = np.stack([tail[one], opposite[two], head[one], opposite[one]], axis=1)
-    return np.stack([one, two], axis=1) // 3, quads
+    corner = triangles.ravel()
+    halfedges = build_edges(corner, np.arange(0, len(corner) + 1, 3)).halfedges
+    opposite = corner[halfedges - halfedges % 3 + (halfedges + 2) % 3]
+    tail = corner[halfedges]
+    quads = np.stack([tail[:, 0], opposite[:, 1], tail[:, 1], opposite[:, 0]], axis=1)
+    return halfedges // 3, quads
 
 
 def _gain_of_flips(corners: np.ndarray) -> np.ndarray:
@@ -138,10 +133,8 @@ def _gain_of_flips(corners: np.ndarray) -> np.ndarray:
 
     `corners` is (n, 4, 3), as in `_diagonals`. The result is 0 where the other diagonal lies outside.
     """
-    following, previous = (
-        np.roll(corners, -1, axis=1) - corners,
-        np.roll(corners, 1, axis=1) - corners,
-    )
+    following = np.roll(corners, -1, axis=1) - corners
+    previous = -np.roll(following, 1, axis=1)
     cross = np.cross(following, previous)
     double_area = np.sqrt(dot(cross, cross))
     cotangent = dot(following, previous) / np.maximum(double_area, 1e-300)

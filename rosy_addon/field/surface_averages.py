@@ -57,14 +57,15 @@ class SurfaceAverages:
             for corner in range(3):
                 edge = points[(corner + 1) % 3] - points[corner]
                 angle[block, corner] = np.arctan2(dot(edge, y), dot(edge, x))
-        angle = angle.ravel()
-        angle += 0.5 * self.connection.corner_angle
-        angle -= self.connection.bisector_direction
+        first, angle, span = angle, angle.ravel(), self.connection.corner_angle
         if len(surface.triangles) == surface.face_count:
-            return angle
+            return angle + 0.5 * span - self.connection.bisector_direction
+        # On a face that is not planar, the two edges of a corner span another angle in the frame.
+        last = np.roll(first, 1, axis=1).ravel() + np.pi
+        angle = angle + 0.5 * span + 0.5 * np.angle(np.exp(1j * (last - angle - span)))
+        angle -= self.connection.bisector_direction
         # If triangles share a corner of a face, take the mean of their angles, weighted by the angles that they span.
-        corner, span = surface.triangles.ravel(), self.connection.corner_angle
-        reference = np.empty(len(surface.corner_vertex))
+        corner, reference = surface.triangles.ravel(), np.empty(len(surface.corner_vertex))
         reference[corner] = angle
         turn = np.angle(np.exp(1j * (angle - reference[corner])))
         total = np.maximum(np.bincount(corner, span), 1e-300)

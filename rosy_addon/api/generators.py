@@ -91,7 +91,7 @@ def curvature(surface: Surface, degree: int = 4, *, reach: float = 0.0) -> Field
         N, an even number.
     reach : float
         Distance over which clear directions extend into parts of the surface without clear directions, as a
-        fraction of the longest side of the mesh. At 0, each face has its own directions.
+        fraction of the size of the mesh (the diameter of a ball). At 0, each face has its own directions.
 
     Raises
     ------
@@ -176,7 +176,7 @@ def guided(
     uv : bool
         Whether the field also follows the axes of the UV map of the surface.
     reach : float
-        Distance over which guides are smoothed, as a fraction of the longest side of the mesh. At 0,
+        Distance over which guides are smoothed, as a fraction of the size of the mesh. At 0,
         the field meets them exactly.
     vectors_have_firmness : bool
         If true, the lengths of `vectors`, from 0 to 1, say how firmly the field follows them, as for guides
@@ -264,7 +264,7 @@ def prescribed(
         guides, it is aligned with the edges of the faces.
     reach : float
         If it is above 0, the field also bends toward the guides. Their influence falls off over this
-        distance, which is a fraction of the longest side of the mesh.
+        distance, which is a fraction of the size of the mesh.
     add_missing : bool
         Whether to add singularities until the sum of the indices is N times the Euler characteristic, at
         vertices where the field stays smoothest.

@@ -57,8 +57,11 @@ class Connection:
         Interior angle of the triangle at each corner, in radians.
     area : (T,) float64 ndarray
         Areas of the triangles.
+    corner_area : (3 T,) float64 ndarray
+        Shares of the areas of the faces. All corners of a face have the same share, whatever its triangles are: a third
+        of the area of a triangle. If triangles have a corner in common, each has a part of it.
     mass : (n,) float64 ndarray
-        Lumped masses: a third of the area of the triangles around each node.
+        Lumped masses: the shares of the areas around each node.
     tail, head : (E,) int32 ndarray
         Nodes at the two ends of each edge.
     transport_angle : (E,) float64 ndarray
@@ -73,6 +76,7 @@ class Connection:
     bisector_direction: np.ndarray
     corner_angle: np.ndarray
     area: np.ndarray
+    corner_area: np.ndarray
     mass: np.ndarray
     tail: np.ndarray
     head: np.ndarray
@@ -128,6 +132,7 @@ def build_connection(surface: Surface) -> Connection:
     reverse_direction = np.where(has_twin, edge_direction[twin_of_tail], border_direction)
     opposite = np.where(has_twin, cotangent[previous_corner[twin_of_tail]], 0)
     weight = 0.5 * (cotangent[previous_corner[tail_corner]] + opposite)
+    corner_area = _corner_areas(surface, area)
     return Connection(
         corner_node=corner_node,
         node_count=node_count,
@@ -135,7 +140,8 @@ def build_connection(surface: Surface) -> Connection:
         bisector_direction=bisector_direction,
         corner_angle=corner_angle,
         area=area,
-        mass=np.bincount(corner_node, np.repeat(area / 3, 3), node_count),
+        corner_area=corner_area,
+        mass=np.bincount(corner_node, corner_area, node_count),
         tail=corner_node[tail_corner],
         head=corner_node[head_corner],
         transport_angle=edge_direction[tail_corner] - reverse_direction - np.pi,
@@ -170,6 +176,16 @@ def laplacian(connection: Connection, degree: int, shift: float = 0.0) -> CSRMat
     diagonal[diagonal <= 0] = max(float(diagonal.mean()), 1.0)
     off_diagonal = -weight * np.exp(1j * degree * c.transport_angle)
     return from_edges(c.tail, c.head, off_diagonal, diagonal)
+
+
+def _corner_areas(surface: Surface, area: np.ndarray) -> np.ndarray:
+    """Return (3 T,) shares of the areas of faces at the corners of triangles, given the (T,) areas of triangles."""
+    face = surface.triangle_face
+    if len(face) == surface.face_count:
+        return np.repeat(area / 3, 3)
+    share = np.bincount(face, area, surface.face_count) / np.diff(surface.face_start)
+    corner = surface.triangles.ravel()
+    return np.repeat(share[face], 3) / np.bincount(corner)[corner]
 
 
 def _corner_geometry(

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..core.errors import RosyError
 from ..core.progress import report
-from .connectivity import smooth_fans
+from .connectivity import connected_components, smooth_fans
 from .corner_fans import corner_angles, corner_rotations, smooth_face_values
 from .frames import dot
 from .polygon_arrays import fan_normals, sum_per_face
@@ -23,6 +23,10 @@ MAGNITUDES = {
     "confidence": "How well the principal directions are defined, from 0 to 1",
     "curvature": "The larger principal curvature, in 1 / unit of the mesh: 2 on a ball of radius 0.5",
 }
+
+#: Confidence below which a principal direction is a rounding error: of `face_curvature`, and of coordinates in single
+#: precision.
+LEAST_CONFIDENCE = 1e-6
 
 #: Number of rounds of averaging over vertices, which reduces the effect of mesh noise on curvature fields.
 CURVATURE_SMOOTHING_ROUNDS = 2
@@ -69,8 +73,9 @@ def with_smooth_normals(surface: Surface, corner_fan: np.ndarray | None = None) 
 def curvature_field(surface: Surface, degree: int) -> RosyField:
     """Compute a field along the principal directions of curvature.
 
-    Degree 2 follows the direction of the greater signed curvature (positive where the surface is
-    convex). Degree 4 follows both principal directions. In fields of other even degrees, one member
+    Degree 2 follows the direction of the greater signed curvature, which is positive where the surface is convex. The
+    side on which most of a connected component is convex counts as the outside, so that reversed faces have the same
+    field. Degree 4 follows both principal directions. In fields of other even degrees, one member
     follows the direction of degree 2. Principal directions have no sign, so odd degrees are not
     possible.
 
@@ -102,6 +107,8 @@ def curvature_field(surface: Surface, degree: int) -> RosyField:
     smooth_surface = with_smooth_normals(surface)
     x, y = smooth_surface.face_frames
     mean, deviator = face_curvature(smooth_surface, x, y)
+    if degree % 4:
+        deviator = deviator * outer_sides(surface, mean)
     report(0.6, label)
     deviator_norm = np.abs(deviator)
     offset = smooth_surface.face_center - smooth_surface.face_center.mean(axis=0)
@@ -109,7 +116,7 @@ def curvature_field(surface: Surface, degree: int) -> RosyField:
     # |k1 - k2| = 2 |d|; |k1| + |k2| is the larger of 2 |H| and 2 |d|.
     larger = np.maximum(np.abs(mean), deviator_norm)
     confidence = deviator_norm / (larger + 0.01 / max(radius, 1e-30))
-    is_curved = deviator_norm > TINY
+    is_curved = confidence > LEAST_CONFIDENCE
     phase = np.divide(deviator, deviator_norm, out=np.zeros_like(deviator), where=is_curved)
     z = confidence * phase ** (degree // 2)
     rotation = corner_rotations(smooth_surface, smooth_surface.corner_normal)
@@ -117,8 +124,22 @@ def curvature_field(surface: Surface, degree: int) -> RosyField:
     for index in range(CURVATURE_SMOOTHING_ROUNDS):
         report(0.7 + 0.1 * index, label)
         z = smooth_face_values(smooth_surface, z, rotation, degree, weights)
+    z[np.abs(z) < LEAST_CONFIDENCE] = 0
     report(0.95, label)
     return RosyField(degree, from_representation(z, x, y, degree))
+
+
+def outer_sides(surface: Surface, mean: np.ndarray) -> np.ndarray:
+    """Return (F,) float64: 1 on components that are mostly convex, -1 on those that are mostly concave.
+
+    Curvature changes its sign if all faces are reversed; curvature times this sign does not. `mean` holds the (F,) mean
+    curvatures. The sign is 1 if both parts are equal, as on a saddle or a wave.
+    """
+    faces = surface.corner_face[surface.edges.halfedges]
+    component = connected_components(surface.face_count, faces)
+    total = np.bincount(component, surface.face_area * mean)
+    least = LEAST_CONFIDENCE * np.bincount(component, surface.face_area * np.abs(mean))
+    return np.where(total < -least, -1.0, 1.0)[component]
 
 
 def face_curvature(surface: Surface, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -22,8 +22,9 @@ SCALE = 0.01
 #: Ratio of curvature to the curvature of noise below which a part of the surface has no feature.
 MIN_NOISE_RATIO = 2.0
 
-#: Seed of the random numbers for the noise sample.
-SEED = 777
+#: The noise at a vertex is a function of its distance from the center of area, relative to the mean distance. It varies
+#: about a million times between 0 and 1, so that it is independent at neighboring vertices.
+NOISE_RATE = 1e6
 
 #: Displacement at which the effect of noise on the normals is measured, relative to the square root
 #: of the mean face area. It must be small.
@@ -108,7 +109,8 @@ def _bounded_curvature(
 def noise_sample(surface: Surface, noise_angle: float) -> np.ndarray:
     """Return random displacements of the vertices along their normals, as strong as the noise of the mesh.
 
-    The noise is white. Its amplitude is estimated in two ways, by comparing the mesh with a mesh that has
+    The noise is white. It does not depend on the position, the scale and the numbering of the mesh, and is the same at
+    vertices that are images of each other under a symmetry. Its amplitude is estimated in two ways, by comparing the mesh with a mesh that has
     white noise of unit amplitude: from the angle by which noise rotates the face normals, and from the
     difference of vertices from the mean of their neighbors. The form of the surface increases the first
     estimate on coarse meshes, and the second one at creases. So the smaller estimate is used.
@@ -126,7 +128,13 @@ def noise_sample(surface: Surface, noise_angle: float) -> np.ndarray:
     """
     count = len(surface.vertices)
     normal = normalize(bincount_rows(surface.corner_vertex, surface.corner_normal, count))
-    sample = np.random.default_rng(SEED).standard_normal(count)[:, None] * normal
+    center = np.average(surface.face_center, axis=0, weights=surface.face_area)
+    distance = np.linalg.norm(surface.vertices - center, axis=1)
+    place = NOISE_RATE * distance / max(float(distance[surface.used_vertices].mean()), 1e-300) % 1
+    # Uniform from -1 to 1, times the square root of 3: the variance is 1. Displacements are outward, also if all faces
+    # are reversed.
+    volume = surface.face_area @ dot(surface.face_center - center, surface.face_normal)
+    sample = np.copysign(np.sqrt(3), volume) * (2 * place - 1)[:, None] * normal
     faces = surface.corner_vertex, surface.face_start
     vectors = face_area_vectors(surface.vertices, *faces)
     area = np.sqrt(dot(vectors, vectors))

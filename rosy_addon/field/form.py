@@ -15,6 +15,7 @@ from ..core.progress import progress, report
 from .conjugate_gradient import conjugate_gradient
 from .connection import laplacian
 from .creases import weighted_median
+from .curvature import outer_sides
 from .edge_guides import coherent_edge_guides
 from .feature_curvature import NoisyCurvature, noisy_curvature, of_unit_extent
 from .frames import dot, normalize
@@ -50,9 +51,9 @@ REACH = 0.04
 #: all meshes that were tried, and up to 100 with 0.05.
 EDGE_REACH = 0.2
 
-#: Relative norm of the residual at which the solver for the field stops. The directions that the field
-#: follows are not more exact than that.
-FIELD_TOLERANCE = 1e-4
+#: Relative norm of the residual at which the solver for the field stops. With 1e-4, the numbering of a mesh changes
+#: directions near singularities by up to 0.5 degrees, with 1e-6 by 0.005, in 3 % more time.
+FIELD_TOLERANCE = 1e-6
 
 
 def form(surface: Surface, degree: int) -> RosyField:
@@ -150,6 +151,8 @@ def _curvature_guides(measured: NoisyCurvature, degree: int) -> tuple[np.ndarray
     confidence = modulus / curvature * (signal / np.maximum(signal + power, 1e-300))
     confidence = np.clip((confidence - MIN_CONFIDENCE) / (1 - MIN_CONFIDENCE), 0.0, 1.0)
     face_z = averages.face_means(confidence * unit_complex(z), 2)
+    if degree % 4:
+        face_z *= outer_sides(averages.surface, measured.mean)
     z = unit_complex(face_z) ** (degree // 2)
     return from_representation(z, averages.x, averages.y, degree), np.abs(face_z)
 

@@ -6,8 +6,12 @@ of lines. On each connected component, the first criterion that prefers a rotati
 1. the principal directions of curvature (even degrees),
 2. creases and borders,
 3. the directions away from the center of the component,
-4. the principal directions, for twice an odd degree; then the field or its opposite, whichever is nearer to 3,
-5. the edges of the mesh, which depend on how it is divided into faces.
+4. the principal directions, for twice an odd degree,
+5. the edges of the mesh, which depend on how it is divided into faces,
+6. the edges for multiples of the degree. On solids such as a cube, the other criteria prefer nothing by symmetry.
+
+Criteria 4 and 6 leave several rotations. The one is taken that is nearest to 3. If there is none, they are images of
+each other under the symmetries of the surface, and which of them is taken depends on rounding errors.
 """
 
 from __future__ import annotations
@@ -33,6 +37,10 @@ LEAST_STRENGTH = 1e-3
 
 #: Curvature below which a surface counts as flat, relative to that of a sphere of the same area.
 FLAT_CURVATURE = 0.02
+
+#: Largest multiple of the degree for criterion 6. It has the order of the symmetries of a cube, or of a tetrahedron, as a
+#: factor, for all degrees.
+MAX_MULTIPLE = 12
 
 #: Smallest angle between the faces of a crease, in radians: the angle of sharp edges of *Features*.
 CREASE_ANGLE = np.pi / 6
@@ -66,13 +74,15 @@ def freely_rotated(surface: Surface, z: np.ndarray, degree: int) -> np.ndarray:
         rotation = np.where(rotation == 0, found, rotation)
         if rotation.all():
             return z * rotation[component]
-    if degree % 2:
-        root = np.sqrt(unit_complex(sums(_curvature(surface, 2 * degree, area[component]), z * z)))
-        away = complex_bincount(component, wanted * z.conj(), len(area)) * root.conj()
-        rotation = np.where(rotation == 0, np.where(away.real < 0, -root, root), rotation)
-    edges = complex_bincount(component, _along_edges(surface, degree) * z.conj(), len(area))
-    rotation = np.where(rotation == 0, unit_complex(edges, otherwise=1), rotation)
-    return z * rotation[component]
+    away = np.angle(complex_bincount(component, wanted * z.conj(), len(area)))
+    for multiple, wanted in _criteria_of_multiples(surface, degree, area[component]):
+        total, turn = sums(wanted, power(z, multiple)), 2 * np.pi / multiple
+        angle = np.angle(total) / multiple
+        angle += turn * np.rint((away - angle) / turn)
+        rotation = np.where((rotation == 0) & (total != 0), np.exp(1j * angle), rotation)
+        if rotation.all():
+            break
+    return z * np.where(rotation == 0, 1, rotation)[component]
 
 
 def _criteria(
@@ -96,6 +106,19 @@ def _criteria(
     away = dot(offset, x) + 1j * dot(offset, y)
     distance = np.abs(away) / np.sqrt(scale)[component]
     yield surface.face_area * distance * power(unit_complex(away), degree)
+
+
+def _criteria_of_multiples(
+    surface: Surface, degree: int, area: np.ndarray
+) -> Iterator[tuple[int, np.ndarray]]:
+    """Yield the multiples k of the degree of criteria 4 to 6, with their (F,) representations of degree k N.
+
+    `area` is that of the component of each face.
+    """
+    if degree % 2:
+        yield 2, _curvature(surface, 2 * degree, area)
+    for multiple in range(1, MAX_MULTIPLE + 1):
+        yield multiple, _along_edges(surface, multiple * degree)
 
 
 def _curvature(surface: Surface, degree: int, area: np.ndarray) -> np.ndarray:

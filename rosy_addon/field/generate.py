@@ -17,6 +17,7 @@ from ..core.memory import check_memory
 from ..core.progress import progress, report
 from ..core.settings import check_settings, choice, number, numbers, settings_of, switch
 from .cheapest_singularities import cheapest_singularities
+from .creases import principal_extent
 from .curvature import TINY, curvature_field
 from .form import form
 from .frames import normalize, unit_direction
@@ -32,9 +33,9 @@ from .guides import (
 from .prescribed import prescribed_field
 from .rosy_field import RosyField, check_degree
 from .smoothest import smoothest_field
-from .surface import Surface
+from .surface import Surface, with_delaunay_triangles
 
-#: Smallest smoothing distance, relative to `Surface.extent`. Shorter distances have no effect.
+#: Smallest smoothing distance, relative to `principal_extent`. Shorter distances have no effect.
 MIN_SMOOTHING_LENGTH = 1e-6
 
 #: Names of the methods that generate fields (the *kind* of a field), with the descriptions in the interface.
@@ -186,6 +187,7 @@ def generate(surface: Surface, settings: GeneratorSettings | str, degree: int) -
         "choose a smaller mesh, or another kind of field",
     )
     report(0.0, "generating the field")
+    surface = with_delaunay_triangles(surface)
     match settings.kind:
         case "form":
             return form(surface, degree)
@@ -217,8 +219,8 @@ def _curvature(surface: Surface, settings: GeneratorSettings, degree: int) -> Ro
         field = curvature_field(surface, degree)
     if not settings.reach or not field.vectors.any():
         return field
-    # The extent is zero if all faces are points. The magnitude is then zero as well.
-    weight = (field.magnitude / max(settings.reach * surface.extent, TINY)) ** 2
+    # The size is zero if all faces are points. The magnitude is then zero as well.
+    weight = (field.magnitude / max(settings.reach * principal_extent(surface), TINY)) ** 2
     with progress(split, 1.0):
         return guided_field(surface, degree, normalize(field.vectors), weight)
 
@@ -229,7 +231,11 @@ def _prescribed(surface: Surface, settings: GeneratorSettings, degree: int) -> R
         raise RosyError(
             f"{surface.name}: no singularities are given: give their vertices and indices"
         )
-    singularities, start, reach = settings.singularities, 0.0, settings.reach * surface.extent
+    singularities, start, reach = (
+        settings.singularities,
+        0.0,
+        settings.reach * principal_extent(surface),
+    )
     if settings.add_missing:
         with progress(0.0, 0.5):
             singularities, start = cheapest_singularities(surface, degree, *singularities), 0.5
@@ -287,7 +293,7 @@ def _guided(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyF
         firmness = np.linalg.norm(settings.vectors, axis=1)
         for guide in guide_sets[:-1]:
             firmness[guide.any(axis=1)] = 1.0
-    reach = settings.reach * surface.extent
+    reach = settings.reach * principal_extent(surface)
     weight, is_exact = firmness_weights(firmness, surface.mean_edge_length, reach)
     return guided_field(surface, degree, guides, weight, is_exact)
 

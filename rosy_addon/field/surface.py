@@ -36,7 +36,7 @@ from .polygon_arrays import (
     mean_per_face,
     next_corners,
 )
-from .triangulate import triangulate
+from .triangulate import delaunay_triangles, triangulate
 from .up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 
 #: Largest coordinate and smallest extent of a mesh. Beyond them, squares and products of lengths
@@ -425,6 +425,18 @@ def build_surface(
         corner_fan=corner_fan,
         rest_vertices=rest_vertices,
     )
+
+
+def with_delaunay_triangles(surface: Surface) -> Surface:
+    """Return the surface with triangles that do not depend on the first corners of its faces; for solvers.
+
+    See `triangulate.delaunay_triangles`. Pictures use triangles that stay the same when a mesh is deformed.
+    """
+    if len(surface.triangles) == surface.face_count:
+        return surface
+    points = surface.vertices[surface.corner_vertex]
+    triangles = delaunay_triangles(points, surface.triangles, surface.triangle_face)
+    return surface.with_parts(triangles=triangles)
 
 
 def _surface_of_parts(**parts: Any) -> Surface:

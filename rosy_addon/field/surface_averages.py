@@ -46,7 +46,7 @@ class SurfaceAverages:
 
         There is one angle in radians for each corner of a triangle. Directions at the node of the corner are
         angles in polar coordinates (the polar map of `Connection`). The added angle is chosen so that the
-        bisector of the corner is the same direction in both.
+        bisector of the corner of the face is the same direction in both.
         """
         surface = self.surface
         angle = np.empty(surface.triangle_vertex.shape)
@@ -57,20 +57,29 @@ class SurfaceAverages:
             for corner in range(3):
                 edge = points[(corner + 1) % 3] - points[corner]
                 angle[block, corner] = np.arctan2(dot(edge, y), dot(edge, x))
-        angle = angle.ravel()
-        angle += 0.5 * self.connection.corner_angle
+        first, angle, span = angle, angle.ravel(), self.connection.corner_angle
+        if len(surface.triangles) == surface.face_count:
+            return angle + 0.5 * span - self.connection.bisector_direction
+        # On a face that is not planar, the two edges of a corner span another angle in the frame.
+        last = np.roll(first, 1, axis=1).ravel() + np.pi
+        angle = angle + 0.5 * span + 0.5 * np.angle(np.exp(1j * (last - angle - span)))
         angle -= self.connection.bisector_direction
-        return angle
+        # If triangles share a corner of a face, take the mean of their angles, weighted by the angles that they span.
+        corner, reference = surface.triangles.ravel(), np.empty(len(surface.corner_vertex))
+        reference[corner] = angle
+        turn = np.angle(np.exp(1j * (angle - reference[corner])))
+        total = np.maximum(np.bincount(corner, span), 1e-300)
+        return (reference + np.bincount(corner, span * turn) / total)[corner]
 
     @cached_property
     def corner_face(self) -> np.ndarray:
         """(3 T,) int32: the face of each corner of the triangles."""
         return np.repeat(self.surface.triangle_face, 3)
 
-    @cached_property
+    @property
     def corner_area(self) -> np.ndarray:
-        """(3 T,) float64: for each corner, a third of the area of its triangle."""
-        return np.repeat(self.connection.area / 3, 3)
+        """(3 T,) float64: the share of the area of its face of each corner of the triangles."""
+        return self.connection.corner_area
 
     @cached_property
     def mass(self) -> np.ndarray:
@@ -80,7 +89,7 @@ class SurfaceAverages:
     def node_sums(
         self, values: np.ndarray, degree: int, corner: np.ndarray | slice = slice(None)
     ) -> np.ndarray:
-        """Sum face values at the nodes (vertices), weighted by a third of the area of each triangle around them.
+        """Sum face values at the nodes (vertices), weighted by the shares of the areas of the faces around them.
 
         Parameters
         ----------
@@ -107,17 +116,17 @@ class SurfaceAverages:
         """Return (F,) complex128 sums of (n,) node values at the triangle corners of each face.
 
         Node values are representations of `degree`, and are converted to the frame of the face. Each is
-        weighted by the area of its triangle.
+        weighted by three times its share of the area of the face: in a triangle, the area.
         """
-        area = self.connection.area
-        weighted = np.empty((len(area), 3), dtype=np.complex128)
+        area = self.corner_area.reshape(-1, 3)
+        weighted = np.empty(area.shape, dtype=np.complex128)
         node = self.connection.corner_node.reshape(-1, 3)
         frame_angle = self.frame_angle.reshape(-1, 3)
         for block in row_blocks(len(weighted), BLOCK_TRIANGLES):
             angle = degree * frame_angle[block]
             to_face = np.cos(angle) + 1j * np.sin(angle)
             np.multiply(values.take(node[block]), to_face, out=weighted[block])
-            weighted[block] *= area[block, None]
+            weighted[block] *= 3 * area[block]
         surface = self.surface
         return complex_bincount(surface.triangle_face, weighted.sum(axis=1), surface.face_count)
 

@@ -6,6 +6,10 @@ import heapq
 
 import numpy as np
 
+from .blocks import mask
+from .connectivity import build_edges
+from .frames import dot
+
 #: Largest sine of the turning angle at a flat corner. Reflex corners have negative sines.
 COLLINEAR_SINE = 1e-6
 
@@ -14,6 +18,10 @@ CHUNK_SIZE = 512
 
 #: Number of faces whose corners are processed at once.
 FACES_PER_BLOCK = 1 << 14
+
+#: A diagonal is flipped if this makes its cotangents larger by more than this. If all corners of a face lie on a circle,
+#: the sums are 0, and differ by rounding errors.
+EQUAL_COTANGENTS = 1e-6
 
 
 def triangulate(
@@ -59,6 +67,81 @@ def triangulate(
         first = first_triangle[face]
         triangles[first : first + len(ears)] = corners[ears]
     return triangles, triangle_face
+
+
+def delaunay_triangles(
+    points: np.ndarray, triangles: np.ndarray, triangle_face: np.ndarray
+) -> np.ndarray:
+    """Return triangles with the Delaunay diagonals of their faces (Lawson 1977), whatever the first corners are.
+
+    Diagonals are flipped until the two angles opposite each of them add up to at most 180 degrees. Where all corners of a
+    face lie on a circle, as in a rectangle, several divisions are as good. Then the cotangent weights of the diagonals
+    are 0, so that a Laplacian does not depend on the choice.
+
+    Parameters
+    ----------
+    points : (C, 3) float64 ndarray
+        Position of each corner.
+    triangles : (T, 3) int32 ndarray
+        Indices of the three corners of each triangle, as `triangulate` returns them.
+    triangle_face : (T,) int32 ndarray
+        Face of each triangle.
+
+    Returns
+    -------
+    (T, 3) int32 ndarray
+        Corners of the new triangles; row t belongs to the same face as before.
+    """
+    triangles, size = triangles.copy(), np.bincount(triangle_face)
+    active = np.flatnonzero(size[triangle_face] > 1)
+    # Each round flips the best diagonal of each face, at least. Faces that are not planar may never settle.
+    for _ in range(int(size.max(initial=0)) ** 2):
+        pairs, quads = _diagonals(triangles[active])
+        gain = _gain_of_flips(points[quads])
+        rank = np.argsort(np.argsort(-gain, kind="stable"))
+        best = np.full(len(active), len(gain))
+        np.minimum.at(best, pairs.ravel(), np.repeat(rank, 2))
+        chosen = (gain > EQUAL_COTANGENTS) & (best[pairs] == rank[:, None]).all(axis=1)
+        if not chosen.any():
+            break
+        first, second = active[pairs[chosen].T]
+        triangles[first], triangles[second] = quads[chosen][:, [0, 1, 3]], quads[chosen][:, 1:]
+        active = active[mask(len(size), triangle_face[first])[triangle_face[active]]]
+    return triangles
+
+
+def _diagonals(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Find the n pairs of triangles that share two corners.
+
+    Returns
+    -------
+    pairs : (n, 2) intp ndarray
+        Rows of both triangles.
+    quads : (n, 4) int32 ndarray
+        The four corners of both, counter-clockwise. The first and the third one are shared.
+    """
+    corner = triangles.ravel()
+    halfedges = build_edges(corner, np.arange(0, len(corner) + 1, 3)).halfedges
+    opposite = corner[halfedges - halfedges % 3 + (halfedges + 2) % 3]
+    tail = corner[halfedges]
+    quads = np.stack([tail[:, 0], opposite[:, 1], tail[:, 1], opposite[:, 0]], axis=1)
+    return halfedges // 3, quads
+
+
+def _gain_of_flips(corners: np.ndarray) -> np.ndarray:
+    """Return (n,) sums of the cotangents of the angles opposite to the other diagonal, minus those of the present one.
+
+    `corners` is (n, 4, 3), as in `_diagonals`. The result is 0 where the other diagonal lies outside.
+    """
+    following = np.roll(corners, -1, axis=1) - corners
+    previous = -np.roll(following, 1, axis=1)
+    cross = np.cross(following, previous)
+    double_area = np.sqrt(dot(cross, cross))
+    cotangent = dot(following, previous) / np.maximum(double_area, 1e-300)
+    normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    is_convex = (dot(cross[:, [0, 2]], normal[:, None]) > 0).all(axis=1)
+    gain = cotangent[:, 0] + cotangent[:, 2] - cotangent[:, 1] - cotangent[:, 3]
+    return np.where(is_convex, gain, 0)
 
 
 def _triangle_fans(face_start: np.ndarray, apex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

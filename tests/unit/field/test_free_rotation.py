@@ -1,10 +1,10 @@
-"""The rotation of a smoothest field depends on the shape alone: mirror images, reversed faces, positions."""
+"""The rotation of a smoothest field depends on the shape: mirror images, symmetries, borders, curvature."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from field_helpers import angle_differences, bumpy, copies_of
+from field_helpers import angle_differences, bumpy
 from shapes import cylinder, from_triangles, icosphere, plane
 
 from rosy_addon.field.smoothest import smoothest_field
@@ -22,27 +22,11 @@ def symmetric_head():
 
 
 @pytest.mark.parametrize("degree", range(1, 7))
-def test_reversed_faces_have_the_same_lines(degree):
-    reverse = from_triangles(BALL.vertices, BALL.corner_vertex.reshape(-1, 3)[:, ::-1])
-    expected, actual = (smoothest_field(s, degree).vectors for s in (BALL, reverse))
-    assert np.degrees(angle_differences(BALL, actual, expected, degree).max()) < 0.1
-
-
-@pytest.mark.parametrize("degree", range(1, 7))
 def test_the_mirror_image_has_the_mirrored_field(degree):
     image = from_triangles(BALL.vertices @ MIRROR, BALL.corner_vertex.reshape(-1, 3)[:, ::-1])
     expected = smoothest_field(BALL, degree).vectors
     actual = smoothest_field(image, degree).vectors @ MIRROR
     assert np.degrees(angle_differences(BALL, actual, expected, degree).max()) < 0.1
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("degree", range(1, 7))
-def test_numbering_and_position_do_not_matter(degree):
-    expected = smoothest_field(BALL, degree).vectors
-    for mesh, rotation in copies_of(BALL):
-        actual = smoothest_field(mesh, degree).vectors @ rotation
-        assert np.degrees(angle_differences(BALL, actual, expected, degree).max()) < 0.1
 
 
 @pytest.mark.parametrize("degree", range(1, 7))

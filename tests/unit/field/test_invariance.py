@@ -1,0 +1,118 @@
+"""Fields do not depend on the position, the scale, the side, the numbering and the first corners of faces."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from field_helpers import angle_differences, bumpy
+from scipy.spatial.transform import Rotation
+from shapes import cube, globe, icosphere, plane, rebuilt
+
+from rosy_addon.core.errors import NoFeaturesError
+from rosy_addon.field.analysis import dirichlet_energy
+from rosy_addon.field.generate import GeneratorSettings, generate
+from rosy_addon.field.surface import build_surface, with_delaunay_triangles
+
+TURN = Rotation.from_rotvec([0.3, 1.0, -0.4]).as_matrix()
+GLOBE = rebuilt(globe(12, 20), globe(12, 20).vertices @ TURN)
+SHEET = plane(9, 7).vertices @ [[1, 0.2, 0.3], [0.1, 0.8, 0], [0, 0, 1]]
+MESHES = {
+    "triangles": bumpy(icosphere(3)),
+    "quads": bumpy(GLOBE),
+    "sheet": rebuilt(plane(9, 7), SHEET + np.outer(np.sin(2 * SHEET[:, 0] + 1), [0, 0, 0.4])),
+}
+KINDS = {
+    "form": (1, 2, 4),
+    "smoothest": range(1, 7),
+    "curvature": (2, 4, 6),
+    "features": range(1, 7),
+    "extended": (2, 4, 6),
+}
+CASES = [(kind, degree) for kind, degrees in KINDS.items() for degree in degrees]
+CHANGES = "moved", "larger", "reversed", "renumbered", "turned"
+
+
+def changed(surface, change):
+    """The same mesh after a change, and a function that takes vectors back to the first mesh."""
+    random, faces = np.random.default_rng(5), [*map(np.asarray, surface.faces)]
+    vertices, order, rotation = surface.vertices, np.arange(len(faces)), np.eye(3)
+    match change:
+        case "moved":
+            rotation = TURN
+            vertices = vertices @ rotation.T + (1, 2, 3)
+        case "larger":
+            vertices = 100 * vertices
+        case "reversed":
+            faces = [face[::-1] for face in faces]
+        case "renumbered":
+            numbers, order = random.permutation(len(vertices)), random.permutation(len(faces))
+            vertices, faces = vertices[numbers], [np.argsort(numbers)[faces[f]] for f in order]
+        case "turned":
+            faces = [np.roll(face, random.integers(len(face))) for face in faces]
+    starts = np.cumsum([0, *map(len, faces)])
+    mesh = build_surface(vertices, np.concatenate(faces), starts)
+    return mesh, lambda vectors: vectors[np.argsort(order)] @ rotation
+
+
+def made(surface, kind, degree):
+    """A generated field; "extended" is along curvature, with a reach."""
+    settings = GeneratorSettings("curvature", reach=0.05) if kind == "extended" else kind
+    return generate(surface, settings, degree)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize(("kind", "degree"), CASES)
+def test_a_field_depends_on_the_shape_alone(name, kind, degree):
+    """Along edges, a direction of odd degree has the sign of the side, so that only its line stays."""
+    surface = MESHES[name]
+    try:
+        expected = made(surface, kind, degree).vectors
+    except NoFeaturesError:
+        assert kind == "features" and name != "sheet"
+        return
+    for change in CHANGES:
+        mesh, back = changed(surface, change)
+        actual = back(made(mesh, kind, degree).vectors)
+        as_lines = kind == "features" and change == "reversed" and degree % 2
+        members = 2 * degree if as_lines else degree
+        turned = angle_differences(surface, actual, expected, members)
+        assert turned.max() < (1e-5 if kind == "smoothest" else np.radians(0.1)), change
+
+
+@pytest.mark.parametrize("degree", [2, 3, 6])
+def test_a_cube_has_one_field_but_for_its_symmetries(degree):
+    """All corners are equal, so that any field is the image of any other under one of 48 symmetries."""
+    surface = cube()
+    expected = generate(surface, "smoothest", degree)
+    mesh, back = changed(surface, "turned")
+    actual = generate(mesh, "smoothest", degree)
+    energies = [dirichlet_energy(s, f) for s, f in ((surface, expected), (mesh, actual))]
+    assert energies[0] == pytest.approx(energies[1], abs=1e-9)
+    images = Rotation.create_group("O").as_matrix()
+    center, least = surface.face_center - 0.5, []
+    for image in [*images, *-images]:
+        face = np.abs(center[:, None] @ image.T - center).max(axis=2).argmin(axis=1)
+        vectors = np.empty_like(center)
+        vectors[face] = expected.vectors @ image.T
+        least.append(angle_differences(surface, vectors, back(actual.vectors), degree).max())
+    assert np.degrees(min(least)) < 0.1
+
+
+def test_principal_directions_that_are_rounding_errors_are_undefined():
+    for degree in (2, 4):
+        assert not generate(cube(), "curvature", degree).vectors.any()
+
+
+def test_triangles_do_not_depend_on_first_corners():
+    """A concave polygon, and one with corners on an ellipse."""
+    angle = np.sort(np.random.default_rng(2).uniform(0, 2 * np.pi, 12))
+    radius = np.where(np.arange(12) % 4, 1.0, 0.3)
+    for radii in (1, radius):
+        points = np.stack([radii * np.cos(angle), 0.6 * radii * np.sin(angle), 0 * angle], axis=1)
+        sets = []
+        for turn in range(12):
+            corners = np.roll(np.arange(12), turn)
+            surface = with_delaunay_triangles(build_surface(points, corners, [0, 12]))
+            sets.append({frozenset(triangle) for triangle in surface.triangle_vertex.tolist()})
+        assert len(sets[0]) == 10 and all(each == sets[0] for each in sets)

@@ -59,11 +59,11 @@ class Effort(NamedTuple):
 
 #: The first makes the field independent of the numbering, to 0.1 degrees, except where two minima are as good. In the
 #: others, the gain of the last step is about what is left to gain: with 1e-4, energies were 0.02 to 0.06 % above those of
-#: a descent to the end, and 0.02 % with 3e-4 on 200,000 faces.
+#: a descent to the end, and 0.03 % with 1e-3 on 200,000 faces: less than 0.1 %.
 EFFORTS = (
     Effort(START_NODES, 1e-7, 1e-7, 1e-13, 8),
     Effort(SMALL_MESH_NODES, 1e-3, 1e-2, 1e-4, 1),
-    Effort(np.inf, 1e-3, 1e-2, 3e-4, 0),
+    Effort(np.inf, 1e-3, 1e-2, 1e-3, 0),
 )
 
 #: Number of eigenvectors that are starts. On a bumpy torus of 1,800

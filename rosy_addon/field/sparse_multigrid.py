@@ -263,8 +263,8 @@ def hierarchy(matrix: CSRMatrix, smoothed_size: int | None = None) -> list[Level
     matrix : CSRMatrix
         The (n, n) matrix, Hermitian.
     smoothed_size : int, optional
-        If n is larger, the prolongation of the finest level is not smoothed. This takes half the time. The levels are
-        then good for a rough solution on the coarser ones only.
+        If n is larger, the prolongation of the finest level is not smoothed. This takes half the time, but a W-cycle then
+        reduces the error less.
 
     Returns
     -------

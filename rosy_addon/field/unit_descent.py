@@ -41,6 +41,10 @@ DIFFUSION_ITERATIONS, MAX_STEPS = 60, 100
 #: Largest weight of an edge, relative to the median. Edges of slivers would make the matrix ill-conditioned.
 MAX_WEIGHT_RATIO = 1e4
 
+#: With more faces, the multigrid levels of the descent are rougher. On 200,000 faces, the whole search takes a tenth less
+#: time, and ends at 0.02 % more energy.
+SMOOTHED_FACES = 60_000
+
 #: Smallest second derivative along the search direction, relative to that of a field that turns nowhere.
 MIN_CURVATURE_RATIO = 0.1
 
@@ -140,7 +144,8 @@ class FaceEnergy:
     def levels(self) -> list[Level]:
         """Multigrid levels for changes of the angles: of a real matrix, that of a field that turns nowhere."""
         diagonal = self.diagonal * (1 + SINGULAR_SHIFT)
-        return hierarchy(from_edges(self.target, self.source, -self.weight, diagonal))
+        matrix = from_edges(self.target, self.source, -self.weight, diagonal)
+        return hierarchy(matrix, SMOOTHED_FACES)
 
 
 def face_energy(surface: Surface, degree: int, is_defined: np.ndarray) -> FaceEnergy:

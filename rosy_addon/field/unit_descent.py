@@ -55,6 +55,9 @@ MIN_GAIN = 1e-6
 #: 206 quads, one of about 40 reaches the least energy at degree 2. They take 0.1 seconds.
 FEW_FACES, RANDOM_STARTS = 400, 80
 
+#: Largest turn of the phase of a face that leaves a saddle point: far above rounding errors, far below those of a minimum.
+SMALL_TURN = 1e-2
+
 #: Decrease of the energy at which the descent stops, relative to the energy, to choose between starts and to try moves.
 CHOICE_TOLERANCE = 1e-4
 
@@ -188,6 +191,8 @@ def least_unit_field(
     if len(starts) > 1:
         found = [descend(energy, start, CHOICE_TOLERANCE) for start in starts]
         z = energy.least(starts, found, 0 if is_small else LEAST_START_GAIN)
+        if is_small:  # rounding errors must not choose the way from a symmetric saddle point
+            z = z * np.exp(SMALL_TURN * 1j * turns[0])
     else:
         z = starts[0]
     z = descend(energy, z, tolerance)

@@ -187,12 +187,13 @@ def least_unit_field(
     is_small = len(energy.area) <= FEW_FACES
     if is_small:
         turns = np.random.default_rng(0).random((len(energy.area), RANDOM_STARTS)).T
-        starts = [*starts, *np.where(starts[0] == 0, 0, np.exp(2j * np.pi * turns))]
+        phases = np.where(starts[0] == 0, 0, np.exp(2j * np.pi * turns))
+        # Rounding errors must not choose the way from a symmetric saddle point.
+        turned = [start * np.exp(SMALL_TURN * 1j * turns[0]) for start in starts]
+        starts = [*turned, *phases]
     if len(starts) > 1:
         found = [descend(energy, start, CHOICE_TOLERANCE) for start in starts]
         z = energy.least(starts, found, 0 if is_small else LEAST_START_GAIN)
-        if is_small:  # rounding errors must not choose the way from a symmetric saddle point
-            z = z * np.exp(SMALL_TURN * 1j * turns[0])
     else:
         z = starts[0]
     z = descend(energy, z, tolerance)

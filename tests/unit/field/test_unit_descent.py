@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from field_helpers import bumpy
 from scipy.optimize import minimize
-from shapes import cube, from_triangles, icosphere, torus
+from shapes import cube, from_quads, from_triangles, icosphere, torus
 
 from rosy_addon.core.errors import RosyError
+from rosy_addon.field import smoothest
 from rosy_addon.field.analysis import dirichlet_energy
 from rosy_addon.field.generate import generate
 from rosy_addon.field.singularities import find_singularities
@@ -60,6 +61,52 @@ def test_no_random_start_has_less_energy(degree, subdivisions):
     starts = random.uniform(0, 2 * np.pi, (20, surface.face_count))
     least = min(minimize(value, start, jac=True, method="L-BFGS-B").fun for start in starts)
     assert dirichlet_energy(surface, smoothest_field(surface, degree)) <= 1.001 * least + 1e-6
+
+
+def _walls(cells):
+    """The quads between unit cells at integer positions and the space around them."""
+    corners = np.array([[0, 0, 0], [0, 1, 0], [0, 1, 1], [0, 0, 1]])
+    quads = []
+    for axis in range(3):
+        for side in (0, 1):
+            square = np.roll(corners, axis, axis=1) + side * np.eye(3, dtype=int)[axis]
+            square = square if side else square[::-1]
+            step = (2 * side - 1) * np.eye(3, dtype=int)[axis]
+            quads += [square + cell for cell in cells if tuple(step + cell) not in cells]
+    vertices, number = np.unique(np.reshape(quads, (-1, 3)), axis=0, return_inverse=True)
+    return from_quads(vertices, number.reshape(-1, 4))
+
+
+#: A frame with two holes, of 206 quads, with many minima.
+FRAME = _walls(
+    set(np.ndindex(9, 7, 2)) - {(x, y, z) for x in (2, 3, 5, 6) for y in (2, 3, 4) for z in (0, 1)}
+)
+
+
+@pytest.mark.parametrize(("degree", "least"), [(2, 60.0819), (4, 0.0)])
+def test_a_frame_of_few_quads(degree, least):
+    """Genus 2. The least energy of 90 random starts; degree 4 turns nowhere, as angle defects are multiples of 90."""
+    assert len(FRAME.vertices) - 206 == -2
+    assert dirichlet_energy(FRAME, smoothest_field(FRAME, degree)) <= 1.001 * least + 1e-6
+
+
+def test_another_eigenvector_gives_less_energy():
+    """From the second one, the field has no singularities. From the first, it has four, and an energy of 73."""
+    surface = bumpy(torus(60, 30))
+    field = smoothest_field(surface, 2)
+    assert dirichlet_energy(surface, field) < 41
+    assert not len(find_singularities(surface, field)[0])
+
+
+@pytest.mark.slow
+def test_coarse_start_reaches_the_energy_of_a_fine_one(monkeypatch):
+    """On 20,480 faces, the starts are computed on a multigrid level with fewer nodes."""
+    surface = bumpy(icosphere(5))
+    energies = []
+    for nodes in (5_000, 50_000):
+        monkeypatch.setattr(smoothest, "START_NODES", nodes)
+        energies.append(dirichlet_energy(surface, smoothest.smoothest_field(surface, 4)))
+    assert energies[0] < 1.02 * energies[1]
 
 
 @pytest.mark.slow

@@ -37,7 +37,7 @@ def test_what_a_page_names_exists(page):
         assert set(re.findall(r"\w\w+", names)) - {"and"} <= names_in(module), module
     operators = "".join(path.read_text() for path in (ROOT / "operators").glob("*.py"))
     for name in re.findall(r"bpy\.ops\.rosy\.(\w+)", text):
-        assert f'"rosy.{name}"' in operators, name
+        assert f"class ROSY_OT_{name}(" in operators, name
 
 
 def test_the_functions_of_the_reference_are_public():

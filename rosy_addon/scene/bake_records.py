@@ -198,7 +198,7 @@ def _replace_datablocks(record: PropertyGroup, image: Image, material: Material)
 
 
 def find_record(scene: Scene, name: str) -> PropertyGroup | None:
-    """Return the record of a camera, given its present name; None if there is none."""
+    """Return the record with a name, as `camera_name` returns it; None if there is none."""
     return next((record for record in scene.rosy.bakes if camera_name(record) == name), None)
 
 
@@ -306,7 +306,8 @@ def _present_reason(
     state : SceneState
         The present state of the scene.
     automatic_device : callable or None
-        See `list_bakes`.
+        Returns the device that draws a look if the scene's device is "auto". None: the device that drew the
+        picture is assumed.
 
     Returns
     -------

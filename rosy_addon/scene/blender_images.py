@@ -65,8 +65,10 @@ def new_tiled_image(
 
     Parameters
     ----------
-    name, is_color
-        See `new_image`.
+    name : str
+        Name of the datablock.
+    is_color : bool
+        Whether 8-bit values are colors (sRGB) instead of data.
     tiles : mapping of int to ImageData
         The tiles by their UDIM numbers.
     stem : Path, optional
@@ -96,7 +98,11 @@ def new_tiled_image(
 
 
 def _load_tiles(name: str, tiles: Mapping[int, ImageData], stem: Path, is_color: bool) -> Image:
-    """Write tiles to files, and load them as one image."""
+    """Write tiles to files, and load them as one image.
+
+    The files are named by `stem` (a path), the tile number and the suffix. `is_color` says whether 8-bit
+    values are colors instead of data.
+    """
     as_float = not all(isinstance(tile, bytes) for tile in tiles.values())
     suffix = _suffix(as_float)
     paths = {number: stem.with_name(f"{stem.name}.{number}{suffix}") for number in sorted(tiles)}
@@ -117,7 +123,10 @@ def _load_tiles(name: str, tiles: Mapping[int, ImageData], stem: Path, is_color:
 
 
 def frame_path(stem: Path, frame: int, as_float: bool) -> Path:
-    """Return the path of a frame of an image sequence: stem, frame number in at least 4 digits, suffix."""
+    """Return the path of a frame of an image sequence: stem, frame number in at least 4 digits, suffix.
+
+    The suffix is .exr if `as_float`, otherwise .png.
+    """
     return stem.with_name(f"{stem.name}_{frame:04d}{_suffix(as_float)}")
 
 
@@ -134,7 +143,9 @@ def write_frame(path: Path, image_data: ImageData) -> None:
     Parameters
     ----------
     path : Path
+        The file, with its suffix.
     image_data : ImageData
+        The bytes of a PNG file, or an array of linear values, which is written as an .exr.
 
     Raises
     ------
@@ -178,7 +189,8 @@ def load_sequence(path: Path, as_float: bool) -> Image:
 def _save_image(image: Image, image_data: ImageData, stem: Path) -> None:
     """Save an image to a file, and make the image use this file. An existing file is replaced.
 
-    A PNG file is written as it is. If the image has pixels in single precision, Blender writes an .exr file.
+    `stem` is the path without the suffix. If the image has pixels in single precision, Blender writes them as
+    an .exr file. Otherwise `image_data` has the bytes of a PNG file, which are written as they are.
     """
     path = stem.with_name(f"{stem.name}{_suffix(image.is_float)}")
     make_folder(path.parent)

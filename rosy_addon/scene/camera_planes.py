@@ -66,7 +66,7 @@ def add_camera_plane(
     material: bpy.types.Material,
     track: Track,
 ) -> bpy.types.Object:
-    """Add a plane, parented to a camera.
+    """Add a plane, parented to a camera, and return its object.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def add_camera_plane(
     name, tag : str
         Name of the new object, and name of the custom property by which it is found again.
     corners : (4, 3) float ndarray
-        Corners of the plane in camera space, counter-clockwise.
+        Corners of the plane in camera space, counter-clockwise as seen from the camera.
     material : bpy.types.Material
     track : function
         Called with each new datablock; see `datablocks.rollback_on_error`.
@@ -97,7 +97,7 @@ def add_camera_plane(
 
 
 def frame_corners(camera: Camera, distance: float, size: float = 1.0) -> np.ndarray:
-    """Return the corners of the frame of a camera at a distance, counter-clockwise.
+    """Return the corners of the frame of a camera at a distance, counter-clockwise from the lower left.
 
     Parameters
     ----------

@@ -155,7 +155,7 @@ def _transport(
     source : str
         Name of the attribute in messages.
     nonfinite : {"error", "zero"}
-        See `read_evaluated_field`.
+        Raise an error if a vector is not finite, or treat it as undefined.
     """
     label = "reading the field"
     vectors = as_float64(values)
@@ -190,6 +190,14 @@ def temp_attributes(
 
     Parameters
     ----------
+    depsgraph : bpy.types.Depsgraph
+        It is updated when attributes have been added or removed.
+    objects : sequence of bpy.types.Object
+        Original mesh objects with a field.
+    nonfinite : {"error", "zero"}
+        Raise an error if a vector is not finite, or treat it as undefined.
+    cache : Cache
+        Keeps surfaces and fields that have not changed since an earlier call.
     errors : dict of bpy.types.Object to RosyError
         The errors of fields that cannot be read are added to it. The result leaves these objects out.
 
@@ -238,7 +246,8 @@ def _prepare_field(
 ) -> FieldLayout:
     """Return the layout of the field of an object as vectors on faces; add temporary attributes if needed.
 
-    If attributes are added to the mesh of the object, the mesh is appended to `temp_meshes`.
+    If attributes are added to the mesh of the object, the mesh is appended to `temp_meshes`. `nonfinite` is
+    "error" or "zero": vectors that are not finite raise an error, or are undefined.
     """
     mesh, label = obj.data, f"object '{obj.name}'"
     if mesh.is_editmode and is_face_vector_field(mesh):  # only the evaluated mesh can be read
@@ -271,7 +280,7 @@ def _can_modify(mesh: Mesh) -> bool:
 def lost_field_error(obj: Object, attribute: str | None) -> RosyError:
     """Return the error for an object whose modifiers remove an attribute.
 
-    If `attribute` is None, they remove all faces.
+    `attribute` is the name of the attribute. If it is None, the modifiers remove all faces.
     """
     if attribute is None and not len(obj.data.polygons):
         return no_faces_error(obj.data, f"object '{obj.name}'")

@@ -223,7 +223,7 @@ def follow_mesh(mesh: Mesh, name: str, vectors: np.ndarray, surface: Surface) ->
 
 
 def have_checks(vectors: np.ndarray, checks: np.ndarray) -> np.ndarray:
-    """Return which of (F, 3) vectors have their stored (F,) checksums, as (F,) bool."""
+    """Return which of (F, 3) vectors still have their stored checksum in `checks`, (F,), as (F,) bool."""
     with np.errstate(invalid="ignore", over="ignore"):
         length = np.abs(vectors).max(axis=1)
         return np.abs(vector_checks(vectors) - checks) <= CHECK_TOLERANCE * length

@@ -89,7 +89,10 @@ def picture_stem(name: str, kind: str = "camera") -> str:
 
 
 def _clean_stem(kind: str, name: str) -> str:
-    """Return a stem with underscores for characters that are not allowed. Its name is cut if it is long."""
+    """Return ``RoSy_``, the name and, for a texture, the kind, as the stem of a file name.
+
+    Characters that are not allowed become underscores, and a long name is cut.
+    """
     stem = bpy.path.clean_name(f"RoSy {name}").encode()[:MAX_STEM_BYTES]
     ending = "" if kind in PLAIN_KINDS else f" {kind}"
     return stem.decode(errors="ignore") + bpy.path.clean_name(ending)
@@ -107,8 +110,9 @@ EXTENSION_ID = __package__.rsplit(".", 2)[0]
 def user_presets_folder() -> Path:
     """Return the folder of the user's own presets. It may not exist yet.
 
-    It is in the folder that Blender provides for the files of an extension. If RoSy does not run as
-    an extension, or the environment variable ROSY_PRESETS is set, it is `default_user_folder`.
+    It is the path in the environment variable ROSY_PRESETS, if this is set. Otherwise it is in the folder
+    that Blender provides for the files of an extension or, if RoSy does not run as an extension, in the
+    user data folder of the operating system (`default_user_folder`).
     """
     if not os.environ.get("ROSY_PRESETS"):
         try:

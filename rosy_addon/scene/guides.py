@@ -208,7 +208,10 @@ def _object_strokes(obj: Object) -> list[np.ndarray]:
 
 
 def _split_strokes(attributes, offsets) -> list[np.ndarray]:
-    """Return the points of each curve, (n, 3), from the ``position`` attribute and the offsets."""
+    """Return the points of each curve, (n, 3) float64, from the attributes of Curves or a drawing.
+
+    The values of `offsets` are the index of the first point of each curve, then the number of points.
+    """
     position = attributes.get("position")
     if position is None or not len(position.data):  # the offsets of an empty drawing are unreadable
         return []
@@ -231,7 +234,7 @@ def _spline_points(spline: Spline) -> np.ndarray:
 
 
 def _read_coordinates(collection, key: str, columns: int) -> np.ndarray:
-    """Read coordinates from a collection: (n, columns) float64."""
+    """Return coordinates, (n, columns) float64: the property `key` of the n items of a collection."""
     return read_collection(collection, key, np.float32, columns).astype(np.float64)
 
 

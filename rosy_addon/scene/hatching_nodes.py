@@ -72,7 +72,7 @@ _INPUTS = (
 
 
 def hatching_group(track: Track) -> bpy.types.NodeTree:
-    """Return the node group in the open .blend file. If there is none, it is created, and `track` called."""
+    """Return the node group in the open .blend file. If there is none, create it and call `track` with it."""
     for group in bpy.data.node_groups:
         is_own = group.library is None and group.get(OWNED_TAG)
         is_hatching = group.bl_idname == "ShaderNodeTree" and group.name.startswith(GROUP_NAME)

@@ -79,7 +79,10 @@ def update_keys(scene: Scene) -> None:
 
 
 def _add_key(scene: Scene, camera: Object, record: PropertyGroup, triangles: TextShapes) -> None:
-    """Add a plane with a key, parented to a camera. Nothing is added if the key would be empty."""
+    """Add a plane with a key, parented to a camera. Nothing is added if the key would be empty.
+
+    `record` is the record of the picture, and `triangles` a function that returns the triangles of a text.
+    """
     view = camera_of_object(scene, scene_depsgraph(scene), camera)
     picture = _draw(scene, view, record, triangles)
     if picture is None:
@@ -100,7 +103,10 @@ def _add_key(scene: Scene, camera: Object, record: PropertyGroup, triangles: Tex
 def _draw(
     scene: Scene, view: Camera, record: PropertyGroup, triangles: TextShapes
 ) -> Picture | None:
-    """Draw a key as a picture that fills the frame of the camera. Return None if the key would be empty."""
+    """Draw a key as a picture that fills the frame of the camera. Return None if the key would be empty.
+
+    `record` is the record of the picture, and `triangles` a function that returns the triangles of a text.
+    """
     settings = scene.rosy
     shrink = min(1.0, MAX_SIDE / max(view.width, view.height))
     width, height = (max(round(side * shrink), 1) for side in (view.width, view.height))
@@ -206,7 +212,10 @@ def _world_color(world: World | None) -> np.ndarray | None:
 
 
 def _new_material(name: str, image: Image, strength: float) -> Material:
-    """Create a material that emits an image with its alpha. Seen from behind it is fully transparent."""
+    """Create a material that emits an image with its alpha. Seen from behind it is fully transparent.
+
+    `strength` is the strength of the emission.
+    """
     material, build = new_empty_material(name)
     material[KEY_TAG] = True
     material.diffuse_color = (1.0, 1.0, 1.0, 0.0)

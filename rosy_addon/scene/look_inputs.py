@@ -317,7 +317,7 @@ def load_reference(
 
 
 def load_luminance(path: Path) -> np.ndarray:
-    """Read the linear luminance, (H, W) float32, of an image file with Blender.
+    """Read the linear luminance of an image file with Blender: (H, W) float32, rows from the bottom.
 
     Raises
     ------
@@ -339,7 +339,7 @@ def load_luminance(path: Path) -> np.ndarray:
 
 
 def image_luminance(image: Image) -> np.ndarray:
-    """Return the linear luminance of an image, (H, W) float32, composited over white.
+    """Return the linear luminance of an image over white, (H, W) float32, rows from the bottom.
 
     Raises
     ------

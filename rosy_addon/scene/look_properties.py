@@ -34,7 +34,10 @@ def apply_look(settings: Any, look: Look) -> None:
 
 
 def color_components(code: str, setting: Color) -> list[float]:
-    """Convert a hex color to the components of its property: red, green, blue, and opacity if it has one."""
+    """Convert a hex color to the components of its property, from 0 to 1.
+
+    They are red, green and blue as sRGB display values, and the opacity if the setting has one.
+    """
     color = from_hex(code).tolist()
     return [*color, alpha_from_hex(code)] if setting.has_alpha else color
 

@@ -124,8 +124,9 @@ def _field_from_directions(
 ) -> RosyField:
     """Read a field from the attributes ``dir0`` ... ``dir{N-1}``. Their number N is the degree.
 
-    Two attributes are the lines of a cross if their directions are nowhere opposite and `degree` is not 2. A
-    `RosyWarning` says so.
+    Two attributes are the lines of a cross if their directions are nowhere opposite and `degree`, the
+    expected degree, is not 2. A `RosyWarning` says so. `label` is the name of the mesh in messages.
+    `nonfinite` is "error" or "zero": vectors that are not finite raise an error, or are undefined.
     """
     count = 0
     while f"dir{count}" in mesh.attributes:
@@ -162,9 +163,10 @@ def _field_from_directions(
 def _field_from_angles(
     surface: Surface, angles: np.ndarray, degree: int, source: str, nonfinite: str
 ) -> RosyField:
-    """Return a field from (F,) angles between its members and the first edges of faces, in radians.
+    """Return a field from the (F,) angles of its members in radians, counterclockwise from the first edges.
 
-    `source` is the name of the attribute in messages.
+    `source` is the name of the attribute in messages. `nonfinite` is "error" or "zero": angles that are not
+    finite raise an error, or the field is undefined there.
     """
     x, y = surface.face_frames
     report(0.5, "reading the field")
@@ -181,7 +183,8 @@ def _field_from_corners(
     """Return a field from (C, 3) vectors on face corners, averaged over each face.
 
     The vectors are projected to the face. Their representations z are averaged, so that different members at
-    the corners of a face do not cancel out. `source` is the name of the attribute in messages.
+    the corners of a face do not cancel out. `source` is the name of the attribute in messages. `nonfinite` is
+    "error" or "zero": vectors that are not finite raise an error, or are undefined.
     """
     vectors = as_float64(vectors)
     validate.apply_nonfinite_policy(vectors, source, "corner", nonfinite)
@@ -234,7 +237,7 @@ def assign_fields(
         Name of the attribute. By default the existing field of each mesh is replaced; for "ANGLE",
         the name is `DEFAULT_ANGLE_NAME`.
     form : {"VECTOR", "DIRECTIONS", "ANGLE"}
-        See `write_mesh_field`.
+        Attributes in which a field is stored; see `write_mesh_field`.
 
     Raises
     ------
@@ -269,8 +272,9 @@ def write_mesh_field(
     name : str
         Name of the attribute. The attributes of the form "DIRECTIONS" are always ``dir0`` ... ``dir{N-1}``.
     form : {"VECTOR", "DIRECTIONS", "ANGLE"}
-        See `STORAGE_FORMS`. A field with free directions (not at equal angles) is always stored as
-        "DIRECTIONS". A vector attribute with the name `name` is removed then, because it would be read
+        One member per face as a vector, all N directions of each face as vectors, or the angle of a member
+        from the first edge of each face. A field with free directions (not at equal angles) is always stored
+        as "DIRECTIONS". A vector attribute with the name `name` is removed then, because it would be read
         instead of the directions. If a RoSy field is stored as "DIRECTIONS", such an attribute is kept.
 
     Raises
@@ -357,9 +361,10 @@ def _check_storable(mesh: Mesh, field: RosyField, name: str, form: str) -> None:
 
 
 def _write_directions(mesh: Mesh, field: RosyField, name: str) -> Attribute:
-    """Store the N directions of a field as ``dir0`` ... ``dir{N-1}``.
+    """Store the N directions of a field as ``dir0`` ... ``dir{N-1}``, and return ``dir0``.
 
-    Remove attributes ``dirN``, ``dir{N+1}`` ...
+    Remove the attributes ``dirN``, ``dir{N+1}`` ... of an earlier field. If the directions of the field are
+    not at equal angles, remove also the attribute `name`, which would be read instead.
     """
     directions = field.source_directions
     if directions is None:

@@ -66,8 +66,10 @@ def read_mesh_state(
     ----------
     mesh : bpy.types.Mesh or None
         Result of `evaluated_mesh`.
-    owner, request
-        See `mesh_state_key`.
+    owner : bpy.types.Object
+        The original object.
+    request : ReadRequest or None
+        What is read from the mesh. None: the object has no field to draw, and only hides others.
     """
     if mesh is None:
         return None

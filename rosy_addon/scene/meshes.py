@@ -318,6 +318,9 @@ def _attribute_or_collection(
 ) -> np.ndarray:
     """Return the values of a property of a collection, from an attribute with the same values if possible.
 
+    `attribute` is the name of the attribute, and `key` is the name of the property. The result is
+    (n, columns), or (n,) for one column.
+
     Blender copies an attribute as a whole. It reads a collection item by item, which is a thousand times
     slower.
     """

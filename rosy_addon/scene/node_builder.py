@@ -42,7 +42,7 @@ class NodeBuilder:
         return node
 
     def connect(self, value: Any, socket: NodeSocket) -> None:
-        """Link a socket to an input, or set the input to a constant."""
+        """Link `value` to an input socket if it is an output socket; else set the input to this constant."""
         if isinstance(value, NodeSocket):
             self.tree.links.new(value, socket)
         else:

@@ -140,9 +140,10 @@ def set_sequence_frames(material: Material, first: int, last: int) -> None:
 
 
 def _clip_position(build: NodeBuilder, view_projection: np.ndarray) -> Node:
-    """Add nodes that compute the clip-space position.
+    """Add nodes that compute the position in the clip space of the picture's camera.
 
-    Outputs X, Y and Z of the returned node are x, y and w.
+    Outputs X, Y and Z of the returned node are x, y and w. `view_projection` is the (4, 4) matrix from world
+    space to clip space.
     """
     baked_clip = build("ShaderNodeAttribute", attribute_name=CLIP_ATTRIBUTE).outputs["Vector"]
     world_position = build("ShaderNodeNewGeometry").outputs["Position"]

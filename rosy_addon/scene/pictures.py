@@ -211,8 +211,10 @@ def apply_sequence(
 
     Parameters
     ----------
-    scene, scene_data, settings
-        See `apply_picture`.
+    scene : bpy.types.Scene
+    scene_data : SceneData
+        Its objects get the pictures.
+    settings : OutputSettings
     sequence : ImageSequence
     camera : Camera
         The camera of the last frame.
@@ -312,7 +314,11 @@ def _image_stem(settings: OutputSettings, name: str, kind: str = "camera") -> Pa
 def _new_groups(
     material: Material, matrices: Mapping[Object, np.ndarray | None], track: datablocks.Track
 ) -> dict[Object, NodeTree]:
-    """Create the node groups that show a picture on objects; see `new_group`."""
+    """Create the node groups that show a picture on objects; see `new_group`.
+
+    `matrices` holds each object's (4, 4) matrix from object space to clip space, or None. `track` is called
+    with each new group.
+    """
     return {
         obj: track(new_group(f"RoSy {obj.name}", material, matrix))
         for obj, matrix in matrices.items()

@@ -91,6 +91,7 @@ def read_turntable(
     Returns
     -------
     instance : MeshInstance
+        The object's mesh with its field, in world space.
     lights : list of Light
         In world space. Empty if the look does not use the lights of the scene.
 

@@ -134,7 +134,8 @@ def _field_errors(
 ) -> list[RosyError]:
     """Return one error for each object of `targets` whose field cannot be drawn.
 
-    If `errors` has an error of another object, or one that is not a `RosyError`, raise it.
+    `errors` are the errors of `SceneReader`, by the full names of objects, and `entries` are the instances
+    that it has read. If `errors` has an error of another object, or one that is not a `RosyError`, raise it.
     """
     names = [obj.name_full for obj in targets]
     for name, error in errors.items():
@@ -350,7 +351,10 @@ class SceneReader:
         layouts: Mapping[Object, FieldLayout],
         problems: dict[str, Exception],
     ) -> None:
-        """Add rest positions and fields of evaluated meshes to `_topologies`, or errors to `problems`."""
+        """Add rest positions and fields of evaluated meshes to `_topologies`, or errors to `problems`.
+
+        `layouts` holds the field's attributes by original object, `problems` errors by full name.
+        """
         for instance in depsgraph.object_instances:
             obj, owner = instance.object, instance.object.original
             layout = layouts.get(owner)
@@ -374,7 +378,10 @@ class SceneReader:
                     problems[owner.name_full] = error
 
     def _mesh_data(self, obj: Object, owner: Object, draws_field: bool) -> _MeshData | None:
-        """Return the data of an evaluated mesh; None if it has no faces or cannot be read now."""
+        """Return the data of the mesh of the evaluated object `obj`, whose original object is `owner`.
+
+        Return None if it has no faces, has an error, or is left for a later call.
+        """
         pointer, request = obj.data.as_pointer(), self._request
         key = owner.name_full, pointer, look_inputs.tone_image_key(owner, request.tone), draws_field
         if key in self._meshes:

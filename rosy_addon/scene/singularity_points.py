@@ -106,7 +106,8 @@ def mesh_of_own_vertices(obj: Object, evaluated: Mesh | None) -> Mesh:
     """Return the evaluated mesh if its first vertices are the vertices of the original mesh.
 
     That is assumed if it has at least as many vertices: modifiers such as *Armature*, *Subdivision Surface*
-    and *Mirror* keep the vertices, and add new ones after them. Otherwise the original mesh is returned.
+    and *Mirror* keep the vertices, and add new ones after them. Otherwise, or if there is no evaluated mesh
+    (None), the original mesh is returned.
     """
     is_lost = evaluated is None or len(evaluated.vertices) < len(obj.data.vertices)
     return obj.data if is_lost else evaluated

@@ -73,7 +73,10 @@ def new_curves(name: str, geometry: StrokeGeometry, frame: int, register: Regist
 
 
 def set_attribute(data: Any, name: str, data_type: str, domain: str, values: np.ndarray) -> None:
-    """Write an attribute of Curves or of a Grease Pencil drawing, and create it if it is missing."""
+    """Write an attribute of Curves or of a Grease Pencil drawing, and create it if it is missing.
+
+    `values` has one row, or one number, per element of the domain: "POINT" or "CURVE".
+    """
     attribute = data.attributes.get(name) or data.attributes.new(name, data_type, domain)
     write_attribute(attribute, values)
 

@@ -16,9 +16,21 @@ from . import video_encoding
 def encode_video(
     folder: Path, count: int, size: tuple[int, int], fps: float, path: Path
 ) -> Steps[None]:
-    """Encode the images of a folder with Blender's encoder. See `video_encoding.encode_video`.
+    """Encode the images ``00000.png``, ``00001.png`` ... of a folder as an .mp4 with Blender's encoder.
 
     If Blender runs with a window, a second Blender process encodes. It is ended if the job is cancelled.
+
+    Parameters
+    ----------
+    folder : Path
+    count : int
+        Number of images.
+    size : (int, int)
+        Width and height in pixels. Both must be even.
+    fps : float
+        Frames per second.
+    path : Path
+        The video file.
 
     Raises
     ------

@@ -65,9 +65,10 @@ class Device:
     def texture(
         self, size: Sequence[int], texel_format: str, layers: int = 0, data: Any = None
     ) -> Any:
-        """Return a new texture of a width and height. If `layers` is not 0, it is a texture array.
+        """Return a new texture of a width and height; with `layers` above 0, an array of so many layers.
 
-        `data` is its contents, (height, width, 4) float32. By default, the contents are undefined.
+        `texel_format` is the name of a format in Blender's `gpu` module, such as "RGBA32F". `data` is the
+        contents, (height, width, 4) float32, rows from the bottom. By default, the contents are undefined.
         """
         options = {}
         if data is not None:
@@ -91,8 +92,9 @@ class Device:
     ) -> None:
         """Run a compute shader; `size` is the width, the height and the number of layers.
 
-        `textures` are the textures and images that the shader reads and writes, by their names there. A
-        shader with switches must be the result of `ComputePass.variant`.
+        `textures` are the textures and images that the shader reads and writes, and `uniforms` the values of
+        its uniforms, both by their names there. A shader with switches must be the result of
+        `ComputePass.variant`.
         """
         program, _block = self._bind(shader, textures, uniforms)
         for name, _ in shader.images:
@@ -102,7 +104,7 @@ class Device:
         self._gpu.compute.dispatch(program, *groups)
 
     def draw(self, shader: RasterPass, batches: Batches, color: Any, depth: Any) -> None:
-        """Draw batches into a color and a depth texture."""
+        """Clear a color and a depth texture, and draw batches (vertex buffers with uniforms) into them."""
         state = self._gpu.state
         framebuffer = self._gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
         saved = state.depth_test_get(), state.depth_mask_get(), state.blend_get()
@@ -121,7 +123,10 @@ class Device:
     def draw_to_view(
         self, shader: RasterPass, batches: Batches, textures: NamedValues, uniforms: NamedValues
     ) -> None:
-        """Draw batches into the current 3D view, tested against the depths in it."""
+        """Draw batches into the current 3D view, tested against the depths in it.
+
+        `textures` and `uniforms` are shared by all batches, by their names in the shader.
+        """
         # With depth writes, the picture is drawn once where surfaces overlap.
         self._set_state("LESS_EQUAL", True, "ALPHA")
         try:
@@ -130,7 +135,10 @@ class Device:
             self._set_state("NONE", False, "NONE")
 
     def _set_state(self, depth_test: str, depth_mask: bool, blend: str) -> None:
-        """Set the depth test, depth writes and blending for all triangles that are drawn from now on."""
+        """Set the depth test, depth writes and blending for all triangles that are drawn from now on.
+
+        `depth_test` and `blend` are names of modes in ``gpu.state``, such as "LESS" and "ALPHA".
+        """
         self._gpu.state.depth_test_set(depth_test)
         self._gpu.state.depth_mask_set(depth_mask)
         self._gpu.state.blend_set(blend)
@@ -150,7 +158,7 @@ class Device:
             batch.draw(program)
 
     def read(self, texture: Any) -> np.ndarray:
-        """Return the (height, width, 4) float32 contents of a texture."""
+        """Return the (height, width, 4) float32 contents of a texture, rows from the bottom."""
         texels = np.asarray(texture.read(), dtype=np.float32)
         return texels.reshape(texture.height, texture.width, 4)
 
@@ -245,7 +253,10 @@ def _std140_order(uniforms: Uniforms) -> Uniforms:
 
 
 def _pack_uniforms(uniforms: Uniforms, values: NamedValues) -> np.ndarray:
-    """Return the values of a uniform block in the std140 layout, padded to whole rows of 16 bytes."""
+    """Return the values of a uniform block in the std140 layout, padded to whole rows of 16 bytes.
+
+    The result is a flat float32 array. Integers are stored as floats with the same bits.
+    """
     words: list[np.ndarray] = []
     for name, kind in _std140_order(uniforms):
         type_ = np.int32 if kind in ("int", "ivec2") else np.float32

@@ -222,7 +222,7 @@ class Frame:
         layers : int
             Number of layers of the texture arrays that the pass writes.
         pause : float, optional
-            See `FramePass`.
+            Fraction of the stage that is done before the pass, if the renderer may pause there.
         """
         uniforms = {**self._shared_uniforms, **uniforms, "box_origin": box[:2]}
         textures = {**self.textures, **textures}
@@ -231,7 +231,10 @@ class Frame:
         self.passes.append(FramePass(shader, run, pause))
 
     def draw(self, shader: RasterPass, batches: Batches, target: Any) -> None:
-        """Add a pass that draws triangles; see `Device.draw`."""
+        """Add a pass that clears the texture `target` and draws triangles into it.
+
+        `batches` are vertex buffers with uniforms; see `Device.draw`.
+        """
         depth = self.resources.image("depth", (target.width, target.height), "DEPTH_COMPONENT32F")
         run = partial(self.resources.device.draw, shader, batches, target, depth)
         self.passes.append(FramePass(shader, run, None))

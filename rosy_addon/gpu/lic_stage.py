@@ -114,7 +114,8 @@ def _streaks(
     """Return means along each line through a pixel, for a look with ink: one layer per line direction.
 
     The channels are the means of the noise, of the noise that breaks lines, and of the tone. If the look
-    needs none of them, return an arbitrary texture, which is not read.
+    needs none of them, return an arbitrary texture, which is not read. `textures` include the result of
+    `_unfold`, and `uniforms` the result of `look_uniforms`.
     """
     layers = kind.line_count
     has_streaks = not uniforms["even_lines"] or uniforms["break_steps"] > 0
@@ -193,7 +194,11 @@ def _unfold(frame: Frame, kind: FieldKind, box: Box) -> dict[str, Any]:
 
 
 def _noise_gradients(frame: Frame, box: Box, textures: dict[str, Any]) -> Any:
-    """Return an image of the derivatives of the noise along x and y. Each layer has two noise channels."""
+    """Return an image of the derivatives of the noise along x and y, per pixel.
+
+    A layer has the x and y derivatives of one noise channel, then of a second one. `textures` include the
+    result of `_unfold`.
+    """
     layers = 2 if noise_channel_count(frame.look) > 1 else 1
     gradients = frame.image("noise_gradients", "RGBA16F", layers)
     textures = {**textures, "noise_gradients": gradients}

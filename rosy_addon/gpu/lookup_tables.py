@@ -71,7 +71,7 @@ def ink_table(resources: GpuResources, kind: FieldKind, look: PixelLook) -> Any:
 
 
 def waves(resources: GpuResources) -> Any:
-    """Return a texture of the waves that `wobble` sums up."""
+    """Return a texture of the waves that `wobble` sums up: a texel per wave, a row of `wave_table`."""
     return resources.lookup_texture("waves", None, lambda: wave_table()[None])
 
 
@@ -96,7 +96,10 @@ def picture_grain(
 
 
 def picture_noise(resources: GpuResources, size: tuple[int, int], look: PixelLook) -> Any:
-    """Return a texture of the noise of `image_noise.image_noise` for a frame of this size."""
+    """Return a texture of the noise of `image_noise.image_noise` for a frame of this size in pixels.
+
+    It has one component for each noise channel.
+    """
     settings = noise_settings(look)
     values = partial(image_noise, settings=settings)
     return _pixel_texture(resources, "noise", settings, size, values)
@@ -107,6 +110,7 @@ def _pixel_texture(
 ) -> Any:
     """Return a texture of values at the pixels of a frame.
 
+    It is kept under `name`, and created again if `key`, the settings that the values depend on, changes.
     Width and height of the texture are rounded up to multiples of `NOISE_TILE_PIXELS`.
     `values(pixel, width)` returns the values at (P,) flat indices into a frame of this width.
     """

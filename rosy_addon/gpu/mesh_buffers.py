@@ -54,6 +54,7 @@ class MeshBuffers:
         The record of each triangle: `texels_per_record` consecutive texels, see
         `_write_records`. None without a field.
     texels_per_record : int
+        Number of texels in the record of a triangle.
     channel_count : int
         Number of channels of the field besides its representation.
     has_tone : bool
@@ -181,6 +182,7 @@ def mesh_buffers(
     instance : MeshInstance
         The linear part of its matrix, from `split_matrix`, is applied.
     display : {"smooth", "flat"}
+        Shading of the surface; see `Look.display`.
     channels : sequence of FieldChannel
         The channel in each layer of the image of field channels, the same for all fields of this degree.
 
@@ -284,7 +286,7 @@ def record_texels(channel_count: int, has_tone: bool = False, has_values: bool =
 
 
 def _values_texel(channels: Sequence[FieldChannel]) -> int:
-    """Return the texel of a record that contains the values for the color map, if there are any."""
+    """Return the texel of a record that contains the values for the color map, if the mesh has values."""
     return record_texels(len(channels)) - 1
 
 

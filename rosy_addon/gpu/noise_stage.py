@@ -71,7 +71,8 @@ def _render_wobble(frame: Frame) -> None:
 def _surface_noise(frame: Frame, settings: NoiseSettings, name: str, detail: float = 0.0) -> Any:
     """Return an image of noise that moves with the surfaces, as `surface_noise.surface_noise` with numpy.
 
-    `settings` and `detail` are arguments of that function, and `name` is the name of the image.
+    `name` is the name of the image. On small features of the surface, the cells of the noise are smaller by
+    up to the fraction `detail`.
     """
     raw_noise = frame.image("raw_noise")
     frame.clear(raw_noise)

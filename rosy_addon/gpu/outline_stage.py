@@ -52,7 +52,10 @@ def render_outline(frame: Frame) -> None:
 
 
 def _coverage(frame: Frame, prepared: dict[Hashable, Any]) -> Any:
-    """Return an image of the fraction that outlines cover, for each pixel of the frame."""
+    """Return an image of the fraction that outlines cover, for each pixel of the frame.
+
+    `prepared` has the `OutlineTextures` of instances, by the keys of `outline_lookups`.
+    """
     crease_marks = frame.image("crease_marks", "R32F")
     edges = frame.image("outline_edges", "RG32F")
     frame.clear(crease_marks, "R32F")
@@ -89,7 +92,10 @@ def _coverage(frame: Frame, prepared: dict[Hashable, Any]) -> Any:
 def _mark_creases(
     frame: Frame, instance_id: int, item: DrawItem, found: OutlineTextures, crease_marks: Any
 ) -> None:
-    """Mark the pixels next to the visible creases of an instance."""
+    """Mark the pixels next to the visible creases of an instance in the image `crease_marks`.
+
+    `found` has the creases of the instance.
+    """
     columns = min(found.crease_count, CREASES_PER_ROW)
     box = 0, 0, columns, -(-found.crease_count // columns)
     textures = {"crease_points": found.crease_points, "crease_marks": crease_marks}

@@ -221,7 +221,11 @@ class GpuRenderer(ViewportRenderer):
     def _color_range(
         self, items: Sequence[DrawItem], view: ViewInput
     ) -> tuple[float, float] | None:
-        """Return `Picture.color_range` of a picture. It must be the last one that was drawn."""
+        """Return the values of the first and the last color of the color map; see `Picture.color_range`.
+
+        Magnitudes are read from the images of the last picture, so `view` must be its input. Return None if
+        there is no color map, or its range differs between degrees.
+        """
         if not colors_magnitude(view.look) or magnitude_range(view.look):
             return fixed_color_range(view.look, view.instances)
         frame, tops = self._frame(items, view), set()

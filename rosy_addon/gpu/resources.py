@@ -115,6 +115,7 @@ class MipAtlas:
     size : (int, int)
         Width and height of level 0.
     max_level : int
+        Number of the smallest level in the texture, counted from its level 0.
     skipped_levels : int
         Number of levels of the mip map that are larger than level 0 of the texture, and left out.
     """
@@ -154,12 +155,17 @@ class GpuResources:
     def mesh_lookups(
         self, instances: Sequence[MeshInstance], display: str
     ) -> list[Callable[[], GpuMesh | Preparation]]:
-        """Return for each mesh instance a function that looks up its mesh; see `prepare_steps`."""
+        """Return for each mesh instance a function that looks up its mesh; see `prepare_steps`.
+
+        `display` is the shading of the surface, "smooth" or "flat".
+        """
         kinds = field_kinds(instance.field for instance in with_field(instances))
         return [partial(self._mesh, instance, display, kinds) for instance in instances]
 
     def upload(self, instances: Sequence[MeshInstance], display: str) -> list[DrawItem]:
         """Return a draw item for each mesh instance. Meshes that are on the device are not sent again.
+
+        `display` is the shading of the surface, "smooth" or "flat".
 
         Raises
         ------
@@ -194,7 +200,7 @@ class GpuResources:
     ) -> OutlineTextures | Preparation:
         """Look up the creases and connected components of the mesh of an item, or return a `Preparation`.
 
-        `crease_angle` is in radians; see `outline_records`.
+        `crease_angle` is the smallest angle between face normals at a crease, in radians. None: no creases.
 
         Raises
         ------
@@ -223,13 +229,15 @@ class GpuResources:
     ) -> tuple[Any, int] | Preparation:
         """Look up the evenly spaced lines of an instance, or return a `Preparation`.
 
-        The result is a texture with the rows of `surface_records.line_rows`, and the node count.
+        The result is a texture with the rows of `surface_records.line_rows`, and the number of nodes of
+        bisection trees in it.
 
         Parameters
         ----------
         item : DrawItem
             An instance with a field.
         display : {"smooth", "flat"}
+            Shading of the surface; see `Look.display`.
         spacing : float
             Distance between lines, in Blender units.
 
@@ -271,6 +279,7 @@ class GpuResources:
         ----------
         name : str
         key : any
+            What the values depend on. If it differs from the key of the kept texture, `create` is called.
         create : function
             Returns (H, W, C) values. The texture has four channels; those after the first C are 0.
         min_size : (int, int)
@@ -292,7 +301,7 @@ class GpuResources:
     def _look_up(self, key: Hashable, missing: Preparation, lifetime: int = TABLE_LIFETIME) -> Any:
         """Return the handle that is kept under a key or, if there is none, the preparation `missing`.
 
-        After the preparation, the handle is kept.
+        After the preparation, the handle is kept until it has not been used during `lifetime` uploads.
         """
         if key in self._kept:
             return self._keep(key, self._kept[key][0], lifetime)
@@ -307,7 +316,10 @@ class GpuResources:
     def _mesh(
         self, instance: MeshInstance, display: str, kinds: dict[int, FieldKind]
     ) -> GpuMesh | Preparation:
-        """Look up the mesh of an instance, or return a `Preparation` of it."""
+        """Look up the mesh of an instance, or return a `Preparation` of it.
+
+        `display` is the shading of the surface, and `kinds` has the kind of the fields of each degree.
+        """
         surface, field, tone = instance.surface, instance.field, instance.tone
         linear, _ = split_matrix(instance.matrix)
         channels = () if field is None else kinds[field.degree].channels

@@ -79,7 +79,17 @@ def image_steps(
 ) -> Steps[tuple[Picture, ImageData]]:
     """Draw a picture as part of a job, and convert it to an image.
 
-    See `picture_steps` and `picture_image`, and `bake_picture` for `keep_gbuffers` and `workers`.
+    Parameters
+    ----------
+    view : ViewInput
+    device : {"cpu", "gpu"}
+        Result of `select_device`.
+    as_float : bool
+        Whether the image has linear values in single precision, instead of 8-bit sRGB.
+    keep_gbuffers : bool
+        Whether G-buffers are kept in the cache. Only used by the CPU.
+    workers : int
+        Number of processes that draw a large picture on the CPU. 0 means one per processor core.
     """
     if device == "cpu":
         return (yield Call(draw_image, (view, as_float, keep_gbuffers, workers)))

@@ -28,15 +28,16 @@ def line_records(
     ----------
     instance : MeshInstance
     display : {"smooth", "flat"}
+        Shading of the surface; see `Look.display`.
     spacing : float
         Distance between lines in world space, in Blender units.
 
     Returns
     -------
     rows : (rows, ROW_TEXELS, 4) float32 ndarray
-        See `line_rows`.
+        The tree of bisected triangles and the phases of the lines; see `line_rows`.
     node_count : int
-        See `line_rows`.
+        Number of nodes of the tree in `rows`; 0 if no triangle is bisected.
     triangle_count : int
         Number of leaves: triangles on which the phase is linear.
     """
@@ -82,9 +83,9 @@ def outline_records(
     ----------
     surface : Surface
     linear : (3, 3) ndarray
-        The linear part from `mesh_buffers.split_matrix`.
+        The linear map of positions that changes the shape, from `mesh_buffers.split_matrix`.
     center : (3,) ndarray
-        `MeshBuffers.center`.
+        Origin of the positions on the device, after the linear map (`MeshBuffers.center`).
     crease_angle : float or None
         Smallest angle between the normals of the faces at a crease, in radians. None: there are no creases.
 
@@ -112,6 +113,7 @@ def outline_records(
 def feature_records(surface: Surface) -> np.ndarray:
     """Return the curvature of surface features as (rows, ROW_TEXELS, 4) float32, a texel for each triangle.
 
-    A texel has the curvatures at the three corners; see `field.feature_curvature`.
+    A texel has the curvatures at the three corners, in units of 1 / length in object space; see
+    `field.feature_curvature`.
     """
     return to_texture_rows(feature_curvature(surface))

@@ -18,9 +18,10 @@ from .uniforms import light_uniforms, light_view_uniforms, shadow_uniforms, tone
 def render_target_tones(frame: Frame) -> None:
     """Render the target tone of each pixel into ``frame.textures["tones"]``.
 
-    The light alone is rendered into the texture ``lighting``. If the look shows values of the surface by a
-    color map, the last component of ``tones`` is the position of the value in the color map, from 0 to 1,
-    or -1 where there is no value. `target_tone.target_tone` does the same with numpy.
+    The first three components are the tones of red, green and blue. If the look shows values of the surface
+    by a color map, the last component is the position of the value in the color map, from 0 to 1, or -1 where
+    there is no value. The light alone is rendered into the texture ``lighting``. `target_tone.target_tone`
+    does the same with numpy.
     """
     look, reference = frame.look, frame.view.reference
     tones = frame.image("tones")
@@ -76,6 +77,7 @@ def _lighting(frame: Frame) -> Any:
 def _shadow_visibility(frame: Frame, light: dict[str, Any], box: Box) -> Any:
     """Return an image of the fraction of a light that reaches each pixel of a box.
 
+    `light` has the uniforms of the light, an item of `light_uniforms`.
     `shadow_maps.shadow_visibility` does the same with numpy.
     """
     kind = "sun" if light["light_kind"] == SUN_LIGHT else "point"

@@ -64,7 +64,10 @@ def matrix_rows(name: str, labels: Iterable[Any], rows: np.ndarray) -> dict[str,
 def clip_uniforms(
     item: DrawItem, camera: Camera, clip_planes: np.ndarray | None
 ) -> dict[str, tuple[float, ...]]:
-    """Return the rows of the model-to-clip matrix, and the clip planes in model space."""
+    """Return the rows of the model-to-clip matrix, and the clip planes in model space.
+
+    `clip_planes` are (6, 4) plane equations in world space, or None.
+    """
     clip = camera.projection @ camera.view @ item.model_matrix
     planes = NO_CLIP_PLANES if clip_planes is None else np.asarray(clip_planes)
     object_planes = planes @ item.model_matrix
@@ -157,7 +160,10 @@ def _paper_grain_depth(look: PixelLook, statistics: StreakStatistics | None) -> 
 
 
 def light_uniforms(look: Look, lights: Sequence[Light]) -> list[dict[str, Any]]:
-    """Return the uniforms of each light; if there is none, the uniforms of a black headlight."""
+    """Return the uniforms of each light; if there is none, the uniforms of a black headlight.
+
+    `lights` are in camera space.
+    """
     headlight = {"light_kind": defines.HEADLIGHT, "light_vector": (0.0,) * 4}
     if look.light == "headlight":
         return [{**headlight, "light_color": (1.0,) * 4}]
@@ -268,7 +274,7 @@ def surface_noise_uniforms(
     settings : NoiseSettings
     look : PixelLook
     detail : float
-        See `surface_noise.surface_noise`.
+        Cells on small features of the surface are smaller by up to this fraction.
     """
     density = settings.density
     amplitude = NOISE_STD / np.sqrt(density * (1 - density)) / len(SUBPIXEL_OFFSETS)

@@ -73,7 +73,11 @@ def draw_picture(
 
 
 def bake_picture(view: ViewInput, keep_gbuffers: bool = True, workers: int = 0) -> Picture:
-    """Draw a picture with `draw_picture` and the cache of the calling process, `BAKE_CACHE`."""
+    """Draw a picture with `draw_picture` and the cache of the calling process, `BAKE_CACHE`.
+
+    `keep_gbuffers` says whether G-buffers are kept in it. `workers` is the number of processes that draw a
+    large picture; 0 means one per processor core.
+    """
     picture = draw_picture(view, BAKE_CACHE, keep_gbuffers=keep_gbuffers, workers=workers)
     BAKE_CACHE.evict_over_limit()
     return picture
@@ -82,7 +86,10 @@ def bake_picture(view: ViewInput, keep_gbuffers: bool = True, workers: int = 0) 
 def _draw_fields(
     view: ViewInput, cache: Cache | None, gbuffer_cache: Cache | None, workers: int
 ) -> Picture:
-    """Draw the picture without arrowheads and singularities."""
+    """Draw the picture without arrowheads and singularities.
+
+    `cache` keeps results that do not depend on the camera, and `gbuffer_cache` the others, if given.
+    """
     check_tone(view.look, [instance.tone for instance in view.instances], view.reference)
     if not view.draws_thresholds:
         check_color_values(view.look, view.instances)
@@ -137,8 +144,8 @@ def draw_rows(
     Returns
     -------
     (h, W, 4) float32 ndarray or None
-        Linear RGBA, not premultiplied, of the rows (`Strip.drawn_rows`) of all strips. None if no mesh with a
-        field is visible in them.
+        Linear RGBA, not premultiplied, of the rows (`Strip.drawn_rows`) of all strips, from the bottom. None
+        if no mesh with a field is visible in them.
     """
     try:
         picture = _draw_strips(view, strips, cache, None)
@@ -155,7 +162,8 @@ def _draw_strips(
     """Draw neighboring strips, and return a picture of their rows.
 
     The meshes are also projected to some rows above and below the strips, because streamlines that begin in
-    the strips may reach them.
+    the strips may reach them. `cache` keeps results that do not depend on the camera, and `gbuffer_cache` the
+    others, if given.
     """
     camera, look = view.shaded_camera, view.look
     scene = view.instances, camera, look.display

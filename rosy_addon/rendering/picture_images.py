@@ -32,9 +32,17 @@ CONVERSION_START = 0.95
 def draw_image(
     view: ViewInput, as_float: bool, keep_gbuffers: bool = True, workers: int = 0
 ) -> tuple[Picture, ImageData]:
-    """Draw a picture with numpy and convert it to an image; see `bake_picture` and `picture_image`.
+    """Draw a picture with numpy, convert it to an image, and return both.
 
-    Return the picture and the image.
+    Parameters
+    ----------
+    view : ViewInput
+    as_float : bool
+        Whether the image has linear values in single precision, instead of 8-bit sRGB.
+    keep_gbuffers : bool
+        Whether G-buffers are kept in the cache of this process.
+    workers : int
+        Number of processes that draw a large picture together. 0 means one per processor core.
     """
     with progress(0.0, CONVERSION_START):
         picture = bake_picture(view, keep_gbuffers, workers)

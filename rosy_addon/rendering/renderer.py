@@ -38,7 +38,8 @@ class ViewportRenderer:
     def prepare_steps(self, instances: Sequence[MeshInstance], display: str) -> Steps[Any]:
         """Do the slow work before a picture, step by step: compile shaders, prepare meshes and upload them.
 
-        Each yielded step names the work that comes next. No step is yielded if everything is prepared.
+        Each yielded step names the work that comes next. No step is yielded if everything is prepared. The
+        arguments are the mesh instances of the picture and `Look.display` of its look, as for `upload`.
         """
         raise NotImplementedError
 

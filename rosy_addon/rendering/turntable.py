@@ -76,7 +76,8 @@ def turntable_views(
     size : (int, int)
         Width and height in pixels.
     view_angles : (float, float)
-        Azimuth of the first view and elevation of all views, in degrees.
+        Azimuth of the first view, 0 from the front (-y) and 90 from the right (+x), and elevation of all
+        views, in degrees.
     perspective : bool
         Whether the camera is perspective. If not, it is orthographic.
     lights : sequence of Light
@@ -186,8 +187,13 @@ def video_steps(
     draw : function
         ``draw(view)`` returns the steps of a job. The job draws the view, and its result is the `video_frame`
         of the picture.
-    views, count, path, fps
-        See `turntable`. Only the suffix of the path is used, for the format. Nothing is written to it.
+    views : iterable of ViewInput
+    count : int
+        Number of views.
+    path : Path
+        Only the suffix is used, for the format: .gif or .mp4. Nothing is written to the path.
+    fps : float
+        Frames per second.
     encode : function
         Takes the arguments of an `Encoder`, and returns the steps of a job that encodes an .mp4.
     """
@@ -223,7 +229,11 @@ def is_gif(path: Path) -> bool:
 
 
 def draw_frame(view: ViewInput, as_gif: bool, keep_gbuffers: bool, workers: int) -> Any:
-    """Draw a picture with `bake_picture`, and return its `video_frame`."""
+    """Draw a picture with `bake_picture`, and return its `video_frame` for a .gif, or else for an .mp4.
+
+    `keep_gbuffers` says whether G-buffers are kept in the cache of this process. `workers` is the number of
+    processes that draw a large picture; 0 means one per processor core.
+    """
     return video_frame(bake_picture(view, keep_gbuffers, workers).rgba, as_gif)
 
 
@@ -245,7 +255,7 @@ def video_frame(rgba: np.ndarray, as_gif: bool) -> Any:
     Parameters
     ----------
     rgba : (H, W, 4) float32 ndarray
-        Pixels as in `Picture.rgba`.
+        Picture: linear, not premultiplied, rows from the bottom.
     as_gif : bool
         Whether the video is a .gif. If not, it is an .mp4.
 
@@ -265,6 +275,7 @@ def video_frame(rgba: np.ndarray, as_gif: bool) -> Any:
 def _swept_hull(points: np.ndarray) -> np.ndarray:
     """Return points, (n, 3), that enclose all positions of a mesh while it turns about its vertical axis.
 
+    `points` are the vertices of the mesh, (V, 3), with z up.
     The mesh is cut into 32 horizontal slices. Each slice is enclosed by a cylinder. The points are samples of
     the two rims of each cylinder.
     """

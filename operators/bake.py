@@ -94,7 +94,10 @@ class ROSY_OT_bake_animation(ModalJobMixin, bpy.types.Operator):
     filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
 
     def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
-        """Ask for a folder if the scene has none, such as in a file that was never saved."""
+        """Ask for a folder if the scene has none, such as in a file that was never saved.
+
+        Return the result of the operator; None if nothing is asked.
+        """
         try:
             output_folder(context.scene)
         except RosyError:

@@ -41,7 +41,10 @@ class ROSY_OT_bake_texture(ModalJobMixin, Operator):
     )
 
     def ask(self, context: Context, event: Event) -> set[str] | None:
-        """If there are meshes without a UV map, ask the user whether to unwrap them."""
+        """If there are meshes without a UV map, ask the user whether to unwrap them.
+
+        Return the result of the operator; None if nothing is asked.
+        """
         if self.unwrap or not self._without_uv_map(context):
             return None
         return context.window_manager.invoke_props_dialog(self, width=340, confirm_text="Unwrap")

@@ -184,7 +184,7 @@ class RosyOperator:
 
 
 def sync_suffix(operator: Operator, suffix: str) -> bool:
-    """Set the suffix of an operator's file path. Return whether the path has changed.
+    """Set the suffix, such as ".svg", of an operator's file path. Return whether the path has changed.
 
     A path without a file name is not changed.
     """

@@ -128,7 +128,7 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         return result
 
     def _drag(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Handle an event while the mouse button is down. Return the result for `modal`."""
+        """Handle an event while the mouse button is down. Return the operator's result for this event."""
         try:
             if event.type in {"MOUSEMOVE", "INBETWEEN_MOUSEMOVE"}:
                 if self._add(context, event) and event.type == "MOUSEMOVE":

@@ -77,7 +77,10 @@ class ROSY_OT_field_import(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Im
     )
 
     def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
-        """Ask for the settings if a file was dropped on the 3D view; otherwise ask for a file."""
+        """Ask for the settings if a file was dropped on the 3D view; otherwise ask for a file.
+
+        Return the result of the operator; None if `skip_browser` is set.
+        """
         return None if self.skip_browser else self.invoke_popup(context)
 
     def begin(self, context: bpy.types.Context) -> Steps[str]:

@@ -47,7 +47,8 @@ class ROSY_OT_strokes(ModalJobMixin, bpy.types.Operator):
     def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
         """Ask for the path if strokes go to a file.
 
-        Ask for a confirmation if edited strokes would be replaced.
+        Ask for a confirmation if edited strokes would be replaced. Return the result of the operator; None
+        if nothing is asked.
         """
         if self._kind(context) == "FILE":
             if self.properties.is_property_set("filepath"):

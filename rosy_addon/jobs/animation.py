@@ -95,12 +95,18 @@ def bake_animation(
     cameras : sequence of bpy.types.Object, optional
         One image sequence is drawn from each of these cameras. By default one sequence is drawn, each frame
         from the camera that renders it, which timeline markers may change.
-    objects, look, size, workers : optional
-        See `bake`. If `look` is not given, the settings of the scene's look may be animated.
+    objects : sequence of bpy.types.Object, optional
+        Objects whose fields are drawn. By default all visible objects with a field.
+    look : Look, optional
+        Settings of the drawing. By default the look of the scene, which may be animated.
+    size : (int, int), optional
+        Width and height in pixels. By default the render resolution of the scene, scaled as in `bake`.
     settings : OutputSettings, optional
         How the pictures are stored and applied, with a folder. By default the settings of the scene.
     show : bool
         Whether the objects get a material that plays the sequence.
+    workers : int
+        Number of processes that draw a large picture together. 0 means one per processor core.
 
     Yields
     ------
@@ -250,8 +256,9 @@ def _frame_steps(
 ) -> Steps[tuple[SceneData, list[_Frame]]]:
     """Draw one frame from all cameras as part of a job.
 
-    Return what was read, and the frame of each camera. `cache` has the meshes and fields of earlier frames.
-    The other parameters are as in `bake_animation`.
+    Return what was read, and the frame of each camera. The frame `frame` is already the current frame of the
+    scene. If `cameras` is None, it is drawn from the camera that renders it. `cache` has the meshes and
+    fields of earlier frames. The other parameters are as in `bake_animation`.
     """
     look = read_look(scene.rosy) if look is None else look
     # The look may be animated, and not every device can draw every method, so the device is chosen per frame.

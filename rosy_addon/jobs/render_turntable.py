@@ -54,7 +54,8 @@ def render_turntable(
     size : (int, int)
         Width and height in pixels.
     view_angles : (float, float)
-        Azimuth of the first view and elevation of all views, in degrees.
+        Azimuth of the first view, 0 from the front (-y) and 90 from the right (+x), and elevation of all
+        views, in degrees.
     still : bool
         Whether the camera stays at the first view. Then only the streaks move.
     workers : int
@@ -90,7 +91,11 @@ def render_turntable(
 def _frame_steps(
     view: ViewInput, device: str, as_gif: bool, still: bool, workers: int
 ) -> Steps[Any]:
-    """Draw a view as part of a job, and return its `video_frame`."""
+    """Draw a view as part of a job, and return its `video_frame`, for a .gif or else for an .mp4.
+
+    `device` is "cpu" or "gpu". If the camera stands still (`still`), the G-buffer is kept for the next view.
+    `workers` is the number of processes that draw a large picture; 0 means one per processor core.
+    """
     if device == "cpu":
         return (yield Call(turntable.draw_frame, (view, as_gif, still, workers)))
     picture = yield from picture_steps(view, device)

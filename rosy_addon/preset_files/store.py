@@ -166,7 +166,15 @@ def find_preset_file(preset: str | Path, user_folder: Path | None = None) -> Pat
 
 
 def load_preset(preset: str | Path, user_folder: Path | None = None) -> Preset:
-    """Find and read a preset; see `find_preset_file` and `read_preset`."""
+    """Read a preset, given its key, its name or the path of its file.
+
+    `user_folder` is the folder of the user's own presets, if there is one.
+
+    Raises
+    ------
+    RosyError
+        If there is no such preset, or its file cannot be read.
+    """
     return read_preset(find_preset_file(preset, user_folder))
 
 

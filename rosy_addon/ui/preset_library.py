@@ -143,7 +143,7 @@ def is_changed(settings: Any) -> bool:
 
 
 def apply_preset(settings: Any, preset: str) -> None:
-    """Copy the look of a preset to ``scene.rosy``.
+    """Copy the look of a preset, given its key, its name or the path of its file, to ``scene.rosy``.
 
     Raises
     ------

@@ -131,9 +131,10 @@ def _own_points(context: Context, obj: Object) -> np.ndarray:
 def _vertex_under(
     context: Context, obj: Object, points: np.ndarray, mouse: tuple[float, float]
 ) -> int | None:
-    """Return the vertex (an index of `_own_points`) nearest to the surface point under the mouse.
+    """Return the vertex (an index into `points`) nearest to the surface point under the mouse.
 
-    None if the mouse is not over the object.
+    `points` is the result of `_own_points`, and `mouse` is in pixels of the region. None if the mouse is not
+    over the object.
     """
     region, view = context.region, context.region_data
     to_object = obj.matrix_world.inverted_safe()
@@ -147,7 +148,10 @@ def _vertex_under(
 
 
 def _handle_under(context: Context, obj: Object, mouse: tuple[float, float]) -> int | None:
-    """Return the vertex of the visible handle nearest to the mouse. None if no handle is near enough."""
+    """Return the vertex of the visible handle nearest to the mouse. None if no handle is near enough.
+
+    The vertex is an index into the original mesh. `mouse` is in pixels of the region.
+    """
     shown = overlay.shown(obj.name)
     assert shown is not None and shown.vertex is not None
     points = overlay.offset_points(obj, shown)

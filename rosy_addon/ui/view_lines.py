@@ -23,9 +23,10 @@ def to_pixels(region: Region, view: RegionView3D, points: np.ndarray) -> np.ndar
 
 
 def draw_lines(kind: str, points: np.ndarray, color: tuple[float, ...], width: float) -> None:
-    """Draw lines between (n, 2) finite positions in pixels of the region or window. `width` is in pixels.
+    """Draw lines between (n, 2) finite positions in pixels of the region or window.
 
-    The kind is "LINES" (one line for each pair of points) or "LINE_STRIP" (a polyline).
+    `kind` is "LINES" (one line for each pair of points) or "LINE_STRIP" (a polyline). `color` is RGBA,
+    display values, and `width` is in pixels.
     """
     if len(points) < 2:  # Blender cannot make an empty batch
         return

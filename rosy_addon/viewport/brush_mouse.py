@@ -28,7 +28,7 @@ class BrushMouse:
         self._surface = BrushSurface(obj, context.evaluated_depsgraph_get(), surface)
 
     def place(self, mouse: tuple[float, float]) -> np.ndarray | None:
-        """Return the point of the rest shape under the mouse, (3,) float32 in object space.
+        """Return the point under the mouse on the object's original mesh, (3,) float32 in object space.
 
         `mouse` is in pixels from the lower left corner of the region. Return None if the object is not under
         the mouse.
@@ -38,7 +38,7 @@ class BrushMouse:
         return self._surface.cast_ray(origin, direction)
 
     def radius(self, place: np.ndarray, pixels: float) -> float:
-        """Return the length in object space of a number of pixels at a point of the rest shape."""
+        """Return the length in object space of a number of pixels at `place`, a point in object space."""
         world = self._obj.matrix_world @ Vector(place.tolist())
         x, y = self._region.width / 2, self._region.height / 2
         start, end = (
@@ -48,7 +48,14 @@ class BrushMouse:
         return pixels * (end - start).length / (self._obj.matrix_world.median_scale or 1.0)
 
     def dashes(self, place: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return short line segments along the field around a point of the rest shape.
+        """Return short line segments along the field around a point.
+
+        Parameters
+        ----------
+        place : (3,) ndarray
+            Center of the brush: a point of the original mesh, object space.
+        radius : float
+            Radius of the brush, object space.
 
         Returns
         -------

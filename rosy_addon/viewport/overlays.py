@@ -85,7 +85,7 @@ def pixel_frames(context: Context, points: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def _draw_triangles(vertices: np.ndarray, code: str, opacity: float) -> None:
-    """Draw triangles, given their (n, 3) corners in world space, in a color."""
+    """Draw triangles, given their (n, 3) corners in world space, in a hex color."""
     if not len(vertices):  # Blender cannot make a batch without vertices
         return
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
@@ -140,7 +140,8 @@ def look_up_singularities(
 ) -> tuple[np.ndarray, np.ndarray] | Preparation:
     """Look up the singularities of an instance with a field, or return a `Preparation` that finds them.
 
-    See `field.find_singularities`. All deformations of a mesh have the same singularities.
+    They are (K,) vertices and (K,) indices in units of 1 / N, row by row (`field.find_singularities`). All
+    deformations of a mesh have the same singularities.
     """
     surface = instance.surface
     key = "singularities", surface.rest_shape_key, instance.field
@@ -165,7 +166,7 @@ def singularity_dots(
     cache : Cache
         Stores the singularities of fields.
     clip_planes : (6, 4) float64 ndarray or None
-        See `rendering.view_input.ViewInput`.
+        Plane equations in world space. The negative side of each plane is cut away.
 
     Returns
     -------
@@ -209,7 +210,11 @@ def draw_dots(
 def draw_singularities(
     context: Context, view_input: ViewInput, look: Look, overlay: ViewOverlay, cache: Cache
 ) -> None:
-    """Draw the dots of a view, and store in its overlay those that get labels."""
+    """Draw the dots of a view, and store in its overlay the dots that get labels.
+
+    `view_input` has the instances and the clip planes. `look` is the look of the scene; the look of
+    `view_input` may have another LIC method.
+    """
     found = [
         singularity_dots(instance, look, cache, view_input.clip_planes)
         for instance in view_input.instances
@@ -244,7 +249,8 @@ def _disc_triangles(
 ) -> np.ndarray:
     """Return the (n, 3) corners of the triangles of a disc at each of K points, facing the camera.
 
-    The (K,) radii and the (K,) offsets toward the camera are in pixels.
+    Points and corners are in world space. The (K,) radii and the (K,) offsets toward the camera are in
+    pixels.
     """
     right, up, nearer = pixel_frames(context, points)
     angles = np.linspace(0, 2 * np.pi, DISC_SEGMENTS + 1)
@@ -335,7 +341,7 @@ def draw_view_arrowheads(
 def _head_triangles(
     context: Context, marks: ArrowMarks, grown: float, nearness: float
 ) -> np.ndarray:
-    """Return the (n, 3) float32 corners of the triangles of arrowheads, facing the camera.
+    """Return the (n, 3) float32 corners, in world space, of triangles of arrowheads that face the camera.
 
     The outline of each arrowhead is moved outward by `grown` pixels, and the arrowhead is moved toward the
     camera by `nearness` pixels.

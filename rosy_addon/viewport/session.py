@@ -369,7 +369,7 @@ class ViewportSession:
             self._schedule(0.0, view3d.redraw_sidebars)
 
     def _lines_of_view(self, pointers: ViewPointers, layer: LayerState | None) -> list[str]:
-        """Return the rows of text that a view shows."""
+        """Return the rows of text that a view shows. `layer` is None if its view layer was never read."""
         lines = []
         if self.fallback_reason and time.monotonic() < self._fallback_time + MESSAGE_SECONDS:
             lines.append(f"drawn on the processor, at reduced size: {self.fallback_reason}")

@@ -78,7 +78,10 @@ def main(handle: str, package: str) -> None:
 def _answer(
     function: Callable[..., Any], arguments: tuple[Any, ...], reporter: _Reporter
 ) -> tuple[Any, ...]:
-    """Call a function, and return a message for the parent with its result or its error."""
+    """Call a function, and return a message for the parent with its result or its error.
+
+    It is ("result", result) or ("error", exception, text of the traceback).
+    """
     try:
         with listening(reporter):
             return "result", function(*arguments)

@@ -124,6 +124,7 @@ class _Worker:
     Attributes
     ----------
     frames : sequence of int
+        Frame numbers that the process works on.
     process : subprocess.Popen
     lines : list of str
         Lines of output that were read so far.

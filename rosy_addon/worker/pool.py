@@ -53,8 +53,9 @@ class Pool:
         function : function
             A function of a module that needs no Blender; see `Helper.submit`.
         arguments : sequence of tuple
+            The arguments of each call.
         count : int
-            Number of processes. 0 means one per processor core.
+            Number of processes, including this one. 0 means one per processor core.
         function_here : function, optional
             Function with the same results, for the calls in this process. For example, it may use a cache
             that exists only in this process. By default `function`.

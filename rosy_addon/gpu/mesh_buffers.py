@@ -220,7 +220,10 @@ def mesh_buffers(
 
 
 def empty_records(count: int, texels: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return new rows of the record texture, all zero, and a (count, texels, 4) view of the same memory."""
+    """Return new rows of the record texture, all zero, and a (count, texels, 4) view of the same memory.
+
+    `count` is the number of records, and `texels` the number of texels in each.
+    """
     row_count = max(-(-count * texels // ROW_TEXELS), 1)
     flat = np.zeros((row_count * ROW_TEXELS, 4), dtype=np.float32)
     return flat.reshape(row_count, ROW_TEXELS, 4), flat[: count * texels].reshape(count, texels, 4)
@@ -242,7 +245,7 @@ def _write_records(
     representation). The three values for the color map have one texel. Its last component is 1 if all three
     values are finite. The `SurfaceTone.values` at the corners have two texels: each corner has two components.
     Of the `rest_positions`, x is in the fourth components of the positions, y in the fourth components of the
-    normals, and z in the last texel. `corners` has the (T, 3, 4) rows of `MeshBuffers.corners`.
+    normals, and z in the last texel. `corners` has the rows of `MeshBuffers.corners`, as (T, 3, 4).
     """
     surface, tone, color_values = instance.surface, instance.tone, instance.color_values
     rest = rest_positions(surface)

@@ -161,8 +161,9 @@ class GpuRenderer(ViewportRenderer):
     ) -> tuple[Any, list[tuple[float, str, Callable[[], None]]]]:
         """Return the texture that a picture is drawn into, and the stages of drawing.
 
-        A stage is a tuple: the fraction of the picture that is done before it, a label for the user, and a
-        function that adds its passes to the frame.
+        Pictures with equal `target_key` and size share the texture. A stage is a tuple: the fraction of the
+        picture that is done before it, a label for the user, and a function that adds its passes to the
+        frame.
         """
         name = ("picture", target_key) if frame.samples is None else "shaded_picture"
         texture = self.resources.image(name, frame.size)

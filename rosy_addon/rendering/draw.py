@@ -122,7 +122,10 @@ def _draw_fields(
 
 
 def picture_groups(view: ViewInput, workers: int) -> list[Sequence[Strip]]:
-    """Divide a picture into strips of rows. Return groups of strips to draw together; see `group_strips`."""
+    """Divide a picture into strips of rows. Return groups of strips to draw together; see `group_strips`.
+
+    `workers` is the number of processes, each of which draws one group at a time.
+    """
     scene = view.look, view.shaded_camera, view.instances
     strips = divide_into_strips(*scene)
     return [strips] if view.draws_thresholds else group_strips(strips, *scene, workers)

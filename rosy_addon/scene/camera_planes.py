@@ -78,7 +78,7 @@ def add_camera_plane(
         Corners of the plane in camera space, counter-clockwise as seen from the camera.
     material : bpy.types.Material
     track : function
-        Called with each new datablock; see `datablocks.rollback_on_error`.
+        Called with each new datablock, which it returns; see `datablocks.rollback_on_error`.
     """
     mesh = track(bpy.data.meshes.new(name))
     mesh.from_pydata(corners.tolist(), [], [(0, 1, 2, 3)])
@@ -144,7 +144,7 @@ def update_backdrops(scene: bpy.types.Scene) -> None:
 
 
 def _add_backdrop(scene: bpy.types.Scene, camera: bpy.types.Object, paper: str) -> None:
-    """Add a plane with the color of the paper, parented to a camera."""
+    """Add a plane with the color of the paper, given as a hex color, parented to a camera."""
     name = f"RoSy Backdrop {camera.name}"
     view = camera_of_object(scene, scene_depsgraph(scene), camera)
     corners = frame_corners(view, DISTANCE * camera.data.clip_end, OVERSIZE)

@@ -74,7 +74,7 @@ def _has_attribute(mesh: Mesh, name: str, domain: str, data_type: str) -> bool:
 def field_values(attribute: Attribute, source: str, mesh: Mesh) -> np.ndarray:
     """Return the values of a field attribute: (n, 3) vectors or (n,) angles, float32.
 
-    `source` is the name of the attribute in messages.
+    Row i is the value at face, point or corner i. `source` is the name of the attribute in messages.
 
     Raises
     ------
@@ -149,7 +149,7 @@ def get_or_create_attribute(
 def store_attribute(
     mesh: Mesh, name: str, data_type: str, values: np.ndarray, domain: str = "FACE"
 ) -> Attribute:
-    """Write the values of the attribute that `get_or_create_attribute` returns, and return it."""
+    """Create an attribute if it is missing, write its values, one row per element, and return it."""
     attribute = get_or_create_attribute(mesh, name, data_type, domain)
     write_attribute(attribute, values)
     return attribute

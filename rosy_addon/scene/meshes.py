@@ -268,7 +268,7 @@ def read_attribute(mesh: Mesh, name: str, dtype: type, columns: int) -> np.ndarr
 
 
 def write_attribute(attribute: Attribute, values: np.ndarray) -> None:
-    """Set the values of an attribute of a mesh, Curves or a Grease Pencil drawing."""
+    """Set the values of an attribute of a mesh, Curves or a Grease Pencil drawing: a row per element."""
     dtype = {"INT": np.int32, "INT8": np.int8}.get(attribute.data_type, np.float32)
     key = VALUE_KEYS.get(attribute.data_type, "value")
     attribute.data.foreach_set(key, np.ascontiguousarray(values, dtype=dtype).ravel())

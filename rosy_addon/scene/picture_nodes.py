@@ -89,7 +89,7 @@ def new_material(
     camera : Camera
         The camera from which the picture was drawn.
     track : function
-        Called with each new datablock; see `datablocks.rollback_on_error`.
+        Called with each new datablock, which it returns; see `datablocks.rollback_on_error`.
     settings : OutputSettings
     hatching : Hatching, optional
         How hatching is drawn. Given if the image has thresholds of ink instead of colors.

@@ -367,6 +367,8 @@ def _reference_digest(scene: Scene, depsgraph: Depsgraph) -> str:
 def _picture_box(camera: Camera, corners: np.ndarray) -> np.ndarray | None:
     """Return a box around the projections of points in a picture; None if it is outside the picture.
 
+    `corners` are (n, 3) points in world space.
+
     Returns
     -------
     (2, 3) float64 ndarray or None

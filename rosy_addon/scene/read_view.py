@@ -172,7 +172,8 @@ def read_texture_input(
 ) -> tuple[MeshInstance, np.ndarray]:
     """Read an evaluated object with its field, and the UV map of its texture.
 
-    If `color_attribute` is given, this attribute is read as the values for the color map.
+    `uv_map` is the name of the UV map; the active one if it is empty. `color_attribute` is the name of the
+    attribute with the values for the color map; if it is None, no values are read.
 
     Returns
     -------

@@ -244,7 +244,10 @@ def _digest_parts(data: ID) -> list[object]:
 
 
 def _attribute_parts(attributes: Any, offsets: Any) -> list[object]:
-    """Return the values of `STROKE_ATTRIBUTES`, and the index of the first point of each stroke."""
+    """Return the values of `STROKE_ATTRIBUTES`, and the index of the first point of each stroke.
+
+    `attributes` and `offsets` are collections of Curves or of a Grease Pencil drawing.
+    """
     position = attributes.get("position")
     if position is None or not len(position.data):  # the offsets of an empty drawing are unreadable
         return []

@@ -57,7 +57,10 @@ def text(name: str, description: str, **others: Any) -> Any:
 
 
 def file_filter(*suffixes: str) -> Any:
-    """Return the property of an operator by which the file browser shows only files with some suffixes."""
+    """Return the property by which the file browser of an operator shows only files with some suffixes.
+
+    Suffixes begin with a dot, such as ".json".
+    """
     pattern = ";".join(f"*{suffix}" for suffix in suffixes)
     return bpy.props.StringProperty(default=pattern, options={"HIDDEN"})
 

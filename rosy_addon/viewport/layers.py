@@ -70,8 +70,8 @@ class LayerStates:
     ) -> LayerState:
         """Return the state of the context's view layer, up to date unless its `is_starting` is true.
 
-        Reading may be slow. So the first call only creates the state: the view can first draw the message
-        that meshes are being read.
+        `include_occluders` says whether meshes without a field are read too. Reading may be slow. So the
+        first call only creates the state: the view can first draw the message that meshes are being read.
         """
         key = context.scene.name, context.view_layer.name
         if key not in self._layers:

@@ -212,8 +212,8 @@ def draw_singularities(
 ) -> None:
     """Draw the dots of a view, and store in its overlay the dots that get labels.
 
-    `view_input` has the instances and the clip planes. `look` is the look of the scene; the look of
-    `view_input` may have another LIC method.
+    `view_input` has the instances and the clip planes. `look` is the look of the scene; in the look of
+    `view_input`, dots are switched off.
     """
     found = [
         singularity_dots(instance, look, cache, view_input.clip_planes)

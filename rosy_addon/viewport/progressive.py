@@ -353,7 +353,8 @@ class ProgressiveRenderer:
         """Begin a picture of a view, or schedule a redraw if another view goes first.
 
         Pictures are rendered one at a time, because they share the renderer's images. Pictures that are
-        rendered within one redraw (`is_at_once`) go before those that are rendered in slices of time.
+        rendered within one redraw (`is_at_once`) go before others, which are rendered in slices of time.
+        `downscale` is the width of a pixel of the picture, in pixels of the view.
         """
         others = [other for other in self.views.values() if other is not view]
         for other in others:

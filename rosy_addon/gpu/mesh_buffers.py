@@ -243,7 +243,7 @@ def _write_records(
     further texels: six components are the real and imaginary parts at the three corners, the seventh is the
     result of `field_channel.rotation_order`, and the eighth is the layer of the channel (0 for the
     representation). The three values for the color map have one texel. Its last component is 1 if all three
-    values are finite. The `SurfaceTone.values` at the corners have two texels: each corner has two components.
+    values are finite. The `SurfaceTone.values` at the corners have two texels: two components per corner.
     Of the `rest_positions`, x is in the fourth components of the positions, y in the fourth components of the
     normals, and z in the last texel. `corners` has the rows of `MeshBuffers.corners`, as (T, 3, 4).
     """
@@ -319,7 +319,7 @@ def mip_atlas(mip_map: MipMap, max_side: int) -> tuple[np.ndarray, tuple[int, in
     ----------
     mip_map : MipMap
     max_side : int
-        Levels with a side of more pixels are left out. The largest of the others becomes level 0 of the image.
+        Levels with a side of more pixels are left out. The largest other level becomes level 0 of the image.
 
     Returns
     -------

@@ -268,7 +268,7 @@ def check_folder(folder: str | os.PathLike[str]) -> None:
 
 
 def file_stamp(path: Path) -> tuple[int, ...]:
-    """Return the time and the size of a file or folder, which change with it; empty if it does not exist."""
+    """Return the time of the last change (ns) and the size of a file or folder; () if it does not exist."""
     try:
         status = path.stat()
     except OSError:

@@ -42,7 +42,7 @@ def read_dmat(path: Path) -> RawField:
 
 
 def _size(path: Path, header: bytes) -> tuple[int, int]:
-    """Return the numbers of columns and of rows that a header declares."""
+    """Return the numbers of columns and of rows in a line `header`, before the numbers of a matrix."""
     words = header.split()
     if len(words) != 2 or not all(word.isdigit() for word in words):
         raise RosyError(f"{path}: expected the numbers of columns and of rows at its beginning")

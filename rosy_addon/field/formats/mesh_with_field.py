@@ -116,7 +116,10 @@ def _table(arrays: dict[str, np.ndarray]) -> np.ndarray:
 
 
 def _ply_faces(surface: Surface, values: np.ndarray) -> bytes:
-    """Return the rows of the faces of a `.ply` file; `values` is a table of what follows the corners."""
+    """Return the rows of the faces of a binary `.ply` file: the count of corners, their vertices, and values.
+
+    `values` is a structured array with a row for each face: the properties that follow the vertices.
+    """
     sizes = np.diff(surface.face_start)
     row_bytes = 4 + 4 * sizes + values.dtype.itemsize
     starts = np.cumsum(row_bytes) - row_bytes

@@ -30,7 +30,10 @@ _CORNER_PROPERTIES = ("vertex_indices", "vertex_index")
 
 @dataclass(frozen=True)
 class _Property:
-    """A property (column) of an element, as the header declares it; types are numpy type codes."""
+    """A property (column) of an element, as the header declares it: a number or a list in each row.
+
+    Types are codes of numpy, such as "f4".
+    """
 
     name: str
     type: str
@@ -87,8 +90,9 @@ def read_ply(path: Path) -> Polygons:
 def _strip_triangles(vertices: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the triangles of strips, as the vertices of their corners and the first corner of each.
 
-    A strip ends at the end of a list and at -1. Every other triangle is clockwise. Triangles that have a vertex
-    twice, which turn a strip, are left out.
+    The strips are rows of vertices: row i is ``vertices[starts[i] : starts[i + 1]]``. A strip ends at the end
+    of its row and at -1. Three consecutive vertices are a triangle, and every other triangle is clockwise.
+    Triangles that have a vertex twice, which turn a strip, are left out.
     """
     vertices = np.insert(vertices.astype(np.float64), starts[1:-1], -1)
     is_end = vertices == -1

@@ -34,13 +34,14 @@ def closest_triangles(
     points : (n, 3) float64 ndarray
         Positions in object space.
     max_distance : float
-        Largest distance that matters. For a point that is farther away from the surface, the result may be
-        any triangle at its distance, or none.
+        Largest distance that matters, in object space. For a point that is farther away from the surface, the
+        result may be a triangle that is not the closest one, or none.
 
     Returns
     -------
     triangle : (n,) int32 ndarray
-        Index into `surface.triangles`; the smallest index if several triangles are equally close.
+        Index into `surface.triangles`; the smallest index if several triangles are equally close, and 0 if no
+        triangle was found.
     distance : (n,) float64 ndarray
         Distance of the point from the triangle, in object space; infinite if no triangle was found.
     """

@@ -36,12 +36,13 @@ TOLERANCE, MAX_ITERATIONS = 1e-2, 100
 def coherent_edge_guides(surface: Surface, ends: np.ndarray, degree: int) -> np.ndarray:
     """Make guides along edges, on their faces, without guides that contradict the other edges around them.
 
-    Voxel remeshing, for example, turns a sharp edge of a part into steps. Their directions say nothing about the
-    part, and a field along them has a pair of singularities at each step.
+    Voxel remeshing, for example, turns a sharp edge of a part into steps. Their directions say nothing about
+    the part, and a field along them has a pair of singularities at each step.
 
-    The guides are averaged over the distance `JAG_LENGTH`, along the faces that touch the edges, and a guide is
-    removed if the average is short or points elsewhere. Faces are unfolded at their common edges, so that the
-    corner of a box does not count as a contradiction for degree 4. Guides on faces larger than the distance are kept.
+    The guides are averaged over the distance `JAG_LENGTH`, along the faces that touch the edges, and a guide
+    is removed if the average is short or points elsewhere. Faces are unfolded at their common edges, so that
+    the corner of a box does not count as a contradiction for degree 4. Guides on faces larger than the
+    distance are kept.
 
     Parameters
     ----------

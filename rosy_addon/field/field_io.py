@@ -209,7 +209,10 @@ def _joined_rows(raws: list[RawField], paths: list[Path]) -> np.ndarray:
 
 
 def _with_degree(raw: RawField, path: Path, degree: int | None) -> tuple[RawField, str]:
-    """Return the rows of a file with the opposites of directions that are not stored, and a note on that.
+    """Return the rows of a file with all N directions, and a note for the user on how they were read.
+
+    If the file stores a cross by two directions, their opposites are added. `degree` is the requested degree,
+    or None for any degree. The note is empty if there is nothing to say.
 
     Raises
     ------
@@ -271,7 +274,8 @@ def field_from_raw(
 def _check_header(raw: RawField, surface: Surface, source: str) -> None:
     """Raise a `RosyError` if a file does not have the number of rows that its header declares.
 
-    Some programs write the number of vertices in the header of a field on faces. This is accepted.
+    Some programs write the number of vertices in the header of a field on faces. This is accepted. `source`
+    is the name of the file in the message.
     """
     row_count, vertex_count = len(raw.values), len(surface.vertices)
     is_mixed = (raw.header_count, row_count) == (vertex_count, surface.face_count)
@@ -286,7 +290,9 @@ def _source_surface(
 ) -> Surface | None:
     """Return the surface of the mesh file to which the rows of a field file belong.
 
-    The result is None if the rows belong to `surface` itself.
+    The result is None if the rows belong to `surface` itself. `path` is the field file. `mesh` is the mesh
+    file that the user has named. If it is None, the mesh in the field file is used or, if the number of rows
+    does not fit `surface`, a mesh file of the same name in the same folder.
     """
     if mesh is not None:
         return Surface(mesh)

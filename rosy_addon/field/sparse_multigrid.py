@@ -104,7 +104,7 @@ class CSRMatrix:
         return concatenated_ranges(self.indptr[:-1][rows], np.diff(self.indptr)[rows])
 
     def rows(self, rows: np.ndarray) -> CSRMatrix:
-        """Return the matrix that consists of the given rows."""
+        """Return the matrix that consists of the given rows, in the order of their indices `rows`."""
         entries = self.entries_of_rows(rows)
         indptr = np.concatenate([[0], np.cumsum(np.diff(self.indptr)[rows])])
         return CSRMatrix(indptr, self.indices[entries], self.data[entries], self.column_count)
@@ -263,8 +263,8 @@ def hierarchy(matrix: CSRMatrix, smoothed_size: int | None = None) -> list[Level
     matrix : CSRMatrix
         The (n, n) matrix, Hermitian.
     smoothed_size : int, optional
-        If n is larger, the prolongation of the finest level is not smoothed. This takes half the time, but a W-cycle then
-        reduces the error less.
+        If n is larger, the prolongation of the finest level is not smoothed. This takes half the time, but a
+        W-cycle then reduces the error less.
 
     Returns
     -------

@@ -72,11 +72,11 @@ def triangulate(
 def delaunay_triangles(
     points: np.ndarray, triangles: np.ndarray, triangle_face: np.ndarray
 ) -> np.ndarray:
-    """Return triangles with the Delaunay diagonals of their faces (Lawson 1977), whatever the first corners are.
+    """Return triangles with the Delaunay diagonals of the faces (Lawson 1977), whatever their first corners.
 
-    Diagonals are flipped until the two angles opposite each of them add up to at most 180 degrees. Where all corners of a
-    face lie on a circle, as in a rectangle, several divisions are as good. Then the cotangent weights of the diagonals
-    are 0, so that a Laplacian does not depend on the choice.
+    Diagonals are flipped until the two angles opposite each of them add up to at most 180 degrees. Where all
+    corners of a face lie on a circle, as in a rectangle, several divisions are as good. Then the cotangent
+    weights of the diagonals are 0, so that a Laplacian does not depend on the choice.
 
     Parameters
     ----------
@@ -129,9 +129,12 @@ def _diagonals(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _gain_of_flips(corners: np.ndarray) -> np.ndarray:
-    """Return (n,) sums of the cotangents of the angles opposite to the other diagonal, minus those of the present one.
+    """Return (n,) gains of flipping diagonals; a flip to a Delaunay diagonal has a positive gain.
 
-    `corners` is (n, 4, 3), as in `_diagonals`. The result is 0 where the other diagonal lies outside.
+    The gain is the sum of the cotangents of the two angles opposite to the other diagonal, minus this sum for
+    the present diagonal. It is 0 where the other diagonal lies outside. `corners` holds the (n, 4, 3)
+    positions of the corners of both triangles, counter-clockwise. The present diagonal is from the first to
+    the third.
     """
     following = np.roll(corners, -1, axis=1) - corners
     previous = -np.roll(following, 1, axis=1)
@@ -343,7 +346,10 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _smallest_sine(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-    """Return the smallest sine of the angles of each triangle; it is negative for clockwise triangles."""
+    """Return the (n,) smallest sines of the angles of triangles with (n, 2) corners a, b and c.
+
+    The sine is negative for clockwise triangles.
+    """
     area = _cross(b - a, c - a)
     ab, bc, ca = (np.linalg.norm(side, axis=1) for side in (b - a, c - b, a - c))
     scale = ab * bc * ca / np.maximum(np.minimum(np.minimum(ab, bc), ca), 1e-300)

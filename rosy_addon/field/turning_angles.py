@@ -69,14 +69,16 @@ def turning_angles(
     required : (n,) ndarray
         Sums of the angles around interior nodes, in radians; values at other nodes are ignored.
     present : (I,) ndarray or float
-        Turning angles of an existing field, to which the result will be added, in radians.
+        Turning angles of an existing field, to which the result will be added, in radians: counter-clockwise,
+        from the source to the target face of each edge.
 
     Returns
     -------
     angle : (I,) float64 ndarray
-        Angles in radians with the least weighted sum of squares. Around each loop, these angles, the present
-        angles and the angles between the frames of neighboring faces add up to a multiple of 2 pi / N. Where
-        the field would turn by pi / N or more between two faces, the angles are reduced, if possible.
+        Angles with the least weighted sum of squares, like `present`. Around each loop, these angles, the
+        present angles and the angles between the frames of neighboring faces add up to a multiple of 2 pi /
+        N. Where the field would turn by pi / N or more between two faces, the angles are reduced, if
+        possible.
     direction : (F,) float64 ndarray
         Direction on each face of the field that turns by the present angles plus these angles, in radians in
         the frame of the face.

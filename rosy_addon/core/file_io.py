@@ -131,7 +131,7 @@ def check_parsing_memory(path: str | os.PathLike[str], binary_memory: float) -> 
 
 
 def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
-    """Write a file atomically; see `replacing`.
+    """Write a file atomically: a reader finds either the old contents or all new contents.
 
     Raises
     ------

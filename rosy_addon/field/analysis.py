@@ -36,8 +36,9 @@ class Difference:
     ----------
     angle : (F,) float64 ndarray
         Angle between a vector of one field and the nearest vector of the other, in radians from 0 to
-        pi/N. It is the same for all N vectors of a face. NaN where either field is undefined. For
-        directions that are not rotationally symmetric, see `Field.difference`.
+        pi/N. It is the same for all N vectors of a face. NaN where either field is undefined. If the
+        directions of a field are not rotationally symmetric, it is the least mean angle between matched
+        directions (see `Field.difference`).
     mean, rms : float
         Mean and root mean square of the angle in radians, weighted by area.
     p95 : float

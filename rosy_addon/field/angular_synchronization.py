@@ -84,7 +84,11 @@ class PhaseGraph:
 def phase_graph(
     node_count: int, row: np.ndarray, column: np.ndarray, a: np.ndarray, b: np.ndarray
 ) -> PhaseGraph:
-    """Return a `PhaseGraph`, given its entries in any order. Entries of the same row and column are added."""
+    """Return a `PhaseGraph`, given its entries in any order.
+
+    `row`, `column`, `a` and `b` have one element for each entry, as in `PhaseGraph`. Entries with the same
+    row and column are added. Entries on the diagonal are left out.
+    """
     entry = np.flatnonzero(row != column)
     key = row[entry].astype(np.int64) * node_count + column[entry]
     key, order = sorted_with_order(key, max(node_count, 1) ** 2)

@@ -173,7 +173,10 @@ class _ClosestSearch:
         return np.sqrt(dot(gap, gap)).ravel()
 
     def update(self, owner: np.ndarray, candidate: np.ndarray) -> None:
-        """Update the results, given pairs of a point (`owner`) and a candidate for its closest triangle."""
+        """Update the results, given (m,) pairs of a point and a candidate for its closest triangle.
+
+        Element i of `owner` is the index of a point, and element i of `candidate` that of a triangle.
+        """
         for block in row_blocks(len(owner), MAX_PAIRS):
             point, triangle = owner[block], candidate[block]
             distance = point_triangle_distances(self.points[point], self.corners[triangle])

@@ -253,7 +253,7 @@ class BrushStroke:
     ----------
     system : GuidedSystem
     guides : (F,) complex128 ndarray
-        Representations of the guides, in the face frames of the system. They are changed in place.
+        Representations of the guides in `Surface.face_frames`. They are changed in place.
     brush : GuideBrush
     locate : callable
         Function that returns the (n,) int faces closest to (n, 3) points in object space; -1 for no face.
@@ -319,7 +319,10 @@ class BrushStroke:
         return changed
 
     def _add_dabs_to(self, point: np.ndarray, pressure: float) -> None:
-        """Add dabs at equal distances on the straight line from the last point to this one."""
+        """Add dabs at equal distances on the straight line from the last point to this one.
+
+        `point` is (3,) in object space. `pressure` is the pressure at the point, from 0 to 1.
+        """
         if self._end is None:
             self._end = _Dab(point, pressure, self._start_arc_length)
             self._dabs = [self._end, self._end]  # the start has no earlier dab

@@ -39,7 +39,11 @@ class Edges:
 
 
 def build_edges(corner_vertex: np.ndarray, face_start: np.ndarray) -> Edges:
-    """Find the edges of a polygon mesh, from `Surface.corner_vertex` and `Surface.face_start`."""
+    """Find the edges of a polygon mesh.
+
+    `corner_vertex` holds the (C,) vertices of the corners, face by face, and `face_start` the (F + 1,) first
+    corners of the faces, and C.
+    """
     tail = corner_vertex.astype(np.int64)
     head = tail[next_corners(face_start)]
     stride = int(corner_vertex.max(initial=0)) + 1

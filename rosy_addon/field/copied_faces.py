@@ -13,7 +13,11 @@ SPLIT_MIX_GAMMA = np.uint64(0x9E3779B97F4A7C15)
 def copied_faces(
     vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray
 ) -> np.ndarray:
-    """Return (F,) bool: which faces have the same corner positions as an earlier face, in any order."""
+    """Return (F,) bool: which faces have the same corner positions as an earlier face, in any order.
+
+    The mesh is given by (V, 3) positions, the (C,) vertices of the corners, and the (F + 1,) first corners of
+    the faces, and C.
+    """
     # A 64-bit hash of each position: the same positions have the same one, and 0.0 equals -0.0.
     bits = (np.asarray(vertices, dtype=np.float64) + 0.0).view(np.uint64)
     key = np.zeros(len(bits), dtype=np.uint64)

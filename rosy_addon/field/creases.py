@@ -64,7 +64,7 @@ MIN_CREASE_ANGLE = 1e-3
 
 
 def weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
-    """Return the weighted median of values; 0 if the total weight is 0."""
+    """Return the weighted median of (n,) values with (n,) weights; 0 if the total weight is 0."""
     order = np.argsort(values)
     total = np.cumsum(weights[order])
     if not len(total) or not total[-1] > 0:
@@ -278,7 +278,8 @@ def find_creases(surface: Surface, crease_angle: float) -> Creases:
 def _large_angles(normals: np.ndarray, sides: np.ndarray, least: float) -> np.ndarray:
     """Return the (I,) angles in radians between the normals of pairs of faces; 0 for angles below `least`.
 
-    `sides` holds the pairs of faces and is (2, I).
+    `normals` holds the (F, 3) face normals, and `sides` the pairs of faces: the first ones and the second
+    ones, (2, I). `least` is in radians.
     """
     angle = np.zeros(sides.shape[1])
     a, b = sides

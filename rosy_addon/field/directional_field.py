@@ -129,7 +129,7 @@ def closest_rosy(w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     Returns
     -------
     first_angle : (n,) float64 ndarray
-        Angle of the member that corresponds to the first direction of the row, in radians.
+        Angle in radians from the x axis of the frame to the member that corresponds to the first direction.
     rho : (n,) float64 ndarray
         Length of the members, the mean length of the directions; 0 where a direction is zero.
     direction_ratios : (n, N) complex128 ndarray
@@ -262,9 +262,9 @@ def tensor_field(surface: Surface, tensors: np.ndarray) -> RosyField:
     Returns
     -------
     RosyField
-        The stored member lies along the major eigenvector: the one with the greater signed eigenvalue.
-        The lengths of the directions are the absolute eigenvalues. `family_count` is 2. The field is
-        undefined (zero) where the two eigenvalues are equal.
+        The stored member lies along the major eigenvector: the one with the greater signed eigenvalue. The
+        lengths of the directions are the absolute eigenvalues, or 1/1000 of the larger one if that is more.
+        `family_count` is 2. The field is undefined (zero) where the two eigenvalues are equal.
     """
     vectors, ratios = by_rows(_tensor_directions, tensors, *surface.face_frames)
     return RosyField(4, vectors, ratios, 2)
@@ -273,7 +273,10 @@ def tensor_field(surface: Surface, tensors: np.ndarray) -> RosyField:
 def _tensor_directions(
     tensors: np.ndarray, x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return (F, 3) stored members and (F, 4) `direction_ratios` for `tensor_field`; x, y: face frames."""
+    """Return (F, 3) stored members and (F, 4) `direction_ratios` of the crosses along eigenvectors.
+
+    `tensors` holds (F, 3, 3) symmetric tensors, and x, y are the (F, 3) face frames (see `tensor_field`).
+    """
     a = np.einsum("fi,fij,fj->f", x, tensors, x)
     b = np.einsum("fi,fij,fj->f", x, tensors, y)
     c = np.einsum("fi,fij,fj->f", y, tensors, y)

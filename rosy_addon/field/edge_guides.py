@@ -1,4 +1,4 @@
-"""Guides along salient edges, without edges that are jagged, as the edges of remeshed parts are."""
+"""Make guides along salient edges, except edges with steps, as voxel remeshing makes them."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def coherent_edge_guides(surface: Surface, ends: np.ndarray, degree: int) -> np.
     Returns
     -------
     (F, 3) float64 ndarray
-        Unit vectors; zero on faces without a guide. See `guides.guides_from_edges`.
+        Unit vectors along the edges of a face (`guides.guides_from_edges`); zero on faces without a guide.
     """
     guides = guides_from_edges(surface, ends, degree)
     z = to_representation(guides, *surface.face_frames, degree)

@@ -197,7 +197,10 @@ def _read_rows(path: Path) -> RawField:
 
 
 def _joined_rows(raws: list[RawField], paths: list[Path]) -> np.ndarray:
-    """Return (n, k, 3) vectors of k files with one vector in each of their n rows."""
+    """Return (n, k, 3) vectors of k files with one vector in each of their n rows.
+
+    `raws` holds the rows of each file, and `paths` its path for messages.
+    """
     count = len(raws[0].values)
     for raw, path in zip(raws, paths, strict=True):
         if raw.values.shape != (count, 1, 3):
@@ -242,6 +245,7 @@ def field_from_raw(
     Parameters
     ----------
     raw : RawField
+        The rows of the file.
     surface : Surface
     degree : int or None
         Degree N for rows with one member vector, if the file does not state a degree; `DEFAULT_DEGREE` if
@@ -317,8 +321,8 @@ def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface
     """Write a field to a file, with one row for each face.
 
     `.obj` files contain the mesh and one row for each vertex. `.vtp`, `.vtu`, `.ply` and `.npz` files contain
-    the mesh, the directions and the numbers of the field. `.sings` and `.sing` files contain only the
-    singularities of the field.
+    the mesh, and the directions, magnitudes and singularities of the field. `.sings` and `.sing` files
+    contain only the singularities of the field.
 
     Numbers are written with all digits, so reading the file gives exactly the same float64 values. Only the
     field in an `.obj` file differs, because it is averaged onto the vertices. For a field made from

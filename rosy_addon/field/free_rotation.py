@@ -47,7 +47,7 @@ CREASE_ANGLE = np.pi / 6
 
 
 def freely_rotated(surface: Surface, z: np.ndarray, degree: int) -> np.ndarray:
-    """Return representations z of a field of degree N, rotated by one angle on each connected component.
+    """Return (F,) representations z of a field, rotated by one angle on each connected component.
 
     Parameters
     ----------

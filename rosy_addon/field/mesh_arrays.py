@@ -173,9 +173,11 @@ def _with_joined_borders(arrays: MeshArrays) -> tuple[MeshArrays, int, int]:
 
 
 def _with_faces(arrays: MeshArrays, vertex: Any, start: Any, corner: Any, face: Any) -> MeshArrays:
-    """Return arrays with other faces, which have the data of these corners and faces of the old ones.
+    """Return the arrays of a mesh with other faces, which take their data from the old faces.
 
-    `vertex` and `start` are the new `corner_vertex` and `face_start`.
+    `vertex` and `start` are the new `corner_vertex` and `face_start`. `corner` holds, for each new corner,
+    the old corner whose texture coordinates it gets, and `face`, for each new face, the old face whose data
+    it gets.
     """
     uv = None if arrays.uv is None else arrays.uv[corner]
     data = _selected_rows(arrays.face_data, face, len(arrays.face_start) - 1)

@@ -415,7 +415,10 @@ def _initial_angle(
 
 
 def _solve(matrix: CSRMatrix, rhs: np.ndarray, levels: list[Level] | None) -> np.ndarray:
-    """Solve a linear system by the conjugate gradient method, with multigrid as preconditioner if given."""
+    """Solve ``matrix @ solution = rhs`` by the conjugate gradient method, preconditioned by a W-cycle.
+
+    `levels` holds the multigrid levels of the matrix; None to build them.
+    """
     precondition = None if levels is None else partial(w_cycle, levels)
     label = "turning the field to the guides"
     return conjugate_gradient(matrix, rhs, TOLERANCE, precondition, label)

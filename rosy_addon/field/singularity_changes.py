@@ -87,7 +87,7 @@ def move_index(
 def _distance(surface: Surface, ends: np.ndarray) -> float:
     """Return the straight-line distance between two vertices, in object space.
 
-    It is 0 if one of them is `OUTSIDE` or not in the mesh.
+    `ends` holds the two vertices. The distance is 0 if one of them is `OUTSIDE` or not in the mesh.
     """
     if (ends < 0).any() or (ends >= len(surface.vertices)).any():
         return 0.0

@@ -392,7 +392,10 @@ def _dense_inverse(matrix: CSRMatrix) -> np.ndarray:
 
 
 def _plain_prolongation(aggregate: np.ndarray, count: int, phase: np.ndarray) -> CSRMatrix:
-    """Return the prolongation matrix with one entry in each row, given the results of `_aggregates`."""
+    """Return the (n, count) prolongation matrix that is not smoothed: the entry of a row is its phase.
+
+    `aggregate`, `count` and `phase` are results of `_aggregates`.
+    """
     return CSRMatrix(np.arange(len(aggregate) + 1), aggregate, phase, count)
 
 
@@ -405,7 +408,7 @@ def _smoothed_prolongation(
 ) -> CSRMatrix:
     """Return the prolongation matrix: one column for each aggregate, smoothed by a Jacobi step of the matrix.
 
-    `aggregate`, `count` and `phase` are results of `_aggregates`.
+    `aggregate`, `count` and `phase` are results of `_aggregates`, and `jacobi_weight` of `_jacobi_weights`.
     """
     unknowns = np.arange(len(matrix))
 

@@ -94,7 +94,8 @@ class StripePattern:
     Attributes
     ----------
     phase : (T, M, 3) float32 ndarray
-        The linear part of the phase, at the corners (see `evaluate`).
+        The linear part of the phase, at the three corners of each triangle. Where `index` is not 0,
+        `evaluate` adds a second part.
     index : (T, M) float32 ndarray
         Number of stripes that begin or end in each triangle: the integer by which the phase grows on the way
         around the triangle, counter-clockwise. It may be negative, and is 0 in most triangles.

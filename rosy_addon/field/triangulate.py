@@ -171,6 +171,7 @@ def _fan_apexes(
     Parameters
     ----------
     vertices, corner_vertex, face_start : ndarray
+        The polygon mesh, as in `triangulate`.
     faces : (n,) int ndarray
         Faces with more than three corners.
 
@@ -290,7 +291,7 @@ def _ear_clip(points: np.ndarray) -> np.ndarray:
 
 
 class _RemainingCorners:
-    """The corners of a polygon that are not cut off yet, sorted along both axes."""
+    """The corners of a polygon in the plane that are not cut off yet, sorted by x and sorted by y."""
 
     def __init__(self, points: np.ndarray) -> None:
         self._points = points
@@ -299,7 +300,7 @@ class _RemainingCorners:
         self._sort()
 
     def _sort(self) -> None:
-        """Sort the remaining corners along both axes."""
+        """Sort the remaining corners by x, and in a second list by y."""
         corners = np.flatnonzero(self._alive)
         self._order = [corners[np.argsort(self._points[corners, axis])] for axis in (0, 1)]
         self._coordinate = [self._points[self._order[axis], axis] for axis in (0, 1)]

@@ -261,8 +261,8 @@ def tangent_normals(surface: Surface, domain: str) -> np.ndarray:
     Returns
     -------
     (F, 3) or (V, 3) float64 ndarray
-        Unit normals; see `Surface.face_normal` and `vertex_normals`. Zero on faces without area and
-        on vertices without a face.
+        Unit normals: `Surface.face_normal` for the domain "face", `vertex_normals` for "vertex". Zero on
+        faces without area and on vertices without a face.
     """
     surface = surface.in_rest_shape()
     return surface.face_normal if domain == "face" else vertex_normals(surface)
@@ -302,7 +302,8 @@ def project_to_tangent(
     source, domain : str
         Name of the file or attribute, and name of the mesh elements, for messages.
     off_surface : {"error", "project", "undefined"}
-        What to do about vectors that exceed the tolerance; see `VectorPolicy`.
+        What to do about vectors that exceed the tolerance: raise an error if they are many (see Raises), and
+        project them otherwise; always project them; or set them to zero.
 
     Returns
     -------

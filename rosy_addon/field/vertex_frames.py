@@ -31,6 +31,7 @@ def in_space(surface: Surface, rows: np.ndarray, source: str) -> tuple[np.ndarra
     Returns
     -------
     vectors : (n, 3) float64 ndarray
+        The vectors in object space.
     domain : {"vertex"} or None
         The mesh elements to which the vectors belong; None to infer it from the number of rows.
     note : str

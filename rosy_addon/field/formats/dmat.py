@@ -15,9 +15,10 @@ from .text_rows import read_rows
 
 
 def read_dmat(path: Path) -> RawField:
-    """Read a matrix of libigl with a row for each face or vertex, as in a text file (see `plain.read_text`).
+    """Read a matrix of libigl with a row of 3, 3 N or 9 numbers for each face or vertex.
 
-    A first column of numbers of rows, or of flags 0 and 1, is not read.
+    The numbers are one member vector, all N directions or a symmetric tensor, as in `plain.read_text`. A
+    first column of numbers of rows, or of flags 0 and 1, is not read.
 
     Raises
     ------

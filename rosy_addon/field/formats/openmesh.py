@@ -111,7 +111,8 @@ def _corners(halfedges: np.ndarray, first: np.ndarray, vertex_count: int) -> lis
     """Return `corner_vertex` and `face_start` of F faces (see `Polygons`), given by their halfedges.
 
     A row of `halfedges` is for one halfedge: the next halfedge, the vertex to which it points, and its face.
-    `first` holds the (F,) indices of one halfedge of each face.
+    `first` holds the (F,) indices of one halfedge of each face. The file is damaged (`ValueError`) if a
+    halfedge points to a vertex that is not below `vertex_count`.
     """
     columns, active, current, visited = [], np.ones(len(first), dtype=bool), first, 0
     while active.any():

@@ -148,8 +148,8 @@ def read_npz(path: Path) -> RawField:
     """Read an `.npz` archive of arrays: rows for a field, and the mesh if it has one.
 
     The field is the array "directions" or "Q", or else the only one of shape (n, 3 N) or (n, N, 3) of
-    floating-point numbers. The mesh are the arrays "vertices" and "faces", or "V" and "F". A number "degree"
-    is the degree of an array of members.
+    floating-point numbers. The arrays of the mesh are "vertices" and "faces", or "V" and "F". If the field is
+    an array of members, the number "degree" is N.
 
     Raises
     ------
@@ -238,7 +238,10 @@ def npy_bytes(directions: np.ndarray) -> bytes:
 
 
 def _check_columns(source: str, columns: int) -> None:
-    """Raise a `RosyError` unless a row has 2 numbers, or 3 N for a degree N from 1 to `MAX_DEGREE`."""
+    """Raise a `RosyError` unless `columns` is 2, or 3 N for a degree N from 1 to `MAX_DEGREE`.
+
+    It is the count of numbers in each row. `source` is the name of the file in the message.
+    """
     if columns != 2 and (columns % 3 or not 3 <= columns <= 3 * MAX_DEGREE):
         raise RosyError(
             f"{source}: has {counted(columns, 'number')} per row, expected 3 for each of up to {MAX_DEGREE} directions"

@@ -186,7 +186,7 @@ def format_rows(rows: np.ndarray) -> list[str]:
 
 
 def format_lines(rows: np.ndarray, prefix: str = "") -> str:
-    """Return (n, k) numbers as lines of text, each with a prefix; see `format_rows`."""
+    """Return (n, k) numbers as lines of text, each with a prefix. Parsing them gives the same values."""
     # Strings of single rows take much more memory than the text, so they are joined block by block.
     blocks = row_blocks(len(rows), ROWS_PER_BLOCK)
     return "".join(

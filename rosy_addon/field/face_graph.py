@@ -280,8 +280,9 @@ class TriangleGraph:
     def on_faces(self, angle: np.ndarray, to_center: np.ndarray) -> np.ndarray:
         """Return (I,) turning angles between faces, computed from (M,) turning angles between triangles.
 
-        The direction of a face is the mean direction of its triangles, weighted by area. `to_center` holds
-        (T,) angles that are added to the directions of the triangles before: 0, or `turns_to_centers`.
+        The direction of a face is the mean of the directions at the centroids of its triangles, weighted by
+        area. `to_center` holds the (T,) angles from the direction of a triangle to its direction at the
+        centroid: the result of `turns_to_centers`, or 0 where they are ignored.
         """
         turn, outer = self._turns_in_faces(angle, to_center), slice(self.face_edge_count)
         return angle[outer] + turn[self.graph.source[outer]] - turn[self.graph.target[outer]]

@@ -100,8 +100,10 @@ def cached(cache: Cache | None, create: Callable[[], Result], *parts: object) ->
     Parameters
     ----------
     cache : Cache or None
+        None to call `create` every time.
     create : callable
-        See `Cache.get_or_create`.
+        Function without arguments that computes the result, which must not be None. It is called if the cache
+        does not have the result.
     *parts : object
         The key: all inputs on which the result depends. Arrays are replaced by their `content_hash`.
     """

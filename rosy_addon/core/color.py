@@ -45,7 +45,8 @@ def map_colors(values: np.ndarray, name: str) -> np.ndarray:
 def color_stops(name: str) -> np.ndarray:
     """Return (n, 3) float64: the colors of a color map at n evenly spaced values from 0 to 1.
 
-    They are sRGB display values. Between them, the map is interpolated linearly.
+    They are sRGB display values, 0 to 1. Between them, the map is interpolated linearly. `name` is "viridis",
+    "magma" or "gray".
     """
     return np.array([list(bytes.fromhex(code)) for code in _COLOR_MAPS[name].split()]) / 255
 

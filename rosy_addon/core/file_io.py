@@ -131,7 +131,7 @@ def check_parsing_memory(path: str | os.PathLike[str], binary_memory: float) -> 
 
 
 def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
-    """Write a file atomically; see `replacing`.
+    """Write a file atomically: a reader finds either the old contents or all new contents.
 
     Raises
     ------
@@ -268,7 +268,7 @@ def check_folder(folder: str | os.PathLike[str]) -> None:
 
 
 def file_stamp(path: Path) -> tuple[int, ...]:
-    """Return the time and the size of a file or folder, which change with it; empty if it does not exist."""
+    """Return the time of the last change (ns) and the size of a file or folder; () if it does not exist."""
     try:
         status = path.stat()
     except OSError:

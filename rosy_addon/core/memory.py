@@ -63,7 +63,7 @@ def samples_memory(samples: float, lines: int, many_images: bool) -> float:
     lines : int
         Number of line directions of the field at a point.
     many_images : bool
-        Whether `MANY_IMAGES` LIC images are stored for each line direction (see `MANY_IMAGES`), not one.
+        Whether the look needs several LIC images for each line direction: `MANY_IMAGES` instead of one.
     """
     return samples * (SAMPLE_BYTES + LINE_BYTES * lines * (MANY_IMAGES if many_images else 1))
 

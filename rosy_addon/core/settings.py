@@ -232,32 +232,32 @@ class Color(Setting):
 
 
 def number(default: float, low: float, high: float, text: str, **description: Any) -> Any:
-    """Return a dataclass field for a setting that is a number; see `Number` and `Setting`."""
+    """Return a dataclass field for a setting that is a number; arguments are attributes of `Number`."""
     return _field(Number(default=default, low=low, high=high, text=text, **description))
 
 
 def numbers(default: tuple[float, ...], text: str, parts: Ranges, **description: Any) -> Any:
-    """Return a dataclass field for a setting that is a tuple of numbers; see `Numbers` and `Setting`."""
+    """Return a dataclass field for a setting of several numbers; arguments are attributes of `Numbers`."""
     return _field(Numbers(default=default, text=text, parts=parts, **description))
 
 
 def choice(default: str, text: str, options: Mapping[str, str], **description: Any) -> Any:
-    """Return a dataclass field for a setting that is one of several options; see `Choice` and `Setting`."""
+    """Return a dataclass field for a setting with several options; arguments are attributes of `Choice`."""
     return _field(Choice(default=default, text=text, options=options, **description))
 
 
 def switch(default: bool, text: str, **description: Any) -> Any:
-    """Return a dataclass field for a setting that is true or false; see `Switch` and `Setting`."""
+    """Return a dataclass field for a setting that is true or false; arguments are attributes of `Switch`."""
     return _field(Switch(default=default, text=text, **description))
 
 
 def color(default: str, text: str, **description: Any) -> Any:
-    """Return a dataclass field for a setting that is a color; see `Color` and `Setting`."""
+    """Return a dataclass field for a setting that is a color; arguments are attributes of `Color`."""
     return _field(Color(default=default, text=text, **description))
 
 
 def fraction(default: float, text: str, **description: Any) -> Any:
-    """Return a dataclass field for a setting that is a number from 0 to 1; see `Number` and `Setting`."""
+    """Return a dataclass field for a number from 0 to 1; arguments are other attributes of `Number`."""
     return number(default, 0.0, 1.0, text, **description)
 
 

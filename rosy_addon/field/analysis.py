@@ -36,8 +36,9 @@ class Difference:
     ----------
     angle : (F,) float64 ndarray
         Angle between a vector of one field and the nearest vector of the other, in radians from 0 to
-        pi/N. It is the same for all N vectors of a face. NaN where either field is undefined. For
-        directions that are not rotationally symmetric, see `Field.difference`.
+        pi/N. It is the same for all N vectors of a face. NaN where either field is undefined. If the
+        directions of a field are not rotationally symmetric, it is the least mean angle between matched
+        directions (see `Field.difference`).
     mean, rms : float
         Mean and root mean square of the angle in radians, weighted by area.
     p95 : float
@@ -65,8 +66,8 @@ class SingularityMatching(NamedTuple):
     Attributes
     ----------
     first, second : (M,) intp ndarray
-        The singularities of each pair: positions in the list of singularities of the first field, and in
-        the list of the second field.
+        The singularities of each pair: positions in the arrays of the singular vertices of the first and
+        of the second field (see `find_singularities`).
     distance : (M,) float64 ndarray
         Distance between the two singularities of each pair, in object space.
     """
@@ -86,7 +87,8 @@ class FieldComparison(NamedTuple):
     singularity_count, other_count : int
         Number of singularities of each field.
     matched_count : int
-        Number of singularities that occur in both fields with the same index and nearly the same position.
+        Number of pairs of singularities, one of each field, with the same index and a distance of at most
+        `DEFAULT_REACH`, a fraction of the longest side of the bounding box.
     """
 
     difference: Difference
@@ -100,8 +102,9 @@ def dirichlet_energy(surface: Surface, field: RosyField) -> float:
 
     The energy is the integral of ``|grad z|^2``, where z is the representation of the field, normalized to
     modulus 1. It is discretized by two-point fluxes, as the sum over the edges between two faces f and g of
-    ``w |z_f - r z_g|^2``. Here r is the rotation that unfolds face g into the plane of face f. The weight w
-    is the length of the edge, divided by the sum of the distances of the two face centers from the edge.
+    ``w |z_f - r z_g|^2``. Here r, of modulus 1, transports the representation from face g to face f: N times
+    the angle between their frames, when the faces are unfolded into a plane. The weight w is the length of
+    the edge, divided by the sum of the distances of the two face centers from the edge.
 
     The energy has no unit, so it does not depend on the scale of the mesh. The smoothest field on a sphere
     has an energy of about 4 pi N. The contribution of each singularity grows slowly with the resolution of
@@ -249,8 +252,9 @@ def match_on_surface(
     Parameters
     ----------
     surface : Surface
-    singularities, other : (vertex, index)
-        The singularities of two fields of the same degree: results of `singularities.find_singularities`.
+    singularities, other : pair of (K,) int ndarrays
+        The singular vertices of two fields of the same degree N, and their indices in units of 1/N: results
+        of `singularities.find_singularities`.
     reach : float
         Largest straight-line distance between the singularities of a pair, as a fraction of the longest side
         of the bounding box of the mesh.

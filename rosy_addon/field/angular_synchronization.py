@@ -42,12 +42,21 @@ MATCHING_ROUNDS = 6
 
 @dataclass(frozen=True, eq=False)
 class PhaseGraph:
-    """A graph of n nodes with unknown complex values of modulus 1, and m relations between two of them.
+    """A graph of n nodes with unknown complex values of modulus 1, and m relations between pairs of nodes.
 
-    Each relation is an *entry*, one element of the arrays `row`, `column`, `a` and `b`, as in a sparse
-    matrix. It demands that the value at node `row` is ``a z + b conj(z)``, where z is the value at node
-    `column`. Its weight is |a| + |b|. Entries are sorted by row. For each pair of related nodes, there is
-    an entry in both directions.
+    Each relation is an *entry*, one element of each of the arrays `row`, `column`, `a` and `b`, as in a
+    sparse matrix. It demands that the value at node `row` is ``a z + b conj(z)``, where z is the value at
+    node `column`. Its weight is |a| + |b|. For each pair of related nodes, there is an entry in both
+    directions.
+
+    Attributes
+    ----------
+    node_count : int
+        n.
+    row, column : (m,) int64 ndarray
+        The two nodes of each entry. Entries are sorted by row.
+    a, b : (m,) complex128 ndarray
+        The factors of each entry.
     """
 
     node_count: int
@@ -75,7 +84,11 @@ class PhaseGraph:
 def phase_graph(
     node_count: int, row: np.ndarray, column: np.ndarray, a: np.ndarray, b: np.ndarray
 ) -> PhaseGraph:
-    """Return a `PhaseGraph`, given its entries in any order. Entries of the same row and column are added."""
+    """Return a `PhaseGraph`, given its entries in any order.
+
+    `row`, `column`, `a` and `b` have one element for each entry, as in `PhaseGraph`. Entries with the same
+    row and column are added. Entries on the diagonal are left out.
+    """
     entry = np.flatnonzero(row != column)
     key = row[entry].astype(np.int64) * node_count + column[entry]
     key, order = sorted_with_order(key, max(node_count, 1) ** 2)

@@ -148,7 +148,10 @@ def _all_arrays(arrays: SurfaceArrays) -> list[FieldArray]:
 
 
 def _array_of_name(arrays: SurfaceArrays, listed: list[FieldArray], name: str) -> FieldArray:
-    """Return the array with this name. The name may have the prefix "point:" or "cell:"."""
+    """Return the array with this name, out of the arrays `listed`.
+
+    The name may have the prefix "point:" (vertices) or "cell:" (faces).
+    """
     found = [array for array in listed if array.name == name]
     prefix, _, rest = name.partition(":")
     if not found and prefix in ("point", "cell"):
@@ -205,8 +208,9 @@ def array_field(
     ----------
     arrays : SurfaceArrays
     name : str, optional
-        See `find_array`. If not given, and the faces have arrays direction_1 to direction_N, these are the N
-        directions.
+        Name of the array, with the prefix "point:" (vertices) or "cell:" (faces) if it occurs at both. If not
+        given, the arrays direction_1 to direction_N at the faces are the N directions. Without these arrays,
+        the only array from which a field can be made is taken (see `find_array`).
     degree : int, optional
         The degree N. If not given, it is `VECTOR_DEGREE` for member vectors. Tensors have degree 4.
     policy : VectorPolicy
@@ -315,7 +319,12 @@ def _raw_field(array: FieldArray, source: str) -> RawField:
 def _tangential_on_faces(
     surface: Surface, vectors: np.ndarray, domain: str, degree: int
 ) -> np.ndarray | None:
-    """Return (F, 3) tangential vectors on the faces, or None if nearly all given vectors are tangent."""
+    """Return (F, 3) tangential components of vectors on the faces, or None if the vectors are tangent.
+
+    `vectors` holds (V, 3) or (F, 3) member vectors of a field of degree `degree`, as `domain` is "vertex" or
+    "face". They count as tangent if at most `MAX_OUTLIER_FRACTION` of them are off the tangent plane.
+    Vectors at vertices are projected to the plane of each face and averaged as representations.
+    """
     normal = tangent_normals(surface, domain)
     length = np.sqrt(dot(vectors, vectors))
     is_off = np.abs(dot(vectors, normal)) > np.sin(np.radians(TOLERANCE_DEG[domain])) * length

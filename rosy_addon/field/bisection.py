@@ -39,7 +39,8 @@ class BisectionTree:
     leaf_vertex : (L, 3) int32 ndarray
         Vertices of the leaves. Midpoints of edges are numbered after the given vertices.
     leaf_weights : (L, 3, 3) float32 ndarray
-        Barycentric coordinates of the corners of each leaf in its root. They are exact.
+        Barycentric coordinates of the corners of each leaf in its root: those of corner k are in row k of
+        its 3 x 3 matrix. They are exact.
     vertices : (V, 3) float64 ndarray
         Positions of all vertices.
     """
@@ -215,9 +216,10 @@ class _Leaves:
 
 
 def _halves(corner: np.ndarray, middle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners of both halves of triangles: (a, middle, c) and (middle, b, c).
+    """Return the (n, 3, ...) corners of both halves of triangles: (a, middle, c) and (middle, b, c).
 
-    `corner` holds the (n, 3, ...) corners a, b, c of the triangles.
+    `corner` holds the (n, 3, ...) corners a, b, c of the triangles, and `middle` the (n, ...) midpoints of
+    their edges from a to b.
     """
     a, b, c = np.moveaxis(corner, 1, 0)
     return np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)

@@ -192,9 +192,9 @@ class _Neighbors:
 def _energy(graph: FaceGraph, degree: int, angle: np.ndarray, diagonal: np.ndarray) -> CSRMatrix:
     """Return a matrix A such that z* A z is the energy of a field with (F,) representations z.
 
-    It is the Dirichlet energy relative to given turning angles: it is 0 for a field that turns by `angle`,
-    (I,) in radians, across the edges. `diagonal` holds (F,) values that are added to the diagonal of the
-    matrix.
+    It is the Dirichlet energy relative to given turning angles. It is 0 for a field that turns by `angle`
+    from the source to the target face of each edge: (I,) counter-clockwise angles in radians. `diagonal`
+    holds (F,) values that are added to the diagonal of the matrix.
     """
     source, target, weight = graph.source, graph.target, 1 / graph.conductance
     transport = np.exp(1j * degree * (graph.unfolding + angle))

@@ -34,13 +34,14 @@ def closest_triangles(
     points : (n, 3) float64 ndarray
         Positions in object space.
     max_distance : float
-        Largest distance that matters. For a point that is farther away from the surface, the result may be
-        any triangle at its distance, or none.
+        Largest distance that matters, in object space. For a point that is farther away from the surface, the
+        result may be a triangle that is not the closest one, or none.
 
     Returns
     -------
     triangle : (n,) int32 ndarray
-        Index into `surface.triangles`; the smallest index if several triangles are equally close.
+        Index into `surface.triangles`; the smallest index if several triangles are equally close, and 0 if no
+        triangle was found.
     distance : (n,) float64 ndarray
         Distance of the point from the triangle, in object space; infinite if no triangle was found.
     """
@@ -172,7 +173,10 @@ class _ClosestSearch:
         return np.sqrt(dot(gap, gap)).ravel()
 
     def update(self, owner: np.ndarray, candidate: np.ndarray) -> None:
-        """Update the results, given pairs of a point (`owner`) and a candidate for its closest triangle."""
+        """Update the results, given (m,) pairs of a point and a candidate for its closest triangle.
+
+        Element i of `owner` is the index of a point, and element i of `candidate` that of a triangle.
+        """
         for block in row_blocks(len(owner), MAX_PAIRS):
             point, triangle = owner[block], candidate[block]
             distance = point_triangle_distances(self.points[point], self.corners[triangle])

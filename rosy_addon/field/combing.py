@@ -67,7 +67,8 @@ class Combing:
     system : GuidedSystem
         The linear system for fields that follow guides.
     guides : (F,) complex128 ndarray
-        Representations of the guides, whose moduli are their firmness. Call `follow` after changing them.
+        Representations of the guides in `Surface.face_frames`, whose moduli are their firmness. Call
+        `follow` after changing them.
     magnitude : (F,) float64 ndarray
         Magnitude of the field.
     """
@@ -94,7 +95,10 @@ class Combing:
 
     @property
     def representations(self) -> tuple[np.ndarray, np.ndarray]:
-        """Current solution: (n,) complex128 representations at the nodes and (F,) complex128 on the faces."""
+        """The current field: (n,) complex128 representations at the nodes and (F,) complex128 on the faces.
+
+        Those on the faces have modulus 1, or 0 where the field is undefined.
+        """
         return self._z, self._face_z
 
     @representations.setter
@@ -116,7 +120,8 @@ class Combing:
     def settle(self, tolerance: float = RELATIVE_TOLERANCE) -> tuple[np.ndarray, np.ndarray]:
         """Solve the linear system for the whole surface, and return `representations`.
 
-        If there are no guides, the field does not change.
+        The solver stops when the residual norm is `tolerance` times the norm of the right-hand side. If there
+        are no guides, the field does not change.
         """
         if not self.guides.any():
             return self.representations
@@ -141,7 +146,7 @@ class Combing:
         return self.system.node_guides(unit_complex(self.guides), *weights, corner)
 
     def _set_face_z(self, z: np.ndarray, face: np.ndarray) -> None:
-        """Normalize (m,) representations, and set the field on the given faces to them.
+        """Set the field on the given (m,) faces to (m,) representations, which are normalized.
 
         A face with a guide of firmness 1, which is followed exactly, gets the representation of its guide.
         """
@@ -162,10 +167,11 @@ def start_combing(
     field : RosyField
         A field whose directions are rotationally symmetric.
     guide_vectors : (F, 3) ndarray
-        Member vectors whose lengths are the firmness of the guides; zero on faces without a guide. On these
-        faces, the field itself becomes a weak guide, so that it does not change far from the strokes.
+        Member vectors whose lengths are the firmness of the guides; zero on faces without a guide. Faces
+        without a guide get the field itself as a weak guide. So the field does not change far from strokes.
     reach : float
-        Distance from a stroke over which the change of a field without guides falls off, in object space.
+        Distance from a stroke, in object space, over which the change of the field falls off where there are
+        no guides.
 
     Raises
     ------
@@ -198,15 +204,16 @@ class GuideBrush:
         Radius in object space.
     strength : float
         Strength of the effect, from 0 to 1.
-    effect : str
-        One of `EFFECTS`.
+    effect : {"comb", "erase", "smooth"}
+        Turn the guides along the stroke, remove guides, or average them with those around them.
     is_exact : bool
         Whether the field follows combed guides exactly, in the whole radius of the brush.
     front_faces : bool
         Whether to skip faces that face away from the surface under the brush: the angle between the normals
         is at least 90 degrees.
     mirror : sequence of 3 bools
-        For each of the planes x = 0, y = 0 and z = 0, whether to repeat the stroke on its other side.
+        For each of the planes x = 0, y = 0 and z = 0 of object space, whether to repeat the stroke on the
+        other side.
     """
 
     radius: float
@@ -217,9 +224,10 @@ class GuideBrush:
     mirror: Sequence[bool] = (False, False, False)
 
     def falloff(self, distance: np.ndarray) -> np.ndarray:
-        """Return the strength of the effect at distances from the stroke: 1 on it, and 0 at the radius.
+        """Return (n,) factors of the effect at (n,) distances from the stroke: 1 on it, and 0 at the radius.
 
-        If the brush combs exactly, the strength is 1 everywhere within the radius.
+        Distances are in object space. If the brush combs exactly, the factor is 1 everywhere within the
+        radius.
         """
         if self.is_exact and self.effect == "comb":
             return (distance < self.radius).astype(np.float64)
@@ -245,7 +253,7 @@ class BrushStroke:
     ----------
     system : GuidedSystem
     guides : (F,) complex128 ndarray
-        Representations of the guides, in the face frames of the system. They are changed in place.
+        Representations of the guides in `Surface.face_frames`. They are changed in place.
     brush : GuideBrush
     locate : callable
         Function that returns the (n,) int faces closest to (n, 3) points in object space; -1 for no face.
@@ -311,7 +319,10 @@ class BrushStroke:
         return changed
 
     def _add_dabs_to(self, point: np.ndarray, pressure: float) -> None:
-        """Add dabs at equal distances on the straight line from the last point to this one."""
+        """Add dabs at equal distances on the straight line from the last point to this one.
+
+        `point` is (3,) in object space. `pressure` is the pressure at the point, from 0 to 1.
+        """
         if self._end is None:
             self._end = _Dab(point, pressure, self._start_arc_length)
             self._dabs = [self._end, self._end]  # the start has no earlier dab
@@ -356,10 +367,10 @@ class BrushStroke:
         return np.unique(np.concatenate(near))
 
     def _near_faces(self, positions: np.ndarray, located: np.ndarray) -> np.ndarray:
-        """Return the faces that may be within the radius of dabs.
+        """Return the indices of the faces that may be within the radius of n dabs.
 
-        The dabs have (n, 3) positions and lie on the (n,) faces `located`, which are included; -1 for no
-        face.
+        The dabs have (n, 3) positions in object space. `located` holds the (n,) faces under the dabs, which
+        are always in the result; -1 for a dab without a face.
         """
         low, high = positions.min(axis=0), positions.max(axis=0)
         center = self._surface.face_center
@@ -442,11 +453,11 @@ class BrushStroke:
         self._coverage[is_new] = 0
 
     def _comb(self, face: np.ndarray, distance: np.ndarray, direction: np.ndarray) -> None:
-        """Turn the guides of faces to the direction of the stroke where the stroke is nearest to the face.
+        """Turn the guides of m faces to the direction of the stroke where the stroke is nearest to the face.
 
-        `distance` and `direction` hold, for each of m faces, its distance from the segment that is drawn, and
-        the (m, 3) directions of the stroke there. In the same pass, a face that an earlier segment passed
-        more closely keeps its guide.
+        `face` holds the (m,) faces, `distance` their (m,) distances from the segment that is drawn, in object
+        space, and `direction` the (m, 3) directions of the stroke at the nearest point. If an earlier segment
+        of the same pass was nearer to a face, the face keeps its guide.
         """
         is_closest = distance <= self._least_distance[face]
         face = face[is_closest]

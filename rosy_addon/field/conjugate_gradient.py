@@ -48,6 +48,7 @@ def conjugate_gradient(
     is_fixed : (n,) bool ndarray, optional
         Unknowns that keep their values in `start`. Their equations are left out.
     max_iterations : int
+        Number of iterations after which the solver stops, without an error.
 
     Returns
     -------

@@ -58,10 +58,10 @@ class Connection:
     area : (T,) float64 ndarray
         Areas of the triangles.
     corner_area : (3 T,) float64 ndarray
-        Shares of the areas of the faces. All corners of a face have the same share, whatever its triangles are: a third
-        of the area of a triangle. If triangles have a corner in common, each has a part of it.
+        Shares of the areas of the faces. A face divides its area equally among its corners. If several
+        triangles of a face have a corner in common, they divide the share of this corner equally.
     mass : (n,) float64 ndarray
-        Lumped masses: the shares of the areas around each node.
+        Lumped masses: the sum of the shares (`corner_area`) around each node.
     tail, head : (E,) int32 ndarray
         Nodes at the two ends of each edge.
     transport_angle : (E,) float64 ndarray
@@ -179,7 +179,10 @@ def laplacian(connection: Connection, degree: int, shift: float = 0.0) -> CSRMat
 
 
 def _corner_areas(surface: Surface, area: np.ndarray) -> np.ndarray:
-    """Return (3 T,) shares of the areas of faces at the corners of triangles, given the (T,) areas of triangles."""
+    """Return the (3 T,) shares of the areas of faces at the corners of triangles (`Connection.corner_area`).
+
+    `area` holds the (T,) areas of the triangles.
+    """
     face = surface.triangle_face
     if len(face) == surface.face_count:
         return np.repeat(area / 3, 3)

@@ -39,7 +39,11 @@ class Edges:
 
 
 def build_edges(corner_vertex: np.ndarray, face_start: np.ndarray) -> Edges:
-    """Find the edges of a polygon mesh, from `Surface.corner_vertex` and `Surface.face_start`."""
+    """Find the edges of a polygon mesh.
+
+    `corner_vertex` holds the (C,) vertices of the corners, face by face, and `face_start` the (F + 1,) first
+    corners of the faces, and C.
+    """
     tail = corner_vertex.astype(np.int64)
     head = tail[next_corners(face_start)]
     stride = int(corner_vertex.max(initial=0)) + 1
@@ -69,14 +73,24 @@ def smooth_fans(
     sharp_angle: float | None = None,
     flat_faces: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Return (C,) int32, the index of the smooth fan of each corner (see `Surface.corner_fan`).
+    """Return (C,) int32, the index of the smooth fan of each corner.
 
     The corners of a smooth fan share a vertex, and their faces are connected by edges that are not sharp.
 
     Parameters
     ----------
-    vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
-        See `surface.build_surface`. If no sharp angle is given, the positions of the vertices do not matter.
+    vertices : (V, 3) float ndarray
+        Positions. They are only used if `sharp_angle` is given.
+    corner_vertex : (C,) int ndarray
+        Vertex of each corner, face by face.
+    face_start : (F + 1,) int ndarray
+        First corner of each face, and C.
+    sharp_edges : (n, 2) array_like of int, optional
+        Pairs of vertices: edges that are sharp regardless of their angle.
+    sharp_angle : float, optional
+        Edges with a larger angle between the normals of their faces, in radians, are also sharp.
+    flat_faces : (F,) array_like of bool, optional
+        Faces with flat shading: all their edges are sharp.
     """
     edges = build_edges(corner_vertex, face_start)
     corner_face, next_corner = corner_faces(face_start), next_corners(face_start)
@@ -106,7 +120,7 @@ def connected_corners(a: np.ndarray, b: np.ndarray, next_corner: np.ndarray) -> 
     a, b : (n,) int ndarray
         For the two faces of each edge, the corner at which the edge starts in that face.
     next_corner : (C,) int ndarray
-        Result of `next_corners`.
+        The next corner of the same face.
     """
     ends = np.stack([a, next_corner[b]], axis=1), np.stack([next_corner[a], b], axis=1)
     return connected_components(len(next_corner), np.concatenate(ends))

@@ -33,11 +33,11 @@ class Conversion:
     rotation : float
         Counter-clockwise rotation about the normals, in radians.
     smoothing_length : float
-        Distance over which the field is smoothed by diffusion, relative to `Surface.extent`; 0 for no
-        smoothing.
+        Distance over which the field is smoothed by diffusion, as a fraction of the longest side of the
+        bounding box (`Surface.extent`); 0 for no smoothing.
     pair_distance : float
-        Pairs of singularities with opposite indices are removed if they are at most this far apart, relative
-        to `Surface.extent`; 0 to keep all pairs.
+        Pairs of singularities with opposite indices are removed if they are at most this far apart, as a
+        fraction of the same length; 0 to keep all pairs.
     magnitude : str, (F,) ndarray or None
         Name of a new magnitude, one of `curvature.MAGNITUDES`, or its values on the faces. None to keep the
         magnitudes.

@@ -13,7 +13,11 @@ SPLIT_MIX_GAMMA = np.uint64(0x9E3779B97F4A7C15)
 def copied_faces(
     vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray
 ) -> np.ndarray:
-    """Return (F,) bool: which faces have their corners at the same positions as an earlier face, in any order."""
+    """Return (F,) bool: which faces have the same corner positions as an earlier face, in any order.
+
+    The mesh is given by (V, 3) positions, the (C,) vertices of the corners, and the (F + 1,) first corners of
+    the faces, and C.
+    """
     # A 64-bit hash of each position: the same positions have the same one, and 0.0 equals -0.0.
     bits = (np.asarray(vertices, dtype=np.float64) + 0.0).view(np.uint64)
     key = np.zeros(len(bits), dtype=np.uint64)
@@ -26,7 +30,10 @@ def copied_faces(
 
 
 def copies_note(name: str, *polygons: np.ndarray) -> str:
-    """Return a note about `copied_faces` of the mesh with this name; an empty string if there are none."""
+    """Return a note for the user about the copied faces of a mesh; an empty string if there are none.
+
+    `name` is the name of the mesh in the note. `polygons` are the arguments of `copied_faces`.
+    """
     is_copy = copied_faces(*polygons)
     if not is_copy.any():
         return ""
@@ -37,7 +44,7 @@ def copies_note(name: str, *polygons: np.ndarray) -> str:
 
 
 def split_mix(key: np.ndarray) -> np.ndarray:
-    """Return a hash of uint64 numbers: the next output of SplitMix64 (Steele et al., OOPSLA 2014).
+    """Return a hash of each uint64 number: SplitMix64's output for that state (Steele et al., OOPSLA 2014).
 
     For the multiples 0, 1, 2 and so on of `SPLIT_MIX_GAMMA`, the hashes are a pseudorandom sequence.
     """

@@ -53,7 +53,9 @@ def average_over_fans(
     Parameters
     ----------
     values : (C,) complex ndarray
+        A value at each corner, in the frame of the corner.
     weights : (C,) float ndarray
+        Weight of each value.
     corner_fan : (C,) int ndarray
         Index of the fan of each corner: `Surface.corner_fan`.
 

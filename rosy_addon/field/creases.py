@@ -64,7 +64,7 @@ MIN_CREASE_ANGLE = 1e-3
 
 
 def weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
-    """Return the weighted median of values; 0 if the total weight is 0."""
+    """Return the weighted median of (n,) values with (n,) weights; 0 if the total weight is 0."""
     order = np.argsort(values)
     total = np.cumsum(weights[order])
     if not len(total) or not total[-1] > 0:
@@ -121,10 +121,11 @@ def filtered_normals(
 
 
 def principal_extent(surface: Surface) -> float:
-    """Return the length of a thin straight bar whose area has the largest variance of the surface's area.
+    """Return the extent of a surface along its principal axis, the axis of largest variance of its area.
 
-    It is the diameter of a sphere and the side of a flat square. Unlike `Surface.extent`, it does not change
-    when the surface is rotated. Surfaces without area use `Surface.extent`.
+    It is the length of a thin straight bar with the same variance: the diameter of a sphere, and the side of
+    a flat square. Unlike `Surface.extent`, it does not change when the surface is rotated. For a surface
+    without area, it is `Surface.extent`.
     """
     points = surface.vertices[surface.triangle_vertex] - surface.vertices[surface.used_vertices[0]]
     cross = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
@@ -150,13 +151,15 @@ def salient_edges(surface: Surface, normals: np.ndarray, noise_angle: float) -> 
     Parameters
     ----------
     surface : Surface
-    normals, noise_angle
-        Results of `filtered_normals`.
+    normals : (F, 3) float64 ndarray
+        Face normals after filtering (`filtered_normals`).
+    noise_angle : float
+        Median angle in radians by which the filter rotates the normals.
 
     Returns
     -------
-    (E, 2) int32 ndarray
-        Pairs of vertices.
+    (n, 2) int32 ndarray
+        The two vertices of each salient edge.
     """
     edges = surface.edges
     face_a, face_b = surface.corner_face[edges.halfedges].T
@@ -275,7 +278,8 @@ def find_creases(surface: Surface, crease_angle: float) -> Creases:
 def _large_angles(normals: np.ndarray, sides: np.ndarray, least: float) -> np.ndarray:
     """Return the (I,) angles in radians between the normals of pairs of faces; 0 for angles below `least`.
 
-    `sides` holds the pairs of faces and is (2, I).
+    `normals` holds the (F, 3) face normals, and `sides` the pairs of faces: the first ones and the second
+    ones, (2, I). `least` is in radians.
     """
     angle = np.zeros(sides.shape[1])
     a, b = sides
@@ -297,9 +301,9 @@ def _faces_near(surface: Surface, ends: np.ndarray) -> np.ndarray:
 
 
 def _is_between_fans(surface: Surface, halfedges: np.ndarray) -> np.ndarray:
-    """Return (n,) bool: whether shading normals are discontinuous across edges.
+    """Return (n,) bool: whether shading normals are discontinuous across each of n edges.
 
-    `halfedges` holds the edges, as rows of `Edges.halfedges`.
+    `halfedges` is (n, 2): the corners at which an edge starts in its two faces (rows of `Edges.halfedges`).
     """
     fan, following = surface.corner_fan, surface.next_corner
     a, b = halfedges.T

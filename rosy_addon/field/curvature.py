@@ -35,8 +35,9 @@ CURVATURE_SMOOTHING_ROUNDS = 2
 def face_magnitude(surface: Surface, kind: str) -> np.ndarray:
     """Compute the magnitude for a field on each face; `kind` is a name in `MAGNITUDES`.
 
-    "unit" is 1, "confidence" is the magnitude of `curvature_field`, and "curvature" is the larger absolute
-    principal curvature in 1 / unit of length in object space.
+    "unit" is 1. "confidence" says how well the principal directions are defined, from 0 to 1: the magnitude
+    of `curvature_field`. "curvature" is the larger absolute principal curvature, in 1 / unit of length in
+    object space.
 
     Returns
     -------
@@ -60,9 +61,9 @@ def face_magnitude(surface: Surface, kind: str) -> np.ndarray:
 
 
 def with_smooth_normals(surface: Surface, corner_fan: np.ndarray | None = None) -> Surface:
-    """Return the surface with shading normals that are averaged over the given fans.
+    """Return the surface with shading normals that are averaged over smooth fans, and without a rest shape.
 
-    If no fans are given, normals are smooth everywhere. `corner_fan` is as in `Surface`.
+    `corner_fan` holds the (C,) index of the fan of each corner. By default, normals are smooth everywhere.
     """
     mesh = surface.vertices, surface.corner_vertex, surface.face_start
     fan = smooth_fans(*mesh) if corner_fan is None else corner_fan
@@ -73,10 +74,10 @@ def with_smooth_normals(surface: Surface, corner_fan: np.ndarray | None = None) 
 def curvature_field(surface: Surface, degree: int) -> RosyField:
     """Compute a field along the principal directions of curvature.
 
-    Degree 2 follows the direction of the greater signed curvature, which is positive where the surface is convex. The
-    side on which most of a connected component is convex counts as the outside, so that reversed faces have the same
-    field. Degree 4 follows both principal directions. In fields of other even degrees, one member
-    follows the direction of degree 2. Principal directions have no sign, so odd degrees are not
+    Degree 2 follows the direction of the greater signed curvature, which is positive where the surface is
+    convex. The side on which most of a connected component is convex counts as the outside, so that reversed
+    faces have the same field. Degree 4 follows both principal directions. In fields of other even degrees,
+    one member follows the direction of degree 2. Principal directions have no sign, so odd degrees are not
     possible.
 
     The magnitude is a confidence from 0 to 1, ``|k1 - k2| / (|k1| + |k2| + k0)``, where k1 and k2 are the
@@ -132,8 +133,8 @@ def curvature_field(surface: Surface, degree: int) -> RosyField:
 def outer_sides(surface: Surface, mean: np.ndarray) -> np.ndarray:
     """Return (F,) float64: 1 on components that are mostly convex, -1 on those that are mostly concave.
 
-    Curvature changes its sign if all faces are reversed; curvature times this sign does not. `mean` holds the (F,) mean
-    curvatures. The sign is 1 if both parts are equal, as on a saddle or a wave.
+    Curvature changes its sign if all faces are reversed; curvature times this sign does not. `mean` holds the
+    (F,) mean curvatures. The sign is 1 if both parts are equal, as on a saddle or a wave.
     """
     faces = surface.corner_face[surface.edges.halfedges]
     component = connected_components(surface.face_count, faces)
@@ -145,16 +146,23 @@ def outer_sides(surface: Surface, mean: np.ndarray) -> np.ndarray:
 def face_curvature(surface: Surface, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Compute the curvature of each face, by a least-squares fit of its second fundamental form.
 
-    The second fundamental form is the symmetric matrix [[a, b], [b, c]] in the frame x, y of the face. It
-    maps each edge (u, v) of the face to the difference (p, q) of the normals at the ends of the edge.
+    The second fundamental form is the symmetric matrix [[a, b], [b, c]] in the frame of the face. It maps
+    each edge (u, v) of the face to the difference (p, q) of the normals at the ends of the edge. So
+    curvatures are positive where the surface is convex.
+
+    Parameters
+    ----------
+    surface : Surface
+    x, y : (F, 3) float64 ndarray
+        Tangent frames of the faces.
 
     Returns
     -------
     mean : (F,) float64 ndarray
-        Mean curvature (k1 + k2) / 2, in 1 / Blender unit.
+        Mean curvature (k1 + k2) / 2, in 1 / unit of length in object space.
     deviator : (F,) complex128 ndarray
-        (a - c) / 2 + i b. Its modulus is (k1 - k2) / 2, its phase twice the angle of the direction
-        of k1 in the frame x, y.
+        (a - c) / 2 + i b. Its modulus is (k1 - k2) / 2, its phase twice the angle from x to the direction of
+        the greater curvature k1.
     """
     face, next_corner = surface.corner_face, surface.next_corner
     points = surface.vertices[surface.corner_vertex]

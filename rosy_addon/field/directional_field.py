@@ -69,8 +69,9 @@ def field_from_directions(surface: Surface, directions: np.ndarray) -> RosyField
     -------
     RosyField
         If the directions are a RoSy within `ANGLE_TOLERANCE_DEG` and `LENGTH_TOLERANCE`, its `vectors` are
-        the first directions, unchanged. Otherwise it is the nearest RoSy with `direction_ratios`. For
-        `family_count`, see `detect_families`.
+        the first directions, unchanged. Otherwise it is the nearest RoSy with `direction_ratios`. If the
+        first directions of neighboring faces lie on matching lines (`detect_families`), `family_count` is
+        the number of lines.
 
     See Also
     --------
@@ -90,15 +91,16 @@ def field_from_directions(surface: Surface, directions: np.ndarray) -> RosyField
 def with_opposites(directions: np.ndarray, degree: int | None = None) -> np.ndarray:
     """Return N directions on each face, given N directions or one of each opposite pair of a cross.
 
-    Programs for quad meshes store a cross by two directions, one for each of its lines. In a field of degree 2,
-    by contrast, the two directions are mostly opposite.
+    Programs for quad meshes store a cross by two directions, one for each of its lines. In a field of degree
+    2, by contrast, the two directions are mostly opposite.
 
     Parameters
     ----------
     directions : (n, k, 3) ndarray
+        k is N, or 2 for crosses.
     degree : int, optional
-        The degree N, if it is known: two directions are then a cross exactly if it is 4. Otherwise they are
-        one if fewer than `MAX_OPPOSITE_SHARE` of the rows have opposite directions.
+        The degree N, if it is known: two directions are then a cross exactly if N is 4. If it is not known,
+        they are a cross if at most the fraction `MAX_OPPOSITE_SHARE` of the rows have opposite directions.
 
     Returns
     -------
@@ -127,7 +129,7 @@ def closest_rosy(w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     Returns
     -------
     first_angle : (n,) float64 ndarray
-        Angle of the member that corresponds to the first direction of the row, in radians.
+        Angle in radians from the x axis of the frame to the member that corresponds to the first direction.
     rho : (n,) float64 ndarray
         Length of the members, the mean length of the directions; 0 where a direction is zero.
     direction_ratios : (n, N) complex128 ndarray
@@ -217,7 +219,10 @@ def field_harmonics(field: RosyField) -> dict[int, np.ndarray]:
 
 
 def ratio_harmonics(direction_ratios: np.ndarray) -> dict[int, np.ndarray]:
-    """Return the harmonics of (n, N) `direction_ratios`, in the format of `field_harmonics`."""
+    """Return the harmonics of (n, N) `direction_ratios`: (n,) values C_j exp(i j t) by their order j.
+
+    t is the angle of the stored member. Small harmonics are left out, as in `field_harmonics`.
+    """
     degree = direction_ratios.shape[1]
     member_angles = 2 * np.pi * np.arange(degree) / degree
     coefficients = {}
@@ -229,7 +234,10 @@ def ratio_harmonics(direction_ratios: np.ndarray) -> dict[int, np.ndarray]:
 
 
 def ratios_from_harmonics(coefficients: dict[int, np.ndarray], degree: int) -> np.ndarray:
-    """Return (n, N) `direction_ratios` from harmonics; the inverse of `ratio_harmonics`."""
+    """Return (n, N) `direction_ratios` from harmonics: the inverse of `ratio_harmonics`.
+
+    `coefficients` holds (n,) values C_j exp(i j t) by their order j, and `degree` is N.
+    """
     member = np.exp(2j * np.pi * np.arange(degree) / degree)
     return sum(values[:, None] * signed_power(member, j) for j, values in coefficients.items())
 
@@ -254,9 +262,9 @@ def tensor_field(surface: Surface, tensors: np.ndarray) -> RosyField:
     Returns
     -------
     RosyField
-        The stored member lies along the major eigenvector: the one with the greater signed eigenvalue.
-        The lengths of the directions are the absolute eigenvalues. `family_count` is 2. The field is
-        undefined (zero) where the two eigenvalues are equal.
+        The stored member lies along the major eigenvector: the one with the greater signed eigenvalue. The
+        lengths of the directions are the absolute eigenvalues, or 1/1000 of the larger one if that is more.
+        `family_count` is 2. The field is undefined (zero) where the two eigenvalues are equal.
     """
     vectors, ratios = by_rows(_tensor_directions, tensors, *surface.face_frames)
     return RosyField(4, vectors, ratios, 2)
@@ -265,7 +273,10 @@ def tensor_field(surface: Surface, tensors: np.ndarray) -> RosyField:
 def _tensor_directions(
     tensors: np.ndarray, x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return (F, 3) stored members and (F, 4) `direction_ratios` for `tensor_field`; x, y: face frames."""
+    """Return (F, 3) stored members and (F, 4) `direction_ratios` of the crosses along eigenvectors.
+
+    `tensors` holds (F, 3, 3) symmetric tensors, and x, y are the (F, 3) face frames (see `tensor_field`).
+    """
     a = np.einsum("fi,fij,fj->f", x, tensors, x)
     b = np.einsum("fi,fij,fj->f", x, tensors, y)
     c = np.einsum("fi,fij,fj->f", y, tensors, y)

@@ -1,4 +1,4 @@
-"""Guides along salient edges, without edges that are jagged, as the edges of remeshed parts are."""
+"""Make guides along salient edges, except edges with steps, as voxel remeshing makes them."""
 
 from __future__ import annotations
 
@@ -36,12 +36,13 @@ TOLERANCE, MAX_ITERATIONS = 1e-2, 100
 def coherent_edge_guides(surface: Surface, ends: np.ndarray, degree: int) -> np.ndarray:
     """Make guides along edges, on their faces, without guides that contradict the other edges around them.
 
-    Voxel remeshing, for example, turns a sharp edge of a part into steps. Their directions say nothing about the
-    part, and a field along them has a pair of singularities at each step.
+    Voxel remeshing, for example, turns a sharp edge of a part into steps. Their directions say nothing about
+    the part, and a field along them has a pair of singularities at each step.
 
-    The guides are averaged over the distance `JAG_LENGTH`, along the faces that touch the edges, and a guide is
-    removed if the average is short or points elsewhere. Faces are unfolded at their common edges, so that the
-    corner of a box does not count as a contradiction for degree 4. Guides on faces larger than the distance are kept.
+    The guides are averaged over the distance `JAG_LENGTH`, along the faces that touch the edges, and a guide
+    is removed if the average is short or points elsewhere. Faces are unfolded at their common edges, so that
+    the corner of a box does not count as a contradiction for degree 4. Guides on faces larger than the
+    distance are kept.
 
     Parameters
     ----------
@@ -55,7 +56,7 @@ def coherent_edge_guides(surface: Surface, ends: np.ndarray, degree: int) -> np.
     Returns
     -------
     (F, 3) float64 ndarray
-        Unit vectors; zero on faces without a guide. See `guides.guides_from_edges`.
+        Unit vectors along the edges of a face (`guides.guides_from_edges`); zero on faces without a guide.
     """
     guides = guides_from_edges(surface, ends, degree)
     z = to_representation(guides, *surface.face_frames, degree)

@@ -99,7 +99,11 @@ class FaceGraph:
         return vertex
 
     def turn_around_nodes(self, angle: np.ndarray) -> np.ndarray:
-        """Return (n,) float64 sums of (I,) angles at the edges, counter-clockwise around each vertex node."""
+        """Return (n,) float64 sums of angles at the edges, counter-clockwise around each vertex node.
+
+        `angle` holds the (I,) angles from the source to the target face of each edge. They are subtracted
+        where the way around the node crosses the edge from the target to the source.
+        """
         count = self.node_count
         return np.bincount(self.head, angle, count) - np.bincount(self.tail, angle, count)
 
@@ -276,7 +280,9 @@ class TriangleGraph:
     def on_faces(self, angle: np.ndarray, to_center: np.ndarray) -> np.ndarray:
         """Return (I,) turning angles between faces, computed from (M,) turning angles between triangles.
 
-        `to_center` holds (T,) angles that are added to the directions of triangles; see `turns_to_centers`.
+        The direction of a face is the mean of the directions at the centroids of its triangles, weighted by
+        area. `to_center` holds the (T,) angles from the direction of a triangle to its direction at the
+        centroid: the result of `turns_to_centers`, or 0 where they are ignored.
         """
         turn, outer = self._turns_in_faces(angle, to_center), slice(self.face_edge_count)
         return angle[outer] + turn[self.graph.source[outer]] - turn[self.graph.target[outer]]
@@ -286,13 +292,17 @@ class TriangleGraph:
     ) -> np.ndarray:
         """Return the (F,) directions of faces, computed from the (T,) directions of their triangles.
 
-        All directions are angles in radians. For `angle` and `to_center`, see `on_faces`.
+        All directions are angles in radians. `angle` holds the (M,) turning angles between triangles, and
+        `to_center` the (T,) angles from the direction of a triangle to its direction at the centroid.
         """
         first = np.flatnonzero(np.diff(self.triangle_face, prepend=-1))
         return (direction - self._turns_in_faces(angle, to_center))[first]
 
     def _turns_in_faces(self, angle: np.ndarray, to_center: np.ndarray) -> np.ndarray:
-        """Return, for each of T triangles, the angle from the direction of its face to its own direction."""
+        """Return (T,) angles, in radians, from the direction of a triangle's face to that of the triangle.
+
+        The parameters are those of `on_faces`: turning angles (M,), and turns to the centroids (T,).
+        """
         face, inner = self.triangle_face, slice(self.face_edge_count, None)
         step = np.zeros(len(face))
         step[self.graph.target[inner]] = angle[inner]

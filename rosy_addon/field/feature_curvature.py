@@ -93,10 +93,11 @@ def noisy_curvature(surface: Surface) -> NoisyCurvature:
 def _bounded_curvature(
     surface: Surface, corner_fan: np.ndarray, x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mean curvature and the deviator of each face; see `curvature.face_curvature`.
+    """Return the (F,) mean curvature and the (F,) complex deviator of the faces, as `face_curvature` does.
 
-    Normals are averaged over the fans of `corner_fan`. The curvature is limited to the inverse of the square
-    root of the face area, because a face cannot resolve more.
+    x, y are the (F, 3) tangent frames of the faces, in which the deviator is given. Normals are averaged over
+    the smooth fans: `corner_fan` holds the (C,) index of the fan of each corner. The curvature is limited to
+    the inverse of the square root of the face area, because a face cannot resolve more.
     """
     mean, deviator = face_curvature(with_smooth_normals(surface, corner_fan), x, y)
     vectors = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
@@ -109,17 +110,18 @@ def _bounded_curvature(
 def noise_sample(surface: Surface, noise_angle: float) -> np.ndarray:
     """Return random displacements of the vertices along their normals, as strong as the noise of the mesh.
 
-    The noise is white. It does not depend on the position, the scale and the numbering of the mesh, and is the same at
-    vertices that are images of each other under a symmetry. Its amplitude is estimated in two ways, by comparing the mesh with a mesh that has
-    white noise of unit amplitude: from the angle by which noise rotates the face normals, and from the
-    difference of vertices from the mean of their neighbors. The form of the surface increases the first
-    estimate on coarse meshes, and the second one at creases. So the smaller estimate is used.
+    The noise is white. It does not depend on the position, the scale and the numbering of the mesh, and is
+    the same at vertices that are images of each other under a symmetry. Its amplitude is estimated in two
+    ways, by comparing the mesh with a mesh that has white noise of unit amplitude: from the angle by which
+    noise rotates the face normals, and from the difference of vertices from the mean of their neighbors. The
+    form of the surface increases the first estimate on coarse meshes, and the second one at creases. So the
+    smaller estimate is used.
 
     Parameters
     ----------
     surface : Surface
     noise_angle : float
-        Result of `creases.filtered_normals`.
+        Median angle in radians by which noise rotates the face normals (see `creases.filtered_normals`).
 
     Returns
     -------

@@ -54,8 +54,14 @@ class Field(RosyField):
         N, the number of directions.
     vectors : (F, 3) float64 ndarray
         One member vector for each face, in object space; zero where the field is undefined.
-    direction_ratios, family_count, source_directions
-        See `RosyField`.
+    direction_ratios : (F, N) complex128 ndarray or None
+        None if the directions are the members. Otherwise direction k is member k, rotated by the phase of
+        ratio k and scaled by its modulus.
+    family_count : int
+        Number of families of directions that are told apart, such as 2 for the major and minor directions of
+        a tensor; 1 if the stored member may be any of the members.
+    source_directions : (F, N, 3) float64 ndarray or None
+        The input directions in their order, if the field was made from directions.
     surface : Surface
         The surface on which the field is defined.
 
@@ -146,15 +152,16 @@ class Field(RosyField):
         return self._converted(Conversion(smoothing_length=reach))
 
     def clusters(self, reach: float) -> Singularities:
-        """Return the singularities, with those that are near to each other read as one.
+        """Return the singularities, with each cluster of nearby singularities replaced by a single one.
 
-        Its index is the sum of theirs, and it is left out if that is 0. So the sum of all indices is the same.
+        It lies at the vertex of the cluster that is nearest to their mean position, and its index is the sum
+        of their indices. A cluster with the sum 0 is left out. So the sum of all indices does not change.
 
         Parameters
         ----------
         reach : float
-            Largest distance from a singularity to the next one of its cluster, along edges, as a fraction of the
-            longest side of the bounding box of the mesh.
+            Largest distance from a singularity to the next one of its cluster, along edges, as a fraction of
+            the longest side of the bounding box of the mesh.
 
         Examples
         --------
@@ -169,14 +176,14 @@ class Field(RosyField):
         """Return the field without singularities that are near to each other and whose indices sum to 0.
 
         These are pairs with opposite indices, and then clusters of the others. Other singularities, and
-        directions far from the removed ones, do not change. A group is kept if the faces near it are too large to
-        remove it: the field would then turn by pi / N or more from one face to the next.
+        directions far from the removed ones, do not change. A group is kept if the faces near it are too
+        large to remove it: the field would then turn by pi / N or more from one face to the next.
 
         Parameters
         ----------
         reach : float
-            Largest distance from a singularity to the next one of its group, along edges, as a fraction of the longest
-            side of the bounding box of the mesh.
+            Largest distance from a singularity to the next one of its group, along edges, as a fraction of
+            the longest side of the bounding box of the mesh.
 
         Raises
         ------

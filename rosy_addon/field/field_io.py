@@ -197,7 +197,10 @@ def _read_rows(path: Path) -> RawField:
 
 
 def _joined_rows(raws: list[RawField], paths: list[Path]) -> np.ndarray:
-    """Return (n, k, 3) vectors of k files with one vector in each of their n rows."""
+    """Return (n, k, 3) vectors of k files with one vector in each of their n rows.
+
+    `raws` holds the rows of each file, and `paths` its path for messages.
+    """
     count = len(raws[0].values)
     for raw, path in zip(raws, paths, strict=True):
         if raw.values.shape != (count, 1, 3):
@@ -209,7 +212,10 @@ def _joined_rows(raws: list[RawField], paths: list[Path]) -> np.ndarray:
 
 
 def _with_degree(raw: RawField, path: Path, degree: int | None) -> tuple[RawField, str]:
-    """Return the rows of a file with the opposites of directions that are not stored, and a note on that.
+    """Return the rows of a file with all N directions, and a note for the user on how they were read.
+
+    If the file stores a cross by two directions, their opposites are added. `degree` is the requested degree,
+    or None for any degree. The note is empty if there is nothing to say.
 
     Raises
     ------
@@ -239,6 +245,7 @@ def field_from_raw(
     Parameters
     ----------
     raw : RawField
+        The rows of the file.
     surface : Surface
     degree : int or None
         Degree N for rows with one member vector, if the file does not state a degree; `DEFAULT_DEGREE` if
@@ -271,7 +278,8 @@ def field_from_raw(
 def _check_header(raw: RawField, surface: Surface, source: str) -> None:
     """Raise a `RosyError` if a file does not have the number of rows that its header declares.
 
-    Some programs write the number of vertices in the header of a field on faces. This is accepted.
+    Some programs write the number of vertices in the header of a field on faces. This is accepted. `source`
+    is the name of the file in the message.
     """
     row_count, vertex_count = len(raw.values), len(surface.vertices)
     is_mixed = (raw.header_count, row_count) == (vertex_count, surface.face_count)
@@ -286,7 +294,9 @@ def _source_surface(
 ) -> Surface | None:
     """Return the surface of the mesh file to which the rows of a field file belong.
 
-    The result is None if the rows belong to `surface` itself.
+    The result is None if the rows belong to `surface` itself. `path` is the field file. `mesh` is the mesh
+    file that the user has named. If it is None, the mesh in the field file is used or, if the number of rows
+    does not fit `surface`, a mesh file of the same name in the same folder.
     """
     if mesh is not None:
         return Surface(mesh)
@@ -311,8 +321,8 @@ def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface
     """Write a field to a file, with one row for each face.
 
     `.obj` files contain the mesh and one row for each vertex. `.vtp`, `.vtu`, `.ply` and `.npz` files contain
-    the mesh, the directions and the numbers of the field. `.sings` and `.sing` files contain only the
-    singularities of the field.
+    the mesh, and the directions, magnitudes and singularities of the field. `.sings` and `.sing` files
+    contain only the singularities of the field.
 
     Numbers are written with all digits, so reading the file gives exactly the same float64 values. Only the
     field in an `.obj` file differs, because it is averaged onto the vertices. For a field made from

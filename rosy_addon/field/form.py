@@ -163,8 +163,8 @@ def _agreement(
     """Return (F,) float64: how far guides agree with salient edges near them, from 0 to 1.
 
     The direction of the edges is continued smoothly over the surface, with a modulus that falls off over the
-    distance `EDGE_REACH`. Guides that contradict it are ignored. Otherwise the field would have to rotate between
-    the edge and the guides, and both ways around are equally good halfway between two members.
+    distance `EDGE_REACH`. Guides that contradict it are ignored. Otherwise the field would have to rotate
+    between the edge and the guides, and both ways around are equally good halfway between two members.
 
     Parameters
     ----------

@@ -171,6 +171,9 @@ def view_frame(toward_eye: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the angles between corresponding vectors of two arrays, in radians; 0 where a vector is zero."""
+    """Return the (...) angles in radians between corresponding vectors of two (..., 3) arrays.
+
+    They are from 0 to pi, and 0 where a vector is zero.
+    """
     cross = np.cross(a, b)
     return np.arctan2(np.sqrt(dot(cross, cross)), dot(a, b))

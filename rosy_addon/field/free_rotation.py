@@ -1,17 +1,17 @@
 """Choose the rotation of a whole field, which does not change its energy.
 
-The rotation depends on the shape alone: mirror images, reversed faces, rigid motions and scales have the same field
-of lines. On each connected component, the first criterion that prefers a rotation decides:
+The rotation depends on the shape alone: mirror images, reversed faces, rigid motions and scales have the same
+field of lines. On each connected component, the first criterion that prefers a rotation decides:
 
 1. the principal directions of curvature (even degrees),
 2. creases and borders,
 3. the directions away from the center of the component,
 4. the principal directions, for twice an odd degree,
 5. the edges of the mesh, which depend on how it is divided into faces,
-6. the edges for multiples of the degree. On solids such as a cube, the other criteria prefer nothing by symmetry.
+6. the edges for multiples of the degree. On solids such as a cube, the other criteria prefer nothing.
 
-Criteria 4 and 6 leave several rotations. The one is taken that is nearest to 3. If there is none, they are images of
-each other under the symmetries of the surface, and which of them is taken depends on rounding errors.
+Criteria 4 and 6 leave several rotations, and the one nearest to criterion 3 is taken. If criterion 3 prefers
+none of them, they are images of each other under the symmetries of the surface, and rounding errors decide.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ CREASE_ANGLE = np.pi / 6
 
 
 def freely_rotated(surface: Surface, z: np.ndarray, degree: int) -> np.ndarray:
-    """Return representations z of a field of degree N, rotated by one angle on each connected component.
+    """Return (F,) representations z of a field, rotated by one angle on each connected component.
 
     Parameters
     ----------
@@ -88,9 +88,9 @@ def freely_rotated(surface: Surface, z: np.ndarray, degree: int) -> np.ndarray:
 def _criteria(
     surface: Surface, degree: int, component: np.ndarray, area: np.ndarray
 ) -> Iterator[np.ndarray]:
-    """Yield (F,) representations of criteria 1 to 3, times areas.
+    """Yield the (F,) representations of criteria 1 to 3, whose moduli are weights with the unit of an area.
 
-    `component` is the connected component of each face, `area` that of each component.
+    `component` holds the (F,) connected component of each face, and `area` the area of each component.
     """
     if degree % 2 == 0:
         yield _curvature(surface, degree, area[component])
@@ -111,9 +111,9 @@ def _criteria(
 def _criteria_of_multiples(
     surface: Surface, degree: int, area: np.ndarray
 ) -> Iterator[tuple[int, np.ndarray]]:
-    """Yield the multiples k of the degree of criteria 4 to 6, with their (F,) representations of degree k N.
+    """Yield criteria 4 to 6, as pairs of a multiple k and (F,) representations of the degree k N.
 
-    `area` is that of the component of each face.
+    N is `degree`. `area` holds, for each face, the area of its connected component: (F,).
     """
     if degree % 2:
         yield 2, _curvature(surface, 2 * degree, area)
@@ -122,10 +122,11 @@ def _criteria_of_multiples(
 
 
 def _curvature(surface: Surface, degree: int, area: np.ndarray) -> np.ndarray:
-    """Return (F,) representations of principal directions, times areas and confidences.
+    """Return (F,) representations of principal directions, times the areas of faces and confidences.
 
-    For degrees that are no multiple of 4, it is the direction of the curvature with the larger modulus: reversed
-    faces change the sign of curvatures. `area` is that of the component of each face.
+    For degrees that are no multiple of 4, only the direction of the curvature with the larger modulus counts.
+    It does not change if all faces are reversed, as the signs of curvatures do. `area` holds, for each face,
+    the area of its connected component: (F,).
     """
     smooth = with_smooth_normals(surface)
     mean, deviator = face_curvature(smooth, *smooth.face_frames)
@@ -140,8 +141,8 @@ def _curvature(surface: Surface, degree: int, area: np.ndarray) -> np.ndarray:
 def _along_edges(surface: Surface, degree: int, weight: np.ndarray | float = 1.0) -> np.ndarray:
     """Return (F,) sums of representations of directions along edges, times squared lengths and weights.
 
-    Odd degrees need a direction with a sign that reversed faces do not change: away from the face, across the edge.
-    `weight` has a value for each corner, for the edge that starts there.
+    Odd degrees need a direction with a sign that reversed faces do not change: away from the face, across the
+    edge. `weight` has a value for each corner, for the edge that starts there.
     """
     x, y = surface.face_frames
     face, points = surface.corner_face, surface.vertices[surface.corner_vertex]

@@ -310,6 +310,7 @@ def axis_field(
     ----------
     surface : Surface
     degree : int
+        N.
     axis : 3 floats
         Vector in object space, of any nonzero length.
 

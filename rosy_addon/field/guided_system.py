@@ -171,6 +171,7 @@ class GuidedSystem:
         nodes : (m,) int ndarray
             The nodes to solve for, without duplicates.
         max_iterations : int
+            Number of iterations after which the solver stops.
 
         Returns
         -------

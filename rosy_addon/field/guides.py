@@ -250,6 +250,8 @@ def _resampled(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Resample a polyline at about equal distances.
 
+    `points` holds its (m, 3) points, and `arc_length` the (m,) arc lengths from its start to these points.
+
     Returns
     -------
     points : (n, 3) float64 ndarray

@@ -82,8 +82,9 @@ def is_plain(field: RosyField) -> bool:
 def _between(first: np.ndarray, second: np.ndarray, share: float) -> np.ndarray:
     """Interpolate complex numbers: the phase of the linear interpolation, and a larger modulus.
 
-    The modulus is the linear interpolation of the two moduli, but at most sqrt(2) times the modulus of the
-    linear interpolation.
+    `first` and `second` have the same shape, and `share` is 0 for the first and 1 for the second. The modulus
+    is the linear interpolation of the two moduli, but at most sqrt(2) times the modulus of the linear
+    interpolation.
     """
     z = (1 - share) * first + share * second
     modulus = np.abs(z)
@@ -96,9 +97,9 @@ def _between(first: np.ndarray, second: np.ndarray, share: float) -> np.ndarray:
 def _matched(first: np.ndarray, second: np.ndarray, family_count: int) -> np.ndarray:
     """Return the (F, N) directions of the second field in the order in which they match the first field best.
 
-    `first` and `second` hold the N directions of each face as complex numbers in `Surface.face_frames`. The
-    directions of a face are shifted cyclically by a multiple of the number of families, so that each
-    direction keeps its family.
+    `first` and `second` hold the (F, N) directions as complex numbers in `Surface.face_frames`. The
+    directions of a face are shifted cyclically by a multiple of `family_count`, so that each direction keeps
+    its family.
     """
     best, best_order = second, np.full(len(second), -np.inf)
     for shift in range(0, first.shape[1], family_count if family_count > 1 else 1):

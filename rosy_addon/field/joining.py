@@ -1,4 +1,4 @@
-"""Join the borders of a mesh where they coincide: at the seam of a grid that closes onto itself, and at its poles."""
+"""Join the borders of a mesh where they coincide: at the seam of a closed grid, and at its poles."""
 
 from __future__ import annotations
 
@@ -63,7 +63,11 @@ def coinciding_borders(polygons: Polygons, vertex_data: Mapping[str, Any] | None
 
 
 def _have_same_data(data: Mapping[str, Any], count: int, pairs: np.ndarray) -> np.ndarray:
-    """Return for (n, 2) pairs of vertices whether their numbers are the same. Whole numbers are only labels."""
+    """Return (n,) bool: whether the data of both vertices of (n, 2) pairs are the same.
+
+    `data` are named arrays with `count` rows, one for each vertex. Only floating-point numbers are compared:
+    whole numbers are labels. Normals and texture coordinates may differ (`SHADING_NAMES`).
+    """
     is_same, (first, second) = np.ones(len(pairs), dtype=bool), pairs.T
     for name, values in data.items():
         if name.lower() in SHADING_NAMES:
@@ -79,7 +83,9 @@ def _have_same_data(data: Mapping[str, Any], count: int, pairs: np.ndarray) -> n
 def without_repeats(
     target: np.ndarray, polygons: Polygons
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the polygons with joined vertices, without corners that repeat the one before.
+    """Return the polygons with joined vertices, without corners at the same vertex as the next corner.
+
+    `target` holds, for each of V vertices, the vertex that replaces it (the result of `coinciding_borders`).
 
     Returns
     -------

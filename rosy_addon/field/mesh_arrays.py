@@ -77,8 +77,27 @@ def mesh_arrays(
 ) -> MeshArrays:
     """Return the arrays of a mesh that is given by arrays, by a file or by a mesh object of another library.
 
-    In the result, `vertices` are (V, 3), and `uv` is (C, 2) or None. For the parameters, see `Surface`.
     A `RosyWarning` says how many vertices have been joined.
+
+    Parameters
+    ----------
+    vertices : (V, 3) or (V, 2) array_like, path-like or object
+        Positions or, if `faces` is None, a mesh file or a mesh object.
+    faces : (F, k) array_like of int, or sequence of sequences of int, or None
+        Vertices of each face.
+    name : str
+        Name of the mesh in messages.
+    uv : (V, 2) or (C, 2) array_like, optional
+        Texture coordinates of vertices or corners; by default those of the file or object.
+    step : int, optional
+        Time step to read from the file of a simulation, from 1; by default the last one.
+    join : bool, optional
+        Whether to join vertices on borders that coincide; by default only for some sources (see `Surface`).
+
+    Returns
+    -------
+    MeshArrays
+        Its `vertices` are (V, 3), and its `uv` is (C, 2) or None.
 
     Raises
     ------
@@ -126,7 +145,7 @@ def mesh_arrays(
 
 
 def _with_joined_borders(arrays: MeshArrays) -> tuple[MeshArrays, int, int]:
-    """Join the vertices that `coinciding_borders` finds, and leave out faces that are then an edge or a point.
+    """Join the vertices that `coinciding_borders` finds, and leave out faces that become an edge or a point.
 
     Parameters
     ----------
@@ -154,9 +173,11 @@ def _with_joined_borders(arrays: MeshArrays) -> tuple[MeshArrays, int, int]:
 
 
 def _with_faces(arrays: MeshArrays, vertex: Any, start: Any, corner: Any, face: Any) -> MeshArrays:
-    """Return arrays with other faces, which have the data of these corners and faces of the old ones.
+    """Return the arrays of a mesh with other faces, which take their data from the old faces.
 
-    `vertex` and `start` are the new `corner_vertex` and `face_start`.
+    `vertex` and `start` are the new `corner_vertex` and `face_start`. `corner` holds, for each new corner,
+    the old corner whose texture coordinates it gets, and `face`, for each new face, the old face whose data
+    it gets.
     """
     uv = None if arrays.uv is None else arrays.uv[corner]
     data = _selected_rows(arrays.face_data, face, len(arrays.face_start) - 1)
@@ -164,14 +185,17 @@ def _with_faces(arrays: MeshArrays, vertex: Any, start: Any, corner: Any, face: 
 
 
 def _selected_rows(data: Mapping[str, Any] | None, index: Any, count: int) -> dict[str, Any] | None:
-    """Return the rows of named arrays that `index` selects; arrays that do not have `count` rows stay as they are."""
+    """Return the rows of named arrays that `index` selects. Arrays without `count` rows do not change."""
     if data is None:
         return None
     return {key: np.asarray(v)[index] if len(v) == count else v for key, v in data.items()}
 
 
 def _corner_uv(uv: Any, vertex_count: int, corner_vertex: NDArray[Any], name: str) -> NDArray[Any]:
-    """Return (C, 2) texture coordinates of corners; `uv` has a row for each vertex or for each corner."""
+    """Return (C, 2) texture coordinates of corners; `uv` has a row for each vertex or for each corner.
+
+    `name` is the name of the mesh in messages.
+    """
     array = np.asarray(uv, dtype=np.float64)
     if array.shape not in ((vertex_count, 2), (len(corner_vertex), 2)):
         raise RosyError(

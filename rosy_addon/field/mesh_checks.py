@@ -1,4 +1,4 @@
-"""What is unusual about a mesh, and changes the fields on it: orientations, and faces on top of each other."""
+"""Find what disturbs fields on a mesh: faces of opposite orientations, and faces on top of each other."""
 
 from __future__ import annotations
 

@@ -86,7 +86,9 @@ def fan_normals(
 ) -> np.ndarray:
     """Return (C, 3) unit corner normals: face normals averaged over smooth fans, weighted by corner angle.
 
-    Where the mean is zero, the corner normal is the face normal or, if that is zero too, (0, 0, 1).
+    A smooth fan is a set of corners at a vertex that share a normal; `corner_fan` holds the (C,) index of the
+    fan of each corner. Where the mean is zero, the corner normal is the face normal or, if that is zero too,
+    (0, 0, 1).
     """
     angle = np.empty(len(corner_vertex))
     for _, corners, starts in face_blocks(face_start):

@@ -170,12 +170,12 @@ def _turning(
     defect: np.ndarray,
     present: np.ndarray | float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the turning angles and directions of a field with given singularity indices.
+    """Return (I,) turning angles and (F,) directions, in radians, of a field with given singularity indices.
 
     For a new field, `index` holds the singularity indices of the vertices, and `defect` the (n,) angle
     defects of the vertex nodes. If an existing field is changed, `index` holds the changes of its indices,
-    `defect` is 0, and `present` holds its (I,) turning angles in radians. For the result, see
-    `turning_angles`.
+    `defect` is 0, and `present` holds its (I,) turning angles. The first result is then the change of these
+    angles. Directions are angles in the frames of the faces.
     """
     node_index = index_at_nodes(graph, vertex, index)
     _check_sums(graph, defect * (degree / (2 * np.pi)), node_index, degree)
@@ -197,8 +197,9 @@ def _bent(
 ) -> np.ndarray:
     """Return (F,) representations z after rotating them toward a target, with the same singularities.
 
-    `target` holds the (F,) representations to reach, and `turning` the (I,) turning angles of the field z
-    (see `guided_rotation`). The influence of the target falls off over the distance `reach`, in object space.
+    `target` holds the (F,) representations to reach, 0 on faces without a guide. `turning` holds the (I,)
+    angles in radians by which the field z turns from the source to the target face of each edge. The
+    influence of the guides falls off over the distance `reach`, in object space.
     """
     penalty = graph.surface.face_area / reach / reach
     angle = guided_rotation(graph, degree, turning, z, target, penalty)
@@ -237,7 +238,8 @@ def index_at_nodes(graph: FaceGraph, vertex: np.ndarray, index: np.ndarray) -> n
 def _check_sums(graph: FaceGraph, needed: np.ndarray, given: np.ndarray, degree: int) -> None:
     """Check that the singularity indices on each closed component have the sum that it needs.
 
-    `needed` and `given` are values at the nodes; their sums over a component must be equal.
+    `needed` and `given` hold (n,) indices at the vertex nodes, in units of 1 / N. Their sums over a closed
+    component must be equal.
 
     Raises
     ------
@@ -284,7 +286,11 @@ def _check_angles(graph: FaceGraph, degree: int, angle: np.ndarray) -> None:
 
 
 def _rotation_to(target: np.ndarray, z: np.ndarray, component: np.ndarray) -> np.ndarray:
-    """Return (F,) complex factors that rotate z toward a target, equal on all faces of a component."""
+    """Return (F,) factors of modulus 1 that rotate representations to a target, equal on each component.
+
+    `target` and `z` hold (F,) representations, and `component` the (F,) connected component of each face. The
+    rotation of a component is the one with the least squared error.
+    """
     total = complex_bincount(component, target * z.conj(), int(component.max(initial=-1)) + 1)
     return unit_complex(total, otherwise=1)[component]
 
@@ -305,7 +311,7 @@ def guided_rotation(
     degree : int
         N.
     turning : (I,) ndarray
-        Angles by which the field turns at the edges; see `turning_angles`.
+        Angles in radians by which the field turns from the source to the target face of each edge.
     z : (F,) complex ndarray
         Representation of the field, of modulus 1 or 0.
     target : (F,) complex ndarray
@@ -317,8 +323,8 @@ def guided_rotation(
     Returns
     -------
     (F,) float64 ndarray
-        Angle in radians. The rotated field turns by less than pi / N across each edge, unless the guides
-        require more.
+        Counter-clockwise angle in radians. The rotated field turns by less than pi / N across each edge,
+        unless the guides require more.
     """
     offset = target * z.conj()
     is_guide = (offset != 0) & (penalty > 0)
@@ -409,7 +415,10 @@ def _initial_angle(
 
 
 def _solve(matrix: CSRMatrix, rhs: np.ndarray, levels: list[Level] | None) -> np.ndarray:
-    """Solve a linear system by the conjugate gradient method, with multigrid as preconditioner if given."""
+    """Solve ``matrix @ solution = rhs`` by the conjugate gradient method, preconditioned by a W-cycle.
+
+    `levels` holds the multigrid levels of the matrix; None to build them.
+    """
     precondition = None if levels is None else partial(w_cycle, levels)
     label = "turning the field to the guides"
     return conjugate_gradient(matrix, rhs, TOLERANCE, precondition, label)

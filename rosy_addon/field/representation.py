@@ -152,5 +152,8 @@ def matching_angles(surface: Surface, z: np.ndarray, degree: int) -> np.ndarray:
 
 
 def is_tie(angle: np.ndarray) -> np.ndarray:
-    """Return whether angles between representations, from -pi to pi, are half a turn; see `TIE_TURNS`."""
+    """Return whether angles between representations, from -pi to pi, are half a turn, up to rounding errors.
+
+    The tolerance is `TIE_TURNS`, in turns.
+    """
     return np.abs(angle) > np.pi * (1 - 2 * TIE_TURNS)

@@ -62,8 +62,8 @@ def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, 
 def count_ties(surface: Surface, field: RosyField) -> int:
     """Return the number of edges at which the field turns by half the angle between its members.
 
-    There, two members of the second face match as well as each other. Which one is taken decides where singularities
-    are; see `representation.matching_angles`.
+    There, two members of the second face match as well as each other. Which one is taken decides where
+    singularities are; see `representation.matching_angles`.
     """
     z = face_representation(surface, field)
     angle = field.degree * matching_angles(surface, z, field.degree)

@@ -87,7 +87,7 @@ def move_index(
 def _distance(surface: Surface, ends: np.ndarray) -> float:
     """Return the straight-line distance between two vertices, in object space.
 
-    It is 0 if one of them is `OUTSIDE` or not in the mesh.
+    `ends` holds the two vertices. The distance is 0 if one of them is `OUTSIDE` or not in the mesh.
     """
     if (ends < 0).any() or (ends >= len(surface.vertices)).any():
         return 0.0
@@ -97,9 +97,10 @@ def _distance(surface: Surface, ends: np.ndarray) -> float:
 def cancel_pairs(surface: Surface, field: RosyField, max_distance: float) -> RosyField:
     """Return the field without nearby singularities whose indices sum to 0.
 
-    Pairs with opposite indices are removed first, and then the clusters of all others whose sum is 0, such as +2/4
-    and two of -1/4. Directions change most near removed singularities, and less with the distance from them. All
-    other singularities stay. A group is kept if the field without it would turn by pi / N or more between two faces.
+    Pairs with opposite indices are removed first, and then the clusters of all others whose sum is 0, such as
+    +2/4 and two of -1/4. Directions change most near removed singularities, and less with the distance from
+    them. All other singularities stay. A group is kept if the field without it would turn by pi / N or more
+    between two faces.
 
     Parameters
     ----------
@@ -107,8 +108,8 @@ def cancel_pairs(surface: Surface, field: RosyField, max_distance: float) -> Ros
     field : RosyField
         A field whose directions are rotationally symmetric.
     max_distance : float
-        Largest length of the shortest path along edges between the vertices of a pair, or from a singularity to
-        the next one of its cluster, in object space.
+        Largest length of the shortest path along edges between the vertices of a pair, or from a singularity
+        to the next one of its cluster, in object space.
 
     Returns
     -------
@@ -146,6 +147,8 @@ def _opposite_groups(
     """Return (K,) int64 numbers of groups of nearby singularities whose indices sum to 0; -1 for all others.
 
     The groups are pairs of opposite indices (`opposite_pairs`), and clusters of the rest (`cluster_numbers`).
+    `max_distance` is the largest distance in a pair, or to the next singularity of a cluster, along edges in
+    object space.
     """
     pairs = opposite_pairs(surface, vertex, index, max_distance)
     group = np.full(len(vertex), -1)
@@ -160,8 +163,8 @@ def _opposite_groups(
 def cluster_numbers(surface: Surface, vertex: np.ndarray, max_distance: float) -> np.ndarray:
     """Return the (K,) int64 number of the cluster of each of K vertices, from 0 without gaps.
 
-    Two vertices are in a cluster if a path along edges connects them whose parts between given vertices are at most
-    `max_distance` long, in object space.
+    Two of the vertices are in the same cluster if their distance is at most `max_distance`, along edges in
+    object space, or if they are connected by a chain of such pairs.
     """
     first, second, _ = _near(surface, vertex, max_distance)
     root = connected_components(len(vertex), np.stack([first, second], axis=1))
@@ -181,13 +184,13 @@ def cluster_singularities(
     vertex, index : (K,) int ndarray
         Vertices and indices of the singularities.
     max_distance : float
-        See `cluster_numbers`.
+        Largest distance from a singularity to the next one of its cluster, along edges in object space.
 
     Returns
     -------
     vertex, index : (n,) int32 ndarray
-        For each cluster, its vertex nearest to the mean position of its vertices, in ascending order, and the sum of
-        its indices. The sum of all indices does not change.
+        For each cluster, its vertex nearest to the mean position of its vertices, and the sum of its indices.
+        Vertices are in ascending order. The sum of all indices does not change.
     """
     cluster = cluster_numbers(surface, vertex, max_distance)
     point, total = surface.vertices[vertex], np.bincount(cluster, index).astype(np.int32)
@@ -202,8 +205,8 @@ def cluster_singularities(
 def _are_near(surface: Surface, places: np.ndarray, vertices: np.ndarray) -> np.ndarray:
     """Return (n,) bool: which of the n vertices `places` are nearest to the given other vertices.
 
-    The distance of a vertex is the number of rings of faces from the given vertices to it. All with the smallest
-    distance are marked.
+    The distance of a vertex is the number of rings of faces from the given vertices to it. All with the
+    smallest distance are marked.
     """
     is_near = mask(len(surface.vertices), vertices)
     corner_vertex, corner_face = surface.corner_vertex, surface.corner_face

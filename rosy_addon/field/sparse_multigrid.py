@@ -104,7 +104,7 @@ class CSRMatrix:
         return concatenated_ranges(self.indptr[:-1][rows], np.diff(self.indptr)[rows])
 
     def rows(self, rows: np.ndarray) -> CSRMatrix:
-        """Return the matrix that consists of the given rows."""
+        """Return the matrix that consists of the given rows, in the order of their indices `rows`."""
         entries = self.entries_of_rows(rows)
         indptr = np.concatenate([[0], np.cumsum(np.diff(self.indptr)[rows])])
         return CSRMatrix(indptr, self.indices[entries], self.data[entries], self.column_count)
@@ -263,8 +263,8 @@ def hierarchy(matrix: CSRMatrix, smoothed_size: int | None = None) -> list[Level
     matrix : CSRMatrix
         The (n, n) matrix, Hermitian.
     smoothed_size : int, optional
-        If n is larger, the prolongation of the finest level is not smoothed. This takes half the time, but a W-cycle then
-        reduces the error less.
+        If n is larger, the prolongation of the finest level is not smoothed. This takes half the time, but a
+        W-cycle then reduces the error less.
 
     Returns
     -------
@@ -392,7 +392,10 @@ def _dense_inverse(matrix: CSRMatrix) -> np.ndarray:
 
 
 def _plain_prolongation(aggregate: np.ndarray, count: int, phase: np.ndarray) -> CSRMatrix:
-    """Return the prolongation matrix with one entry in each row, given the results of `_aggregates`."""
+    """Return the (n, count) prolongation matrix that is not smoothed: the entry of a row is its phase.
+
+    `aggregate`, `count` and `phase` are results of `_aggregates`.
+    """
     return CSRMatrix(np.arange(len(aggregate) + 1), aggregate, phase, count)
 
 
@@ -405,7 +408,7 @@ def _smoothed_prolongation(
 ) -> CSRMatrix:
     """Return the prolongation matrix: one column for each aggregate, smoothed by a Jacobi step of the matrix.
 
-    `aggregate`, `count` and `phase` are results of `_aggregates`.
+    `aggregate`, `count` and `phase` are results of `_aggregates`, and `jacobi_weight` of `_jacobi_weights`.
     """
     unknowns = np.arange(len(matrix))
 

@@ -70,7 +70,8 @@ class CornerDirections:
     def phase_changes(self, spacing: float) -> np.ndarray:
         """Return the (3 T, M) changes that the phase of each family should have from each corner to the next.
 
-        `spacing` is the distance between neighboring stripes, in the units of `offset`.
+        Row 3 t + k is for corner k of triangle t. `spacing` is the distance between neighboring stripes, in
+        the units of `offset`.
         """
         edge = np.roll(self.offset, -1, axis=1) - self.offset
         middle = 0.5 * (self.angle + np.roll(self.angle, -1, axis=1))
@@ -93,7 +94,8 @@ class StripePattern:
     Attributes
     ----------
     phase : (T, M, 3) float32 ndarray
-        The linear part of the phase, at the corners (see `evaluate`).
+        The linear part of the phase, at the three corners of each triangle. Where `index` is not 0,
+        `evaluate` adds a second part.
     index : (T, M) float32 ndarray
         Number of stripes that begin or end in each triangle: the integer by which the phase grows on the way
         around the triangle, counter-clockwise. It may be negative, and is 0 in most triangles.
@@ -248,7 +250,8 @@ def _shared_changes(
 ) -> np.ndarray:
     """Return (3 T, M) changes of the phases along edges: means of the changes in both triangles of each edge.
 
-    So the changes of the two opposite halfedges of an edge are exactly opposite.
+    `change` holds the (3 T, M) changes in each triangle (`CornerDirections.phase_changes`). The result is
+    exactly opposite for the two opposite halfedges of an edge.
     """
     families = directions.family_count
     result = change.copy()
@@ -332,7 +335,8 @@ def _covering_graph(
 ) -> PhaseGraph:
     """Return the graph that connects the nodes of the covering along the edges of all triangles.
 
-    Each entry relates the values at the ends of an edge by the given change of the phase.
+    Each entry relates the values at the ends of an edge. `change` holds the (3 T, M) changes of the phase
+    from each corner to the next (`_shared_changes`).
     """
     weight = _edge_weights(directions).reshape(-1)
     corner = np.arange(len(weight))

@@ -59,8 +59,8 @@ class Surface:
     ----------
     vertices : (V, 3) array_like, path-like or mesh
         Positions of the vertices; (V, 2) for a flat mesh. If `faces` is not given: the path of a file
-        (``.obj``, ``.off``, ``.ply``, ``.stl``, ``.om``, or a file of a simulation, such as ``.vtu``), or a mesh
-        object of meshio, PyVista, trimesh (or a scene of trimesh) or Open3D.
+        (``.obj``, ``.off``, ``.ply``, ``.stl``, ``.om``, or a file of a simulation, such as ``.vtu``), or a
+        mesh object of meshio, PyVista, trimesh (or a scene of trimesh) or Open3D.
     faces : (F, k) array_like of int, or sequence of sequences of int, optional
         Vertices of each face, counter-clockwise about the outward normal.
     name : str, optional
@@ -81,12 +81,12 @@ class Surface:
         Number of the time step to read if the file of a simulation has several, counted from 1. By default
         the last step.
     join : bool, optional
-        Whether to join vertices on borders that are at the same position (within 1e-6 of the longest side) and
-        have the same data, such as at the seam and the poles of a grid of longitudes and latitudes. By default
-        only for files of simulations, objects of other libraries and .stl files. Faces with fewer than three
-        different corners are then left out, and a `RosyWarning` says so. If it is True, faces that
-        have the same corners as others, as on a two-sided sheet, are removed; otherwise a `RosyWarning` says
-        that there are some.
+        Whether to join vertices on borders that are at the same position (within 1e-6 of the longest side)
+        and have the same data, such as at the seam and the poles of a grid of longitudes and latitudes. By
+        default only for files of simulations, objects of other libraries and .stl files. Faces with fewer
+        than three different corners are then left out, and a `RosyWarning` says so. If `join` is True, faces
+        that have the same corners as others, as on a two-sided sheet, are removed; otherwise a `RosyWarning`
+        says that there are some.
 
     Attributes
     ----------
@@ -235,7 +235,7 @@ class Surface:
 
     @cached_property
     def face_frames(self) -> tuple[np.ndarray, np.ndarray]:
-        """The tangent frames x, y of the faces: x along the first edge of a face, y a quarter turn from x.
+        """The tangent frames x, y of the faces: x along the first edge of a face, y = normal cross x.
 
         Both are (F, 3) float64, and zero for faces without area, so that representations are zero there. An
         edge of length 0 is skipped. `Field.angles` are measured from x. The frames are the same as those of
@@ -372,10 +372,14 @@ def build_surface(
     Parameters
     ----------
     vertices : (V, 3) array_like
+        Positions in object space, after deformation.
     corner_vertex : (C,) array_like of int
+        Vertex of each corner, face by face.
     face_start : (F + 1,) array_like of int
+        First corner of each face, and C.
     name : str
-    sharp_edges : (E, 2) array_like of int, optional
+        Name for messages.
+    sharp_edges : (n, 2) array_like of int, optional
         Vertex pairs across which normals and field values do not mix.
     sharp_angle : float, optional
         Edges with a larger angle between the normals of their faces, in radians, are also sharp.
@@ -384,9 +388,9 @@ def build_surface(
     corner_normal : (C, 3) array_like, optional
         Shading normals. By default the face normals averaged over each smooth fan, weighted by corner angle.
     corner_fan : (C,) array_like of int, optional
-        The result of `smooth_fans`, if it is known.
+        Index of the smooth fan of each corner; by default the result of `smooth_fans`.
     triangles, triangle_face : (T, 3) and (T,) array_like of int, optional
-        The result of `triangulate`, if it is known.
+        Corners and face of each triangle; by default the result of `triangulate`.
     rest_vertices : (V, 3) array_like, optional
         Positions before deformation, if the mesh is deformed.
 
@@ -428,9 +432,9 @@ def build_surface(
 
 
 def with_delaunay_triangles(surface: Surface) -> Surface:
-    """Return the surface with triangles that do not depend on the first corners of its faces; for solvers.
+    """Return the surface with Delaunay triangles, which do not depend on the first corners of its faces.
 
-    See `triangulate.delaunay_triangles`. Pictures use triangles that stay the same when a mesh is deformed.
+    They are for solvers. Pictures use triangles that stay the same when a mesh is deformed.
     """
     if len(surface.triangles) == surface.face_count:
         return surface

@@ -78,18 +78,18 @@ class SurfaceAverages:
 
     @property
     def corner_area(self) -> np.ndarray:
-        """(3 T,) float64: the share of the area of its face of each corner of the triangles."""
+        """(3 T,) float64: the share of each triangle corner in the area of its face (see `Connection`)."""
         return self.connection.corner_area
 
     @cached_property
     def mass(self) -> np.ndarray:
-        """(n,) float64: the mass of each node (a third of the area of its triangles), always positive."""
+        """(n,) float64: the mass of each node, the sum of the shares of areas around it; always positive."""
         return self.connection.positive_mass
 
     def node_sums(
         self, values: np.ndarray, degree: int, corner: np.ndarray | slice = slice(None)
     ) -> np.ndarray:
-        """Sum face values at the nodes (vertices), weighted by the shares of the areas of the faces around them.
+        """Sum face values at the nodes (vertices), weighted by the corners' shares of the face areas.
 
         Parameters
         ----------
@@ -115,8 +115,9 @@ class SurfaceAverages:
     def face_sums(self, values: np.ndarray, degree: int) -> np.ndarray:
         """Return (F,) complex128 sums of (n,) node values at the triangle corners of each face.
 
-        Node values are representations of `degree`, and are converted to the frame of the face. Each is
-        weighted by three times its share of the area of the face: in a triangle, the area.
+        Node values are representations of `degree`, and are converted to the frame of the face. The weight of
+        a corner is three times its share in the area of the face (`corner_area`). If the face is a triangle,
+        this is the area of the face.
         """
         area = self.corner_area.reshape(-1, 3)
         weighted = np.empty(area.shape, dtype=np.complex128)

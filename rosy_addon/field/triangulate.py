@@ -72,11 +72,11 @@ def triangulate(
 def delaunay_triangles(
     points: np.ndarray, triangles: np.ndarray, triangle_face: np.ndarray
 ) -> np.ndarray:
-    """Return triangles with the Delaunay diagonals of their faces (Lawson 1977), whatever the first corners are.
+    """Return triangles with the Delaunay diagonals of the faces (Lawson 1977), whatever their first corners.
 
-    Diagonals are flipped until the two angles opposite each of them add up to at most 180 degrees. Where all corners of a
-    face lie on a circle, as in a rectangle, several divisions are as good. Then the cotangent weights of the diagonals
-    are 0, so that a Laplacian does not depend on the choice.
+    Diagonals are flipped until the two angles opposite each of them add up to at most 180 degrees. Where all
+    corners of a face lie on a circle, as in a rectangle, several divisions are as good. Then the cotangent
+    weights of the diagonals are 0, so that a Laplacian does not depend on the choice.
 
     Parameters
     ----------
@@ -129,9 +129,12 @@ def _diagonals(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _gain_of_flips(corners: np.ndarray) -> np.ndarray:
-    """Return (n,) sums of the cotangents of the angles opposite to the other diagonal, minus those of the present one.
+    """Return (n,) gains of flipping diagonals; a flip to a Delaunay diagonal has a positive gain.
 
-    `corners` is (n, 4, 3), as in `_diagonals`. The result is 0 where the other diagonal lies outside.
+    The gain is the sum of the cotangents of the two angles opposite to the other diagonal, minus this sum for
+    the present diagonal. It is 0 where the other diagonal lies outside. `corners` holds the (n, 4, 3)
+    positions of the corners of both triangles, counter-clockwise. The present diagonal is from the first to
+    the third.
     """
     following = np.roll(corners, -1, axis=1) - corners
     previous = -np.roll(following, 1, axis=1)
@@ -168,6 +171,7 @@ def _fan_apexes(
     Parameters
     ----------
     vertices, corner_vertex, face_start : ndarray
+        The polygon mesh, as in `triangulate`.
     faces : (n,) int ndarray
         Faces with more than three corners.
 
@@ -287,7 +291,7 @@ def _ear_clip(points: np.ndarray) -> np.ndarray:
 
 
 class _RemainingCorners:
-    """The corners of a polygon that are not cut off yet, sorted along both axes."""
+    """The corners of a polygon in the plane that are not cut off yet, sorted by x and sorted by y."""
 
     def __init__(self, points: np.ndarray) -> None:
         self._points = points
@@ -296,7 +300,7 @@ class _RemainingCorners:
         self._sort()
 
     def _sort(self) -> None:
-        """Sort the remaining corners along both axes."""
+        """Sort the remaining corners by x, and in a second list by y."""
         corners = np.flatnonzero(self._alive)
         self._order = [corners[np.argsort(self._points[corners, axis])] for axis in (0, 1)]
         self._coordinate = [self._points[self._order[axis], axis] for axis in (0, 1)]
@@ -343,7 +347,10 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _smallest_sine(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-    """Return the smallest sine of the angles of each triangle; it is negative for clockwise triangles."""
+    """Return the (n,) smallest sines of the angles of triangles with (n, 2) corners a, b and c.
+
+    The sine is negative for clockwise triangles.
+    """
     area = _cross(b - a, c - a)
     ab, bc, ca = (np.linalg.norm(side, axis=1) for side in (b - a, c - b, a - c))
     scale = ab * bc * ca / np.maximum(np.minimum(np.minimum(ab, bc), ca), 1e-300)

@@ -69,14 +69,16 @@ def turning_angles(
     required : (n,) ndarray
         Sums of the angles around interior nodes, in radians; values at other nodes are ignored.
     present : (I,) ndarray or float
-        Turning angles of an existing field, to which the result will be added, in radians.
+        Turning angles of an existing field, to which the result will be added, in radians: counter-clockwise,
+        from the source to the target face of each edge.
 
     Returns
     -------
     angle : (I,) float64 ndarray
-        Angles in radians with the least weighted sum of squares. Around each loop, these angles, the present
-        angles and the angles between the frames of neighboring faces add up to a multiple of 2 pi / N. Where
-        the field would turn by pi / N or more between two faces, the angles are reduced, if possible.
+        Angles with the least weighted sum of squares, like `present`. Around each loop, these angles, the
+        present angles and the angles between the frames of neighboring faces add up to a multiple of 2 pi /
+        N. Where the field would turn by pi / N or more between two faces, the angles are reduced, if
+        possible.
     direction : (F,) float64 ndarray
         Direction on each face of the field that turns by the present angles plus these angles, in radians in
         the frame of the face.
@@ -114,11 +116,11 @@ def _least_angles_near(
 ) -> np.ndarray | None:
     """Return (M,) turning angles: least-squares angles near some edges, and the old angles elsewhere.
 
-    `graph` is the graph of triangles with M edges, and `loops` is the result of `_loops` for it. `angle`
-    holds the (M,) old turning angles. `changed` holds the indices of edges whose conductances have changed;
-    angles within `REACH` edges of them are computed again. For `required`, see `turning_angles`. The result
-    is None if the sum of the angles around a loop would change. That can happen if the changed neighborhood
-    surrounds a part of the surface.
+    `graph` is the graph of triangles with M edges, and `loops` is the result of `_loops` for it. `required`
+    holds the (n,) sums of the angles around interior nodes, and `angle` the (M,) old turning angles, in
+    radians. `changed` holds the indices of edges whose conductances have changed; angles within `REACH` edges
+    of them are computed again. The result is None if the sum of the angles around a loop would change. That
+    can happen if the changed neighborhood surrounds a part of the surface.
     """
     is_near = mask(graph.node_count, np.stack([graph.tail[changed], graph.head[changed]]))
     for step in range(REACH):
@@ -151,8 +153,8 @@ def added_resistance(angle: np.ndarray, present: np.ndarray | float, limit: floa
     """Return (I,) factors for the resistances of edges, which make angles smaller where they are too large.
 
     The resistance of an edge is its weight in the sum of squares. `angle` and `present` hold the (I,) added
-    and present turning angles, in radians. A factor is 1 unless the added angle brings the modulus of the sum
-    near to `limit` or above it.
+    and present turning angles, in radians, as is `limit`. A factor is 1 unless the added angle brings the
+    modulus of the sum near to `limit` or above it.
     """
     room = np.maximum(limit - np.sign(angle) * present, MIN_ROOM * limit)
     return np.maximum(np.abs(angle) / (ANGLE_MARGIN * room), 1) ** 2
@@ -165,8 +167,9 @@ def least_angles(
 
     The angles have the least sum of squares, each divided by the conductance. `graph` has M edges: it is the
     graph of triangles (`TriangleGraph.graph`) or, for a simpler solution, the graph of faces. `loops` is the
-    result of `_loops` for this graph, or empty to ignore loops. `present` holds (M,) turning angles of an
-    existing field at its edges, or is 0. For `degree` and `required`, see `turning_angles`.
+    result of `_loops` for this graph, or empty to ignore loops. `required` holds the (n,) sums of the angles
+    around interior nodes, in radians. `present` holds (M,) turning angles of an existing field at the edges,
+    or is 0. `degree` is N.
     """
     with progress(0.0, 0.5):
         solver = potential_solver(graph)
@@ -193,7 +196,7 @@ def least_angles(
 
 
 def _sums_around(loops: Loops, angle: np.ndarray) -> np.ndarray:
-    """Return the sum of (I,) angles around each of the loops, as a float64 array."""
+    """Return the sum of angles around each of L loops, (L,) float64; `angle` has one for each edge."""
     return np.array([(signs * angle[edges]).sum() for edges, signs in loops])
 
 
@@ -203,7 +206,7 @@ def potential_solver(
     """Return a function that solves the Poisson equation of a graph.
 
     It takes the (n,) sums of angles around the interior nodes, in radians, and returns the (n,) potential at
-    the nodes.
+    the nodes. The solver stops when the residual norm is `tolerance` times the norm of the right-hand side.
     """
     matrix = levels = None
     if graph.is_interior.any():
@@ -244,7 +247,8 @@ def _potential_matrix(graph: FaceGraph) -> CSRMatrix:
 def _nearest_lattice_coefficients(matrix: np.ndarray, sums: np.ndarray, turn: float) -> np.ndarray:
     """Return (m,) coefficients c that make the energy c @ matrix @ c small, given the sums matrix @ c.
 
-    The sums are given up to multiples of `turn`. These multiples are first found by rounding. They are then
+    The (m, m) matrix has a row and a column for each of m loops. The (m,) sums are in radians. They are given
+    up to multiples of `turn`, 2 pi / N. These multiples are first found by rounding. They are then
     changed by 1, one by one and in pairs, as long as that reduces the energy. The search ends because the
     inverse of the matrix is made positive definite, so that only finitely many multiples have less energy
     than the first ones.

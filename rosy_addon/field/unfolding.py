@@ -41,11 +41,11 @@ def folded_faces(surface: Surface) -> np.ndarray:
 
 
 def unfolded(surface: Surface) -> Surface:
-    """Return the surface without folded faces, and oriented consistently; itself if it is so already.
+    """Return the surface without folded faces, and oriented consistently.
 
-    In each part that can be oriented, the orientation of most faces counts, and the others are reversed. The
-    vertices of folded faces move to the mean of their neighbors. Faces keep their numbers, but the corners of
-    reversed faces do not.
+    A surface that needs no change is returned itself. In each part that can be oriented, the orientation of
+    most faces counts, and the others are reversed. The vertices of folded faces move to the mean of their
+    neighbors. Faces keep their numbers, but the corners of reversed faces do not.
     """
     start, face = surface.face_start, surface.corner_face
     is_reversed = _reversed_faces(surface)
@@ -71,7 +71,8 @@ def unfolded(surface: Surface) -> Surface:
 def _reversed_faces(surface: Surface) -> np.ndarray:
     """Return (F,) bool: whether each face has the opposite orientation of most faces of its part.
 
-    A part is a set of faces that are connected by edges with two faces. No face of a one-sided part is reversed.
+    A part is a set of faces that are connected by edges with two faces. No face of a one-sided part is
+    reversed.
     """
     edges, count = surface.edges, surface.face_count
     is_pair = edges.face_count == 2

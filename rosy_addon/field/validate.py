@@ -59,9 +59,9 @@ class VectorPolicy(NamedTuple):
     nonfinite : {"error", "zero"}
         For vectors that are not finite: raise an error, or treat them as undefined.
     off_surface : {"error", "project", "undefined"}
-        For vectors that are more than `TOLERANCE_DEG` off the tangent plane: raise an error if they are more than
-        `MAX_OUTLIER_FRACTION` of all, otherwise rotate them into the plane; always rotate them into the plane;
-        or treat them as undefined.
+        For vectors that are more than `TOLERANCE_DEG` off the tangent plane: raise an error if they are more
+        than `MAX_OUTLIER_FRACTION` of all, otherwise rotate them into the plane; always rotate them into the
+        plane; or treat them as undefined.
     """
 
     nonfinite: str = "error"
@@ -139,8 +139,8 @@ def validated_field(
 def checked_domain(surface: Surface, count: int, domain: str | None, source: str) -> str:
     """Return the domain ("face" or "vertex") of `count` rows, or raise an error if the count does not fit.
 
-    If `domain` is given, `count` must fit it. Otherwise, it is "face" if the mesh has `count` faces, even if it
-    has as many vertices.
+    If `domain` is given, `count` must fit it. Otherwise, it is "face" if the mesh has `count` faces, even if
+    it has as many vertices.
     """
     faces, vertices = surface.face_count, len(surface.vertices)
     if domain is None:
@@ -170,8 +170,12 @@ def validated_directions(
         If it is deformed, the directions must be tangent to its rest shape.
     directions : (n, N, 3) array_like
         Vectors in object space, in any order. Where one of the N vectors is zero, the field is undefined.
-    source, policy, domain
-        See `validated_field`.
+    source : str
+        Name of the file or attribute, for messages.
+    policy : VectorPolicy
+        What to do about directions that are not finite, or off the surface.
+    domain : {"face", "vertex"}, optional
+        The mesh elements to which the rows belong; by default determined from their number.
 
     Returns
     -------
@@ -257,8 +261,8 @@ def tangent_normals(surface: Surface, domain: str) -> np.ndarray:
     Returns
     -------
     (F, 3) or (V, 3) float64 ndarray
-        Unit normals; see `Surface.face_normal` and `vertex_normals`. Zero on faces without area and
-        on vertices without a face.
+        Unit normals: `Surface.face_normal` for the domain "face", `vertex_normals` for "vertex". Zero on
+        faces without area and on vertices without a face.
     """
     surface = surface.in_rest_shape()
     return surface.face_normal if domain == "face" else vertex_normals(surface)
@@ -298,7 +302,8 @@ def project_to_tangent(
     source, domain : str
         Name of the file or attribute, and name of the mesh elements, for messages.
     off_surface : {"error", "project", "undefined"}
-        What to do about vectors that exceed the tolerance; see `VectorPolicy`.
+        What to do about vectors that exceed the tolerance: raise an error if they are many (see Raises), and
+        project them otherwise; always project them; or set them to zero.
 
     Returns
     -------
@@ -326,9 +331,10 @@ def project_to_tangent(
 
 
 def _project(vectors: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the projections of vectors to planes, with their original length.
+    """Return (n, 3) projections of vectors to planes, with their original length.
 
-    Further results are the angles between vectors and planes in degrees, and whether each vector is zero.
+    Further results are the (n,) angles from 0 to 90 between vectors and planes, in degrees, and (n,) bool:
+    whether each vector is zero. `normal` holds the (n, 3) unit normals of the planes, one for each vector.
     """
     length = np.sqrt(dot(vectors, vectors))
     component = dot(vectors, normal)

@@ -31,6 +31,7 @@ def in_space(surface: Surface, rows: np.ndarray, source: str) -> tuple[np.ndarra
     Returns
     -------
     vectors : (n, 3) float64 ndarray
+        The vectors in object space.
     domain : {"vertex"} or None
         The mesh elements to which the vectors belong; None to infer it from the number of rows.
     note : str
@@ -51,10 +52,11 @@ def in_space(surface: Surface, rows: np.ndarray, source: str) -> tuple[np.ndarra
 def vertex_frames(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     """Return the x and y axes of geometry-central's tangent plane at each vertex.
 
-    The angles between the edges around a vertex are scaled so that their sum is 2 pi, or pi on the border. The
-    angle 0 is at the first edge: the one that begins the last face of the vertex, in the order of faces, or the
-    one on the border that has a face to its left. The x axis is the mean of the projected edges, each rotated
-    back by its angle (Sharp, Soliman and Crane, *The Vector Heat Method*, 2019; ``vertexTangentBasis``).
+    The angles between the edges around a vertex are scaled so that their sum is 2 pi, or pi on the border.
+    The angle 0 is at the first edge. Inside, it leads to the next corner of the face with the largest index
+    at the vertex. On the border, it is the border edge that has a face to its left. The x axis is the mean of
+    the projected edges, each rotated back by its angle (Sharp, Soliman and Crane, *The Vector Heat Method*,
+    2019; ``vertexTangentBasis``).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Read crosses that are stored as two directions, one for each of their lines: `.crossfield`, `.ffield`, `.vfield`."""
+"""Read crosses that are stored as two directions, one per line: `.crossfield`, `.ffield`, `.vfield`."""
 
 from __future__ import annotations
 
@@ -53,7 +53,8 @@ def read_vcg_frames(path: Path) -> RawField:
 def _crosses(rows: TextRows, columns: int, count: int, domain: str | None) -> RawField:
     """Return the crosses whose two directions are the last six of `columns` numbers in each row.
 
-    `count` is the number of rows that the header declares.
+    `count` is the number of rows that the header declares. `domain` says whether the rows belong to faces or
+    vertices: "face", "vertex", or None to infer it from the number of rows.
     """
     if not len(rows):
         raise RosyError(f"{rows.path}: contains no rows of {columns} numbers")

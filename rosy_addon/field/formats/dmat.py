@@ -15,9 +15,10 @@ from .text_rows import read_rows
 
 
 def read_dmat(path: Path) -> RawField:
-    """Read a matrix of libigl with a row for each face or vertex, as in a text file (see `plain.read_text`).
+    """Read a matrix of libigl with a row of 3, 3 N or 9 numbers for each face or vertex.
 
-    A first column of numbers of rows, or of flags 0 and 1, is not read.
+    The numbers are one member vector, all N directions or a symmetric tensor, as in `plain.read_text`. A
+    first column of numbers of rows, or of flags 0 and 1, is not read.
 
     Raises
     ------
@@ -42,7 +43,7 @@ def read_dmat(path: Path) -> RawField:
 
 
 def _size(path: Path, header: bytes) -> tuple[int, int]:
-    """Return the numbers of columns and of rows that a header declares."""
+    """Return the numbers of columns and of rows in a line `header`, before the numbers of a matrix."""
     words = header.split()
     if len(words) != 2 or not all(word.isdigit() for word in words):
         raise RosyError(f"{path}: expected the numbers of columns and of rows at its beginning")

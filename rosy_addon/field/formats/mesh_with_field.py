@@ -1,4 +1,4 @@
-"""Write a mesh with its field and the numbers of the field: `.vtp`, `.vtu`, `.ply` and `.npz`."""
+"""Write a mesh with directions, magnitudes and singularities of its field: `.vtp`, `.vtu`, `.ply`, `.npz`."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def field_arrays(surface: Surface, field: RosyField) -> tuple[dict[str, np.ndarr
     Returns
     -------
     face_arrays : dict of str to (F, 3) or (F,) float64 ndarray
-        The N directions, and "magnitude".
+        "direction_1" to "direction_N", and "magnitude".
     vertex_arrays : dict of str to (V,) float64 ndarray
         "singularity": the index of each vertex, a multiple of 1/N.
     """
@@ -55,7 +55,7 @@ def field_arrays(surface: Surface, field: RosyField) -> tuple[dict[str, np.ndarr
 
 
 def vtk_bytes(surface: Surface, field: RosyField, suffix: str) -> bytes:
-    """Return the contents of a `.vtp` or `.vtu` file."""
+    """Return the contents of a VTK file with a mesh and its field; `suffix` is ".vtp" or ".vtu"."""
     face_arrays, vertex_arrays = field_arrays(surface, field)
     connectivity, offsets = (a.astype("<i8") for a in (surface.corner_vertex, surface.face_start))
     topology = {"connectivity": connectivity, "offsets": offsets[1:]}
@@ -73,7 +73,7 @@ def vtk_bytes(surface: Surface, field: RosyField, suffix: str) -> bytes:
 
 
 def _vtk_arrays(arrays: dict[str, np.ndarray]) -> str:
-    """Return arrays as elements of VTK's XML, in base64 after their number of bytes."""
+    """Return arrays as elements of VTK's XML: in base64, the number of bytes of an array and its values."""
     elements = []
     for name, values in arrays.items():
         data = np.ascontiguousarray(values).tobytes()
@@ -116,7 +116,10 @@ def _table(arrays: dict[str, np.ndarray]) -> np.ndarray:
 
 
 def _ply_faces(surface: Surface, values: np.ndarray) -> bytes:
-    """Return the rows of the faces of a `.ply` file; `values` is a table of what follows the corners."""
+    """Return the rows of the faces of a binary `.ply` file: the count of corners, their vertices, and values.
+
+    `values` is a structured array with a row for each face: the properties that follow the vertices.
+    """
     sizes = np.diff(surface.face_start)
     row_bytes = 4 + 4 * sizes + values.dtype.itemsize
     starts = np.cumsum(row_bytes) - row_bytes

@@ -61,7 +61,13 @@ def _after_keyword(rows: TextRows) -> TextRows:
 
 
 def _faces(rows: TextRows, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return `corner_vertex` and `face_start` of `Polygons`, given one row of text for each face."""
+    """Return `corner_vertex` and `face_start` of `Polygons`, given one row of text for each face.
+
+    Raises
+    ------
+    RosyError
+        If a row is malformed, or a vertex is not below `vertex_count`.
+    """
     sizes = rows.with_words([words[:1] for words in rows.words]).ints("number of corners of a face")
     corner_words = []
     for row, (size, words) in enumerate(zip(sizes.tolist(), rows.words, strict=True)):

@@ -1,8 +1,8 @@
 """Read binary `.om` files of OpenMesh: the mesh, and directions stored as properties of its faces.
 
 A file consists of chunks, each with a header of 16 bits: the element that it describes, the type of its data,
-their dimension and size. Properties that a program has added have a name, the name of their type and a size in
-bytes. OpenMesh's package for Python skips these.
+their dimension and size. Properties that a program has added have a name, the name of their type and a size
+in bytes. OpenMesh's package for Python skips these.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def _read(path: Path) -> tuple[Polygons, dict[bytes, np.ndarray]]:
 
 
 def _parse(data: bytes) -> tuple[Polygons, dict[bytes, np.ndarray]]:
-    """Return the mesh of a file, and the (F, 3) vectors that are properties of its faces, from its contents."""
+    """Return the mesh and the (F, 3) vectors that are properties of its faces, in the contents of a file."""
     magic, _, _, vertex_count, face_count, edge_count = struct.unpack_from("<2sccIII", data)
     if magic != b"OM":
         raise ValueError
@@ -102,15 +102,17 @@ def _parse(data: bytes) -> tuple[Polygons, dict[bytes, np.ndarray]]:
 
 
 def _text(data: bytes, position: int) -> tuple[bytes, int]:
-    """Return the text at a position, after its length, and the position of its end."""
+    """Return the text at a position, and the position after it. The byte before the text is its length."""
     end = position + 1 + data[position]
     return data[position + 1 : end], end
 
 
 def _corners(halfedges: np.ndarray, first: np.ndarray, vertex_count: int) -> list[np.ndarray]:
-    """Return `corner_vertex` and `face_start` of faces, given by their first halfedges.
+    """Return `corner_vertex` and `face_start` of F faces (see `Polygons`), given by their halfedges.
 
-    A row of `halfedges` is the next halfedge, the vertex to which it points, and its face.
+    A row of `halfedges` is for one halfedge: the next halfedge, the vertex to which it points, and its face.
+    `first` holds the (F,) indices of one halfedge of each face. The file is damaged (`ValueError`) if a
+    halfedge points to a vertex that is not below `vertex_count`.
     """
     columns, active, current, visited = [], np.ones(len(first), dtype=bool), first, 0
     while active.any():

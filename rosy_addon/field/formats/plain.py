@@ -1,8 +1,8 @@
 """Read and write fields as plain tables of numbers: text, `.npy` and `.npz` files.
 
 A row holds one of the N member vectors (3 numbers, or 2; see `vertex_frames.in_space`), all N directions (3 N
-numbers), one direction of each line of a cross (6 numbers; see `directional_field.with_opposites`) or a symmetric
-tensor (9 numbers).
+numbers), one direction of each line of a cross (6 numbers; see `directional_field.with_opposites`) or a
+symmetric tensor (9 numbers).
 """
 
 from __future__ import annotations
@@ -129,7 +129,10 @@ def _load_npy(data: bytes, source: str) -> Any:
 
 
 def _array_field(values: Any, source: str) -> RawField:
-    """Return an array of shape (n, 2), (n, 3 N), (n, N, 3) or (n, 3, 3) as a `RawField`."""
+    """Return an array of shape (n, 2), (n, 3 N), (n, N, 3) or (n, 3, 3) as a `RawField`.
+
+    `source` is the name of the array in messages.
+    """
     if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu":
         raise RosyError(f"{source}: does not contain an array of real numbers")
     if values.ndim not in (2, 3) or not len(values) or (values.ndim == 3 and values.shape[2] != 3):
@@ -145,8 +148,8 @@ def read_npz(path: Path) -> RawField:
     """Read an `.npz` archive of arrays: rows for a field, and the mesh if it has one.
 
     The field is the array "directions" or "Q", or else the only one of shape (n, 3 N) or (n, N, 3) of
-    floating-point numbers. The mesh are the arrays "vertices" and "faces", or "V" and "F". A number "degree" is
-    the degree of an array of members.
+    floating-point numbers. The arrays of the mesh are "vertices" and "faces", or "V" and "F". If the field is
+    an array of members, the number "degree" is N.
 
     Raises
     ------
@@ -235,7 +238,10 @@ def npy_bytes(directions: np.ndarray) -> bytes:
 
 
 def _check_columns(source: str, columns: int) -> None:
-    """Raise a `RosyError` unless a row has 2 numbers, or 3 N for a degree N from 1 to `MAX_DEGREE`."""
+    """Raise a `RosyError` unless `columns` is 2, or 3 N for a degree N from 1 to `MAX_DEGREE`.
+
+    It is the count of numbers in each row. `source` is the name of the file in the message.
+    """
     if columns != 2 and (columns % 3 or not 3 <= columns <= 3 * MAX_DEGREE):
         raise RosyError(
             f"{source}: has {counted(columns, 'number')} per row, expected 3 for each of up to {MAX_DEGREE} directions"

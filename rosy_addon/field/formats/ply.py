@@ -30,7 +30,10 @@ _CORNER_PROPERTIES = ("vertex_indices", "vertex_index")
 
 @dataclass(frozen=True)
 class _Property:
-    """A property (column) of an element, as the header declares it; types are numpy type codes."""
+    """A property (column) of an element, as the header declares it: a number or a list in each row.
+
+    Types are codes of numpy, such as "f4".
+    """
 
     name: str
     type: str
@@ -87,8 +90,9 @@ def read_ply(path: Path) -> Polygons:
 def _strip_triangles(vertices: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the triangles of strips, as the vertices of their corners and the first corner of each.
 
-    A strip ends at the end of a list and at -1. Every other triangle is clockwise. Triangles that have a vertex
-    twice, which turn a strip, are left out.
+    The strips are rows of vertices: row i is ``vertices[starts[i] : starts[i + 1]]``. A strip ends at the end
+    of its row and at -1. Three consecutive vertices are a triangle, and every other triangle is clockwise.
+    Triangles that have a vertex twice, which turn a strip, are left out.
     """
     vertices = np.insert(vertices.astype(np.float64), starts[1:-1], -1)
     is_end = vertices == -1
@@ -112,7 +116,8 @@ def _is_index(values: np.ndarray, count: int) -> np.ndarray:
 def read_values(path: Path, element: str = "vertex") -> dict[str, np.ndarray]:
     """Read the scalar properties of the vertices or faces of a .ply file, except the position.
 
-    Three properties NAME_x, NAME_y and NAME_z of floating-point numbers are also a vector NAME.
+    Three properties NAME_x, NAME_y and NAME_z of floating-point numbers are also a vector NAME. `element` is
+    "vertex" or "face".
 
     Returns
     -------
@@ -187,7 +192,7 @@ def _header(path: Path, data: bytes) -> tuple[str, list[_Element], int]:
 
 
 def _declare(place: str, kind: str, earlier: list[Any], new: _Element | _Property) -> None:
-    """Append an element or a property. Raise a `RosyError` if an earlier one has the same name.
+    """Append the element or property `new` to `earlier` ones. Raise a `RosyError` if one has the same name.
 
     For the message, `place` is the file and line of the declaration, and `kind` is "element" or "property".
     """
@@ -197,7 +202,7 @@ def _declare(place: str, kind: str, earlier: list[Any], new: _Element | _Propert
 
 
 def _text_elements(path: Path, data: bytes, elements: list[_Element]) -> dict[str, _Columns]:
-    """Return the values of all elements of a text file, by element and property."""
+    """Return the values of all elements of a text file, by element and property; `data` are its contents."""
     # Parse the header as well, so that rows have the line numbers of the file.
     rows = read_rows(path, comment=None, data=data)
     first = next(row for row, words in enumerate(rows.words) if words[0] == b"end_header") + 1
@@ -241,7 +246,7 @@ def _check_lengths(rows: TextRows, element: _Element, end: np.ndarray, starts: n
     """Raise a `RosyError` if a row has too few values.
 
     All words of `rows` are numbered consecutively. Row i has the words ``starts[i] .. starts[i + 1] - 1``,
-    and needs the words up to ``end[i] - 1``.
+    and needs the words up to ``end[i] - 1``. The message names `element`.
     """
     short = end > starts[1:]
     if short.any():
@@ -255,8 +260,8 @@ def _binary_elements(
 ) -> dict[str, _Columns]:
     """Return the values of all elements of a binary file, whose data begin at the byte `offset`.
 
-    An element in which lists have the same lengths in all rows is read as one structured array, which is
-    faster.
+    `data` are the contents of the file, and `byte_order` is "<" or ">" (numpy's codes). An element in which
+    lists have the same lengths in all rows is read as one structured array, which is faster.
     """
     columns = {}
     for element in elements:
@@ -293,7 +298,8 @@ def _read_rows(
 ) -> tuple[_Columns, int]:
     """Return the values of the first `row_count` rows of a binary element, and the offset of their end.
 
-    The position of a row depends on the lists in all rows before it, so the rows are read in a loop.
+    The first row is at the byte `offset` of the contents `data`. `byte_order` is "<" or ">". The position of
+    a row depends on the lists in all rows before it, so the rows are read in a loop.
     """
     types = [np.dtype(byte_order + prop.type) for prop in element.properties]
     counts = [

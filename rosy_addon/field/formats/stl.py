@@ -63,7 +63,7 @@ def weld(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _binary_points(path: Path, data: bytes, count: int) -> np.ndarray:
-    """Return (3 T, 3) float32 corners of the triangles of a binary file."""
+    """Return the (3 T, 3) float32 corners of the triangles of a binary file; T is the declared `count`."""
     found = (len(data) - _HEADER_BYTES) // _TRIANGLE_DTYPE.itemsize
     if len(data) < _HEADER_BYTES:
         raise RosyError(f"{path}: is not an .stl file: it is shorter than the header")

@@ -103,7 +103,8 @@ class TextRows:
     def _parse(self, convert: Callable, dtype: type, expected: str) -> np.ndarray:
         """Convert all words of all rows, or raise an error about the first word that cannot be converted.
 
-        `convert` is float or int. `expected` says in the message what a word should be, such as "a number".
+        `convert` is float or int, and `dtype` the type of the result. `expected` says in the message what a
+        word should be, such as "a number".
         """
         count = sum(map(len, self.words))
         values = np.empty(count, dtype=dtype)
@@ -119,7 +120,7 @@ class TextRows:
     def _parse_error(self, convert: Callable, expected: str, first_row: int) -> RosyError:
         """Return the error to raise for the first word that cannot be converted, from row `first_row` on.
 
-        For `convert` and `expected`, see `_parse`.
+        `convert` is float or int. `expected` says what a word should be, such as "a number".
         """
         for row, words in enumerate(self.words[first_row:], first_row):
             for word in words:
@@ -185,7 +186,7 @@ def format_rows(rows: np.ndarray) -> list[str]:
 
 
 def format_lines(rows: np.ndarray, prefix: str = "") -> str:
-    """Return (n, k) numbers as lines of text, each with a prefix; see `format_rows`."""
+    """Return (n, k) numbers as lines of text, each with a prefix. Parsing them gives the same values."""
     # Strings of single rows take much more memory than the text, so they are joined block by block.
     blocks = row_blocks(len(rows), ROWS_PER_BLOCK)
     return "".join(

@@ -38,7 +38,8 @@ class MovingKernel:
     length : int
         Steps of the kernel at rest, in each direction.
     shifts, weights : (3,) float64 ndarray
-        From `channel_shifts` and `channel_weights`.
+        For each channel: the steps that its streaks have drifted from their middle position, and the weight
+        of the channel in the sum.
     reach : int
         R, steps from the pixel to the last sample.
     energies : (3, L, 2 R + 2) float64 ndarray
@@ -110,7 +111,8 @@ class MovingKernel:
 def _shifted_weights(position: np.ndarray, shift: float, length: float, kind: Kernel) -> np.ndarray:
     """Return the weights of a kernel whose center is `shift` steps backward.
 
-    Weights are interpolated linearly between whole steps.
+    They are the weights at the samples `position`, in whole steps from the pixel. The kernel has `length`
+    steps in each direction. Weights are interpolated linearly between whole steps.
     """
     whole = math.floor(shift)
     fraction = shift - whole
@@ -238,13 +240,14 @@ class DriftingAverages:
 def _kernel_terms(kind: Kernel, length, is_mirrored: bool) -> list[tuple]:
     """Return (offset o, factor) pairs: the weighted sum around the sample q is the sum of factor * E(q + o).
 
-    The noise is n(i) = E(i) - 2 E(i - 1) + E(i - 2). So the factor at the offset d is
-    w(d) - 2 w(d + 1) + w(d + 2), for the weights w of `filter_kernel.sample_weights`.
+    The noise is n(i) = E(i) - 2 E(i - 1) + E(i - 2). So the factor at the offset o is
+    w(o) - 2 w(o + 1) + w(o + 2), where w(o) is the weight of the sample o steps from q
+    (`filter_kernel.sample_weights`).
 
     Parameters
     ----------
     length : int or ndarray of int
-        Steps in each direction.
+        Steps of the kernel in each direction.
     is_mirrored : bool
         Whether the kernel belongs to the opposite direction: its weights are reversed.
     """

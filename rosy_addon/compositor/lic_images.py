@@ -23,7 +23,8 @@ class LicImages:
     Attributes
     ----------
     members : (M, P, K) float32 ndarray
-        K is 1 for gray noise and 3 for colored noise.
+        Mean of the noise along the streamlines of each of the M lines. K is 1 for gray noise and 3 for
+        colored noise.
     blend : (P, K) float32 ndarray
         Mean of the member images. With the method of the paper, a second set of images is blended in.
     effective_samples : (P,) float32 ndarray
@@ -49,7 +50,9 @@ class LicImages:
 def lic_images(
     members: np.ndarray, effective_samples: np.ndarray, slopes: np.ndarray | None = None
 ) -> LicImages:
-    """Make `LicImages`, whose blend is the mean of the member images. Parameters are its attributes."""
+    """Make `LicImages`, whose blend is the mean of the member images. The parameters are the
+    other attributes.
+    """
     return LicImages(members, members.mean(axis=0), effective_samples, slopes)
 
 
@@ -65,7 +68,7 @@ def magnitude_step_limits(field: PixelField, look: PixelLook) -> np.ndarray | No
 
 
 def relative_magnitude(field: PixelField, ends: tuple[float, float]) -> np.ndarray:
-    """Return the (P,) float32 positions of the magnitudes between `magnitude_ends`, 0 to 1."""
+    """Return the (P,) float32 magnitudes of a field, scaled from the range `ends` to 0 to 1, and clipped."""
     low, high = np.float32(ends)
     clipped = np.clip(np.abs(field.representation), min(low, high), max(low, high))
     return (clipped - low) / (high - low)

@@ -1,10 +1,10 @@
 """The covering surface of a field, and a compact table of its states for tracing streamlines.
 
-A *state* is a pixel and a *sheet* k. Sheet k is the direction at the angle t + 2 pi k / S, where t
-is the angle of the member nearest to the guiding angle (a setting of the look: an angle in the picture that
-selects the first member), and S is N for even N and 2 N for odd N. The states form an S-fold covering of the
-surface. On it the field is a single vector field without breaking points. A step from (p, k) to the pixel q
-leads to the sheet
+A *state* is a pixel and a *sheet* k. Sheet k is the direction at the angle t + 2 pi k / S, where t is the
+angle of the member nearest to the guiding angle (a setting of the look: an angle in the picture that selects
+the first member), and S is N for even N and 2 N for odd N. The states form an S-fold covering of the surface.
+On it the field is a single vector field without breaking points. A step from (p, k) to the pixel q leads to
+the sheet
 
     k' = k + round((t(p) - t(q)) S / 2 pi)  mod S,
 
@@ -96,9 +96,9 @@ class SeamTable:
 class Covering:
     """The covering surface of a pixel field: all its states (a pixel and one direction of the field there).
 
-    There are P pixels, C cells and S sheets. The state of cell c and sheet k is row k C + c of `state_table`;
-    k C + c is the *index* of the state. Line l of the cell c is the pair of the
-    opposite sheets l and l + S/2. The index of the line is l C + c.
+    There are P pixels, C cells and S sheets. The *index* of the state of cell c and sheet k is k C + c: its
+    row in `state_table`. Line l of a cell is the pair of its opposite sheets l and l + S / 2, and has the
+    index l C + c.
 
     Attributes
     ----------

@@ -102,8 +102,8 @@ def _bands(gbuffer: GBuffer, entries: np.ndarray, margin: int) -> list[tuple[sli
     Returns
     -------
     list of (band, core)
-        Slices of `entries`. The cores divide all entries. A band is its
-        core with `margin` more rows below and above.
+        Slices of `entries`. The cores divide all entries. A band is its core with `margin` more rows below
+        and above.
     """
     row = gbuffer.pixel[entries] // np.int32(gbuffer.camera.width)
     limit = max(MAX_OUTLINE_SAMPLES // gbuffer.samples.side**2, 1)

@@ -101,7 +101,8 @@ def target_tone(
     lights : sequence of Light
         Lights of the scene in camera space. Used if the light of the look is "scene".
     reference : ReferenceRender, optional
-        Required if the tone of the look is "picture".
+        Another render of the scene, whose luminance is the tone. Required if the tone of the look is
+        "picture".
     cache : Cache, optional
         Stores the shadows of lights.
 
@@ -113,7 +114,7 @@ def target_tone(
     Raises
     ------
     RosyError
-        If the source of the tone does not exist; see `check_tone`.
+        If the source of the tone does not exist: the reference render, or an attribute or image of a mesh.
     """
     if look.tone != "light":
         check_tone(look, [instance.tone for instance in gbuffer.instances], reference)

@@ -3,8 +3,8 @@
 A *state* is a pixel and a *sheet* k. Sheet k is the direction at the angle t + 2 pi k / S, where t is the
 angle of the member nearest to the guiding angle (a setting of the look: an angle in the picture that selects
 the first member), and S is N for even N and 2 N for odd N. The states form an S-fold covering of the surface.
-On it the field is a single vector field without breaking points. A step from (p, k) to the pixel q leads to
-the sheet
+On it the field is a single vector field, without jumps from one member to another. A step from (p, k) to the
+pixel q leads to the sheet
 
     k' = k + round((t(p) - t(q)) S / 2 pi)  mod S,
 
@@ -387,7 +387,8 @@ def _nearest_member(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the angle from the guiding angle to the nearest member, and the cosine and sine of that angle.
 
-    Angles are in radians. All three results are 0 where the representation `z` is 0.
+    All are (n,), like the representations `z` of the degree `degree`. Angles are in radians. All three
+    results are 0 where the representation `z` is 0.
     """
     x, y = _rotate(z.real, z.imag, -degree * guiding_angle)
     angle = vector_angle(x, y)

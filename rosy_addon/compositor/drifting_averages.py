@@ -87,7 +87,7 @@ class MovingKernel:
         forward : (n,) float32 ndarray
             Fraction of the kernel that drifts forward, 0 to 1.
         behind, ahead : (n,) intp ndarray
-            Steps to the ends of the streamlines. Negative numbers count as 0.
+            Steps to the backward and the forward end of each streamline. Negative numbers count as 0.
 
         Returns
         -------
@@ -161,7 +161,7 @@ class DriftingAverages:
         forward : (n,) float32 ndarray
             Fraction of the kernel that drifts forward, 0 to 1; the rest drifts backward.
         behind, ahead : (n,) intp ndarray
-            Steps to the ends of the streamlines.
+            Steps to the backward and the forward end of each streamline.
 
         Returns
         -------
@@ -205,8 +205,8 @@ class DriftingAverages:
     def _full(self, is_mirrored: bool) -> np.ndarray:
         """Return the (3, 2 Q + 1, n) complex64 weighted sums of each channel around each step from -Q to Q.
 
-        The kernels have the full length r. Q is R - r, so that no kernel reaches beyond step R of its
-        streamline.
+        If `is_mirrored`, the kernels are those that drift backward. They have the full length r. Q is R - r,
+        so that no kernel reaches beyond step R of its streamline.
         """
         if is_mirrored not in self._full_sums:
             kernel = self._kernel

@@ -164,7 +164,7 @@ def resolved_share(period: np.ndarray, supersampling: int = 1) -> np.ndarray:
 
 
 def crowded_pixels(look: PixelLook) -> tuple[float, float]:
-    """Return two distances between lines on screen, in pixels of the frame; see `CROWDED_SHARES`.
+    """Return the distances between lines on screen at which crowding is 1 and 0, in pixels of the frame.
 
     Lines closer than the first are fully crowded, lines farther apart than the second are not crowded.
     """
@@ -230,7 +230,10 @@ def uneven_width(
 
 
 def look_width_table(look: PixelLook) -> np.ndarray:
-    """Return the `_width_table` of a look: (COVERAGE_STEPS,) widths, for mean widths from 0 to 1."""
+    """Return (COVERAGE_STEPS,) widths of lines before breaks and paper grain change them.
+
+    Element i is the width for which the mean of the changed widths is i / (COVERAGE_STEPS - 1).
+    """
     return _width_table(look.breaks, look.wobble, PAPER_GRAIN_STRENGTH * look.paper_grain)
 
 
@@ -286,7 +289,7 @@ def even_lines(
     look : PixelLook
     wobble_angle : (P,) float32 ndarray, optional
         Angle of the wobble (lines drawn by hand) at the pixels of the field, in radians, from
-        `wobble.wobble_angle`. It displaces the lines.
+        `wobble.wobble_angle`. It is for a `Look.wobble` of 1, and displaces the lines.
     cache : Cache, optional
         Stores the lines on the surfaces, which do not depend on the camera.
 

@@ -213,8 +213,8 @@ def _crop_rows(field: PixelField, extent: slice) -> PixelField:
 class _LineAverages:
     """Averages of noise along each line (pair of opposite directions) of each cell of the covering surface.
 
-    Stored are the average times the effective samples, and the effective samples. These are 0 for a line
-    that has no average yet, and -1 for a line that needs none.
+    Stored are the average times the effective samples, and the effective samples. The effective samples
+    are 0 for a line that has no average yet, and -1 for a line that needs none.
 
     Parameters
     ----------
@@ -262,7 +262,7 @@ class _LineAverages:
         return line[~is_known]
 
     def missing_lines(self) -> np.ndarray:
-        """Return the indices of the lines (see the class) that need an average and have none yet."""
+        """Return the indices (see `Covering`) of the lines that need an average and have none yet."""
         return np.flatnonzero(self._values[:, :, -1] == 0)
 
     def filter_missing(self, line: np.ndarray) -> np.ndarray:
@@ -307,7 +307,9 @@ class _LineAverages:
 
     @staticmethod
     def _or_own(values: np.ndarray, own: np.ndarray) -> np.ndarray:
-        """Copy rows of `own` to the (n, K + 1) `values` where these have no average, and return `values`.
+        """Replace the rows of `values` that have no average by the same rows of `own`. Return `values`.
+
+        Both are (n, K + 1).
 
         A row has no average if its effective samples, in the last column, are not above 0.
         """
@@ -407,7 +409,7 @@ def _write_streamlines(
 
 
 def has_slopes(look: PixelLook) -> bool:
-    """Return whether the images of a look have slopes; see `LicImages`."""
+    """Return whether LIC images of a look have slopes: derivatives across the lines (`LicImages.slopes`)."""
     return is_fine(look) and is_hatched(look)
 
 
@@ -471,9 +473,9 @@ def _even_positions(size: int, spacing: int) -> np.ndarray:
 def _seed_priority(covering: Covering, line: np.ndarray) -> np.ndarray:
     """Return (n,) float64 priorities from 0 to 1, evenly distributed over rows and columns.
 
-    The seeds of a round are the lines whose priorities are in a range. A priority depends on the cell and the
-    number of the line alone. If every n-th line that has no average were a seed, a small change of the
-    field would move the seeds everywhere, and animations would flicker.
+    `line` holds (n,) indices of lines. The seeds of a round are the lines whose priorities are in a range. A
+    priority depends on the cell and the number of the line alone. If every n-th line that has no average were
+    a seed, a small change of the field would move the seeds everywhere, and animations would flicker.
     """
     line_index, cell = np.divmod(line, covering.cell_count)
     row, column = np.divmod(cell, covering.width)

@@ -377,8 +377,8 @@ def is_shaded_by_pixel(look: Any) -> bool:
 def line_ink_indices(field: PixelField, look: PixelLook) -> list[np.ndarray] | None:
     """Find the ink of each line at each pixel.
 
-    All lines of a family have the same ink. If the field does not distinguish families, the ink is chosen
-    by the rank of the line (see `line_ranks`).
+    All lines of a family have the same ink. If the field does not distinguish families, the ink is chosen by
+    the rank of the line: its place in the order of the angles to the guiding angle.
 
     Returns
     -------

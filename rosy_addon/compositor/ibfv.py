@@ -224,7 +224,7 @@ def decay_of_samples(effective_samples: np.ndarray, two_sided: bool) -> np.ndarr
     Returns
     -------
     float64 ndarray
-        q, the ratio of the weights of successive steps.
+        Of the same shape: q, the ratio of the weights of successive steps.
     """
     low, high = np.zeros_like(effective_samples), np.ones_like(effective_samples)
     for _ in range(40):
@@ -285,8 +285,9 @@ class _Sums:
     Attributes
     ----------
     values : list of (S C,) complex64 ndarray
-        Sum of each source over the first D steps upstream of each state, in which the noise at the pixel
-        itself has the weight 1. D is 1 at first, and is doubled by `_doubled`.
+        For the states of the S sheets and C cells of `sheets`: sum of each source over the first D steps
+        upstream of each state, in which the noise at the pixel itself has the weight 1. D is 1 at first, and
+        is doubled by `_doubled`.
     weight : (P,) or () float32 ndarray
         q^D, the weight of the next D steps.
     """

@@ -372,7 +372,8 @@ def streak_moments(
 def _line_response(cycles: np.ndarray, kernel: Kernel) -> np.ndarray:
     """Return the factor by which the mean along a streamline changes the amplitude of a wave of noise.
 
-    `cycles` is the number of cycles of the wave along the streamline.
+    `cycles` is the number of cycles of the wave along the streamline. The result has the shape of `cycles`,
+    and is complex for the kernel "ramp".
     """
     if kernel == "taper":
         return np.sinc(cycles / 2) ** 2

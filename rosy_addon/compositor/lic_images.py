@@ -28,8 +28,8 @@ class LicImages:
     blend : (P, K) float32 ndarray
         Mean of the member images. With the method of the paper, a second set of images is blended in.
     effective_samples : (P,) float32 ndarray
-        Effective samples of the streamlines of a pixel (see `filter_kernel.KernelWeights`), mean
-        over the members.
+        Number of samples of equal weight whose mean has the variance of the averages at a pixel
+        (`filter_kernel.KernelWeights`); mean over the M lines.
     slopes : (M, P) float32 ndarray or None
         Derivatives of the member images toward the left of the lines, per pixel, averaged over the channels.
         None if they are not computed; see `fast_lic.has_slopes`.
@@ -50,8 +50,9 @@ class LicImages:
 def lic_images(
     members: np.ndarray, effective_samples: np.ndarray, slopes: np.ndarray | None = None
 ) -> LicImages:
-    """Make `LicImages`, whose blend is the mean of the member images. The parameters are the
-    other attributes.
+    """Make `LicImages` whose blend is the mean of the member images.
+
+    The parameters are the other attributes of `LicImages`.
     """
     return LicImages(members, members.mean(axis=0), effective_samples, slopes)
 

@@ -272,8 +272,7 @@ class _Edges:
         """Set the width of lines at pixels where their surface ends, unless the neighbor occludes them.
 
         There is no edge at the border of the frame, and none where the surface continues but the field
-        ends. The bits `PART_BORDER` and `EMPTY_BORDER` are set next to another instance and next to no
-        surface.
+        ends. The bit `PART_BORDER` is set next to another instance, `EMPTY_BORDER` next to the background.
         """
         gbuffer, depth, outline = self._gbuffer, self._depth, np.float32(self._look.outline)
         for block in reported_blocks(self._count, STEP_LABEL):

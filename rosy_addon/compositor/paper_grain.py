@@ -96,8 +96,8 @@ def picture_paper_grain(
 def surface_paper_grain_settings(look: PixelLook) -> NoiseSettings:
     """Return the settings of the noise for paper grain that is anchored to surfaces.
 
-    The noise has `PAPER_GRAIN_CHANNELS` channels. Their standard deviation is
-    `StreakStatistics.paper_grain_std`.
+    Lengths are in the unit of the look: pixels of the frame, or steps of streamlines on a texture. The noise
+    has `PAPER_GRAIN_CHANNELS` channels. Their standard deviation is `StreakStatistics.paper_grain_std`.
 
     Parameters
     ----------

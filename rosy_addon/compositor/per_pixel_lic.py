@@ -32,8 +32,8 @@ LineTracer = Callable[[slice], DirectionSampler]
 def brute_force(field: PixelField, look: PixelLook, noise: np.ndarray) -> LicImages:
     """Compute one LIC image for each of the M lines.
 
-    There are no breaking points and no second set of images, but every step of every streamline
-    compares all N members.
+    There are no breaking points (where one member jumps to another) and no second set of images, but every
+    step of every streamline compares all N members.
 
     Parameters
     ----------
@@ -406,7 +406,7 @@ def integrate_noise(
     total : (B, K) float32 ndarray
         Weighted sum of the noise, without the sample at the start.
     samples : (B,) float32 ndarray
-        Number of these samples.
+        Number of samples in the sum.
     """
     end = neighbors.shape[1] - 1
     weight_slope = WEIGHT_SLOPES[look.kernel][0 if side > 0 else 1]

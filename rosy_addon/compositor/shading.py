@@ -26,7 +26,7 @@ class Light:
     vector : (3,) ndarray
         The unit vector toward a sun, or the position of a point light.
     color : (3,) ndarray
-        Linear.
+        Linear RGB.
     strength : float
         Radiance of a white diffuse surface that faces the light; 1 is white. If the light is a point light,
         the surface is at a distance of one Blender unit.

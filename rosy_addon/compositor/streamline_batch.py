@@ -301,12 +301,12 @@ class StreamlineBatch:
     ) -> np.ndarray:
         """Return (2 n, K) complex64 sums of the noise around a step, with weights that fall along the field.
 
-        Let i be the step, r the `half_width`, P(i) the prefix sums of the noise along a lane, and E(i) the
-        sums of these prefix sums. In a lane that runs along the field, the weights fall from 2 r + 1 to 1,
-        and the sum is E(i + r) - E(i - r - 1) - (2 r + 1) P(i - r - 1). In a lane that runs against the field
-        (`is_along` is False), the weights rise from 1 to 2 r + 1. Both weights of a sample add up to 2 r + 2,
-        so the sum is 2 r + 2 times the unweighted sum, minus the sum with falling weights. All sums are
-        divided by r + 1.
+        Let i be the step, r the `half_width` (one number, or (2 n,) numbers), P(i) the prefix sums of the
+        noise along a lane, and E(i) the sums of these prefix sums. In a lane that runs along the field, the
+        weights fall from 2 r + 1 to 1, and the sum is E(i + r) - E(i - r - 1) - (2 r + 1) P(i - r - 1). In a
+        lane that runs against the field (`is_along` is False), the weights rise from 1 to 2 r + 1. Both
+        weights of a sample add up to 2 r + 2, so the sum is 2 r + 2 times the unweighted sum, minus the sum
+        with falling weights. All sums are divided by r + 1.
         """
         last, before = step + half_width, step - half_width - 1
         sums_through, sums_before = (self._second_prefix_sums(i, lanes) for i in (last, before))

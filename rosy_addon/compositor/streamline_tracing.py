@@ -136,7 +136,8 @@ class TracedLanes:
     def _move(self, direction: np.ndarray, step_scale: np.float32) -> np.ndarray:
         """Move positions by a step. Return the (m,) complex64 whole pixels from the old to the new cell.
 
-        The method is two-step Adams-Bashforth, 3/2 d - 1/2 d_previous.
+        `direction` is from `look_up`; `step_scale` is the factor from its unit to pixels, times 3/2. The
+        method is two-step Adams-Bashforth, 3/2 d - 1/2 d_previous.
         """
         previous = self._previous_direction
         displacement = direction.copy() if previous is None else previous

@@ -72,7 +72,10 @@ class ReferenceRender:
         return max(float(np.log2(pixels_per_unit / camera.pixels_per_unit)), 0.0)
 
     def sample(self, gbuffer: GBuffer) -> np.ndarray:
-        """Return the (P,) float32 luminance at the surface points of a G-buffer."""
+        """Return the (P,) float32 luminance at the surface points of a G-buffer.
+
+        Points outside of the picture have the luminance of its border.
+        """
         reprojection = self.reprojection(gbuffer.camera)
         clip = gbuffer.position @ reprojection[[0, 1, 3], :3].T + reprojection[[0, 1, 3], 3]
         u, v = clip[:, :2].T / np.maximum(clip[:, 2], 1e-12) * 0.5 + 0.5

@@ -84,7 +84,7 @@ class UvCharts:
         A displacement d in the UV map is the tangent a d + b conj(d). `triangle` holds (n,) indices of
         triangles.
 
-        They are 0 for triangles without area in the UV map.
+        Both coefficients are 0 for triangles without area in the UV map.
         """
         linear, conjugate = self.linear[triangle], self.conjugate[triangle]
         density = np.abs(linear) ** 2 - np.abs(conjugate) ** 2

@@ -199,7 +199,8 @@ def combed_directions(mesh: TangentMesh, guiding_angle: float) -> CombedDirectio
     mesh : TangentMesh
         Tangent mesh with the field.
     guiding_angle : float
-        Angle on the surface, in radians from the horizontal direction, near which the chosen line lies.
+        Angle on the surface, in radians from the horizontal direction and counter-clockwise as seen from
+        outside, near which the chosen line lies.
 
     Returns
     -------

@@ -124,6 +124,7 @@ class TexelSurface(NamedTuple):
     ----------
     instance : MeshInstance
     mesh : TangentMesh
+        Its triangles in world space, with frames and the field at their corners.
     charts : UvCharts
     texels : Texels
     step : float

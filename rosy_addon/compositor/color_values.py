@@ -66,7 +66,8 @@ def value_ends(look: Look, ranges: Iterable[ValueRange]) -> tuple[float, float]:
 def value_scale(look: Look, ranges: Iterable[ValueRange]) -> tuple[float, float]:
     """Return (low, scale): the color value v is at the position (v - low) * scale in the color map.
 
-    The parameters are those of `value_ends`.
+    `ranges` are ranges of color values from `value_ranges`. If low and high are equal, the scale is a large
+    finite number: the map is a step, and larger values have the position 1 after clipping.
     """
     low, high = value_ends(look, ranges)
     difference = high - low
@@ -78,7 +79,7 @@ def value_scale(look: Look, ranges: Iterable[ValueRange]) -> tuple[float, float]
 def scaled_positions(values: np.ndarray, low: float, scale: float) -> np.ndarray:
     """Return the (P,) float32 positions of (P,) color values in the color map, clipped to 0 to 1.
 
-    `low` and `scale` are from `value_scale`.
+    The position of the value v is (v - low) * scale, with `low` and `scale` from `value_scale`.
     """
     return np.clip((values.astype(np.float64) - low) * scale, 0, 1).astype(np.float32)
 
@@ -101,7 +102,7 @@ def map_positions(gbuffer: GBuffer, look: Look) -> np.ndarray:
     Raises
     ------
     RosyError
-        See `check_color_values`.
+        If the look shows color values, and no mesh instance with a field has any.
     """
     check_color_values(look, gbuffer.instances)
     low, scale = value_scale(look, value_ranges(gbuffer.instances))

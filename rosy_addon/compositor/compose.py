@@ -66,14 +66,15 @@ def compose(
     Parameters
     ----------
     gbuffer : GBuffer
-        It has the width and the height of the picture times `look.supersampling`; if it has a
-        `coverage`, it has the width and the height of the picture itself.
+        It has the width and the height of the picture times `look.supersampling`. If it has a `coverage` (the
+        parts of pixels that surfaces cover, for antialiasing), it has the size of the picture itself.
     look : Look
         The settings of the user, with lengths in pixels of the picture.
     lights : sequence of Light
         Lights of the scene in camera space. Used if the light of the look is "scene".
     reference : ReferenceRender, optional
-        Required if the tone of the look is "picture".
+        Another render of the scene, whose luminance is the tone. Required if the tone of the look is
+        "picture".
     cache : Cache, optional
         Stores intermediate results. For the same G-buffer and another look, the results that do not
         depend on the changed settings are reused.
@@ -81,8 +82,8 @@ def compose(
         Stores results that do not depend on the camera. By default `cache` stores them, too.
     strips : sequence of Strip, optional
         Rows to draw, from `divide_into_strips`; by default all rows. The G-buffer must contain these rows
-        and the rows around them that streamlines reach. Without effect if the G-buffer is supersampled
-        and has no `coverage`: such a picture is drawn as a single strip.
+        and the rows around them that streamlines reach. Without effect if `look.supersampling` is above 1 and
+        the G-buffer has no `coverage`: such a picture is drawn as a single strip.
     draws_thresholds : bool
         Whether to draw the thresholds of the ink (`ink_thresholds`), which do not depend on the tone,
         instead of the ink. Without effect if the look has no ink.
@@ -98,8 +99,8 @@ def compose(
     Raises
     ------
     RosyError
-        If the source of the tone or of the colors does not exist; see `target_tone.check_tone` and
-        `color_values.check_color_values`.
+        If the tone of the look is "picture" without a `reference`, or "attribute" or "image" and no mesh has
+        a tone; or if the look shows color values and no mesh has any.
     """
     camera, instances = gbuffer.camera, gbuffer.instances
     is_antialiased = gbuffer.coverage is not None
@@ -133,7 +134,11 @@ def compose(
 def _draw_strips(
     stages: ComposeStages, canvas: _Canvas, layers: Sequence[_Layer], strips: Sequence[Strip]
 ) -> list[np.ndarray]:
-    """Draw all layers, strip by strip. Return the RGBA picture, and the image of `_Canvas.spread`."""
+    """Draw all layers, strip by strip. Return the (H, W, 4) RGBA picture and the `_Canvas.spread` image.
+
+    The second image tells in its first channel how far the thresholds of ink in a pixel spread. It has no
+    columns if no thresholds are drawn.
+    """
     pictures = []
     for number, strip in enumerate(strips):
         for index, layer in enumerate(layers):
@@ -173,8 +178,9 @@ class _Canvas:
         Position in the color map of the color value of each pixel; None if the look does not show color
         values.
     color : (P, 3) float32 ndarray
-        Linear, not premultiplied.
+        Color of each pixel: linear, not premultiplied. 0 until its strip is drawn.
     alpha : (P,) float32 ndarray
+        Opacity of each pixel, 0 to 1.
     spread : (P, 1) float32 ndarray
         If thresholds of ink are drawn in place of colors: the alpha channel that
         `ink_thresholds.threshold_pixels` returns, which tells how far the thresholds in a pixel spread.
@@ -252,7 +258,10 @@ class _Canvas:
 
 
 def _rgba(color: np.ndarray, alpha: np.ndarray, is_premultiplied: bool) -> np.ndarray:
-    """Return (n, 4) float32 RGBA of (n, 3) or (n, 1) colors, premultiplied if that is asked for."""
+    """Return (n, 4) float32 RGBA of (n, 3) or (n, 1) colors that are not premultiplied, and (n,) alphas.
+
+    The result is premultiplied if `is_premultiplied`. Colors with one channel are gray.
+    """
     rgba = np.empty((len(color), 4), dtype=np.float32)
     rgba[:, 3] = alpha
     rgba[:, :3] = color * rgba[:, 3:] if is_premultiplied else color
@@ -278,7 +287,10 @@ class _Layer(NamedTuple):
 
 
 def _prepare_layer(stages: ComposeStages, canvas: _Canvas, degree: int, look: PixelLook) -> _Layer:
-    """Compute the data of the fields of one degree that all strips share."""
+    """Compute the data of the fields of one degree that all strips share.
+
+    `look` is the look of the whole picture, not yet adapted to the symmetry of the fields.
+    """
     with progress(0.0, 0.3):
         field = stages.pixel_field(degree, look)
     look = look.for_symmetry(field.symmetry)
@@ -308,7 +320,7 @@ def _prepare_layer(stages: ComposeStages, canvas: _Canvas, degree: int, look: Pi
 
 
 def _draw_layer(stages: ComposeStages, canvas: _Canvas, layer: _Layer, strip: Strip) -> None:
-    """Draw the fields of one degree in a strip."""
+    """Draw the fields of one degree in a strip: write their colors to `canvas`."""
     field, look = layer.field, layer.lines.look
     rows = entries_of_rows(field.pixel, field.width, strip.averaged_rows)
     lines = layer.lines.part(rows)
@@ -343,10 +355,11 @@ def _draw_layer(stages: ComposeStages, canvas: _Canvas, layer: _Layer, strip: St
 
 
 def _tone_along_lines(layer: _Layer, strip: Strip) -> np.ndarray:
-    """Return the (M, n) mean tone along the streamlines of each of the M directions of the field.
+    """Return the (M, n) mean tone, 0 to 1, along the streamlines of each of the M lines of the field.
 
-    The n pixels are those of the strip. A mean covers the `overshoot` of the look in both directions: the
-    distance by which lines of ink continue past the border of a tone.
+    Lines are in the order of the member images, the n pixels are in the `averaged_rows` of the strip. A mean
+    covers the `overshoot` of the look in both directions: the distance by which lines of ink continue past
+    the border of a tone.
     """
     # `normalize_variance` scales the means of streamlines that end early. A channel of ones is
     # scaled by the same factor, which is divided out below. There are two such channels, because LIC
@@ -363,10 +376,12 @@ def _tone_along_lines(layer: _Layer, strip: Strip) -> np.ndarray:
 def streak_tone(field: PixelField, look: PixelLook, images: LicImages) -> np.ndarray:
     """Scale the mean of the M member images to the contrast of one image, times the gain of the look.
 
+    Contrast is the standard deviation of the streaks.
+
     Returns
     -------
     (P, K) float32 ndarray
-        Display values, not clipped.
+        Display values (sRGB), not clipped. K is 1 for gray noise, 3 for colored noise.
     """
     supersampled_gain = np.float32(supersampling_gain(look) if look.supersampling > 1 else 1)
     blended_gain = blend_gain(field.line_count, images.effective_samples, look)
@@ -378,7 +393,9 @@ def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: Pixel
     """Return the (P, 3) or (P, 1) linear colors of pixels.
 
     Pixels are gray, or colored by the magnitude, the family of lines or the color values, as the look says.
-    Pixels without a color value are gray, and so are undefined ones without streaks. `tone`, (P, K), is from `streak_tone`.
+    Pixels without a color value are gray, and so are undefined ones without streaks. `tone`, (P, K), holds
+    the brightness of the streaks as display values, from `streak_tone`. `images` decide which family
+    dominates.
     """
     hue, position = None, None
     if colors_magnitude(look):

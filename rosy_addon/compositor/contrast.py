@@ -1,6 +1,7 @@
 """Contrast correction of LIC images, with factors from theory instead of image analysis.
 
-The paper is Palacios and Zhang, IEEE TVCG 2011 (see `compositor`).
+The paper is Palacios and Zhang, IEEE TVCG 2011 (see `compositor`). P is the number of pixels, K the number of
+noise channels.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ def normalize_variance(
     mean : (P, K) float32 ndarray
         Mean noise along each streamline.
     effective_samples : (P,) float32 ndarray
-        n of each streamline, at least 1.
+        Effective samples of each streamline (`filter_kernel.KernelWeights`), n above; at least 1.
     look : PixelLook
         Its `length`, `line_width` and kernel are used.
 
@@ -89,13 +90,16 @@ def supersampling_gain(look: PixelLook) -> float:
 def expected_std(look: PixelLook) -> float:
     """Compute the theoretical standard deviation of the LIC image of one member of the field.
 
-    No streamline ends early.
+    Streamlines are assumed to have their full length. The result is in display values, like the noise.
     """
     return streak_moments(*streak_args(look), kernel=look.kernel)[0]
 
 
 def streak_args(look: PixelLook) -> tuple[float, float, float]:
-    """Return the length of streamlines, and the cell size and high-pass width of the noise, in pixels."""
+    """Return the length of streamlines, and the cell size and high-pass width of the noise.
+
+    They are in pixels of the frame. The length includes both directions and the pixel itself.
+    """
     return 2 * look.length + 1, look.line_width, look.high_pass
 
 

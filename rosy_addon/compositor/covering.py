@@ -1,9 +1,10 @@
 """The covering surface of a field, and a compact table of its states for tracing streamlines.
 
-A *state* is a pixel and a *sheet* k. Sheet k is the direction at the angle t + 2 pi k / S, where t
-is the angle of the member nearest to the guiding angle, and S is N for even N and 2 N for odd N. The
-states form an S-fold covering of the surface. On it the field is a single vector field without
-breaking points. A step from (p, k) to the pixel q leads to the sheet
+A *state* is a pixel and a *sheet* k. Sheet k is the direction at the angle t + 2 pi k / S, where t is the
+angle of the member nearest to the guiding angle (a setting of the look: an angle in the picture that selects
+the first member), and S is N for even N and 2 N for odd N. The states form an S-fold covering of the surface.
+On it the field is a single vector field, without jumps from one member to another. A step from (p, k) to the
+pixel q leads to the sheet
 
     k' = k + round((t(p) - t(q)) S / 2 pi)  mod S,
 
@@ -55,8 +56,10 @@ class SeamTable:
     Parameters
     ----------
     steps : SeamSteps
-    cell_of_pixel, sheets_per_turn
-        Attributes of the `Covering`.
+    cell_of_pixel : (P,) int32 ndarray
+        The cell of each pixel.
+    sheets_per_turn : int
+        Sheets that a full turn passes; see `Covering`.
     """
 
     def __init__(self, steps: SeamSteps, cell_of_pixel: np.ndarray, sheets_per_turn: int) -> None:
@@ -74,14 +77,14 @@ class SeamTable:
         cell : (n,) ndarray of int
             Cells where the steps start.
         bit : (n,) ndarray of int
-            Which neighbor each step leads to: its bit in the neighbor mask.
+            Which neighbor each step leads to: the number of its bit in the neighbor mask, 0 to 8.
 
         Returns
         -------
         crosses : (n,) bool ndarray
             Whether the step crosses a seam.
         seam : (k,) intp ndarray
-            Index into the `SeamSteps`, of each step that does.
+            For each step that crosses a seam, in the same order: its index in the `SeamSteps`.
         """
         key = cell.astype(np.int64) * 9 + bit
         place = np.minimum(np.searchsorted(self._key, key), len(self._key) - 1)
@@ -93,8 +96,9 @@ class SeamTable:
 class Covering:
     """The covering surface of a pixel field: all its states (a pixel and one direction of the field there).
 
-    The state of cell c and sheet k is row k C + c of `state_table`. Line l of the cell c is the pair of
-    the opposite sheets l and l + S / 2. Its index in arrays of lines is l C + c.
+    There are P pixels, C cells and S sheets. The *index* of the state of cell c and sheet k is k C + c: its
+    row in `state_table`. Line l of a cell is the pair of its opposite sheets l and l + S / 2, and has the
+    index l C + c.
 
     Attributes
     ----------
@@ -158,7 +162,7 @@ class Covering:
             of the first state of sheet k. A streamline starts in the middle of the table. If opposite
             directions are a separate covering, a second table for that covering follows.
         backward : int
-            The opposite of the sheet at element i is at element i + backward.
+            Offset in the table: the opposite of the sheet at element i is at element i + backward.
         """
         one_turn = np.arange(self.sheets_per_turn) * self.cell_count
         forward = np.tile(one_turn, 2 * max_winding)
@@ -167,14 +171,17 @@ class Covering:
         return np.concatenate([forward, forward + self.line_count * self.cell_count]), len(forward)
 
     def fold_to_line(self, state: np.ndarray) -> np.ndarray:
-        """Replace indices of states by the indices of their lines (pairs of opposite states), in place."""
+        """Replace (n,) indices of states by the indices of their lines (pairs of opposite states), in place.
+
+        The same array is returned.
+        """
         entry_count = self.line_count * self.cell_count
         return np.subtract(state, entry_count, out=state, where=state >= entry_count)
 
     def is_along_member(self, state: np.ndarray) -> np.ndarray:
         """Return an (n,) bool mask: whether each state is a member of a field without opposites.
 
-        The other states are the opposite directions of members.
+        `state` holds (n,) indices of states. The other states are the opposite directions of members.
         """
         sheet = state // np.int32(self.cell_count)
         if self.sheets_per_turn == 2 * self.line_count:
@@ -184,10 +191,11 @@ class Covering:
     def forward_share(self, state: np.ndarray) -> np.ndarray:
         """Return the fraction of the filter kernel that moves along the direction of each of (n,) states.
 
-        The result is (n,) float32, 0 to 1; the rest of the kernel moves the opposite way (see `flow`). In a
-        field without opposites, the kernel moves along the directions of the field. In other fields, the
-        fraction depends on the angle to the guiding angle; on a texture with seams, where angles in
-        different charts cannot be compared, it is 0.5.
+        `state` holds indices of states. The result is float32, 0 to 1; the rest of the kernel moves in the
+        opposite direction (streaks drift by moving kernels, see `flow`). In a field without opposites, the
+        kernel moves along the directions of the field. In other fields, the fraction depends on the angle to
+        the guiding angle; on a texture with seams, where angles in different charts cannot be compared, it is
+        0.5.
         """
         if self.has_directions:
             return self.is_along_member(state).astype(np.float32)
@@ -210,13 +218,14 @@ class Covering:
         line : (n,) intp ndarray
             Indices of lines.
         offsets : sequence of (int, int)
-            Offset of each neighbor: pixels forward along the line, and pixels to the left of it.
+            Offset of each neighbor: pixels forward along the line, and pixels to the left of it. Forward is
+            the direction of the sheet with the number of the line. The sum is rounded to a neighboring pixel.
 
         Returns
         -------
         list of (n,) intp ndarray
-            The indices of the lines that match, one array for each offset. Where no neighbor is linked, the
-            line is in `SINK_CELL`.
+            The indices of the lines that match, one array for each offset. Where streamlines may not step to
+            the neighbor, the line is in `SINK_CELL`, an empty cell of the border.
         """
         sheet, cell = np.divmod(line, self.cell_count)
         step = self.state_table.take(line, axis=0)[:, :2].astype(np.float32)
@@ -240,8 +249,9 @@ class Covering:
 def member_lines(field: PixelField) -> np.ndarray:
     """Return the (M,) intp number of the line of each member image.
 
-    Lines are pairs of opposite sheets of the covering surface, numbered from 0 to M - 1. For an odd degree N,
-    sheet 2 i is member i of the field, and sheet 2 i - N is the opposite direction.
+    Lines are pairs of opposite sheets of the covering surface, numbered from 0 to M - 1. For an even degree,
+    line i is member i of the field and its opposite. For an odd degree N, sheet 2 i is member i of the field,
+    and sheet 2 i - N is the opposite direction.
     """
     spacing = field.symmetry.sheets_per_turn // field.degree
     return np.arange(field.line_count) * spacing % field.line_count
@@ -338,7 +348,7 @@ def unpack_neighbor_mask(packed_phase: np.ndarray) -> np.ndarray:
 
 
 def _pack_neighbor_mask(phase: np.ndarray, bits: np.ndarray | int) -> np.ndarray:
-    """Return float32 phases whose last nine bits of the mantissa are replaced by neighbor masks."""
+    """Return (n,) float32 phases with neighbor masks (`bits`) in the last nine bits of the mantissa."""
     return (phase.view(np.uint32) & ~np.uint32(ALL_NEIGHBORS) | bits).view(np.float32)
 
 
@@ -358,7 +368,8 @@ def _noise_gradient(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return two (n, K) central differences of the (C, K) noise at n cells: in x and in y.
 
-    A difference is 0 where one of the two neighbors is not linked to the cell (`mask`).
+    The differences are per pixel. One is 0 where one of its two neighbors is not linked to the cell. `mask`,
+    (n,), has a bit for each neighbor that is linked: one that streamlines may step to.
     """
     slopes = []
     for cell_offset, offset in ((1, (1, 0)), (width, (0, 1))):
@@ -376,7 +387,8 @@ def _nearest_member(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the angle from the guiding angle to the nearest member, and the cosine and sine of that angle.
 
-    Angles are in radians. All three results are 0 where the representation `z` is 0.
+    All are (n,), like the representations `z` of the degree `degree`. Angles are in radians. All three
+    results are 0 where the representation `z` is 0.
     """
     x, y = _rotate(z.real, z.imag, -degree * guiding_angle)
     angle = vector_angle(x, y)
@@ -411,9 +423,10 @@ def _rotate(x: np.ndarray, y: np.ndarray, angle: float) -> tuple[np.ndarray, np.
 def _apply_harmonics(
     field: PixelField, block: slice, x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Compute `PixelField.member_direction`, the directions of members, for a block of pixels.
+    """Return the directions of the field from members of the RoSy that they deviate from, for some pixels.
 
-    Directions are given and returned as real and imaginary parts, x and y.
+    `x` and `y` are the (n,) components of a unit member at each pixel of `block`, in the view plane. The
+    result has the components of the unit direction. It is `x` and `y` if the field is a RoSy.
     """
     if not field.harmonics:
         return x, y
@@ -425,9 +438,10 @@ def _apply_harmonics(
 def _to_screen(
     field: PixelField, block: slice, x: np.ndarray, y: np.ndarray, foreshorten: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Compute `PixelField.to_screen` for a block of pixels in single precision.
+    """Project unit directions from the view plane to the screen, for a block of pixels, in single precision.
 
-    Directions are given and returned as components, x and y.
+    Directions are given and returned as components, x and y. The results are unit vectors or, if
+    `foreshorten`, displacements in pixels of a unit step on the surface (`PixelField.screen_jacobian`).
     """
     x_axis, y_axis = field.screen_jacobian[block, 0], field.screen_jacobian[block, 1]
     screen_x = x_axis.real * x + y_axis.real * y

@@ -38,7 +38,8 @@ class MovingKernel:
     length : int
         Steps of the kernel at rest, in each direction.
     shifts, weights : (3,) float64 ndarray
-        From `channel_shifts` and `channel_weights`.
+        For each channel: the steps that its streaks have drifted from their middle position, and the weight
+        of the channel in the sum.
     reach : int
         R, steps from the pixel to the last sample.
     energies : (3, L, 2 R + 2) float64 ndarray
@@ -86,7 +87,7 @@ class MovingKernel:
         forward : (n,) float32 ndarray
             Fraction of the kernel that drifts forward, 0 to 1.
         behind, ahead : (n,) intp ndarray
-            Steps to the ends of the streamlines. Negative numbers count as 0.
+            Steps to the backward and the forward end of each streamline. Negative numbers count as 0.
 
         Returns
         -------
@@ -110,7 +111,8 @@ class MovingKernel:
 def _shifted_weights(position: np.ndarray, shift: float, length: float, kind: Kernel) -> np.ndarray:
     """Return the weights of a kernel whose center is `shift` steps backward.
 
-    Weights are interpolated linearly between whole steps.
+    They are the weights at the samples `position`, in whole steps from the pixel. The kernel has `length`
+    steps in each direction. Weights are interpolated linearly between whole steps.
     """
     whole = math.floor(shift)
     fraction = shift - whole
@@ -159,7 +161,7 @@ class DriftingAverages:
         forward : (n,) float32 ndarray
             Fraction of the kernel that drifts forward, 0 to 1; the rest drifts backward.
         behind, ahead : (n,) intp ndarray
-            Steps to the ends of the streamlines.
+            Steps to the backward and the forward end of each streamline.
 
         Returns
         -------
@@ -203,8 +205,8 @@ class DriftingAverages:
     def _full(self, is_mirrored: bool) -> np.ndarray:
         """Return the (3, 2 Q + 1, n) complex64 weighted sums of each channel around each step from -Q to Q.
 
-        The kernels have the full length r. Q is R - r, so that no kernel reaches beyond step R of its
-        streamline.
+        If `is_mirrored`, the kernels are those that drift backward. They have the full length r. Q is R - r,
+        so that no kernel reaches beyond step R of its streamline.
         """
         if is_mirrored not in self._full_sums:
             kernel = self._kernel
@@ -238,13 +240,14 @@ class DriftingAverages:
 def _kernel_terms(kind: Kernel, length, is_mirrored: bool) -> list[tuple]:
     """Return (offset o, factor) pairs: the weighted sum around the sample q is the sum of factor * E(q + o).
 
-    The noise is n(i) = E(i) - 2 E(i - 1) + E(i - 2). So the factor at the offset d is
-    w(d) - 2 w(d + 1) + w(d + 2), for the weights w of `filter_kernel.sample_weights`.
+    The noise is n(i) = E(i) - 2 E(i - 1) + E(i - 2). So the factor at the offset o is
+    w(o) - 2 w(o + 1) + w(o + 2), where w(o) is the weight of the sample o steps from q
+    (`filter_kernel.sample_weights`).
 
     Parameters
     ----------
     length : int or ndarray of int
-        Steps in each direction.
+        Steps of the kernel in each direction.
     is_mirrored : bool
         Whether the kernel belongs to the opposite direction: its weights are reversed.
     """

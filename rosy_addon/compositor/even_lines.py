@@ -95,13 +95,14 @@ class EvenLines:
         line : int
             Index of the direction, from 0 to M - 1.
         target_coverage : (P,) ndarray
-            Width of the lines as a fraction of the distance between lines, 0 to 1.
+            Width of the lines as a fraction of the distance between lines, 0 to 1: the mean coverage.
         look : PixelLook
             Its `crispness` and `supersampling` are used.
 
         Returns
         -------
         (P,) float32 ndarray
+            Part of each pixel that is ink, 0 to 1.
         """
         width = np.asarray(target_coverage, dtype=np.float32)
         relief = self._relief(line, width, look)
@@ -142,7 +143,7 @@ class EvenLines:
         Returns
         -------
         (P,) float32 ndarray
-            0 (not crowded) to 1; see `CROWDED_SHARES`.
+            0: not crowded; 1: closer than the smaller of the two `crowded_pixels`.
         """
         low, high = (np.float32(pixels) for pixels in crowded_pixels(look))
         return 1 - smoothstep((self.period[line] - low) / (high - low))
@@ -163,7 +164,7 @@ def resolved_share(period: np.ndarray, supersampling: int = 1) -> np.ndarray:
 
 
 def crowded_pixels(look: PixelLook) -> tuple[float, float]:
-    """Return two distances between lines on screen, in pixels of the frame; see `CROWDED_SHARES`.
+    """Return the distances between lines on screen at which crowding is 1 and 0, in pixels of the frame.
 
     Lines closer than the first are fully crowded, lines farther apart than the second are not crowded.
     """
@@ -205,6 +206,7 @@ def uneven_width(
     target_coverage : (P,) ndarray
         Mean width, as a fraction of the distance between lines.
     look : PixelLook
+        Its `breaks`, `wobble` and `paper_grain` are used.
     break_streak, paper_grain : (P,) ndarray or None
         Short streaks that break lines, and the height of the paper, each with mean 0 and standard
         deviation 1; see `hatching.HatchedLines`. None if lines are not broken, or the paper has no grain.
@@ -228,7 +230,10 @@ def uneven_width(
 
 
 def look_width_table(look: PixelLook) -> np.ndarray:
-    """Return the `_width_table` of a look: (COVERAGE_STEPS,) widths, for mean widths from 0 to 1."""
+    """Return (COVERAGE_STEPS,) widths of lines before breaks and paper grain change them.
+
+    Element i is the width for which the mean of the changed widths is i / (COVERAGE_STEPS - 1).
+    """
     return _width_table(look.breaks, look.wobble, PAPER_GRAIN_STRENGTH * look.paper_grain)
 
 
@@ -237,9 +242,9 @@ def _width_table(breaks: float, wobble: float, paper_grain_amplitude: float) -> 
     """Return (COVERAGE_STEPS,) widths m of lines before breaks and paper grain change them.
 
     Breaks and grain add a normally distributed variation s X to the width, and the sum is clipped to 0 to 1.
-    The result has the m for which the mean of the clipped widths is 0 to 1, in even steps. The mean of
-    clip(m + s X, 0, 1) is g(m) - g(m - 1), with g(x) = x F(x / s) + s f(x / s), where F is the distribution
-    function and f the density of X. It is solved for m by bisection.
+    Element i of the result is the m for which the mean of the clipped widths is i / (COVERAGE_STEPS - 1). The
+    mean of clip(m + s X, 0, 1) is g(m) - g(m - 1), with g(x) = x F(x / s) + s f(x / s), where F is the
+    distribution function and f the density of X. It is solved for m by bisection.
 
     Parameters
     ----------
@@ -283,9 +288,10 @@ def even_lines(
         A field of one degree, from `gbuffer`.
     look : PixelLook
     wobble_angle : (P,) float32 ndarray, optional
-        From `wobble.wobble_angle`, at the pixels of the field.
+        Angle of the wobble (lines drawn by hand) at the pixels of the field, in radians, from
+        `wobble.wobble_angle`. It is for a `Look.wobble` of 1, and displaces the lines.
     cache : Cache, optional
-        Stores what does not depend on the camera.
+        Stores the lines on the surfaces, which do not depend on the camera.
 
     Returns
     -------
@@ -328,21 +334,22 @@ def line_phases(
     ----------
     lines : SurfaceLines
     place : tuple of ndarray
-        Points of the surface, from ``lines.tree.locate``.
+        The n points of the surface: index of the leaf triangle and weights of its corners, from
+        ``lines.tree.locate``.
     field : PixelField
         The field at the n pixels.
     members : list of (n,) complex64 ndarray
-        From `all_members`.
+        Unit vectors in the view plane, from `all_members`.
     first_direction : (n,) int ndarray
-        The direction of `lines` that the first member is.
+        Number, in the directions of `lines` (0 to N - 1), of the direction that ``members[0]`` is.
     step : (n,) int ndarray or int
-        What is added to the number of the direction from one member to the next: 1, or -1 where the surface is
-        seen from behind.
+        What is added to the number of the direction from one member to the next: 1, or -1 where the surface
+        is seen from behind.
 
     Returns
     -------
     phases : (M, n) float32 ndarray
-        In distances between lines.
+        Position across the lines of each of the M lines of directions, in distances between lines.
     foreshortening : (M, n) float32 ndarray
         Distance between lines on screen, relative to the distance on a surface that faces the eye.
     """
@@ -357,7 +364,11 @@ def line_phases(
 
 
 class _InstanceLines:
-    """The evenly spaced lines of one mesh instance. All parameters but `instance` are as in `even_lines`."""
+    """The evenly spaced lines of one mesh instance.
+
+    The parameters are the G-buffer, a field of one degree from it, the look, the mesh instance, and the
+    wobble angle and the cache of `even_lines`.
+    """
 
     def __init__(
         self,
@@ -385,16 +396,17 @@ class _InstanceLines:
         Parameters
         ----------
         pixels : (n,) intp ndarray
+            Indices into the pixels of the field.
         ratio : float
             Distance between lines on the surface, relative to the `line_distance` of the look.
 
         Returns
         -------
         streaks, period : (M, n) float32 ndarray
-            See `EvenLines`. `period` does not depend on `ratio`: it is the distance between lines at the
-            ratio 1.
+            `EvenLines.streaks`, and the distance between lines on screen in pixels of the frame. `period`
+            does not depend on `ratio`: it is the distance at the ratio 1.
         growth : (n,) float32 ndarray
-            See `EvenLines`; 0 where no further lines grow.
+            Width of the new lines between the lines as a fraction of the width of the lines, 0 to 1.
         """
         look, spacing = self._look, ratio * self._spacing
         lines = cached_surface_lines(self._instance, look.display, spacing, self._cache)
@@ -458,8 +470,9 @@ class _InstanceLines:
     def _heading_in_view(self, entries: np.ndarray, heading: np.ndarray) -> np.ndarray:
         """Return the (n,) complex64 directions in the view plane of headings on the surface.
 
-        `heading`, (2, n), is from `SurfaceLines.heading`: a unit vector along the surface, as multiples of
-        two sides of the triangle. `entries` are the indices of the n pixels in the G-buffer.
+        `heading`, (2, n), is from `SurfaceLines.heading`: a unit vector in the plane of the triangle, as
+        multiples of the sides from corner 0 to corner 1 and to corner 2. `entries` are the indices of the n
+        pixels in the G-buffer.
         """
         gbuffer = self._gbuffer
         triangle = gbuffer.triangle[entries]

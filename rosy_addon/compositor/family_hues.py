@@ -2,11 +2,11 @@
 
 Families are the lines that a field distinguishes, such as the major and the minor directions of a
 tensor. Equation 6 of Palacios and Zhang (IEEE TVCG 2011) restores the contrast that the mean of M gray
-images loses. If the images differ in hue, their mean loses saturation as well, which they leave to future
-work. Here brightness and hue are computed separately. The brightness is taken from the corrected gray
+images loses. If the images differ in hue, their mean loses saturation as well. That paper leaves this to
+future work. Here brightness and hue are computed separately. The brightness is taken from the corrected gray
 picture. The hue is a mean of the family colors, with softmax weights of the member images: the family with
-the brightest streak at the pixel dominates. The weights are scaled by the standard deviation of
-streaks, which is known from theory (`contrast.expected_std`), so no image has to be analyzed.
+the brightest streak at the pixel dominates. The weights are scaled by the standard deviation of streaks,
+which is known from theory (`contrast.expected_std`), so no image has to be analyzed.
 """
 
 from __future__ import annotations

@@ -90,6 +90,7 @@ def fast_lic(
     looks : sequence of PixelLook
         They differ in the `length` of streamlines. The first has the greatest length.
     noise : (P, K) float32 ndarray
+        K channels of image noise, with the mean `NOISE_MEAN`.
     strip : Strip, optional
         The rows to draw; by default all rows.
 
@@ -120,15 +121,16 @@ def _line_averages(
 ) -> list[tuple[np.ndarray, np.ndarray | None]]:
     """Average noise along the streamlines through the pixels `drawn`, for each look.
 
-    Streamlines end at the border of the pixels `extent`. The result is a list of (sums, slopes) pairs.
+    `drawn` and `extent` are slices of the P pixels of the field. Streamlines end at the border of the pixels
+    `extent`. The result is a list of (sums, slopes) pairs, for the n pixels `drawn`.
 
     Returns
     -------
     sums : (M, n, K + 1) float32 ndarray
-        For each of the M lines: the average of each noise channel times the effective samples, then the
-        effective samples.
+        For each of the M lines: the average of each noise channel (relative to `NOISE_MEAN`) times the
+        effective samples, then the effective samples.
     slopes : (M, n) float32 ndarray or None
-        See `LicImages`.
+        Derivatives of the averages toward the left of the lines, per pixel; None if the look needs none.
     """
     channels = 1 if has_flow(looks[0]) else noise.shape[1]
     if drawn.start == drawn.stop:
@@ -166,6 +168,7 @@ def _line_limits(
 ) -> np.ndarray | None:
     """Return the (M C,) intp step limits of the lines of a covering, given the (P,) limits of pixels.
 
+    A limit is the length of streamlines in each direction, in steps. The covering has the pixels `extent`.
     None if `step_limit` is None.
     """
     if step_limit is None:
@@ -178,7 +181,8 @@ def _line_limits(
 def _write_averages(line_sums: np.ndarray, look: PixelLook, member: np.ndarray) -> None:
     """Write the (n, K) averages of a line to `member`, scaled to the variance of full streamlines.
 
-    `line_sums`, (n, K + 1), holds the averages times the effective samples, then the effective samples.
+    `line_sums`, (n, K + 1), holds the averages relative to `NOISE_MEAN`, times the effective samples; then
+    the effective samples.
     """
     full_samples = np.float32(full_sample_count(look.length, look.kernel) - 0.5)
     for block in pixel_blocks(len(line_sums)):
@@ -209,8 +213,8 @@ def _crop_rows(field: PixelField, extent: slice) -> PixelField:
 class _LineAverages:
     """Averages of noise along each line (pair of opposite directions) of each cell of the covering surface.
 
-    Stored are the average times the effective samples, and the effective samples. These are 0 for a line
-    that has no average yet, and -1 for a line that needs none.
+    Stored are the average times the effective samples, and the effective samples. The effective samples
+    are 0 for a line that has no average yet, and -1 for a line that needs none.
 
     Parameters
     ----------
@@ -230,12 +234,15 @@ class _LineAverages:
         self._flat = self._values.reshape(-1, shape[-1])
 
     def init_undefined(self, cell: np.ndarray, noise: np.ndarray) -> None:
-        """Set the averages of cells where the field is undefined to the noise of the cell."""
+        """Set the averages of n cells where the field is undefined to the (n, K) noise of these cells."""
         self._values[:, cell, :-1] = noise
         self._values[:, cell, -1] = 1
 
     def write(self, line: np.ndarray, values: np.ndarray) -> None:
-        """Store (n, K + 1) averages at (n,) indices of lines, in the form `StreamlineBatch.trace` yields."""
+        """Store (n, K + 1) averages at the lines with the (n,) indices `line`.
+
+        `values` are the averages times the effective samples, then the effective samples.
+        """
         scatter_rows(self._flat, line, values)
 
     def clear_sink(self) -> None:
@@ -243,7 +250,9 @@ class _LineAverages:
         self._values[:, SINK_CELL, -1] = -1
 
     def copy_from(self, line: np.ndarray, source: np.ndarray) -> np.ndarray:
-        """Copy averages from the lines `source` to the lines `line`.
+        """Copy the average of each line ``source[i]`` to the line ``line[i]``.
+
+        Both are (n,) indices of lines.
 
         Return the elements of `line` whose source has no average. They are not changed.
         """
@@ -253,7 +262,7 @@ class _LineAverages:
         return line[~is_known]
 
     def missing_lines(self) -> np.ndarray:
-        """Return the indices of the lines (see the class) that need an average and have none yet."""
+        """Return the indices (see `Covering`) of the lines that need an average and have none yet."""
         return np.flatnonzero(self._values[:, :, -1] == 0)
 
     def filter_missing(self, line: np.ndarray) -> np.ndarray:
@@ -280,7 +289,8 @@ class _LineAverages:
     def slopes(self, covering: Covering, cells: np.ndarray, line: np.ndarray) -> np.ndarray:
         """Return the (M, n) float32 derivatives of averages perpendicular to the line, toward its left.
 
-        They are for the M lines of each of the n cells; `line` gives the order of lines. See `LicImages`.
+        They are per pixel, for the M lines of each of the n cells, and averaged over the channels. `line`,
+        (M,), holds the numbers of the lines of a cell in the order of the result.
         """
         slopes = np.empty((len(line), len(cells)), dtype=np.float32)
         for first_entry, out in zip(line * covering.cell_count, slopes, strict=True):
@@ -297,7 +307,9 @@ class _LineAverages:
 
     @staticmethod
     def _or_own(values: np.ndarray, own: np.ndarray) -> np.ndarray:
-        """Copy rows of `own` to the (n, K + 1) `values` where these have no average, and return `values`.
+        """Replace the rows of `values` that have no average by the same rows of `own`. Return `values`.
+
+        Both are (n, K + 1).
 
         A row has no average if its effective samples, in the last column, are not above 0.
         """
@@ -324,7 +336,9 @@ def _cover_all_lines(
 ) -> None:
     """Trace streamlines until every line that needs an average has one, for each look.
 
-    `averages` are filled, one for each look. `looks` and `step_limits` are as in `StreamlineBatch`.
+    `averages` are filled, one for each look. The looks differ in `length` alone. `step_limits` has for each
+    look the (M C,) steps in each direction that the average of each line covers, or None for the `length` of
+    the look.
     """
     look = looks[0]
     half_window = max(HALF_WINDOW_STEPS, look.length // 2)
@@ -377,7 +391,9 @@ def _write_streamlines(
     averages : sequence of _LineAverages
         The averages for each look, which are changed.
     steps : iterable
-        What `StreamlineBatch.trace` yields for each step of the streamlines.
+        For each step of the streamlines, from `StreamlineBatch.trace`: the indices of the lines that are
+        passed, a list with their averages for each look, and the indices (into the first array) of the
+        streamlines that pass near the center of the cell.
     """
     centered_lines: list[np.ndarray] = []
     centered_values: list[list[np.ndarray]] = [[] for _ in averages]
@@ -393,7 +409,7 @@ def _write_streamlines(
 
 
 def has_slopes(look: PixelLook) -> bool:
-    """Return whether the images of a look have slopes; see `LicImages`."""
+    """Return whether LIC images of a look have slopes: derivatives across the lines (`LicImages.slopes`)."""
     return is_fine(look) and is_hatched(look)
 
 
@@ -426,6 +442,7 @@ def _grid_seeds(covering: Covering, averages: _LineAverages, spacing: int) -> np
     ----------
     covering : Covering
     averages : _LineAverages
+        Lines that need no average are not seeds.
     spacing : int
         Approximate distance of rows and of columns, pixels.
 
@@ -456,9 +473,9 @@ def _even_positions(size: int, spacing: int) -> np.ndarray:
 def _seed_priority(covering: Covering, line: np.ndarray) -> np.ndarray:
     """Return (n,) float64 priorities from 0 to 1, evenly distributed over rows and columns.
 
-    The seeds of a round are the lines whose priorities are in a range. A priority depends on the cell and the
-    number of the line alone. If every n-th line that has no average were a seed, a small change of the
-    field would move the seeds everywhere, and animations would flicker.
+    `line` holds (n,) indices of lines. The seeds of a round are the lines whose priorities are in a range. A
+    priority depends on the cell and the number of the line alone. If every n-th line that has no average were
+    a seed, a small change of the field would move the seeds everywhere, and animations would flicker.
     """
     line_index, cell = np.divmod(line, covering.cell_count)
     row, column = np.divmod(cell, covering.width)

@@ -27,7 +27,7 @@ KERNEL_OF_FADE: dict[str, Kernel] = {"none": "box", "ends": "taper", "tail": "ra
 def sample_weights(position: np.ndarray, length: float, kernel: Kernel) -> np.ndarray:
     """Return the weights of samples at given positions: whole steps from the center, positive if forward.
 
-    Samples more than `length` steps away have the weight 0.
+    The weight of the center is 1. Samples more than `length` steps away have the weight 0.
     """
     forward, backward = WEIGHT_SLOPES[kernel]
     slope = np.where(position > 0, forward, backward) / (1 + length)
@@ -56,8 +56,8 @@ def kernel_weights(forward: Any, backward: Any, full_length: Any, kernel: Kernel
     Parameters
     ----------
     forward, backward : ndarray or float
-        Numbers of samples on either side, as floats, at most `full_length`. Forward is along the
-        direction of the field, if the kernel is a ramp.
+        Numbers of samples on either side, without the center, as floats, at most `full_length`. Forward is
+        along the direction of the field, if the kernel is a ramp.
     full_length : ndarray or float
         Number of samples on either side of a streamline that does not end early.
     kernel : {"box", "taper", "ramp"}

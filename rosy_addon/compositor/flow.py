@@ -63,7 +63,7 @@ NO_DRIFT = Drift()
 
 
 def noise_channel_count(look: Any) -> int:
-    """Return the number of noise channels that a look convolves."""
+    """Return the number of noise channels that a look convolves: 3 with flow or colored noise, else 1."""
     if has_flow(look):
         return FLOW_CHANNELS
     return 3 if has_colored_noise(look) else 1
@@ -104,12 +104,12 @@ def drift_at(look: Look, frame: float, loop_frames: int = 0) -> Drift:
 
 
 def _channel_positions(phase: float) -> np.ndarray:
-    """Return the (3,) float64 positions of the channels in their cycles, from 0 to 1."""
+    """Return the (3,) float64 positions of the channels in their cycles, from 0 to 1, at a `Drift.phase`."""
     return (phase + np.arange(FLOW_CHANNELS) / FLOW_CHANNELS) % 1.0
 
 
 def channel_weights(phase: float) -> np.ndarray:
-    """Return the (3,) float64 weights of the channels. The sum of their squares is 1."""
+    """Return the (3,) float64 weights of the channels at a `Drift.phase`. The sum of their squares is 1."""
     position = _channel_positions(phase)
     return math.sqrt(8 / 9) * np.sin(np.pi * position) ** 2
 
@@ -136,7 +136,7 @@ def forward_share(cosine: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     cosine : ndarray
-        Cosine of the angle between the forward direction of the line and the guiding angle.
+        Cosine of the angle between the forward direction of the line and the direction at the guiding angle.
     """
     x = np.clip(0.5 + cosine * (0.5 / ONE_WAY_COSINE), 0.0, 1.0)
     return x * x * (3 - 2 * x)

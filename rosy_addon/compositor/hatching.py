@@ -77,7 +77,7 @@ class HatchedLines(NamedTuple):
     outline : (P,) float32 ndarray or None
         Coverage of each pixel by lines along silhouettes and creases, 0 to 1.
     undirected : (P,) float32 ndarray or None
-        Undirected texture where the field is undefined, NaN elsewhere; see `undirected_texture`.
+        Mean of the noise over a disc where the field is undefined, relative to `NOISE_MEAN`; NaN elsewhere.
     even_lines : EvenLines or None
         Evenly spaced lines, if they are drawn instead of the streaks of LIC images.
     """
@@ -98,7 +98,8 @@ class HatchedLines(NamedTuple):
     def relief(self, line: int) -> np.ndarray | np.float32:
         """Return what the paper grain adds to the LIC image of one direction of the field.
 
-        (P,) float32, in standard deviations of the image; or the scalar 0 if there is no paper grain.
+        `line` is the index of the direction. The result is (P,) float32, in standard deviations of the image;
+        or the scalar 0 if there is no paper grain.
         """
         if self.paper_grain is None:
             return np.float32(0)
@@ -118,8 +119,9 @@ class HatchedLines(NamedTuple):
     def spots(self, line: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the pixels where the field is undefined, and what is thresholded there in place of a LIC image.
 
-        The pixels are (n,) indices. The (n,) float32 values are the undirected texture with standard deviation
-        1, plus the paper grain of the line, and below all thresholds if no spots are drawn.
+        The pixels are (n,) indices. The (n,) float32 values are `undirected`, scaled to the standard
+        deviation 1, plus the paper grain of the line with the index `line`. If no spots are drawn, they are
+        below all thresholds.
         """
         below = 0 if undefined_drawing(self.look) == "texture" else np.float32(NO_INK)
         std = np.float32(look_streak_statistics(self.look).disc_std)
@@ -239,9 +241,8 @@ def _render_many_inks(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the (P, 3) linear color of the ink and its (P,) coverage, if lines have different inks.
 
-    `ink_indices` are from `line_ink_indices`.
-
-    Inks are transparent: the transmittances of crossing lines are multiplied.
+    `ink_indices` has the (P,) ink of each of the M lines. Inks are transparent: the transmittances of
+    crossing lines are multiplied.
     """
     look = lines.look
     inks = inks_of(look.look, ink_count(look.look, field.line_count, field.family_count))
@@ -272,8 +273,8 @@ def standard_streak(
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """Return the LIC image of one direction of the field with mean 0 and variance 1, and its slopes.
 
-    `std` is the standard deviation of streaks. The slopes (`LicImages.slopes`) are scaled in the same way, or
-    None if the images have none.
+    `line` is the index of the direction, `std` the standard deviation of `images`. The slopes
+    (`LicImages.slopes`) are scaled in the same way, or None if the images have none.
     """
     streak = (images.members[line].mean(axis=1) - NOISE_MEAN) / std
     return streak, None if images.slopes is None else images.slopes[line] / std
@@ -376,8 +377,8 @@ def is_shaded_by_pixel(look: Any) -> bool:
 def line_ink_indices(field: PixelField, look: PixelLook) -> list[np.ndarray] | None:
     """Find the ink of each line at each pixel.
 
-    All lines of a family have the same ink. If the field does not distinguish families, the ink is chosen
-    by the rank of the line (see `line_ranks`).
+    All lines of a family have the same ink. If the field does not distinguish families, the ink is chosen by
+    the rank of the line: its place in the order of the angles to the guiding angle.
 
     Returns
     -------
@@ -421,7 +422,7 @@ def soft_rank_of(rank: np.ndarray, rank_count: int) -> np.ndarray:
 def line_shares(
     field: PixelField, lines: HatchedLines, transmittance: np.ndarray
 ) -> list[np.ndarray]:
-    """Compute the share of the ink that each line takes.
+    """Compute the share s of the ink that each line takes: the line transmits T^s of the light.
 
     Lines join as the picture gets darker, in the order of their ranks. Even lines that are crowded
     join last. The shares are continuous where two lines swap ranks, so no seam is visible.
@@ -466,7 +467,7 @@ def onset_shares(darkness: np.ndarray, delays: Sequence[np.ndarray | float]) -> 
     Returns
     -------
     list of ndarray
-        Share of each line, from 0 (does not take part) to 1. The shares sum to 1.
+        Share of each line, from 0 (it has no ink) to 1. The shares sum to 1.
     """
     extent = ONSET_RANGE + ONSET_LEAD
     weights = [smoothstep((darkness - delay + ONSET_LEAD) / extent) for delay in delays]
@@ -479,7 +480,8 @@ def _onset_darkness(
 ) -> list[np.ndarray]:
     """Return M (P,) arrays: the darkness (1 - transmittance) at which each line joins the hatching.
 
-    It is above 1, so that the line is never drawn, for ranks beyond `look.layers`.
+    It is above 1 for ranks beyond `look.layers`, so these lines are never drawn. Crowded `even_lines` join
+    later.
     """
     onsets = []
     for line, rank in enumerate(line_ranks(field, look)):

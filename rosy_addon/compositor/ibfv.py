@@ -72,12 +72,12 @@ class StreakWaves:
     Attributes
     ----------
     constant : (M, P, K) float32 ndarray
-        Averages around 0, scaled to the variance of full streamlines.
+        Averages relative to `NOISE_MEAN`, scaled to the variance of full streamlines.
     wave : (M, P) complex64 ndarray or None
         Part that depends on the phase: the real part of its product with exp(2 pi i phase) is added to
         `constant`. None if the look has no flow.
     effective_samples : (P,) float32 ndarray
-        See `LicImages`.
+        Number of samples of equal weight whose mean has the variance of the averages; mean over the lines.
     """
 
     constant: np.ndarray
@@ -109,7 +109,7 @@ def streak_waves(
     looks : sequence of PixelLook
         Looks in pixels of the frame. The first has the greatest length.
     noise : (P, K) float32 ndarray
-        The three channels of `flow`, if the looks have flow.
+        Noise with the mean `NOISE_MEAN`. If the looks have flow, these are its three channels.
 
     Returns
     -------
@@ -151,9 +151,9 @@ def _noise_sources(noise: np.ndarray, look: PixelLook) -> list[np.ndarray]:
     Returns
     -------
     list of (P,) complex64 ndarray
-        The real part of the first array is the noise. Its imaginary part is 1, so that its sum is the sum of
-        the weights. The second array has the other two channels of colored noise, or the noise that
-        becomes `StreakWaves.wave`.
+        The real part of the first array is the first channel of the noise or, with flow, its constant part.
+        The imaginary part is 1, so that its sum is the sum of the weights. The second array has the other two
+        channels of colored noise, or the noise that becomes `StreakWaves.wave`.
     """
     if has_flow(look):
         third = np.exp(2j * np.pi * np.arange(FLOW_CHANNELS) / FLOW_CHANNELS)
@@ -224,7 +224,7 @@ def decay_of_samples(effective_samples: np.ndarray, two_sided: bool) -> np.ndarr
     Returns
     -------
     float64 ndarray
-        q, the ratio of the weights of successive steps.
+        Of the same shape: q, the ratio of the weights of successive steps.
     """
     low, high = np.zeros_like(effective_samples), np.ones_like(effective_samples)
     for _ in range(40):
@@ -250,9 +250,10 @@ def _square_sum(rest: np.ndarray | float, decay: np.ndarray) -> np.ndarray:
 def _sharpened_sources(
     sheets: Sheets, noise: np.ndarray, look: PixelLook, sharpening: np.float32
 ) -> list[np.ndarray]:
-    """Return the (C,) `_noise_sources` of the cells of a covering, from (P, K) noise, sharpened.
+    """Return the sharpened noise of cells that is summed along streamlines: (C,) complex64 `_noise_sources`.
 
-    Cells without a pixel are 0. `sharpening` is the factor of differences from neighbors; see `SHARPENING`.
+    It is computed from (P, K) `noise` at the pixels, and is 0 at cells without a pixel. `sharpening` is the
+    factor of differences from neighbors; see `SHARPENING`.
     """
     plain: list[np.ndarray] = []
     for _, block, cell in sheets.blocks(1):
@@ -284,8 +285,9 @@ class _Sums:
     Attributes
     ----------
     values : list of (S C,) complex64 ndarray
-        Sum of each source over the first D steps upstream of each state, in which the noise at the pixel
-        itself has the weight 1.
+        For the states of the S sheets and C cells of `sheets`: sum of each source over the first D steps
+        upstream of each state, in which the noise at the pixel itself has the weight 1. D is 1 at first, and
+        is doubled by `_doubled`.
     weight : (P,) or () float32 ndarray
         q^D, the weight of the next D steps.
     """
@@ -336,8 +338,9 @@ class _Sums:
     ) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
         """Return the sums at the pixels of a block along one sheet (direction) of the covering surface.
 
-        The result is the sum of each source, the sum of the weights, and the sum of the squared weights. The
-        noise at the pixel itself has the weight `OWN_WEIGHT` in them.
+        `covering_sheet` is the number of the sheet in the `Covering`. The result is a list with the (n,) sums
+        of each source, the (n,) sums of the weights, and the (n,) sums of the squared weights. The noise at
+        the pixel itself has the weight `OWN_WEIGHT` in them.
         """
         sheets = self._sheets
         cell = sheets.cells[block].astype(np.intp)
@@ -357,6 +360,9 @@ def _doubled(
     sheets: Sheets, sums: Sequence[_Sums], steps: int, origins: Origins, is_last: bool
 ) -> Origins:
     """Double the number of steps that sums cover: add the sums at the origins, which are `steps` upstream.
+
+    `sums` has the sums for each look, which are changed. `origins` are the points `steps` upstream of every
+    state.
 
     Returns
     -------
@@ -380,7 +386,10 @@ def _doubled(
 
 
 def _line_waves(field: PixelField, covering: Covering, look: PixelLook, sums: _Sums) -> StreakWaves:
-    """Average the sums of the two opposite sheets of each line, and equalize the contrast."""
+    """Average the sums of the two opposite sheets of each line, and equalize the contrast.
+
+    Averages are scaled to the variance of full streamlines.
+    """
     lines, count = field.line_count, len(field.pixel)
     flows = has_flow(look)
     match = TWO_SIDED_MATCH if _is_two_sided(field, look) else ONE_SIDED_MATCH

@@ -71,6 +71,7 @@ def hash_bits(
         Up to five arrays of one shape: the indices of the cells along each axis of the lattice, and further
         integers that tell lattices apart.
     seed, channel : int
+        Other values give independent bits.
     density : float
         Fraction of cells whose bit is set, to the nearest 2 ** -24.
 
@@ -120,7 +121,10 @@ class NoiseSettings(NamedTuple):
 
 
 class TileRectangle(NamedTuple):
-    """A rectangle of the picture that consists of whole tiles; rows from the bottom, in pixels."""
+    """A rectangle of the picture that consists of whole tiles: rows from the bottom, in pixels.
+
+    `right` and `top` are the column and the row after the last ones.
+    """
 
     left: int
     right: int
@@ -128,7 +132,7 @@ class TileRectangle(NamedTuple):
     top: int
 
     def index(self, row: np.ndarray, column: np.ndarray) -> np.ndarray:
-        """Return the flat indices of pixels in the rectangle, row by row."""
+        """Return the flat indices in the rectangle of pixels, given their rows and columns in the picture."""
         return (row - self.bottom) * np.int32(self.right - self.left) + (column - self.left)
 
 
@@ -165,7 +169,8 @@ def cached_tiles(
 ) -> np.ndarray:
     """Return the result of ``create(rectangle, *settings)``, from the cache if it is there.
 
-    The result is a flat image of the rectangle. It is stored unless it has more than `MAX_CACHED_PIXELS`.
+    `create` makes an image of the rectangle: one value for each pixel, row by row, as a flat array. It is
+    stored unless it has more than `MAX_CACHED_PIXELS`.
     """
     left, right, bottom, top = rectangle
     if (right - left) * (top - bottom) > MAX_CACHED_PIXELS:
@@ -207,7 +212,10 @@ def image_noise(pixel: np.ndarray, width: int, settings: NoiseSettings) -> np.nd
 def _noise_tiles(
     rectangle: TileRectangle, cell: float, seed: int, channel: int, density: float, high_pass: float
 ) -> np.ndarray:
-    """Return the flat float32 noise of one channel in a rectangle, row by row, averaged over each pixel."""
+    """Return the flat float32 noise of one channel in a rectangle, row by row, averaged over each pixel.
+
+    `channel` is the number of the channel. The other settings are attributes of `NoiseSettings`.
+    """
     full_margin = high_pass_margin(high_pass)
     margin = min(full_margin, MAX_MARGIN)
     left, right, bottom, top = rectangle
@@ -274,7 +282,10 @@ def gaussian_blur(
 
 
 def _box_filter(image: np.ndarray, radius: int, outside: str) -> np.ndarray:
-    """Return the mean over 2 * radius + 1 pixels along the columns; `outside` as in `gaussian_blur`."""
+    """Return the mean of each pixel and the `radius` pixels above and below it, (H, W) float64.
+
+    `outside` is what lies outside of the image: "edge" for its border pixels, "mean" for `NOISE_MEAN`.
+    """
     low, high = (image[0], image[-1]) if outside == "edge" else (NOISE_MEAN, NOISE_MEAN)
     window = 2 * radius + 1
     prefix_sum = np.empty((len(image) + window, image.shape[1]))
@@ -361,7 +372,8 @@ def streak_moments(
 def _line_response(cycles: np.ndarray, kernel: Kernel) -> np.ndarray:
     """Return the factor by which the mean along a streamline changes the amplitude of a wave of noise.
 
-    `cycles` is the number of cycles of the wave along the streamline.
+    `cycles` is the number of cycles of the wave along the streamline. The result has the shape of `cycles`,
+    and is complex for the kernel "ramp".
     """
     if kernel == "taper":
         return np.sinc(cycles / 2) ** 2

@@ -110,10 +110,11 @@ def line_thresholds(line: int, lines: HatchedLines) -> np.ndarray:
 def _streak_thresholds(
     streak: np.ndarray, break_streak: np.ndarray | None, look: PixelLook, table: np.ndarray
 ) -> np.ndarray:
-    """Compute `line_thresholds` for a LIC image with mean 0 and standard deviation 1.
+    """Return the (P,) thresholds of lines drawn from a LIC image with mean 0 and standard deviation 1.
 
     `streak` is the LIC image. `break_streak` is a LIC image of short streamlines, with the same mean and
-    deviation; None if lines are not broken. `table` is `StreakStatistics.threshold`.
+    deviation; None if lines are not broken. `table`, (COVERAGE_STEPS,), is the streak above which there is
+    ink, for each coverage.
     """
     if break_streak is None:
         return _coverage_from(streak, table)
@@ -129,7 +130,11 @@ def _streak_thresholds(
 def _even_line_thresholds(
     line: int, break_streak: np.ndarray | None, lines: HatchedLines
 ) -> np.ndarray:
-    """Compute `line_thresholds` for evenly spaced lines."""
+    """Return the (P,) thresholds of evenly spaced lines along the direction with the index `line`.
+
+    `break_streak` is from `HatchedLines.break_streak`: short streaks that break lines; None if they are not
+    broken.
+    """
     # 0 in the middle of a line, 1 between two lines.
     position = 1 - lines.even_lines.streaks[line]
     if break_streak is None and lines.paper_grain is None:
@@ -144,13 +149,17 @@ def _even_line_thresholds(
 def _coverage_from(streak: np.ndarray, table: np.ndarray) -> np.ndarray:
     """Return the (P,) float32 coverages at which streaks have ink, by inverting a table of thresholds.
 
-    `table` is `StreakStatistics.threshold`, or `disc_threshold` for the undirected texture.
+    `table`, (COVERAGE_STEPS,), is the streak above which there is ink, for each coverage from 0 to 1. It
+    falls.
     """
     return np.interp(streak, table[::-1], COVERAGES[::-1]).astype(np.float32)
 
 
 def _bisect(excess: Callable[[np.ndarray], np.ndarray], count: int) -> np.ndarray:
-    """Find the (count,) float32 coverages, 0 to 1, at which `excess` becomes positive."""
+    """Find the (count,) float32 coverages, 0 to 1, at which `excess` becomes positive.
+
+    `excess` takes (count,) coverages and returns (count,) numbers, which increase with the coverage.
+    """
     low, high = np.zeros((2, count), dtype=np.float32)
     high += 1
     for _ in range(BISECTION_STEPS):
@@ -161,7 +170,9 @@ def _bisect(excess: Callable[[np.ndarray], np.ndarray], count: int) -> np.ndarra
 
 
 def cyclic_places(first: np.ndarray) -> np.ndarray:
-    """Return the `places` of `ordered_thresholds` for lines in cyclic order: line m + 1 follows line m.
+    """Return how much each line has each place in the order, if line m + 1 follows line m.
+
+    The result is (min(M, MAX_LAYERS), M, P) float32: the `places` of `ordered_thresholds`.
 
     Parameters
     ----------
@@ -179,7 +190,7 @@ def ordered_thresholds(
     Parameters
     ----------
     thresholds : (M, P) float32 ndarray
-        From `line_thresholds`.
+        Thresholds of each line, from `line_thresholds`.
     places : (L, M, P) float32 ndarray
         For each of the first L = min(M, MAX_LAYERS) places in the order, how much each line has it. The
         sum over the lines is 1.
@@ -211,8 +222,8 @@ def ordered_thresholds(
 def _layer_densities(layers: int, layering: float) -> np.ndarray:
     """Tabulate the (layers, DENSITY_STEPS) float32 density of each layer, by the total density `DENSITIES`.
 
-    Density is -log(transmittance). Each row increases strictly. Beyond the table it continues linearly. The
-    parameters are those of `layer_shares`.
+    Density is -log(transmittance). Each row increases strictly. Beyond the table it continues linearly.
+    `layers` is their number, `layering` the difference in darkness between the tones at which they join.
     """
     shares = np.stack(layer_shares(-np.expm1(-DENSITIES), layers, layering))
     return (DENSITIES * np.maximum(shares, LEAST_SHARE)).astype(np.float32)
@@ -239,13 +250,14 @@ def _merged_densities(density: np.ndarray, places: np.ndarray, table: np.ndarray
     density : (M, P) float32 ndarray
         -log(1 - threshold) of each line.
     places : (L, M, P) float32 ndarray
-        See `ordered_thresholds`. Only the layers that are drawn.
+        For each of the L layers that are drawn, how much each line has that place in the order, 0 to 1.
     table : (L, DENSITY_STEPS) float32 ndarray
         From `_layer_densities`.
 
     Returns
     -------
     (L, P) float32 ndarray
+        Threshold of each layer as a density of this layer.
     """
 
     def line_density(index: np.ndarray) -> np.ndarray:
@@ -279,7 +291,9 @@ def _merged_densities(density: np.ndarray, places: np.ndarray, table: np.ndarray
 
 
 def layer_shares(darkness: np.ndarray, layers: int, layering: float) -> list[np.ndarray]:
-    """Compute the share of the ink of each layer, in order, as `hatching.line_shares` does for lines.
+    """Return the share of the ink of each layer, in order, 0 to 1. The shares sum to 1.
+
+    A layer with the share s transmits T^s of the light, where T is the transmittance of all layers.
 
     Parameters
     ----------
@@ -386,7 +400,8 @@ def picture_thresholds(
 def _streak_sample(images: LicImages | None, node: float) -> LicImages | None:
     """Return LIC images at points beside the centers of pixels, or None for None.
 
-    The points are `node`, from `PIXEL_NODES`, times `STREAK_REACH` pixels to the left of the lines.
+    The points are `node` times `STREAK_REACH` pixels to the left of the lines. `node` is a position of
+    `PIXEL_NODES`, from -1 to 1.
     """
     if images is None or images.slopes is None or not node:
         return images
@@ -397,7 +412,9 @@ def _streak_sample(images: LicImages | None, node: float) -> LicImages | None:
 def _even_sample(
     lines: EvenLines, is_coarse: np.ndarray, node: float
 ) -> tuple[EvenLines, np.ndarray]:
-    """Sample even lines beside the centers of pixels, at a position `node` of `PIXEL_NODES`.
+    """Sample even lines `node` half pixels beside the centers of pixels, across the lines.
+
+    `node` is a position of `PIXEL_NODES`, from -1 to 1.
 
     `is_coarse`, (M, P) bool, says where coarse lines (at a larger distance) replace them. The result is the
     sampled lines, and the distance between the lines at each pixel, (M, P).

@@ -33,6 +33,7 @@ def lic_lengths(
         which module computes the images: "sheets" is `fast_lic`, "ibfv" is `ibfv`, and "members" and
         "brute" are in `per_pixel_lic`.
     noise : (P, K) float32 ndarray
+        K channels of noise at the pixels, with the mean `NOISE_MEAN`.
     strip : Strip, optional
         Rows to draw. With the method "sheets", the images have the pixels of its `averaged_rows`; other
         methods draw all pixels.

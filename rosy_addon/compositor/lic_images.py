@@ -23,12 +23,13 @@ class LicImages:
     Attributes
     ----------
     members : (M, P, K) float32 ndarray
-        K is 1 for gray noise and 3 for colored noise.
+        Mean of the noise along the streamlines of each of the M lines. K is 1 for gray noise and 3 for
+        colored noise.
     blend : (P, K) float32 ndarray
         Mean of the member images. With the method of the paper, a second set of images is blended in.
     effective_samples : (P,) float32 ndarray
-        Effective samples of the streamlines of a pixel (see `filter_kernel.KernelWeights`), mean
-        over the members.
+        Number of samples of equal weight whose mean has the variance of the averages at a pixel
+        (`filter_kernel.KernelWeights`); mean over the M lines.
     slopes : (M, P) float32 ndarray or None
         Derivatives of the member images toward the left of the lines, per pixel, averaged over the channels.
         None if they are not computed; see `fast_lic.has_slopes`.
@@ -49,7 +50,10 @@ class LicImages:
 def lic_images(
     members: np.ndarray, effective_samples: np.ndarray, slopes: np.ndarray | None = None
 ) -> LicImages:
-    """Make `LicImages`, whose blend is the mean of the member images. Parameters are its attributes."""
+    """Make `LicImages` whose blend is the mean of the member images.
+
+    The parameters are the other attributes of `LicImages`.
+    """
     return LicImages(members, members.mean(axis=0), effective_samples, slopes)
 
 
@@ -65,7 +69,7 @@ def magnitude_step_limits(field: PixelField, look: PixelLook) -> np.ndarray | No
 
 
 def relative_magnitude(field: PixelField, ends: tuple[float, float]) -> np.ndarray:
-    """Return the (P,) float32 positions of the magnitudes between `magnitude_ends`, 0 to 1."""
+    """Return the (P,) float32 magnitudes of a field, scaled from the range `ends` to 0 to 1, and clipped."""
     low, high = np.float32(ends)
     clipped = np.clip(np.abs(field.representation), min(low, high), max(low, high))
     return (clipped - low) / (high - low)

@@ -104,8 +104,9 @@ def _shading(panel: str, applies: Callable[[Any], bool] = always) -> dict[str, A
 def _pixel_length(
     default: float, high: float, text: str, low: float = 0.0, **description: Any
 ) -> Any:
-    """Return a dataclass field for a setting that is a length in pixels; see `Number.is_pixel_length`.
+    """Return a dataclass field for a setting that is a length in pixels, scaled with the picture.
 
+    `text` is the help text, `low` and `high` are the range; `description` has further arguments of `number`.
     By default, it is in the panel "streaks".
     """
     description = {"panel": "streaks", **description}
@@ -113,7 +114,7 @@ def _pixel_length(
 
 
 def _ink(applies: Callable[[Any], bool] = is_hatched) -> dict[str, Any]:
-    """Return the arguments that most settings of the panel "Ink" have in common."""
+    """Return the arguments of most settings of the panel "Ink"; `applies`: when they have an effect."""
     return _shading("ink", applies)
 
 

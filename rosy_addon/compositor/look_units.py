@@ -171,8 +171,9 @@ def pixel_look(
     supersampling : int
         Pixels of the frame along a side of a pixel of the picture.
     drift : Drift
+        How far the streaks have drifted.
     is_antialiased : bool
-        See `PixelLook`.
+        Whether streaks are drawn more accurately, because pixels have several samples.
     """
     bounds = [instance.world_bounds() for instance in with_field(instances)]
     scale = 1.0
@@ -198,6 +199,7 @@ def surface_pixel_look(look: Look, step: float, pixel: float, drift: Drift = NO_
     pixel : float
         Blender units that stand for a pixel, if the lengths of the look are in pixels.
     drift : Drift
+        How far the streaks have drifted.
     """
     unit_size = look.unit_size or pixel
     look = replace(look, method="sheets", anchor="surface", guiding_angle=0.0, supersampling=1)
@@ -271,7 +273,7 @@ def preview_look(look: Look, downscale: int) -> Look:
 def pixel_world_size(points: np.ndarray, camera: Camera) -> float:
     """Return the width of a pixel, in Blender units, at the center of (n, 3) points in world space.
 
-    The center is that of the bounding box.
+    The center is the center of their bounding box.
     """
     if not camera.is_perspective:
         return 1 / camera.pixels_per_unit
@@ -290,7 +292,8 @@ def instance_line_spacing(look: PixelLook, camera: Camera, instance: MeshInstanc
     camera : Camera
         The camera of the frame.
     instance : MeshInstance
-        If the lengths of the look are in pixels, they are pixels at the center of the instance.
+        If the lengths of the look are in pixels (not in Blender units), they are pixels at the center of the
+        instance.
     """
     if look.pixel_size:
         return look.line_distance * look.pixel_size

@@ -65,7 +65,7 @@ def outline_coverage(gbuffer: GBuffer, look: PixelLook, cache: Cache | None = No
     look : PixelLook
         Its `outline`, `crease_angle`, `supersampling` and `display` are used.
     cache : Cache, optional
-        Stores results that do not depend on the view.
+        Stores the creases and the parts of meshes, which do not depend on the view.
 
     Returns
     -------
@@ -97,11 +97,13 @@ def outline_coverage(gbuffer: GBuffer, look: PixelLook, cache: Cache | None = No
 def _bands(gbuffer: GBuffer, entries: np.ndarray, margin: int) -> list[tuple[slice, slice]]:
     """Divide pixels of a G-buffer into bands of rows with about `MAX_OUTLINE_SAMPLES` samples at most.
 
+    `entries` are the (n,) ascending indices of the pixels in the G-buffer.
+
     Returns
     -------
     list of (band, core)
-        Ranges of `entries` (indices of pixels of the G-buffer). The cores divide all entries. A band is its
-        core with `margin` more rows below and above.
+        Slices of `entries`. The cores divide all entries. A band is its core with `margin` more rows below
+        and above.
     """
     row = gbuffer.pixel[entries] // np.int32(gbuffer.camera.width)
     limit = max(MAX_OUTLINE_SAMPLES // gbuffer.samples.side**2, 1)
@@ -136,8 +138,10 @@ def _sample_outline(
     home : (Q,) int32 ndarray
         For each sample, the index of the pixel of the G-buffer in which the sample lies.
     shown : (Q,) int32 ndarray
-        For each sample, the index of the pixel whose surface it shows; see `project_samples`.
+        For each sample, the index of the pixel whose surface it shows: a pixel of the G-buffer has one
+        surface, but a neighbor's surface may show at some of its samples.
     coverage : (Q,) float32 ndarray
+        Coverage of each sample by outlines, 0 to 1.
     """
     with progress(0.0, 0.4):
         samples, home, shown = project_samples(gbuffer, entries, look.display, cache)
@@ -173,7 +177,8 @@ class _Edges:
     Attributes
     ----------
     line_width : (P,) float32 ndarray
-        Largest width of the lines that are drawn from each pixel; 0 where there is no edge.
+        Largest width of the lines that are drawn at each pixel, on its own side of the edge, in pixels of the
+        frame; 0 where there is no edge.
     """
 
     def __init__(self, gbuffer: GBuffer, look: PixelLook, cache: Cache | None) -> None:
@@ -221,7 +226,11 @@ class _Edges:
         return coverage
 
     def _is_linked(self, entry: np.ndarray | slice, bit: int) -> np.ndarray:
-        """Return whether the surface continues from each pixel to the neighbor of the given bit."""
+        """Return an (n,) bool mask: whether the surface continues from each pixel to its neighbor.
+
+        `entry` are indices of pixels in the G-buffer, `bit` is the number of the neighbor in
+        `neighbor_masks`.
+        """
         return self._mask[entry] >> np.uint16(bit) & 1 == 1
 
     def _find_creases_and_parts(self, instance_id: int, cache: Cache | None) -> None:
@@ -263,8 +272,7 @@ class _Edges:
         """Set the width of lines at pixels where their surface ends, unless the neighbor occludes them.
 
         There is no edge at the border of the frame, and none where the surface continues but the field
-        ends. The bits `PART_BORDER` and `EMPTY_BORDER` are set next to another instance and next to no
-        surface.
+        ends. The bit `PART_BORDER` is set next to another instance, `EMPTY_BORDER` next to the background.
         """
         gbuffer, depth, outline = self._gbuffer, self._depth, np.float32(self._look.outline)
         for block in reported_blocks(self._count, STEP_LABEL):
@@ -290,10 +298,10 @@ class _Edges:
     def _find_steps(self) -> None:
         """Set the width of lines at the nearer pixel of steps in the depth of a surface.
 
-        `pixel_neighbors` tells by depth which neighbor pixels show the same piece of surface. On a surface that
-        is seen nearly edge-on it may miss a silhouette, as any difference in depth is plausible there. Here it
-        is found: between two pixels of a row or a column, the depth changes much more than it does from each
-        of them to its other neighbor in that row or column.
+        `pixel_neighbors` tells by depth which neighbor pixels show the same piece of surface. On a surface
+        that is seen nearly edge-on it may miss a silhouette, as any difference in depth is plausible there.
+        Here it is found: between two pixels of a row or a column, the depth changes much more than it does
+        from each of them to its other neighbor in that row or column.
         """
         depth, tolerance, defined = self._depth, self._tolerance, self._defined
         for block in reported_blocks(self._count, STEP_LABEL):
@@ -330,7 +338,8 @@ def _mark_strength(
     pixel : (n,) int32 ndarray
         Pixels at edges, in ascending order.
     border : (n,) uint8 ndarray
-        Bits `PART_BORDER` and `EMPTY_BORDER`.
+        For each of these pixels, the bits `PART_BORDER` (next to another part of a mesh) and `EMPTY_BORDER`
+        (next to the background).
     width : int
         Width of the frame.
     block_side : int
@@ -339,7 +348,7 @@ def _mark_strength(
     Returns
     -------
     (n,) float32 ndarray
-        From 0 to 1.
+        For each of these pixels, the fraction for its mark, 0 to 1.
     """
     if not len(pixel):
         return np.zeros(0, dtype=np.float32)
@@ -367,7 +376,10 @@ def _mark_strength(
 
 
 def _extent_per_label(values: np.ndarray, label: np.ndarray) -> np.ndarray:
-    """Return, for each of K labels, its largest minus its smallest value plus 1, (K,)."""
+    """Return, for each of K labels, its largest minus its smallest value plus 1, (K,).
+
+    `label[i]`, from 0 to K - 1, is the label of `values[i]`. Each label occurs.
+    """
     order = np.argsort(label, kind="stable")
     start = np.flatnonzero(np.diff(label[order], prepend=-1))
     ordered = values[order]

@@ -74,6 +74,7 @@ def picture_paper_grain(
     line_width : float
         Width of the lines in pixels of the picture. The paper grain scales with it.
     seed : int
+        Seed of the look.
     subpixels : int
         Subpixels along each side of a pixel. All subpixels of a pixel have the same height.
     line_count : int
@@ -95,8 +96,8 @@ def picture_paper_grain(
 def surface_paper_grain_settings(look: PixelLook) -> NoiseSettings:
     """Return the settings of the noise for paper grain that is anchored to surfaces.
 
-    The noise has `PAPER_GRAIN_CHANNELS` channels. Their standard deviation is
-    `StreakStatistics.paper_grain_std`.
+    Lengths are in the unit of the look: pixels of the frame, or steps of streamlines on a texture. The noise
+    has `PAPER_GRAIN_CHANNELS` channels. Their standard deviation is `StreakStatistics.paper_grain_std`.
 
     Parameters
     ----------
@@ -134,13 +135,19 @@ def line_offset(line_width: float) -> int:
 
 
 def _band_sigmas(line_width: float) -> list[float]:
-    """Return the standard deviations in pixels of the blurs whose differences are the frequency bands."""
+    """Return the standard deviations, ascending, of the blurs whose differences are the frequency bands.
+
+    They are in pixels, like `line_width`.
+    """
     finest_sigma = max(FINEST_SIGMA_WIDTHS * line_width, MIN_SIGMA_PIXELS)
     return [finest_sigma * 2**octave for octave in range(len(BAND_WEIGHTS) + 1)]
 
 
 def _grain_tiles(rectangle: TileRectangle, line_width: float, seed: int) -> np.ndarray:
-    """Return the float32 heights of the paper grain in a rectangle of the picture, as a flat image."""
+    """Return the flat float32 heights of the paper grain in a rectangle of the picture, row by row.
+
+    The mean is 0, the standard deviation 1. `line_width` is in pixels.
+    """
     sigmas = _band_sigmas(line_width)
     margin = 4 * box_radius(sigmas[-1])
     left, right, bottom, top = rectangle
@@ -158,7 +165,8 @@ def _grain_tiles(rectangle: TileRectangle, line_width: float, seed: int) -> np.n
 def _band_noise(white: np.ndarray, sigmas: Sequence[float]) -> np.ndarray:
     """Return the weighted sum of the frequency bands of (H, W) white noise.
 
-    A band is the difference of two successive blurs, with the standard deviations `sigmas`.
+    A band is the difference of two successive blurs. `sigmas` are the standard deviations of the blurs in
+    pixels, ascending.
     """
     total = np.zeros_like(white)
     finer = _blur(white, sigmas[0])
@@ -171,7 +179,7 @@ def _band_noise(white: np.ndarray, sigmas: Sequence[float]) -> np.ndarray:
 
 
 def _blur(image: np.ndarray, sigma: float) -> np.ndarray:
-    """Approximate a Gaussian blur, including small ones that `gaussian_blur` does not support."""
+    """Approximate a Gaussian blur of `sigma` pixels, also if it is too small for `gaussian_blur`."""
     if sigma > 1.5:
         with progress(0.0, label=STEP_LABEL):
             return gaussian_blur(image, sigma)
@@ -184,7 +192,10 @@ def _blur(image: np.ndarray, sigma: float) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def _band_noise_std(*sigmas: float) -> float:
-    """Return the standard deviation of the `_band_noise` of binary noise, from the impulse response."""
+    """Return the standard deviation of the `_band_noise` of random values -1/2 and 1/2.
+
+    It is computed from the impulse response. `sigmas` are the standard deviations of the blurs in pixels.
+    """
     radius = 4 * box_radius(sigmas[-1])
     impulse = np.zeros((2 * radius + 1,) * 2, dtype=np.float32)
     impulse[radius, radius] = 1

@@ -32,8 +32,8 @@ LineTracer = Callable[[slice], DirectionSampler]
 def brute_force(field: PixelField, look: PixelLook, noise: np.ndarray) -> LicImages:
     """Compute one LIC image for each of the M lines.
 
-    There are no breaking points and no second set of images, but every step of every streamline
-    compares all N members.
+    There are no breaking points (where one member jumps to another) and no second set of images, but every
+    step of every streamline compares all N members.
 
     Parameters
     ----------
@@ -41,6 +41,7 @@ def brute_force(field: PixelField, look: PixelLook, noise: np.ndarray) -> LicIma
     look : PixelLook
         In pixels of the frame.
     noise : (P, K) float32 ndarray
+        Noise at the pixels, with the mean `NOISE_MEAN`.
 
     Returns
     -------
@@ -64,7 +65,8 @@ def _best_match_sampler(
 ) -> DirectionSampler:
     """Make a function for directions that starts along one member and then follows the best match.
 
-    The function stores the current member of each streamline between calls.
+    The function takes the pixels and offsets that streamlines have reached, and returns their directions (see
+    `direction_at` of `integrate_noise`). It stores the current member of each streamline between calls.
 
     Parameters
     ----------
@@ -115,6 +117,7 @@ def member_decomposition(field: PixelField, look: PixelLook, noise: np.ndarray) 
     look : PixelLook
         In pixels of the frame.
     noise : (P, K) float32 ndarray
+        Noise at the pixels, with the mean `NOISE_MEAN`.
 
     Returns
     -------
@@ -138,7 +141,10 @@ def member_decomposition(field: PixelField, look: PixelLook, noise: np.ndarray) 
 def _one_set(
     field: PixelField, look: PixelLook, noise: np.ndarray, neighbors: np.ndarray, angle: float
 ) -> LicImages:
-    """Compute one set of member images, of the members nearest to `angle` and its rotations by 2 pi / N."""
+    """Compute one set of member images, of the members nearest to `angle` and its rotations by 2 pi / N.
+
+    `angle` is in radians. `neighbors` is the `neighbor_table` of the field.
+    """
     if look.view_plane:
         members, directions = _members_on_screen(field, angle, field.line_count)
     else:
@@ -150,12 +156,19 @@ def _one_set(
 
 
 def _member_sampler(table: np.ndarray, _block: slice) -> DirectionSampler:
-    """Make a function for the directions of one vector field on screen, given its `direction_table`."""
+    """Make a function that interpolates directions on screen in the `direction_table` of a vector field.
+
+    It takes pixels and offsets and returns directions: `direction_at` of `integrate_noise`.
+    """
     return lambda entry, offset: interpolate_direction(table.take(entry, axis=0), offset)
 
 
 def _first_set_weight(field: PixelField, look: PixelLook) -> np.ndarray:
-    """Return the (P,) float32 weight of the first set of member images in the blend."""
+    """Return the (P,) float32 weight of the first set of member images in the blend, 0 to 1.
+
+    It is from `blend_weights`, and is rounded to 0 or 1 if the `weights` of the look are "binary". If
+    `view_plane` is off, it is computed from members on screen.
+    """
     if look.view_plane:
         weight = blend_weights(field, look.guiding_angle)
     else:
@@ -176,7 +189,9 @@ def blend_weights(field: PixelField, guiding_angle: float) -> np.ndarray:
 
 
 def _screen_space_members(field: PixelField, angle: float) -> np.ndarray:
-    """Return (M, P) complex64 directions, chosen among the members after projection to the screen.
+    """Return (M, P) complex64 directions on screen, chosen among the members after projection to the screen.
+
+    Direction i is the projected member nearest to `angle` + 2 pi i / N, in radians.
 
     This reproduces the error in Figure 8 of the paper. On a tilted surface the angles between
     projected members are not 2 pi / N. The two sets of breaking points then come close to each
@@ -207,6 +222,7 @@ def _members_on_screen(
     Returns
     -------
     members, directions : (count, P) complex64 ndarray
+        Unit vectors in the view plane, and the unit vectors on screen of the same directions.
     """
     members = all_members(field, angle)[:count]
     directions = [field.to_screen(field.member_direction(member)) for member in members]
@@ -228,11 +244,12 @@ def convolve_members(
     look : PixelLook
         In pixels of the frame. Its `length`, kernel and `magnitude_length` are used.
     noise : (P, K) float32 ndarray
+        Noise at the pixels, with the mean `NOISE_MEAN`.
     neighbors : (9, P + 1) int32 ndarray
-        From `neighbor_table`.
+        Index of each neighbor of each pixel, from `neighbor_table`.
     tracers : sequence of M LineTracer
-        For each member image, a function that takes a block of pixels, and returns the function for
-        directions of `integrate_noise`.
+        For each member image, a function that takes a block of pixels, and returns the function that
+        `integrate_noise` calls for the directions of the streamlines from these pixels.
 
     Returns
     -------
@@ -286,7 +303,7 @@ def direction_table(
 ) -> np.ndarray:
     """Build a table of directions and the gradients of their angles, for `interpolate_direction`.
 
-    The gradients are differences of linked neighbors.
+    The gradients are differences between neighbors that streamlines may step to.
 
     Parameters
     ----------
@@ -298,7 +315,7 @@ def direction_table(
     degree : int
         Degree of the field.
     neighbors : (9, P + 1) int32 ndarray
-        From `neighbor_table`.
+        Index of each neighbor of each pixel, from `neighbor_table`.
 
     Returns
     -------
@@ -376,7 +393,7 @@ def integrate_noise(
     block : slice
         Pixels of the field.
     neighbors : (9, P + 1) int32 ndarray
-        From `neighbor_table`.
+        Index of each neighbor of each pixel, from `neighbor_table`.
     noise : (P + 1, K) float32 ndarray
         Noise at the P pixels; row P is 0.
     look : PixelLook
@@ -389,7 +406,7 @@ def integrate_noise(
     total : (B, K) float32 ndarray
         Weighted sum of the noise, without the sample at the start.
     samples : (B,) float32 ndarray
-        Number of these samples.
+        Number of samples in the sum.
     """
     end = neighbors.shape[1] - 1
     weight_slope = WEIGHT_SLOPES[look.kernel][0 if side > 0 else 1]

@@ -72,12 +72,12 @@ class PixelField:
         Flat indices into the frame, ascending, from the lower left.
     representation : (P,) complex64 ndarray
         z = rho exp(i N t), where rho is the magnitude and t is the angle of a member in the view plane:
-        the plane perpendicular to the ray from the eye. See `GBuffer.representation`. It is 0 where the
-        field is undefined.
+        the plane perpendicular to the ray from the eye. The frame of angles is described in
+        `GBuffer.representation`. z is 0 where the field is undefined.
     screen_jacobian : (P, 2) complex64 ndarray
         For each axis of the view plane: the displacement on screen, x + i y in pixels, of a step on the
-        surface along that axis. A step that is parallel to the picture is one pixel long. For textures, see
-        `surface_texture.texel_field`.
+        surface along that axis. A step that is parallel to the picture is one pixel long. For textures, the
+        tangent plane takes the place of the view plane (`surface_texture.texel_field`).
     neighbor_mask : (P,) uint16 ndarray
         Neighbors that streamlines may step to. Bit i stands for `NEIGHBOR_OFFSETS[i]`. No bit is
         set where the field is undefined.
@@ -180,7 +180,8 @@ class PixelField:
         Returns
         -------
         (P,) complex64 ndarray
-            x + i y: unit vectors or, with `foreshorten`, displacements as in `screen_jacobian`.
+            x + i y: unit vectors or, with `foreshorten`, displacements in pixels of a step on the surface
+            (see `screen_jacobian`).
         """
         # Double precision makes the float32 result the same with all versions of numpy.
         x, y = self.screen_jacobian.astype(np.complex128).T
@@ -317,8 +318,9 @@ def without_undefined_neighbors(field: PixelField) -> PixelField:
 def nearest_member(field: PixelField, guiding_angle: float) -> np.ndarray:
     """Return the (P,) complex64 member nearest to a guiding angle, in the view plane (equations 3 and 4).
 
-    If two members are equally near, the one on the counter-clockwise side is returned. Equations and this
-    choice are from Palacios and Zhang, IEEE TVCG 2011.
+    It is a unit vector; 0 where the field is undefined. The angle is in radians. If two members are equally
+    near, the one on the counter-clockwise side is returned. Equations and this choice are from Palacios and
+    Zhang, IEEE TVCG 2011.
     """
     relative = field.representation.astype(np.complex128)
     relative *= np.exp(-1j * field.degree * guiding_angle)
@@ -328,7 +330,7 @@ def nearest_member(field: PixelField, guiding_angle: float) -> np.ndarray:
 
 
 def rotated(values: np.ndarray, angle: float) -> np.ndarray:
-    """Rotate complex numbers by an angle in radians."""
+    """Rotate complex numbers counter-clockwise by an angle in radians, as complex64."""
     return product(values, np.complex128(np.exp(1j * angle)))
 
 
@@ -340,7 +342,8 @@ def product(a: np.ndarray, b: np.ndarray | np.complex128) -> np.ndarray:
 def all_members(field: PixelField, guiding_angle: float) -> list[np.ndarray]:
     """Return the N members of a field in the view plane, as (P,) complex64 arrays.
 
-    The first is the member nearest to the guiding angle, and the others are its rotations by 2 pi / N.
+    They are unit vectors, 0 where the field is undefined. The first is the member nearest to the guiding
+    angle, the others follow counter-clockwise, 2 pi / N apart.
     """
     nearest = nearest_member(field, guiding_angle)
     return [rotated(nearest, 2 * np.pi * k / field.degree) for k in range(field.degree)]

@@ -26,7 +26,7 @@ class Light:
     vector : (3,) ndarray
         The unit vector toward a sun, or the position of a point light.
     color : (3,) ndarray
-        Linear.
+        Linear RGB.
     strength : float
         Radiance of a white diffuse surface that faces the light; 1 is white. If the light is a point light,
         the surface is at a distance of one Blender unit.
@@ -96,8 +96,8 @@ def diffuse(
     lights : sequence of Light
         Lights of the scene in camera space. Used if the light of the look is "scene".
     visibility : sequence of (P,) ndarray, optional
-        The fraction of each light that reaches each pixel, from `light_visibility`. By default, nothing casts
-        shadows.
+        The fraction of each light that reaches each pixel, for the lights in the order of `lights_of` (see
+        `light_visibility`). By default, nothing casts shadows.
 
     Returns
     -------
@@ -126,8 +126,11 @@ def light_visibility(
 
     Parameters
     ----------
-    gbuffer, look, lights
-        See `diffuse`.
+    gbuffer : GBuffer
+    look : Look
+        Its `light`, `shading` and `shadows` are used.
+    lights : sequence of Light
+        Lights of the scene in camera space. Used if the light of the look is "scene".
     cache : Cache, optional
         Stores the results, which do not depend on the other settings of the look.
 

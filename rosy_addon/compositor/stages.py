@@ -63,7 +63,11 @@ class ComposeStages:
         return rotate_pixel_field(field, np.float32(look.wobble) * angle)
 
     def noise(self, field: PixelField, look: PixelLook) -> np.ndarray:
-        """Return the (P, K) float32 noise of a look at the pixels of a field."""
+        """Return the (P, K) float32 noise of a look at the pixels of a field.
+
+        It is anchored to the picture or to the surfaces. There are K channels (`noise_channel_count`), with
+        the mean `NOISE_MEAN`.
+        """
         if look.anchor == "surface":
             return self._surface_noise(field, look, noise_settings(look), look.detail)
         key = "picture noise", self._gbuffer, field.degree, noise_settings(look)
@@ -72,7 +76,7 @@ class ComposeStages:
     def lic(
         self, field: PixelField, looks: Sequence[PixelLook], strip: Strip | None = None
     ) -> list[LicImages]:
-        """Compute the LIC images of a field at the pixels of a strip, or find them in the cache.
+        """Compute the LIC images of a field in the `averaged_rows` of a strip, or find them in the cache.
 
         `looks` must differ only in the length of streamlines, the longest first. `strip` is used only if the
         setting `method` of the looks is "sheets".
@@ -99,14 +103,22 @@ class ComposeStages:
     def _convolved(
         self, convolve: Callable[..., Any], field: PixelField, looks: Sequence[PixelLook]
     ) -> Any:
-        """Make the noise of a field, and return the result of `convolve` (a method of LIC) for it."""
+        """Make the noise of a field, and return the result of `convolve` (a method of LIC) for it.
+
+        `convolve` takes the field, the looks and the noise. The looks differ only in the length of
+        streamlines.
+        """
         with progress(0.0, NOISE_SHARE):
             noise = self.noise(field, looks[0])
         with progress(NOISE_SHARE, 1.0):
             return convolve(field, looks, noise)
 
     def undirected_texture(self, field: PixelField, look: PixelLook) -> np.ndarray | None:
-        """Compute the texture of hatching where the field is undefined; see `undirected`."""
+        """Return the (P,) means of noise over discs where the field is undefined, which hatching draws there.
+
+        They are relative to `NOISE_MEAN`, and NaN where the field is defined. None if it is defined
+        everywhere.
+        """
         if field.representation.all():
             return None
         noise = unconvolved_noise(self.noise(field, look), look)
@@ -129,7 +141,7 @@ class ComposeStages:
         return self._cache.get_or_create(key, compute)[field.gbuffer_index]
 
     def paper_grain(self, field: PixelField, look: PixelLook) -> np.ndarray:
-        """Return the (M, P) heights of the paper grain for each of the M directions of the field.
+        """Return the (M, P) heights of the paper grain for each of the M lines of the field.
 
         The mean is 0, the standard deviation 1.
         """
@@ -143,7 +155,11 @@ class ComposeStages:
     def _surface_noise(
         self, field: PixelField, look: PixelLook, settings: NoiseSettings, detail: float = 0.0
     ) -> np.ndarray:
-        """Return the (P, K) float32 noise at the pixels of a field; see `surface_noise`."""
+        """Return the (P, K) float32 noise anchored to surfaces, at the pixels of a field.
+
+        `settings` are its cells and its K channels. Cells on small features are smaller by up to the fraction
+        `detail`.
+        """
         args = self._gbuffer, settings, look.pixel_size, look.supersampling, detail
 
         def compute() -> np.ndarray:
@@ -154,7 +170,10 @@ class ComposeStages:
         return self._cache.get_or_create(key, compute)[field.gbuffer_index]
 
     def _wobble_angle(self, look: PixelLook) -> np.ndarray:
-        """Return the (Q,) float32 `wobble.wobble_angle` at all Q pixels of the G-buffer."""
+        """Return the (Q,) float32 angle between drawn lines and the field at all Q pixels of the G-buffer.
+
+        It is in radians, for a `Look.wobble` of 1.
+        """
         size = look.line_width, look.pixel_size, look.supersampling
         key = "wobble", self._gbuffer, look.anchor, *size
         return self._cache.get_or_create(key, partial(wobble_angle, self._gbuffer, look))

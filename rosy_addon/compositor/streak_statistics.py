@@ -164,7 +164,7 @@ def break_amount(target_coverage: np.ndarray, breaks: float, wobble: float) -> n
     Returns
     -------
     ndarray
-        0 to 1, of the shape of `target_coverage`.
+        Weight w, 0 to 1, of the shape of `target_coverage`. The other streaks have the weight 1 - w.
     """
     min_amount = WOBBLE_BREAKS * wobble
     return min_amount + (1 - min_amount) * breaks * (1 - target_coverage) ** 2
@@ -219,7 +219,7 @@ def _noise_sample(shape: tuple[int, int], settings: NoiseSettings, anchored: boo
 def _line_means(noise: np.ndarray, length: int, side: int, kernel: Kernel) -> np.ndarray:
     """Return the (n, side) weighted means of `length` successive pixels in the rows of (n, width) noise.
 
-    They are centered at the middle `side` columns.
+    They are centered at the middle `side` columns. `kernel` gives the weights.
     """
     if kernel == "ramp":
         # The weights of a window from column a on are 1 - 2 (j - middle) / length, for the column j.

@@ -1,7 +1,7 @@
 """Batches of streamlines on a covering surface, traced together in both directions from their seeds.
 
 A *state* is a pixel with one direction of the field there, a *line* is a pair of opposite states (see
-`covering`).
+`covering`). The noise has K channels. The covering surface has C cells and M lines in each cell.
 """
 
 from __future__ import annotations
@@ -169,7 +169,8 @@ class StreamlineBatch:
     ) -> Iterator[tuple[np.ndarray, list[np.ndarray], np.ndarray]]:
         """Yield the same as `trace`, for looks with flow, whose kernels move. Averages have one channel.
 
-        `count` is n, the number of streamlines. The other parameters are the results of `_trace_steps`.
+        `count` is n, the number of streamlines. `step_counts`, (2 n,), and `last_step` are from
+        `_trace_steps`: the steps of each lane, and the last row of the buffers.
         """
         lanes, covering = 2 * count, self._covering
         second_sums = self._whole_second_sums(count)
@@ -221,12 +222,12 @@ class StreamlineBatch:
     def _trace_steps(self, seeds: np.ndarray) -> tuple[np.ndarray, int]:
         """Trace the streamlines and fill the buffers. Row i of a buffer is step i.
 
-        A row holds n forward halves of streamlines, then n backward halves. The buffers are `_states`;
-        `_lateral_offset`, the distances to the left of the centers of pixels; for moving kernels,
-        `_axial_offset`, the distances along the streamline; and `_sums`. The real part of `_sums` has prefix
-        sums of the noise, which include the seed. The imaginary part has prefix sums of the derivative of the
-        noise to the left. For kernels other than the box, `_sums` are the prefix sums of these prefix sums,
-        and all rows are filled. Lanes that have ended are in `SINK_CELL`.
+        `seeds` are (n,) indices of lines. A row holds n forward halves of streamlines, then n backward
+        halves. The buffers are `_states`; `_lateral_offset`, the distances to the left of the centers of
+        pixels; for moving kernels, `_axial_offset`, the distances along the streamline; and `_sums`. The real
+        part of `_sums` has prefix sums of the noise, which include the seed. The imaginary part has prefix
+        sums of the derivative of the noise to the left. For kernels other than the box, `_sums` are the
+        prefix sums of these prefix sums, and all rows are filled. Lanes that have ended are in `SINK_CELL`.
 
         Returns
         -------
@@ -285,9 +286,9 @@ class StreamlineBatch:
     def _tapered_sums(self, step: int, half_width: int | np.ndarray, lanes: int) -> np.ndarray:
         """Return (2 n, K) complex64 sums of the noise around the step i = `step`, with tapered weights.
 
-        The kernel reaches r = `half_width` steps in each direction. With the sums of prefix sums E, the sum
-        is (E(i + r) - 2 E(i - 1) + E(i - r - 2)) / (r + 1), because a triangular kernel is the mean of r + 1
-        box kernels of r + 1 steps, each one step further.
+        The kernel reaches r = `half_width` steps in each direction: one number, or (2 n,) numbers. With the
+        sums of prefix sums E, the sum is (E(i + r) - 2 E(i - 1) + E(i - r - 2)) / (r + 1), because a
+        triangular kernel is the mean of r + 1 box kernels of r + 1 steps, each one step further.
         """
         total = self._second_prefix_sums(step + half_width, lanes)
         total = total - 2 * self._second_prefix_sums(step - 1, lanes)
@@ -300,12 +301,12 @@ class StreamlineBatch:
     ) -> np.ndarray:
         """Return (2 n, K) complex64 sums of the noise around a step, with weights that fall along the field.
 
-        Let i be the step, r the `half_width`, P(i) the prefix sums of the noise along a lane, and E(i) the
-        sums of these prefix sums. In a lane that runs along the field, the weights fall from 2 r + 1 to 1,
-        and the sum is E(i + r) - E(i - r - 1) - (2 r + 1) P(i - r - 1). In a lane that runs against the field
-        (`is_along` is False), the weights rise from 1 to 2 r + 1. Both weights of a sample add up to 2 r + 2,
-        so the sum is 2 r + 2 times the unweighted sum, minus the sum with falling weights. All sums are
-        divided by r + 1.
+        Let i be the step, r the `half_width` (one number, or (2 n,) numbers), P(i) the prefix sums of the
+        noise along a lane, and E(i) the sums of these prefix sums. In a lane that runs along the field, the
+        weights fall from 2 r + 1 to 1, and the sum is E(i + r) - E(i - r - 1) - (2 r + 1) P(i - r - 1). In a
+        lane that runs against the field (`is_along` is False), the weights rise from 1 to 2 r + 1. Both
+        weights of a sample add up to 2 r + 2, so the sum is 2 r + 2 times the unweighted sum, minus the sum
+        with falling weights. All sums are divided by r + 1.
         """
         last, before = step + half_width, step - half_width - 1
         sums_through, sums_before = (self._second_prefix_sums(i, lanes) for i in (last, before))

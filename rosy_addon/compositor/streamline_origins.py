@@ -29,8 +29,8 @@ STEP_LABEL = "tracing streamlines"
 class Origins(NamedTuple):
     """The points that (n,) states are reached from: cells, sheets, and offsets from the centers of cells.
 
-    Cells and sheets are integers. Offsets are complex64, in pixels. The cell is `SINK_CELL` where the
-    streamline has ended.
+    Cells are int32 indices, sheets are int8 numbers (of `Sheets`). Offsets are complex64, in pixels. The cell
+    is `SINK_CELL` where the streamline has ended.
     """
 
     cell: np.ndarray
@@ -48,7 +48,10 @@ class Origins(NamedTuple):
         return Origins(*(values.take(state) for values in self))
 
     def put(self, state: np.ndarray, origins: Origins) -> None:
-        """Replace the origins of the states (pixels with a direction) that have the given indices."""
+        """Replace the origin of the state (a pixel with a direction) with the index `state[i]`, for each i.
+
+        Element i of `origins` takes its place.
+        """
         for values, new in zip(self, origins, strict=True):
             values[state] = new
 
@@ -135,6 +138,7 @@ class Sheets:
         Yields
         ------
         sheet : int
+            Number of the sheet, from 0.
         block : slice
             Pixels of the block.
         state : (n,) intp ndarray
@@ -165,7 +169,10 @@ class Sheets:
         return result
 
     def interpolated(self, origins: Origins, around: _Surroundings) -> Origins:
-        """Return the origins of points, interpolated between the origins of the four states around each."""
+        """Return the origins of (n,) points, interpolated between the origins of the four states around each.
+
+        `origins` has the origins of all states, `around` the four pixels around each of the points.
+        """
         target = origins.at(around.states[0])
         change = np.zeros_like(target.offset)
         width, inverse_width = np.float32(self._width), np.float32(1 / self._width)
@@ -224,8 +231,8 @@ class Sheets:
     def linked_neighbors(self, cell: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return the steps that streamlines can make from (n,) cells to each of the four nearest neighbors.
 
-        The result is a pair of arrays for each neighbor: the cells where such steps start, and the cells
-        where they arrive.
+        The result is a pair of arrays for each neighbor: the cells where such steps start, and, row by row,
+        the cells where they arrive.
         """
         steps = []
         for bit, (column, row) in enumerate(NEIGHBOR_OFFSETS):

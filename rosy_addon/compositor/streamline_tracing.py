@@ -97,7 +97,8 @@ class TracedLanes:
     def look_up(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the (m,) states of the lanes, their (m,) directions, and the (m, K) noise there.
 
-        The imaginary part of the noise is its derivative to the left.
+        States are indices. Directions and noise are complex64, in the integers of `Covering.state_table`. The
+        imaginary part of the noise is its derivative to the left.
         """
         state = self._sheet_offset.take(self._sheet, mode="clip")
         state += self._cell
@@ -135,7 +136,8 @@ class TracedLanes:
     def _move(self, direction: np.ndarray, step_scale: np.float32) -> np.ndarray:
         """Move positions by a step. Return the (m,) complex64 whole pixels from the old to the new cell.
 
-        The method is two-step Adams-Bashforth, 3/2 d - 1/2 d_previous.
+        `direction` is from `look_up`; `step_scale` is the factor from its unit to pixels, times 3/2. The
+        method is two-step Adams-Bashforth, 3/2 d - 1/2 d_previous.
         """
         previous = self._previous_direction
         displacement = direction.copy() if previous is None else previous
@@ -155,21 +157,21 @@ class TracedLanes:
     def _step_cells(
         self, mask: np.ndarray, column: np.ndarray, row: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Move each streamline to a neighbor cell, or to `SINK_CELL` where the neighbor is not linked.
+        """Move each lane to a neighbor cell, or to `SINK_CELL` where it may not step to the neighbor.
 
         Parameters
         ----------
-        mask : (n,) uint32 ndarray
-            Which neighbors of the cell of each streamline are linked, as bits.
-        column, row : (n,) ndarray
+        mask : (m,) uint32 ndarray
+            Which neighbors of its cell each lane may step to, as bits.
+        column, row : (m,) ndarray
             The step: -1, 0 or 1 columns and rows.
 
         Returns
         -------
         ended : (e,) intp ndarray
-            Indices of the streamlines that end.
+            Indices of the lanes that end.
         crossing, seam : (s,) intp ndarray
-            Indices of the streamlines that cross a seam, and the indices of their steps in `SeamSteps`.
+            Indices of the lanes that cross a seam, and the indices of their steps in `SeamSteps`.
         """
         covering, cell = self._covering, self._cell
         crossing = seam = np.empty(0, dtype=np.intp)
@@ -193,7 +195,8 @@ class TracedLanes:
     def _cross_seams(self, crossing: np.ndarray, seam: np.ndarray) -> None:
         """Continue the lanes `crossing` beyond the seam: adapt their position and direction.
 
-        `seam` is the index of the step across the seam in `SeamSteps`.
+        `crossing` are (s,) indices of lanes. `seam[i]` is the index in `SeamSteps` of the step of
+        `crossing[i]`.
         """
         seams, steps = self._covering.seams, self._covering.seams.steps
         reached = steps.displaced(seam, self.position[crossing]) + steps.offset.take(seam)
@@ -238,7 +241,9 @@ class _LoopFinder:
     def find(self, step: int, state: np.ndarray, next_cell: np.ndarray) -> np.ndarray:
         """Return the indices of the streamlines that have returned to an earlier state.
 
-        Streamlines whose `next_cell` is `SINK_CELL` have ended already, and are left out.
+        `step` is the number of the step, `state` and `next_cell` are the (m,) indices of the state of each
+        streamline and of its next cell. Streamlines whose `next_cell` is `SINK_CELL` have ended already, and
+        are left out.
         """
         if step in (MIN_LOOP_STEPS, 2 * self._past_step):
             self._past_step, self._past_state = step, state
@@ -255,7 +260,8 @@ class _LoopFinder:
 def lateral_offset(position: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Return how far positions are to the left of the centers of cells, as seen along `direction`.
 
-    The result is (n,) float32, in pixels times the length of `direction`.
+    `position` is the offset from the center of the cell, in pixels. The result is (n,) float32, in pixels
+    times the length of `direction`.
     """
     lateral = position.imag * direction.real
     lateral -= position.real * direction.imag
@@ -276,10 +282,10 @@ def axial_steps(position: np.ndarray, direction: np.ndarray, step_scale: np.floa
 def _r2_offsets(covering: Covering, seeds: np.ndarray) -> np.ndarray:
     """Return (n,) complex64 offsets from the centers of pixels, spread evenly (R2 sequence, Roberts).
 
-    If all streamlines started at the centers, they would step to the next row of pixels at the same
-    time, which is visible. Along rows and columns, the offsets are a sequence of low discrepancy. An offset
-    depends on the cell and the sheet of its seed alone, so streamlines stay where they are if the field
-    changes a little.
+    `seeds` are (n,) indices of lines. Offsets are in pixels, -0.5 to 0.5. If all streamlines started at the
+    centers, they would step to the next row of pixels at the same time, which is visible. Along rows and
+    columns, the offsets are a sequence of low discrepancy. An offset depends on the cell and the sheet of its
+    seed alone, so streamlines stay where they are if the field changes a little.
     """
     sheet, cell = np.divmod(seeds, covering.cell_count)
     row, column = np.divmod(cell, covering.width)

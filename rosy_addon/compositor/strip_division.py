@@ -80,8 +80,12 @@ def group_strips(
     ----------
     strips : sequence of Strip
         From `divide_into_strips`, for these arguments.
-    look, camera, instances
-        See `divide_into_strips`.
+    look : Look
+        Its lengths are in pixels of the picture or in Blender units.
+    camera : Camera
+        The camera of the picture.
+    instances : sequence of MeshInstance
+        All meshes of the picture.
     workers : int
         Number of processes. A group has at most `MAX_GROUP_PIXELS` pixels, unless a single strip has more.
 
@@ -106,7 +110,10 @@ def group_strips(
 
 
 def context_rows(look: Look, camera: Camera, instances: Sequence[MeshInstance]) -> int:
-    """Return how many rows below and above a strip the pixels of the strip may depend on."""
+    """Return how many rows below and above a strip the pixels of the strip may depend on.
+
+    `camera` and `instances` are the camera and all meshes of the picture.
+    """
     look = pixel_look(look, camera, instances)
     noise = 0
     if look.anchor == "surface":
@@ -123,7 +130,7 @@ def context_rows(look: Look, camera: Camera, instances: Sequence[MeshInstance]) 
 
 
 def _longest_margin(look: PixelLook) -> int:
-    """Return the largest `streamline_margin` of all LIC images that a look needs."""
+    """Return by how many rows the streamlines of any LIC image of a look may leave a strip."""
     lengths = [look.length]
     if has_breaks(look):
         lengths.append(break_steps(look))

@@ -1,8 +1,8 @@
 """Strips: ranges of rows of a picture that are drawn independently of each other.
 
 How a picture is cut into strips does not depend on the number of processes (see `strip_division`). A strip
-depends on a limited number of rows around it, its context. It is the same to the last bit in every process.
-So several processes can share a picture.
+depends on a limited number of rows around it, its context. Every process draws the same pixels of a strip, to
+the last bit. So several processes can share a picture.
 
 Streamlines differ between two strips. So the first rows of a strip are drawn twice, also with the strip
 below, and fade from the lower strip to the upper one (`join_strips`).
@@ -96,7 +96,10 @@ def join_strips(pictures: Sequence[np.ndarray], strips: Sequence[Strip]) -> np.n
 
 
 def _faded(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """Fade from one strip to the strip above, row by row, beginning with the lower strip."""
+    """Return (f, W, 4) rows that fade from a strip to the strip above.
+
+    `lower` and `upper` are the same f rows of both strips: RGBA, not premultiplied. The first row is `lower`.
+    """
     weight = np.linspace(1, 0, len(lower), endpoint=False, dtype=np.float32)[:, None, None]
     alpha = upper[..., 3:] + weight * (lower[..., 3:] - upper[..., 3:])
     premultiplied = upper[..., :3] * upper[..., 3:]

@@ -79,16 +79,17 @@ def surface_noise(
     gbuffer : GBuffer
         Its `instances` must be set.
     settings : NoiseSettings
-        The side of a cell is approximate.
+        Settings of the cells. Cells of three sizes around the given side are blended.
     pixel : float
         Size in Blender units that replaces a pixel as the unit of the side of a cell: cells then have a fixed
         size on the surface. 0 gives cells of a fixed size on screen.
     smallest : float
         Minimum side of a cell on screen, in pixels. Only used if `pixel` is not 0.
     detail : float
-        Cells on small features are smaller by up to this fraction; see `feature_scale`.
+        Cells on small features of the surface are smaller by up to this fraction (`feature_scale`).
     curvature : (P,) float32 ndarray, optional
-        Curvature of the features; see `field.feature_curvature`. Required if `detail` is not 0.
+        Curvature of the features (`field.feature_curvature`), in 1 / Blender unit of object space. Required
+        if `detail` is not 0.
 
     Returns
     -------
@@ -137,9 +138,11 @@ def solid_noise(
     cell_size : (n,) float32 ndarray
         Side of a cell on the surface, in Blender units of rest space.
     instance_hash : (n,) uint32 ndarray
-        From `instance_hashes`.
-    seed, density
-        See `surface_noise`.
+        Number that selects the noise of the mesh instance at each pixel, from `instance_hashes`.
+    seed : int
+        Seed of the noise.
+    density : float
+        Fraction of cells that are bright.
     out : (K, n) float32 ndarray
         Output: independent channels with the mean 0. The standard deviation of cells is `NOISE_STD`.
     """
@@ -195,11 +198,12 @@ def cell_scale(
     Parameters
     ----------
     units : (B,) float32 ndarray or None
-        From `instance_units`.
+        The unit of lengths in the object space of each mesh instance (`instance_units`); None if lengths are
+        in pixels.
     instance_id : (n,) int ndarray
-        The mesh instances of n pixels.
+        Index of the mesh instance of each of n pixels.
     size : (n,) float32 ndarray
-        `RestCoordinates.pixel_size` of these pixels.
+        Size of a pixel on the surface at each pixel, in Blender units of rest space.
     min_scale : float
         Lower bound of the factor.
 
@@ -224,7 +228,7 @@ def feature_scale(
     curvature : (n,) float32 ndarray
         Curvature in 1 / Blender unit of object space.
     pixel_size : (n,) float32 ndarray
-        `RestCoordinates.pixel_size`.
+        Size of a pixel on the surface, in Blender units of rest space.
     cell : float
         Side of a cell in pixels.
     detail : float

@@ -72,7 +72,10 @@ class ReferenceRender:
         return max(float(np.log2(pixels_per_unit / camera.pixels_per_unit)), 0.0)
 
     def sample(self, gbuffer: GBuffer) -> np.ndarray:
-        """Return the (P,) float32 luminance at the surface points of a G-buffer."""
+        """Return the (P,) float32 luminance at the surface points of a G-buffer.
+
+        Points outside of the picture have the luminance of its border.
+        """
         reprojection = self.reprojection(gbuffer.camera)
         clip = gbuffer.position @ reprojection[[0, 1, 3], :3].T + reprojection[[0, 1, 3], 3]
         u, v = clip[:, :2].T / np.maximum(clip[:, 2], 1e-12) * 0.5 + 0.5
@@ -101,7 +104,8 @@ def target_tone(
     lights : sequence of Light
         Lights of the scene in camera space. Used if the light of the look is "scene".
     reference : ReferenceRender, optional
-        Required if the tone of the look is "picture".
+        Another render of the scene, whose luminance is the tone. Required if the tone of the look is
+        "picture".
     cache : Cache, optional
         Stores the shadows of lights.
 
@@ -113,7 +117,7 @@ def target_tone(
     Raises
     ------
     RosyError
-        If the source of the tone does not exist; see `check_tone`.
+        If the source of the tone does not exist: the reference render, or an attribute or image of a mesh.
     """
     if look.tone != "light":
         check_tone(look, [instance.tone for instance in gbuffer.instances], reference)

@@ -43,6 +43,7 @@ def undirected_texture(field: PixelField, noise: np.ndarray, line_width: float) 
     ----------
     field : PixelField
     noise : (P, K) float32 ndarray
+        Noise at the pixels, with the mean `NOISE_MEAN`. The K channels are averaged.
     line_width : float
         Width of a cell of the noise in pixels.
 

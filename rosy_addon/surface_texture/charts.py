@@ -37,7 +37,7 @@ LABEL = "reading the UV map"
 
 @dataclass(frozen=True, eq=False)
 class UvCharts:
-    """T triangles of a surface in a UV map. The unit of length in the map is its side.
+    """T triangles of a surface in a UV map. Lengths in the map are in sides of its unit square.
 
     Attributes
     ----------
@@ -67,11 +67,11 @@ class UvCharts:
         return np.abs(self.linear) ** 2 - np.abs(self.conjugate) ** 2
 
     def to_uv(self, triangle: np.ndarray, tangent: np.ndarray) -> np.ndarray:
-        """Map (n,) complex tangents in triangles to displacements in the UV map."""
+        """Map (n,) complex tangents, each in the triangle `triangle[i]`, to displacements in the UV map."""
         return self.linear[triangle] * tangent + self.conjugate[triangle] * tangent.conj()
 
     def to_surface(self, triangle: np.ndarray, displacement: np.ndarray) -> np.ndarray:
-        """Map (n,) complex displacements in the UV map to tangents in triangles.
+        """Map (n,) complex displacements in the UV map to tangents, each in the triangle `triangle[i]`.
 
         The result is 0 for triangles without area in the UV map.
         """
@@ -81,7 +81,10 @@ class UvCharts:
     def inverse(self, triangle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the coefficients a and b, each (n,), of the map from the UV map to tangents of triangles.
 
-        They are 0 for triangles without area in the UV map.
+        A displacement d in the UV map is the tangent a d + b conj(d). `triangle` holds (n,) indices of
+        triangles.
+
+        Both coefficients are 0 for triangles without area in the UV map.
         """
         linear, conjugate = self.linear[triangle], self.conjugate[triangle]
         density = np.abs(linear) ** 2 - np.abs(conjugate) ** 2

@@ -258,7 +258,7 @@ def check_texture_size(size: int, margin: int) -> None:
 def _check_texture_memory(
     frame: TextureFrame, charts: UvCharts, mesh: TangentMesh, look: Look
 ) -> None:
-    """Check that there is memory for a texture; see `memory.check_memory`."""
+    """Raise RosyError if there is not enough memory to draw a texture."""
     texels = frame.width * frame.height
     used = min(float((mesh.area * np.abs(charts.density)).sum()) * frame.size**2, texels)
     many_images = is_hatched(look) or noise_channel_count(look) > 1
@@ -281,7 +281,10 @@ def step_length(mesh: TangentMesh, charts: UvCharts, texels: Texels) -> float:
 
 
 def _look_pixels(on: TexelSurface, field: PixelField, look: Look, drift: Drift) -> np.ndarray:
-    """Return (P, 4) values at texels: thresholds for a look with ink, linear colors for any other look."""
+    """Return (P, 4) values at texels: thresholds for a look with ink, linear RGBA for any other look.
+
+    `look` has the settings of the user, `drift` is how far its streaks have drifted.
+    """
     is_ink = is_hatched(look)
     pixel = float(np.sqrt(on.mesh.area.sum())) / SURFACE_PIXELS
     step_look = surface_pixel_look(sharp_look(look) if is_ink else look, on.step, pixel, drift)
@@ -292,7 +295,11 @@ def _look_pixels(on: TexelSurface, field: PixelField, look: Look, drift: Drift) 
 
 
 def _colors(on: TexelSurface, field: PixelField, look: PixelLook) -> np.ndarray:
-    """Return (P, 4) RGBA at texels: the linear colors of the field, and the opacity 1."""
+    """Return (P, 4) float32 RGBA at texels: the linear colors of the field, and the opacity.
+
+    The opacity is 1; it is 0 where the field is undefined if the look hides these parts. The lengths of
+    `look` are in steps of streamlines.
+    """
     with progress(0.0, 0.3):
         noise = texel_noise(on, noise_settings(look))
     with progress(0.3, 0.95):
@@ -315,7 +322,22 @@ def _colors(on: TexelSurface, field: PixelField, look: PixelLook) -> np.ndarray:
 
 
 class TextureSettings(NamedTuple):
-    """The arguments of `draw_texture` that the user can set besides the look."""
+    """The arguments of `draw_texture` that the user can set besides the look.
+
+    Attributes
+    ----------
+    size : int
+        Texels on each side of the texture, or of a tile of it.
+    margin : int
+        Width of the margin around charts, in texels.
+    is_udim : bool
+        Whether each UDIM tile of the UV map has a picture of its own.
+    content : {"look", "anisotropy", "flow"}
+        What the texture shows: the picture of the look, or the direction of the field as an anisotropy map
+        or as a flow map.
+    drift : Drift
+        How far streaks have drifted.
+    """
 
     size: int = DEFAULT_SIZE
     margin: int = DEFAULT_MARGIN
@@ -331,10 +353,12 @@ class TextureImages(NamedTuple):
     ----------
     tiles : dict of int to ImageData
         Image of each tile, by its UDIM number.
-    is_data, line_count
-        See `Texture`.
+    is_data : bool
+        Whether the pixels are thresholds of ink or directions. Otherwise they are colors.
+    line_count : int
+        Number of line directions of the field at a point. Opposite directions count as one.
     note : str
-        Result of `Texture.overlap_note`.
+        Message for the user about overlapping charts; empty if they hardly overlap.
     """
 
     tiles: dict[int, ImageData]
@@ -355,10 +379,16 @@ def draw_texture_images(
 
     Parameters
     ----------
-    instance, uv, look, lights
-        See `draw_texture`.
+    instance : MeshInstance
+        An instance with a field.
+    uv : (C, 2) ndarray
+        u and v at the corners of the surface.
+    look : Look
+        Settings of the user.
     settings : TextureSettings
         The other arguments of `draw_texture`.
+    lights : sequence of Light or None
+        Lights in world space under which hatching is drawn as ink. None: it is stored as thresholds.
     as_float : bool
         Whether images store linear values in single precision (.exr), or else in 8 bits (.png).
     """

@@ -66,12 +66,14 @@ def thresholds(
     look : PixelLook
         Look with ink, from `sharp_look`. Its lengths are in steps of streamlines.
     guiding_angle : float
-        Angle that the first line direction is near to; see `line_order`.
+        Angle, in radians from the horizontal direction on the surface, that the first line direction is near
+        to. See `line_order`.
 
     Returns
     -------
     (P, 4) float32 ndarray
-        Thresholds as `threshold_pixels` stores them in the channels of pixels.
+        Thresholds of up to three layers in red, green and blue, 0 to 1, and in alpha a measure of their
+        spread (`threshold_pixels`).
     """
     with progress(0.0, 0.1):
         order = line_order(on.mesh, guiding_angle, SWAP_WIDTHS * look.line_width * on.step)
@@ -147,7 +149,8 @@ def _lines(
 ) -> HatchedLines:
     """Return the streaks or the evenly spaced lines of a field at the texels.
 
-    Breaks and paper grain, which make them uneven, and the undirected texture are included.
+    Breaks and paper grain, which make them uneven, and the undirected texture are included. Lengths of `look`
+    are in steps of streamlines. `wobble_angle` is from `_wobble_angle`; None if lines do not wobble.
     """
     is_spaced, undefined = is_even(look), not field.representation.all()
     even_lines = noise = undirected = paper_grain = None
@@ -191,7 +194,11 @@ def _wobble_angle(on: TexelSurface, look: PixelLook) -> np.ndarray:
 def _even_lines(
     on: TexelSurface, field: PixelField, look: PixelLook, wobble_angle: np.ndarray | None
 ) -> EvenLines:
-    """Return evenly spaced lines along the field, evaluated at the texels."""
+    """Return evenly spaced lines along the field, evaluated at the texels.
+
+    Lengths of `look` are in steps of streamlines. `wobble_angle` is from `_wobble_angle`; None if lines do
+    not wobble.
+    """
     texels = on.texels
     spacing = look.line_distance * on.step
     max_triangles = min(MAX_TRIANGLES, TRIANGLES_PER_TEXEL * len(texels))

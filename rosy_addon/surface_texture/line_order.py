@@ -94,6 +94,7 @@ class LineOrder:
         Parameters
         ----------
         triangle : (n,) ndarray of int
+            Indices of triangles of the tangent mesh, in whose frames the results are.
         weights : (n, 3) float32 ndarray
             Barycentric coordinates of the points in their triangles.
         """
@@ -123,8 +124,10 @@ class CombedDirections:
 
         Parameters
         ----------
-        triangle, weights
-            Triangles and barycentric coordinates, as in `LineOrder.first_at`.
+        triangle : (n,) ndarray of int
+            Indices of triangles of the tangent mesh, in whose frames the results are.
+        weights : (n, 3) float32 ndarray
+            Barycentric coordinates of the points in their triangles.
         """
         direction = _unit_root(self.line.first_at(triangle, weights), self.line.degree)
         is_opposite = (direction * self.sense.first_at(triangle, weights).conj()).real < 0
@@ -196,7 +199,8 @@ def combed_directions(mesh: TangentMesh, guiding_angle: float) -> CombedDirectio
     mesh : TangentMesh
         Tangent mesh with the field.
     guiding_angle : float
-        Angle on the surface, in radians from the horizontal direction, near which the chosen line lies.
+        Angle on the surface, in radians from the horizontal direction and counter-clockwise as seen from
+        outside, near which the chosen line lies.
 
     Returns
     -------
@@ -261,7 +265,8 @@ def _first_lines(
     """Choose for each refined triangle which line direction comes first.
 
     It is the direction that is near to the guiding angle. If the field itself marks one of its line
-    directions (`TangentMesh.family_z`), it is this direction. The parameters are as in `line_order`.
+    directions (`TangentMesh.family_z`), it is this direction. The angle is in radians from the horizontal
+    direction. `blend` is the width of the strip in which two line directions swap, in Blender units.
     """
     degree = mesh.degree // mesh.family_count
     tree = refined.tree
@@ -293,9 +298,10 @@ def _aligned(
     refined : _RefinedMesh
         Mesh of L triangles.
     z : (L,) complex ndarray
-        Representation of the field, of the degree `z_degree`.
+        Representation of the field at each triangle, of the degree `z_degree`, in the frame of the triangle
+        of the tangent mesh.
     first : (L,) complex ndarray
-        Representation of the guiding direction, of the degree `degree`.
+        Representation of the guiding direction at each triangle, of the degree `degree`, in the same frame.
     lengths : sequence of float
         Lengths over which directions are averaged, one after the other, in units of `refined.side`.
     """
@@ -322,7 +328,8 @@ def _unit_root(values: np.ndarray, degree: int) -> np.ndarray:
 def _guide(mesh: TangentMesh, guiding_angle: float, degree: int) -> np.ndarray:
     """Return (T,) complex: representations of the guiding direction on the triangles of a mesh.
 
-    It is at `guiding_angle` to the horizontal direction of the triangle. The modulus decreases toward
+    They are of the degree `degree`, in the frames of the triangles. The guiding direction is at
+    `guiding_angle`, in radians, to the horizontal direction of the triangle. The modulus decreases toward
     horizontal triangles. On these, the angle is measured from the x axis instead.
     """
     x, _, z = (mesh.x + 1j * mesh.y).T
@@ -359,7 +366,8 @@ def direction_map(on: TexelSurface, content: str, guiding_angle: float) -> np.nd
     on : TexelSurface
     content : {"anisotropy", "flow"}
     guiding_angle : float
-        Angle that the directions in the map are near to; see `line_order`.
+        Angle, in radians from the horizontal direction on the surface, that the directions in the map are
+        near to. See `line_order`.
 
     Returns
     -------
@@ -401,7 +409,8 @@ def corner_tangents(surface: Surface, field: RosyField, guiding_angle: float) ->
     surface : Surface
     field : RosyField
     guiding_angle : float
-        Angle that the directions are near to; see `line_order`.
+        Angle, in radians from the horizontal direction on the surface, that the directions are near to. See
+        `line_order`.
 
     Returns
     -------
@@ -427,7 +436,8 @@ def _directions_at(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return (n,) unit tangents at points, and (n,) bool: whether the field is defined there.
 
-    A tangent is the direction of the field that is nearest to the combed direction.
+    A tangent, complex in the frame of its triangle, is the direction of the field that is nearest to the
+    combed direction. The points are given by (n,) triangles and (n, 3) barycentric coordinates.
     """
     member = mesh.members_at(triangle, weights, combed.directions_at(triangle, weights))
     return mesh.directions_at(triangle, weights, member), member != 0

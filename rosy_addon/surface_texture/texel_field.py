@@ -76,8 +76,9 @@ def texel_field(on: TexelSurface, crease_angle: float | None) -> PixelField:
     Returns
     -------
     PixelField
-        Its pixels are the texels. Its `screen_jacobian` maps unit tangents to steps in texels. These are
-        foreshortened where the UV map is coarse.
+        Its pixels are the texels. Angles are measured from the unit tangents `frames_at`. Its
+        `screen_jacobian` maps unit tangents to steps in texels. These are foreshortened where the UV map is
+        coarse.
     """
     mesh, charts, texels = on.mesh, on.charts, on.texels
     count, degree = len(texels), mesh.degree
@@ -129,7 +130,11 @@ def _interpolated(weights: np.ndarray, corners: np.ndarray, triangle: np.ndarray
 
 
 def frames_at(charts: UvCharts, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Return (n,) complex128: the unit tangents `UvCharts.frame` at (n, 3) barycentric coordinates."""
+    """Return the (n,) complex128 unit tangents from which angles are measured at points of the surface.
+
+    They are in the frames of the triangles, interpolated between `UvCharts.frame` at the corners. The points
+    are given by (n,) triangles and (n, 3) barycentric coordinates.
+    """
     frame = _interpolated(weights, charts.frame, triangle)
     norm = np.abs(frame)
     return np.divide(frame, norm, out=charts.frame[triangle, 0], where=norm > 1e-6)
@@ -142,7 +147,8 @@ def _neighbor_masks(
 
     A neighboring texel is linked if it is in the same chart and near on the surface. `entry`, (H W + 1,)
     int32, holds the texel at each flat index of the frame, or -1. `defined`, (P,) bool, is true where the
-    field is not zero.
+    field is not zero. Texels whose normals differ by more than `crease_angle` (radians, or None) are not
+    linked.
     """
     mesh, charts, texels = on.mesh, on.charts, on.texels
     masks = defined.astype(np.uint16) << np.uint16(NEIGHBOR_OFFSETS.index((0, 0)))
@@ -187,7 +193,8 @@ def _find_seam_steps(
 ) -> SeamSteps:
     """Trace the steps to neighbors that are not linked in `mask`, as straight lines on the surface.
 
-    `entry`, `mask` and `defined` are as in `_neighbor_masks`.
+    `entry`, (H W + 1,) int32, holds the texel at each flat index of the frame, or -1. `mask`, (P,) uint16,
+    has a bit for each linked neighbor of a texel. `defined`, (P,) bool, is true where the field is not zero.
     """
     border = np.flatnonzero(defined & (mask != 0b111_111_111))
     source, bit = np.nonzero(mask[border, None] >> np.arange(9, dtype=np.uint16) & 1 == 0)
@@ -336,7 +343,7 @@ def _subtract_local_means(
     ----------
     on : TexelSurface
     rest : (V, 3) float32 ndarray
-        The `rest_positions` of the surface.
+        Vertices of the surface in rest space (before modifiers and animation).
     channels : (K, P) float32 ndarray
         Values at the texels, which are changed.
     sigma : float

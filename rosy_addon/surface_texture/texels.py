@@ -124,6 +124,7 @@ class TexelSurface(NamedTuple):
     ----------
     instance : MeshInstance
     mesh : TangentMesh
+        Its triangles in world space, with frames and the field at their corners.
     charts : UvCharts
     texels : Texels
     step : float
@@ -303,8 +304,11 @@ def _beyond_seams(
 
     Parameters
     ----------
-    frame, field, color
-        Parameters of `fill_margin`.
+    frame : TextureFrame
+    field : PixelField
+        Field at the P texels of the charts, with the steps across seams.
+    color : (P, K) float32 ndarray
+        Colors of these texels.
     filled : (H W,) bool ndarray
         Whether each texel of the frame has a color.
 
@@ -332,7 +336,9 @@ def _color_at(
 ) -> np.ndarray:
     """Return (n, K) float32: colors at positions near texels, interpolated linearly between linked neighbors.
 
-    `texel` holds texels, and `offset` the positions relative to their centers, as complex numbers in texels.
+    `color`, (P, K), holds the colors of texels. `texel` holds (n,) indices of texels, and `offset` the
+    positions relative to the centers of these texels, as complex numbers in texels. Linked neighbors are
+    those that streamlines may step to (`field.neighbor_mask`).
     """
     column, row = np.sign(offset.real).astype(np.intp), np.sign(offset.imag).astype(np.intp)
     x, y = np.minimum(np.abs(offset.real), 1), np.minimum(np.abs(offset.imag), 1)

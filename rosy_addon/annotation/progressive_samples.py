@@ -153,11 +153,12 @@ def _with_points(
     clip : (V, 4) float64 ndarray
         Vertices in clip space.
     triangles : (T, 3) int ndarray
+        Vertices of the triangles.
     camera : Camera
     spacing : float
-        See `progressive_samples`, in pixels.
+        Side, in pixels, of a square on screen that contains about `POINTS_PER_SPACING` points.
     offset : (T,) float64 ndarray
-        The random number u of each triangle; see the module.
+        The random number u of each triangle, 0 to 1; its point i has the rank (i + u) / area.
     """
     w = np.where(clip[:, 3] > 0, clip[:, 3], np.nan)
     x, y = clip[:, 0] / w, clip[:, 1] / w
@@ -191,7 +192,7 @@ def _screen_areas(
         Corners in clip space.
     camera : Camera
     spacing : float
-        See `progressive_samples`, in pixels.
+        Side, in pixels, of a square on screen that contains about `POINTS_PER_SPACING` points.
 
     Returns
     -------
@@ -223,7 +224,10 @@ def matrix_scale(instance: MeshInstance) -> float:
 
 
 def rest_areas(surface: Surface, triangle: np.ndarray | None = None) -> np.ndarray:
-    """Return the (n,) areas of triangles in the rest shape, by default of all triangles of the surface."""
+    """Return the (n,) areas of triangles in the rest shape, in object space.
+
+    `triangle` holds the indices of the triangles; by default, they are all triangles of the surface.
+    """
     vertices = surface.in_rest_shape().vertices
     corners = surface.triangle_vertex if triangle is None else surface.triangle_vertex[triangle]
     a, b, c = (np.ascontiguousarray(vertices[corner].T) for corner in corners.T)

@@ -39,9 +39,9 @@ def label_families(strokes: Strokes, mesh: TangentMesh, right: np.ndarray | None
     Returns
     -------
     Strokes
-        The same strokes with `mesh.family_count` families, named "family 1" and so on. The first family is
-        nearest to the guide direction, and the others follow counter-clockwise. If the families are
-        consistent over the surface, `global_labels` chooses the first one.
+        The same strokes with `mesh.family_count` families, named "family 1" and so on. If the families are
+        consistent over the surface, `global_labels` numbers them. Otherwise, in each triangle, the first
+        family is nearest to the guide direction, and the others follow counter-clockwise.
     """
     report(0.0, "matching families")
     family_count = mesh.family_count

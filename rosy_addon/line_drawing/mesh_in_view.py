@@ -217,7 +217,9 @@ class _Pieces(Parts):
     def _neighbors(
         self, edge: np.ndarray, side: np.ndarray, cut_count: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the attributes `neighbor` and `neighbor_edge` of m new pieces, which are parts of these.
+        """Return the attributes `neighbor` and `neighbor_edge` of m new pieces, as in `TangentMesh`.
+
+        Each new piece is a part of one of the pieces of this object, the old pieces.
 
         Parameters
         ----------
@@ -350,9 +352,10 @@ def triangles_near(mesh: TangentMesh, seen: np.ndarray, spacing: np.ndarray) -> 
 
 
 def _edge_distance(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Return the (n,) distances between two (n, 2, 3) edges, which do not cross.
+    """Return the (n,) distances between the two edges of each pair, which do not cross.
 
-    Distances are measured from the ends of each edge to the other edge.
+    `first` and `second`, (n, 2, 3), hold the ends of the two edges, row by row. Distances are measured from
+    the ends of each edge to the other edge.
     """
     # The shortest connection starts at an end of one of the two edges.
     point = np.stack([first, second]).transpose(2, 0, 1, 3)

@@ -386,7 +386,11 @@ class _OutlineTest:
         self.corners = _Corners.of(instance)
 
     def is_visible(self, block: Strokes, point: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-        """Return (m,) bool: whether points of outlines are visible. Parameters are as in `visible_runs`."""
+        """Return (m,) bool: whether points of outlines are visible.
+
+        `block` holds outlines, `point` the (m,) indices of the points to test, and `pixels` the (m, 2) pixel
+        coordinates of these points.
+        """
         camera, triangle = self.depth_buffer.camera, block.triangle[point]
         ring_depth = np.full(len(point), -1.0)
         contour = np.flatnonzero(block.family[block.stroke[point]] == SILHOUETTES)
@@ -432,9 +436,10 @@ class _OutlineTest:
     ) -> np.ndarray:
         """Return (n,) bool: whether each point is hidden by the triangles at all four pixels around it.
 
-        `points` are in world space, `pixels` are their (n, 2) pixel coordinates, and `triangle` is the
-        triangle on which each point lies. A triangle that shares a vertex with it does not hide the point if
-        the point is behind it by less than `ring_depth`, (n,), along the view ray, in world space.
+        `points` are in world space, `pixels` are their (n, 2) pixel coordinates, and `triangle` is the own
+        triangle of each point, on which it lies. Another triangle that shares a vertex with the own triangle
+        does not hide the point if the point is less than `ring_depth`, (n,), behind it along the view ray, in
+        world space.
         """
         hidden = np.ones(len(points), dtype=bool)
         for plane in planes_around(points, pixels, self.depth_buffer):

@@ -284,7 +284,8 @@ class StreamlinePlacer:
     def _compare(self, sample: np.ndarray, previous: np.ndarray | None = None) -> LateralNeighbors:
         """Compare new samples with others by the rules, and remove the rejected samples.
 
-        `sample` and `previous` are as in `find_lateral_neighbors`.
+        `sample` holds the indices of the new samples, and `previous`, for each of them, the position in
+        `sample` of the sample before it at the same end of its stroke, or -1.
         """
         min_separation, max_gap = self.rules.min_separation, self.rules.max_gap
         neighbors = find_lateral_neighbors(self.samples, sample, min_separation, max_gap, previous)

@@ -55,9 +55,9 @@ def polyline_file(suffix: str, strokes: Strokes, camera: Camera, pen: Pen, up: s
     camera : Camera
         Camera that sets the length of a pixel.
     pen : Pen
-        Width of the strokes. Its other attributes are not used.
-    up : str
-        Axis that points up in the space of the file, as in `UP_AXIS_MATRIX`. In world space, z points up.
+        Width of the strokes, in pixels of the camera. Its other attributes are not used.
+    up : {"y", "z"}
+        Axis that points up in the space of the file. In world space, z points up.
 
     Returns
     -------

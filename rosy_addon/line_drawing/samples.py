@@ -284,8 +284,8 @@ class StrokeSamples(ColumnTable):
 
         Parameters
         ----------
-        stroke_alive : ndarray of bool
-            Whether each stroke is alive.
+        stroke_alive : (S,) bool ndarray
+            Whether each of all strokes is alive.
         first : int
             Index of the first sample that may have to be removed.
         """

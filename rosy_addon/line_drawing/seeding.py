@@ -182,7 +182,10 @@ def candidate_seeds(mesh: TangentMesh, corner_spacing: np.ndarray) -> SurfacePar
 
 
 def uncovered_seeds(samples: StrokeSamples, seeds: SurfaceParticles) -> SurfaceParticles:
-    """Return the seeds that are not near a stroke of their family (one of the M line directions)."""
+    """Return the seeds that are not near a stroke of their family (one of the M line directions).
+
+    Near means less than `MAX_COVERED_GAP` spacings away.
+    """
     is_uncovered = np.zeros(len(seeds), dtype=bool)
     for batch in row_blocks(len(seeds), SEED_BATCH_SIZE):
         report(samples.coverage, "looking for gaps")

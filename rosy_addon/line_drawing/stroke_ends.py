@@ -182,7 +182,10 @@ def _point_before_end(
 def _move_to_depth(
     points: np.ndarray, depth: np.ndarray, target_depth: np.ndarray, camera: Camera
 ) -> np.ndarray:
-    """Return (k, 3) points moved along their view rays from `depth` to `target_depth`."""
+    """Return (k, 3) points in world space, moved along their view rays from `depth` to `target_depth`.
+
+    Both depths, (k,), are measured along the axis of the camera.
+    """
     to_camera = camera.view_directions(points)
     return points + ((depth - target_depth) / (to_camera @ camera.view[2, :3]))[:, None] * to_camera
 

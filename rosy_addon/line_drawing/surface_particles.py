@@ -241,9 +241,9 @@ def _next_segment(
 ) -> tuple[np.ndarray, ...]:
     """Compute the next segment of each particle. It has the direction of the field at its midpoint.
 
-    A segment is at most `length` long. Particles are stuck if the field rotates so fast that a segment
-    would be much shorter than `usual_length`. `rotation`, (n,) complex128, is the factor that rotates the
-    direction of the field to the direction of motion.
+    A segment is at most `length`, (n,), long. Particles are stuck if the field rotates so fast that a segment
+    would be much shorter than `usual_length`, (n,). Both are in world space. `rotation`, (n,) complex128, is
+    the factor that rotates the direction of the field to the direction of motion.
 
     Returns
     -------
@@ -333,7 +333,11 @@ def _midpoint_segments(
 
 
 def _weight_slopes(mesh: TangentMesh, triangle: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Return the (n, 3) derivatives of the barycentric coordinates along unit directions."""
+    """Return the (n, 3) derivatives of the barycentric coordinates along unit directions.
+
+    They are changes per unit of length in world space. `direction`, (n,) complex, is in the frames of the
+    triangles.
+    """
     gradient = mesh.gradient[triangle]
     return gradient.real * direction.real[:, None] + gradient.imag * direction.imag[:, None]
 

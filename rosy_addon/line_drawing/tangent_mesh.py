@@ -198,10 +198,11 @@ class TangentMesh:
     def directions_at(
         self, triangle: np.ndarray, weights: np.ndarray, member: np.ndarray
     ) -> np.ndarray:
-        """Return (n,) complex128: the unit direction of the field that corresponds to a member.
+        """Return (n,) complex128: the unit direction of the field that corresponds to each member.
 
-        The N members are at equal angles. In a RoSy field, they are the directions of the field. In other
-        fields, the directions deviate from the members by the harmonics.
+        `member` holds (n,) unit members. These and the result are in the frames of the triangles. The N
+        members are at equal angles. In a RoSy field, they are the directions of the field. In other fields,
+        the directions deviate from the members by the harmonics.
         """
         if not self.harmonics:
             return member
@@ -230,7 +231,7 @@ class SharedEdges(NamedTuple):
     def ends(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the corners at the first ends of the edges and at the second ends: two (n, 2) arrays.
 
-        Each row has the corners, as 3 t + k, of the two triangles t that share the edge.
+        Each row has the corners, as 3 t + k, in the two triangles t of the edge: `triangle`, then `neighbor`.
         """
         triangle = np.stack([self.triangle, self.neighbor], axis=1)
         edge = np.stack([self.edge, self.neighbor_edge], axis=1)
@@ -366,9 +367,9 @@ def with_corners(mesh: TangentMesh, points: np.ndarray) -> TangentMesh:
 
 
 def _triangle_frames(points: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return the normals, x axes, y axes and areas of triangles.
+    """Return the normals, x axes and y axes, (T, 3) unit vectors, and the (T,) areas of triangles.
 
-    x points from the first corner to the second.
+    `points`, (T, 3, 3), holds the corners. x points from the first corner to the second.
     """
     edge_a, edge_b = points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]
     cross = np.cross(edge_a, edge_b)

@@ -35,7 +35,7 @@ HIDDEN_OPACITY = 0.3
 
 @dataclass(frozen=True)
 class Dot:
-    """A dot of a singularity: center, radius without outline, width of the outline (all in pixels), and index.
+    """A dot of a singularity: center, radius without outline, width of the outline, in pixels; and index.
 
     Coordinates are measured from the lower left corner of the frame. The index is in units of 1 / N.
     """

@@ -245,7 +245,7 @@ class GBuffer:
         -------
         instance_id : int
         blocks : list of slice or of (n,) intp ndarray
-            Blocks of its pixels; see `pixel_blocks`.
+            Its pixels, as indices into this G-buffer, in blocks of limited size.
         progress : (float, float)
             Fraction of all pixels that belong to instances before this one, and the same fraction with
             this instance included.

@@ -2,8 +2,8 @@
 
 No depth buffer is used. A triangle hides a point if it is nearer to the eye and covers the projection of
 the point. Barycentric coordinates come from homogeneous clip coordinates, so triangles that reach behind
-the eye need no clipping; see Marc Olano
-and Trey Greer, "Triangle Scan Conversion Using 2D Homogeneous Coordinates", 1997.
+the eye need no clipping; see Marc Olano and Trey Greer, "Triangle Scan Conversion Using 2D Homogeneous
+Coordinates", 1997.
 """
 
 from __future__ import annotations
@@ -309,7 +309,8 @@ def is_cut_away(points: np.ndarray, clip_planes: np.ndarray | None) -> np.ndarra
     ----------
     points : (n, 3) ndarray
     clip_planes : (6, 4) ndarray or None
-        Clip planes in the space of the points. If it is None, no point is cut away.
+        Coefficients (a, b, c, d) of clip planes a x + b y + c z + d = 0, in the space of the points. The
+        negative side is cut away. If it is None, no point is cut away.
 
     Returns
     -------

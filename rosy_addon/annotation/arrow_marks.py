@@ -137,7 +137,7 @@ def arrow_marks(
     display : {"smooth", "flat"}
         Whether the field is interpolated, or constant on each face; see `projection.project.project`.
     clip_planes : (6, 4) float64 ndarray, optional
-        Planes in world space. The negative side of each plane is cut away.
+        Planes (a, b, c, d) in world space. Points with a x + b y + c z + d < 0 are cut away.
     cache : Cache, optional
         Cache for points of surfaces at which arrowheads are drawn, and for corner fields.
     is_exact : bool

@@ -252,7 +252,8 @@ def surface_samples(surface: Surface, density: float) -> tuple[np.ndarray, np.nd
     barycentric : (P, 3) float64 ndarray
         Barycentric coordinates of each point in its triangle.
     rank : (P,) float64 ndarray
-        Rank of each point, at most `density`; see `progressive_samples`.
+        Rank of each point, in points per square unit of object space, at most `density`. All points up to a
+        rank are an even sample of the surface.
     """
     area = rest_areas(surface)
     shuffle = _random_bits(len(area))

@@ -129,7 +129,7 @@ def singularity_marks(
         Only the settings `singularity_dots` and `singularity_size` are read. They select the singularities
         and the style of their dots.
     clip_planes : (6, 4) float64 ndarray, optional
-        Planes in world space. The negative side of each plane is cut away.
+        Planes (a, b, c, d) in world space. Points with a x + b y + c z + d < 0 are cut away.
     cache : Cache, optional
         Cache for the singularities of fields.
 

@@ -60,12 +60,13 @@ class CommandParser(argparse.ArgumentParser):
         Parameters
         ----------
         option : str
+            Name of the option, such as "--size".
         metavar : str
             Placeholder for the value in the help.
         text : str
             Help text, in which %(default)s stands for the default.
-        parse : Parse, optional
-            By default, the value is the text.
+        parse : function, optional
+            Function that returns the value for the text after the option. By default, the value is the text.
         **keywords
             More keyword arguments of `argparse.ArgumentParser.add_argument`.
         """
@@ -267,6 +268,7 @@ class Options(argparse.Namespace):
         Parameters
         ----------
         function : function
+            The function of `api` that is going to be called.
         **others
             Further arguments. They take precedence over options of the same name.
         """
@@ -282,6 +284,7 @@ class Options(argparse.Namespace):
         Parameters
         ----------
         function : function
+            The function of `api`, such as `render`.
         path : Path
             The file that is drawn, for messages.
 

@@ -375,7 +375,7 @@ def _marker_size(diameter: np.ndarray, is_open: bool) -> tuple[np.ndarray, np.nd
 
 
 def _legend_entries(marks: Sequence[SingularityMarks]) -> list[tuple[str, str, float]]:
-    """Return text, color and diameter (pixels) for each index of singularities, the largest index first."""
+    """Return text, color (``#rrggbb``) and diameter (pixels) of each singularity index, the largest first."""
     diameters: dict[tuple[float, int, int], float] = {}
     for part in marks:
         columns = part.index.tolist(), part.degree.tolist(), part.radius.tolist()

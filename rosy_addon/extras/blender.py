@@ -338,7 +338,8 @@ def blender_encoder(requested: str | None) -> Encoder | None:
     Parameters
     ----------
     requested : str, optional
-        See `find_blender`.
+        Path of a Blender program, its name on the PATH, or a folder that contains it. By default, the program
+        is searched as by `find_blender`.
 
     Raises
     ------

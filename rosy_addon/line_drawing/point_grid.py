@@ -248,7 +248,8 @@ def _reached_cells(
     rings : int
         Number of rings of cells around the cell of a query.
     direction : (n, 3) ndarray, optional
-        Directions of the queries; see `PointGrid.pairs_within`.
+        Unit directions of the queries, which restrict them to two parts of their balls; see
+        `PointGrid.pairs_within`.
     """
     side = np.arange(-rings, rings + 1)
     beyond = np.maximum(side - position[:, :, None], position[:, :, None] - (side + 1))

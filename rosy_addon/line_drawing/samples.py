@@ -217,7 +217,7 @@ class StrokeSamples(ColumnTable):
         arc : (n,) ndarray
             Signed arc lengths from the seeds, in world space.
         step : (n,) ndarray of int
-            Steps of growth in which the samples are added; see `next_steps`.
+            Numbers of the steps of growth in which the samples are added, from `next_steps`.
 
         Returns
         -------

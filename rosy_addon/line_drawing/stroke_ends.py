@@ -273,7 +273,8 @@ def _drop_onto_surfaces(
     """Move points of extensions along their view rays onto the visible surface.
 
     Points are moved only if the surface is in front of them, or behind them by less than a tolerance.
-    `distance`, (n,), is above 0 for points of extensions; see `_append_extensions`.
+    `distance`, (n,), is the distance in pixels of a point of an extension from the start of the extension,
+    and 0 for other points.
     """
     extended = np.flatnonzero(distance > 0)
     points = strokes.points[extended]

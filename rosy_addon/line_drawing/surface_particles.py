@@ -308,7 +308,7 @@ def _midpoint_segments(
     midpoint : (n, 3) float64 ndarray
         Barycentric coordinates of the estimated midpoints of the segments.
     rotation : (n,) complex128 ndarray
-        Factor from the direction of the field to the direction of motion, as in `_next_segment`.
+        Unit factor that rotates the direction of the field to the direction of motion.
     allowed : (n,) float64 ndarray
         Largest lengths of the segments, in world space.
 

@@ -1,4 +1,4 @@
-"""The G-buffer, a flat list of the visible pixels of surfaces with a field; mesh instances, and points on them."""
+"""The G-buffer, a flat list of the visible pixels of surfaces; mesh instances, and points on them."""
 
 from __future__ import annotations
 

@@ -135,7 +135,7 @@ def arrow_marks(
     size : float
         Length of an arrowhead, pixels.
     display : {"smooth", "flat"}
-        Whether the field is interpolated, or constant on each face; see `projection.project.project`.
+        Whether the field is interpolated, or constant on each face.
     clip_planes : (6, 4) float64 ndarray, optional
         Planes (a, b, c, d) in world space. Points with a x + b y + c z + d < 0 are cut away.
     cache : Cache, optional
@@ -325,7 +325,8 @@ class SurfacePlaces:
     level : int
         Number of the finest level; -1 if there are no points.
     extent : float
-        Distance between the points of level 0: the side of a square that has the area of the surface.
+        Distance between the points of level 0, in Blender units of the rest shape: the side of a square that
+        has the area of the surface.
     """
 
     triangle: np.ndarray
@@ -400,7 +401,8 @@ def _with_level(
 ) -> SurfacePlaces:
     """Return `places` with one more level, whose points are chosen from candidates.
 
-    `triangle` and `barycentric` are the triangles and barycentric coordinates of the candidates.
+    `triangle`, (n,), and `barycentric`, (n, 3), are the triangles and barycentric coordinates of the
+    candidates.
     """
     level = places.level + 1
     finest = level_distance(places.extent, level)

@@ -195,7 +195,10 @@ def _letter(letter: str) -> tuple[np.ndarray, float]:
 def _arc(
     center: tuple[float, float], radii: tuple[float, float], first: float, last: float
 ) -> list[tuple[float, float]]:
-    """Return points on an arc of an ellipse, from the angle `first` to the angle `last` in degrees."""
+    """Return points on an arc of an ellipse, from the angle `first` to the angle `last` in degrees.
+
+    `radii` are half of the width and half of the height of the ellipse.
+    """
     angles = np.radians(np.linspace(first, last, max(int(abs(last - first) / 20), 2)))
     x, y = center[0] + radii[0] * np.cos(angles), center[1] + radii[1] * np.sin(angles)
     return list(zip(x.tolist(), y.tolist(), strict=True))

@@ -165,7 +165,8 @@ def lay_out_key(
 def wrapped(text: str, width: float, text_width: Callable[[str], float]) -> list[str]:
     """Return the lines of a text, broken at spaces so that they are not wider than `width`.
 
-    A single word that is wider is on a line of its own. `text_width` returns the width of a string.
+    A single word that is wider is on a line of its own. `text_width` returns the width of a string, in the
+    unit of `width`.
     """
     lines: list[str] = []
     for paragraph in text.strip().splitlines():

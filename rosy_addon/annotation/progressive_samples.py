@@ -265,9 +265,10 @@ def surface_samples(surface: Surface, density: float) -> tuple[np.ndarray, np.nd
 def _points(
     number: np.ndarray, triangle: np.ndarray, shuffle: np.ndarray, area: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return points as `progressive_samples` does, given their triangles and their indices in the sequences.
+    """Return the triangles, barycentric coordinates and ranks of points, as `progressive_samples` does.
 
-    `number` holds the (P,) indices. `shuffle` and `area` are the random bits and areas of all triangles.
+    `triangle` holds the (P,) triangles of the points, and `number` their (P,) indices in the sequences of
+    these triangles. `shuffle` and `area` are the random bits and areas of all triangles.
     """
     shuffle, area = shuffle[triangle], area[triangle]
     rank = (number + _random_offsets(shuffle)) / area
@@ -287,7 +288,8 @@ def _random_bits(count: int) -> np.ndarray:
 def _shuffle_bits(shuffle: np.ndarray, depth: int) -> np.ndarray:
     """Return (n,) int64 numbers from 0 to 3, with which triangles shuffle sub-triangles of one depth.
 
-    A digit of an index, XOR this number, is the number of the sub-triangle in `PARTS`.
+    `shuffle`, (n,), holds the random bits of the triangles. A digit of an index, XOR the result, is the
+    number of the sub-triangle in `PARTS`.
     """
     return (shuffle >> np.uint64(2 * depth) & np.uint64(3)).astype(np.int64)
 

@@ -175,7 +175,10 @@ class Studio:
         return place[is_visible].mean(axis=0) if is_visible.any() else None
 
     def _projected(self, vertices: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Return the (n, 2) positions of vertices of the first surface in pixels, and which are visible."""
+        """Return where n vertices of the first surface are in the picture, and which are visible.
+
+        Positions, (n, 2), are in pixels from the lower left.
+        """
         first = next(iter(self.instances.values()))
         projected = project_vertices([first], self.camera, [vertices])
         return projected.position, projected.is_visible

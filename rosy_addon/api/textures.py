@@ -196,7 +196,7 @@ def texture(
 
 
 def _lamp(light_direction: ArrayLike, instance: MeshInstance) -> Light:
-    """Return a lamp in world space, given the direction to it in the coordinates of the mesh.
+    """Return a lamp in world space, given the direction to it in the coordinates of the mesh of `instance`.
 
     Raises
     ------
@@ -215,7 +215,9 @@ def _lamp(light_direction: ArrayLike, instance: MeshInstance) -> Light:
 def texture_look(
     preset: str | os.PathLike[str] | None, settings: dict[str, Any], has_color_values: bool = False
 ) -> Look:
-    """Return the look of a texture: a preset with settings; see `texture`.
+    """Return the look of a texture: a preset with some settings changed.
+
+    `has_color_values` says whether there are values for the color map, by which streaks are then colored.
 
     Raises
     ------

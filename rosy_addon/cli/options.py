@@ -40,7 +40,7 @@ class CommandParser(argparse.ArgumentParser):
     _is_intermixed = False
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
-        """Parse arguments; see `argparse.ArgumentParser.parse_known_args`."""
+        """Parse arguments. Return the options and the unknown arguments, as `argparse` does."""
         if self._is_intermixed or self._subparsers is not None:
             return super().parse_known_args(args, namespace)
         self._is_intermixed = True  # parse_known_intermixed_args calls this method

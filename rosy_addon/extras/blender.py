@@ -291,7 +291,7 @@ def _copy(stream: TextIO | None, default: int, stack: ExitStack) -> int:
 
 
 def _encoding(stream: TextIO | None) -> tuple[str, str]:
-    """Return the encoding of a stream, and its error handler."""
+    """Return the encoding of a stream, by default UTF-8, and the name of its error handler."""
     encoding = getattr(stream, "encoding", None) or "utf-8"
     return encoding, getattr(stream, "errors", None) or "backslashreplace"
 

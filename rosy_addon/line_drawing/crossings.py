@@ -139,7 +139,7 @@ def _close_pairs(
 def _strip_keys(strokes: Strokes, segment_end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return keys by which segments are sorted, and the largest difference of the keys of crossing segments.
 
-    Strips are described in `_close_pairs`.
+    Each triangle is divided into numbered strips, which are as wide as its longest segment.
 
     Parameters
     ----------

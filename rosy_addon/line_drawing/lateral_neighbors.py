@@ -76,7 +76,8 @@ class LateralNeighbors(NamedTuple):
         Whether the sample has yielded: the gap beside it is wider than `SeparationRules.max_gap`, but too
         narrow for another stroke, so its stroke ends there.
     covering : CoveringPairs
-        Pairs of a sample that is not rejected and a neighbor beside it, less than `MAX_COVERED_GAP` away.
+        Pairs of a sample that is not rejected and a neighbor beside it, less than `MAX_COVERED_GAP` spacings
+        away.
     """
 
     gap: np.ndarray

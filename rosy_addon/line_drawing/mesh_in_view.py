@@ -88,6 +88,8 @@ class MeshInView(Parts):
 def mesh_in_view(mesh: TangentMesh, camera: Camera) -> MeshInView:
     """Cut off what is outside the frame and its margin, or nearer to the camera than the near plane.
 
+    The margin is `MARGIN_PIXELS` wide, but at most `MARGIN_RATIO` times the side of the frame.
+
     Parameters
     ----------
     mesh : TangentMesh
@@ -143,7 +145,10 @@ def _depths_of_cuts(depth: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _Pieces(Parts):
-    """Parts of triangles and their adjacency, with attributes as in `TangentMesh`."""
+    """Parts of triangles and their adjacency.
+
+    `neighbor`, `neighbor_edge` and `edge_transport` are as in `TangentMesh`, for the edges of the parts.
+    """
 
     neighbor: np.ndarray
     neighbor_edge: np.ndarray
@@ -298,7 +303,7 @@ def seen_triangles(instance: MeshInstance, index: int, depth_buffer: DepthBuffer
 
 
 def _is_hidden(points: np.ndarray, depth_buffer: DepthBuffer) -> np.ndarray:
-    """Return (n,) bool: whether points are in the frame and hidden.
+    """Return (n,) bool: whether (n, 3) points in world space are in the frame and hidden.
 
     A point is hidden if the triangles that are visible at all four pixels around it hide it.
     """

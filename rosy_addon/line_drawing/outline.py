@@ -212,8 +212,9 @@ def _are_pairs(vertex: np.ndarray, starts: np.ndarray, pairs: np.ndarray) -> np.
 def _pixel_salience(segments: Segments, angle: np.ndarray, camera: Camera) -> np.ndarray:
     """Return (k,) float64: the lengths of creases in pixels, times their angle over `REFERENCE_ANGLE`.
 
-    The length is not foreshortened: it is divided by the size of a pixel at the depth of the segment. So the
-    result hardly changes when the mesh rotates.
+    `angle`, (k,), is the angle between the normals at both sides of each segment, in radians. The length is
+    not foreshortened: it is divided by the size of a pixel at the depth of the segment. So the result hardly
+    changes when the mesh rotates.
     """
     length = np.linalg.norm(segments.ends[:, 1] - segments.ends[:, 0], axis=1)
     length = length / pixel_size(segments.ends.mean(axis=1), camera)
@@ -281,7 +282,7 @@ def _chain_segments(keys: np.ndarray, ends: np.ndarray) -> list[tuple[np.ndarray
     Parameters
     ----------
     keys : (k, 2) int64 ndarray
-        Keys of the end points, from `_point_keys`.
+        Keys of the end points, which are equal for points at the same position.
     ends : (k, 2, 3) ndarray
         End points of the segments.
 
@@ -377,6 +378,7 @@ class _OutlineTest:
     triangle_vertex : (T, 3) int32 ndarray
         Vertices of the triangles of the instance.
     corners : _Corners
+        Corners and normals of these triangles, in world space.
     """
 
     def __init__(self, instance: MeshInstance, index: int, depth_buffer: DepthBuffer) -> None:

@@ -208,7 +208,7 @@ def _instance_strokes(
 ) -> Strokes | None:
     """Return the strokes of a mesh instance before clipping, or None if no stroke can be in view.
 
-    `index` is the index of the instance in the depth buffer.
+    `index` is the index of the instance in the depth buffer, and `lights` are in camera space.
     """
     style = view.style
     report(0.0, "computing the spacing")

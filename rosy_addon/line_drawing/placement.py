@@ -144,14 +144,18 @@ class GrowingStrokes(ColumnTable):
     end_done = np.empty((0, 2), bool)
 
     def add(self, parent_side: np.ndarray, spacing: np.ndarray) -> np.ndarray:
-        """Add n strokes with two growing ends each, and return their indices."""
+        """Add n strokes with two growing ends each, and return their indices.
+
+        `parent_side` and `spacing`, (n,), are the values of the columns of these names.
+        """
         columns = {"spacing": spacing, "parent_side": parent_side}
         return self.append(len(spacing), alive=True, tip_count=2, **columns)
 
     def add_active_children(self, parent_side: np.ndarray, change: int) -> None:
         """Add `change` to the number of growing strokes seeded beside each given side of a stroke.
 
-        `parent_side` is as in the column of this name. Values of -1 are ignored.
+        `parent_side` holds 2 * stroke for left sides and 2 * stroke + 1 for right sides. Values of -1 are
+        ignored.
         """
         parent_side = parent_side[parent_side >= 0]
         np.add.at(self.active_children, (parent_side >> 1, parent_side & 1), change)

@@ -381,7 +381,8 @@ def _cross_edges(
     crossed : (k,) intp ndarray
         Indices of the particles that crossed an edge.
     transport : (k,) complex128 ndarray
-        Factors that transport tangents across these edges.
+        Factors that transport tangents across these edges, from the frame of the old triangle to the frame of
+        the new one.
     """
     neighbor = mesh.neighbor[particles.triangle, edge]
     stopped = (edge >= 0) & (neighbor < 0)

@@ -130,6 +130,7 @@ def svg_text(
         Strokes whose points are all in front of the camera.
     camera : Camera
     pen : Pen, optional
+        Width and colors of the strokes. By default, the defaults of `Pen`.
     marks : SingularityMarks, optional
         Singularities in the view of the camera; they are drawn over the strokes.
 
@@ -273,12 +274,12 @@ def _stroke_paths(pixels: np.ndarray, strokes: Strokes, width: float, color: str
 def _offset_sides(
     points: np.ndarray, radius: np.ndarray, start: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return (n, 2) points to the left of polylines and (n, 2) points to the right.
+    """Return (n, 2) points to the left of polylines and (n, 2) points to the right, as seen on screen.
 
     Parameters
     ----------
     points : (n, 2) ndarray
-        Points of all polylines.
+        Points of all polylines, in coordinates of the SVG document: y points down.
     radius : (n,) ndarray
         Distance from each point to the points on its left and right.
     start : (S + 1,) ndarray of int

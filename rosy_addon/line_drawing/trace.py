@@ -74,6 +74,7 @@ def trace_on_mesh(
     spacing : CornerSpacing
         Spacing between strokes of the same family.
     rules : SeparationRules, optional
+        Limits on the separation and the length of strokes. By default, the defaults of the class.
     surface_name : str
         Name of the surface in error messages.
 

@@ -191,7 +191,7 @@ def _validated_view(view: np.ndarray, name: str) -> np.ndarray:
 
 
 def _validated_projection(projection: np.ndarray, name: str) -> np.ndarray:
-    """Return the projection matrix, scaled as described in `Camera`; raise `RosyError` if it is invalid."""
+    """Return the projection matrix, scaled so that w is depth or 1. Raise `RosyError` if it is invalid."""
     projection = _validated_matrix(projection, "projection", name)
     w_row, xy_rows = projection[3], projection[:2]
     if w_row[2] < 0 and not w_row[[0, 1, 3]].any() and not xy_rows[:, 3].any():

@@ -150,6 +150,7 @@ def cached_corner_field(
 ) -> CornerField:
     """Return the result of `field_at_corners` for an instance with a field; store it in a cache if given.
 
+    `display` is "smooth" or "flat": whether the field is interpolated, or constant on each face.
     All cameras, and instances that differ only in their location, share one corner field.
     """
     surface, field = instance.surface, instance.field

@@ -100,7 +100,7 @@ class SurfacePoints(NamedTuple):
 
     @staticmethod
     def of(instance_id: int, triangle: np.ndarray, barycentric: np.ndarray) -> SurfacePoints:
-        """Return points on one instance."""
+        """Return points on one instance, given their (P,) triangles and (P, 3) barycentric coordinates."""
         return SurfacePoints(
             np.full(len(triangle), instance_id, dtype=np.int32), triangle, barycentric
         )

@@ -60,9 +60,9 @@ class _Entries(NamedTuple):
     """The P pixels of a G-buffer, as arrays that are compared with `_OtherSamples`.
 
     `x` and `y` are the centers of the pixels, and `depth`, `instance_id` and `normal` describe the triangles
-    visible there, as in `_OtherSamples`.
-    `slope_x` and `slope_y` are the changes of the depth to the next column and row, on the tangent plane, and
-    `tolerance` is the permitted deviation from this plane; see `pixel_neighbors.depth_slopes`.
+    visible there, as in `_OtherSamples`. `slope_x` and `slope_y` are the changes of the depth to the next
+    column and row, on the tangent plane, and `tolerance` is the permitted deviation from this plane; see
+    `pixel_neighbors.depth_slopes`.
     """
 
     x: np.ndarray

@@ -304,6 +304,8 @@ def _spans_with_depth(
 def _depth_test(spans: _Spans, depth_buffer: np.ndarray, triangle_buffer: np.ndarray) -> None:
     """Draw spans into the depth buffer and the triangle buffer, in place.
 
+    The buffers are flat arrays with z / w and the index of the triangle that is visible at each pixel.
+
     If several fragments write to the same pixel in one assignment, an arbitrary one is kept. The
     fragments that are nearer than the kept one write again, until there are none. Few rounds are
     needed, because each round removes all fragments that are not in front of the kept one.

@@ -77,7 +77,7 @@ def project_vertices(
     vertices : sequence of (n,) int ndarray
         For each instance, the indices of the vertices to project.
     clip_planes : (6, 4) float64 ndarray, optional
-        World space. The negative side of each plane is cut away.
+        Planes (a, b, c, d) in world space. Points with a x + b y + c z + d < 0 are cut away.
 
     Returns
     -------
@@ -115,13 +115,14 @@ def project_points(
     points : SurfacePoints
         K points.
     clip_planes : (6, 4) float64 ndarray, optional
-        World space. The negative side of each plane is cut away.
+        Planes (a, b, c, d) in world space. Points with a x + b y + c z + d < 0 are cut away.
     finds_hidden : bool
         Whether hidden points are found. If not, all points in the frame count as visible.
 
     Returns
     -------
     ProjectedPoints
+        The points in their order.
     """
     report(0.0, POINTS_LABEL)
     scene = _Scene.of(instances, camera, clip_planes)
@@ -197,7 +198,7 @@ class _Scene:
         Triangles that can hide points, as indices of vertices.
     camera : Camera
     clip_planes : (6, 4) float64 ndarray or None
-        World space. The negative side of each plane is cut away.
+        Planes (a, b, c, d) in world space. Points with a x + b y + c z + d < 0 are cut away.
     tolerance : float
         A surface hides a point only if it is nearer to the camera by more than this depth, in Blender units.
     """

@@ -89,7 +89,8 @@ def _draw_plate(
 ) -> None:
     """Draw a rectangle with round corners over a picture (see `draw_key`), in place.
 
-    `radius` is the radius of the corners in pixels, and `color` a linear color, (3,).
+    `box` and `radius`, the radius of the corners, are in pixels. `color` is a linear color, (3,), and
+    `opacity` is from 0 to 1.
     """
     low, high = np.array(box[:2]), np.array(box[2:])
     part, x, y = window(rgba, low, high)

@@ -176,7 +176,10 @@ class GrowingStrokes(ColumnTable):
         return self.max_arc[stroke] - self.min_arc[stroke]
 
     def finish_ends(self, stroke: np.ndarray, end: np.ndarray) -> np.ndarray:
-        """Mark n ends as finished. Return the indices of strokes that have no growing end left."""
+        """Mark n ends as finished. Return the indices of strokes that have no growing end left.
+
+        `stroke` and `end`, (n,), are the strokes and their ends: 0 is the backward end, 1 the forward end.
+        """
         self.end_done[stroke, end] = True
         np.subtract.at(self.tip_count, stroke, 1)
         finished = np.unique(stroke)

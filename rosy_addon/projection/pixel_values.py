@@ -104,8 +104,9 @@ def _interpolated_values(
     corner_values : (3, T) complex64 ndarray
         Values of one channel of `corner_field`.
     triangle : (P,) ndarray of int
+        Triangle at each pixel.
     weights : (3, P) float32 ndarray
-        Barycentric coordinates b_i.
+        Barycentric coordinates b_i of the pixel in it.
     length : (P,) float32 ndarray
         Length of sum b_i n_i, from `_interpolated_normal`.
     order : int

@@ -273,8 +273,9 @@ class _Scene:
         Parameters
         ----------
         triangle : (n,) ndarray of int
+            Triangles to test, one for each point.
         ndc : (n, 2) float64 ndarray
-            Positions of the points, from -1 to 1.
+            Positions of the points on screen, from -1 to 1.
         distance : (n,) float64 ndarray
             Depths of the points, along the axis of the camera.
         """

@@ -135,9 +135,9 @@ def arrow_marks(
     size : float
         Length of an arrowhead, pixels.
     display : {"smooth", "flat"}
-        Whether the field is interpolated, or constant on each face; see `projection.project.project`.
+        Whether the field is interpolated, or constant on each face.
     clip_planes : (6, 4) float64 ndarray, optional
-        Planes in world space. The negative side of each plane is cut away.
+        Planes (a, b, c, d) in world space. Points with a x + b y + c z + d < 0 are cut away.
     cache : Cache, optional
         Cache for points of surfaces at which arrowheads are drawn, and for corner fields.
     is_exact : bool
@@ -183,8 +183,9 @@ def _places_in_order(
     """Return candidates for the points at which arrowheads are drawn on all surfaces, in order of preference.
 
     The first candidates are the points of `surface_places`, which do not depend on the view, from the largest
-    distance between points to the smallest. In views so near that these are too far apart, points between
-    them follow.
+    distance between points to the smallest. In views so near that even the points of the finest level are too
+    far apart, additional points between these follow. `spacing` is the smallest distance of arrowheads on
+    screen, in pixels.
     """
     parts = [SurfacePoints.of(0, np.empty(0, np.int32), np.empty((0, 3)))]
     keys = [np.empty((2, 0))]
@@ -215,7 +216,8 @@ def _needed_distances(
 ) -> np.ndarray:
     """Return (P,) float64: the smallest distance between arrowheads near each point, in world space.
 
-    `spacing` is in pixels. The distance is infinite behind the eye.
+    `points` are P points of the instance. `spacing` is the distance of arrowheads on screen, in pixels. The
+    result is infinite behind the eye.
     """
     world = instance.points_in_triangles(points.triangle, points.barycentric)
     result = np.full(len(world), NEAREST_PLACES * spacing / camera.pixels_per_unit)
@@ -249,7 +251,8 @@ def _reach(degree: int, size: float) -> float:
 def _screen_directions(gbuffer: GBuffer) -> np.ndarray:
     """Return (P, M) complex128: the directions of the field at P points, foreshortened, on screen.
 
-    M is the largest degree of all fields. A point with fewer than M directions has zeros in their place.
+    A direction is right + i up. Its modulus is 1 if it is parallel to the picture. M is the largest degree of
+    all fields. A point with fewer than M directions has zeros in their place.
     """
     jacobian = screen_jacobians(gbuffer).astype(np.complex128)
     degree = np.asarray(gbuffer.instance_degrees)[gbuffer.instance_id]
@@ -322,7 +325,8 @@ class SurfacePlaces:
     level : int
         Number of the finest level; -1 if there are no points.
     extent : float
-        Distance between the points of level 0: the side of a square that has the area of the surface.
+        Distance between the points of level 0, in Blender units of the rest shape: the side of a square that
+        has the area of the surface.
     """
 
     triangle: np.ndarray
@@ -397,7 +401,8 @@ def _with_level(
 ) -> SurfacePlaces:
     """Return `places` with one more level, whose points are chosen from candidates.
 
-    `triangle` and `barycentric` are the triangles and barycentric coordinates of the candidates.
+    `triangle`, (n,), and `barycentric`, (n, 3), are the triangles and barycentric coordinates of the
+    candidates.
     """
     level = places.level + 1
     finest = level_distance(places.extent, level)

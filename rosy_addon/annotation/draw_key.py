@@ -87,7 +87,11 @@ def draw_key(
 def _draw_plate(
     rgba: np.ndarray, box: Box, radius: float, color: np.ndarray, opacity: float
 ) -> None:
-    """Draw a rectangle with round corners of the given radius, in place."""
+    """Draw a rectangle with round corners over a picture (see `draw_key`), in place.
+
+    `box` and `radius`, the radius of the corners, are in pixels. `color` is a linear color, (3,), and
+    `opacity` is from 0 to 1.
+    """
     low, high = np.array(box[:2]), np.array(box[2:])
     part, x, y = window(rgba, low, high)
     center, half = (low + high) / 2, (high - low) / 2 - radius
@@ -105,7 +109,7 @@ def _draw_color_bar(rgba: np.ndarray, box: Box, color_scale: ColorScale) -> None
 
 
 def _draw_rectangle(rgba: np.ndarray, box: Box, color: np.ndarray) -> None:
-    """Draw an opaque rectangle with antialiased edges, in place."""
+    """Draw an opaque rectangle of a linear color, (3,), with antialiased edges, in place."""
     part, x, y = window(rgba, np.array(box[:2]), np.array(box[2:]))
     left, bottom, right, top = box
     across = np.minimum(x + 0.5, right) - np.maximum(x - 0.5, left)
@@ -118,7 +122,8 @@ def _draw_triangles(
 ) -> None:
     """Draw triangles that do not overlap, with antialiased edges, in place.
 
-    `triangles` are (n, 3, 2) corners in pixels. The opacity is 1 - (1 - coverage of the pixel)^exponent.
+    `triangles` are (n, 3, 2) corners in pixels from the lower left, and `color` is linear, (3,). The opacity
+    is 1 - (1 - coverage of the pixel)^exponent.
     """
     if not len(triangles):
         return

@@ -24,8 +24,9 @@ def window(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the part of a picture between two corners, and the x and y coordinates of its pixel centers.
 
-    `low` and `high` are the lower left and the upper right corner in pixels. The part is a view of the
-    picture. It is empty if the corners are outside of the picture.
+    `low` and `high` are the lower left and the upper right corner, in pixels from the lower left of the
+    picture. The part, (h, w, 4), is a view of the picture. It is empty if the corners are outside of the
+    picture. x and y, (h, w) each, are pixels of the whole picture.
     """
     size = rgba.shape[1::-1]
     left, bottom = np.floor(np.clip(low, 0, size)).astype(int)
@@ -35,7 +36,10 @@ def window(
 
 
 def draw_over(part: np.ndarray, color: np.ndarray, opacity: np.ndarray) -> None:
-    """Composite a linear color, with an opacity for each pixel, over a part of a picture, in place."""
+    """Composite a linear color, with an opacity for each pixel, over a part of a picture, in place.
+
+    `part`, (h, w, 4), is linear and not premultiplied. `color` is (3,), and `opacity`, 0 to 1, is (h, w).
+    """
     opacity = opacity.astype(np.float32)
     alpha = opacity + part[..., 3] * (1 - opacity)
     share = np.divide(opacity, alpha, out=np.zeros_like(alpha), where=alpha > 0)[..., None]
@@ -80,6 +84,7 @@ def draw_dot(rgba: np.ndarray, dot: Dot, opacity: float = 1.0) -> None:
         Picture: linear, not premultiplied, rows from the bottom.
     dot : Dot
     opacity : float
+        Opacity of the whole dot, 0 to 1.
     """
     center, outer = np.array((dot.x, dot.y)), dot.radius + dot.outline
     part, x, y = window(rgba, center - outer - 1, center + outer + 1)
@@ -205,9 +210,10 @@ def head_outline(size: float) -> np.ndarray:
 def _edge_distance(
     x: np.ndarray, y: np.ndarray, start: np.ndarray, end: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the distances from points to an edge, and whether points are to its left or on it.
+    """Return the distances from points to an edge, and whether points are to its left or on its line.
 
-    `x` and `y` are the coordinates of the points, in any shape, and `start` and `end` the ends of the edge.
+    `x` and `y` are the coordinates of the points, in any shape, which is also the shape of the results.
+    `start` and `end`, (2,), are the ends of the edge. Left is as seen from the start toward the end.
     """
     dx, dy = end - start
     px, py = x - start[0], y - start[1]

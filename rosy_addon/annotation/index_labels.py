@@ -39,7 +39,8 @@ class Label:
     ----------
     text : str
     left, bottom, height : float
-        Lower left corner and height of the letters, pixels.
+        Lower left corner of the text, in pixels from the lower left of the picture, and height of the
+        letters.
     """
 
     text: str
@@ -95,7 +96,7 @@ def place_indices(
     Parameters
     ----------
     position : (K, 2) ndarray
-        Centers of the dots, pixels.
+        Centers of the dots, pixels from the lower left.
     index, degree : (K,) int ndarray
         Indices of the singularities in units of 1 / N, and N.
     size : float
@@ -108,7 +109,7 @@ def place_indices(
     Returns
     -------
     list of (str, float, float)
-        The text and the lower left corner, in pixels, of each label that was placed.
+        The text of each label that was placed, and x and y of its lower left corner in pixels.
     """
     texts = [format_index(*pair) for pair in zip(index.tolist(), degree.tolist(), strict=True)]
     sizes = np.array([label_size(text) for text in texts])
@@ -194,7 +195,10 @@ def _letter(letter: str) -> tuple[np.ndarray, float]:
 def _arc(
     center: tuple[float, float], radii: tuple[float, float], first: float, last: float
 ) -> list[tuple[float, float]]:
-    """Return points on an arc of an ellipse, from the angle `first` to the angle `last` in degrees."""
+    """Return points on an arc of an ellipse, from the angle `first` to the angle `last` in degrees.
+
+    `radii` are half of the width and half of the height of the ellipse.
+    """
     angles = np.radians(np.linspace(first, last, max(int(abs(last - first) / 20), 2)))
     x, y = center[0] + radii[0] * np.cos(angles), center[1] + radii[1] * np.sin(angles)
     return list(zip(x.tolist(), y.tolist(), strict=True))

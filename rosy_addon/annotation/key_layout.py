@@ -165,7 +165,8 @@ def lay_out_key(
 def wrapped(text: str, width: float, text_width: Callable[[str], float]) -> list[str]:
     """Return the lines of a text, broken at spaces so that they are not wider than `width`.
 
-    A single word that is wider is on a line of its own. `text_width` returns the width of a string.
+    A single word that is wider is on a line of its own. `text_width` returns the width of a string, in the
+    unit of `width`.
     """
     lines: list[str] = []
     for paragraph in text.strip().splitlines():
@@ -182,7 +183,10 @@ def wrapped(text: str, width: float, text_width: Callable[[str], float]) -> list
 
 @dataclass
 class _Arrangement:
-    """The arrangement of the parts of a key at one text size, `size`. Dots are scaled by `dot_scale`."""
+    """The arrangement of the parts of a key for one text size, `size`, in pixels.
+
+    The diameters of the dots in the legend are multiplied by `dot_scale`.
+    """
 
     parts: KeyParts
     frame: tuple[int, int]
@@ -234,10 +238,10 @@ class _Arrangement:
     def _add_plate(
         self, left: float, bottom: float, width: float, height: float
     ) -> tuple[float, float]:
-        """Add a background rectangle. Return the lower left corner for its contents.
+        """Add a background rectangle. Return the lower left corner of its contents, x and y in pixels.
 
-        `left` and `bottom` are coordinates of the rectangle. `width` and `height` are the size of its
-        contents.
+        (`left`, `bottom`) is the lower left corner of the rectangle. `width` and `height` are the size of its
+        contents, without the padding. All are in pixels.
         """
         left, bottom = round(left), round(bottom)
         right, top = left + self._plate_size(width), bottom + self._plate_size(height)

@@ -153,11 +153,12 @@ def _with_points(
     clip : (V, 4) float64 ndarray
         Vertices in clip space.
     triangles : (T, 3) int ndarray
+        Vertices of the triangles.
     camera : Camera
     spacing : float
-        See `progressive_samples`, in pixels.
+        Side, in pixels, of a square on screen that contains about `POINTS_PER_SPACING` points.
     offset : (T,) float64 ndarray
-        The random number u of each triangle; see the module.
+        The random number u of each triangle, 0 to 1; its point i has the rank (i + u) / area.
     """
     w = np.where(clip[:, 3] > 0, clip[:, 3], np.nan)
     x, y = clip[:, 0] / w, clip[:, 1] / w
@@ -191,7 +192,7 @@ def _screen_areas(
         Corners in clip space.
     camera : Camera
     spacing : float
-        See `progressive_samples`, in pixels.
+        Side, in pixels, of a square on screen that contains about `POINTS_PER_SPACING` points.
 
     Returns
     -------
@@ -223,7 +224,10 @@ def matrix_scale(instance: MeshInstance) -> float:
 
 
 def rest_areas(surface: Surface, triangle: np.ndarray | None = None) -> np.ndarray:
-    """Return the (n,) areas of triangles in the rest shape, by default of all triangles of the surface."""
+    """Return the (n,) areas of triangles in the rest shape, in object space.
+
+    `triangle` holds the indices of the triangles; by default, they are all triangles of the surface.
+    """
     vertices = surface.in_rest_shape().vertices
     corners = surface.triangle_vertex if triangle is None else surface.triangle_vertex[triangle]
     a, b, c = (np.ascontiguousarray(vertices[corner].T) for corner in corners.T)
@@ -248,7 +252,8 @@ def surface_samples(surface: Surface, density: float) -> tuple[np.ndarray, np.nd
     barycentric : (P, 3) float64 ndarray
         Barycentric coordinates of each point in its triangle.
     rank : (P,) float64 ndarray
-        Rank of each point, at most `density`; see `progressive_samples`.
+        Rank of each point, in points per square unit of object space, at most `density`. All points up to a
+        rank are an even sample of the surface.
     """
     area = rest_areas(surface)
     shuffle = _random_bits(len(area))
@@ -260,9 +265,10 @@ def surface_samples(surface: Surface, density: float) -> tuple[np.ndarray, np.nd
 def _points(
     number: np.ndarray, triangle: np.ndarray, shuffle: np.ndarray, area: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return points as `progressive_samples` does, given their triangles and their indices in the sequences.
+    """Return the triangles, barycentric coordinates and ranks of points, as `progressive_samples` does.
 
-    `number` holds the (P,) indices. `shuffle` and `area` are the random bits and areas of all triangles.
+    `triangle` holds the (P,) triangles of the points, and `number` their (P,) indices in the sequences of
+    these triangles. `shuffle` and `area` are the random bits and areas of all triangles.
     """
     shuffle, area = shuffle[triangle], area[triangle]
     rank = (number + _random_offsets(shuffle)) / area
@@ -282,7 +288,8 @@ def _random_bits(count: int) -> np.ndarray:
 def _shuffle_bits(shuffle: np.ndarray, depth: int) -> np.ndarray:
     """Return (n,) int64 numbers from 0 to 3, with which triangles shuffle sub-triangles of one depth.
 
-    A digit of an index, XOR this number, is the number of the sub-triangle in `PARTS`.
+    `shuffle`, (n,), holds the random bits of the triangles. A digit of an index, XOR the result, is the
+    number of the sub-triangle in `PARTS`.
     """
     return (shuffle >> np.uint64(2 * depth) & np.uint64(3)).astype(np.int64)
 

@@ -64,7 +64,7 @@ def tick_labels(low: float, high: float, max_steps: int, gap: float) -> list[tup
     low, high : float
         Ends of the range; `low` must not be above `high`. If they are equal, there is one tick.
     max_steps : int
-        Largest number of steps between round numbers, as in `tick_values`.
+        Largest number of steps from one round number to the next in the range.
     gap : float
         Smallest distance between a round number and the ends, as a fraction of the range.
 

@@ -35,7 +35,7 @@ HIDDEN_OPACITY = 0.3
 
 @dataclass(frozen=True)
 class Dot:
-    """A dot of a singularity: center, radius without outline, and width of the outline, in pixels; and the index.
+    """A dot of a singularity: center, radius without outline, width of the outline, in pixels; and index.
 
     Coordinates are measured from the lower left corner of the frame. The index is in units of 1 / N.
     """
@@ -60,7 +60,7 @@ class SingularityMarks:
     degree : (K,) int ndarray
         Degrees N of their fields.
     depth : (K,) float64 ndarray
-        Depths from the camera. Near dots are drawn over far ones.
+        Depths along the axis of the camera, in Blender units. Near dots are drawn over far ones.
     is_visible : (K,) bool ndarray
         Whether the camera sees the singularity. Dots of hidden singularities are fainter, below all others
         and without labels.
@@ -129,7 +129,7 @@ def singularity_marks(
         Only the settings `singularity_dots` and `singularity_size` are read. They select the singularities
         and the style of their dots.
     clip_planes : (6, 4) float64 ndarray, optional
-        Planes in world space. The negative side of each plane is cut away.
+        Planes (a, b, c, d) in world space. Points with a x + b y + c z + d < 0 are cut away.
     cache : Cache, optional
         Cache for the singularities of fields.
 
@@ -182,10 +182,10 @@ def shown_singularities(
 def clusters_of(
     instance: MeshInstance, found: tuple[np.ndarray, np.ndarray], cache: Cache
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the singularities of an instance, of which those within `CLUSTER_REACH` are read as one.
+    """Return the singularities of an instance after near ones are merged to clusters.
 
-    `found` holds all singularities. The result, which is from the cache if possible, is explained in
-    `cluster_singularities`.
+    `found` holds the vertices and the indices, in units of 1 / N, of all singularities. The result is of the
+    same form, with one singularity for each cluster; see `cluster_singularities`. It is stored in the cache.
     """
     surface = instance.surface.in_rest_shape()
     return cache.get_or_create(

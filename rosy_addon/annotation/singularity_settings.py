@@ -16,7 +16,10 @@ def shows_singularities(settings: Any) -> bool:
 
 
 def shows_hidden_singularities(settings: Any) -> bool:
-    """Return whether dots are also drawn for singularities that the camera does not see."""
+    """Return whether dots are also drawn for singularities that the camera does not see.
+
+    `settings` is a look, a stroke style, or a group of properties in Blender with the same names.
+    """
     return settings.singularity_dots.startswith("all")
 
 

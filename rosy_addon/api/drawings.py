@@ -29,8 +29,11 @@ class Drawing:
     Parameters
     ----------
     strokes : rosyfields.line_drawing.pipeline.StrokeDrawing
+        The strokes in world space.
     camera : rosyfields.projection.camera.Camera
+        Camera of the picture.
     pen : rosyfields.line_drawing.svg.Pen
+        Width and colors of the strokes.
     up : {"y", "z"}
         The axis of the mesh that points up.
 
@@ -116,9 +119,16 @@ def strokes(
 
     Parameters
     ----------
-    surface, field, view, size, orthographic
-        See `render`. All lengths in pixels, such as the setting `spacing`, are pixels of a picture of this
-        `size`.
+    surface : Surface
+    field : Field, optional
+        By default a field of degree 4 along the form of the surface; see `form`.
+    view : (float, float)
+        Azimuth and elevation of the camera in degrees: (0, 0) is from the front, (0, 90) from above.
+    size : (int, int)
+        Width and height of the picture in pixels. All lengths in pixels, such as the setting `spacing`, refer
+        to it.
+    orthographic : bool
+        Orthographic projection instead of perspective.
     width : float
         Full width of a stroke in pixels.
     colors : sequence of str

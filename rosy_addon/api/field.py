@@ -52,15 +52,16 @@ def from_vectors(
     surface : Surface
     vectors : (F, 3), (V, 3) or (V, 2) array_like
         Zero where the field is undefined. If there are as many faces as vertices, each vector belongs to a
-        face. Rows of two numbers are x and y if all vertices have the same z. Otherwise they are vectors at the
-        vertices in the frames of geometry-central, as potpourri3d returns them. A `RosyWarning` says so.
+        face. Rows of two numbers are x and y if all vertices have the same z. Otherwise they are vectors at
+        the vertices in the frames of geometry-central, as potpourri3d returns them. A `RosyWarning` says so.
     degree : int
         N, from 1 to 12: 1 for a vector field, 2 for a line field, 4 for a cross field.
     nonfinite : {"error", "zero"}
         Raise an error if a vector is not finite, or treat it as undefined.
     off_surface : {"error", "project", "undefined"}
-        What to do about vectors that are more than 5 degrees (at vertices, 20) off the surface: raise an error if
-        they are more than 1 percent, always rotate them into the surface, or treat them as undefined.
+        What to do about vectors that are more than 5 degrees (at vertices, 20) off the surface: raise an
+        error if they are more than 1 percent, always rotate them into the surface, or treat them as
+        undefined.
 
     Raises
     ------
@@ -179,7 +180,8 @@ def from_directions(
     nonfinite : {"error", "zero"}
         Raise an error if a vector is not finite, or treat it as undefined.
     off_surface : {"error", "project", "undefined"}
-        See `from_vectors`.
+        What to do about directions off the surface: raise an error if they are many, always rotate them into
+        the surface, or treat them as undefined; see `from_vectors`.
 
     Raises
     ------
@@ -276,15 +278,17 @@ def from_array(
         From a file of a simulation, from the mesh of another library, or from a ``.ply`` file. There, three
         properties such as ``wind_x``, ``wind_y`` and ``wind_z`` are the array of vectors "wind".
     name : str, optional
-        Name of the array; not needed for files that `Field.save` wrote. If the vertices and the faces both have an array NAME, "point:NAME" is the array
-        of the vertices, and "cell:NAME" the array of the faces. By default, the only array that can be a
-        field is used: floating-point numbers that are not normals.
+        Name of the array; not needed for files that `Field.save` wrote. If the vertices and the faces both
+        have an array NAME, "point:NAME" is the array of the vertices, and "cell:NAME" the array of the faces.
+        By default, the only array that can be a field is used: floating-point numbers that are not normals.
     degree : int, optional
         N, from 1 to 12; by default 1 for an array of vectors. Tensors have degree 4.
     nonfinite : {"error", "zero"}
         Raise an error if a number is not finite, or treat the vector or tensor as undefined.
     off_surface : {"error", "project", "undefined"}
-        See `from_vectors`. With "error", arrays of 3 components are replaced by their tangential components.
+        What to do about vectors off the surface: with "error", replace arrays of 3 components by their
+        tangential components; always rotate vectors into the surface; or treat them as undefined. See
+        `from_vectors`.
 
     Raises
     ------
@@ -326,7 +330,8 @@ def read_field(
     nonfinite : {"error", "zero"}
         Raise an error if a vector is not finite, or treat it as undefined.
     off_surface : {"error", "project", "undefined"}
-        See `from_vectors`.
+        What to do about vectors off the surface: raise an error if they are many, always rotate them into the
+        surface, or treat them as undefined; see `from_vectors`.
     mesh : path-like, optional
         The mesh file of the field, if it is another mesh than `surface`. The field is then transferred
         by position.

@@ -56,7 +56,7 @@ class Studio:
     _cache: Cache = field(default_factory=Cache)
 
     def _rgba(self, instance: MeshInstance, **changes: Any) -> NDArray[np.float32]:
-        """Return the picture of a mesh instance as `Picture.rgba`, without singularities.
+        """Return the (H, W, 4) picture of a mesh instance, without singularities: linear, bottom row first.
 
         `changes` are settings that replace those of the look.
         """
@@ -96,7 +96,8 @@ class Studio:
         Parameters
         ----------
         lines : {"other", "first", "both"}
-            Fields whose lines are drawn over a difference; see `figure`.
+            Fields whose lines are drawn over a difference: the field that is compared with the first one, the
+            first field, or both.
         largest_angle : float
             Angle at the top of the color map, in degrees. 0 means 180/N.
         """
@@ -151,7 +152,8 @@ class Studio:
     def _links(self, title: str) -> NDArray[np.float64]:
         """Return the (n, 2, 2) end points, in pixels, of lines that connect matching singularities.
 
-        Lines of which an end is hidden are left out.
+        A line begins at a singularity of the first field and ends at one of the field `title`. Pixels are
+        counted from the lower left. Lines of which an end is hidden are left out.
         """
         first = next(iter(self.comparison.fields.values())).singularities
         second = self.comparison.fields[title].singularities
@@ -161,9 +163,9 @@ class Studio:
         return place.reshape(-1, 2, 2)[is_visible.reshape(-1, 2).all(axis=1)]
 
     def _worst_place(self, face: int) -> NDArray[np.float64] | None:
-        """Return the position of a face in the picture, (2,) pixels.
+        """Return the position of a face of the first field in the picture, (2,) pixels from the lower left.
 
-        None if none of its corners is visible, or `face` is negative.
+        None if none of the corners of the face is visible, or `face` is negative.
         """
         if face < 0:
             return None
@@ -173,7 +175,10 @@ class Studio:
         return place[is_visible].mean(axis=0) if is_visible.any() else None
 
     def _projected(self, vertices: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Return the (n, 2) positions of vertices of the first surface in pixels, and which are visible."""
+        """Return where n vertices of the first surface are in the picture, and which are visible.
+
+        Positions, (n, 2), are in pixels from the lower left.
+        """
         first = next(iter(self.instances.values()))
         projected = project_vertices([first], self.camera, [vertices])
         return projected.position, projected.is_visible

@@ -97,12 +97,15 @@ def figure(
     dpi : int
         Resolution of the pictures. Lines do not get thinner with it: lengths of the look are in
         pixels at 150 dpi.
-    view, preset
-        See `render`.
+    view : (float, float)
+        Azimuth and elevation of the camera in degrees: (0, 0) is from the front, (0, 90) from above.
     orthographic : bool
         Whether the projection is orthographic. A scale bar needs this.
+    preset : str or path-like, optional
+        Name of a preset of the look, or a ``.json`` file; see `list_presets`.
     color_values : str, or sequence of str or array_like, optional
-        Values for the color map (see `render`) for each field, or the name of an array for all fields.
+        Values for the color map, at faces, vertices or corners, for each field; or the name of an array for
+        all fields. See `render`.
     color_label : str, optional
         Label of the color bar of the fields: a quantity and its unit. By default the name of the array of
         values, or "magnitude" if the colors show magnitudes.
@@ -111,15 +114,16 @@ def figure(
     lines : {"other", "first", "both"}
         Field whose lines are drawn over a difference: the other field, the first field, or both.
     reach : float
-        Largest distance of singularities that match; see `compare`.
+        Largest distance of singularities that match, as a fraction of the longest side of the mesh; see
+        `compare`.
     scale_bar : str, optional
         Unit of the coordinates, such as "mm", or "" if they have none. By default, no scale bar is drawn.
     caption : str
         Text below everything else.
-    workers
-        See `render`.
+    workers : int
+        Number of processes that draw a large picture together. 0 means one for each processor core.
     **settings
-        Settings of the look; see `render`.
+        Settings of the look, after the preset: ``length=120, seed=3``.
 
     Returns
     -------
@@ -182,7 +186,10 @@ def _comparison_of(
     parts: Sequence[str],
     reach: float,
 ) -> Comparison:
-    """Return the comparison of fields. It has no differences if no part of the figure shows any."""
+    """Return the comparison of fields. It has no differences if none of the `parts` of the figure shows any.
+
+    `reach` is the largest distance of singularities that match, as a fraction of the size of the mesh.
+    """
     if isinstance(fields, Comparison):
         return fields
     titled = {fields.surface.name: fields} if isinstance(fields, Field) else fields
@@ -294,7 +301,10 @@ def _check_numbers(name: str, **numbers: float) -> None:
 def _instances(
     name: str, fields: Mapping[str, Field], color_values: str | Sequence[str | ArrayLike] | None
 ) -> dict[str, MeshInstance]:
-    """Return the fields in world space, with their `color_values`; see `figure`.
+    """Return the fields in world space as mesh instances by title, with their values for the color map.
+
+    `color_values` has an array of values, or the name of an array, for each field. Or it is one name for all
+    fields, or None.
 
     Raises
     ------

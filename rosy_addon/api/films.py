@@ -78,10 +78,22 @@ def film(
         Add pictures from the last field back to the first one, so that the video can be played as a loop.
     rate : float
         Pictures per second.
-    view, size, orthographic, preset, workers, **settings
-        See `render`.
-    encode, on_picture
-        See `turntable`.
+    view : (float, float)
+        Azimuth and elevation of the camera in degrees: (0, 0) is from the front, (0, 90) from above.
+    size : (int, int)
+        Width and height in pixels.
+    orthographic : bool
+        Orthographic projection instead of perspective.
+    preset : str or path-like, optional
+        Name of a preset of the look, or a ``.json`` file; see `list_presets`.
+    workers : int
+        Number of processes that draw a large picture together. 0 means one for each processor core.
+    encode : function, optional
+        Function that encodes an ``.mp4`` file; see `turntable`. By default ffmpeg, if it is installed.
+    on_picture : function, optional
+        Function that is called before each picture is drawn, with its number, from 1.
+    **settings
+        Settings of the look, after the preset: ``length=120, seed=3``; see `render`.
 
     Returns
     -------
@@ -130,6 +142,7 @@ class _Survey(NamedTuple):
     points : (n, 3) float64 ndarray
         Points in world space that the camera frames.
     largest_magnitude : float
+        Largest length of a member in all fields.
     turn : float
         Largest mean angle between neighboring fields, in radians.
     keeps_polygons : bool
@@ -152,12 +165,13 @@ class Film:
     Parameters
     ----------
     fields : sequence of Field
-        See `film`.
+        Two or more fields of the same degree, in order of time. Each item is requested twice.
     look : Look
         Look of the first picture. If it shows magnitudes and sets no range of colors, the range covers all
         fields.
     framing : (float, float, int, int)
-        Azimuth and elevation in degrees, width and height in pixels; see `orbit_camera`.
+        Azimuth and elevation of the camera in degrees (see `orbit_camera`), and width and height of the
+        picture in pixels.
     perspective : bool
         Whether the projection is perspective. If not, it is orthographic.
     between : int or None

@@ -126,8 +126,8 @@ def features(
     sharp_angle : float
         Smallest angle in radians between the normals of the two faces of a sharp edge.
     edges : (E, 2) array_like of int, or path-like, optional
-        Pairs of vertices: edges that the field follows instead of borders and sharp edges. Or a file of edges:
-        ``.sharp`` of QuadWild, or ``.feature`` of TriCrossField.
+        Pairs of vertices: edges that the field follows instead of borders and sharp edges. Or a file of
+        edges: ``.sharp`` of QuadWild, or ``.feature`` of TriCrossField.
 
     Raises
     ------
@@ -209,7 +209,10 @@ def guided(
 
 
 def _edge_ends(surface: Surface, edges: Any) -> np.ndarray | None:
-    """Return the argument `edges` of `features` as pairs of vertices, or None if it is None."""
+    """Return `edges` as (E, 2) vertices at the ends of edges, or None if it is None.
+
+    It holds such pairs, or it is the path of a file of edges, which is read.
+    """
     if isinstance(edges, (str, os.PathLike)):
         return read_edges(edges, surface)
     return None if edges is None else np.asarray(edges)
@@ -304,7 +307,16 @@ def prescribed(
 
 
 def _whole_indices(surface: Surface, singularities: Mapping[int, float], degree: int) -> np.ndarray:
-    """Return the indices of singularities in units of 1 / `degree`; see `prescribed`."""
+    """Return (K,) int64: the indices of singularities in units of 1 / `degree`, in the order of the mapping.
+
+    `singularities` has the index of each singularity by its vertex: an int is in units of 1 / `degree`,
+    another number is the index itself.
+
+    Raises
+    ------
+    RosyError
+        If an index is not a multiple of 1 / `degree`.
+    """
     indices = []
     for vertex, index in singularities.items():
         units = index if isinstance(index, Integral) else float(index) * degree
@@ -349,9 +361,9 @@ def along_axis(surface: Surface, axis: Sequence[float] = (0.0, 0.0, 1.0), degree
 def along_uv(surface: Surface, degree: int = 4) -> Field:
     """Make a field along the axes of the UV map of the surface.
 
-    Members follow the direction in which u increases. If the degree N is a multiple of 4, the field is the one
-    that is nearest to both axes of the map: where the angle between them is not a multiple of 360/N degrees, it
-    deviates equally from both, by at most 90/N degrees. `from_directions` keeps axes that are not
+    Members follow the direction in which u increases. If the degree N is a multiple of 4, the field is the
+    one that is nearest to both axes of the map: where the angle between them is not a multiple of 360/N
+    degrees, it deviates equally from both, by at most 90/N degrees. `from_directions` keeps axes that are not
     perpendicular.
 
     Raises

@@ -139,9 +139,11 @@ def render(
         is dark and 1 is light. A string names an array of `Surface.vertex_data`. The name "Color" stands for
         the luminance of the vertex colors of a ``.ply`` file or of a mesh of trimesh or Open3D.
     tone_image : path-like, array_like or Picture, optional
-        For hatching: an image for the UV map of the surface. Its luminance is the tone.
+        For hatching: an image for the UV map of the surface. Its luminance is the tone. An array holds sRGB
+        display values, as uint8 or from 0 to 1, in rows from the top: (H, W), (H, W, 3) or (H, W, 4).
     tone_picture : path-like, array_like or Picture, optional
-        For hatching: a picture of the surface from the same view. Its luminance is the tone.
+        For hatching: a picture of the surface from the same view, as a file, array or `Picture` like
+        `tone_image`. Its luminance is the tone.
     workers : int
         Number of processes that draw a large picture together. 0 means one for each processor core. The
         picture does not depend on it.
@@ -205,8 +207,9 @@ def turntable(
 
     Parameters
     ----------
-    surface, field, size, orthographic, preset, color_values, tone_values, tone_image, workers, **settings
-        See `render`.
+    surface : Surface
+    field : Field, optional
+        By default a field of degree 4 along the form of the surface; see `form`.
     path : path-like
         Path of a ``.gif`` file, or of an ``.mp4`` file if there is an encoder.
     pictures : int
@@ -218,11 +221,23 @@ def turntable(
         streaks drift.
     view : (float, float)
         Azimuth of the first picture, and elevation, in degrees.
+    size : (int, int)
+        Width and height in pixels.
+    orthographic : bool
+        Orthographic projection instead of perspective.
+    preset : str or path-like, optional
+        Name of a preset of the look, or a ``.json`` file; see `list_presets`.
+    color_values, tone_values, tone_image
+        Values for the color map, and tones or an image of tones for hatching, as in `render`.
+    workers : int
+        Number of processes that draw a large picture together. 0 means one for each processor core.
     encode : function, optional
-        Function that encodes an ``.mp4`` file; see `rendering.turntable.Encoder`. By default ffmpeg, if it is
-        installed.
+        Function that encodes the pictures in a folder as an ``.mp4`` file; its arguments are described by
+        `rendering.turntable.Encoder`. By default ffmpeg, if it is installed.
     on_picture : function, optional
         Function that is called before each picture is drawn, with its number, from 1.
+    **settings
+        Settings of the look, after the preset: ``length=120, seed=3``.
 
     Returns
     -------
@@ -332,7 +347,9 @@ def upright_instance(
 ) -> MeshInstance:
     """Return a surface with a field as a mesh instance, with its upward axis along z of world space.
 
-    The parameters are as in `render`.
+    By default, the field is one of degree 4 along the form of the surface. `color_values` are values for the
+    color map at faces, vertices or corners. `tone_values` are tones at vertices or corners, and `tone_image`
+    is an image of tones for the UV map. Either may be given. All are in the forms that `render` accepts.
     """
     tone = _surface_tone(surface, tone_values, tone_image)
     numbers = corner_numbers(surface, color_values)
@@ -453,7 +470,8 @@ def _named_tone(surface: Surface, name: str) -> NDArray[Any]:
 def _image_luminance(image: str | os.PathLike[str] | ArrayLike | Picture) -> NDArray[np.float32]:
     """Return the linear luminance of an image, (H, W), with the bottom row first.
 
-    The image is a picture, a file, or an array of display values (sRGB).
+    The image is a picture, a .png file, or an array of sRGB display values, uint8 or from 0 to 1, with the
+    top row first: (H, W), (H, W, 3) or (H, W, 4).
     """
     if isinstance(image, Picture):
         return luminance(image.rgba)

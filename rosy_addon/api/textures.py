@@ -143,7 +143,8 @@ def texture(
     preset : str or path-like, optional
         Name of a preset, or a ``.json`` file; see `list_presets`.
     color_values : str or (F,), (V,) or (C,) array_like, optional
-        Values for the color map, by which streaks are colored; see `render`. Hatching cannot show them.
+        Values at faces, vertices or corners, or the name of an array. Streaks are colored by them with the
+        color map; see `render`. Hatching cannot show them.
     **settings
         Settings of the look, after the preset: ``line_width=3, seed=3``. In these, a pixel is 1/1024 of the
         square root of the area of the surface, for any size of the texture. With ``unit_size=0.002``, a
@@ -195,7 +196,7 @@ def texture(
 
 
 def _lamp(light_direction: ArrayLike, instance: MeshInstance) -> Light:
-    """Return a lamp in world space, given the direction to it in the coordinates of the mesh.
+    """Return a lamp in world space, given the direction to it in the coordinates of the mesh of `instance`.
 
     Raises
     ------
@@ -214,7 +215,9 @@ def _lamp(light_direction: ArrayLike, instance: MeshInstance) -> Light:
 def texture_look(
     preset: str | os.PathLike[str] | None, settings: dict[str, Any], has_color_values: bool = False
 ) -> Look:
-    """Return the look of a texture: a preset with settings; see `texture`.
+    """Return the look of a texture: a preset with some settings changed.
+
+    `has_color_values` says whether there are values for the color map, by which streaks are then colored.
 
     Raises
     ------

@@ -98,7 +98,7 @@ def _check_bake_options(options: Options) -> None:
 
 
 def _bake(options: Options, scene: Any, settings: Any) -> list[Any]:
-    """Draw the current frame or several frames in this process. Return the result for each camera.
+    """Draw the current frame or several frames in this process. Return a `BakeResult` for each camera.
 
     `settings` are `OutputSettings`: how the pictures are stored and applied.
     """

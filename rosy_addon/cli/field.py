@@ -160,7 +160,7 @@ def _format_info(facts: dict[str, Any]) -> str:
 
 
 def _format_comparison(against: dict[str, Any]) -> str:
-    """Return the result of `_compare` as a line of text."""
+    """Return the differences or equal singularities from `_compare` as a line of text."""
     if "same" in against:
         here, there = len(against["only_here"]), len(against["only_there"])
         same = against["same"]

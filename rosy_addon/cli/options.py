@@ -40,7 +40,7 @@ class CommandParser(argparse.ArgumentParser):
     _is_intermixed = False
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
-        """Parse arguments; see `argparse.ArgumentParser.parse_known_args`."""
+        """Parse arguments. Return the options and the unknown arguments, as `argparse` does."""
         if self._is_intermixed or self._subparsers is not None:
             return super().parse_known_args(args, namespace)
         self._is_intermixed = True  # parse_known_intermixed_args calls this method
@@ -60,12 +60,13 @@ class CommandParser(argparse.ArgumentParser):
         Parameters
         ----------
         option : str
+            Name of the option, such as "--size".
         metavar : str
             Placeholder for the value in the help.
         text : str
             Help text, in which %(default)s stands for the default.
-        parse : Parse, optional
-            By default, the value is the text.
+        parse : function, optional
+            Function that returns the value for the text after the option. By default, the value is the text.
         **keywords
             More keyword arguments of `argparse.ArgumentParser.add_argument`.
         """
@@ -267,6 +268,7 @@ class Options(argparse.Namespace):
         Parameters
         ----------
         function : function
+            The function of `api` that is going to be called.
         **others
             Further arguments. They take precedence over options of the same name.
         """
@@ -282,6 +284,7 @@ class Options(argparse.Namespace):
         Parameters
         ----------
         function : function
+            The function of `api`, such as `render`.
         path : Path
             The file that is drawn, for messages.
 

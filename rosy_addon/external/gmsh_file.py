@@ -147,7 +147,11 @@ def _nodes_2(data: bytes, is_text: bool) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _rows(data: bytes, is_text: bool) -> Iterator[tuple[int, np.ndarray]]:
-    """Yield blocks of elements: their type, and rows of their tag and the tags of their nodes."""
+    """Yield blocks of elements: their type, and rows of their tag and the tags of their nodes.
+
+    All elements of a block have the same type, a number of Gmsh. `data` is the contents of the section
+    Elements of the format 4.1.
+    """
     section = _Section(data, is_text)
     for _ in range(int(section.take("<u8", 4)[0])):
         kind, count = int(section.take("<i4", 3)[2]), int(section.take("<u8", 1)[0])
@@ -158,8 +162,8 @@ def _rows(data: bytes, is_text: bool) -> Iterator[tuple[int, np.ndarray]]:
 def _rows_2(data: bytes, is_text: bool) -> Iterator[tuple[int, np.ndarray]]:
     """Yield blocks of elements as `_rows`, from the format 2.2.
 
-    A row has the tag of the element, in text also its type and a number n, then n numbers for groups, then the
-    tags of the nodes.
+    A row has the tag of the element, in text also its type and a number n, then n numbers for groups, then
+    the tags of the nodes.
     """
     left, data = _counted(data)
     if is_text:
@@ -206,7 +210,9 @@ def _elements(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return the tags of faces and volumes, the numbers of their corners, VTK's types, and the tags of nodes.
 
-    For the blocks, see `_rows`.
+    Each block has elements of one type: the number of the type, and rows with the tag of an element and the
+    tags of its nodes. The first three results have a value for each face or volume. The fourth one has the
+    tags of the nodes at all corners, element by element.
     """
     tags, corner_tags = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
     sizes, types = [np.empty(0, np.int64)], [np.empty(0, np.uint8)]

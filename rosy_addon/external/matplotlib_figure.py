@@ -103,9 +103,11 @@ def panel_width(width: float, columns: int, has_key: bool, dpi: int) -> int:
     width : float
         Width of the figure, inches.
     columns : int
+        Number of panels side by side.
     has_key : bool
         Whether there is a column of keys.
     dpi : int
+        Resolution of the pictures, in pixels per inch.
     """
     room = width - (KEY_WIDTH + GAP if has_key else 0.0) - (columns - 1) * GAP
     return max(int(room / columns * dpi), 1)
@@ -320,7 +322,7 @@ def _text_width(text: str) -> float:
 
 
 def _draw_panel(axes: Axes, panel: Panel, dpi: int) -> None:
-    """Draw the picture of a panel, with the marks over it."""
+    """Draw the picture of a panel, with the marks over it. `dpi` is its resolution in pixels per inch."""
     height, width = panel.picture.shape[:2]
     axes.imshow(panel.picture, extent=(0, width, 0, height), interpolation="antialiased")
     axes.set(xlim=(0, width), ylim=(0, height))
@@ -375,7 +377,7 @@ def _marker_size(diameter: np.ndarray, is_open: bool) -> tuple[np.ndarray, np.nd
 
 
 def _legend_entries(marks: Sequence[SingularityMarks]) -> list[tuple[str, str, float]]:
-    """Return text, color and diameter (pixels) for each index of singularities, the largest index first."""
+    """Return text, color (``#rrggbb``) and diameter (pixels) of each singularity index, the largest first."""
     diameters: dict[tuple[float, int, int], float] = {}
     for part in marks:
         columns = part.index.tolist(), part.degree.tolist(), part.radius.tolist()

@@ -84,7 +84,11 @@ class Step:
 
 
 def _without_gaps(arrays: MeshArrays, name: str) -> MeshArrays:
-    """Return arrays of Gmsh with vectors 0, which are undefined, where it has no data, and a note on this."""
+    """Replace rows of NaN in the arrays of vectors and tensors of a Gmsh file by 0, which means undefined.
+
+    Gmsh files may have no data at some vertices or faces, where their rows are NaN. `MeshArrays.note` of the
+    result says at how many, and begins with `name`.
+    """
     notes = []
     for data in (arrays.vertex_data, arrays.face_data):
         for key, values in data.items():
@@ -160,7 +164,9 @@ def read_simulation(path: str | os.PathLike[str], step: int | None = None) -> Me
 
 
 def read_object(mesh: Any, name: str) -> MeshArrays:
-    """Read the surface of a data set of PyVista or a mesh of meshio, as that of a file; see `read_simulation`.
+    """Read the surface of a data set of PyVista or a mesh of meshio, with its arrays.
+
+    The surface is found in the same way as the surface in a file; see `read_simulation`.
 
     Parameters
     ----------
@@ -298,7 +304,10 @@ def _times(reader: Any) -> Sequence[float]:
 
 
 def _read_dataset(path: Path, index: int | None) -> Any:
-    """Return the contents of a file as one of pyvista's datasets; `index` as in `Step`."""
+    """Return the contents of a file as one of pyvista's datasets.
+
+    `index` is the number of the time step, from 0, or None if the file has no steps.
+    """
     suffix = path.suffix.lower()
     check_readable(path)
     with _reporting(path):

@@ -72,7 +72,11 @@ def surface_arrays(datasets: list, name: str, has_parts: bool, repeats_blocks: b
 
 
 def _joined_grid(datasets: list[Any], name: str, has_parts: bool, repeats_blocks: bool) -> Any:
-    """Return the unstructured grid of the datasets of a step; see `surface_arrays`."""
+    """Join the datasets of a time step, or their blocks, to one unstructured grid.
+
+    If `has_parts` is true, points at the same position are merged. If `repeats_blocks` is true, copies of a
+    block are left out. `name` is the name of the step, for messages.
+    """
     import pyvista
 
     dataset = datasets[0] if len(datasets) == 1 else pyvista.MultiBlock(datasets)
@@ -228,7 +232,11 @@ def _surface_cells(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _boundary(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the boundary of the volume cells of a grid as polygons, in the form of `_surface_cells`."""
+    """Return the boundary of the volume cells of a grid as polygons.
+
+    The result has the points at the corners, the first corner of each face, and the volume cell behind each
+    face, as in `_surface_cells`.
+    """
     import pyvista
     from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
 

@@ -291,7 +291,7 @@ def _copy(stream: TextIO | None, default: int, stack: ExitStack) -> int:
 
 
 def _encoding(stream: TextIO | None) -> tuple[str, str]:
-    """Return the encoding of a stream, and its error handler."""
+    """Return the encoding of a stream, by default UTF-8, and the name of its error handler."""
     encoding = getattr(stream, "encoding", None) or "utf-8"
     return encoding, getattr(stream, "errors", None) or "backslashreplace"
 
@@ -338,7 +338,8 @@ def blender_encoder(requested: str | None) -> Encoder | None:
     Parameters
     ----------
     requested : str, optional
-        See `find_blender`.
+        Path of a Blender program, its name on the PATH, or a folder that contains it. By default, the program
+        is searched as by `find_blender`.
 
     Raises
     ------

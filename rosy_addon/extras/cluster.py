@@ -92,10 +92,11 @@ def _run_tasks(
 
 
 def _python_runner() -> Callable[[list[str]], tuple[int, str, str]]:
-    """Return a function that runs Python with some arguments on a worker.
+    """Return a function that runs Python with a list of arguments on a worker.
 
-    The function is local to this one. Dask pickles local functions by value, so that the scheduler can
-    unpickle it without RoSy.
+    The returned function returns the exit status, the standard output and the standard error as text. It is
+    local to this one. Dask pickles local functions by value, so that the scheduler can unpickle it without
+    RoSy.
     """
 
     def run_python(words: list[str]) -> tuple[int, str, str]:

@@ -16,7 +16,10 @@ from .film import add_film_command
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command, and return its exit status. See `cli.parser.main`."""
+    """Run a command, and return its exit status.
+
+    `argv` holds the arguments without the name of the program; by default, `sys.argv[1:]`.
+    """
     arguments = sys.argv[1:] if argv is None else argv
     extras = Extras(
         program=(sys.executable, "-m", PACKAGE),

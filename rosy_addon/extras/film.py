@@ -160,8 +160,12 @@ class StepReader:
 
     Parameters
     ----------
-    array, degree, policy
-        See `field.array_field.array_field`.
+    array : str or None
+        Name of the array of vectors, directions or tensors. None: the only array that can be a field.
+    degree : int or None
+        N of the field. None: the default for the array.
+    policy : VectorPolicy
+        What to do about values that are not finite, and about vectors off the surface.
     up : {"y", "z"}
         The upward axis of the meshes.
     """

@@ -54,9 +54,10 @@ def _to_uint8(values: np.ndarray) -> np.ndarray:
 
 
 def png_bytes(rgba: np.ndarray, *, is_color: bool = True) -> bytes:
-    """Return the contents of a PNG file with a picture; see `write_png`.
+    """Return the contents of a PNG file with 8 bits per channel.
 
-    If `is_color` is false, the values are data, such as vectors, and are stored without conversion to sRGB.
+    `rgba`, (H, W, 4), is a picture: linear, not premultiplied, rows from the bottom. If `is_color` is false,
+    the values are data, such as vectors, and are stored without conversion to sRGB.
     """
     height, width = rgba.shape[:2]
     compressor = zlib.compressobj(ZLIB_LEVEL)

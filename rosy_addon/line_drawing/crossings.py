@@ -76,13 +76,14 @@ def find_crossings(strokes: Strokes) -> Crossings:
 
 
 def _first_of_each(stroke: np.ndarray, arc: np.ndarray, tolerance: np.ndarray) -> np.ndarray:
-    """Return the indices of the crossings that do not repeat an earlier crossing, in ascending order.
+    """Return the rows of the crossings that do not repeat a crossing in an earlier row, in ascending order.
 
     Parameters
     ----------
     stroke : (m, 2) ndarray of int
+        Indices of the two strokes of each crossing.
     arc : (m, 2) ndarray
-        Strokes and arc lengths, as in `Crossings`.
+        Arc length along each of these strokes up to the crossing, in world space.
     tolerance : (m,) ndarray
         Difference in arc length, in world space, up to which crossings of the same strokes are one crossing.
     """
@@ -138,7 +139,7 @@ def _close_pairs(
 def _strip_keys(strokes: Strokes, segment_end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return keys by which segments are sorted, and the largest difference of the keys of crossing segments.
 
-    Strips are described in `_close_pairs`.
+    Each triangle is divided into numbered strips, which are as wide as its longest segment.
 
     Parameters
     ----------
@@ -185,15 +186,17 @@ def _strip_keys(strokes: Strokes, segment_end: np.ndarray) -> tuple[np.ndarray, 
 def _intersect_segments(
     points: np.ndarray, stroke: np.ndarray, first: np.ndarray, second: np.ndarray
 ) -> tuple[np.ndarray, ...]:
-    """Return those of the given pairs of segments that cross, and where they cross.
+    """Return the given pairs of segments that cross, and where they cross.
 
-    A segment is given by the index of the point at which it ends. It begins at the point before it. `stroke`
-    is the stroke of each point. Pairs of segments of the same stroke are left out.
+    A segment is given by the index of the point at which it ends. It begins at the point before that.
+    Pairs of segments of the same stroke are left out.
 
     Parameters
     ----------
     points : (n, 3) float64 ndarray
+        Points of all strokes, in world space.
     stroke : (n,) int ndarray
+        Index of the stroke of each point.
     first, second : (k,) int64 ndarray
         The pairs to test, row by row.
 
@@ -229,7 +232,7 @@ def with_crossing_gaps(strokes: Strokes, gap: float) -> Strokes:
     strokes : Strokes
         Strokes as they were traced, before `clip_to_visible`.
     gap : float
-        Length of the gap in spacings.
+        Length of a gap along the stroke, as a multiple of the spacing at the start of the stroke.
     """
     with progress(0.0, 0.6):
         crossings = find_crossings(strokes)

@@ -63,7 +63,7 @@ class StrokeGeometry:
     radius : (n,) float64 ndarray
         Radii in world space.
     colors : list of str
-        The color of each family of strokes.
+        The color of each family of strokes, in the order of the families, as a color of SVG (see `Pen`).
     attachment : SurfaceAttachment or None
         Positions of the points relative to the surface that they follow; None if they follow no surface.
     """
@@ -81,10 +81,16 @@ class StrokeInput(NamedTuple):
 
     Attributes
     ----------
-    instances, camera, style, lights
-        Parameters of `draw_instances`.
+    instances : sequence of MeshInstance
+        All meshes of the scene. Strokes are drawn on the meshes with a field.
+    camera : Camera
+        Camera of the drawing.
+    style : StrokeStyle
+        Settings of the strokes, such as their spacing.
     pen : Pen
         Width, in pixels of the camera, and colors of the strokes.
+    lights : sequence of compositor.shading.Light
+        Lights in camera space, from which the tone is computed.
     """
 
     instances: Sequence[MeshInstance]
@@ -116,7 +122,10 @@ def drawing_file(suffix: str, inputs: StrokeInput) -> tuple[StrokeDrawing, bytes
 def drawing_curves(
     inputs: StrokeInput, follows: MeshInstance | None
 ) -> tuple[StrokeDrawing, StrokeGeometry]:
-    """Draw mesh instances with strokes. Return the drawing and its curves from `stroke_geometry`."""
+    """Draw mesh instances with strokes. Return the drawing and its strokes as curves in world space.
+
+    The curves follow the surface of the instance `follows` when it deforms, or no surface if it is None.
+    """
     drawing = _draw(inputs, clip_to_frame=False)
     with progress(OUTPUT_START, 1.0, OUTPUT_LABEL):
         return drawing, stroke_geometry(drawing, inputs.camera, inputs.pen, follows)
@@ -168,15 +177,15 @@ def offset_toward_camera(strokes: Strokes, camera: Camera, width: float) -> np.n
 
     Their positions in the picture do not change. Ribbons of the given width that face the camera
     are then in front of the surface. The offset along the view ray grows with the angle between the surface
-    and the image plane, so that points are between 1 and 1.5 ribbon widths above the surface. Only where it
-    is seen almost edge-on, they are lower; see `MAX_OFFSET_STEEPNESS`.
+    and the image plane, so that points are between 1 and 1.5 ribbon widths above the surface. Only where
+    the surface is seen almost edge-on, they are lower; see `MAX_OFFSET_STEEPNESS`.
 
     Parameters
     ----------
     strokes : Strokes
     camera : Camera
     width : float
-        Width of the ribbons in pixels at the depth of each point.
+        Width of the ribbons, in pixels of the camera.
 
     Returns
     -------

@@ -39,9 +39,9 @@ def label_families(strokes: Strokes, mesh: TangentMesh, right: np.ndarray | None
     Returns
     -------
     Strokes
-        The same strokes with `mesh.family_count` families, named "family 1" and so on. The first family is
-        nearest to the guide direction, and the others follow counter-clockwise. If the families are
-        consistent over the surface, `global_labels` chooses the first one.
+        The same strokes with `mesh.family_count` families, named "family 1" and so on. If the families are
+        consistent over the surface, `global_labels` numbers them. Otherwise, in each triangle, the first
+        family is nearest to the guide direction, and the others follow counter-clockwise.
     """
     report(0.0, "matching families")
     family_count = mesh.family_count
@@ -160,7 +160,7 @@ def _members_near_guide(mesh: TangentMesh, right: np.ndarray | None) -> np.ndarr
     """Return (T,) complex128: the unit member of each triangle that is nearest to a guide direction.
 
     The guide direction is `right`, or the first of `GUIDE_AXES` that is not almost normal to the triangle. It
-    is projected to the plane of the triangle.
+    is projected to the plane of the triangle. The result is in the frame of the triangle.
     """
     axes = GUIDE_AXES if right is None else np.concatenate([[np.asarray(right, float)], GUIDE_AXES])
     guide = np.zeros_like(mesh.normal)

@@ -70,12 +70,14 @@ class LateralNeighbors(NamedTuple):
     gap : (n, 2) float64 ndarray
         Distance to the nearest stroke on each side, in spacings; infinite if there is none.
     rejected : (n,) bool ndarray
-        Whether the sample is too near to an older sample, follows a rejected sample, or has yielded.
+        Whether the sample is too near to an older sample (added in an earlier step of growth), follows a
+        rejected sample, or has yielded.
     yielded : (n,) bool ndarray
-        Whether the gap to the next stroke is wider than `SeparationRules.max_gap`, but too narrow for another
-        stroke in it.
+        Whether the sample has yielded: the gap beside it is wider than `SeparationRules.max_gap`, but too
+        narrow for another stroke, so its stroke ends there.
     covering : CoveringPairs
-        Pairs of a sample that is not rejected and a neighbor beside it, less than `MAX_COVERED_GAP` away.
+        Pairs of a sample that is not rejected and a neighbor beside it, less than `MAX_COVERED_GAP` spacings
+        away.
     """
 
     gap: np.ndarray
@@ -87,7 +89,7 @@ class LateralNeighbors(NamedTuple):
 class _Pairs(NamedTuple):
     """m pairs of samples that are near each other on the surface, not only in space.
 
-    The strokes of both belong to the same family: they follow the same line direction; see `families`.
+    The strokes of both samples follow the same line direction, so they belong to the same family.
 
     Attributes
     ----------
@@ -98,7 +100,7 @@ class _Pairs(NamedTuple):
     sample_frame, neighbor_frame : (m, 4, 3) float64 ndarray
         Position, normal, direction and member of the two samples, as in `StrokeSamples.frame`.
     offset : (m, 3) float64 ndarray
-        Displacement on the surface from the neighbor to the sample.
+        Displacement on the surface from the neighbor to the sample, in world space.
     """
 
     query: np.ndarray
@@ -124,7 +126,7 @@ def find_lateral_neighbors(
     sample : (n,) ndarray of int
         Indices of the samples that are compared with all others.
     min_separation, max_gap : float
-        Limits in spacings, as in `SeparationRules`.
+        Distance below which a sample is rejected, and largest gap at which it does not yield, in spacings.
     previous : (n,) ndarray of int, optional
         For each sample, the position in `sample` of the sample before it at the same end of its stroke, or
         -1. It may only be given if `sample` holds the samples that were added last, sorted by step of growth.
@@ -183,14 +185,14 @@ def _judge(
     step : (n,) ndarray of int
         Step of growth at which each sample was added, in ascending order.
     previous : (n,) ndarray of int
-        Previous samples; see `find_lateral_neighbors`.
+        For each sample, the position of the sample before it on its stroke among the n samples, or -1.
     near : tuple of (k,) ndarray
-        Two columns: samples, and older neighbors that are too near to them. Neighbors that are not among the
-        n samples are -1.
+        Two columns: samples, and older neighbors that are too near to them, as positions among the n samples.
+        Neighbors that are not among them are -1.
     beside : tuple of (m,) ndarray
         Four columns: samples, neighbors beside them, sides and distances in spacings.
     max_gap : float
-        Limit in spacings, as in `SeparationRules`.
+        Largest gap at which a sample does not yield, in spacings.
     """
     near, beside = _sorted_by_first(near), _sorted_by_first(beside)
     # The last element is for the index -1.
@@ -229,7 +231,10 @@ def _rows_of(columns: tuple[np.ndarray, ...], first: int, end: int) -> tuple[np.
 
 
 def _comparable_pairs(samples: StrokeSamples, sample: np.ndarray) -> _Pairs:
-    """Return all pairs of a given sample and another sample of its family that is near on the surface."""
+    """Return all pairs of a given sample and another sample of its family that is near on the surface.
+
+    `sample` holds the indices of the given samples. Near means within `SEARCH_RADIUS` spacings.
+    """
     radius, direction = SEARCH_RADIUS * samples.spacing[sample], samples.direction[sample]
     query, neighbor = samples.grid.pairs_within(samples.position[sample], radius, direction)
     parts = row_blocks(len(query), PAIR_BLOCK)
@@ -244,8 +249,8 @@ def _comparable_block(
 ) -> _Pairs:
     """Return the pairs of samples of the same family that are near on the surface.
 
-    The given pairs are near each other in space: `query` is a position in `sample`, and `neighbor` an index
-    of another sample.
+    The given pairs, row by row, are near each other in space. `query` holds the position of the first sample
+    of each pair in `sample`, and `neighbor` the index of the other one.
     """
     current = sample[query]
     arc_gap = np.abs(samples.arc.take(current) - samples.arc.take(neighbor))
@@ -285,6 +290,6 @@ def _is_older(samples: StrokeSamples, pairs: _Pairs) -> np.ndarray:
 def _left_component(vectors: np.ndarray, frame: np.ndarray) -> np.ndarray:
     """Return the (n,) components of vectors along the unit vectors to the left of strokes.
 
-    `frame` holds positions, normals and directions of samples, as in `StrokeSamples.frame`.
+    `frame`, (n, 4, 3), has the position, normal and direction of a sample for each of the (n, 3) vectors.
     """
     return dot(vectors, np.cross(frame[:, 1], frame[:, 2]))

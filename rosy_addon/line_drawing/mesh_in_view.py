@@ -88,6 +88,8 @@ class MeshInView(Parts):
 def mesh_in_view(mesh: TangentMesh, camera: Camera) -> MeshInView:
     """Cut off what is outside the frame and its margin, or nearer to the camera than the near plane.
 
+    The margin is `MARGIN_PIXELS` wide, but at most `MARGIN_RATIO` times the side of the frame.
+
     Parameters
     ----------
     mesh : TangentMesh
@@ -143,7 +145,10 @@ def _depths_of_cuts(depth: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _Pieces(Parts):
-    """Parts of triangles and their adjacency, with attributes as in `TangentMesh`."""
+    """Parts of triangles and their adjacency.
+
+    `neighbor`, `neighbor_edge` and `edge_transport` are as in `TangentMesh`, for the edges of the parts.
+    """
 
     neighbor: np.ndarray
     neighbor_edge: np.ndarray
@@ -217,7 +222,9 @@ class _Pieces(Parts):
     def _neighbors(
         self, edge: np.ndarray, side: np.ndarray, cut_count: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the attributes `neighbor` and `neighbor_edge` of m new pieces, which are parts of these.
+        """Return the attributes `neighbor` and `neighbor_edge` of m new pieces, as in `TangentMesh`.
+
+        Each new piece is a part of one of the pieces of this object, the old pieces.
 
         Parameters
         ----------
@@ -296,7 +303,7 @@ def seen_triangles(instance: MeshInstance, index: int, depth_buffer: DepthBuffer
 
 
 def _is_hidden(points: np.ndarray, depth_buffer: DepthBuffer) -> np.ndarray:
-    """Return (n,) bool: whether points are in the frame and hidden.
+    """Return (n,) bool: whether (n, 3) points in world space are in the frame and hidden.
 
     A point is hidden if the triangles that are visible at all four pixels around it hide it.
     """
@@ -350,9 +357,10 @@ def triangles_near(mesh: TangentMesh, seen: np.ndarray, spacing: np.ndarray) -> 
 
 
 def _edge_distance(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Return the (n,) distances between two (n, 2, 3) edges, which do not cross.
+    """Return the (n,) distances between the two edges of each pair, which do not cross.
 
-    Distances are measured from the ends of each edge to the other edge.
+    `first` and `second`, (n, 2, 3), hold the ends of the two edges, row by row. Distances are measured from
+    the ends of each edge to the other edge.
     """
     # The shortest connection starts at an end of one of the two edges.
     point = np.stack([first, second]).transpose(2, 0, 1, 3)

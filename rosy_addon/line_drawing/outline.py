@@ -212,8 +212,9 @@ def _are_pairs(vertex: np.ndarray, starts: np.ndarray, pairs: np.ndarray) -> np.
 def _pixel_salience(segments: Segments, angle: np.ndarray, camera: Camera) -> np.ndarray:
     """Return (k,) float64: the lengths of creases in pixels, times their angle over `REFERENCE_ANGLE`.
 
-    The length is not foreshortened: it is divided by the size of a pixel at the depth of the segment. So the
-    result hardly changes when the mesh rotates.
+    `angle`, (k,), is the angle between the normals at both sides of each segment, in radians. The length is
+    not foreshortened: it is divided by the size of a pixel at the depth of the segment. So the result hardly
+    changes when the mesh rotates.
     """
     length = np.linalg.norm(segments.ends[:, 1] - segments.ends[:, 0], axis=1)
     length = length / pixel_size(segments.ends.mean(axis=1), camera)
@@ -281,7 +282,7 @@ def _chain_segments(keys: np.ndarray, ends: np.ndarray) -> list[tuple[np.ndarray
     Parameters
     ----------
     keys : (k, 2) int64 ndarray
-        Keys of the end points, from `_point_keys`.
+        Keys of the end points, which are equal for points at the same position.
     ends : (k, 2, 3) ndarray
         End points of the segments.
 
@@ -377,6 +378,7 @@ class _OutlineTest:
     triangle_vertex : (T, 3) int32 ndarray
         Vertices of the triangles of the instance.
     corners : _Corners
+        Corners and normals of these triangles, in world space.
     """
 
     def __init__(self, instance: MeshInstance, index: int, depth_buffer: DepthBuffer) -> None:
@@ -386,7 +388,11 @@ class _OutlineTest:
         self.corners = _Corners.of(instance)
 
     def is_visible(self, block: Strokes, point: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-        """Return (m,) bool: whether points of outlines are visible. Parameters are as in `visible_runs`."""
+        """Return (m,) bool: whether points of outlines are visible.
+
+        `block` holds outlines, `point` the (m,) indices of the points to test, and `pixels` the (m, 2) pixel
+        coordinates of these points.
+        """
         camera, triangle = self.depth_buffer.camera, block.triangle[point]
         ring_depth = np.full(len(point), -1.0)
         contour = np.flatnonzero(block.family[block.stroke[point]] == SILHOUETTES)
@@ -432,9 +438,10 @@ class _OutlineTest:
     ) -> np.ndarray:
         """Return (n,) bool: whether each point is hidden by the triangles at all four pixels around it.
 
-        `points` are in world space, `pixels` are their (n, 2) pixel coordinates, and `triangle` is the
-        triangle on which each point lies. A triangle that shares a vertex with it does not hide the point if
-        the point is behind it by less than `ring_depth`, (n,), along the view ray, in world space.
+        `points` are in world space, `pixels` are their (n, 2) pixel coordinates, and `triangle` is the own
+        triangle of each point, on which it lies. Another triangle that shares a vertex with the own triangle
+        does not hide the point if the point is less than `ring_depth`, (n,), behind it along the view ray, in
+        world space.
         """
         hidden = np.ones(len(points), dtype=bool)
         for plane in planes_around(points, pixels, self.depth_buffer):

@@ -52,7 +52,7 @@ class SampledPath:
     path : TracedPath
         Segments of all paths.
     sign : (n,) ndarray
-        Signs of the particles; see `SurfaceParticles`.
+        1 if the particle moves along the direction of its member, -1 if against it.
     """
 
     def __init__(self, path: TracedPath, sign: np.ndarray) -> None:

@@ -208,7 +208,7 @@ def _instance_strokes(
 ) -> Strokes | None:
     """Return the strokes of a mesh instance before clipping, or None if no stroke can be in view.
 
-    `index` is the index of the instance in the depth buffer.
+    `index` is the index of the instance in the depth buffer, and `lights` are in camera space.
     """
     style = view.style
     report(0.0, "computing the spacing")
@@ -321,7 +321,8 @@ def _check_distance(mesh: TangentMesh, view: _View, surface_name: str) -> None:
     Raises
     ------
     RosyError
-        If they are less than `MIN_SPACING_PIXELS` apart where the surface is nearest to the camera.
+        If strokes are less than `MIN_SPACING_PIXELS` apart where the surface is nearest to the camera. The
+        message begins with `surface_name`.
     """
     nearest = float(pixel_size(mesh.points.reshape(-1, 3), view.camera).min())
     pixels = view.style.distance / nearest

@@ -144,14 +144,18 @@ class GrowingStrokes(ColumnTable):
     end_done = np.empty((0, 2), bool)
 
     def add(self, parent_side: np.ndarray, spacing: np.ndarray) -> np.ndarray:
-        """Add n strokes with two growing ends each, and return their indices."""
+        """Add n strokes with two growing ends each, and return their indices.
+
+        `parent_side` and `spacing`, (n,), are the values of the columns of these names.
+        """
         columns = {"spacing": spacing, "parent_side": parent_side}
         return self.append(len(spacing), alive=True, tip_count=2, **columns)
 
     def add_active_children(self, parent_side: np.ndarray, change: int) -> None:
         """Add `change` to the number of growing strokes seeded beside each given side of a stroke.
 
-        `parent_side` is as in the column of this name. Values of -1 are ignored.
+        `parent_side` holds 2 * stroke for left sides and 2 * stroke + 1 for right sides. Values of -1 are
+        ignored.
         """
         parent_side = parent_side[parent_side >= 0]
         np.add.at(self.active_children, (parent_side >> 1, parent_side & 1), change)
@@ -172,7 +176,10 @@ class GrowingStrokes(ColumnTable):
         return self.max_arc[stroke] - self.min_arc[stroke]
 
     def finish_ends(self, stroke: np.ndarray, end: np.ndarray) -> np.ndarray:
-        """Mark n ends as finished. Return the indices of strokes that have no growing end left."""
+        """Mark n ends as finished. Return the indices of strokes that have no growing end left.
+
+        `stroke` and `end`, (n,), are the strokes and their ends: 0 is the backward end, 1 the forward end.
+        """
         self.end_done[stroke, end] = True
         np.subtract.at(self.tip_count, stroke, 1)
         finished = np.unique(stroke)
@@ -284,7 +291,8 @@ class StreamlinePlacer:
     def _compare(self, sample: np.ndarray, previous: np.ndarray | None = None) -> LateralNeighbors:
         """Compare new samples with others by the rules, and remove the rejected samples.
 
-        `sample` and `previous` are as in `find_lateral_neighbors`.
+        `sample` holds the indices of the new samples, and `previous`, for each of them, the position in
+        `sample` of the sample before it at the same end of its stroke, or -1.
         """
         min_separation, max_gap = self.rules.min_separation, self.rules.max_gap
         neighbors = find_lateral_neighbors(self.samples, sample, min_separation, max_gap, previous)

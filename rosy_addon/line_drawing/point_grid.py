@@ -183,9 +183,11 @@ class PointGrid:
     ) -> list[tuple[np.ndarray, np.ndarray]]:
         """Find the points of one level within the radius of some queries.
 
+        `points`, `radius_squared` and `direction` describe all queries of `pairs_within`. `queries` holds the
+        indices of the queries that are answered here. Their radius is at most `rings` cells of this level.
+
         The linked lists of all cells are followed at the same time. For each step along the lists, there are
-        two arrays in the result: queries, and points within their radius. `queries` holds the indices of the
-        queries. Their radius is at most `rings` cells.
+        two arrays in the result: indices of queries, and indices of points within their radius, row by row.
         """
         cell = self.cell * LEVEL_RATIO**level
         scaled = points.take(queries, axis=0) / cell
@@ -246,7 +248,8 @@ def _reached_cells(
     rings : int
         Number of rings of cells around the cell of a query.
     direction : (n, 3) ndarray, optional
-        Directions of the queries; see `PointGrid.pairs_within`.
+        Unit directions of the queries, which restrict them to two parts of their balls; see
+        `PointGrid.pairs_within`.
     """
     side = np.arange(-rings, rings + 1)
     beyond = np.maximum(side - position[:, :, None], position[:, :, None] - (side + 1))
@@ -264,7 +267,7 @@ def _reached_cells(
 
 
 def grow_to(values: np.ndarray, count: int, fill: float) -> np.ndarray:
-    """Double the length of an array until it has `count` rows; new rows hold `fill`."""
+    """Double the length of an array until it has at least `count` rows; new rows hold `fill`."""
     while count > len(values):
         values = np.concatenate([values, np.full_like(values, fill)])
     return values

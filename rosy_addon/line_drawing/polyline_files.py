@@ -55,9 +55,9 @@ def polyline_file(suffix: str, strokes: Strokes, camera: Camera, pen: Pen, up: s
     camera : Camera
         Camera that sets the length of a pixel.
     pen : Pen
-        Width of the strokes. Its other attributes are not used.
-    up : str
-        Axis that points up in the space of the file, as in `UP_AXIS_MATRIX`. In world space, z points up.
+        Width of the strokes, in pixels of the camera. Its other attributes are not used.
+    up : {"y", "z"}
+        Axis that points up in the space of the file. In world space, z points up.
 
     Returns
     -------
@@ -133,7 +133,8 @@ def _obj(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.nd
     """Return an .obj file: vertices, then a line for each stroke, in a group for each family.
 
     In this format, lines cannot refer to normals, so normal n belongs to vertex n. Widths are stored as
-    texture coordinates with one component. The parameters are as in `_csv`.
+    texture coordinates with one component. `points` and `normals`, (n, 3), are in the space of the file, and
+    `width`, (n,), is the width of the stroke at each point, in world space.
     """
     kept, number = _numbered_points(strokes)
     rows = np.flatnonzero(kept)
@@ -161,7 +162,8 @@ def _obj(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.nd
 def _ply(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.ndarray) -> bytes:
     """Return a binary .ply file with the points as vertices and the segments as edges.
 
-    The parameters are as in `_csv`.
+    `points` and `normals`, (n, 3), are in the space of the file, and `width`, (n,), is the width of the
+    stroke at each point, in world space.
     """
     kept, number = _numbered_points(strokes)
     stroke = strokes.stroke

@@ -217,7 +217,7 @@ class StrokeSamples(ColumnTable):
         arc : (n,) ndarray
             Signed arc lengths from the seeds, in world space.
         step : (n,) ndarray of int
-            Steps of growth in which the samples are added; see `next_steps`.
+            Numbers of the steps of growth in which the samples are added, from `next_steps`.
 
         Returns
         -------
@@ -284,8 +284,8 @@ class StrokeSamples(ColumnTable):
 
         Parameters
         ----------
-        stroke_alive : ndarray of bool
-            Whether each stroke is alive.
+        stroke_alive : (S,) bool ndarray
+            Whether each of all strokes is alive.
         first : int
             Index of the first sample that may have to be removed.
         """

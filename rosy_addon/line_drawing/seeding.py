@@ -89,7 +89,9 @@ def singularities(mesh: TangentMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 
 def seeds_around_singularities(mesh: TangentMesh, spacing: np.ndarray) -> SurfaceParticles:
-    """Return seeds around the singularities that are far from all other singularities.
+    """Return seeds around singularities, one in each sector between two streamlines that end there.
+
+    Only singularities that are `MIN_ISOLATION` spacings away from all others get seeds.
 
     Parameters
     ----------
@@ -152,7 +154,7 @@ def _is_isolated(points: np.ndarray, radius: np.ndarray) -> np.ndarray:
 
 
 def candidate_seeds(mesh: TangentMesh, corner_spacing: np.ndarray) -> SurfaceParticles:
-    """Return seeds at evenly distributed points of the mesh.
+    """Return seeds at evenly distributed points of the mesh, about `CANDIDATE_DENSITY` in a square spacing.
 
     Each point has a seed for each of the M different directions in which a streamline runs through it.
 
@@ -182,7 +184,10 @@ def candidate_seeds(mesh: TangentMesh, corner_spacing: np.ndarray) -> SurfacePar
 
 
 def uncovered_seeds(samples: StrokeSamples, seeds: SurfaceParticles) -> SurfaceParticles:
-    """Return the seeds that are not near a stroke of their family (one of the M line directions)."""
+    """Return the seeds that are not near a stroke of their family (one of the M line directions).
+
+    Near means less than `MAX_COVERED_GAP` spacings away.
+    """
     is_uncovered = np.zeros(len(seeds), dtype=bool)
     for batch in row_blocks(len(seeds), SEED_BATCH_SIZE):
         report(samples.coverage, "looking for gaps")
@@ -204,10 +209,11 @@ def thinned_seeds(
     mesh : TangentMesh
     seeds : SurfaceParticles
     cell_size : float
-        Distance of the points where `spacing_ratio` is 1.
+        Distance of the points where `spacing_ratio` is 1, in world space.
     spacing_ratio : (n,) ndarray
-        Spacing of strokes at the seeds, relative to their usual spacing. The distance of the chosen points is
-        `cell_size` times this ratio, rounded to a power of `LEVEL_RATIO` by `point_grid.grid_levels`.
+        Spacing of strokes at the seeds, relative to the median spacing on the mesh. The distance of the
+        chosen points is `cell_size` times this ratio, rounded to a power of `LEVEL_RATIO` by
+        `point_grid.grid_levels`.
     """
     position = mesh.points_at(seeds.triangle, seeds.weights)
     level = grid_levels(spacing_ratio, 1.0)
@@ -314,8 +320,8 @@ def _lateral_points(
 ) -> tuple[SurfaceParticles, np.ndarray]:
     """Return points beside samples, and (n,) bool: whether the surface and the field extend to the point.
 
-    `distance`, (n,), is the distance of the point from its sample in spacings. `side` is as in
-    `lateral_seeds`.
+    `side`, (n,), is the side of the sample on which the point is: 0 is left, 1 is right. `distance`, (n,), is
+    the distance of the point from its sample in spacings.
     """
     particles = samples.particles(sample, np.ones(len(sample)))
     direction = samples.local_direction[sample] * np.where(side == 0, 1j, -1j)
@@ -329,7 +335,8 @@ def _free_gap(
 ) -> np.ndarray:
     """Return (n,) float64: the distances from seeds to the next stroke on the side away from their sample.
 
-    They are in spacings, and infinite if there is no such stroke or no room for the seed.
+    They are in spacings, and infinite if there is no such stroke or if `has_room`, (n,), is false. `sample`
+    holds the index of the sample of each seed.
     """
     free_gap = np.full(len(sample), np.inf)
     indices = np.flatnonzero(has_room)

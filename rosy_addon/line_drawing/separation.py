@@ -235,7 +235,8 @@ def _pairs_of_one_family(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the pairs of points that are of the same family and on the same side of a fold.
 
-    `point` and `other` are the indices of the two points of each pair.
+    `point` and `other` hold the indices of the two points of each pair, row by row. The result is these two
+    arrays without the other pairs.
     """
     normal_a, normal_b = refined.normal[point], refined.normal[other]
     normal_sum, delta = normal_a + normal_b, refined.points[point] - refined.points[other]

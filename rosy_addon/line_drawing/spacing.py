@@ -289,7 +289,7 @@ def weight_by_tone(
     layering : float
         Difference in darkness between the tones at which successive families begin.
     max_ratio : float
-        Largest factor of the spacing, as in `spacing_by_tone`.
+        Largest factor by which `spacing_by_tone` increases the spacing.
 
     Returns
     -------

@@ -182,7 +182,10 @@ def _point_before_end(
 def _move_to_depth(
     points: np.ndarray, depth: np.ndarray, target_depth: np.ndarray, camera: Camera
 ) -> np.ndarray:
-    """Return (k, 3) points moved along their view rays from `depth` to `target_depth`."""
+    """Return (k, 3) points in world space, moved along their view rays from `depth` to `target_depth`.
+
+    Both depths, (k,), are measured along the axis of the camera.
+    """
     to_camera = camera.view_directions(points)
     return points + ((depth - target_depth) / (to_camera @ camera.view[2, :3]))[:, None] * to_camera
 
@@ -270,7 +273,8 @@ def _drop_onto_surfaces(
     """Move points of extensions along their view rays onto the visible surface.
 
     Points are moved only if the surface is in front of them, or behind them by less than a tolerance.
-    `distance`, (n,), is above 0 for points of extensions; see `_append_extensions`.
+    `distance`, (n,), is the distance in pixels of a point of an extension from the start of the extension,
+    and 0 for other points.
     """
     extended = np.flatnonzero(distance > 0)
     points = strokes.points[extended]

@@ -110,15 +110,16 @@ class Strokes:
         )
 
     def take_points(self, point: np.ndarray) -> Strokes:
-        """Return a copy with the points of the indices `point`.
+        """Return a copy with only the points at the indices `point`.
 
         Attributes for each stroke, such as `start`, are not changed. The caller has to replace them.
         """
         return replace(self, **{name: getattr(self, name)[point] for name in POINT_COLUMNS})
 
     def between(self, after: np.ndarray, fraction: np.ndarray) -> Strokes:
-        """Return a copy with m interpolated points on segments; see `take_points`.
+        """Return a copy with m interpolated points on segments.
 
+        Attributes for each stroke, such as `start`, are not changed. The caller has to replace them.
         The segments end at the points with the indices `after`, (m,). `fraction`, (m,), is the position of
         the new point on its segment, from 0 to 1. Interpolated normals are not of unit length. Weights are
         NaN where the fraction is below 1, as the two ends of a segment may be in different triangles.

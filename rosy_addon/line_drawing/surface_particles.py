@@ -241,9 +241,9 @@ def _next_segment(
 ) -> tuple[np.ndarray, ...]:
     """Compute the next segment of each particle. It has the direction of the field at its midpoint.
 
-    A segment is at most `length` long. Particles are stuck if the field rotates so fast that a segment
-    would be much shorter than `usual_length`. `rotation`, (n,) complex128, is the factor that rotates the
-    direction of the field to the direction of motion.
+    A segment is at most `length`, (n,), long. Particles are stuck if the field rotates so fast that a segment
+    would be much shorter than `usual_length`, (n,). Both are in world space. `rotation`, (n,) complex128, is
+    the factor that rotates the direction of the field to the direction of motion.
 
     Returns
     -------
@@ -308,7 +308,7 @@ def _midpoint_segments(
     midpoint : (n, 3) float64 ndarray
         Barycentric coordinates of the estimated midpoints of the segments.
     rotation : (n,) complex128 ndarray
-        Factor from the direction of the field to the direction of motion, as in `_next_segment`.
+        Unit factor that rotates the direction of the field to the direction of motion.
     allowed : (n,) float64 ndarray
         Largest lengths of the segments, in world space.
 
@@ -333,7 +333,11 @@ def _midpoint_segments(
 
 
 def _weight_slopes(mesh: TangentMesh, triangle: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Return the (n, 3) derivatives of the barycentric coordinates along unit directions."""
+    """Return the (n, 3) derivatives of the barycentric coordinates along unit directions.
+
+    They are changes per unit of length in world space. `direction`, (n,) complex, is in the frames of the
+    triangles.
+    """
     gradient = mesh.gradient[triangle]
     return gradient.real * direction.real[:, None] + gradient.imag * direction.imag[:, None]
 
@@ -377,7 +381,8 @@ def _cross_edges(
     crossed : (k,) intp ndarray
         Indices of the particles that crossed an edge.
     transport : (k,) complex128 ndarray
-        Factors that transport tangents across these edges.
+        Factors that transport tangents across these edges, from the frame of the old triangle to the frame of
+        the new one.
     """
     neighbor = mesh.neighbor[particles.triangle, edge]
     stopped = (edge >= 0) & (neighbor < 0)

@@ -130,6 +130,7 @@ def svg_text(
         Strokes whose points are all in front of the camera.
     camera : Camera
     pen : Pen, optional
+        Width and colors of the strokes. By default, the defaults of `Pen`.
     marks : SingularityMarks, optional
         Singularities in the view of the camera; they are drawn over the strokes.
 
@@ -217,7 +218,10 @@ def _singularity_layer(marks: SingularityMarks, height: int) -> list[str]:
 
 
 def _plotter_paths(pixels: np.ndarray, strokes: Strokes) -> list[str]:
-    """Return an SVG path for each stroke, in the order of `plotter_order`. `pixels` are the (n, 2) points."""
+    """Return an SVG path for each stroke, in an order that keeps the travel of the pen short.
+
+    `pixels`, (n, 2), holds the points of the strokes in coordinates of the SVG document.
+    """
     first, last = pixels[strokes.start[:-1]], pixels[strokes.start[1:] - 1]
     with progress(0.0, 0.5):
         order, is_reversed = plotter_order(first, last)
@@ -235,7 +239,11 @@ def _plotter_paths(pixels: np.ndarray, strokes: Strokes) -> list[str]:
 
 
 def _stroke_paths(pixels: np.ndarray, strokes: Strokes, width: float, color: str) -> list[str]:
-    """Return an SVG path for each stroke: a line if its width is constant, otherwise a filled contour."""
+    """Return an SVG path for each stroke: a line if its width is constant, otherwise a filled contour.
+
+    `pixels`, (n, 2), holds the points of the strokes in coordinates of the SVG document, and `width` is the
+    full width of a stroke in pixels.
+    """
     radius = np.clip(strokes.width, 0, 1) * width / 2
     with progress(0.1, 0.5):
         features = np.column_stack([pixels, radius])
@@ -266,12 +274,12 @@ def _stroke_paths(pixels: np.ndarray, strokes: Strokes, width: float, color: str
 def _offset_sides(
     points: np.ndarray, radius: np.ndarray, start: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return (n, 2) points to the left of polylines and (n, 2) points to the right.
+    """Return (n, 2) points to the left of polylines and (n, 2) points to the right, as seen on screen.
 
     Parameters
     ----------
     points : (n, 2) ndarray
-        Points of all polylines.
+        Points of all polylines, in coordinates of the SVG document: y points down.
     radius : (n,) ndarray
         Distance from each point to the points on its left and right.
     start : (S + 1,) ndarray of int
@@ -298,7 +306,8 @@ def _offset_sides(
 def _tapered_path(left: np.ndarray, right: np.ndarray, end_radii: np.ndarray) -> str:
     """Return the SVG path data of a closed contour along points on both sides of a stroke.
 
-    It has round caps at both ends of the stroke, with the two radii `end_radii`.
+    `left` and `right`, (n, 2), are the points on both sides, from the first to the last point of the stroke.
+    The contour has round caps, whose radii at the first and at the last point are `end_radii`.
     """
     reversed_right = right[::-1]
     return (
@@ -310,7 +319,10 @@ def _tapered_path(left: np.ndarray, right: np.ndarray, end_radii: np.ndarray) ->
 
 
 def _end_cap(radius: float) -> str:
-    """Return the SVG path command of a clockwise half circle, or of a line if the radius is below 0.05."""
+    """Return the SVG path command of a clockwise half circle, or of a line if the radius is below 0.05.
+
+    The caller appends the coordinates of the point at which it ends.
+    """
     return f"A{radius:.2f},{radius:.2f} 0 0 1 " if radius >= 0.05 else "L"
 
 
@@ -419,7 +431,7 @@ def _nearest_end(
 ) -> int:
     """Return the index of the end that is nearest to the position `current`.
 
-    `positions` are the positions of all ends, of which one or more are left in the grid. `cell` is the cell of
+    `positions` are the positions of all ends, one or more of which are in the grid. `cell` is the cell of
     `current`, and `cell_size` the side of a cell in the unit of the positions. Rings of cells around `cell`
     are searched until no nearer end is possible.
     """

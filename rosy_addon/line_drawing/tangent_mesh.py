@@ -120,7 +120,8 @@ class TangentMesh:
     def weights_at(self, triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Return the (n, 3) barycentric coordinates of points in triangles.
 
-        Points outside their triangle get coordinates on its boundary.
+        `points`, (n, 3), are in world space, one for each triangle. Points outside their triangle get
+        coordinates on its boundary.
         """
         planar = self.to_frame(triangle, points - self.points[triangle, 0])
         weights = (self.gradient[triangle] * planar.conj()[:, None]).real
@@ -154,7 +155,10 @@ class TangentMesh:
         return dot(vectors, self.x[triangle]) + 1j * dot(vectors, self.y[triangle])
 
     def z_at(self, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Return (n,) complex128: the representation of the field, interpolated at points of triangles."""
+        """Return (n,) complex128: the representation of the field, interpolated at points of triangles.
+
+        It is in the frames of the triangles.
+        """
         return np.einsum("nk,nk->n", weights, self.z[triangle])
 
     def members_at(
@@ -162,7 +166,7 @@ class TangentMesh:
     ) -> np.ndarray:
         """Return (n,) complex128: the unit member of the field nearest to a unit tangent `reference`.
 
-        It is 0 where the field is zero.
+        Both are in the frames of the triangles. The result is 0 where the field is zero.
         """
         return nearest_member(reference, self.z_at(triangle, weights), self.degree)
 
@@ -198,10 +202,11 @@ class TangentMesh:
     def directions_at(
         self, triangle: np.ndarray, weights: np.ndarray, member: np.ndarray
     ) -> np.ndarray:
-        """Return (n,) complex128: the unit direction of the field that corresponds to a member.
+        """Return (n,) complex128: the unit direction of the field that corresponds to each member.
 
-        The N members are at equal angles. In a RoSy field, they are the directions of the field. In other
-        fields, the directions deviate from the members by the harmonics.
+        `member` holds (n,) unit members. These and the result are in the frames of the triangles. The N
+        members are at equal angles. In a RoSy field, they are the directions of the field. In other fields,
+        the directions deviate from the members by the harmonics.
         """
         if not self.harmonics:
             return member
@@ -230,7 +235,7 @@ class SharedEdges(NamedTuple):
     def ends(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the corners at the first ends of the edges and at the second ends: two (n, 2) arrays.
 
-        Each row has the corners, as 3 t + k, of the two triangles t that share the edge.
+        Each row has the corners, as 3 t + k, in the two triangles t of the edge: `triangle`, then `neighbor`.
         """
         triangle = np.stack([self.triangle, self.neighbor], axis=1)
         edge = np.stack([self.edge, self.neighbor_edge], axis=1)
@@ -269,8 +274,8 @@ def build_tangent_mesh(
     display : {"smooth", "flat"}
         Whether the field is interpolated, or constant on each face.
     crease_angle : float or None
-        Smallest angle between the normals of the triangles at a crease, in radians. Streamlines stop at
-        creases. If None, they continue across all creases, along the nearest member.
+        Angle between the normals of two triangles, in radians. Sharp edges with larger angles are creases, at
+        which streamlines stop. If None, streamlines continue across all edges, along the nearest member.
     cache : Cache, optional
         Cache for corner fields.
 
@@ -366,9 +371,9 @@ def with_corners(mesh: TangentMesh, points: np.ndarray) -> TangentMesh:
 
 
 def _triangle_frames(points: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return the normals, x axes, y axes and areas of triangles.
+    """Return the normals, x axes and y axes, (T, 3) unit vectors, and the (T,) areas of triangles.
 
-    x points from the first corner to the second.
+    `points`, (T, 3, 3), holds the corners. x points from the first corner to the second.
     """
     edge_a, edge_b = points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]
     cross = np.cross(edge_a, edge_b)
@@ -382,7 +387,10 @@ def _triangle_frames(points: np.ndarray) -> tuple[np.ndarray, ...]:
 def _barycentric_gradients(
     points: np.ndarray, x: np.ndarray, y: np.ndarray, area: np.ndarray
 ) -> np.ndarray:
-    """Return the (T, 3) complex gradients of the barycentric coordinates; 0 in triangles without area."""
+    """Return the (T, 3) complex gradients of the barycentric coordinates; 0 in triangles without area.
+
+    They are in the frames with the unit axes x and y, (T, 3). `points`, (T, 3, 3), holds the corners.
+    """
     delta = points - points[:, :1]
     planar = dot(delta, x[:, None]) + 1j * dot(delta, y[:, None])
     # The edge opposite to corner k, rotated inward by 90 degrees, over twice the area.
@@ -423,7 +431,8 @@ def _rotations_to_planes(
 def _connect(mesh: TangentMesh, surface: Surface, crease_angle: float | None) -> None:
     """Fill the arrays `neighbor`, `neighbor_edge` and `edge_transport` of a tangent mesh, in place.
 
-    Strokes stop at triangles on which the field is zero and, unless `crease_angle` is None, at creases.
+    Strokes stop at triangles on which the field is zero and at creases: sharp edges at which the angle
+    between the normals is larger than `crease_angle`, in radians. If it is None, there are no creases.
     """
     start = np.arange(0, mesh.neighbor.size + 1, 3, dtype=np.int32)
     with progress(0.0, 0.5):

@@ -74,6 +74,7 @@ def trace_on_mesh(
     spacing : CornerSpacing
         Spacing between strokes of the same family.
     rules : SeparationRules, optional
+        Limits on the separation and the length of strokes. By default, the defaults of the class.
     surface_name : str
         Name of the surface in error messages.
 
@@ -313,9 +314,9 @@ def close_loops(mesh: TangentMesh, strokes: Strokes, spacing: CornerSpacing) -> 
 def _left_offset(strokes: Strokes, first: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Return (n,) float64: how far points are to the left of the first points of strokes.
 
-    Distances to the right are negative.
-    `first` holds the indices of the first points. Left is relative to the direction of the stroke
-    there, seen from outside the surface.
+    Distances are in world space, and negative to the right. `first` holds the indices of the first points of
+    n strokes, and `points`, (n, 3), one point for each of them. Left is relative to the direction of the
+    stroke at its first point, seen from outside the surface.
     """
     left = np.cross(strokes.normal[first], strokes.member[first])
     return dot(points - strokes.points[first], normalize(left))

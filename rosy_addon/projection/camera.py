@@ -123,7 +123,10 @@ class Camera:
         return -(points @ self.view[2, :3] + self.view[2, 3])
 
     def resized(self, width: int, height: int) -> Camera:
-        """Return the same camera with another picture size in pixels."""
+        """Return a camera with the same matrices and another picture size, in pixels.
+
+        It shows the same part of the scene. If the ratio of the sides changes, pixels are not square.
+        """
         return Camera(self.view, self.projection, width, height, self.name)
 
     def scaled(self, factor: int) -> Camera:
@@ -137,9 +140,10 @@ class Camera:
 
     @property
     def view_to_pixels(self) -> np.ndarray:
-        """The (2, 2) float64 map from displacements in the view plane to displacements on screen.
+        """The (2, 2) float64 map from displacements parallel to the picture to displacements on screen.
 
-        It is relative to `pixels_per_unit`.
+        Displacements on screen are in pixels, divided by `pixels_per_unit`. So the map is the identity for
+        a usual camera with square pixels.
         """
         scaled = self.projection[:2, :2] * [[self.width], [self.height]]
         return scaled / (2 * self.pixels_per_unit)
@@ -187,7 +191,7 @@ def _validated_view(view: np.ndarray, name: str) -> np.ndarray:
 
 
 def _validated_projection(projection: np.ndarray, name: str) -> np.ndarray:
-    """Return the projection matrix, scaled as described in `Camera`; raise `RosyError` if it is invalid."""
+    """Return the projection matrix, scaled so that w is depth or 1. Raise `RosyError` if it is invalid."""
     projection = _validated_matrix(projection, "projection", name)
     w_row, xy_rows = projection[3], projection[:2]
     if w_row[2] < 0 and not w_row[[0, 1, 3]].any() and not xy_rows[:, 3].any():
@@ -233,7 +237,7 @@ def pixel_rays(camera: Camera, pixel: np.ndarray) -> tuple[np.ndarray, np.ndarra
 def z_at_depth(camera: Camera, x: np.ndarray, y: np.ndarray, depth: np.ndarray) -> np.ndarray:
     """Return z in camera space of points on pixel rays, given their depth z / w in clip space.
 
-    `x` and `y` are the rays from `pixel_rays`.
+    `x` and `y` are the rays as in `pixel_rays`: in camera space, at depth 1 under perspective.
     """
     m_x, m_y, m_z, m_w = camera.projection[2]
     if camera.is_perspective:
@@ -302,8 +306,9 @@ def orthographic_camera(
         Pixels.
     scale : float
         Blender units along the longer side of the picture (Blender's orthographic scale).
-    clip, name
-        See `perspective_camera`. The clip range may start behind the camera.
+    clip : (float, float)
+        Depths of the near and the far plane, in Blender units. The near plane may be behind the camera.
+    name : str
 
     Raises
     ------
@@ -389,7 +394,7 @@ def orbit_camera(
     points : (V, 3) ndarray
         World space.
     azimuth, elevation : float
-        Degrees, see `orbit_basis`.
+        Direction of the camera in degrees: (0, 0) looks along +y, (0, 90) down; see `orbit_basis`.
     width, height : int
         Pixels.
     perspective : bool
@@ -460,8 +465,12 @@ def framing_points(
     ----------
     points : (V, 3) ndarray
         World space; at least one.
-    azimuth, elevation, width, height, perspective
-        See `orbit_camera`. The result is valid for its default margin.
+    azimuth, elevation : float
+        Direction of the camera in degrees, as in `orbit_basis`.
+    width, height : int
+        Pixels.
+    perspective : bool
+        Whether the camera is perspective. The result is valid for the default margin of `orbit_camera`.
 
     Returns
     -------

@@ -150,6 +150,7 @@ def cached_corner_field(
 ) -> CornerField:
     """Return the result of `field_at_corners` for an instance with a field; store it in a cache if given.
 
+    `display` is "smooth" or "flat": whether the field is interpolated, or constant on each face.
     All cameras, and instances that differ only in their location, share one corner field.
     """
     surface, field = instance.surface, instance.field
@@ -173,9 +174,16 @@ def _fan_values(
     linear : (3, 3) float64 ndarray
         Object to world space, without the translation.
     faces : TangentValues
+        The field on the faces, in world space without the translation.
     angle : (C,) float32 ndarray
         Interior angle of the face at each of its corners, in radians.
     degree : int
+        N of the field.
+
+    Returns
+    -------
+    TangentValues
+        The field on the fans, in the same space.
     """
     normal = np.array(
         normalize_components(transform_components(surface.fan_normal.T, cofactor_matrix(linear))),
@@ -217,9 +225,9 @@ def transport_phase(
     Parameters
     ----------
     source, target : 3 (n,) ndarrays
-        Unit normals.
+        Unit normals, row by row.
     x, y : 3 (n,) ndarrays
-        Tangent frames of `target`.
+        Axes of the tangent frames of `target`.
 
     Returns
     -------
@@ -258,7 +266,8 @@ def _fill_triangles(
 
     `deformed` holds the (3, V) vertices in world space without the translation. `faces` and `fans` are the
     field on the faces and on the smooth fans of the surface. If `fans` is None (flat display), the corners
-    get the values and normals of their faces. `custom_normals` are as in `_corner_normals`.
+    get the values and normals of their faces. `custom_normals`, (3, C) or None, are normals at all corners of
+    the surface, which replace the normals of the fans.
     """
     corners = surface.triangles[block].T.astype(np.intp)
     face = surface.triangle_face[block]
@@ -300,9 +309,9 @@ def _fill_triangles(
 
 
 def _fill_missing_normals(normal: np.ndarray, geometric_normal: np.ndarray) -> np.ndarray:
-    """Return normals in which zero normals are replaced by the geometric normals.
+    """Return (3, n) normals in which zero normals are replaced by the geometric normals, (3, n).
 
-    Where these are zero too, the result is the z axis.
+    Where a geometric normal is zero too, the result is the z axis.
     """
     missing = dot_components(normal, normal) == 0
     if missing.any():
@@ -321,16 +330,18 @@ def _corner_normals(
     Parameters
     ----------
     fan : 3 (n,) ndarrays of int
-        Fan of each corner.
+        Smooth fans at the first, second and third corner of the triangles.
     corners : (3, n) ndarray of int
-        Corners of the triangles.
+        Corners of the triangles, as indices of the corners of the surface.
     fans : TangentValues
+        The field on all fans, of which the normals are used.
     custom : (3, C) ndarray or None
         Custom normals at all corners of the surface, of any length. Corners of one fan may differ.
 
     Returns
     -------
     normals : 3 (3, n) float32 ndarrays
+        Unit normals at the first, second and third corner; zero if there is no normal.
     phases : 3 (n,) complex64 ndarrays or None
         Unit complex numbers: the rotations from the tangent frames of the fan normals to the tangent
         frames of the custom normals. None if there are no custom normals.

@@ -63,10 +63,11 @@ def crease_pixels(
 
 
 def _on_screen(points: np.ndarray, camera: Camera) -> np.ndarray:
-    """Return the (m, 2, 3) ends of edges on screen: x, y in pixels, and depth as in `depth_slopes`.
+    """Return the (m, 2, 3) ends of edges on screen: x and y in pixels from the lower left, and depth.
 
-    `points` are their (n, 2, 3) ends in world space. Under perspective, edges are clipped in front of the
-    eye, and edges behind it are left out.
+    The depth is linear on screen: z of camera space if orthographic, -1 / z if perspective. `points` are the
+    (n, 2, 3) ends in world space. Under perspective, edges are clipped in front of the eye, and edges behind
+    it are left out.
     """
     view, projection = camera.view, camera.projection
     ends = points @ view[:3, :3].T + view[:3, 3]
@@ -101,7 +102,7 @@ def _crossings(
     offset : (k,) float64 ndarray
         Signed distance in pixels from the pixel center to the crossing, along x (axis 0) or y (axis 1).
     depth : (k,) float64 ndarray
-        Depth of the crossing, as in `_on_screen`.
+        Depth of the crossing, linear on screen, as in `lines`.
     """
     along, across = axis, 1 - axis
     size = camera.size

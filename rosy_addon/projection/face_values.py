@@ -111,7 +111,7 @@ def face_values(
 
 
 def relative_channels(field: RosyField) -> dict[FieldChannel, np.ndarray]:
-    """Return the channels of a field besides the representation: (F,) values relative to the stored members."""
+    """Return the channels of a field besides z: (F,) values relative to the stored members."""
     channels: dict[FieldChannel, np.ndarray] = {
         ("deviation", j): values for j, values in field_harmonics(field).items()
     }

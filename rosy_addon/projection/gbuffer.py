@@ -1,4 +1,4 @@
-"""The G-buffer, a flat list of the visible pixels of surfaces with a field; mesh instances, and points on them."""
+"""The G-buffer, a flat list of the visible pixels of surfaces; mesh instances, and points on them."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ class SurfacePoints(NamedTuple):
 
     @staticmethod
     def of(instance_id: int, triangle: np.ndarray, barycentric: np.ndarray) -> SurfacePoints:
-        """Return points on one instance."""
+        """Return points on one instance, given their (P,) triangles and (P, 3) barycentric coordinates."""
         return SurfacePoints(
             np.full(len(triangle), instance_id, dtype=np.int32), triangle, barycentric
         )
@@ -245,7 +245,7 @@ class GBuffer:
         -------
         instance_id : int
         blocks : list of slice or of (n,) intp ndarray
-            Blocks of its pixels; see `pixel_blocks`.
+            Its pixels, as indices into this G-buffer, in blocks of limited size.
         progress : (float, float)
             Fraction of all pixels that belong to instances before this one, and the same fraction with
             this instance included.

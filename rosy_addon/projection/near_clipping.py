@@ -13,7 +13,8 @@ class ClippedTriangles(NamedTuple):
     Attributes
     ----------
     corners : 3 (K,) int32 ndarrays
-        Vertex index of each corner.
+        Vertices at the first, second and third corner, as indices into the `vertices` of the result of
+        `clip_near`.
     triangle : (K,) int32 ndarray
         Index of the original triangle, in ascending order.
     """
@@ -108,7 +109,8 @@ def _clip_crossing_triangles(
 def _intersect_near(vertices: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Return the (K, 4) intersections of edges with the near plane.
 
-    They do not depend on the order of the two vertices of an edge.
+    `vertices` are in clip space. `first` and `second`, (K,), are the indices of the two ends of each edge.
+    The result does not depend on their order.
     """
     low, high = vertices[np.minimum(first, second)], vertices[np.maximum(first, second)]
     low_distance, high_distance = low[:, 2] + low[:, 3], high[:, 2] + high[:, 3]

@@ -53,7 +53,8 @@ def outline_mesh(surface: Surface, linear: np.ndarray, crease_angle: float | Non
     linear : (3, 3) ndarray
         Object to world space, without the translation.
     crease_angle : float or None
-        See `find_creases`. If it is None, the mesh has no creases.
+        Angle between the normals of two faces, in radians, from which their edge can be a crease; see
+        `find_creases`. If it is None, the mesh has no creases.
     """
     ends = np.empty((0, 2), dtype=np.int32)
     if crease_angle is not None:
@@ -71,9 +72,9 @@ def outline_mesh(surface: Surface, linear: np.ndarray, crease_angle: float | Non
 def cached_outline_mesh(
     surface: Surface, matrix: np.ndarray, crease_angle: float | None, cache: Cache | None
 ) -> OutlineMesh:
-    """Do the same as `outline_mesh`, with results stored in a cache if one is given.
+    """Return the result of `outline_mesh`, and store it in a cache if one is given.
 
-    All deformations of a mesh share a result.
+    `matrix`, (3, 3) or (4, 4), maps object to world space. All deformations of a mesh share a result.
     """
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
     if similarity_scale(linear) is not None:

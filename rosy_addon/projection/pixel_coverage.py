@@ -34,9 +34,10 @@ class _OtherSamples(NamedTuple):
     entry : (E,) int32 ndarray
         The pixel that contains the sample, as an index into the G-buffer.
     x, y : (E,) float32 ndarray
-        Position in pixels.
+        Position in the frame, in pixels from the lower left.
     depth : (E,) float32 ndarray
-        Linear on screen for planes; see `pixel_neighbors.depth_slopes`.
+        Depth of the visible triangle, linear on screen: z of camera space if orthographic, -1 / z if
+        perspective.
     instance_id : (E,) int32 ndarray
         Mesh instance of the visible triangle.
     normal : (3, E) float32 ndarray
@@ -58,8 +59,10 @@ class _OtherSamples(NamedTuple):
 class _Entries(NamedTuple):
     """The P pixels of a G-buffer, as arrays that are compared with `_OtherSamples`.
 
-    `x`, `y`, `depth`, `instance_id` and `normal` are as in `_OtherSamples`, at the centers of the pixels.
-    `slope_x`, `slope_y` and `tolerance` are results of `pixel_neighbors.depth_slopes`.
+    `x` and `y` are the centers of the pixels, and `depth`, `instance_id` and `normal` describe the triangles
+    visible there, as in `_OtherSamples`. `slope_x` and `slope_y` are the changes of the depth to the next
+    column and row, on the tangent plane, and `tolerance` is the permitted deviation from this plane; see
+    `pixel_neighbors.depth_slopes`.
     """
 
     x: np.ndarray
@@ -72,7 +75,10 @@ class _Entries(NamedTuple):
     normal: np.ndarray
 
     def shows(self, entry: np.ndarray, sample: _OtherSamples) -> np.ndarray:
-        """Return (n,) bool: whether each sample is on the surface that its pixel in `entry` shows."""
+        """Return (n,) bool: whether each of n samples is on the surface that a pixel shows.
+
+        `entry`, (n,), is the pixel to which each sample is compared, as an index into the G-buffer.
+        """
         x, y = sample.x - self.x.take(entry), sample.y - self.y.take(entry)
         predicted = self.depth.take(entry)
         predicted += x * self.slope_x.take(entry) + y * self.slope_y.take(entry)
@@ -94,8 +100,10 @@ def pixel_coverage(
     sampled : SampledTriangles
     side : int
         Samples along each side of a pixel.
-    instance, normal
-        Mesh instances and normals of ``sampled.other_triangle``; see `_OtherSamples`.
+    instance : (E,) int32 ndarray
+        Mesh instance of each triangle in ``sampled.other_triangle``.
+    normal : (3, E) float32 ndarray
+        Unit normals of these triangles in camera space, of either orientation.
     """
     others = _other_samples(sampled, gbuffer.camera, side, instance, normal)
     count = len(gbuffer.pixel)
@@ -138,7 +146,11 @@ def pixel_coverage(
 def _other_samples(
     sampled: SampledTriangles, camera: Camera, side: int, instance: np.ndarray, normal: np.ndarray
 ) -> _OtherSamples:
-    """Return the samples that show another triangle than the center of their pixel."""
+    """Return the samples that show another triangle than the center of their pixel.
+
+    `camera` is the camera of the G-buffer, and `side` the number of samples along each side of a pixel.
+    `instance` and `normal` are the mesh instances and normals of ``sampled.other_triangle``.
+    """
     frame = camera.scaled(side)
     count = len(sampled.other_entry)
     x, y, depth = np.empty((3, count), dtype=np.float32)

@@ -25,13 +25,13 @@ DEPTH_TOLERANCE, SLOPE_TOLERANCE = 0.5, 0.5
 
 
 class PixelTable:
-    """A table of the pixels of a G-buffer by their places in the frame, for steps from pixel to pixel.
+    """A table of the pixels of a G-buffer by row and column of the frame, for steps from pixel to pixel.
 
     Parameters
     ----------
     gbuffer : GBuffer
     margin : int
-        How far outside of the frame a place may be, in rows and columns. No pixels are there.
+        How many rows and columns outside of the frame can be queried on each side. No pixels are there.
     """
 
     def __init__(self, gbuffer: GBuffer, margin: int) -> None:
@@ -43,11 +43,17 @@ class PixelTable:
         self._entry[self._cell] = np.arange(len(self._cell), dtype=np.int32)
 
     def beside(self, entry: np.ndarray, dx: int, dy: int) -> np.ndarray:
-        """Return the indices of the pixels at the offset (dx, dy) from pixels; -1 where there is none."""
+        """Return the indices of the pixels dx columns right and dy rows above others; -1 where there is none.
+
+        These indices and `entry`, the indices of the others, are indices into the G-buffer.
+        """
         return self._entry.take(self._cell[entry] + (dy * self._stride + dx))
 
     def at(self, row: np.ndarray, column: np.ndarray) -> np.ndarray:
-        """Return the indices of the pixels in rows and columns of the frame; -1 where there is none."""
+        """Return the indices of the pixels in rows and columns of the frame; -1 where there is none.
+
+        They are indices into the G-buffer.
+        """
         return self._entry.take((row + self._margin) * self._stride + column + self._margin)
 
 

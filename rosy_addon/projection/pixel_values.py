@@ -35,8 +35,8 @@ def fill_pixels(
 ) -> None:
     """Write the normals, the representation and the channels at some pixels of one instance.
 
-    `triangle` holds the visible triangle of each of these pixels. `corner_field` must be in camera
-    space.
+    `pixels` are indices into the G-buffer, and `triangle` holds the visible triangle of each of them.
+    `corner_field` must be in camera space.
     """
     triangle = triangle.astype(np.intp)
     weights = gbuffer.barycentric[pixels].T
@@ -104,8 +104,9 @@ def _interpolated_values(
     corner_values : (3, T) complex64 ndarray
         Values of one channel of `corner_field`.
     triangle : (P,) ndarray of int
+        Triangle at each pixel.
     weights : (3, P) float32 ndarray
-        Barycentric coordinates b_i.
+        Barycentric coordinates b_i of the pixel in it.
     length : (P,) float32 ndarray
         Length of sum b_i n_i, from `_interpolated_normal`.
     order : int
@@ -159,7 +160,9 @@ def _scale_to_magnitude(
 ) -> np.ndarray:
     """Return the (P,) float32 factors that give z the modulus of the interpolated magnitude.
 
-    The modulus of the interpolated z is smaller where directions differ, as around singularities.
+    `triangle`, (P,), and `weights`, (3, P), are the triangles and barycentric coordinates of pixels, and `z`,
+    (P,), is the representation interpolated there. Its modulus is smaller where directions differ, as around
+    singularities.
     """
     magnitude = sum(
         weight * corner.take(triangle)

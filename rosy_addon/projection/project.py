@@ -112,8 +112,10 @@ def project_samples(
         Result of `project` with several samples.
     entries : (n,) intp ndarray
         The pixels, as indices into the G-buffer.
-    display, cache
-        See `project`.
+    display : {"smooth", "flat"}
+        Whether the field is interpolated, or constant on each face.
+    cache : Cache, optional
+        Cache for corner fields.
 
     Returns
     -------
@@ -173,12 +175,17 @@ def surface_points(
 
     Parameters
     ----------
-    instances, camera, display, cache
-        See `project`.
+    instances : sequence of MeshInstance
+    camera : Camera
+        Camera in whose space the G-buffer is.
+    display : {"smooth", "flat"}
+        Whether the field is interpolated, or constant on each face.
     points : SurfacePoints
         P points of instances with a field, in front of the camera.
     position : (P, 2) float64 ndarray
         Their positions in the frame, in pixels from the lower left.
+    cache : Cache, optional
+        Cache for corner fields.
 
     Returns
     -------
@@ -213,7 +220,7 @@ def surface_points(
 def cached_project(
     instances: MeshInstances, camera: Camera, display: str, cache: Cache, samples: int = 1
 ) -> GBuffer:
-    """Return the result of `project`, and store it in a cache.
+    """Return the G-buffer of all rows, the result of `project`, and store it in a cache.
 
     The key consists of the instances (by identity), the camera (by value), the display and the
     number of samples.
@@ -225,7 +232,7 @@ def cached_project(
 
 
 def check_instances(instances: MeshInstances, camera: Camera, display: str) -> None:
-    """Check that mesh instances can be projected.
+    """Check that mesh instances can be projected. `camera` is only named in an error message.
 
     Raises
     ------

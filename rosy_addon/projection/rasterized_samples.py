@@ -61,12 +61,18 @@ def rasterize_samples(
 
     Parameters
     ----------
-    clip_vertices, triangles, width, height, rows
-        See `rasterize`.
+    clip_vertices : (V, 4) float64 ndarray
+        Vertices in clip space, in OpenGL's convention.
+    triangles : (T, 3) ndarray of int
+        Vertex indices.
     is_drawn : (T,) bool ndarray
         Whether each triangle is drawn. Triangles that are not drawn only hide others.
+    width, height : int
+        Size of the frame in pixels.
     samples : int
         S, the samples along each side of a pixel.
+    rows : (int, int) or None
+        First row of pixels to draw, and the row after the last one. None for all rows.
     """
     first_row, stop_row = (0, height) if rows is None else rows
     vertices, clipped = clip_near(clip_vertices, triangles)

@@ -195,7 +195,11 @@ def rasterize_rows(
 def _scan_convert(
     screen: _ScreenVertices, corners: tuple[np.ndarray, ...], triangle: np.ndarray, width: int
 ) -> Iterator[_Spans]:
-    """Yield the spans of a block of triangles, in the order of the triangles."""
+    """Yield the spans of a block of n triangles, in the order of the triangles.
+
+    `corners` are 3 (n,) arrays of vertex indices. `triangle`, (n,), is the index that the spans get, and
+    `width` the width of the frame in pixels.
+    """
     a, b, c = corners
     # If all corners have the same row or the same column in `packed_center`, the triangle covers no
     # pixel center.
@@ -235,7 +239,8 @@ def _edge_x_at_row(
 ) -> np.ndarray:
     """Return the x coordinates where edges intersect the horizontal lines at `center_y`.
 
-    `edges` is the result of `_edge_line`. `edge` holds the index of the edge for each horizontal line.
+    `edges` has x and y of the lower ends of all edges, and their slopes dx / dy. `edge` holds the index of an
+    edge for each horizontal line. All coordinates are in pixels.
     """
     x, y, slope = edges
     crossing = center_y - y.take(edge)
@@ -266,10 +271,12 @@ def _spans_with_depth(
     Parameters
     ----------
     row : (S,) ndarray of int
+        Row of each span.
     first, last : (S,) float64 ndarray
-        Results of `_column_range`.
+        First column of each span, and the column after its last one.
     plane : 5 (S,) float64 ndarrays
-        Result of `_depth_plane` for the triangle of each span.
+        Depth of the triangle of each span as a linear function on screen, from `_depth_plane`. The arrays may
+        be changed in place.
     width : int
         Width of the frame in pixels.
     """
@@ -296,6 +303,8 @@ def _spans_with_depth(
 
 def _depth_test(spans: _Spans, depth_buffer: np.ndarray, triangle_buffer: np.ndarray) -> None:
     """Draw spans into the depth buffer and the triangle buffer, in place.
+
+    The buffers are flat arrays with z / w and the index of the triangle that is visible at each pixel.
 
     If several fragments write to the same pixel in one assignment, an arbitrary one is kept. The
     fragments that are nearer than the kept one write again, until there are none. Few rounds are
@@ -353,7 +362,8 @@ def _depth_plane(
     Returns
     -------
     slope_x, slope_y, base, min_depth, max_depth : (n,) float64 ndarray
-        depth = slope_x x + slope_y y + base, with x and y in pixels.
+        depth = slope_x x + slope_y y + base, with x and y in pixels; and the smallest and the largest depth
+        of the three corners.
     """
     xb, yb, depth_b = b.x - a.x, b.y - a.y, b.depth - a.depth
     xc, yc, depth_c = c.x - a.x, c.y - a.y, c.depth - a.depth

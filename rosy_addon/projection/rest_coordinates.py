@@ -36,11 +36,12 @@ class RestCoordinates:
     Attributes
     ----------
     weights, weights_dx, weights_dy : (3, P) float32 ndarray
-        Homogeneous barycentric coordinates at the pixel center, and their changes to the next pixel on
-        the right and to the next pixel above, in the plane of the triangle.
+        Homogeneous barycentric coordinates at the pixel center, with sum 1, and their changes to the next
+        pixel on the right and to the next pixel above, in the plane of the triangle. Divided by their sum,
+        they are perspective-correct.
     rest_corners : (3, 3, P) float32 ndarray
-        The corners of the triangle in the rest shape; see `rest_positions`. The first axis is the corner,
-        the second the component.
+        The corners of the triangle in the rest shape, in object space, or relative to a point near the mesh
+        (see `rest_positions`). The first axis is the corner, the second the component.
     pixel_size : (P,) float32 ndarray
         Width of a pixel at the depth of the surface, parallel to the picture, in units of object
         space.
@@ -134,8 +135,8 @@ def _fill_pixels(
 ) -> None:
     """Compute the coordinates at some pixels of one mesh instance, in place.
 
-    `rest` is the (V, 3) result of `rest_positions` for its surface, and `screen` is the (3, V) result of
-    `_screen_vertices`.
+    `rest` holds the (V, 3) vertices of the instance in the rest shape, and `screen` their (3, V) homogeneous
+    screen coordinates. `pixels` are indices into the G-buffer.
     """
     camera, surface = gbuffer.camera, instance.surface
     vertices = surface.triangle_vertex.take(gbuffer.triangle[pixels], axis=0).T

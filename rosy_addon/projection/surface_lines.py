@@ -86,7 +86,8 @@ def cached_surface_lines(
 ) -> SurfaceLines:
     """Return the result of `surface_lines`, and store it in a cache if one is given.
 
-    Lines are shared by all cameras, and by instances of equal size.
+    Lines are shared by all cameras, and by instances of equal size. `spacing` is the distance between
+    neighboring lines in world space, if the mesh is not deformed.
     """
     surface, field, cache = instance.surface, instance.field, Cache() if cache is None else cache
     stretch, scale = rest_matrix(instance.matrix), matrix_scale(instance.matrix)
@@ -120,9 +121,9 @@ def surface_lines(
         Linear map from the rest shape to the shape on which distances are measured.
     field : RosyField
     display : {"smooth", "flat"}
-        See `field_at_corners`.
+        Whether the field is interpolated between the faces, or constant on each face.
     spacing : float
-        Distance between neighboring lines after `stretch`.
+        Distance between neighboring lines after `stretch`, in Blender units.
     max_triangles : int
         Largest number of triangles on which the phase is computed, unless the mesh has more.
 
@@ -167,14 +168,15 @@ def _leaf_directions(
     """Interpolate a field to the corners of the leaves of a tree.
 
     `corners` are the (T, 3, 3) positions of the corners of the surface's triangles in the rest shape, after
-    `stretch` of `surface_lines`.
+    `stretch` of `surface_lines`. `corner_field` is the field at these corners.
 
     Returns
     -------
     directions : CornerDirections
         Directions of the field at the corners of the leaves, in the planes of the surface's triangles.
     heading : (2, L) float32 ndarray
-        See `SurfaceLines`.
+        A member of the field in each leaf, as multiples of two sides of the surface's triangle; see
+        `SurfaceLines`.
     """
     x, y = tangent_frame_components(corner_field.geometric_normal)
     sides = (corners - corners[:, :1]).transpose(1, 2, 0)

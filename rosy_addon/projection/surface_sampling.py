@@ -27,7 +27,7 @@ def surface_tones(gbuffer: GBuffer) -> np.ndarray:
     Returns
     -------
     (P,) float32 ndarray
-        Linear tones. NaN where the mesh instance has no tone.
+        Linear tones, from 0 (dark) to 1 (light). NaN where the mesh instance has no tone.
     """
     tones = np.full(len(gbuffer.pixel), np.nan, dtype=np.float32)
     for instance_id, blocks, _ in gbuffer.instance_blocks():
@@ -78,7 +78,9 @@ def values_in_triangles(
     instance : MeshInstance
         An instance that has `color_values`.
     triangle : (n,) ndarray of int
+        Triangle of each point.
     barycentric : (n, 3) float32 ndarray
+        Barycentric coordinates of each point in its triangle.
 
     Returns
     -------

@@ -67,7 +67,11 @@ def _downsample(image: np.ndarray) -> np.ndarray:
 
 
 def _sample_bilinear(image: np.ndarray, u: np.ndarray, v: np.ndarray, repeat: bool) -> np.ndarray:
-    """Interpolate (n,) values bilinearly between the pixel centers of one (h, w) image."""
+    """Interpolate (n,) values bilinearly between the pixel centers of one (h, w) image.
+
+    `u` and `v` are texture coordinates, from 0 to 1 over the width and the height. If `repeat` is false, they
+    are clamped.
+    """
     height, width = image.shape
     neighbors, fractions = [], []
     for position, size in ((v, height), (u, width)):

@@ -36,7 +36,10 @@ def normalize_components(vectors: VectorComponents) -> list[np.ndarray]:
 
 
 def tangent_frame_components(normal: VectorComponents) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Return the tangent frames x, y of normals: `field.frames.tangent_frame` for vectors by component."""
+    """Return two unit tangents x, y for each unit normal, with x cross y = normal.
+
+    They are the same as in `field.frames.tangent_frame`.
+    """
     nx, ny, nz = normal
     sign = np.copysign(nz.dtype.type(1), nz)
     a = -1 / (sign + nz)

@@ -2,8 +2,8 @@
 
 No depth buffer is used. A triangle hides a point if it is nearer to the eye and covers the projection of
 the point. Barycentric coordinates come from homogeneous clip coordinates, so triangles that reach behind
-the eye need no clipping; see Marc Olano
-and Trey Greer, "Triangle Scan Conversion Using 2D Homogeneous Coordinates", 1997.
+the eye need no clipping; see Marc Olano and Trey Greer, "Triangle Scan Conversion Using 2D Homogeneous
+Coordinates", 1997.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def project_vertices(
     vertices : sequence of (n,) int ndarray
         For each instance, the indices of the vertices to project.
     clip_planes : (6, 4) float64 ndarray, optional
-        World space. The negative side of each plane is cut away.
+        Planes (a, b, c, d) in world space. Points with a x + b y + c z + d < 0 are cut away.
 
     Returns
     -------
@@ -115,13 +115,14 @@ def project_points(
     points : SurfacePoints
         K points.
     clip_planes : (6, 4) float64 ndarray, optional
-        World space. The negative side of each plane is cut away.
+        Planes (a, b, c, d) in world space. Points with a x + b y + c z + d < 0 are cut away.
     finds_hidden : bool
         Whether hidden points are found. If not, all points in the frame count as visible.
 
     Returns
     -------
     ProjectedPoints
+        The points in their order.
     """
     report(0.0, POINTS_LABEL)
     scene = _Scene.of(instances, camera, clip_planes)
@@ -197,7 +198,7 @@ class _Scene:
         Triangles that can hide points, as indices of vertices.
     camera : Camera
     clip_planes : (6, 4) float64 ndarray or None
-        World space. The negative side of each plane is cut away.
+        Planes (a, b, c, d) in world space. Points with a x + b y + c z + d < 0 are cut away.
     tolerance : float
         A surface hides a point only if it is nearer to the camera by more than this depth, in Blender units.
     """
@@ -272,8 +273,9 @@ class _Scene:
         Parameters
         ----------
         triangle : (n,) ndarray of int
+            Triangles to test, one for each point.
         ndc : (n, 2) float64 ndarray
-            Positions of the points, from -1 to 1.
+            Positions of the points on screen, from -1 to 1.
         distance : (n,) float64 ndarray
             Depths of the points, along the axis of the camera.
         """
@@ -309,7 +311,8 @@ def is_cut_away(points: np.ndarray, clip_planes: np.ndarray | None) -> np.ndarra
     ----------
     points : (n, 3) ndarray
     clip_planes : (6, 4) ndarray or None
-        Clip planes in the space of the points. If it is None, no point is cut away.
+        Coefficients (a, b, c, d) of clip planes a x + b y + c z + d = 0, in the space of the points. The
+        negative side is cut away. If it is None, no point is cut away.
 
     Returns
     -------

@@ -50,9 +50,9 @@ def bent(points, angle):
     return np.stack([points[:, 0], cos * y - sin * z, sin * y + cos * z], axis=1)
 
 
-def make_instance(surface: Surface, degree=4, matrix=None):
+def make_instance(surface: Surface, degree=4, matrix=None, tone=None):
     field = axis_field(surface.in_rest_shape(), degree, (0.3, 0.2, 1.0))
-    return MeshInstance(surface, np.eye(4) if matrix is None else matrix, field)
+    return MeshInstance(surface, np.eye(4) if matrix is None else matrix, field, tone)
 
 
 def make_wall(angle=0.0, half=9.0, matrix=None):

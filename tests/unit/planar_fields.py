@@ -8,6 +8,13 @@ import numpy as np
 KERNELS = {"box": {}, "taper": {"fade": "ends"}, "ramp": {"fade": "tail"}}
 
 
+def kernel_window(length: int, kernel: str) -> np.ndarray:
+    """(2 length + 1,) weights of the samples of a streamline, along it from end to end."""
+    offset = np.arange(-length, length + 1)
+    distance = {"box": 0 * offset, "taper": np.abs(offset), "ramp": offset}[kernel]
+    return 1 - distance / (length + 1)
+
+
 def pixel_centers(size: int) -> tuple[np.ndarray, np.ndarray]:
     """(size, size) x and y of pixel centers, rows from the bottom."""
     y, x = np.mgrid[0:size, 0:size] + 0.5

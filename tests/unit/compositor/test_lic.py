@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from harness.planar import compose_planar, lic, planar_pixel_field
 from harness.streaks import correlation, orientation_spectrum, peaks, persistence
-from planar_fields import KERNELS, pair_angle, pixel_centers, swirl_angle
+from planar_fields import KERNELS, kernel_window, pair_angle, pixel_centers, swirl_angle
 
 from rosy_addon.compositor.contrast import blend_gain, expected_std
 from rosy_addon.compositor.image_noise import NoiseSettings, image_noise
@@ -37,13 +37,6 @@ def tone(angles, degree, look=PLAIN, **more):
 def make_noise(size, line_width=1.5, seed=0):
     pixel = np.arange(size * size, dtype=np.int32)
     return image_noise(pixel, size, NoiseSettings(line_width, seed))[:, 0]
-
-
-def kernel_window(length, kernel):
-    """Weights of the samples of a streamline, along it from end to end."""
-    offset = np.arange(-length, length + 1)
-    distance = {"box": 0 * offset, "taper": np.abs(offset), "ramp": offset}[kernel]
-    return 1 - distance / (length + 1)
 
 
 def runge_kutta_lic(angle, noise, size, length, kernel):

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import tracemalloc
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import ROOT, traced_peak
 from field_helpers import write_off
 from shapes import plane
 
 from bench import cases
 from rosy_addon.cli.parser import main
-from rosy_addon.compositor import image_noise, streak_statistics
 from rosy_addon.compositor.look import Look
 from rosy_addon.core import memory
 from rosy_addon.core.cache import Cache
@@ -90,19 +88,6 @@ def test_a_limit_of_the_address_space():
 
 
 # --- the bound of a picture ------------------------------------------------------------------------------------
-
-
-def traced_peak(work) -> int:
-    """Return the largest number of bytes that are allocated at once, as in a new process."""
-    for cache in (image_noise.TILE_CACHE, streak_statistics.STATISTICS_CACHE):
-        cache.clear()
-    image_noise.streak_moments.cache_clear()
-    tracemalloc.start()
-    try:
-        work()
-        return tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
 
 
 def test_a_picture_in_strips_needs_less_than_a_whole_one():

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rays import ray_intersections
 from shapes import icosphere, instance_of, moved, plane, torus
 
 from rosy_addon.line_drawing.mesh_in_view import HIDDEN_MARGIN, seen_triangles, triangles_near
@@ -46,19 +47,11 @@ def test_every_triangle_that_is_not_hidden_is_seen(camera):
 
 
 def meets_another(points, direction, triangles):
-    """Whether rays from points toward the camera meet a triangle, by Moeller and Trumbore."""
-    a, u, v = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    """Whether rays from points toward the camera meet a triangle."""
     result = np.zeros(len(points), dtype=bool)
     for index, (point, ray) in enumerate(zip(points, direction, strict=True)):
-        p = np.cross(ray, v)
-        determinant = np.einsum("ij,ij->i", u, p)
-        determinant[determinant == 0] = np.nan
-        to_point = point - a
-        q = np.cross(to_point, u)
-        s = np.einsum("ij,ij->i", to_point, p) / determinant
-        t = np.einsum("j,ij->i", ray, q) / determinant
-        depth = np.einsum("ij,ij->i", v, q) / determinant
-        result[index] = ((s >= 0) & (t >= 0) & (s + t <= 1) & (depth > 1e-6)).any()
+        barycentric, distance = ray_intersections(point, ray, triangles)
+        result[index] = ((barycentric >= 0).all(axis=1) & (distance > 1e-6)).any()
     return result
 
 

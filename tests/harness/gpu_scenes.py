@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -27,6 +28,7 @@ MIRROR = np.diag([-1.0, 1.0, 1.0])
 ROSY = rooms()
 SIZE = 160, 144
 LOOK = Look(shading=0.0, length=30)
+EVEN_LINES = replace(LOOK, ink="even", shading=0.9, line_width=3.0, line_distance=6.0)
 BALL = icosphere(3)
 
 

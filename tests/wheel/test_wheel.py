@@ -126,11 +126,8 @@ def test_nothing_imports_the_name_of_the_tree():
 @pytest.mark.parametrize(
     ("arguments", "status", "stream", "text"),
     [
-        (["--help"], 0, "stdout", "render"),
         (["render", "--help"], 0, "stdout", "--preset"),
-        ([], 2, "stderr", "usage"),
         (["render", "no.obj", "-o", "no.png"], 2, "stderr", "no.obj"),
-        (["draw"], 2, "stderr", "draw"),
     ],
 )
 def test_statuses(arguments, status, stream, text, tmp_path):

@@ -121,11 +121,6 @@ def test_the_representation_is_that_of_any_member(sphere, field):
     assert np.allclose(other_member.representation, field.representation)
 
 
-def test_singularities_sum_to_the_euler_characteristic(sphere, field):
-    assert sphere.euler_characteristic == 2 and field.singularities.index.sum() == 4 * 2
-    assert field.to_degree(8).singularities.index.sum() == 8 * 2
-
-
 def test_fields_from_directions_and_tensors(sphere, field):
     again = rf.from_directions(sphere, field.directions)
     assert again.is_rosy and again.difference(field).max < 1e-6

@@ -154,6 +154,6 @@ def test_hatching_for_one_light():
         options = settings | {"size": 256, "margin": 0, "light_direction": light}
         ink = rf.texture(square, field, **options).tiles[1001]
         assert ink.rgba[..., 0].mean() == pytest.approx(cosine, abs=0.03)
-        clear = rf.texture(square, field, paper_color="#ffffff00", **options).tiles[1001]
-        assert clear.rgba[..., 3].mean() == pytest.approx(1 - cosine, abs=0.03)
-        assert clear.rgba[..., :3].max() < 0.01
+    clear = rf.texture(square, field, paper_color="#ffffff00", **options).tiles[1001]
+    assert clear.rgba[..., 3].mean() == pytest.approx(1 - cosine, abs=0.03)
+    assert clear.rgba[..., :3].max() < 0.01

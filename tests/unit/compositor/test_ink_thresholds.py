@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from harness.planar import planar_lines
-from shapes import torus
+from shapes import instance_of, torus
 
 from rosy_addon.compositor.ink_from_thresholds import ink_of_thresholds
 from rosy_addon.compositor.ink_thresholds import (
@@ -22,9 +22,7 @@ from rosy_addon.compositor.ink_thresholds import (
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import pixel_look
 from rosy_addon.core.color import to_linear
-from rosy_addon.field.generate import axis_field
 from rosy_addon.projection.camera import orbit_camera
-from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
@@ -128,8 +126,7 @@ def test_undefined_pixels_have_the_ink_of_all_lines():
 def test_thresholds_of_a_picture_draw_its_ink(ink, supersampling):
     """At any tone: a torus in the light of the camera, whose contour has all of them."""
     look = replace(INK, ink=ink, layers=2, supersampling=supersampling, light="headlight")
-    mesh = torus(48, 24)
-    instance = MeshInstance(mesh, np.eye(4), axis_field(mesh, 4, (0, 0, 1)))
+    instance = instance_of(torus(48, 24), 4, "axis")
     camera = orbit_camera(instance.face_points(), 0.0, 50.0, 320, 240)
     view = ViewInput((instance,), camera, look)
     expected = draw_picture(view).rgba

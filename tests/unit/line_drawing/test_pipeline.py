@@ -14,7 +14,6 @@ from shapes import from_triangles, icosphere, instance_of, moved, plane, rebuilt
 from rosy_addon.compositor.shading import Light
 from rosy_addon.core.progress import listening
 from rosy_addon.field.frames import dot, normalize
-from rosy_addon.field.generate import generate
 from rosy_addon.line_drawing import lateral_neighbors, seeding, separation, visibility
 from rosy_addon.line_drawing.drawing_outputs import offset_toward_camera, stroke_geometry
 from rosy_addon.line_drawing.outline import OUTLINE_KINDS
@@ -38,7 +37,7 @@ ORTHOGRAPHIC = orthographic_camera(look_at((0.5, -4, 1), (0, 0, 0)), 240, 200, s
 
 @pytest.mark.slow
 def test_families_of_several_instances_are_merged_by_name():
-    degree_6 = MeshInstance(icosphere(3), moved(x=0.9), generate(icosphere(3), "smoothest", 6))
+    degree_6 = instance_of(icosphere(3), 6, matrix=moved(x=0.9))
     occluder = MeshInstance(plane(), moved(z=-1.0))
     style = StrokeStyle(spacing=16, outline=True)
     drawing = draw_instances([occluder, SPHERE, degree_6], CAMERA, style)

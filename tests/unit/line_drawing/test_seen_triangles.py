@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from rays import ray_intersections
@@ -16,7 +14,7 @@ from rosy_addon.projection.camera import look_at, orthographic_camera, perspecti
 
 
 def instance(surface, location=(0, 0, 0)):
-    return replace(instance_of(surface, 4), matrix=moved(*location))
+    return instance_of(surface, 4, matrix=moved(*location))
 
 
 def seen(instances, index, camera):
@@ -31,11 +29,11 @@ CLOSE = orthographic_camera(look_at((0, -3, 0.5), (0.6, 0, 0)), 120, 100, scale=
 
 @pytest.mark.parametrize("camera", [SIDE, FAR, CLOSE], ids=["side", "far", "close"])
 def test_every_triangle_that_is_not_hidden_is_seen(camera):
-    """A sphere behind a torus: rays to points on it meet nothing else."""
+    """A sphere behind a torus: rays to points on a third of its triangles meet nothing else."""
     ball, ring = instance(icosphere(3)), instance(torus(24, 12), (0, -2.2, 0))
     instances = [ring, ball]
-    found = seen(instances, 1, camera)
-    corners = ball.world_points()[ball.surface.triangle_vertex]
+    found = seen(instances, 1, camera)[::3]
+    corners = ball.world_points()[ball.surface.triangle_vertex][::3]
     occluders = [other.world_points()[other.surface.triangle_vertex] for other in instances]
     weights = np.random.default_rng(3).dirichlet(np.ones(3), size=len(corners))
     points = np.einsum("tk,tki->ti", weights, corners)

@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 from lenses import shifted
+from scipy.spatial.transform import Rotation
 from shapes import cube, icosphere, joined, placed, rebuilt
 
 from rosy_addon.compositor.flow import NO_DRIFT
@@ -37,14 +38,7 @@ BALL = icosphere(3)
 
 def rotation(x, y, z):
     """Return the rotation about the three axes, one after the other."""
-    result = np.eye(3)
-    for axis, angle in enumerate((x, y, z)):
-        a, b = (axis + 1) % 3, (axis + 2) % 3
-        turn = np.eye(3)
-        turn[np.ix_((a, b), (a, b))] = np.cos(angle) * np.eye(2)
-        turn[a, b], turn[b, a] = -np.sin(angle), np.sin(angle)
-        result = turn @ result
-    return result
+    return Rotation.from_euler("xyz", (x, y, z)).as_matrix()
 
 
 def boxes():

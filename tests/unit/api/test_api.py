@@ -257,17 +257,17 @@ def test_numbers_as_colors(error_of):
 
 
 def test_sources_of_the_tone(sphere, field, error_of):
-    """Light to the left: the same from values of vertices and corners, from a picture and an array."""
+    """Light on the right, unlike the lamp: from values of vertices and corners, a picture and an array."""
     look = {"view": (0, 0), "size": (64, 64), "orthographic": True, "preset": "pen-and-ink"}
-    values = (sphere.vertices[:, 0] < 0).astype(float)
+    values = (sphere.vertices[:, 0] > 0).astype(float)
     by_vertex, by_corner = (
         np.asarray(rf.render(sphere, field, tone_values=each, **look))[..., :3]
         for each in (values, values[sphere.corner_vertex])
     )
     assert np.array_equal(by_vertex, by_corner)
-    assert by_vertex[:, :24].mean() > by_vertex[:, -24:].mean() + 50
+    assert by_vertex[:, -24:].mean() > by_vertex[:, :24].mean() + 50
     tone = np.zeros((64, 64, 3), dtype=np.uint8)
-    tone[:, :32] = 255
+    tone[:, 32:] = 255
     by_array = rf.render(sphere, field, tone_picture=tone, **look)
     rgba = np.ones((64, 64, 4), dtype=np.float32)
     rgba[..., :3] = tone / 255

@@ -73,6 +73,11 @@ def camera_before_wall(scale, x=0.0, z=0.0):
     return orthographic_camera(look_at((x, -5, z), (x, 0, z)), SIZE, SIZE, scale=scale)
 
 
+def camera_above(scale=8.0, size=SIZE, eye=(0, 0, 5)):
+    """An orthographic camera on the z axis, with y up in the picture."""
+    return orthographic_camera(look_at(eye, (0, 0, 0), (0, 1, 0)), size, size, scale=scale)
+
+
 def render(instance, camera, look, lights=()):
     """(H, W, 4) linear colors, shaded at all samples."""
     return compose(project([instance], camera.scaled(look.supersampling)), look, lights).rgba

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from harness.stroke_tracing import turned
-from hatched import render
+from hatched import camera_above, render
 from scipy.ndimage import gaussian_filter
 from shapes import plane
 
@@ -53,10 +53,6 @@ def partly_undefined(degree):
     vectors = axis_field(surface, degree, (1, 0.3, 0)).vectors.copy()
     vectors[24:40] = 0
     return MeshInstance(surface, np.eye(4), RosyField(degree, vectors))
-
-
-def camera_above(scale=8.0, size=SIZE, eye=(0, 0, 5)):
-    return orthographic_camera(look_at(eye, (0, 0, 0), (0, 1, 0)), size, size, scale=scale)
 
 
 def lines_at_pixels(instance, camera, look=LOOK):

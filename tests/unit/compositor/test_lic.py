@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from harness.planar import compose_planar, lic, planar_pixel_field
 from harness.streaks import correlation, orientation_spectrum, peaks, persistence
-from planar_fields import KERNELS, kernel_window, pair_angle, pixel_centers, swirl_angle
+from planar_fields import KERNELS, kernel_window, pair_angle, pixel_centers, plain, swirl_angle
 
 from rosy_addon.compositor.contrast import blend_gain, expected_std
 from rosy_addon.compositor.image_noise import NoiseSettings, image_noise
@@ -20,16 +20,9 @@ pytestmark = pytest.mark.slow
 
 SIZE = 256
 METHODS = "sheets", "members", "brute", "ibfv"
-#: The paper's noise, and the contrast of one member.
-PLAIN = Look(gain=1.0, density=0.5, high_pass=0.0)
 
 
-def plain(**settings):
-    """The plain look with some settings changed."""
-    return PLAIN.with_settings(settings)
-
-
-def tone(angles, degree, look=PLAIN, **more):
+def tone(angles, degree, look, **more):
     """(H, W) display values of a planar picture before clipping, one channel."""
     return compose_planar(angles, degree, look, **more).layer.tone[:, 0].reshape(angles.shape)
 
@@ -74,7 +67,7 @@ def crop_margin(image, margin=50):
 def test_one_direction_agrees_with_a_runge_kutta_integrator(kernel):
     size = 192
     noise = make_noise(size).reshape(size, size).astype(np.float64)
-    expected = runge_kutta_lic(swirl_angle, noise, size, PLAIN.length, kernel)
+    expected = runge_kutta_lic(swirl_angle, noise, size, plain().length, kernel)
     look = plain(method="members", **KERNELS[kernel])
     actual = tone(swirl_angle(*pixel_centers(size), size), 1, look, noise=noise)
     assert correlation(crop_margin(actual), crop_margin(expected)) > 0.99
@@ -86,7 +79,7 @@ def test_one_direction_resembles_another_library(kernel):
     x, y = pixel_centers(SIZE)
     angles = swirl_angle(x, y, SIZE)
     noise = make_noise(SIZE).reshape(SIZE, SIZE).astype(np.float64)
-    window = kernel_window(PLAIN.length, kernel)
+    window = kernel_window(plain().length, kernel)
     expected = rlic.convolve(noise, np.cos(angles), np.sin(angles), kernel=window, iterations=1)
     actual = tone(angles, 1, plain(**KERNELS[kernel]), noise=noise)
     assert correlation(crop_margin(actual), crop_margin(expected)) > 0.7
@@ -104,7 +97,7 @@ def test_corrected_contrast_is_that_of_one_member(method, settings):
 
 def test_the_blend_gain_of_seven_lines_includes_correlations():
     # Equation 6 assumes independent images; the correction for correlations is about a tenth.
-    gain = blend_gain(7, np.array([81.0]), pixel_look(PLAIN))[0]
+    gain = blend_gain(7, np.array([81.0]), pixel_look(plain()))[0]
     assert 0.87 < gain / np.sqrt(7) < 0.94
 
 
@@ -199,7 +192,7 @@ def test_color_noise_has_three_channels():
     channels = compose_planar(angles, 4, plain(hue="noise")).layer.tone
     assert channels.shape == (128 * 128, 3)
     assert abs(correlation(channels[:, 0], channels[:, 1])) < 0.1
-    gray = tone(angles, 4)
+    gray = tone(angles, 4, plain())
     assert np.allclose(channels[:, 0].reshape(128, 128), gray, atol=1e-6)
 
 

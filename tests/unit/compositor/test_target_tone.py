@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hatched import BALL, make_instance
+from hatched import BALL, camera_above, make_instance
 from shapes import icosphere, placed, plane
 
 from rosy_addon.compositor.look import Look
@@ -118,23 +118,19 @@ def mapped_plane(image, repeat=1.0, cells=4):
     return make_instance(surface, tone=SurfaceTone(uv.astype(np.float32), image.astype(np.float32)))
 
 
-def camera_above(size, scale=2.0):
-    return orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), size, size, scale=scale)
-
-
 @pytest.mark.parametrize("repeat", [1, 2])
 def test_images_follow_the_uv_map_and_repeat(repeat):
     """An image with pixels of the size of the picture's is reproduced, rows from the bottom."""
     image = np.random.default_rng(1).random((16, 16))
     size = 16 * repeat
-    gbuffer = project([mapped_plane(image, repeat)], camera_above(size))
+    gbuffer = project([mapped_plane(image, repeat)], camera_above(2.0, size))
     tones = surface_tones(gbuffer).reshape(size, size)
     np.testing.assert_allclose(tones, np.tile(image, (repeat, repeat)), atol=2e-4)
 
 
 def test_images_are_interpolated():
     ramp = np.tile((np.arange(8) + 0.5) / 8, (8, 1))
-    tones = surface_tones(project([mapped_plane(ramp)], camera_above(128))).reshape(128, 128)
+    tones = surface_tones(project([mapped_plane(ramp)], camera_above(2.0, 128))).reshape(128, 128)
     expected = (np.arange(128) + 0.5) / 128
     np.testing.assert_allclose(tones[:, 8:-8], np.tile(expected[8:-8], (128, 1)), atol=1e-3)
 
@@ -142,11 +138,11 @@ def test_images_are_interpolated():
 def test_images_finer_than_the_picture_are_averaged():
     """A checkerboard with sixteen squares per pixel of the picture is gray."""
     board = np.indices((256, 256)).sum(axis=0) % 2
-    tones = surface_tones(project([mapped_plane(board)], camera_above(64)))
+    tones = surface_tones(project([mapped_plane(board)], camera_above(2.0, 64)))
     np.testing.assert_allclose(tones, 0.5, atol=1e-3)
     # The same for an image with odd sides that is repeated.
     odd = np.random.default_rng(2).random((255, 131))
-    tones = surface_tones(project([mapped_plane(odd, repeat=3.0)], camera_above(8)))
+    tones = surface_tones(project([mapped_plane(odd, repeat=3.0)], camera_above(2.0, 8)))
     np.testing.assert_allclose(tones, odd.mean(), atol=0.05)
 
 

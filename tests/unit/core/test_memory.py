@@ -41,19 +41,17 @@ def limit_memory(monkeypatch, free: float) -> None:
 
 
 def test_limits_of_control_groups(tmp_path):
-    """Of the group and of the one around it; files that are only cached are free."""
+    """Of both versions, of the group and the one around it; files that are only cached are free."""
     (tmp_path / "proc/self").mkdir(parents=True)
     (tmp_path / "proc/self/cgroup").write_text("0::/outer/inner\n7:memory:/box\n2:cpu:/\n")
     mount = tmp_path / "sys/fs/cgroup"
+    first = "memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"
+    second = "memory.max", "memory.current", "inactive_file"
     for folder, limit, names in (
-        (mount / "outer/inner", "max", ("memory.max", "memory.current", "inactive_file")),
-        (mount / "outer", "5000", ("memory.max", "memory.current", "inactive_file")),
+        (mount / "outer/inner", "max", second),
+        (mount / "outer", "5000", second),
         # In a container, the path of its group does not exist.
-        (
-            mount / "memory",
-            "7000",
-            ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
-        ),
+        (mount / "memory", "7000", first),
     ):
         folder.mkdir(parents=True, exist_ok=True)
         (folder / names[0]).write_text(f"{limit}\n")

@@ -367,8 +367,8 @@ def test_outer_faces_see_the_sky_and_inner_ones_do_not():
     vertices, faces = awkward.cube()
     outside = rf.Surface(vertices, faces)
     inside = rf.Surface(vertices, [face[::-1] for face in faces])
-    np.testing.assert_allclose(rf.ambient_occlusion(outside, 32), 1, atol=0.02)
-    np.testing.assert_allclose(rf.ambient_occlusion(inside, 32), 0, atol=0.02)
+    np.testing.assert_allclose(rf.ambient_occlusion(outside, 8), 1, atol=0.02)
+    np.testing.assert_allclose(rf.ambient_occlusion(inside, 8), 0, atol=0.02)
 
 
 def test_indices_are_fractions_or_units(error_of):

@@ -121,7 +121,7 @@ def test_the_state_of_blender_is_restored(rosy, card, surface_of):
         surface = surface_of("sphere")
         instance = rosy.MeshInstance(surface, np.eye(4), rosy.generate(surface, "axis", 2))
         camera = camera_of_shape(rosy, "sphere", surface, 64)
-        draw_on_card(rosy, card, [instance], camera, rosy.Look())
+        draw_on_card(rosy, card, rosy.ViewInput((instance,), camera, rosy.Look()))
         current = state.depth_test_get(), state.depth_mask_get(), state.blend_get()
         assert current == ("GREATER", False, "ADDITIVE")
     finally:

@@ -8,6 +8,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.random import Generator
 
+from ..unit.awkward import cube
+
 #: Points (V, 3), and the faces as tuples of vertex indices.
 Polygons = tuple[np.ndarray, list[tuple[int, ...]]]
 Writer = Callable[[Generator, np.ndarray, list], bytes]
@@ -52,8 +54,7 @@ def _sheet(rng: Generator) -> Polygons:
 
 
 def _cube(rng: Generator) -> Polygons:
-    points = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
-    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    points, quads = cube()
     return np.array(points) * rng.uniform(0.2, 3, 3), quads[: rng.integers(1, 7)]
 
 

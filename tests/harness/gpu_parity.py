@@ -86,13 +86,54 @@ class Pair:
 
     @property
     def agreement(self) -> float:
-        """See `agreement`."""
-        return agreement(self.gbuffer, self.images, self.is_center)
+        """Return the fraction of pixels at which both G-buffers agree.
+
+        The pixels are those that at least one of the G-buffers covers with a field. They agree if
+
+        - both cover the pixel, with the same instance;
+        - the points are within `MAX_DISTANCE_PX`. Both are on the ray through the pixel, so their
+          distance is the difference in depth, in pixels at that depth. The triangles may be different
+          where two meet, because OpenGL rounds their corners, but the points may not;
+        - the normals differ by less than `MAX_DIFFERENCE`, and both G-buffers see the same side;
+        - the representations z differ by at most `MAX_DIFFERENCE` times the greater modulus; 0 agrees
+          only with 0.
+
+        Where only samples beside the center show a surface, the two take other points of the triangle. There,
+        the instance has to agree.
+        """
+        gbuffer, is_center = self.gbuffer, self.is_center
+        camera, pixel = gbuffer.camera, gbuffer.pixel
+        normals, values = (self.images[name].reshape(-1, 4) for name in ("normals", "field_values"))
+        covered = np.zeros(camera.width * camera.height, dtype=bool)
+        covered[pixel] = True
+        either = np.count_nonzero(covered | (values[:, 3] > 0))
+        normals, values = normals[pixel].astype(np.float64), values[pixel].astype(np.float64)
+        same = values[:, 3] == gbuffer.instance_id + 1
+        depth = -gbuffer.position[:, 2].astype(np.float64)
+        distance = np.abs(np.abs(normals[:, 3]) - depth)
+        if camera.is_perspective:
+            # Along the ray, and in units of a pixel at that depth.
+            distance = distance / gbuffer.view_direction[:, 2] / depth
+        same &= distance * camera.pixels_per_unit < MAX_DISTANCE_PX
+        same &= np.linalg.norm(normals[:, :3] - gbuffer.normal, axis=1) < MAX_DIFFERENCE
+        same &= (normals[:, 3] > 0) == gbuffer.front_facing
+        z = values[:, 0] + 1j * values[:, 1]
+        expected = gbuffer.representation.astype(np.complex128)
+        same &= np.abs(z - expected) <= MAX_DIFFERENCE * np.maximum(np.abs(z), np.abs(expected))
+        if is_center is not None:
+            same |= ~is_center & (values[:, 3] == gbuffer.instance_id + 1)
+        return np.count_nonzero(same) / either
 
     @property
     def likeness(self) -> float:
         """See `likeness`."""
         return likeness(self.card, self.numpy)
+
+
+def draw_on_card(rosy: SimpleNamespace, card: Any, view: Any) -> np.ndarray:
+    """Draw the picture of a view on a card: (H, W, 4), without marks over it."""
+    texture = rosy.run(card.texture_steps(card.upload(view.instances, view.look.display), view))
+    return card.device.read(texture)
 
 
 def draw_pair(
@@ -128,8 +169,7 @@ def draw_pair(
     view = rosy.ViewInput(
         tuple(instances), camera.resized(width, height), look, tuple(lights), reference, drift=drift
     )
-    texture = rosy.run(card.texture_steps(card.upload(instances, look.display), view))
-    card_picture = card.device.read(texture)
+    card_picture = draw_on_card(rosy, card, view)
     images = read_gbuffer(card, width, height)
     gbuffer = rosy.project(instances, view.camera, look.display, samples=supersampling)
     is_center = None
@@ -150,65 +190,6 @@ def read_gbuffer(card: Any, width: int, height: int) -> dict[str, np.ndarray]:
     """Return the G-buffer of the last picture of a card, by the names of its images."""
     names = "normals", "field_values"
     return {name: card.device.read(card.resources.image(name, (width, height))) for name in names}
-
-
-def draw_on_card(
-    rosy: SimpleNamespace, card: Any, instances: Sequence[Any], camera: Any, look: Any
-) -> np.ndarray:
-    """Draw a picture on the card: (H, W, 4), without supersampling."""
-    view = rosy.ViewInput(tuple(instances), camera, look)
-    texture = rosy.run(card.texture_steps(card.upload(instances, look.display), view))
-    return card.device.read(texture)
-
-
-def agreement(
-    gbuffer: Any, images: dict[str, np.ndarray], is_center: np.ndarray | None = None
-) -> float:
-    """Return the fraction of pixels at which both G-buffers agree.
-
-    The pixels are those that at least one of the G-buffers covers with a field. They agree if
-
-    - both cover the pixel, with the same instance;
-    - the points are within `MAX_DISTANCE_PX`. Both are on the ray through the pixel, so their
-      distance is the difference in depth, in pixels at that depth. The triangles may be different
-      where two meet, because OpenGL rounds their corners, but the points may not;
-    - the normals differ by less than `MAX_DIFFERENCE`, and both G-buffers see the same side;
-    - the representations z differ by at most `MAX_DIFFERENCE` times the greater modulus; 0 agrees
-      only with 0.
-
-    Where only samples beside the center show a surface, the two take other points of the triangle. There,
-    the instance has to agree.
-
-    Parameters
-    ----------
-    gbuffer : GBuffer
-        The G-buffer of numpy.
-    images : dict of str to (H, W, 4) ndarray
-        The G-buffer of the card; see `read_gbuffer`.
-    is_center : (P,) bool ndarray, optional
-        See `Pair`.
-    """
-    camera, pixel = gbuffer.camera, gbuffer.pixel
-    normals, values = (images[name].reshape(-1, 4) for name in ("normals", "field_values"))
-    covered = np.zeros(camera.width * camera.height, dtype=bool)
-    covered[pixel] = True
-    either = np.count_nonzero(covered | (values[:, 3] > 0))
-    normals, values = normals[pixel].astype(np.float64), values[pixel].astype(np.float64)
-    same = values[:, 3] == gbuffer.instance_id + 1
-    depth = -gbuffer.position[:, 2].astype(np.float64)
-    distance = np.abs(np.abs(normals[:, 3]) - depth)
-    if camera.is_perspective:
-        # Along the ray, and in units of a pixel at that depth.
-        distance = distance / gbuffer.view_direction[:, 2] / depth
-    same &= distance * camera.pixels_per_unit < MAX_DISTANCE_PX
-    same &= np.linalg.norm(normals[:, :3] - gbuffer.normal, axis=1) < MAX_DIFFERENCE
-    same &= (normals[:, 3] > 0) == gbuffer.front_facing
-    z = values[:, 0] + 1j * values[:, 1]
-    expected = gbuffer.representation.astype(np.complex128)
-    same &= np.abs(z - expected) <= MAX_DIFFERENCE * np.maximum(np.abs(z), np.abs(expected))
-    if is_center is not None:
-        same |= ~is_center & (values[:, 3] == gbuffer.instance_id + 1)
-    return np.count_nonzero(same) / either
 
 
 def likeness(one: np.ndarray, other: np.ndarray) -> float:

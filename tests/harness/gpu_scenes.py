@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 from lenses import shifted
+from scipy.spatial.transform import Rotation
 from shapes import cube, icosphere, joined, placed, rebuilt
 
 from rosy_addon.compositor.flow import NO_DRIFT
@@ -27,6 +29,7 @@ MIRROR = np.diag([-1.0, 1.0, 1.0])
 ROSY = rooms()
 SIZE = 160, 144
 LOOK = Look(shading=0.0, length=30)
+EVEN_LINES = replace(LOOK, ink="even", shading=0.9, line_width=3.0, line_distance=6.0)
 BALL = icosphere(3)
 
 
@@ -35,14 +38,7 @@ BALL = icosphere(3)
 
 def rotation(x, y, z):
     """Return the rotation about the three axes, one after the other."""
-    result = np.eye(3)
-    for axis, angle in enumerate((x, y, z)):
-        a, b = (axis + 1) % 3, (axis + 2) % 3
-        turn = np.eye(3)
-        turn[np.ix_((a, b), (a, b))] = np.cos(angle) * np.eye(2)
-        turn[a, b], turn[b, a] = -np.sin(angle), np.sin(angle)
-        result = turn @ result
-    return result
+    return Rotation.from_euler("xyz", (x, y, z)).as_matrix()
 
 
 def boxes():

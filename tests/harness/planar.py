@@ -10,12 +10,16 @@ import numpy as np
 import rosy_addon.compositor.compose as compose_module
 from rosy_addon.compositor.compose import colorize, compose, streak_tone
 from rosy_addon.compositor.flow import NO_DRIFT, Drift
+from rosy_addon.compositor.hatching import HatchedLines
 from rosy_addon.compositor.lic import lic_lengths, look_noise
 from rosy_addon.compositor.lic_images import LicImages
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import PixelLook, pixel_look
+from rosy_addon.compositor.paper_grain import picture_paper_grain
 from rosy_addon.compositor.pixel_field import PixelField, without_undefined_neighbors
+from rosy_addon.compositor.streak_statistics import break_steps
 from rosy_addon.compositor.strips import Strip
+from rosy_addon.compositor.undirected import undirected_texture
 from rosy_addon.core.cache import Cache
 from rosy_addon.core.deterministic_trig import unit_phasor
 from rosy_addon.projection.gbuffer import GBuffer
@@ -103,6 +107,24 @@ def planar_pixel_field(
         neighbor_mask=np.full(len(pixel), 0b111_111_111, dtype=np.uint16),
     )
     return without_undefined_neighbors(field)
+
+
+def planar_lines(
+    angles: np.ndarray, degree: int, look: PixelLook
+) -> tuple[PixelField, HatchedLines]:
+    """Make a field in the plane, given as for `planar_pixel_field`, and the lines of hatching along it."""
+    field = planar_pixel_field(angles, degree)
+    noise = look_noise(field, look)
+    images, breaks = lic_lengths(field, [look, look.with_length(break_steps(look))], noise)
+    grain = None
+    if look.paper_grain:
+        grain = picture_paper_grain(
+            field.pixel, field.width, look.line_width, look.seed, 1, field.line_count
+        )
+    undirected = undirected_texture(field, noise, look.line_width)
+    has_breaks = look.breaks > 0 or look.wobble > 0
+    breaks = breaks if has_breaks else None
+    return field, HatchedLines(look, images, breaks, grain, undirected=undirected)
 
 
 def compose_planar(

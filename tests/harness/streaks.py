@@ -14,28 +14,6 @@ def correlation(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.corrcoef(a.ravel(), b.ravel())[0, 1])
 
 
-def local_correlation(
-    a: np.ndarray, b: np.ndarray, weight: np.ndarray, deviation: float
-) -> np.ndarray:
-    """Return the (H, W) correlation of two (H, W) pictures under a Gaussian window around each pixel.
-
-    `weight` is 1 where the pictures count and 0 where not; NaN is returned where it is 0.
-    """
-
-    def mean(values: np.ndarray) -> np.ndarray:
-        return ndimage.gaussian_filter(values * weight, deviation, mode="constant")
-
-    a, b = a.astype(np.float64), b.astype(np.float64)
-    total_weight = mean(np.ones_like(a))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        mean_a, mean_b = mean(a) / total_weight, mean(b) / total_weight
-        product = mean(a * b) / total_weight - mean_a * mean_b
-        spread_a = mean(a * a) / total_weight - mean_a**2
-        spread_b = mean(b * b) / total_weight - mean_b**2
-        result = product / np.sqrt(spread_a * spread_b)
-    return np.where(weight > 0, result, np.nan)
-
-
 def orientation_spectrum(tone: np.ndarray, bins: int = 180) -> np.ndarray:
     """Return (bins,): the power of a patch by orientation of streaks, 0 to 180 degrees; mean 1.
 
@@ -88,25 +66,6 @@ def peaks(spectrum: np.ndarray, min_height: float = 1.5) -> list[float]:
         weight = smooth[(peak + offset) % bins] - smooth[(peak + offset) % bins].min()
         orientations.append(float((peak + 0.5 + np.average(offset, weights=weight)) * degree % 180))
     return sorted(orientations)
-
-
-def peak_to_floor(spectrum: np.ndarray, lines: int, first: float) -> float:
-    """Return the power along the directions of a field relative to that midway between them.
-
-    Parameters
-    ----------
-    spectrum : (bins,) ndarray
-    lines : int
-        Number of different orientations of the N members.
-    first : float
-        One of these orientations, in degrees.
-    """
-    bins = len(spectrum)
-    smooth = ndimage.gaussian_filter1d(spectrum, 1.5 * bins / 180, mode="wrap")
-    position = (first + 180 / lines * np.arange(lines)) * bins / 180
-    on_lines = np.rint(position - 0.5).astype(int) % bins
-    between = np.rint(position - 0.5 + bins / lines / 2).astype(int) % bins
-    return float(smooth[on_lines].mean() / smooth[between].mean())
 
 
 def persistence(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,16 @@ def mainly(common, cases):
     """Parameters of all cases; `make test` runs the common ones, `make test LONG=1` all."""
     long = pytest.mark.long
     return [case if case in set(common) else pytest.param(case, marks=long) for case in cases]
+
+
+def traced_peak(work) -> int:
+    """Return the largest number of bytes that a function allocates at once."""
+    tracemalloc.start()
+    try:
+        work()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
 
 
 def pytest_collection_modifyitems(items):

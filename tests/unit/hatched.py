@@ -50,9 +50,9 @@ def bent(points, angle):
     return np.stack([points[:, 0], cos * y - sin * z, sin * y + cos * z], axis=1)
 
 
-def make_instance(surface: Surface, degree=4, matrix=None):
+def make_instance(surface: Surface, degree=4, matrix=None, tone=None):
     field = axis_field(surface.in_rest_shape(), degree, (0.3, 0.2, 1.0))
-    return MeshInstance(surface, np.eye(4) if matrix is None else matrix, field)
+    return MeshInstance(surface, np.eye(4) if matrix is None else matrix, field, tone)
 
 
 def make_wall(angle=0.0, half=9.0, matrix=None):
@@ -71,6 +71,11 @@ def make_camera(azimuth=0.0, zoom=1.0, distance=4.0):
 
 def camera_before_wall(scale, x=0.0, z=0.0):
     return orthographic_camera(look_at((x, -5, z), (x, 0, z)), SIZE, SIZE, scale=scale)
+
+
+def camera_above(scale=8.0, size=SIZE, eye=(0, 0, 5)):
+    """An orthographic camera on the z axis, with y up in the picture."""
+    return orthographic_camera(look_at(eye, (0, 0, 0), (0, 1, 0)), size, size, scale=scale)
 
 
 def render(instance, camera, look, lights=()):

@@ -4,8 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 
+from rosy_addon.compositor.look import Look
+
 #: Settings that choose a kernel.
 KERNELS = {"box": {}, "taper": {"fade": "ends"}, "ramp": {"fade": "tail"}}
+
+
+#: The noise of the paper, the contrast of one member, and no light.
+PLAIN = Look(gain=1.0, density=0.5, high_pass=0.0, shading=0.0)
+
+
+def plain(**settings) -> Look:
+    """The plain look with some settings changed."""
+    return PLAIN.with_settings(settings)
+
+
+def kernel_window(length: int, kernel: str) -> np.ndarray:
+    """(2 length + 1,) weights of the samples of a streamline, along it from end to end."""
+    offset = np.arange(-length, length + 1)
+    distance = {"box": 0 * offset, "taper": np.abs(offset), "ramp": offset}[kernel]
+    return 1 - distance / (length + 1)
 
 
 def pixel_centers(size: int) -> tuple[np.ndarray, np.ndarray]:

@@ -8,7 +8,7 @@ import awkward
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rosy_addon.field.generate import generate
+from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.surface import Surface, build_surface
 from rosy_addon.projection.gbuffer import MeshInstance
 
@@ -145,6 +145,12 @@ def sharp_cube() -> Surface:
     return rebuilt(cube(), name="cube", sharp_angle=0.5)
 
 
-def instance_of(surface: Surface, degree: int, kind: str = "smoothest") -> MeshInstance:
-    """A surface at its place with a generated field."""
-    return MeshInstance(surface, np.eye(4), generate(surface, kind, degree))
+def instance_of(
+    surface: Surface,
+    degree: int,
+    kind: GeneratorSettings | str = "smoothest",
+    matrix: np.ndarray | None = None,
+) -> MeshInstance:
+    """A surface with a generated field, at its place or moved."""
+    matrix = np.eye(4) if matrix is None else matrix
+    return MeshInstance(surface, matrix, generate(surface, kind, degree))

@@ -19,16 +19,14 @@ else:
 
 from harness.planar import compose_planar
 from planar_fields import pair_angle, pixel_centers
-from shapes import icosphere, torus
+from shapes import icosphere, instance_of, torus
 
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.flow import Drift
 from rosy_addon.compositor.look import Look
-from rosy_addon.field.generate import generate
 from rosy_addon.image_io.png import to_srgb_uint8
 from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.camera import orbit_camera
-from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 
 
@@ -47,7 +45,7 @@ def draw() -> dict[str, np.ndarray]:
     for name, (surface, kind, degree, shape_look) in shapes.items():
         size = 112 * shape_look.supersampling
         camera = orbit_camera(surface.vertices, -25, 30, size, size)
-        instance = MeshInstance(surface, np.eye(4), generate(surface, kind, degree))
+        instance = instance_of(surface, degree, kind)
         pictures[name] = compose(project([instance], camera), shape_look, drift=Drift(0.3))
     return {name: to_srgb_uint8(picture.rgba) for name, picture in pictures.items()}
 

@@ -1,4 +1,4 @@
-"""Fixtures for the tests of the installed wheel, which run without the tree on the path."""
+"""Helpers for the tests of the installed wheel, which run without the tree on the path."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 TREE = Path(__file__).resolve().parents[2]
 
@@ -40,11 +39,3 @@ def write_torus(path: Path) -> None:
     lines += [f"vt {x:.6f} {y:.6f}" for x, y in zip(u.ravel(), v.ravel(), strict=True)]
     lines += ["f " + " ".join(f"{vertex}/{vertex}" for vertex in quad) for quad in quads]
     path.write_text("\n".join(lines) + "\n")
-
-
-@pytest.fixture
-def torus(tmp_path) -> Path:
-    """A mesh file in a folder of its own."""
-    path = tmp_path / "torus.obj"
-    write_torus(path)
-    return path

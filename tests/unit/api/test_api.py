@@ -6,6 +6,7 @@ import inspect
 import io
 import pickle
 
+import awkward
 import numpy as np
 import pytest
 from command_helpers import write_obj
@@ -53,7 +54,6 @@ def test_faces_of_any_kind(faces, sizes):
     surface = rf.Surface([*SQUARE, [0.5, -1, 0]], faces)
     assert np.array_equal(surface.face_start, offsets_from_sizes(sizes))
     assert [list(face) for face in surface.faces] == [list(map(int, face)) for face in faces]
-    assert [len(face) for face in surface.faces] == sizes
 
 
 def test_a_flat_mesh_needs_no_z():
@@ -119,20 +119,6 @@ def test_the_representation_is_that_of_any_member(sphere, field):
     assert np.allclose(again.representation, field.representation)
     other_member = rf.from_vectors(sphere, field.directions[:, 1], 4)
     assert np.allclose(other_member.representation, field.representation)
-
-
-def test_difference_of_a_rotated_field(sphere, field):
-    difference = field.difference(field.rotated(np.radians(20)))
-    assert np.allclose(difference.angle, np.radians(20))
-    assert np.allclose((difference.mean, difference.rms, difference.max), np.radians(20))
-    assert difference.compared == 1
-    # Beyond 45 degrees, another member is nearer.
-    assert np.allclose(field.difference(field.rotated(np.radians(60))).angle, np.radians(30))
-
-
-def test_singularities_sum_to_the_euler_characteristic(sphere, field):
-    assert sphere.euler_characteristic == 2 and field.singularities.index.sum() == 4 * 2
-    assert field.to_degree(8).singularities.index.sum() == 8 * 2
 
 
 def test_fields_from_directions_and_tensors(sphere, field):
@@ -248,7 +234,7 @@ def test_the_command_draws_the_same_picture(tmp_path):
 
 def test_numbers_as_colors(error_of):
     """Of faces, vertices and corners; those of faces if there are as many of both."""
-    quad = rf.Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    quad = rf.Surface(SQUARE, [[0, 1, 2], [0, 2, 3]])
     tetrahedron = rf.Surface(np.eye(4)[:, :3], [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
     for surface, numbers, expected in (
         (quad, [1, 2], [1, 1, 1, 2, 2, 2]),
@@ -271,13 +257,17 @@ def test_numbers_as_colors(error_of):
 
 
 def test_sources_of_the_tone(sphere, field, error_of):
-    """Light to the left: the same from values, from a picture and from an array."""
+    """Light on the right, unlike the lamp: from values of vertices and corners, a picture and an array."""
     look = {"view": (0, 0), "size": (64, 64), "orthographic": True, "preset": "pen-and-ink"}
-    values = (sphere.vertices[:, 0] < 0).astype(float)
-    by_values = np.asarray(rf.render(sphere, field, tone_values=values, **look))[..., :3].mean(2)
-    assert by_values[:, :24].mean() > by_values[:, -24:].mean() + 50
+    values = (sphere.vertices[:, 0] > 0).astype(float)
+    by_vertex, by_corner = (
+        np.asarray(rf.render(sphere, field, tone_values=each, **look))[..., :3]
+        for each in (values, values[sphere.corner_vertex])
+    )
+    assert np.array_equal(by_vertex, by_corner)
+    assert by_vertex[:, -24:].mean() > by_vertex[:, :24].mean() + 50
     tone = np.zeros((64, 64, 3), dtype=np.uint8)
-    tone[:, :32] = 255
+    tone[:, 32:] = 255
     by_array = rf.render(sphere, field, tone_picture=tone, **look)
     rgba = np.ones((64, 64, 4), dtype=np.float32)
     rgba[..., :3] = tone / 255
@@ -373,34 +363,18 @@ def test_a_turntable_counts_its_pictures(sphere, field, tmp_path):
         rf.turntable(sphere, field, path=tmp_path / "b.gif", pictures=1)
 
 
-CUBE = (
-    [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]],
-    [[3, 2, 1, 0], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]],
-)
-
-
 def test_outer_faces_see_the_sky_and_inner_ones_do_not():
-    vertices, faces = CUBE
+    vertices, faces = awkward.cube()
     outside = rf.Surface(vertices, faces)
     inside = rf.Surface(vertices, [face[::-1] for face in faces])
-    np.testing.assert_allclose(rf.ambient_occlusion(outside, 32), 1, atol=0.02)
-    np.testing.assert_allclose(rf.ambient_occlusion(inside, 32), 0, atol=0.02)
+    np.testing.assert_allclose(rf.ambient_occlusion(outside, 8), 1, atol=0.02)
+    np.testing.assert_allclose(rf.ambient_occlusion(inside, 8), 0, atol=0.02)
 
 
 def test_indices_are_fractions_or_units(error_of):
-    surface = rf.Surface(*CUBE)
+    surface = rf.Surface(*awkward.cube())
     units = rf.prescribed(surface, dict.fromkeys(range(8), 1), 4)
     fractions = rf.prescribed(surface, dict.fromkeys(range(8), 0.25), 4)
     assert (units.vectors == fractions.vectors).all() and (fractions.singularities.index == 1).all()
     message = error_of(rf.prescribed, surface, {0: 0.3, 1: 1.7}, 4)
     assert "0.3 at vertex 0 is not a multiple of 1/4" in message
-
-
-def test_tones_of_corners_and_of_vertices_draw_the_same_picture():
-    surface = rf.Surface(*CUBE)
-    tones = np.linspace(0, 1, 8)
-    options = {"preset": "pen-and-ink", "size": (64, 64)}
-    by_vertex = rf.render(surface, tone_values=tones, **options)
-    by_corner = rf.render(surface, tone_values=tones[surface.faces.ravel()], **options)
-    np.testing.assert_array_equal(by_vertex, by_corner)
-    assert not np.array_equal(by_vertex, rf.render(surface, **options))

@@ -151,9 +151,9 @@ def test_hatching_for_one_light():
     assert abs(np.corrcoef(red, green)[0, 1]) < 0.1
     for cosine, length in ((0.2, 1.0), (0.5, 1e-260), (0.9, 1e200)):
         light = (0, length * np.sqrt(1 - cosine**2), length * cosine)
-        options = settings | {"size": 256, "margin": 0, "light_direction": light}
+        options = settings | {"size": 128, "margin": 0, "light_direction": light}
         ink = rf.texture(square, field, **options).tiles[1001]
         assert ink.rgba[..., 0].mean() == pytest.approx(cosine, abs=0.03)
-        clear = rf.texture(square, field, paper_color="#ffffff00", **options).tiles[1001]
-        assert clear.rgba[..., 3].mean() == pytest.approx(1 - cosine, abs=0.03)
-        assert clear.rgba[..., :3].max() < 0.01
+    clear = rf.texture(square, field, paper_color="#ffffff00", **options).tiles[1001]
+    assert clear.rgba[..., 3].mean() == pytest.approx(1 - cosine, abs=0.03)
+    assert clear.rgba[..., :3].max() < 0.01

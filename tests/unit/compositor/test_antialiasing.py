@@ -7,17 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from harness.streaks import correlation
-from shapes import icosphere, torus
+from shapes import icosphere, instance_of, torus
 
 from rosy_addon.compositor import outline
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import pixel_look
 from rosy_addon.compositor.outline import outline_coverage
-from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.camera import look_at, perspective_camera
-from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
@@ -32,11 +30,6 @@ LOOKS = {
     ("cross-hatch", 4): load_preset("cross-hatch").look,
     ("engraving", 4): load_preset("engraving").look,
 }
-
-
-def torus_instance(degree=4):
-    surface = torus(96, 48)
-    return MeshInstance(surface, np.eye(4), generate(surface, "form", degree))
 
 
 def rendered(instance, look):
@@ -57,7 +50,7 @@ def luminance(rgba, where):
 @pytest.mark.parametrize(("name", "degree"), LOOKS)
 def test_streaks_are_those_of_many_samples(name, degree):
     """Nearer to them than without samples, of the same tone and contrast, and with the same silhouettes."""
-    instance, look = torus_instance(degree), LOOKS[name, degree]
+    instance, look = instance_of(torus(), degree, "form"), LOOKS[name, degree]
     actual, single = (rendered(instance, replace(look, supersampling=s)) for s in (2, 1))
     expected = sampled(instance, look, 3)
     inside = (actual[..., 3] == 1) & (single[..., 3] == 1) & (expected[..., 3] == 1)
@@ -71,7 +64,7 @@ def test_streaks_are_those_of_many_samples(name, degree):
 @pytest.mark.parametrize(("width", "max_samples"), [(1.0, 1 << 20), (2.6, 1 << 11)])
 def test_outlines_are_those_of_samples(width, max_samples, monkeypatch):
     monkeypatch.setattr(outline, "MAX_OUTLINE_SAMPLES", max_samples)
-    instance, look = torus_instance(), Look(outline=width)
+    instance, look = instance_of(torus(), 4, "form"), Look(outline=width)
     pixels, samples = project([instance], CAMERA, samples=2), project([instance], CAMERA.scaled(2))
     coverage = outline_coverage(pixels, pixel_look(look, is_antialiased=True))
     actual = np.zeros(SIZE * SIZE)
@@ -88,8 +81,7 @@ def test_outlines_are_those_of_samples(width, max_samples, monkeypatch):
 @pytest.mark.slow
 def test_light_changes_within_a_pixel_at_a_crease():
     """Where two faces meet, a pixel has a color between those of the faces, as with many samples."""
-    surface = icosphere(0)
-    instance = MeshInstance(surface, np.eye(4), axis_field(surface, 4, (0, 0, 1)))
+    instance = instance_of(icosphere(0), 4, "axis")
     look = Look(display="flat", gain=0.0, shading=1.0)
     actual, single = (rendered(instance, replace(look, supersampling=s)) for s in (4, 1))
     expected = sampled(instance, look, 4)

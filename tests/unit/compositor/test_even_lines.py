@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from harness.stroke_tracing import turned
+from hatched import camera_above, render
 from scipy.ndimage import gaussian_filter
 from shapes import plane
 
-from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.even_lines import (
     COARSE_RATIO,
     EvenLines,
@@ -44,9 +45,7 @@ LOOK = Look(
 
 
 def wall_instance(degree=2, angle=0.0, size=20.0):
-    surface = plane(2, 2, size)
-    field = axis_field(surface, degree, (np.cos(angle), np.sin(angle), 0))
-    return MeshInstance(surface, np.eye(4), field)
+    return turned(plane(2, 2, size), degree, angle)
 
 
 def partly_undefined(degree):
@@ -54,16 +53,6 @@ def partly_undefined(degree):
     vectors = axis_field(surface, degree, (1, 0.3, 0)).vectors.copy()
     vectors[24:40] = 0
     return MeshInstance(surface, np.eye(4), RosyField(degree, vectors))
-
-
-def camera_above(scale=8.0, size=SIZE, eye=(0, 0, 5)):
-    return orthographic_camera(look_at(eye, (0, 0, 0), (0, 1, 0)), size, size, scale=scale)
-
-
-def picture(instance, camera, look=LOOK):
-    if look.supersampling > 1:
-        camera = camera.scaled(look.supersampling)
-    return compose(project([instance], camera), look).rgba
 
 
 def lines_at_pixels(instance, camera, look=LOOK):
@@ -87,7 +76,7 @@ def distance_of_lines(rgba):
 def test_the_distance_between_lines(distance, supersampling):
     """Distances in pixels are rounded to steps of 1 / 8 octave."""
     look = replace(LOOK, line_distance=distance, supersampling=supersampling)
-    rgba = picture(wall_instance(), camera_above(), look)
+    rgba = render(wall_instance(), camera_above(), look)
     assert abs(np.log2(distance_of_lines(rgba) / distance)) <= 0.5 / 8 + 0.01
     # Lines are along the rows.
     assert rgba[..., 0].std(axis=1).max() < 0.01
@@ -115,7 +104,7 @@ def test_lines_at_a_larger_distance_replace_crowded_ones():
     cosine = 0.2
     eye = (0, -5 * np.sqrt(1 - cosine**2), 5 * cosine)
     camera = orthographic_camera(look_at(eye, (0, 0, 0), (0, 0, 1)), SIZE, SIZE, scale=2.0)
-    rgba = picture(wall_instance(), camera, replace(LOOK, line_distance=8.0))
+    rgba = render(wall_instance(), camera, replace(LOOK, line_distance=8.0))
     assert rgba[..., 0].std() > 0.2
     distance = distance_of_lines(rgba)
     assert abs(np.log2(distance / (COARSE_RATIO * 2 * 4.0 * cosine))) <= 0.5 / 8 + 0.02
@@ -151,7 +140,7 @@ def test_settings_that_do_not_apply_do_not_change_the_picture(breaks):
     """Pictures are up to date when only such settings change. Some faces have no direction."""
     instance, camera = partly_undefined(4), camera_above(20.0, size=96)
     look = replace(LOOK, crispness=0.8, layers=2, breaks=breaks)
-    expected = picture(instance, camera, look)
+    expected = render(instance, camera, look)
     others = {"length": 7, "fade": "ends"}
     applied = {name for name in others if settings_of(Look)[name].applies(look)}
     assert applied == (set(others) if breaks else set())
@@ -159,10 +148,10 @@ def test_settings_that_do_not_apply_do_not_change_the_picture(breaks):
         if setting.applies(look):
             continue
         other = others.get(name, _other_value(setting))
-        actual = picture(instance, camera, replace(look, **{name: other}))
+        actual = render(instance, camera, replace(look, **{name: other}))
         np.testing.assert_array_equal(actual, expected, err_msg=name)
     for name in applied:
-        actual = picture(instance, camera, replace(look, **{name: others[name]}))
+        actual = render(instance, camera, replace(look, **{name: others[name]}))
         assert np.abs(actual - expected).max() > 0.1, name
 
 
@@ -216,7 +205,7 @@ def test_uneven_lines_have_the_mean_width(breaks, paper_grain):
 def test_flat_tones(shading, degree):
     look = load_preset("engraving").look
     look = replace(look, light="scene", shading=shading, paper_color="#ffffff")
-    rgba = picture(wall_instance(degree, 0.4), camera_above(), look)
+    rgba = render(wall_instance(degree, 0.4), camera_above(), look)
     ink = to_linear(from_hex(look.ink_color))[0]
     blurred = gaussian_filter((rgba[..., 0] - ink) / (1 - ink), 16)[40:-40, 40:-40]
     assert np.abs(blurred - (1 - shading)).max() <= 0.04
@@ -228,8 +217,7 @@ def test_flat_tones(shading, degree):
 @pytest.mark.slow
 def test_lines_grow_between_lines_that_are_too_far_apart():
     """A floor that runs from near the eye to far away."""
-    surface = plane(2, 2, 40.0)
-    instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2, (0, 1, 0)))
+    instance = wall_instance(2, np.pi / 2, 40.0)
     camera = perspective_camera(look_at((0, -18.5, 1.0), (0, 0, 0), (0, 0, 1)), SIZE, SIZE, fov=1.0)
     look = replace(LOOK, line_distance=4.0)
     lines, gbuffer = lines_at_pixels(instance, camera, look)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from planar_fields import kernel_window
 
 from rosy_addon.compositor.filter_kernel import full_sample_count, kernel_weights
 
@@ -20,9 +21,7 @@ def streamlines(draw):
 @given(streamlines())
 def test_sums_of_weights_in_closed_form(kernel, streamline):
     forward, backward, full_length = streamline
-    offset = np.arange(-backward, forward + 1)
-    distance = {"box": 0 * offset, "taper": np.abs(offset), "ramp": offset}[kernel]
-    weight = 1 - distance / (full_length + 1)
+    weight = kernel_window(full_length, kernel)[full_length - backward :][: backward + 1 + forward]
     actual = kernel_weights(np.float64(forward), np.float64(backward), full_length, kernel)
     np.testing.assert_allclose(actual.total, weight.sum(), rtol=1e-9)
     expected = weight.sum() ** 2 / (weight**2).sum()

@@ -13,21 +13,14 @@ from bench import cases
 from rosy_addon.compositor import stages
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.filter_kernel import full_sample_count
-from rosy_addon.compositor.flow import NO_DRIFT, Drift, cycle_distance, drift_at
+from rosy_addon.compositor.flow import Drift, cycle_distance, drift_at
 from rosy_addon.compositor.ibfv import decay_of_samples
-from rosy_addon.compositor.lic_images import LicImages
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.pixel_field import PixelField
 from rosy_addon.core.cache import Cache
 from rosy_addon.projection.project import project
 
 LOOK = Look(method="ibfv")
-
-
-def draw(
-    field: PixelField, look: Look = LOOK, noise: np.ndarray | None = None, drift: Drift = NO_DRIFT
-) -> LicImages:
-    return lic(field, look, noise, drift)
 
 
 def uniform(angle: float, degree: int, size: int = 192) -> PixelField:
@@ -41,7 +34,7 @@ def frame(values: np.ndarray, field: PixelField) -> np.ndarray:
 def test_the_contrast_is_the_same_where_streaks_end():
     """Without the correction it would be several times as high."""
     field = uniform(0.3, 1)
-    images = [frame(draw(field, replace(LOOK, seed=seed)).members[0], field) for seed in range(3)]
+    images = [frame(lic(field, replace(LOOK, seed=seed)).members[0], field) for seed in range(3)]
     begin = np.std([image[:, 6:14] for image in images])
     middle = np.std([image[:, 90:98] for image in images])
     assert begin == pytest.approx(middle, rel=0.2)
@@ -64,7 +57,7 @@ def test_the_kernel_is_exponential():
     noise[32, 60] = 1.5
     look = replace(LOOK, length=10)
     field = planar_pixel_field(np.zeros(noise.shape), 1)
-    image = frame(draw(field, look, noise.reshape(-1, 1).astype(np.float32)).members[0], field)
+    image = frame(lic(field, look, noise.reshape(-1, 1).astype(np.float32)).members[0], field)
     decay = float(decay_of_samples(np.array(full_sample_count(look.length, "box")), False))
     # The noise of the first pixels is sharpened.
     streak = image[32, 63:93] - 0.5
@@ -79,7 +72,7 @@ def test_streamlines_stay_on_circles():
     distance, angle = np.hypot(x - size / 2, y - size / 2), np.arctan2(y - size / 2, x - size / 2)
     field = planar_pixel_field(angle + np.pi / 2, 1)
     noise = (0.5 + (distance - radius) / 100).reshape(-1, 1).astype(np.float32)
-    image = draw(field, LOOK, noise).members[0].reshape(size, size)
+    image = lic(field, LOOK, noise).members[0].reshape(size, size)
     ring = np.abs(distance - radius) < 3
     slope, error = np.polyfit((distance - radius)[ring], 100 * (image[ring] - 0.5), 1)
     assert abs(error / slope) < 0.1
@@ -92,7 +85,7 @@ def test_branch_cuts_of_the_angle_leave_no_seam(degree):
     x, y = pixel_centers(size)
     angle = np.arctan2(y - size / 2, x - size / 2) / degree
     field = planar_pixel_field(angle, degree)
-    one, other = (draw(field, replace(LOOK, guiding_angle=angle)).blend for angle in (0.0, 0.5))
+    one, other = (lic(field, replace(LOOK, guiding_angle=angle)).blend for angle in (0.0, 0.5))
     assert np.std(one - other) < 0.02 * one.std()
 
 
@@ -116,7 +109,7 @@ def test_streaks_drift_by_the_flow(degree, backward):
     field = planar_pixel_field(np.full((64, 200), np.pi * backward), degree)
     frames = []
     for number in (5, 7):
-        image = frame(draw(field, FLOW, noise.reshape(-1, 3), drift_of(number)).members[0], field)
+        image = frame(lic(field, FLOW, noise.reshape(-1, 3), drift_of(number)).members[0], field)
         frames.append((image[32, ::-1] if backward else image[32]) - 0.5)
     decay = float(decay_of_samples(np.array(full_sample_count(FLOW.length, "box")), False))
     source = 200 - 101 if backward else 100
@@ -131,7 +124,7 @@ def test_lines_across_the_guiding_angle_drift_both_ways():
     noise[32, 100] += (1.0, -0.5, 0.3)
     field = planar_pixel_field(np.zeros((64, 200)), 2)
     look = replace(FLOW, guiding_angle=np.pi / 2)
-    image = draw(field, look, noise.reshape(-1, 3), Drift(0.3, CYCLE)).members[0]
+    image = lic(field, look, noise.reshape(-1, 3), Drift(0.3, CYCLE)).members[0]
     row = frame(image, field)[32] - 0.5
     np.testing.assert_allclose(row[101:180], row[99:20:-1], atol=1e-4)
     assert np.abs(row[110]) > 0.1 * np.abs(row).max()
@@ -141,7 +134,7 @@ def test_lines_across_the_guiding_angle_drift_both_ways():
 def test_a_loop_closes(degree):
     field = uniform(0.3, degree)
     drifts = [drift_at(FLOW, number, 12) for number in (0, 1, 11, 12)]
-    frames = [draw(field, FLOW, drift=drift).members.astype(float) for drift in drifts]
+    frames = [lic(field, FLOW, drift=drift).members.astype(float) for drift in drifts]
     np.testing.assert_array_equal(frames[0], frames[3])
     to_next, to_last = np.std(frames[1] - frames[0]), np.std(frames[2] - frames[3])
     assert to_last == pytest.approx(to_next, rel=0.1) and to_next < 0.5 * np.std(frames[0])

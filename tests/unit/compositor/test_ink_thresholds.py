@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from harness.planar import planar_pixel_field
-from shapes import torus
+from harness.planar import planar_lines
+from shapes import instance_of, torus
 
-from rosy_addon.compositor.hatching import HatchedLines
 from rosy_addon.compositor.ink_from_thresholds import ink_of_thresholds
 from rosy_addon.compositor.ink_thresholds import (
     cyclic_places,
@@ -20,16 +19,10 @@ from rosy_addon.compositor.ink_thresholds import (
     threshold_pixels,
     unlit_look,
 )
-from rosy_addon.compositor.lic import lic_lengths, look_noise
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.look_units import PixelLook, pixel_look
-from rosy_addon.compositor.paper_grain import picture_paper_grain
-from rosy_addon.compositor.streak_statistics import break_steps
-from rosy_addon.compositor.undirected import undirected_texture
+from rosy_addon.compositor.look_units import pixel_look
 from rosy_addon.core.color import to_linear
-from rosy_addon.field.generate import axis_field
 from rosy_addon.projection.camera import orbit_camera
-from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
@@ -37,28 +30,14 @@ SIZE = 400
 INK = Look(ink="hatch", length=30, line_width=2.0, density=0.3, high_pass=8.0)
 
 
-def drawn_lines(look: PixelLook, degree: int = 4, undefined: slice = slice(0)):
-    """A planar field, and its lines."""
-    row, column = np.indices((SIZE, SIZE)) / SIZE
-    angles = 0.5 * np.sin(4 * row) + 0.5 * column
-    angles[undefined] = np.nan
-    field = planar_pixel_field(angles, degree)
-    noise = look_noise(field, look)
-    images, breaks = lic_lengths(field, [look, look.with_length(break_steps(look))], noise)
-    grain = None
-    if look.paper_grain:
-        grain = picture_paper_grain(field.pixel, SIZE, look.line_width, 1, 1, field.line_count)
-    undirected = undirected_texture(field, noise, look.line_width)
-    has_breaks = look.breaks > 0 or look.wobble > 0
-    breaks = breaks if has_breaks else None
-    return field, HatchedLines(look, images, breaks, grain, undirected=undirected)
-
-
 @pytest.mark.parametrize("breaks, wobble, grain", [(0, 0, 0), (0.7, 0, 0.4), (0, 0.4, 0)])
 def test_thresholds_draw_the_lines_of_a_picture(breaks, wobble, grain):
     """They are evenly distributed, and comparing them with a coverage draws the coverage by the line."""
     look = pixel_look(sharp_look(replace(INK, breaks=breaks, wobble=wobble, paper_grain=grain)))
-    _, lines = drawn_lines(look, undefined=slice(0, 80))
+    row, column = np.indices((SIZE, SIZE)) / SIZE
+    angles = 0.5 * np.sin(4 * row) + 0.5 * column
+    angles[:80] = np.nan
+    _, lines = planar_lines(angles, 4, look)
     thresholds = line_thresholds(1, lines)
     expected = np.linspace(0.1, 0.9, 9)
     np.testing.assert_allclose(np.quantile(thresholds, expected), expected, atol=0.025)
@@ -147,8 +126,7 @@ def test_undefined_pixels_have_the_ink_of_all_lines():
 def test_thresholds_of_a_picture_draw_its_ink(ink, supersampling):
     """At any tone: a torus in the light of the camera, whose contour has all of them."""
     look = replace(INK, ink=ink, layers=2, supersampling=supersampling, light="headlight")
-    mesh = torus(48, 24)
-    instance = MeshInstance(mesh, np.eye(4), axis_field(mesh, 4, (0, 0, 1)))
+    instance = instance_of(torus(48, 24), 4, "axis")
     camera = orbit_camera(instance.face_points(), 0.0, 50.0, 320, 240)
     view = ViewInput((instance,), camera, look)
     expected = draw_picture(view).rgba

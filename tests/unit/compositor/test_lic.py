@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from harness.planar import compose_planar, lic, planar_pixel_field
 from harness.streaks import correlation, orientation_spectrum, peaks, persistence
-from planar_fields import KERNELS, pair_angle, pixel_centers, swirl_angle
+from planar_fields import KERNELS, kernel_window, pair_angle, pixel_centers, plain, swirl_angle
 
 from rosy_addon.compositor.contrast import blend_gain, expected_std
 from rosy_addon.compositor.image_noise import NoiseSettings, image_noise
@@ -20,16 +20,9 @@ pytestmark = pytest.mark.slow
 
 SIZE = 256
 METHODS = "sheets", "members", "brute", "ibfv"
-#: The paper's noise, and the contrast of one member.
-PLAIN = Look(gain=1.0, density=0.5, high_pass=0.0)
 
 
-def plain(**settings):
-    """The plain look with some settings changed."""
-    return PLAIN.with_settings(settings)
-
-
-def tone(angles, degree, look=PLAIN, **more):
+def tone(angles, degree, look, **more):
     """(H, W) display values of a planar picture before clipping, one channel."""
     return compose_planar(angles, degree, look, **more).layer.tone[:, 0].reshape(angles.shape)
 
@@ -37,13 +30,6 @@ def tone(angles, degree, look=PLAIN, **more):
 def make_noise(size, line_width=1.5, seed=0):
     pixel = np.arange(size * size, dtype=np.int32)
     return image_noise(pixel, size, NoiseSettings(line_width, seed))[:, 0]
-
-
-def kernel_window(length, kernel):
-    """Weights of the samples of a streamline, along it from end to end."""
-    offset = np.arange(-length, length + 1)
-    distance = {"box": 0 * offset, "taper": np.abs(offset), "ramp": offset}[kernel]
-    return 1 - distance / (length + 1)
 
 
 def runge_kutta_lic(angle, noise, size, length, kernel):
@@ -81,7 +67,7 @@ def crop_margin(image, margin=50):
 def test_one_direction_agrees_with_a_runge_kutta_integrator(kernel):
     size = 192
     noise = make_noise(size).reshape(size, size).astype(np.float64)
-    expected = runge_kutta_lic(swirl_angle, noise, size, PLAIN.length, kernel)
+    expected = runge_kutta_lic(swirl_angle, noise, size, plain().length, kernel)
     look = plain(method="members", **KERNELS[kernel])
     actual = tone(swirl_angle(*pixel_centers(size), size), 1, look, noise=noise)
     assert correlation(crop_margin(actual), crop_margin(expected)) > 0.99
@@ -93,7 +79,7 @@ def test_one_direction_resembles_another_library(kernel):
     x, y = pixel_centers(SIZE)
     angles = swirl_angle(x, y, SIZE)
     noise = make_noise(SIZE).reshape(SIZE, SIZE).astype(np.float64)
-    window = kernel_window(PLAIN.length, kernel)
+    window = kernel_window(plain().length, kernel)
     expected = rlic.convolve(noise, np.cos(angles), np.sin(angles), kernel=window, iterations=1)
     actual = tone(angles, 1, plain(**KERNELS[kernel]), noise=noise)
     assert correlation(crop_margin(actual), crop_margin(expected)) > 0.7
@@ -111,7 +97,7 @@ def test_corrected_contrast_is_that_of_one_member(method, settings):
 
 def test_the_blend_gain_of_seven_lines_includes_correlations():
     # Equation 6 assumes independent images; the correction for correlations is about a tenth.
-    gain = blend_gain(7, np.array([81.0]), pixel_look(PLAIN))[0]
+    gain = blend_gain(7, np.array([81.0]), pixel_look(plain()))[0]
     assert 0.87 < gain / np.sqrt(7) < 0.94
 
 
@@ -160,11 +146,9 @@ def test_breaking_points_are_not_visible(settings):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_short_streamlines_have_the_contrast_of_full_ones(method):
-    look = plain(method=method)
-    size = 256
-    angles = np.full((size, size), 0.0)
+    angles = np.zeros((SIZE, SIZE))
     angles[:, 100:112] = np.nan
-    image = tone(angles, 1, look)
+    image = tone(angles, 1, plain(method=method))
     # Near the gap, about half of each streamline is missing.
     near_gap, far_from_gap = image[:, 112:122], image[:, 170:200]
     assert near_gap.std() == pytest.approx(far_from_gap.std(), rel=0.1)
@@ -173,13 +157,12 @@ def test_short_streamlines_have_the_contrast_of_full_ones(method):
 @pytest.mark.parametrize("method", METHODS)
 def test_streamlines_end_at_undefined_pixels(method):
     look = plain(method=method)
-    angles = np.full((64, 64), 0.0)
-    angles[:, 32:] = np.nan
-    changed = np.full((64, 64), 0.0)
+    whole = np.zeros((64, 64))
+    half = np.where(np.arange(64) < 32, whole, np.nan)
     noise = make_noise(64).reshape(64, 64)
     other = noise.copy()
     other[:, 32:] = 1 - other[:, 32:]
-    for ends, shown in ((True, angles), (False, changed)):
+    for ends, shown in ((True, half), (False, whole)):
         halves = [tone(shown, 1, look, noise=each)[:, :32] for each in (noise, other)]
         assert np.array_equal(*halves) == ends
 
@@ -209,7 +192,7 @@ def test_color_noise_has_three_channels():
     channels = compose_planar(angles, 4, plain(hue="noise")).layer.tone
     assert channels.shape == (128 * 128, 3)
     assert abs(correlation(channels[:, 0], channels[:, 1])) < 0.1
-    gray = tone(angles, 4)
+    gray = tone(angles, 4, plain())
     assert np.allclose(channels[:, 0].reshape(128, 128), gray, atol=1e-6)
 
 

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
-from shapes import torus
+from shapes import instance_of, torus
 
 from rosy_addon.compositor.flow import Drift
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import pixel_look
 from rosy_addon.core.settings import pixel_lengths
-from rosy_addon.field.generate import generate
 from rosy_addon.projection.camera import look_at, orthographic_camera
-from rosy_addon.projection.gbuffer import MeshInstance
 
 LOOK = Look(flow=1.0, arrows=20.0, overshoot=3.0, outline=2.0, unit_size=0.1)
 
@@ -31,8 +28,7 @@ def test_samples_have_the_same_lengths_in_the_picture(side):
 
 
 def test_lengths_in_blender_units_do_not_depend_on_the_distance():
-    surface = torus(12, 6)
-    instance = MeshInstance(surface, np.eye(4), generate(surface, "axis", 4))
+    instance = instance_of(torus(12, 6), 4, "axis")
     for scale in (2.0, 8.0):
         camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), 200, 200, scale=scale)
         drawn = pixel_look(LOOK, camera, [instance])

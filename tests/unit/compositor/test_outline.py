@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from harness.outline_marks import covered_share, mark_lengths, to_image, visible_silhouettes
-from hatched import make_wall
+from hatched import make_instance, make_wall
 from scipy.ndimage import maximum_filter
 from shapes import (
     cube,
@@ -32,10 +32,8 @@ from rosy_addon.compositor.outline import (
     outline_coverage,
 )
 from rosy_addon.field.frames import normalize
-from rosy_addon.field.generate import axis_field
 from rosy_addon.field.surface import Surface
 from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
-from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.outline_mesh import outline_mesh
 from rosy_addon.projection.project import project
 
@@ -44,10 +42,6 @@ WIDTH, SIZE = 1.3, 320
 
 #: Marks from this length on are no specks.
 MIN_LENGTH = 6
-
-
-def instance_of(surface: Surface) -> MeshInstance:
-    return MeshInstance(surface, np.eye(4), axis_field(surface, 4, (0.3, 0.2, 1.0)))
 
 
 def outline_of(instance, camera, **settings):
@@ -88,7 +82,7 @@ def test_the_width_of_outlines(width):
     A border of pixels is off by up to half a pixel, which is most for the thinnest ring.
     """
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), SIZE, SIZE, scale=2.4)
-    gbuffer = project([instance_of(icosphere(5))], camera)
+    gbuffer = project([make_instance(icosphere(5))], camera)
     covered = outline_coverage(gbuffer, pixel_look(Look(outline=width)))
     radius = SIZE / 2.4
     ring = np.pi * (radius**2 - (radius - width) ** 2)
@@ -118,7 +112,7 @@ def test_outlines_are_drawn_on_the_nearer_surface():
 @pytest.mark.parametrize("flat", [False, True])
 @pytest.mark.parametrize("name", ["torus", "sphere"])
 def test_noise_makes_no_specks(name, flat):
-    instance = instance_of(noisy(name, flat))
+    instance = make_instance(noisy(name, flat))
     camera = orbit_camera(instance.face_points(), 30.0, 35.0, SIZE, SIZE)
     lengths = mark_lengths(outline_of(instance, camera))
     assert lengths.max() > SIZE / 2 and (lengths >= MIN_LENGTH).all()
@@ -126,7 +120,7 @@ def test_noise_makes_no_specks(name, flat):
 
 @pytest.mark.parametrize("supersampling", [2, 3])
 def test_lengths_of_marks_are_in_pixels_of_the_finished_picture(supersampling):
-    instance = instance_of(noisy("torus", False))
+    instance = make_instance(noisy("torus", False))
     side = 200 * supersampling
     camera = orbit_camera(instance.face_points(), 30.0, 35.0, side, side)
     samples = {"outline": WIDTH * supersampling, "supersampling": supersampling}
@@ -154,7 +148,7 @@ def test_silhouettes_are_covered(name):
         "tube": lambda: cylinder(64, 4),
         "boxes": lambda: combined(((0, 0, 0), (1, 1, 0.2)), ((0.2, 0.3, 0.4), (0.3, 0.2, 0.3))),
     }[name]()
-    instance = instance_of(surface)
+    instance = make_instance(surface)
     for angles in ((30.0, 35.0), (-70.0, 8.0), (0.0, 20.0)):
         camera = orbit_camera(instance.face_points(), *angles, SIZE, SIZE)
         points, lengths = visible_silhouettes(instance, camera)
@@ -166,9 +160,9 @@ def test_tiny_parts_keep_their_outlines():
     """A bolt of 5 pixels in front of a plate, also where it belongs to the same mesh."""
     plate, bolt = ((0, 0, 0), (1, 0.1, 1)), ((0.305, -0.4, 0.205), (0.023, 0.1, 0.023))
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), 240, 240, scale=2.4)
-    coverage = outline_of(instance_of(combined(plate, bolt)), camera)
+    coverage = outline_of(make_instance(combined(plate, bolt)), camera)
     assert sorted(mark_lengths(coverage))[0] == 5
-    bare = outline_of(instance_of(combined(bolt)), camera)
+    bare = outline_of(make_instance(combined(bolt)), camera)
     np.testing.assert_array_equal(bare > 0, (coverage > 0) & (bare > 0))
     assert (bare > 0.9).sum() >= 12
 
@@ -189,7 +183,7 @@ def line_is_covered(coverage, camera, start, end, least=0.6) -> bool:
 def test_all_edges_of_a_cube_are_drawn(sharp, side):
     """Without gaps, at any size, also if the normals are interpolated across its edges."""
     box = sharp_cube() if sharp else cube()
-    instance = instance_of(box)
+    instance = make_instance(box)
     camera = orbit_camera(instance.face_points(), 35.0, 25.0, side, side)
     coverage = outline_of(instance, camera)
     corner = box.vertices[np.argmin(np.linalg.norm(box.vertices - camera.eye, axis=1))]
@@ -205,7 +199,7 @@ def test_creases_of_dense_meshes_have_no_gaps():
     flat = plane(300, 300)
     x, y, _ = flat.vertices.T
     points = np.stack([x, y, -0.6 * np.abs(y - 1e-3)], axis=1)
-    instance = instance_of(from_triangles(points, flat.triangle_vertex))
+    instance = make_instance(from_triangles(points, flat.triangle_vertex))
     camera = orbit_camera(instance.face_points(), 20.0, 50.0, 200, 200)
     coverage = outline_of(instance, camera)
     top = points[np.argmax(points[:301, 2])]
@@ -216,18 +210,18 @@ def test_hidden_creases_are_not_drawn():
     """A wall in front of a box hides its edges."""
     boxes = combined(((0, 0, 0), (0.5, 0.5, 0.5)), ((0, -1.5, 0), (1, 0.1, 1)))
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), 200, 200, scale=2.4)
-    coverage = outline_of(instance_of(boxes), camera)
+    coverage = outline_of(make_instance(boxes), camera)
     assert not coverage[30:170, 30:170].any() and coverage.any()
 
 
 def test_parts_that_intersect_have_a_line_between_them():
     boxes = combined(((0, 0, 0), (1, 1, 0.1)), ((0, 0, 0.3), (0.4, 0.4, 0.4)))
     camera = orbit_camera(boxes.vertices, 30.0, 40.0, SIZE, SIZE)
-    coverage = outline_of(instance_of(boxes), camera)
+    coverage = outline_of(make_instance(boxes), camera)
     near = 0.4 * np.sign(camera.eye[:2])
     for end in ((-near[0], near[1]), (near[0], -near[1])):
         assert line_is_covered(coverage, camera, (*near, 0.1), (*end, 0.1))
-    crossing = outline_of(instance_of(boxes), camera, crease_angle=np.pi)
+    crossing = outline_of(make_instance(boxes), camera, crease_angle=np.pi)
     assert not line_is_covered(crossing, camera, (*near, 0.1), (-near[0], near[1], 0.1))
 
 

@@ -7,10 +7,10 @@ import pytest
 from field_helpers import with_random_members
 from harness.planar import degree_layers
 from harness.streaks import correlation, orientation_spectrum, peaks
+from planar_fields import PLAIN, plain
 from shapes import icosphere, moved, plane, torus
 
 from rosy_addon.compositor.compose import compose
-from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import Light, diffuse
 from rosy_addon.core.color import map_colors, to_display, to_linear
 from rosy_addon.field.frames import normalize
@@ -22,13 +22,6 @@ from rosy_addon.projection.project import project
 
 #: These tests draw many pictures and measure them.
 pytestmark = pytest.mark.slow
-
-PLAIN = Look(gain=1.0, line_width=1.5, density=0.5, high_pass=0.0, shading=0.0)
-
-
-def plain(**settings):
-    """The plain look with some settings changed."""
-    return PLAIN.with_settings(settings)
 
 
 def project_surface(

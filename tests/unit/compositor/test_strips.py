@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from shapes import icosphere, moved, plane, torus
+from shapes import icosphere, instance_of, moved, plane, torus
 
 from rosy_addon.compositor import strip_division
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.strip_division import divide_into_strips, group_strips
 from rosy_addon.compositor.strips import FADE_ROWS, Strip, join_strips
-from rosy_addon.field.generate import axis_field, generate
+from rosy_addon.field.generate import axis_field
 from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.camera import look_at, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
@@ -32,10 +32,9 @@ def _many_strips(monkeypatch):
 
 def instances() -> tuple[MeshInstance, ...]:
     """A torus with a field of degree 4, and in front a ball with one of degree 3."""
-    ring, ball = torus(30, 15), icosphere(3)
     return (
-        MeshInstance(ring, np.eye(4), axis_field(ring, 4, (0, 0, 1))),
-        MeshInstance(ball, moved(0.2, -0.5, 1.0), generate(ball, "smoothest", 3)),
+        instance_of(torus(30, 15), 4, "axis"),
+        instance_of(icosphere(3), 3, matrix=moved(0.2, -0.5, 1.0)),
     )
 
 

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hatched import BALL, camera_above, make_instance
 from shapes import icosphere, placed, plane
 
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import Light, diffuse
 from rosy_addon.compositor.target_tone import ReferenceRender, apply_tone_curve, target_tone
-from rosy_addon.field.generate import axis_field
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
@@ -23,12 +23,6 @@ from rosy_addon.projection.surface_tone import SurfaceTone
 pytestmark = pytest.mark.slow
 
 SIZE = 384
-BALL = icosphere(5)
-
-
-def make_instance(surface, matrix=None, tone=None):
-    field = axis_field(surface, 4, (0.3, 0.2, 1.0))
-    return MeshInstance(surface, np.eye(4) if matrix is None else matrix, field, tone)
 
 
 def make_camera(size=SIZE, position=(0.0, -4.0, 1.2), target=(0.0, 0.0, 0.0), fov=0.56):
@@ -54,7 +48,7 @@ def test_attributes_are_interpolated_over_triangles():
     surface = plane(3, 3, 4.0)
     linear = 0.3 * surface.vertices[:, 0] - 0.2 * surface.vertices[:, 1] + 0.5
     matrix = placed(1.5, (0.3, 0.2, -0.4))
-    instance = make_instance(surface, matrix, tone_from_vertices(surface, linear))
+    instance = make_instance(surface, 4, matrix, tone_from_vertices(surface, linear))
     gbuffer = project([instance], make_camera(fov=0.9))
     x, y, _ = ((world_positions(gbuffer) - matrix[:3, 3]) / 1.5).T
     np.testing.assert_allclose(surface_tones(gbuffer), 0.3 * x - 0.2 * y + 0.5, atol=2e-5)
@@ -70,9 +64,9 @@ def test_corner_values_may_differ_between_faces():
 
 
 def test_instances_without_a_tone_use_the_light():
-    other = make_instance(BALL, placed(0.5, (1.2, 0, 0)))
+    other = make_instance(BALL, 4, placed(0.5, (1.2, 0, 0)))
     tone = tone_from_vertices(BALL, np.full(len(BALL.vertices), 0.7))
-    painted = make_instance(BALL, placed(0.5, (-1.2, 0, 0)), tone)
+    painted = make_instance(BALL, 4, placed(0.5, (-1.2, 0, 0)), tone)
     gbuffer = project([painted, other], make_camera(fov=1.2))
     look = Look(tone="attribute", light="lamp")
     tone = target_tone(gbuffer, look)
@@ -124,23 +118,19 @@ def mapped_plane(image, repeat=1.0, cells=4):
     return make_instance(surface, tone=SurfaceTone(uv.astype(np.float32), image.astype(np.float32)))
 
 
-def camera_above(size, scale=2.0):
-    return orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), size, size, scale=scale)
-
-
 @pytest.mark.parametrize("repeat", [1, 2])
 def test_images_follow_the_uv_map_and_repeat(repeat):
     """An image with pixels of the size of the picture's is reproduced, rows from the bottom."""
     image = np.random.default_rng(1).random((16, 16))
     size = 16 * repeat
-    gbuffer = project([mapped_plane(image, repeat)], camera_above(size))
+    gbuffer = project([mapped_plane(image, repeat)], camera_above(2.0, size))
     tones = surface_tones(gbuffer).reshape(size, size)
     np.testing.assert_allclose(tones, np.tile(image, (repeat, repeat)), atol=2e-4)
 
 
 def test_images_are_interpolated():
     ramp = np.tile((np.arange(8) + 0.5) / 8, (8, 1))
-    tones = surface_tones(project([mapped_plane(ramp)], camera_above(128))).reshape(128, 128)
+    tones = surface_tones(project([mapped_plane(ramp)], camera_above(2.0, 128))).reshape(128, 128)
     expected = (np.arange(128) + 0.5) / 128
     np.testing.assert_allclose(tones[:, 8:-8], np.tile(expected[8:-8], (128, 1)), atol=1e-3)
 
@@ -148,11 +138,11 @@ def test_images_are_interpolated():
 def test_images_finer_than_the_picture_are_averaged():
     """A checkerboard with sixteen squares per pixel of the picture is gray."""
     board = np.indices((256, 256)).sum(axis=0) % 2
-    tones = surface_tones(project([mapped_plane(board)], camera_above(64)))
+    tones = surface_tones(project([mapped_plane(board)], camera_above(2.0, 64)))
     np.testing.assert_allclose(tones, 0.5, atol=1e-3)
     # The same for an image with odd sides that is repeated.
     odd = np.random.default_rng(2).random((255, 131))
-    tones = surface_tones(project([mapped_plane(odd, repeat=3.0)], camera_above(8)))
+    tones = surface_tones(project([mapped_plane(odd, repeat=3.0)], camera_above(2.0, 8)))
     np.testing.assert_allclose(tones, odd.mean(), atol=0.05)
 
 
@@ -233,7 +223,7 @@ def test_the_shadow_of_a_ball_on_a_plane(name):
     """The shadow is known in closed form. It may differ only close to its border."""
     kind, where = LIGHTS[name]
     ground = make_instance(plane(8, 8, 8.0))
-    ball = make_instance(icosphere(5), placed(0.8, (0, 0, 1.0)))
+    ball = make_instance(BALL, 4, placed(0.8, (0, 0, 1.0)))
     camera = make_camera(256, position=(3, -6, 4), target=(0, 0, 0.6), fov=0.7)
     light = light_at(camera, kind, where)
     gbuffer = project([ground, ball], camera)

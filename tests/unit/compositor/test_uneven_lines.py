@@ -6,18 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from harness.planar import planar_pixel_field
+from harness.planar import planar_lines, planar_pixel_field
 from hatched import INK, make_camera, make_instance, tube
 from scipy.ndimage import gaussian_filter
 
-from rosy_addon.compositor.fast_lic import fast_lic
-from rosy_addon.compositor.hatching import HatchedLines, render_hatching
+from rosy_addon.compositor.hatching import render_hatching
 from rosy_addon.compositor.image_noise import NoiseSettings, image_noise
-from rosy_addon.compositor.lic import look_noise
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import pixel_look
 from rosy_addon.compositor.paper_grain import picture_paper_grain
-from rosy_addon.compositor.streak_statistics import break_steps
 from rosy_addon.compositor.wobble import WOBBLE_STD, rotate_pixel_field, wobble_angle
 from rosy_addon.projection.project import project
 
@@ -28,18 +25,9 @@ pytestmark = pytest.mark.slow
 def plane_coverage(look, tone, degree=2, angle=0.3, side=320):
     """(H, W) coverage by lines of a constant field in the plane, for a constant tone."""
     look = pixel_look(replace(look, anchor="picture", paper_color="#ffffff00"))
-    field = planar_pixel_field(np.full((side, side), angle), degree)
-    noise = look_noise(field, look)
-    break_images = paper_grain = None
-    if look.breaks or look.wobble:
-        (break_images,) = fast_lic(field, [look.with_length(break_steps(look))], noise)
-    if look.paper_grain:
-        paper_grain = picture_paper_grain(
-            field.pixel, field.width, look.line_width, look.seed, 1, field.line_count
-        )
-    (images,) = fast_lic(field, [look], noise)
+    field, lines = planar_lines(np.full((side, side), angle), degree, look)
     tones = np.full(len(field.pixel), tone, dtype=np.float32)
-    _, alpha = render_hatching(field, HatchedLines(look, images, break_images, paper_grain), tones)
+    _, alpha = render_hatching(field, lines, tones)
     # Streamlines end at the frame.
     return alpha.reshape(side, side)[40:-40, 40:-40]
 

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import tracemalloc
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import ROOT, traced_peak
 from field_helpers import write_off
 from shapes import plane
 
 from bench import cases
 from rosy_addon.cli.parser import main
-from rosy_addon.compositor import image_noise, streak_statistics
 from rosy_addon.compositor.look import Look
 from rosy_addon.core import memory
 from rosy_addon.core.cache import Cache
@@ -43,19 +41,17 @@ def limit_memory(monkeypatch, free: float) -> None:
 
 
 def test_limits_of_control_groups(tmp_path):
-    """Of the group and of the one around it; files that are only cached are free."""
+    """Of both versions, of the group and the one around it; files that are only cached are free."""
     (tmp_path / "proc/self").mkdir(parents=True)
     (tmp_path / "proc/self/cgroup").write_text("0::/outer/inner\n7:memory:/box\n2:cpu:/\n")
     mount = tmp_path / "sys/fs/cgroup"
+    first = "memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"
+    second = "memory.max", "memory.current", "inactive_file"
     for folder, limit, names in (
-        (mount / "outer/inner", "max", ("memory.max", "memory.current", "inactive_file")),
-        (mount / "outer", "5000", ("memory.max", "memory.current", "inactive_file")),
+        (mount / "outer/inner", "max", second),
+        (mount / "outer", "5000", second),
         # In a container, the path of its group does not exist.
-        (
-            mount / "memory",
-            "7000",
-            ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
-        ),
+        (mount / "memory", "7000", first),
     ):
         folder.mkdir(parents=True, exist_ok=True)
         (folder / names[0]).write_text(f"{limit}\n")
@@ -90,19 +86,6 @@ def test_a_limit_of_the_address_space():
 
 
 # --- the bound of a picture ------------------------------------------------------------------------------------
-
-
-def traced_peak(work) -> int:
-    """Return the largest number of bytes that are allocated at once, as in a new process."""
-    for cache in (image_noise.TILE_CACHE, streak_statistics.STATISTICS_CACHE):
-        cache.clear()
-    image_noise.streak_moments.cache_clear()
-    tracemalloc.start()
-    try:
-        work()
-        return tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
 
 
 def test_a_picture_in_strips_needs_less_than_a_whole_one():

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from listeners import CancelledError, cancel_at, reported
-from shapes import torus
+from shapes import instance_of, torus
 from uv_maps import torus_uv
 
 from rosy_addon.compositor.look import Look
@@ -24,14 +24,12 @@ from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.ambient_occlusion import ambient_occlusion
 from rosy_addon.projection.camera import orbit_camera
-from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 from rosy_addon.surface_texture.draw import draw_texture
 
-SURFACE = torus(48, 24)
-FIELD = generate(SURFACE, "smoothest", 4)
-INSTANCE = MeshInstance(SURFACE, np.eye(4), FIELD)
+INSTANCE = instance_of(torus(48, 24), 4)
+SURFACE, FIELD = INSTANCE.surface, INSTANCE.field
 SUN = Light("sun", np.array([0.3, 0.5, 0.8]), np.ones(3), 1.0)
 CAMERA = orbit_camera(INSTANCE.face_points(), 20, 40, 200, 200)
 

@@ -11,6 +11,7 @@ from harness.gpu_parity import read_gbuffer
 from harness.gpu_scenes import (
     AXIS,
     BALL,
+    EVEN_LINES,
     LOOK,
     SHEAR,
     SIZE,
@@ -31,8 +32,6 @@ from rosy_addon.gpu.renderer import GpuRenderer
 from rosy_addon.preset_files.store import load_preset
 from rosy_addon.rendering.view_input import ViewInput
 from rosy_addon.worker.job import Call, run
-
-EVEN_LINES = replace(LOOK, ink="even", shading=0.9, line_width=3.0, line_distance=6.0)
 
 
 def kept_kinds(card):

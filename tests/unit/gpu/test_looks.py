@@ -49,6 +49,7 @@ HATCH = {"ink": "hatch", "shading": 0.9, "line_width": 2.5}
 LIGHT_INK = HATCH | {"ink_color": "#ffd060", "paper_color": "#101020"}
 EVEN = {"ink": "even", "shading": 0.9, "line_width": 3.0, "line_distance": 6.0}
 UNEVEN = {"wobble": 0.7, "breaks": 0.4, "paper_grain": 0.5}
+UNEVEN_IN_UNITS = ON_SURFACE | UNEVEN | {"unit_size": 0.012, "overshoot": 5.0}
 #: Streaks that drift, at a phase at which no kernel is where it is at rest.
 DRIFTING = {"flow": 2.0, "drift": Drift(0.2)}
 
@@ -77,10 +78,7 @@ LOOKS = {
     | {"paper_grain": 0.6, "supersampling": 2, "crispness": 0.3, "seed": 5},
     "hatched, an ink per family": HATCH | {"hue": "families", "degree": 6, "layering": 0.1},
     "hatched, ink ramp, light on dark": LIGHT_INK | {"hue": "tone", "ink_color_light": "#fff0f0"},
-    "hatched in Blender units, uneven": ON_SURFACE
-    | HATCH
-    | UNEVEN
-    | {"unit_size": 0.012, "overshoot": 5.0},
+    "hatched in Blender units, uneven": HATCH | UNEVEN_IN_UNITS,
     "hatched by families, with an outline": LIGHT_INK
     | {"hue": "families", "outline": 1.5, "supersampling": 2},
     "hatched, overshoot": HATCH | {"light": "lamp", "shadows": True, "overshoot": 9.0, "length": 7},
@@ -91,10 +89,7 @@ LOOKS = {
     "even lines, supersampled": EVEN
     | {"light": "lamp", "supersampling": 2, "degree": 6, "layers": 2, "guiding_angle": 0.5},
     "even lines of an odd degree, soft": EVEN | {"degree": 3, "crispness": 0.3, "hue": "families"},
-    "even lines in Blender units, uneven": ON_SURFACE
-    | EVEN
-    | UNEVEN
-    | {"unit_size": 0.012, "overshoot": 5.0},
+    "even lines in Blender units, uneven": EVEN | UNEVEN_IN_UNITS,
     "the method members": {"method": "members", "weights": "none", "view_plane": False},
     "drifting": DRIFTING,
     "drifting, oriented": DRIFTING | {"fade": "tail", "degree": 1, "density": 0.03},

@@ -10,6 +10,7 @@ from awkward import moebius
 from harness.gpu_scenes import (
     AXIS,
     BALL,
+    EVEN_LINES,
     FREE,
     LOOK,
     MIRROR,
@@ -38,7 +39,6 @@ from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.projection.camera import Camera, look_at, perspective_camera
 
 FAMILIES = replace(LOOK, hue="families")
-EVEN_LINES = replace(LOOK, ink="even", shading=0.9, line_width=3.0, line_distance=6.0)
 
 
 def with_axis_field(surface, degree=4, axis=AXIS, linear=1.0, shift=(0, 0, 0)):

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shapes import icosphere, plane
+from shapes import icosphere, instance_of, plane
 
-from rosy_addon.field.generate import GeneratorSettings, generate
+from rosy_addon.field.generate import GeneratorSettings
 from rosy_addon.line_drawing.mesh_in_view import MARGIN_PIXELS, MARGIN_RATIO, mesh_in_view
 from rosy_addon.line_drawing.surface_particles import SurfaceParticles, trace_geodesics
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
 from rosy_addon.line_drawing.visibility import project_to_pixels
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
-from rosy_addon.projection.gbuffer import MeshInstance
 
 #: A camera at the height 2 above a ground plane, whose horizon is in the picture.
 ABOVE_GROUND = perspective_camera(look_at((0, 0, 2), (0, 20, 1)), 192, 108)
@@ -31,13 +30,8 @@ SCENES = {
 def mesh_and_part(name):
     surface, camera = SCENES[name]
     settings = GeneratorSettings("axis", (1, 0.3, 0)) if name == "ground" else "form"
-    mesh = build_tangent_mesh(MeshInstance(surface, np.eye(4), generate(surface, settings, 4)))
+    mesh = build_tangent_mesh(instance_of(surface, 4, settings))
     return mesh, mesh_in_view(mesh, camera), camera
-
-
-def random_weights(count, rng):
-    weights = -np.log(rng.random((count, 3)))
-    return weights / weights.sum(axis=1, keepdims=True)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -54,7 +48,7 @@ def test_part_is_what_is_in_the_frame(name):
     # Random points of triangles that are in the frame are in one part each, others in none.
     rng = np.random.default_rng(5)
     triangle = rng.integers(len(mesh.points), size=4000)
-    weights = random_weights(len(triangle), rng)
+    weights = rng.dirichlet(np.ones(3), len(triangle))
     pixels, _ = project_to_pixels(mesh.points_at(triangle, weights), camera)
     with np.errstate(invalid="ignore"):
         expected = (np.abs(pixels - size / 2) <= limit).all(axis=1)
@@ -76,7 +70,7 @@ def test_parts_are_connected_as_the_mesh(name):
     assert np.array_equal(part.mesh.neighbor_edge[other], edge)
     rng = np.random.default_rng(6)
     start = rng.choice(np.flatnonzero(part.mesh.area > 0), 500).astype(np.int32)
-    weights = random_weights(len(start), rng)
+    weights = rng.dirichlet(np.ones(3), len(start))
     direction = np.exp(2j * np.pi * rng.random(len(start)))
     length = rng.random(len(start)) * 0.4 * np.sqrt(part.mesh.area[start])
     ends = []
@@ -92,7 +86,6 @@ def test_parts_are_connected_as_the_mesh(name):
 
 
 def test_a_mesh_in_the_frame_is_not_changed():
-    surface = icosphere(2)
-    mesh = build_tangent_mesh(MeshInstance(surface, np.eye(4), generate(surface, "form", 4)))
+    mesh = build_tangent_mesh(instance_of(icosphere(2), 4, "form"))
     camera = perspective_camera(look_at((0, -5, 1), (0, 0, 0)), 100, 100)
     assert mesh_in_view(mesh, camera).mesh is mesh

@@ -6,11 +6,11 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from harness.stroke_tracing import latitudes
+from harness.stroke_tracing import latitudes, turned
 from shapes import icosphere, instance_of, moved, placed, plane, sharp_cube
 
 from rosy_addon.field.frames import dot, normalize
-from rosy_addon.field.generate import GeneratorSettings, axis_field, generate
+from rosy_addon.field.generate import axis_field
 from rosy_addon.line_drawing.outline import OUTLINE_KINDS
 from rosy_addon.line_drawing.pipeline import TIP_WIDTH, draw_instances
 from rosy_addon.line_drawing.stroke_ends import MIN_EXTENSION_RATIO, extend_free_ends
@@ -20,10 +20,9 @@ from rosy_addon.projection.camera import look_at, orthographic_camera, perspecti
 from rosy_addon.projection.gbuffer import MeshInstance
 
 IDENTITY = np.eye(4)
-ALONG_X = GeneratorSettings("axis", (1.0, 0.0, 0.0))
 MAX_PIXELS = 12.0
 
-SQUARE = MeshInstance(plane(8, 8), IDENTITY, generate(plane(8, 8), ALONG_X, 2))
+SQUARE = turned(plane(8, 8), 2)
 TOP_CAMERA = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 300, 300, scale=3.0)
 
 SPHERE = instance_of(icosphere(4), 4)
@@ -130,8 +129,7 @@ def test_extensions_into_the_light_follow_the_surface():
 
 @pytest.mark.slow
 def test_ends_at_gaps_and_at_neighbors_are_not_extended():
-    crossed = MeshInstance(SQUARE.surface, IDENTITY, axis_field(SQUARE.surface, 4, (1, 0, 0)))
-    plain, extended = draw_both([crossed], TOP_CAMERA, spacing=20.0, gaps=0.3)
+    plain, extended = draw_both([turned(SQUARE.surface, 4)], TOP_CAMERA, spacing=20.0, gaps=0.3)
     is_inner = np.abs(ends_of(plain)[:, :, :2]).max(axis=(1, 2)) < 1 - 1e-9
     assert is_inner.sum() > 50 and not is_inner.all()
     for number in np.flatnonzero(is_inner):

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from shapes import icosphere, plane
+from harness.stroke_tracing import turned
+from shapes import icosphere, instance_of, plane
 
-from rosy_addon.field.generate import axis_field
-from rosy_addon.field.smoothest import smoothest_field
 from rosy_addon.line_drawing import placement
 from rosy_addon.line_drawing.lateral_neighbors import SeparationRules
 from rosy_addon.line_drawing.path_samples import SampledPath
@@ -14,13 +13,11 @@ from rosy_addon.line_drawing.seeding import candidate_seeds, thinned_seeds
 from rosy_addon.line_drawing.spacing import CornerSpacing
 from rosy_addon.line_drawing.surface_particles import advance
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
-from rosy_addon.projection.gbuffer import MeshInstance
 
 
 def test_samples_of_a_straight_path():
     """Steps grow by a tenth each; the last sample is at the border. Paths end where they are cut."""
-    ground = plane(7, 7)
-    mesh = build_tangent_mesh(MeshInstance(ground, np.eye(4), axis_field(ground, 1, (1, 0, 0))))
+    mesh = build_tangent_mesh(turned(plane(7, 7), 1))
     seeds = candidate_seeds(mesh, np.full((len(mesh.points), 3), 0.4))
     x, y, _ = mesh.points_at(seeds.triangle, seeds.weights).T
     length = np.full(len(seeds), 10.0)
@@ -71,8 +68,7 @@ def test_samples_are_accepted_one_after_the_other(monkeypatch):
     """
     monkeypatch.setattr(placement, "MIN_STEP_SCALE", 1.0)
     monkeypatch.setattr(placement, "MIN_SEGMENTS", 100)
-    sphere = icosphere(3)
-    mesh = build_tangent_mesh(MeshInstance(sphere, np.eye(4), smoothest_field(sphere, 4)))
+    mesh = build_tangent_mesh(instance_of(icosphere(3), 4))
     spacing = CornerSpacing(np.full((len(mesh.points), 3), 0.1))
     reached = []
     for sample_counts in ((6,), (1,) * 6):

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from harness.stroke_tracing import trace_strokes
+from harness.stroke_tracing import trace_strokes, turned
 from listeners import cancel_at
 from scipy.spatial import cKDTree
 from shapes import from_triangles, icosphere, instance_of, moved, plane, rebuilt
@@ -14,7 +14,6 @@ from shapes import from_triangles, icosphere, instance_of, moved, plane, rebuilt
 from rosy_addon.compositor.shading import Light
 from rosy_addon.core.progress import listening
 from rosy_addon.field.frames import dot, normalize
-from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.line_drawing import lateral_neighbors, seeding, separation, visibility
 from rosy_addon.line_drawing.drawing_outputs import offset_toward_camera, stroke_geometry
 from rosy_addon.line_drawing.outline import OUTLINE_KINDS
@@ -31,8 +30,6 @@ from rosy_addon.projection.camera import (
 )
 from rosy_addon.projection.gbuffer import MeshInstance
 
-IDENTITY = np.eye(4)
-ALONG_X = GeneratorSettings("axis", (1.0, 0.0, 0.0))
 SPHERE = instance_of(icosphere(3), 4)
 CAMERA = perspective_camera(look_at((0.5, -4, 1), (0, 0, 0)), 240, 200, fov=np.radians(40))
 ORTHOGRAPHIC = orthographic_camera(look_at((0.5, -4, 1), (0, 0, 0)), 240, 200, scale=2.5)
@@ -40,7 +37,7 @@ ORTHOGRAPHIC = orthographic_camera(look_at((0.5, -4, 1), (0, 0, 0)), 240, 200, s
 
 @pytest.mark.slow
 def test_families_of_several_instances_are_merged_by_name():
-    degree_6 = MeshInstance(icosphere(3), moved(x=0.9), generate(icosphere(3), "smoothest", 6))
+    degree_6 = instance_of(icosphere(3), 6, matrix=moved(x=0.9))
     occluder = MeshInstance(plane(), moved(z=-1.0))
     style = StrokeStyle(spacing=16, outline=True)
     drawing = draw_instances([occluder, SPHERE, degree_6], CAMERA, style)
@@ -59,8 +56,7 @@ def test_families_of_several_instances_are_merged_by_name():
 @pytest.mark.slow
 def test_a_floor_that_continues_behind_the_camera_is_drawn():
     """Beside the camera, outside the frame, spacings in pixels are almost zero in world space."""
-    surface = plane(60, 60, size=40.0)
-    floor = MeshInstance(surface, IDENTITY, generate(surface, ALONG_X, 2))
+    floor = turned(plane(60, 60, size=40.0), 2)
     camera = perspective_camera(look_at((0, -10, 3), (0, 0, 0)), 200, 150, fov=np.radians(40))
     drawing = draw_instances([floor], camera, StrokeStyle(spacing=10, overshoot=12.0))
     pixels, depth = project_to_pixels(drawing.strokes.points, camera)
@@ -70,10 +66,9 @@ def test_a_floor_that_continues_behind_the_camera_is_drawn():
 
 @pytest.mark.parametrize("distance", [0.1, 0.2])
 def test_spacings_in_world_units_do_not_depend_on_the_camera(distance):
-    square = MeshInstance(plane(8, 8), IDENTITY, generate(plane(8, 8), ALONG_X, 2))
     camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 300, 300, scale=3.0)
     style = StrokeStyle(unit="world", distance=distance, hidden=True)
-    drawing = draw_instances([square], camera, style)
+    drawing = draw_instances([turned(plane(8, 8), 2)], camera, style)
     # The total length is the area, 2 by 2, divided by the distance.
     assert np.isclose(drawing.strokes.length.sum(), 4 / distance, rtol=0.12)
 
@@ -133,10 +128,8 @@ def test_seeding_ends_where_shading_normals_are_steep(tilt):
     """As on polygons that are not flat: strokes beside each other still find each other."""
     flat = plane(2, 2)
     normal = np.tile((0.0, np.sin(tilt), np.cos(tilt)), (len(flat.corner_vertex), 1))
-    surface = rebuilt(flat, corner_normal=normal)
-    instance = MeshInstance(surface, IDENTITY, generate(surface, ALONG_X, 2))
     with listening(cancel_at(300)):
-        strokes = trace_strokes(instance, 0.1)
+        strokes = trace_strokes(turned(rebuilt(flat, corner_normal=normal), 2), 0.1)
     assert 30 < strokes.length.sum() < 50
 
 

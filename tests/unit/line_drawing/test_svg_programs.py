@@ -11,15 +11,13 @@ import pytest
 from harness.stroke_tracing import trace_strokes, visible_strokes, write_svg
 from PIL import Image
 from scipy.ndimage import gaussian_filter
-from shapes import torus
+from shapes import instance_of, torus
 
-from rosy_addon.field.generate import generate
 from rosy_addon.line_drawing.outline import outline_strokes
 from rosy_addon.line_drawing.stroke_set import Strokes
 from rosy_addon.line_drawing.svg import Pen
 from rosy_addon.line_drawing.visibility import pixel_size
 from rosy_addon.projection.camera import orbit_camera
-from rosy_addon.projection.gbuffer import MeshInstance
 
 pytestmark = pytest.mark.slow
 
@@ -120,16 +118,15 @@ def correlation(a, b, blur=0.0):
 @pytest.fixture(scope="module")
 def scene():
     """A torus with a field along its axis, and a camera."""
-    surface = torus(96, 48)
-    instance = MeshInstance(surface, np.eye(4), generate(surface, "axis", 2))
-    return instance, orbit_camera(surface.vertices, -25, 40, WIDTH, HEIGHT)
+    instance = instance_of(torus(), 2, "axis")
+    return instance, orbit_camera(instance.surface.vertices, -25, 40, WIDTH, HEIGHT)
 
 
 @pytest.fixture(scope="module")
 def strokes(scene):
     """Tapered strokes along and across the axis, and silhouettes."""
     instance, camera = scene
-    crossed = MeshInstance(instance.surface, instance.matrix, generate(instance.surface, "axis", 4))
+    crossed = instance_of(instance.surface, 4, "axis")
     lines = trace_strokes(crossed, 9.0 * pixel_size(crossed.world_points(), camera))
     lines = Strokes.concatenate(lines.tapered(0.8, 0.15), outline_strokes(instance, camera))
     return visible_strokes(lines, [instance], camera)

@@ -125,10 +125,10 @@ def test_look_at():
     assert abs(above[0]) < 1e-12 and above[1] > 0
 
 
-def make_camera(view=None, projection=None, size=(10, 10)):
-    good = perspective_camera(np.eye(4), 10, 10)
-    view = good.view if view is None else view
-    projection = good.projection if projection is None else projection
+GOOD = perspective_camera(np.eye(4), 10, 10)
+
+
+def make_camera(view=GOOD.view, projection=GOOD.projection, size=(10, 10)):
     return Camera(view, projection, *size, "Cam")
 
 

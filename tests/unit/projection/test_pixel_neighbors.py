@@ -171,15 +171,6 @@ def test_links_are_symmetric_and_include_the_pixel_itself():
     assert len(linked_pairs) < len(pairs) and all((b, a) in linked_pairs for a, b in linked_pairs)
 
 
-def test_links_do_not_leave_the_frame():
-    gbuffer = project_surfaces([plane(1, 1, 50.0)], camera_above(11))
-    assert len(gbuffer.pixel) == 121
-    masks = neighbor_masks(gbuffer, 0.7).reshape(11, 11)
-    assert (masks[1:-1, 1:-1] == 511).all()
-    assert not (masks[:, 0] & 0b001001001).any() and not (masks[:, -1] & 0b100100100).any()
-    assert not (masks[0] & 0b000000111).any() and not (masks[-1] & 0b111000000).any()
-
-
 def test_streamlines_end_at_the_frame_and_at_holes():
     size = 7
     angles = np.zeros((size, size))

@@ -10,6 +10,7 @@ from field_helpers import with_random_members
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lenses import shifted
+from scipy.spatial.transform import Rotation
 from shapes import cube, from_quads, from_triangles, icosphere, placed, plane, rebuilt, torus
 
 from rosy_addon.core.errors import RosyError
@@ -27,12 +28,6 @@ seeds = st.integers(0, 2**32 - 1)
 degrees = st.integers(1, 7)
 IDENTITY = np.eye(4)
 ON_EDGE = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
-
-
-def random_rotation(random):
-    q, r = np.linalg.qr(random.normal(size=(3, 3)))
-    q *= np.sign(np.diag(r))
-    return q * np.linalg.det(q)
 
 
 def tangent_field(surface, degree, seed=0):
@@ -151,7 +146,7 @@ def test_moving_mesh_and_camera_together_changes_nothing(seed, degree, perspecti
     surface = torus(16, 9)
     field = tangent_field(surface, degree, seed)
     camera = orbit_camera(surface.vertices, 25, 40, 64, 64, perspective=perspective)
-    motion = placed(random_rotation(random), random.normal(size=3))
+    motion = placed(Rotation.random(None, random).as_matrix(), random.normal(size=3))
     moved = type(camera)(camera.view @ np.linalg.inv(motion), camera.projection, 64, 64)
     first = project([MeshInstance(surface, IDENTITY, field)], camera, display)
     second = project([MeshInstance(surface, motion, field)], moved, display)

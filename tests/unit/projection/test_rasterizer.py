@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rays import ray_intersections
 from shapes import plane
 
 from rosy_addon.projection import near_clipping, rasterizer
@@ -53,19 +54,15 @@ def cast_rays(points, triangles, camera):
             origin, direction = np.zeros(3), np.array([x, y, -1.0])
         else:
             origin, direction = np.array([x, y, 0.0]), np.array([0.0, 0.0, -1.0])
-        for index, corners in enumerate(points[triangles]):
-            # a + s (b - a) + t (c - a) = origin + d direction
-            a, b, c = corners
-            matrix = np.stack([b - a, c - a, -direction], axis=1)
-            if abs(np.linalg.det(matrix)) < 1e-9:
-                continue
-            s, t, d = np.linalg.solve(matrix, origin - a)
-            barycentric = np.array([1 - s - t, s, t])
-            if barycentric.min() > -1e-9 and near - 1e-9 < d < far + 1e-9:
-                margin = min(barycentric.min(), d - near, far - d, abs(d - depth[pixel]))
-                doubtful[pixel] |= margin < 1e-9
-                if d < depth[pixel]:
-                    owner[pixel], depth[pixel], weights[pixel] = index, d, barycentric
+        barycentric, distance = ray_intersections(origin, direction, points[triangles])
+        smallest = barycentric.min(axis=1)
+        hits = (smallest > -1e-9) & (distance > near - 1e-9) & (distance < far + 1e-9)
+        for index in np.flatnonzero(hits):
+            d = distance[index]
+            margin = min(smallest[index], d - near, far - d, abs(d - depth[pixel]))
+            doubtful[pixel] |= margin < 1e-9
+            if d < depth[pixel]:
+                owner[pixel], depth[pixel], weights[pixel] = index, d, barycentric[index]
     return owner, weights, depth, doubtful
 
 

@@ -82,11 +82,11 @@ def test_lines_along_a_cylinder(rounds):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("degree", [2, 4])
-def test_rings_on_a_torus(degree):
-    surface = torus()
-    lines = lines_of(surface, generate(surface, "curvature", degree), 0.06)
-    assert share_within(lines, 0.06, TOLERANCE, AWAY) >= SHARE
+@pytest.mark.parametrize(("degree", "size"), [(2, 1.0), (4, 1.0), (4, 1e-6), (4, 1e6)])
+def test_rings_on_a_torus_of_any_size(degree, size):
+    surface = rebuilt(torus(), torus().vertices * size)
+    lines = lines_of(surface, generate(surface, "curvature", degree), 0.06 * size)
+    assert share_within(lines, 0.06 * size, TOLERANCE, AWAY) >= SHARE
 
 
 @pytest.mark.slow
@@ -146,15 +146,6 @@ def test_lines_continue_over_a_coarse_cube():
     lines = lines_of(surface, generate(surface, "form", 4), 0.04)
     assert len(lines.tree.leaf_root) > 1000 and share_within(lines, 0.04, 0.02, AWAY) >= SHARE
     assert not lines.pattern.index.any()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("factor", [1e-6, 1e6])
-def test_the_size_of_a_mesh_does_not_matter(factor):
-    surface = torus()
-    scaled = rebuilt(surface, surface.vertices * factor)
-    lines = lines_of(scaled, generate(scaled, "curvature", 4), 0.06 * factor)
-    assert share_within(lines, 0.06 * factor, TOLERANCE, AWAY) >= SHARE
 
 
 @pytest.mark.slow

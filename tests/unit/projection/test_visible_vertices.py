@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from rays import ray_intersections
 from shapes import cube, icosphere, joined, placed, plane, rebuilt, torus
 
 from rosy_addon.field.surface import build_surface
@@ -30,23 +31,16 @@ def moved(surface, offset=(0, 0, 0), scale=1.0) -> MeshInstance:
 
 
 def rays_reach_the_eye(instances, camera, planes=None):
-    """(V,) bool: no triangle of another vertex is between a vertex and the near plane (Möller-Trumbore)."""
+    """(V,) bool: no triangle of another vertex is between a vertex and the near plane."""
     whole = joined(*(rebuilt(each.surface, each.world_points()) for each in instances))
     world, triangles = whole.vertices, whole.triangle_vertex
-    a, b, c = np.moveaxis(world[triangles], 1, 0)
     free = np.ones(len(world), dtype=bool)
     for vertex, point in enumerate(world):
         toward = camera.eye - point if camera.is_perspective else camera.view[2, :3]
-        p = np.cross(toward, c - a)
-        det = ((b - a) * p).sum(axis=1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            u = ((point - a) * p).sum(axis=1) / det
-            q = np.cross(point - a, b - a)
-            v = (q @ toward) / det
-            t = ((c - a) * q).sum(axis=1) / det
-        hit = point + t[:, None] * toward
+        barycentric, distance = ray_intersections(point, toward, world[triangles])
+        hit = point + distance[:, None] * toward
         depth = -(hit @ camera.view[2, :3] + camera.view[2, 3])
-        hits = (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 1e-6) & (depth >= 0.05)
+        hits = (barycentric >= 0).all(axis=1) & (distance > 1e-6) & (depth >= 0.05)
         hits &= ~(triangles == vertex).any(axis=1)
         if planes is not None:
             hits &= (hit @ planes[:, :3].T + planes[:, 3] >= 0).all(axis=1)

@@ -30,7 +30,7 @@ def texture_colors(instance, uv, look, size, points, **options):
 
 #: A torus, and two UV maps of it: a single chart, and square ones, turned and mirrored at random.
 TORUS = torus(48, 24)
-SINGLE, PATCHES = torus_uv(48, 24), patches_uv(1, 48, 24, 6)
+MAPS = SINGLE, PATCHES = torus_uv(48, 24), patches_uv(1, 48, 24, 6)
 POINTS = surface_points(TORUS, 20_000)
 
 
@@ -39,9 +39,8 @@ POINTS = surface_points(TORUS, 20_000)
 def test_texture_does_not_depend_on_the_charts(degree):
     """64 square charts, turned and mirrored at random, show the picture of a single one."""
     instance = instance_of(TORUS, degree)
-    maps = SINGLE, PATCHES
-    assert all(draw_texture(instance, uv, WIDE, 64).overlap < 0.1 for uv in maps)
-    colors = [texture_colors(instance, uv, WIDER, 512, POINTS) for uv in maps]
+    assert all(draw_texture(instance, uv, WIDE, 64).overlap < 0.1 for uv in MAPS)
+    colors = [texture_colors(instance, uv, WIDER, 512, POINTS) for uv in MAPS]
     assert correlation(*colors) > 0.95
 
 
@@ -54,8 +53,7 @@ def test_colors_of_all_kinds_do_not_depend_on_the_charts():
     by_length = {"hue": "magnitude", "magnitude_length": True}
     for changes in ({"hue": "noise"}, by_length, {"method": "ibfv"}):
         look = WIDER.with_settings(changes)
-        maps = SINGLE, PATCHES
-        colors = [texture_colors(instance, uv, look, 512, POINTS) for uv in maps]
+        colors = [texture_colors(instance, uv, look, 512, POINTS) for uv in MAPS]
         assert correlation(*colors) > 0.93, changes
 
 
@@ -73,7 +71,7 @@ def test_hatching_does_not_depend_on_the_charts(settings, lights):
     instance = instance_of(TORUS, 4)
     look = WIDER.with_settings({"ink": "hatch", **settings})
     colors = []
-    for uv in (SINGLE, PATCHES):
+    for uv in MAPS:
         texture = draw_texture(instance, uv, look, 384, lights=lights)
         assert texture.is_data == (lights is None)
         colors.append(colors_at(texture.rgba, TORUS, uv, POINTS))

@@ -5,19 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from shapes import cube, cylinder, icosphere, placed, torus
+from shapes import cube, cylinder, icosphere, instance_of, placed, torus
 
-from rosy_addon.field.generate import generate
 from rosy_addon.line_drawing.tangent_mesh import TangentMesh, build_tangent_mesh, nearest_member
-from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.surface_texture.line_order import first_line_weights, line_order
 
 
 def mesh_of(surface, kind: str, degree: int, matrix=None) -> TangentMesh:
     """The tangent mesh of a surface with a field."""
-    field = generate(surface, kind, degree)
-    matrix = np.eye(4) if matrix is None else matrix
-    return build_tangent_mesh(MeshInstance(surface, matrix, field))
+    return build_tangent_mesh(instance_of(surface, degree, kind, matrix))
 
 
 def first_lines(mesh: TangentMesh, angle: float = 0.0, blend: float = 0.02):

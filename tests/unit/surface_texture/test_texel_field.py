@@ -22,20 +22,25 @@ from rosy_addon.surface_texture.texels import TexelSurface, rasterize_charts, te
 STEPS = 40
 
 
+def torus_texels(degree, size):
+    """A torus with a field, and the texels of 32 charts in a texture of some size."""
+    instance = instance_of(torus(), degree)
+    mesh = build_tangent_mesh(instance)
+    charts = uv_charts(instance.surface, mesh, patches_uv(3))
+    assert charts.chart.max() + 1 == 32
+    texels = rasterize_charts(charts, texture_frame(charts, size, "torus"), "torus")
+    return TexelSurface(instance, mesh, charts, texels, step_length(mesh, charts, texels))
+
+
 @pytest.mark.parametrize("degree", [2, 3])
 def test_streamlines_cross_seams_as_on_the_mesh(degree):
     """After 40 steps, streamlines are where particles on the mesh are, to less than a texel.
 
     Particles know neither texels nor charts. Streamlines begin within half a texel of its center.
     """
-    surface = torus()
-    instance = instance_of(surface, degree)
-    mesh = build_tangent_mesh(instance)
-    charts = uv_charts(surface, mesh, patches_uv(3))
-    assert charts.chart.max() + 1 == 32
-    texels = rasterize_charts(charts, texture_frame(charts, 1024, "torus"), "torus")
-    step = step_length(mesh, charts, texels)
-    field = texel_field(TexelSurface(instance, mesh, charts, texels, step), np.pi)
+    surface = torus_texels(degree, 1024)
+    _, mesh, charts, texels, step, _ = surface
+    field = texel_field(surface, np.pi)
     look = surface_pixel_look(Look(), step, step)
     covering = build_covering(field, look, np.full((len(texels), 1), 0.1, dtype=np.float32))
     start = np.unique(field.seam_steps.source)
@@ -67,12 +72,9 @@ def test_streamlines_cross_seams_as_on_the_mesh(degree):
 
 def test_steps_across_seams_are_isometries():
     """They lead as far on the surface as in the chart, and back to where they began."""
-    surface = torus()
-    instance = instance_of(surface, 4)
-    mesh = build_tangent_mesh(instance)
-    charts = uv_charts(surface, mesh, patches_uv(3))
-    texels = rasterize_charts(charts, texture_frame(charts, 512, "torus"), "torus")
-    steps = texel_field(TexelSurface(instance, mesh, charts, texels, 0.01), np.pi).seam_steps
+    surface = torus_texels(4, 512)
+    charts, texels = surface.charts, surface.texels
+    steps = texel_field(surface, np.pi).seam_steps
     source, target = texels.triangle[steps.source], texels.triangle[steps.target]
     displacement = np.exp(1j * np.arange(len(source)))
     before = charts.to_surface(source, displacement / 512)

@@ -1,0 +1,31 @@
+"""Intersections of rays with triangles, one ray at a time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def ray_intersections(
+    origin: np.ndarray, direction: np.ndarray, triangles: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where a line meets the planes of triangles (Möller and Trumbore).
+
+    Parameters
+    ----------
+    origin, direction : (3,) ndarray
+    triangles : (T, 3, 3) ndarray
+        Their corners.
+
+    Returns
+    -------
+    barycentric : (T, 3) ndarray
+        All are at least 0 on the triangle. Not finite if the line is parallel to the plane.
+    distance : (T,) ndarray
+        In lengths of the direction, negative behind the origin.
+    """
+    a, u, v = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    p, q = np.cross(direction, v), np.cross(origin - a, u)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse = 1 / (u * p).sum(axis=1)
+        s, t = ((origin - a) * p).sum(axis=1) * inverse, q @ direction * inverse
+        return np.stack([1 - s - t, s, t], axis=1), (v * q).sum(axis=1) * inverse

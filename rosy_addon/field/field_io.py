@@ -6,6 +6,7 @@ import os
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,7 +18,7 @@ from ..core.progress import progress, report
 from .analysis import angle_errors
 from .blocks import row_blocks
 from .closest_point import closest_triangles
-from .directional_field import ANGLE_TOLERANCE_DEG, field_directions, tensor_field, with_opposites
+from .directional_field import ANGLE_TOLERANCE_DEG, tensor_field, with_opposites
 from .formats.crosses import read_crossfield, read_vcg_frames
 from .formats.dmat import read_dmat
 from .formats.fieldgen import fieldgen_text, read_fieldgen, vertex_members
@@ -31,7 +32,6 @@ from .frames import dot, normalize, transport
 from .mesh_io import READERS as MESH_READERS
 from .mesh_io import SHARP_ANGLE
 from .rosy_field import RosyField
-from .singularities import find_singularities
 from .surface import Surface, build_surface
 from .validate import (
     STRICT,
@@ -64,14 +64,20 @@ _READERS: dict[str, Callable[[Path], RawField]] = {
     ".om": read_om,
 }
 READ_SUFFIXES = tuple(_READERS)
-WRITE_SUFFIXES = (
-    *(".rosy", ".rawfield", ".obj", ".txt", ".npy", ".npz", ".vtp", ".vtu", ".ply"),
-    *SINGULARITY_SUFFIXES,
-)
 
-#: The functions that return the contents of files with the mesh, and of files with only rows of all directions.
-_MESH_WRITERS = {".npz": npz_bytes, ".ply": ply_bytes, ".obj": fieldgen_text}
-_ROW_WRITERS = {".npy": npy_bytes, ".rawfield": rawfield_text, ".txt": rows_text}
+#: The function that returns the contents of files with each file name extension.
+_WRITERS: dict[str, Callable[[Surface, RosyField], str | bytes]] = {
+    ".rosy": rosy_text,
+    ".rawfield": rawfield_text,
+    ".obj": fieldgen_text,
+    ".txt": rows_text,
+    ".npy": npy_bytes,
+    ".npz": npz_bytes,
+    **{suffix: partial(vtk_bytes, suffix=suffix) for suffix in (".vtp", ".vtu")},
+    ".ply": ply_bytes,
+    **dict.fromkeys(SINGULARITY_SUFFIXES, sings_text),
+}
+WRITE_SUFFIXES = tuple(_WRITERS)
 
 #: Degree of fields from files that do not state a degree, if the caller gives none.
 DEFAULT_DEGREE = 4
@@ -355,7 +361,7 @@ def field_file(path: str | os.PathLike[str], field: RosyField, surface: Surface)
         If the extension is not in `WRITE_SUFFIXES`, or the format cannot store such a field.
     """
     suffix = Path(path).suffix.lower()
-    if suffix not in WRITE_SUFFIXES:
+    if suffix not in _WRITERS:
         suffixes = _join_names(WRITE_SUFFIXES)
         raise RosyError(f"{path}: cannot be written as a field: its name must end in {suffixes}")
     if suffix in (".rosy", ".obj") and field.direction_ratios is not None:
@@ -364,18 +370,7 @@ def field_file(path: str | os.PathLike[str], field: RosyField, surface: Surface)
             "do not form a RoSy: write a .rawfield, .txt or .npy file"
         )
     report(0.0, "writing the file")
-    if suffix in _MESH_WRITERS:
-        contents = _MESH_WRITERS[suffix](surface, field)
-    elif suffix in (".vtp", ".vtu"):
-        contents = vtk_bytes(surface, field, suffix)
-    elif suffix == ".rosy":
-        contents = rosy_text(field)
-    elif suffix in SINGULARITY_SUFFIXES:
-        contents = sings_text(field.degree, *find_singularities(surface, field))
-    else:
-        rows = field.source_directions
-        rows = field_directions(surface, field) if rows is None else rows
-        contents = _ROW_WRITERS[suffix](rows)
+    contents = _WRITERS[suffix](surface, field)
     return contents if isinstance(contents, bytes) else contents.encode("ascii")
 
 

@@ -21,7 +21,9 @@ from ...core.errors import RosyError, counted
 from ...core.file_io import read_bytes
 from ...core.memory import check_memory
 from ..blocks import as_float64
-from ..rosy_field import MAX_DEGREE, check_degree
+from ..directional_field import stored_directions
+from ..rosy_field import MAX_DEGREE, RosyField, check_degree
+from ..surface import Surface
 from .polygons import Polygons, RawField
 from .text_rows import is_number, read_rows
 
@@ -227,10 +229,10 @@ def read_guide_strokes(path: Path) -> list[np.ndarray]:
     return strokes
 
 
-def npy_bytes(directions: np.ndarray) -> bytes:
-    """Return the contents of an `.npy` file that stores (F, N, 3) directions as an array (F, 3 N)."""
+def npy_bytes(surface: Surface, field: RosyField) -> bytes:
+    """Return the contents of an `.npy` file that stores all directions of a field as an array (F, 3 N)."""
     file = io.BytesIO()
-    np.save(file, directions.reshape(len(directions), -1))
+    np.save(file, stored_directions(surface, field).reshape(surface.face_count, -1))
     return file.getvalue()
 
 

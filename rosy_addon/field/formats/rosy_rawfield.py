@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from ...core.errors import RosyError, counted
+from ..directional_field import stored_directions
 from ..rosy_field import RosyField, check_degree
+from ..surface import Surface
 from .polygons import RawField
 from .text_rows import TextRows, abbreviate, format_lines, read_rows
 
@@ -48,20 +50,19 @@ def read_rawfield(path: Path) -> RawField:
     return RawField(_vector_table(rows, 3 * degree, count).reshape(-1, degree, 3), degree, count)
 
 
-def rosy_text(field: RosyField) -> str:
+def rosy_text(_: Surface, field: RosyField) -> str:
     """Return the text of a `.rosy` file with the member vectors of a field."""
     return f"{len(field.vectors)}\n{field.degree}\n{format_lines(field.vectors)}"
 
 
-def rawfield_text(directions: np.ndarray) -> str:
-    """Return the text of a `.rawfield` file with (F, N, 3) directions."""
-    count, degree = directions.shape[:2]
-    return f"{degree} {count}\n{rows_text(directions)}"
+def rawfield_text(surface: Surface, field: RosyField) -> str:
+    """Return the text of a `.rawfield` file with all directions of a field."""
+    return f"{field.degree} {surface.face_count}\n{rows_text(surface, field)}"
 
 
-def rows_text(directions: np.ndarray) -> str:
-    """Return (F, N, 3) directions as text, with a row for each face."""
-    return format_lines(directions.reshape(len(directions), -1))
+def rows_text(surface: Surface, field: RosyField) -> str:
+    """Return all directions of a field as text, with a row of 3 N numbers for each face."""
+    return format_lines(stored_directions(surface, field).reshape(surface.face_count, -1))
 
 
 def _read_header(rows: TextRows, *names: str) -> list[int]:

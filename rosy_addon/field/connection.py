@@ -88,7 +88,7 @@ class Connection:
         """(n,) int32: the index of the connected component of each node."""
         return connected_components(self.node_count, np.stack([self.tail, self.head], axis=1))
 
-    @property
+    @cached_property
     def positive_mass(self) -> np.ndarray:
         """(n,) float64: `mass`, but a small positive value at nodes where the mass is 0."""
         return np.maximum(self.mass, 1e-12 * max(float(self.mass.mean()), 1e-300))

@@ -201,7 +201,7 @@ def feature_curvature(surface: Surface) -> np.ndarray:
         for values in (measured.deviator, measured.deviator_noise)
     )
     curvature = mean + deviator
-    power = averages.mass * (mean_noise + deviator_noise) ** 2
+    power = averages.connection.positive_mass * (mean_noise + deviator_noise) ** 2
     power = averages.smooth(scalar, 16 * area, power)
     signal = curvature**2 - MIN_NOISE_RATIO**2 * np.maximum(power, 0.0)
     curvature = np.sqrt(np.maximum(signal, 0.0)) / extent

@@ -115,7 +115,7 @@ def outline_strokes(instance: MeshInstance, camera: Camera) -> Strokes:
         edges = build_edges(vertex, np.arange(0, len(vertex) + 1, 3, dtype=np.int32))
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     with progress(0.3, 0.7, "finding outlines"):
-        is_crease = _are_pairs(vertex, a, find_creases(surface, CREASE_ANGLE).ends)
+        is_crease = _are_pairs(vertex, a, find_creases(surface, CREASE_ANGLE))
     is_border = ~mask(len(edges.face_count), edges.interior)
     borders = np.flatnonzero(is_border[edges.corner_edge])
     starts = a[is_crease]

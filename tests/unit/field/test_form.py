@@ -205,5 +205,5 @@ def test_averages_with_an_indefinite_matrix():
     matrix = laplacian(connection, 0)
     matrix = replace(matrix, data=np.where(matrix.data.real > 0, 4.0, -1.0).astype(np.float32))
     sums = np.ones(connection.node_count)
-    area = float(averages.mass.mean())
+    area = float(averages.connection.positive_mass.mean())
     assert not averages.smooth(matrix, area, sums).any()

@@ -30,7 +30,7 @@ from .formats.rosy_rawfield import rawfield_text, read_rawfield, read_rosy, rosy
 from .formats.sings import SINGULARITY_SUFFIXES, sings_text
 from .frames import dot, normalize, transport
 from .mesh_io import READERS as MESH_READERS
-from .mesh_io import SHARP_ANGLE
+from .mesh_io import SHARP_ANGLE, must_end_in
 from .rosy_field import RosyField
 from .surface import Surface, build_surface
 from .validate import (
@@ -196,8 +196,7 @@ def _read_rows(path: Path) -> RawField:
     if suffix in SINGULARITY_SUFFIXES:
         raise RosyError(f"{path}: contains singularities, not directions: choose a field file")
     if suffix not in _READERS:
-        suffixes = _join_names(READ_SUFFIXES)
-        raise RosyError(f"{path}: is not a field file: its name must end in {suffixes}")
+        raise RosyError(f"{path}: is not a field file: {must_end_in(READ_SUFFIXES)}")
     check_parsing_memory(path, NPY_MEMORY)
     return _READERS[suffix](path)
 
@@ -215,13 +214,7 @@ def _joined_rows(raws: list[RawField], paths: list[Path]) -> np.ndarray:
 
 
 def _with_degree(raw: RawField, path: Path, degree: int | None) -> tuple[RawField, str]:
-    """Return the rows of a file with the opposites of directions that are not stored, and a note on that.
-
-    Raises
-    ------
-    RosyError
-        If the rows are of another degree than the requested one.
-    """
+    """Return the rows of a file with the opposites of directions that are not stored, and a note on that."""
     note, count = "", raw.values.shape[1]
     if raw.degree is None and count > 1:
         values = with_opposites(raw.values, degree)
@@ -230,10 +223,6 @@ def _with_degree(raw: RawField, path: Path, degree: int | None) -> tuple[RawFiel
         raw = replace(raw, values=values, degree=len(values[0]))
     elif raw.degree is None and degree is None:
         note = f"{path.name}: no degree is stated; it is read as a field of degree {DEFAULT_DEGREE}"
-    if degree is not None and raw.degree not in (None, degree):
-        raise RosyError(
-            f"{path}: the field has degree {raw.degree}, but degree {degree} was requested"
-        )
     return raw, note
 
 
@@ -247,8 +236,8 @@ def field_from_raw(
     raw : RawField
     surface : Surface
     degree : int or None
-        Degree N for rows with one member vector, if the file does not state a degree; `DEFAULT_DEGREE` if
-        None.
+        The required degree N. For rows with one member vector, if the file does not state a degree, None is
+        `DEFAULT_DEGREE`.
     source : str
         Name of the file, for messages.
     policy : VectorPolicy
@@ -257,8 +246,11 @@ def field_from_raw(
     Raises
     ------
     RosyError
-        If the rows belong to another mesh, or a vector is not finite or not tangent to the surface.
+        If the field has another degree, the rows belong to another mesh, or a vector is not finite or not tangent to the surface.
     """
+    if degree is not None and raw.degree not in (None, degree):
+        text = f"the field has degree {raw.degree}, but degree {degree} was requested"
+        raise RosyError(f"{source}: {text}")
     _check_header(raw, surface, source)
     values = raw.values
     if raw.tensors:
@@ -362,8 +354,7 @@ def field_file(path: str | os.PathLike[str], field: RosyField, surface: Surface)
     """
     suffix = Path(path).suffix.lower()
     if suffix not in _WRITERS:
-        suffixes = _join_names(WRITE_SUFFIXES)
-        raise RosyError(f"{path}: cannot be written as a field: its name must end in {suffixes}")
+        raise RosyError(f"{path}: cannot be written as a field: {must_end_in(WRITE_SUFFIXES)}")
     if suffix in (".rosy", ".obj") and field.direction_ratios is not None:
         raise RosyError(
             f"{path}: a {suffix} file stores one member per row, but the directions of this field "
@@ -372,11 +363,6 @@ def field_file(path: str | os.PathLike[str], field: RosyField, surface: Surface)
     report(0.0, "writing the file")
     contents = _WRITERS[suffix](surface, field)
     return contents if isinstance(contents, bytes) else contents.encode("ascii")
-
-
-def _join_names(names: tuple[str, ...]) -> str:
-    """Return names joined as in "a, b or c"."""
-    return f"{', '.join(names[:-1])} or {names[-1]}"
 
 
 def transfer_field(source: Surface, field: RosyField, target: Surface, name: str) -> RosyField:

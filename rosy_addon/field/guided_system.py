@@ -197,13 +197,10 @@ class GuidedSystem:
 
         z holds (n,) representations at the nodes. The sums are in the frames of the faces.
         """
-        corner = self._corners_of_faces(face)
-        value = (
-            z[self.averages.connection.corner_node[corner]]
-            * self.averages.connection.corner_area[corner]
-        )
-        value *= np.exp(1j * self.degree * self.averages.frame_angle[corner])
-        corner_face = self.averages.corner_face[corner]
+        corner, averages = self._corners_of_faces(face), self.averages
+        connection, corner_face = averages.connection, averages.corner_face[corner]
+        value = z[connection.corner_node[corner]] * connection.corner_area[corner]
+        value *= np.exp(1j * self.degree * averages.frame_angle[corner])
         return complex_bincount(corner_face, value, self.surface.face_count)[face]
 
     def neighbor_means(self, values: np.ndarray, face: np.ndarray) -> np.ndarray:

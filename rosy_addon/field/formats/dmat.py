@@ -9,7 +9,7 @@ import numpy as np
 from ...core.errors import RosyError
 from ...core.file_io import read_bytes
 from ..blocks import as_float64
-from .plain import raw_field, without_numbers
+from .plain import raw_field
 from .polygons import RawField
 from .text_rows import read_rows
 
@@ -38,7 +38,7 @@ def read_dmat(path: Path) -> RawField:
     if not count:
         raise RosyError(f"{path}: contains no numbers")
     matrix = as_float64(values.reshape(columns, count).T)
-    return raw_field(without_numbers(matrix, str(path), flags=True))
+    return raw_field(matrix, str(path), flags=True)
 
 
 def _size(path: Path, header: bytes) -> tuple[int, int]:

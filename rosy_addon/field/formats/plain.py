@@ -70,33 +70,7 @@ def read_text(path: Path) -> RawField:
     values = rows.floats("part of a vector").reshape(-1, columns)
     if columns == 15 and not (values[:, 3:9] + values[:, 9:]).any():
         values = values[:, 3:]
-    return replace(raw_field(without_numbers(values, str(path))), header_count=header_count)
-
-
-def without_numbers(values: np.ndarray, source: str, flags: bool = False) -> np.ndarray:
-    """Return rows of 3 N numbers, without a first column that numbers the rows from 0 or 1.
-
-    Parameters
-    ----------
-    values : (n, k) float64 ndarray
-        At least one row.
-    source : str
-        Name of the file, for messages.
-    flags : bool
-        Whether a first column of the numbers 0 and 1 is left out as well.
-
-    Raises
-    ------
-    RosyError
-        If the other columns are not 3 N numbers for a degree N from 1 to `MAX_DEGREE`.
-    """
-    if values.shape[1] % 3 == 1:
-        first = values[:, 0]
-        is_number = first[0] in (0, 1) and (first - first[0] == np.arange(len(first))).all()
-        if is_number or (flags and np.isin(first, (0, 1)).all()):
-            values = values[:, 1:]
-    _check_columns(source, values.shape[1])
-    return values
+    return replace(raw_field(values, str(path)), header_count=header_count)
 
 
 def _check_npy_size(data: bytes) -> None:
@@ -138,9 +112,7 @@ def _array_field(values: Any, source: str) -> RawField:
         raise RosyError(
             f"{source}: expected an array of shape (n, 3 N) or (n, N, 3), found {values.shape}"
         )
-    values = as_float64(values.reshape(len(values), -1))
-    _check_columns(source, values.shape[1])
-    return raw_field(values)
+    return raw_field(as_float64(values.reshape(len(values), -1)), source)
 
 
 def read_npz(path: Path) -> RawField:
@@ -244,11 +216,32 @@ def _check_columns(source: str, columns: int) -> None:
         )
 
 
-def raw_field(values: np.ndarray) -> RawField:
-    """Return (n, k) values as a `RawField` of member vectors, directions or tensors.
+def raw_field(values: np.ndarray, source: str, flags: bool = False) -> RawField:
+    """Return the rows of a file as member vectors, directions or tensors.
 
-    Rows of 9 values are tensors if all of them are symmetric 3 x 3 matrices, and 3 directions otherwise.
+    Rows of 9 values are tensors if all of them are symmetric 3 x 3 matrices, and 3 directions otherwise. A first
+    column that numbers the rows from 0 or 1 is left out.
+
+    Parameters
+    ----------
+    values : (n, k) float64 ndarray
+        At least one row.
+    source : str
+        Name of the file, for messages.
+    flags : bool
+        Whether a first column of the numbers 0 and 1 is left out as well.
+
+    Raises
+    ------
+    RosyError
+        If the other columns are not 2 numbers, or 3 N for a degree N from 1 to `MAX_DEGREE`.
     """
+    if values.shape[1] % 3 == 1:
+        first = values[:, 0]
+        is_number = first[0] in (0, 1) and (first - first[0] == np.arange(len(first))).all()
+        if is_number or (flags and np.isin(first, (0, 1)).all()):
+            values = values[:, 1:]
+    _check_columns(source, values.shape[1])
     matrices = values.reshape(len(values), -1, 2 if values.shape[1] == 2 else 3)
     if values.shape[1] == 9 and _are_symmetric(matrices):
         return RawField(matrices, 4, tensors=True)

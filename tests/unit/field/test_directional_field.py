@@ -91,13 +91,6 @@ def test_the_representation_is_the_product_of_the_directions():
         assert np.allclose(np.exp(1j * degree * first), (-1) ** (degree - 1) * w.prod(axis=1))
 
 
-def test_a_rosy_has_no_direction_ratios():
-    surface = icosphere(2)
-    angles = 0.3 + 2 * np.pi * np.arange(6) / 6
-    field = field_from_directions(surface, directions_at_angles(surface, angles, np.full(6, 2.0)))
-    assert field.direction_ratios is None and np.allclose(field.magnitude, 2)
-
-
 def test_opposite_directions_are_detected():
     surface = plane()
     pairs = np.array([0.0, 0.6, np.pi, np.pi + 0.6])

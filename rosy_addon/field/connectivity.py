@@ -170,6 +170,32 @@ def _lower(values: np.ndarray, index: np.ndarray, limits: np.ndarray) -> None:
     np.minimum.at(values, index, limits)
 
 
+def sums_from_roots(parent: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sum values along the path from the root of each node of a forest.
+
+    Parameters
+    ----------
+    parent : (n,) int ndarray
+        The parent of each node, for example the corner before a corner (see `connection.umbrella_order`). A root is its
+        own parent.
+    value : (n,) ndarray
+        Amount that each node adds to the sum of its parent. The values of roots are ignored.
+
+    Returns
+    -------
+    root : (n,) int ndarray
+        The root of the tree that contains each node.
+    total : (n,) ndarray
+        The sum at each node; 0 at roots.
+    """
+    total = np.where(parent == np.arange(len(parent)), 0, value)
+    while True:
+        following = parent[parent]
+        if np.array_equal(following, parent):
+            return parent, total
+        total, parent = total + total[parent], following
+
+
 def sorted_with_order(key: np.ndarray, limit: int) -> tuple[np.ndarray, np.ndarray]:
     """Return sorted keys, and the indices that sort them: a stable `argsort`.
 

@@ -208,7 +208,7 @@ def test_what_a_figure_refuses(fields, error_of):
         ({"lines": "none"}, "choose other, first, both"),
         ({"dpi": 3}, "from 10 to 2400"),
         ({"width": float("nan")}, "from 0.5 to 100"),
-        ({"gian": 3}, "no setting 'gian'"),
+        ({"gian": 3}, "unknown setting 'gian'"),
     ):
         assert message in error_of(rf.figure, fields, **arguments)
     mixed = [fields["Ours"], rf.form(other)]

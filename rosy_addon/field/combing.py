@@ -16,7 +16,6 @@ import numpy as np
 
 from ..core.errors import RosyError
 from ..core.progress import progress
-from .conjugate_gradient import RELATIVE_TOLERANCE
 from .frames import dot, normalize
 from .guided_system import GuidedSystem, NodeGuides, firmness_weights, unit_representations
 from .representation import to_representation, unit_complex
@@ -106,7 +105,7 @@ class Combing:
         changed = np.unique(self.system.surface.triangle_face[corner // 3])
         self._set_face_z(self.system.face_representations_at(z, changed), changed)
 
-    def settle(self, tolerance: float = RELATIVE_TOLERANCE) -> tuple[np.ndarray, np.ndarray]:
+    def settle(self) -> tuple[np.ndarray, np.ndarray]:
         """Solve the linear system for the whole surface, and return `representations`.
 
         If there are no guides, the field does not change.
@@ -115,7 +114,7 @@ class Combing:
             return self.representations
         self._node_guides = self._guides_at_nodes()
         with progress(0.1, 0.95):
-            z = self.system.solve(self._node_guides, self.representations[0], tolerance)
+            z = self.system.solve(self._node_guides, self.representations[0])
         self.representations = z, self.representations[1]
         face_z = self.system.averages.face_sums(z, self.system.degree)
         self._set_face_z(face_z, np.arange(len(self.guides)))

@@ -73,16 +73,6 @@ def read_text(path: Path) -> RawField:
     return replace(raw_field(values, str(path)), header_count=header_count)
 
 
-def _check_npy_size(data: bytes) -> None:
-    """Raise `ValueError` if the header of an `.npy` file declares more data than the file contains."""
-    file = io.BytesIO(data)
-    version = np.lib.format.read_magic(file)
-    if version in _NPY_HEADERS:
-        shape, _, dtype = _NPY_HEADERS[version](file)
-        if math.prod(shape) * dtype.itemsize > len(data):
-            raise ValueError(f"it declares the shape {shape}, which is more than it contains")
-
-
 def read_npy(path: Path) -> RawField:
     """Read an `.npy` array of shape (n, 2), (n, 3), (n, 3 N), (n, N, 3) or, for tensors, (n, 3, 3).
 
@@ -97,7 +87,13 @@ def read_npy(path: Path) -> RawField:
 def _load_npy(data: bytes, source: str) -> Any:
     """Return the array of an `.npy` file, given its contents; `source` is its name in messages."""
     try:
-        _check_npy_size(data)
+        file = io.BytesIO(data)
+        version = np.lib.format.read_magic(file)
+        if version in _NPY_HEADERS:
+            # numpy allocates what the header declares, even if the file contains less.
+            shape, _, dtype = _NPY_HEADERS[version](file)
+            if math.prod(shape) * dtype.itemsize > len(data):
+                raise ValueError(f"it declares the shape {shape}, which is more than it contains")
         return np.load(io.BytesIO(data), allow_pickle=False)
     except Exception as reason:  # numpy evaluates the header as Python, which can raise any error
         line = (str(reason).splitlines() or [type(reason).__name__])[0]

@@ -64,6 +64,14 @@ class _Section:
             raise ValueError("it ends too early")
         return values
 
+    def tagged_rows(self, count: int, columns: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the tags of the next rows, and their (count, columns) numbers."""
+        if self._words is not None:
+            rows = self.take("<f8", count * (1 + columns)).reshape(count, 1 + columns)
+            return rows[:, 0].astype(np.int64), rows[:, 1:]
+        table = np.frombuffer(self._data, [("tag", "<i4"), ("row", "<f8", (columns,))], count)
+        return table["tag"].astype(np.int64), table["row"]
+
 
 def is_gmsh(path: Path) -> bool:
     """Return whether a file begins as a `.msh` file of one of the `VERSIONS`."""
@@ -139,11 +147,7 @@ def _nodes(data: bytes, is_text: bool) -> tuple[np.ndarray, np.ndarray]:
 def _nodes_2(data: bytes, is_text: bool) -> tuple[np.ndarray, np.ndarray]:
     """Return the tags and the (n, 3) positions of the nodes, from the format 2.2."""
     count, data = _counted(data)
-    if is_text:
-        table = _Section(data, is_text).take("<f8", 4 * count).reshape(count, 4)
-        return table[:, 0].astype(np.int64), table[:, 1:]
-    rows = np.frombuffer(data, [("tag", "<i4"), ("point", "<f8", (3,))], count)
-    return rows["tag"].astype(np.int64), rows["point"]
+    return _Section(data, is_text).tagged_rows(count, 3)
 
 
 def _rows(data: bytes, is_text: bool) -> Iterator[tuple[int, np.ndarray]]:
@@ -237,12 +241,7 @@ def _data(data: bytes, is_text: bool) -> tuple[str, np.ndarray, np.ndarray]:
     components, count = int(header[2][1]), int(header[2][2])
     if components not in (1, 3, 9):
         raise ValueError(f"'{title}' has {components} numbers at each element, expected 1, 3 or 9")
-    if is_text:
-        rows = _Section(data, is_text).take("<f8", count * (1 + components))
-        rows = rows.reshape(count, 1 + components)
-        return title, rows[:, 0].astype(np.int64), rows[:, 1:]
-    table = np.frombuffer(data, [("tag", "<i4"), ("values", "<f8", (components,))], count)
-    return title, table["tag"].astype(np.int64), table["values"]
+    return title, *_Section(data, is_text).tagged_rows(count, components)
 
 
 def _find(tags: np.ndarray, wanted: np.ndarray) -> np.ndarray:

@@ -24,6 +24,7 @@ import numpy as np
 from ..core.errors import RosyError, counted
 from ..core.file_io import check_readable, open_file, read_bytes
 from ..field.mesh_arrays import MeshArrays
+from ..field.mesh_io import must_end_in
 from .gmsh_file import is_gmsh, read_gmsh
 from .vtk_surface import surface_arrays
 
@@ -223,9 +224,7 @@ def _steps_of(path: Path) -> list[Step]:
     """Return the steps of one file."""
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
-        *others, last = SUFFIXES
-        names = f"{', '.join(others)} or {last}"
-        raise RosyError(f"{path}: is not a file of a simulation: its name must end in {names}")
+        raise RosyError(f"{path}: is not a file of a simulation: {must_end_in(SUFFIXES)}")
     check_readable(path)
     if suffix in SERIES_SUFFIXES:
         return _listed_steps(path)

@@ -212,7 +212,9 @@ def error_statistics(surface: Surface, error: np.ndarray) -> Difference:
     defined = np.flatnonzero(np.isfinite(error))
     if not len(defined):
         return Difference(error, 0.0, 0.0, 0.0, 0.0, -1, 0.0)
-    area = np.bincount(surface.triangle_face, _triangle_areas(surface), surface.face_count)
+    corner = surface.vertices[surface.triangle_vertex]
+    cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    area = np.bincount(surface.triangle_face, np.sqrt(dot(cross, cross)) / 2, surface.face_count)
     values, weight = error[defined], area[defined] / max(float(area[defined].sum()), 1e-300)
     order = np.argsort(values, kind="stable")
     rank = np.searchsorted(np.cumsum(weight[order]), PERCENTILE)
@@ -230,13 +232,6 @@ def error_statistics(surface: Surface, error: np.ndarray) -> Difference:
 def format_degrees(degrees: float) -> str:
     """Return an angle as text, rounded to three significant digits and at most three decimal places."""
     return f"{round(degrees, 3):.3g}"
-
-
-def _triangle_areas(surface: Surface) -> np.ndarray:
-    """Return (T,) float64 areas of the triangles, in square Blender units."""
-    corner = surface.vertices[surface.triangle_vertex]
-    cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    return np.sqrt(dot(cross, cross)) / 2
 
 
 def match_on_surface(

@@ -231,10 +231,6 @@ def array_field(
     surface = arrays.surface
     if name is None and (rows := _stored_directions(arrays)) is not None:
         raw = RawField(rows, rows.shape[1], domain="face")
-        if degree not in (None, raw.degree):
-            raise RosyError(
-                f"{arrays.name}: stores a field of degree {raw.degree}, but degree {degree} was requested"
-            )
         return field_from_raw(raw, surface, degree, arrays.name, policy)
     found = find_array(arrays, name)
     array = f"array '{found.name}'"  # without the file, so that warnings are the same for all steps
@@ -247,10 +243,6 @@ def array_field(
         )
     raw = _raw_field(found, source)
     degree = check_degree(raw.degree or VECTOR_DEGREE if degree is None else degree)
-    if raw.degree not in (None, degree):
-        raise RosyError(
-            f"{source} gives a field of degree {raw.degree}, but degree {degree} was requested"
-        )
     if found.columns == 6:
         warnings.warn(
             f"{array}: its components have no names; they are read in VTK's order XX, YY, ZZ, XY, YZ, XZ",

@@ -16,7 +16,6 @@ import numpy as np
 
 from ..core.errors import RosyError
 from ..core.progress import progress
-from .conjugate_gradient import RELATIVE_TOLERANCE
 from .frames import dot, normalize
 from .guided_system import GuidedSystem, NodeGuides, firmness_weights, unit_representations
 from .representation import to_representation, unit_complex
@@ -71,6 +70,9 @@ class Combing:
         `follow` after changing them.
     magnitude : (F,) float64 ndarray
         Magnitude of the field.
+    representations : ((n,) complex128 ndarray, (F,) complex128 ndarray)
+        The current field: representations at the nodes, and on the faces. Those on the faces have modulus 1, or
+        0 where the field is undefined.
     """
 
     def __init__(
@@ -80,30 +82,18 @@ class Combing:
         self.guides = guides
         self.magnitude = magnitude
         self._node_guides: NodeGuides | None = None
-        self._z = start
-        self._face_z = unit_representations(system.averages.face_sums(start, system.degree))
+        face_z = unit_representations(system.averages.face_sums(start, system.degree))
+        self.representations = start, face_z
 
     @property
     def vectors(self) -> np.ndarray:
         """(F, 3) float64: the current field, as one member vector for each face."""
-        return self.system.to_vectors(self.magnitude * self._face_z)
+        return self.system.to_vectors(self.magnitude * self.representations[1])
 
     @property
     def guide_vectors(self) -> np.ndarray:
         """(F, 3) float64: member vectors of the guides, whose lengths are their firmness."""
         return self.system.to_vectors(self.guides)
-
-    @property
-    def representations(self) -> tuple[np.ndarray, np.ndarray]:
-        """The current field: (n,) complex128 representations at the nodes and (F,) complex128 on the faces.
-
-        Those on the faces have modulus 1, or 0 where the field is undefined.
-        """
-        return self._z, self._face_z
-
-    @representations.setter
-    def representations(self, representations: tuple[np.ndarray, np.ndarray]) -> None:
-        self._z, self._face_z = representations
 
     def follow(self, face: np.ndarray) -> None:
         """Update the field near faces whose guides have changed; `face` holds these (m,) faces."""
@@ -111,24 +101,24 @@ class Combing:
             return
         node = self.system.nodes_of_faces(face)
         self._update_node_guides(node)
-        near = self.system.nodes_near(node, NEAR_NODES)
-        self._z[near] = self.system.solve_near(self._node_guides, self._z, near, NEAR_ITERATIONS)
+        near, z = self.system.nodes_near(node, NEAR_NODES), self.representations[0]
+        z[near] = self.system.solve_near(self._node_guides, z, near, NEAR_ITERATIONS)
         corner = self.system.corners_of_nodes(near)
         changed = np.unique(self.system.surface.triangle_face[corner // 3])
-        self._set_face_z(self.system.face_representations_at(self._z, changed), changed)
+        self._set_face_z(self.system.face_representations_at(z, changed), changed)
 
-    def settle(self, tolerance: float = RELATIVE_TOLERANCE) -> tuple[np.ndarray, np.ndarray]:
+    def settle(self) -> tuple[np.ndarray, np.ndarray]:
         """Solve the linear system for the whole surface, and return `representations`.
 
-        The solver stops when the residual norm is `tolerance` times the norm of the right-hand side. If there
-        are no guides, the field does not change.
+        If there are no guides, the field does not change.
         """
         if not self.guides.any():
             return self.representations
         self._node_guides = self._guides_at_nodes()
         with progress(0.1, 0.95):
-            self._z = self.system.solve(self._node_guides, self._z, tolerance)
-        face_z = self.system.averages.face_sums(self._z, self.system.degree)
+            z = self.system.solve(self._node_guides, self.representations[0])
+        self.representations = z, self.representations[1]
+        face_z = self.system.averages.face_sums(z, self.system.degree)
         self._set_face_z(face_z, np.arange(len(self.guides)))
         return self.representations
 
@@ -152,7 +142,9 @@ class Combing:
         """
         guides = self.guides[face]
         _, is_exact = firmness_weights(np.abs(guides), self.system.surface.mean_edge_length)
-        self._face_z[face] = np.where(is_exact, unit_complex(guides), unit_representations(z))
+        self.representations[1][face] = np.where(
+            is_exact, unit_complex(guides), unit_representations(z)
+        )
 
 
 def start_combing(
@@ -190,7 +182,9 @@ def start_combing(
     edges = max(reach / surface.mean_edge_length, MIN_REACH_EDGES)
     weak_guides = unit_z / (1 + edges**2)
     guides = np.where(guides == 0, weak_guides, guides)
-    start = system.averages.node_sums(unit_z, system.degree) / system.averages.mass
+    start = (
+        system.averages.node_sums(unit_z, system.degree) / system.averages.connection.positive_mass
+    )
     return Combing(system, guides, start, np.where(magnitude > 0, magnitude, 1.0))
 
 

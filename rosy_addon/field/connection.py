@@ -22,7 +22,7 @@ import numpy as np
 
 from ..core.progress import report
 from .blocks import row_blocks
-from .connectivity import build_edges, connected_components
+from .connectivity import build_edges, connected_components, sums_from_roots
 from .frames import dot
 from .polygon_arrays import next_corners
 from .sparse_multigrid import CSRMatrix, from_edges
@@ -88,7 +88,7 @@ class Connection:
         """(n,) int32: the index of the connected component of each node."""
         return connected_components(self.node_count, np.stack([self.tail, self.head], axis=1))
 
-    @property
+    @cached_property
     def positive_mass(self) -> np.ndarray:
         """(n,) float64: `mass`, but a small positive value at nodes where the mass is 0."""
         return np.maximum(self.mass, 1e-12 * max(float(self.mass.mean()), 1e-300))
@@ -110,7 +110,7 @@ def build_connection(surface: Surface) -> Connection:
     corner_angle, cotangent, area = _corner_geometry(surface.vertices, surface.triangle_vertex)
     previous, is_closed = umbrella_order(vertex, twin, next_corner)
     is_first = previous == corner
-    first_corner, offset = sums_in_umbrellas(previous, corner_angle[previous])
+    first_corner, offset = sums_from_roots(previous, corner_angle[previous])
     node_of_corner = np.cumsum(is_first) - 1
     corner_node = node_of_corner[first_corner].astype(np.int32)
     node_count = int(node_of_corner[-1]) + 1
@@ -246,29 +246,3 @@ def umbrella_order(
         smallest, pointer = np.minimum(smallest, smallest[pointer]), pointer[pointer]
     is_closed = twin[pointer] >= 0
     return np.where(is_closed & (smallest == corner), corner, previous), is_closed
-
-
-def sums_in_umbrellas(previous: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the cumulative sum of values along each umbrella (the ordered corners around a vertex).
-
-    Parameters
-    ----------
-    previous : (C,) int ndarray
-        Result of `umbrella_order`.
-    value : (C,) ndarray
-        Amount that each corner adds to the sum of the previous corner. The value of the first corner of an
-        umbrella is ignored.
-
-    Returns
-    -------
-    first_corner : (C,) int ndarray
-        The first corner of the umbrella that contains each corner.
-    total : (C,) ndarray
-        The sum at each corner; 0 at the first corner of an umbrella.
-    """
-    total = np.where(previous == np.arange(len(previous)), 0, value)
-    while True:
-        following = previous[previous]
-        if np.array_equal(following, previous):
-            return previous, total
-        total, previous = total + total[previous], following

@@ -103,11 +103,23 @@ def smooth_fans(
         normal = normalize(face_area_vectors(vertices, corner_vertex, face_start))
         smooth &= dot(normal[corner_face[a]], normal[corner_face[b]]) >= np.cos(sharp_angle)
     if sharp_edges is not None and len(sharp_edges):
-        stride = int(corner_vertex.max()) + 1
-        sharp = np.sort(np.asarray(sharp_edges, dtype=np.int64).reshape(-1, 2), axis=1)
-        ends = edges.ends[edges.interior].astype(np.int64)
-        smooth &= ~np.isin(ends[:, 0] * stride + ends[:, 1], sharp[:, 0] * stride + sharp[:, 1])
+        smooth &= ~are_pairs(edges.ends[edges.interior], sharp_edges)
     return connected_corners(a[smooth], b[smooth], next_corner)
+
+
+def are_pairs(ends: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Return (n,) bool: which of n edges connect one of the given pairs of vertices.
+
+    Parameters
+    ----------
+    ends : (n, 2) int ndarray
+        The two vertices of each edge.
+    pairs : (m, 2) int ndarray
+        Pairs of vertices. The order of the two does not matter, neither here nor in `ends`.
+    """
+    ends, pairs = (np.sort(np.asarray(each, np.int64).reshape(-1, 2)) for each in (ends, pairs))
+    strides = [max(ends.max(initial=0), pairs.max(initial=0)) + 1, 1]
+    return np.isin(ends @ strides, pairs @ strides)
 
 
 def connected_corners(a: np.ndarray, b: np.ndarray, next_corner: np.ndarray) -> np.ndarray:
@@ -170,6 +182,32 @@ def _lower(values: np.ndarray, index: np.ndarray, limits: np.ndarray) -> None:
         remaining = limits < values[index]
         index, limits = index[remaining], limits[remaining]
     np.minimum.at(values, index, limits)
+
+
+def sums_from_roots(parent: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sum values along the path from the root of each node of a forest.
+
+    Parameters
+    ----------
+    parent : (n,) int ndarray
+        The parent of each node, for example the corner before a corner (see `connection.umbrella_order`). A root is its
+        own parent.
+    value : (n,) ndarray
+        Amount that each node adds to the sum of its parent. The values of roots are ignored.
+
+    Returns
+    -------
+    root : (n,) int ndarray
+        The root of the tree that contains each node.
+    total : (n,) ndarray
+        The sum at each node; 0 at roots.
+    """
+    total = np.where(parent == np.arange(len(parent)), 0, value)
+    while True:
+        following = parent[parent]
+        if np.array_equal(following, parent):
+            return parent, total
+        total, parent = total + total[parent], following
 
 
 def sorted_with_order(key: np.ndarray, limit: int) -> tuple[np.ndarray, np.ndarray]:

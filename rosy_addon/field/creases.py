@@ -7,8 +7,6 @@ creases do not flicker in animations.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from ..core.progress import report
@@ -179,8 +177,7 @@ def salient_edges(surface: Surface, normals: np.ndarray, noise_angle: float) -> 
     if not len(ends):
         return ends
     line = connected_components(len(surface.vertices), ends)[ends[:, 0]]
-    edge = surface.vertices[ends[:, 0]] - surface.vertices[ends[:, 1]]
-    length = np.bincount(line, np.sqrt(dot(edge, edge)))[line]
+    length = np.bincount(line, _lengths(surface, ends))[line]
     return ends[length >= MIN_LINE_LENGTH * principal_extent(surface)]
 
 
@@ -203,22 +200,7 @@ def _largest_of_others(surface: Surface, angle: np.ndarray) -> np.ndarray:
     return np.where(is_largest[edges.halfedges], second[face], largest[face]).max(axis=1)
 
 
-class Creases(NamedTuple):
-    """The edges of a mesh that are creases.
-
-    Attributes
-    ----------
-    ends : (n, 2) int32 ndarray
-        The two vertices of each edge, the smaller index first.
-    chain : (n,) int32 ndarray
-        The chain of connected edges to which each edge belongs, numbered from 0 without gaps.
-    """
-
-    ends: np.ndarray
-    chain: np.ndarray
-
-
-def find_creases(surface: Surface, crease_angle: float) -> Creases:
+def find_creases(surface: Surface, crease_angle: float) -> np.ndarray:
     """Find the creases of a mesh.
 
     An edge is strong if the angle between the normals of its faces is at least the crease angle, and weak
@@ -236,10 +218,11 @@ def find_creases(surface: Surface, crease_angle: float) -> Creases:
 
     Returns
     -------
-    Creases
-        The creases. Border edges and edges with more than two faces are not creases.
+    (n, 2) int32 ndarray
+        The two vertices of each edge that is a crease, the smaller index first. Border edges and edges with more
+        than two faces are not creases.
     """
-    none = Creases(np.empty((0, 2), np.int32), np.empty(0, np.int32))
+    none = np.empty((0, 2), np.int32)
     report(0.0, "finding creases")
     edges = surface.edges
     sides = surface.corner_face[edges.halfedges].T
@@ -251,8 +234,7 @@ def find_creases(surface: Surface, crease_angle: float) -> Creases:
     region = _faces_near(surface, edges.ends[edges.interior[angle >= crease_angle]])
     normals, noise_angle = filtered_normals(surface, region)
     ends = edges.ends[edges.interior]
-    vector = surface.vertices[ends[:, 0]] - surface.vertices[ends[:, 1]]
-    length = np.sqrt(dot(vector, vector))
+    length = _lengths(surface, ends)
     mean_length = max(float(length.mean()), 1e-300)
     density = min(1.0, NOISY_EDGE_LENGTH * surface.extent / mean_length) ** 2
     noise_angle *= density
@@ -271,8 +253,13 @@ def find_creases(surface: Surface, crease_angle: float) -> Creases:
     total = np.bincount(chain, length)[chain]
     is_kept = np.bincount(chain, length * is_strong)[chain] >= MIN_STRONG_SHARE * total
     is_kept &= total >= MIN_EDGES_PER_NOISE * noise_angle * mean_length
-    _, chain = np.unique(chain[is_kept], return_inverse=True)
-    return Creases(ends[is_kept], chain.ravel().astype(np.int32))
+    return ends[is_kept]
+
+
+def _lengths(surface: Surface, ends: np.ndarray) -> np.ndarray:
+    """Return the (n,) lengths of edges, given by (n, 2) vertices."""
+    edge = surface.vertices[ends[:, 0]] - surface.vertices[ends[:, 1]]
+    return np.sqrt(dot(edge, edge))
 
 
 def _large_angles(normals: np.ndarray, sides: np.ndarray, least: float) -> np.ndarray:

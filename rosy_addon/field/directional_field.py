@@ -204,6 +204,12 @@ def field_directions(surface: Surface, field: RosyField) -> np.ndarray:
     return factor.real * field.vectors[:, None] + factor.imag * perpendicular[:, None]
 
 
+def stored_directions(surface: Surface, field: RosyField) -> np.ndarray:
+    """Return the (F, N, 3) directions to store for a field: those from which it was made, if it has them."""
+    rows = field.source_directions
+    return field_directions(surface, field) if rows is None else rows
+
+
 def field_harmonics(field: RosyField) -> dict[int, np.ndarray]:
     """Compute the harmonics of a field, which describe how its directions deviate from a RoSy.
 

@@ -20,7 +20,7 @@ import numpy as np
 from ..core.progress import report
 from .analysis import edge_lengths
 from .blocks import concatenated_ranges, mask, neighbors_of_nodes
-from .connectivity import connected_components, connected_corners
+from .connectivity import connected_components, connected_corners, sums_from_roots
 from .frames import dot
 from .representation import edge_unfolding
 from .singularities import signed_corner_angles
@@ -185,14 +185,8 @@ class SpanningForest:
 
         Values of edges that the path runs along in the opposite direction are subtracted.
         """
-        total = self.parent_sign * value[self.parent_edge] if len(value) else self.parent_sign * 0
-        pointer = self.parent
-        while True:
-            following = pointer[pointer]
-            if np.array_equal(following, pointer):
-                return total
-            # Roots have the sum 0.
-            total, pointer = total + total[pointer], following
+        step = self.parent_sign * value[self.parent_edge] if len(value) else self.parent_sign
+        return sums_from_roots(self.parent, step)[1]
 
     def path_to_root(self, node: int) -> np.ndarray:
         """Return the nodes on the path from a node to its root, with the node and without the root."""

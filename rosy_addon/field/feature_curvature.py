@@ -195,19 +195,16 @@ def feature_curvature(surface: Surface) -> np.ndarray:
     extent, surface = principal_extent(surface), of_unit_extent(surface)
     measured = noisy_curvature(surface)
     averages = measured.averages
-    scalar, line = averages.laplacian(0), averages.laplacian(2)
-    area = SCALE**2
-    mean, mean_noise = (
-        np.abs(averages.smooth(scalar, area, averages.node_sums(values, 0)))
-        for values in (measured.mean, measured.mean_noise)
-    )
-    deviator, deviator_noise = (
-        np.abs(averages.smooth(line, area, averages.node_sums(values, 2)))
-        for values in (measured.deviator, measured.deviator_noise)
-    )
-    curvature = mean + deviator
-    power = averages.mass * (mean_noise + deviator_noise) ** 2
-    power = averages.smooth(scalar, 16 * area, power)
+    laplacians, area = {degree: averages.laplacian(degree) for degree in (0, 2)}, SCALE**2
+
+    def smooth(values: np.ndarray, degree: int) -> np.ndarray:
+        sums = averages.node_sums(values, degree)
+        return np.abs(averages.smooth(laplacians[degree], area, sums))
+
+    curvature = smooth(measured.mean, 0) + smooth(measured.deviator, 2)
+    noise = smooth(measured.mean_noise, 0) + smooth(measured.deviator_noise, 2)
+    power = averages.connection.positive_mass * noise**2
+    power = averages.smooth(laplacians[0], 16 * area, power)
     signal = curvature**2 - MIN_NOISE_RATIO**2 * np.maximum(power, 0.0)
     curvature = np.sqrt(np.maximum(signal, 0.0)) / extent
     return curvature.astype(np.float32)[averages.connection.corner_node].reshape(-1, 3)

@@ -6,6 +6,7 @@ import os
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,7 +18,7 @@ from ..core.progress import progress, report
 from .analysis import angle_errors
 from .blocks import row_blocks
 from .closest_point import closest_triangles
-from .directional_field import ANGLE_TOLERANCE_DEG, field_directions, tensor_field, with_opposites
+from .directional_field import ANGLE_TOLERANCE_DEG, tensor_field, with_opposites
 from .formats.crosses import read_crossfield, read_vcg_frames
 from .formats.dmat import read_dmat
 from .formats.fieldgen import fieldgen_text, read_fieldgen, vertex_members
@@ -29,9 +30,8 @@ from .formats.rosy_rawfield import rawfield_text, read_rawfield, read_rosy, rosy
 from .formats.sings import SINGULARITY_SUFFIXES, sings_text
 from .frames import dot, normalize, transport
 from .mesh_io import READERS as MESH_READERS
-from .mesh_io import SHARP_ANGLE
+from .mesh_io import SHARP_ANGLE, must_end_in
 from .rosy_field import RosyField
-from .singularities import find_singularities
 from .surface import Surface, build_surface
 from .validate import (
     STRICT,
@@ -64,14 +64,20 @@ _READERS: dict[str, Callable[[Path], RawField]] = {
     ".om": read_om,
 }
 READ_SUFFIXES = tuple(_READERS)
-WRITE_SUFFIXES = (
-    *(".rosy", ".rawfield", ".obj", ".txt", ".npy", ".npz", ".vtp", ".vtu", ".ply"),
-    *SINGULARITY_SUFFIXES,
-)
 
-#: The functions that return the contents of files with the mesh, and of files with only rows of all directions.
-_MESH_WRITERS = {".npz": npz_bytes, ".ply": ply_bytes, ".obj": fieldgen_text}
-_ROW_WRITERS = {".npy": npy_bytes, ".rawfield": rawfield_text, ".txt": rows_text}
+#: The function that returns the contents of files with each file name extension.
+_WRITERS: dict[str, Callable[[Surface, RosyField], str | bytes]] = {
+    ".rosy": rosy_text,
+    ".rawfield": rawfield_text,
+    ".obj": fieldgen_text,
+    ".txt": rows_text,
+    ".npy": npy_bytes,
+    ".npz": npz_bytes,
+    **{suffix: partial(vtk_bytes, suffix=suffix) for suffix in (".vtp", ".vtu")},
+    ".ply": ply_bytes,
+    **dict.fromkeys(SINGULARITY_SUFFIXES, sings_text),
+}
+WRITE_SUFFIXES = tuple(_WRITERS)
 
 #: Degree of fields from files that do not state a degree, if the caller gives none.
 DEFAULT_DEGREE = 4
@@ -190,8 +196,7 @@ def _read_rows(path: Path) -> RawField:
     if suffix in SINGULARITY_SUFFIXES:
         raise RosyError(f"{path}: contains singularities, not directions: choose a field file")
     if suffix not in _READERS:
-        suffixes = _join_names(READ_SUFFIXES)
-        raise RosyError(f"{path}: is not a field file: its name must end in {suffixes}")
+        raise RosyError(f"{path}: is not a field file: {must_end_in(READ_SUFFIXES)}")
     check_parsing_memory(path, NPY_MEMORY)
     return _READERS[suffix](path)
 
@@ -216,11 +221,6 @@ def _with_degree(raw: RawField, path: Path, degree: int | None) -> tuple[RawFiel
 
     If the file stores a cross by two directions, their opposites are added. `degree` is the requested degree,
     or None for any degree. The note is empty if there is nothing to say.
-
-    Raises
-    ------
-    RosyError
-        If the rows are of another degree than the requested one.
     """
     note, count = "", raw.values.shape[1]
     if raw.degree is None and count > 1:
@@ -230,10 +230,6 @@ def _with_degree(raw: RawField, path: Path, degree: int | None) -> tuple[RawFiel
         raw = replace(raw, values=values, degree=len(values[0]))
     elif raw.degree is None and degree is None:
         note = f"{path.name}: no degree is stated; it is read as a field of degree {DEFAULT_DEGREE}"
-    if degree is not None and raw.degree not in (None, degree):
-        raise RosyError(
-            f"{path}: the field has degree {raw.degree}, but degree {degree} was requested"
-        )
     return raw, note
 
 
@@ -248,8 +244,8 @@ def field_from_raw(
         The rows of the file.
     surface : Surface
     degree : int or None
-        Degree N for rows with one member vector, if the file does not state a degree; `DEFAULT_DEGREE` if
-        None.
+        The required degree N. For rows with one member vector, if the file does not state a degree, None is
+        `DEFAULT_DEGREE`.
     source : str
         Name of the file, for messages.
     policy : VectorPolicy
@@ -258,8 +254,11 @@ def field_from_raw(
     Raises
     ------
     RosyError
-        If the rows belong to another mesh, or a vector is not finite or not tangent to the surface.
+        If the field has another degree, the rows belong to another mesh, or a vector is not finite or not tangent to the surface.
     """
+    if degree is not None and raw.degree not in (None, degree):
+        text = f"the field has degree {raw.degree}, but degree {degree} was requested"
+        raise RosyError(f"{source}: {text}")
     _check_header(raw, surface, source)
     values = raw.values
     if raw.tensors:
@@ -365,33 +364,16 @@ def field_file(path: str | os.PathLike[str], field: RosyField, surface: Surface)
         If the extension is not in `WRITE_SUFFIXES`, or the format cannot store such a field.
     """
     suffix = Path(path).suffix.lower()
-    if suffix not in WRITE_SUFFIXES:
-        suffixes = _join_names(WRITE_SUFFIXES)
-        raise RosyError(f"{path}: cannot be written as a field: its name must end in {suffixes}")
+    if suffix not in _WRITERS:
+        raise RosyError(f"{path}: cannot be written as a field: {must_end_in(WRITE_SUFFIXES)}")
     if suffix in (".rosy", ".obj") and field.direction_ratios is not None:
         raise RosyError(
             f"{path}: a {suffix} file stores one member per row, but the directions of this field "
             "do not form a RoSy: write a .rawfield, .txt or .npy file"
         )
     report(0.0, "writing the file")
-    if suffix in _MESH_WRITERS:
-        contents = _MESH_WRITERS[suffix](surface, field)
-    elif suffix in (".vtp", ".vtu"):
-        contents = vtk_bytes(surface, field, suffix)
-    elif suffix == ".rosy":
-        contents = rosy_text(field)
-    elif suffix in SINGULARITY_SUFFIXES:
-        contents = sings_text(field.degree, *find_singularities(surface, field))
-    else:
-        rows = field.source_directions
-        rows = field_directions(surface, field) if rows is None else rows
-        contents = _ROW_WRITERS[suffix](rows)
+    contents = _WRITERS[suffix](surface, field)
     return contents if isinstance(contents, bytes) else contents.encode("ascii")
-
-
-def _join_names(names: tuple[str, ...]) -> str:
-    """Return names joined as in "a, b or c"."""
-    return f"{', '.join(names[:-1])} or {names[-1]}"
 
 
 def transfer_field(source: Surface, field: RosyField, target: Surface, name: str) -> RosyField:

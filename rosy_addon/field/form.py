@@ -138,11 +138,11 @@ def _curvature_guides(measured: NoisyCurvature, degree: int) -> tuple[np.ndarray
         # directions has a symmetry of four, so the phase is doubled again, and divided by 4 to get the angle.
         turn = np.abs(np.angle(((z + z_noise) * z.conj()) ** 2)) / 4
         modulus = np.abs(z)
-        clear = averages.mass * modulus / (modulus + 1)
+        clear = averages.connection.positive_mass * modulus / (modulus + 1)
         if weighted_median(turn, clear) <= MAX_TURN:
             break
     mean = averages.smooth(flat_matrix, area, averages.node_sums(measured.mean, 0))
-    power = averages.mass * np.abs(z_noise) ** 2
+    power = averages.connection.positive_mass * np.abs(z_noise) ** 2
     power = averages.smooth(flat_matrix, 4 * area, power)
     power = np.maximum(power, 0.0) * CLEAR_RATIO**2
     modulus = np.abs(z)

@@ -231,11 +231,8 @@ def _prescribed(surface: Surface, settings: GeneratorSettings, degree: int) -> R
         raise RosyError(
             f"{surface.name}: no singularities are given: give their vertices and indices"
         )
-    singularities, start, reach = (
-        settings.singularities,
-        0.0,
-        settings.reach * principal_extent(surface),
-    )
+    singularities, start = settings.singularities, 0.0
+    reach = settings.reach * principal_extent(surface)
     if settings.add_missing:
         with progress(0.0, 0.5):
             singularities, start = cheapest_singularities(surface, degree, *singularities), 0.5

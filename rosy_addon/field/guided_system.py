@@ -198,10 +198,10 @@ class GuidedSystem:
 
         z holds (n,) representations at the nodes. The sums are in the frames of the faces.
         """
-        corner = self._corners_of_faces(face)
-        value = z[self.averages.connection.corner_node[corner]] * self.averages.corner_area[corner]
-        value *= np.exp(1j * self.degree * self.averages.frame_angle[corner])
-        corner_face = self.averages.corner_face[corner]
+        corner, averages = self._corners_of_faces(face), self.averages
+        connection, corner_face = averages.connection, averages.corner_face[corner]
+        value = z[connection.corner_node[corner]] * connection.corner_area[corner]
+        value *= np.exp(1j * self.degree * averages.frame_angle[corner])
         return complex_bincount(corner_face, value, self.surface.face_count)[face]
 
     def neighbor_means(self, values: np.ndarray, face: np.ndarray) -> np.ndarray:
@@ -214,7 +214,7 @@ class GuidedSystem:
         total = averages.node_sums(values, self.degree, corner)
         mass = averages.node_sums(np.ones(self.surface.face_count), 0, corner)
         mean = total / np.maximum(mass, 1e-300)
-        corner_face, area = averages.corner_face[corner], averages.corner_area[corner]
+        corner_face, area = averages.corner_face[corner], averages.connection.corner_area[corner]
         face_area = np.bincount(corner_face, area, self.surface.face_count)[face]
         return self.face_representations_at(mean, face) / np.maximum(face_area, 1e-300)
 

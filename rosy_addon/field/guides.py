@@ -13,6 +13,7 @@ import numpy as np
 from ..core.errors import RosyError
 from .blocks import mask
 from .closest_point import closest_triangles
+from .connectivity import are_pairs
 from .frames import dot, normalize
 from .polygon_arrays import mean_per_face, sum_per_face
 from .representation import complex_bincount, from_representation, to_representation, unit_complex
@@ -52,14 +53,10 @@ def guides_from_edges(surface: Surface, ends: np.ndarray, degree: int) -> np.nda
     (F, 3) float64 ndarray
         Unit vectors; zero on faces without a guide.
     """
-    tail = surface.corner_vertex.astype(np.int64)
-    head = tail[surface.next_corner]
-    stride = len(surface.vertices)
-    ends = np.sort(np.asarray(ends, dtype=np.int64).reshape(-1, 2), axis=1)
-    key = np.minimum(tail, head) * stride + np.maximum(tail, head)
-    corner = np.flatnonzero(np.isin(key, ends[:, 0] * stride + ends[:, 1]))
+    edges, points = surface.edges, surface.vertices[surface.corner_vertex]
+    corner = np.flatnonzero(are_pairs(edges.ends, ends)[edges.corner_edge])
     face = surface.corner_face[corner]
-    edge = normalize(surface.vertices[head[corner]] - surface.vertices[tail[corner]])
+    edge = normalize(points[surface.next_corner[corner]] - points[corner])
     # On a face that is not planar, the edge direction is projected to the face plane and normalized again.
     edge -= dot(edge, surface.face_normal[face])[:, None] * surface.face_normal[face]
     return average_guides(surface, face, normalize(edge), degree)

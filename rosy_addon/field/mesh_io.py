@@ -35,6 +35,11 @@ BINARY_MEMORY = {".ply": 20, ".stl": 10, ".om": 20}
 SHARP_ANGLE = np.radians(60)
 
 
+def must_end_in(suffixes: Sequence[str]) -> str:
+    """Return the end of a message about a file name with another suffix: "its name must end in .a, .b or .c"."""
+    return f"its name must end in {', '.join(suffixes[:-1])} or {suffixes[-1]}"
+
+
 def read_polygons(path: str | os.PathLike[str], other_suffixes: Sequence[str] = ()) -> Polygons:
     """Read the polygons of an .obj, .off, .ply, .stl or .om file.
 
@@ -60,9 +65,6 @@ def read_polygons(path: str | os.PathLike[str], other_suffixes: Sequence[str] = 
     path = Path(path)
     reader = READERS.get(path.suffix.lower())
     if reader is None:
-        *suffixes, last = (*READERS, *other_suffixes)
-        raise RosyError(
-            f"{path}: is not a mesh file: its name must end in {', '.join(suffixes)} or {last}"
-        )
+        raise RosyError(f"{path}: is not a mesh file: {must_end_in((*READERS, *other_suffixes))}")
     check_parsing_memory(path, BINARY_MEMORY.get(path.suffix.lower(), 1))
     return reader(path)

@@ -161,14 +161,13 @@ def _opposite_groups(
 
 
 def cluster_numbers(surface: Surface, vertex: np.ndarray, max_distance: float) -> np.ndarray:
-    """Return the (K,) int64 number of the cluster of each of K vertices, from 0 without gaps.
+    """Return the (K,) int32 number of the cluster of each of K vertices, from 0 without gaps.
 
     Two of the vertices are in the same cluster if their distance is at most `max_distance`, along edges in
     object space, or if they are connected by a chain of such pairs.
     """
     first, second, _ = _near(surface, vertex, max_distance)
-    root = connected_components(len(vertex), np.stack([first, second], axis=1))
-    return np.unique(root, return_inverse=True)[1].astype(np.int64)
+    return connected_components(len(vertex), np.stack([first, second], axis=1))
 
 
 def cluster_singularities(

@@ -29,8 +29,8 @@ import numpy as np
 from ..core.progress import progress, report
 from .angular_synchronization import LABEL, PhaseGraph, phase_graph, synchronize
 from .blocks import mask, row_blocks
-from .connection import sums_in_umbrellas, umbrella_order
-from .connectivity import build_edges
+from .connection import umbrella_order
+from .connectivity import build_edges, sums_from_roots
 from .polygon_arrays import next_corners
 
 #: Smallest and largest cotangent weight of an edge. The smallest weight is positive, so that obtuse triangles
@@ -298,7 +298,7 @@ def _covering(
     degree, families = directions.degree, directions.family_count
     corner = np.arange(len(gluing.twin), dtype=np.int32)
     previous, _ = umbrella_order(triangle_vertex.reshape(-1), gluing.twin, gluing.next_corner)
-    start, shift = sums_in_umbrellas(previous, gluing.shift)
+    start, shift = sums_from_roots(previous, gluing.shift)
     last = gluing.next_corner[gluing.twin]
     closes = (gluing.twin >= 0) & (start == corner)
     is_singular = (closes & ((gluing.shift + shift[last]) % degree != 0))[start]

@@ -299,7 +299,7 @@ class Surface:
     @cached_property
     def used_vertices(self) -> np.ndarray:
         """(n,) intp: the vertices that belong to a face, in ascending order."""
-        return _used_vertices(self.corner_vertex, len(self.vertices))
+        return np.flatnonzero(mask(len(self.vertices), self.corner_vertex))
 
     @cached_property
     def box_corners(self) -> np.ndarray:
@@ -450,11 +450,6 @@ def _surface_of_parts(**parts: Any) -> Surface:
     return surface
 
 
-def _used_vertices(corner_vertex: np.ndarray, vertex_count: int) -> np.ndarray:
-    """Return the (n,) intp vertices that belong to at least one corner, in ascending order."""
-    return np.flatnonzero(mask(vertex_count, corner_vertex))
-
-
 def _check_polygons(
     name: str, vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray
 ) -> None:
@@ -480,9 +475,8 @@ def _check_polygons(
             f"{name}: vertex {int(np.argmax(far))} has a coordinate above {MAX_COORDINATE:g}: scale or "
             "move the mesh"
         )
-    used = _used_vertices(corner_vertex, len(vertices))
-    points = vertices if len(used) == len(vertices) else vertices[used]
-    if 0 < np.ptp(points, axis=0).max() < MIN_EXTENT:
+    used = mask(len(vertices), corner_vertex)
+    if 0 < np.ptp(vertices[used], axis=0).max() < MIN_EXTENT:
         raise RosyError(f"{name}: is smaller than {MIN_EXTENT:g}: scale the mesh")
 
 

@@ -76,16 +76,6 @@ class SurfaceAverages:
         """(3 T,) int32: the face of each corner of the triangles."""
         return np.repeat(self.surface.triangle_face, 3)
 
-    @property
-    def corner_area(self) -> np.ndarray:
-        """(3 T,) float64: the share of each triangle corner in the area of its face (see `Connection`)."""
-        return self.connection.corner_area
-
-    @cached_property
-    def mass(self) -> np.ndarray:
-        """(n,) float64: the mass of each node, the sum of the shares of areas around it; always positive."""
-        return self.connection.positive_mass
-
     def node_sums(
         self, values: np.ndarray, degree: int, corner: np.ndarray | slice = slice(None)
     ) -> np.ndarray:
@@ -105,7 +95,7 @@ class SurfaceAverages:
         (n,) ndarray
             Sums in the tangent frames of the nodes (see `Connection`); complex if the degree is not 0.
         """
-        terms = self.corner_area[corner] * values[self.corner_face[corner]]
+        terms = self.connection.corner_area[corner] * values[self.corner_face[corner]]
         node, count = self.connection.corner_node[corner], self.connection.node_count
         if not degree:
             return np.bincount(node, terms, count)
@@ -119,7 +109,7 @@ class SurfaceAverages:
         a corner is three times its share in the area of the face (`corner_area`). If the face is a triangle,
         this is the area of the face.
         """
-        area = self.corner_area.reshape(-1, 3)
+        area = self.connection.corner_area.reshape(-1, 3)
         weighted = np.empty(area.shape, dtype=np.complex128)
         node = self.connection.corner_node.reshape(-1, 3)
         frame_angle = self.frame_angle.reshape(-1, 3)
@@ -176,15 +166,16 @@ class SurfaceAverages:
         if scale < np.finfo(np.float64).tiny:
             return np.zeros_like(sums)
         # Scale all numbers to order 1, so that single precision is enough for a mesh of any size.
-        mass = (self.mass / self.mass.mean()).astype(np.float32)
-        area = np.float32(area / self.mass.mean())
+        mass = self.connection.positive_mass
+        mean_mass = mass.mean()
+        mass, area = (mass / mean_mass).astype(np.float32), np.float32(area / mean_mass)
         diagonal = mass + area * matrix.diagonal.astype(np.float32)
 
         def apply(vector: np.ndarray) -> np.ndarray:
             return mass * vector + area * (matrix @ vector)
 
         right = (sums / scale).astype(dtype)
-        unit = scale / self.mass.mean()
+        unit = scale / mean_mass
         solution = np.zeros_like(right) if start is None else (start / unit).astype(dtype)
         residual = right - apply(solution)
         limit = AVERAGE_TOLERANCE**2 * np.vdot(right, right / diagonal).real

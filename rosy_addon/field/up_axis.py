@@ -10,13 +10,5 @@ UP_AXIS_MATRIX = {
     "z": np.eye(4),
 }
 
-#: The upward axis of mesh files by file suffix. Blender's importers assume the same axes.
-UP_AXIS_BY_SUFFIX = {
-    ".obj": "y",
-    ".off": "y",
-    ".ply": "z",
-    ".stl": "z",
-    ".om": "y",
-    ".glb": "y",
-    ".gltf": "y",
-}
+#: The upward axis of mesh files by file suffix, where it is not z. Blender's importers assume the same axes.
+UP_AXIS_BY_SUFFIX = dict.fromkeys((".obj", ".off", ".om", ".glb", ".gltf"), "y")

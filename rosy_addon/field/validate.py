@@ -28,8 +28,9 @@ from .surface import Surface
 #: Largest angle in degrees between a vector and the tangent plane of its face or vertex. Larger angles mean
 #: that the field belongs to another mesh or another space. On faces, rounding in text files causes only
 #: about a thousandth of this angle. On vertices, the angle allows for the different definitions of vertex
-#: normals: angle-weighted and area-weighted normals differ by this much on coarse meshes.
-TOLERANCE_DEG = {"face": 5.0, "vertex": 20.0}
+#: normals: angle-weighted and area-weighted normals differ by this much on coarse meshes. On corners it is large,
+#: because their vectors may be tangent to the smooth surface rather than to the face.
+TOLERANCE_DEG = {"face": 5.0, "vertex": 20.0, "corner": 30.0}
 
 #: Largest fraction of the nonzero vectors that may exceed the tolerance, for example on needle
 #: faces whose normals are inaccurate.
@@ -126,8 +127,7 @@ def validated_field(
     domain = checked_domain(surface, len(vectors), domain, source)
     apply_nonfinite_policy(vectors, source, domain, policy.nonfinite)
     normal = tangent_normals(surface, domain)
-    limit = TOLERANCE_DEG[domain]
-    vectors = project_to_tangent(vectors, normal, limit, source, domain, policy.off_surface)
+    vectors = project_to_tangent(vectors, normal, source, domain, policy.off_surface)
     if domain == "vertex":
         rest = surface.in_rest_shape()
         z = to_representation(vectors, *tangent_frame(normal), degree)
@@ -210,8 +210,7 @@ def validated_directions(
         return replace(field, source_directions=source_directions)
     apply_nonfinite_policy(directions.reshape(count, -1), source, domain, policy.nonfinite)
     rows, normals = directions.reshape(-1, 3), np.repeat(normal, degree, axis=0)
-    limit = TOLERANCE_DEG[domain]
-    rows = project_to_tangent(rows, normals, limit, source, domain, policy.off_surface)
+    rows = project_to_tangent(rows, normals, source, domain, policy.off_surface)
     directions = rows.reshape(count, degree, 3)
     surface = surface.in_rest_shape()
     if domain == "face":
@@ -286,7 +285,6 @@ def vertex_normals(surface: Surface) -> np.ndarray:
 def project_to_tangent(
     vectors: np.ndarray,
     normal: np.ndarray,
-    tolerance_deg: float,
     source: str,
     domain: str,
     off_surface: str = "error",
@@ -297,12 +295,13 @@ def project_to_tangent(
     ----------
     vectors, normal : (n, 3) float64 ndarray
         Vectors, and the unit normals of their planes.
-    tolerance_deg : float
-        Largest angle between a vector and its plane, in degrees.
-    source, domain : str
-        Name of the file or attribute, and name of the mesh elements, for messages.
+    source : str
+        Name of the file or attribute, for messages.
+    domain : {"face", "vertex", "corner"}
+        The mesh elements to which the vectors belong. They decide the largest angle between a vector and its
+        plane, `TOLERANCE_DEG`.
     off_surface : {"error", "project", "undefined"}
-        What to do about vectors that exceed the tolerance: raise an error if they are many (see Raises), and
+        What to do about vectors that exceed this angle: raise an error if they are many (see Raises), and
         project them otherwise; always project them; or set them to zero.
 
     Returns
@@ -313,17 +312,18 @@ def project_to_tangent(
     Raises
     ------
     RosyError
-        If `off_surface` is "error" and more than `MAX_OUTLIER_FRACTION` of the vectors exceed the tolerance.
+        If `off_surface` is "error" and more than `MAX_OUTLIER_FRACTION` of the vectors exceed the angle.
     """
     tangent, angle, is_zero = by_rows(_project, vectors, normal)
-    outlier = angle > tolerance_deg
+    tolerance = TOLERANCE_DEG[domain]
+    outlier = angle > tolerance
     if off_surface == "undefined":
         tangent[outlier] = 0.0
     elif off_surface == "error" and outlier.sum() > MAX_OUTLIER_FRACTION * (~is_zero).sum():
         worst = int(np.argmax(angle))
         raise RosyError(
             f"{source}: {outlier.sum()} of {len(vectors)} vectors are not tangent to the surface: they "
-            f"are more than {tolerance_deg:g} degrees off, {domain} {worst} by {angle[worst]:.1f} "
+            f"are more than {tolerance:g} degrees off, {domain} {worst} by {angle[worst]:.1f} "
             "degrees. It belongs to another mesh or another shape of it: make or import it again. If only a few "
             "vectors are wrong, choose to project them or to leave them undefined (off_surface, --off-surface)"
         )

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core.progress import progress
 from ..field.blocks import mask
-from ..field.connectivity import build_edges
+from ..field.connectivity import are_pairs, build_edges
 from ..field.creases import find_creases
 from ..field.formats.polygons import offsets_from_sizes
 from ..field.frames import angle_between, dot, normalize
@@ -115,7 +115,7 @@ def outline_strokes(instance: MeshInstance, camera: Camera) -> Strokes:
         edges = build_edges(vertex, np.arange(0, len(vertex) + 1, 3, dtype=np.int32))
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     with progress(0.3, 0.7, "finding outlines"):
-        is_crease = _are_pairs(vertex, a, find_creases(surface, CREASE_ANGLE).ends)
+        is_crease = are_pairs(edges.ends[edges.interior], find_creases(surface, CREASE_ANGLE))
     is_border = ~mask(len(edges.face_count), edges.interior)
     borders = np.flatnonzero(is_border[edges.corner_edge])
     starts = a[is_crease]
@@ -189,24 +189,6 @@ def _edge_segments(corners: _Corners, starts: np.ndarray) -> Segments:
     row, ends = triangle[:, None], np.stack([k, (k + 1) % 3], axis=1)
     triangle = triangle.astype(np.int64)
     return Segments(corners.points[row, ends], corners.normals[row, ends], triangle)
-
-
-def _are_pairs(vertex: np.ndarray, starts: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-    """Return (n,) bool: whether edges of triangles connect one of the given pairs of vertices.
-
-    Parameters
-    ----------
-    vertex : (3 T,) ndarray of int
-        Vertex of each corner.
-    starts : (n,) ndarray of int
-        Corners at which the edges start.
-    pairs : (m, 2) ndarray of int
-        Pairs of vertices; the smaller index is first.
-    """
-    stride = int(vertex.max()) + 1
-    following = starts - starts % 3 + (starts + 1) % 3
-    low, high = np.sort(np.stack([vertex[starts], vertex[following]]).astype(np.int64), axis=0)
-    return np.isin(low * stride + high, pairs[:, 0].astype(np.int64) * stride + pairs[:, 1])
 
 
 def _pixel_salience(segments: Segments, angle: np.ndarray, camera: Camera) -> np.ndarray:

@@ -60,7 +60,7 @@ def outline_mesh(surface: Surface, linear: np.ndarray, crease_angle: float | Non
     if crease_angle is not None:
         shape = surface.in_rest_shape()
         with progress(0.0, 0.6):
-            ends = find_creases(shape.with_vertices(shape.vertices @ linear.T), crease_angle).ends
+            ends = find_creases(shape.with_vertices(shape.vertices @ linear.T), crease_angle)
     report(0.6, "finding connected parts")
     pairs = np.stack([surface.corner_vertex, surface.corner_vertex[surface.next_corner]], axis=1)
     with progress(0.6, 1.0):

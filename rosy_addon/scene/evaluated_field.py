@@ -168,11 +168,11 @@ def _transport(
         # Mirroring reverses the normal of a face. Only the plane matters, so the sign is made equal.
         source_normals *= np.where(dot(source_normals, normals) < 0, -1.0, 1.0)[:, None]
         report(0.4, label)
-        vectors = project_to_tangent(vectors, source_normals, 180.0, source, "face")
+        vectors = project_to_tangent(vectors, source_normals, source, "face", "project")
         report(0.6, label)
         vectors = transport(vectors, source_normals, normals)
         report(0.7, label)
-    return project_to_tangent(vectors, normals, 180.0, source, "face")
+    return project_to_tangent(vectors, normals, source, "face", "project")
 
 
 @contextmanager

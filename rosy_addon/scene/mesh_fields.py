@@ -13,7 +13,7 @@ from ..core.errors import RosyError, RosyWarning, counted
 from ..core.progress import progress, report
 from ..field import validate
 from ..field.blocks import as_float64
-from ..field.directional_field import field_directions, with_opposites
+from ..field.directional_field import stored_directions, with_opposites
 from ..field.field_io import HALF_CROSS_NOTE
 from ..field.frames import dot, normalize, tangent_frame
 from ..field.polygon_arrays import mean_per_face
@@ -37,10 +37,6 @@ from .field_attributes import (
     store_rest_shape,
 )
 from .meshes import flush_edit_mode, mesh_label, mesh_surface, read_attribute, write_attribute
-
-#: Largest angle between a vector on a face corner and the plane of the face, in degrees. It is large because
-#: such vectors may be tangent to the smooth surface rather than to the face.
-CORNER_TOLERANCE = 30.0
 
 #: Names of the elements of a mesh in `field.validate`, by the domain of an attribute.
 ELEMENTS = {"FACE": "face", "POINT": "vertex"}
@@ -192,9 +188,7 @@ def _field_from_corners(
     corner_normal = normal[surface.corner_face]
     report(0.2, "reading the field")
     with progress(0.2, 0.7):
-        vectors = validate.project_to_tangent(
-            vectors, corner_normal, CORNER_TOLERANCE, source, "corner"
-        )
+        vectors = validate.project_to_tangent(vectors, corner_normal, source, "corner")
     x, y = tangent_frame(normal)
     z = to_representation(vectors, x[surface.corner_face], y[surface.corner_face], degree)
     report(0.9, "reading the field")
@@ -366,9 +360,7 @@ def _write_directions(mesh: Mesh, field: RosyField, name: str) -> Attribute:
     Remove the attributes ``dirN``, ``dir{N+1}`` ... of an earlier field. If the directions of the field are
     not at equal angles, remove also the attribute `name`, which would be read instead.
     """
-    directions = field.source_directions
-    if directions is None:
-        directions = field_directions(mesh_surface(mesh), field)
+    directions = stored_directions(mesh_surface(mesh), field)
     vector_attribute = mesh.attributes.get(name)
     if field.direction_ratios is not None and vector_attribute is not None:
         mesh.attributes.remove(vector_attribute)

@@ -13,7 +13,7 @@ from bpy.types import Attribute, Mesh, Object, bpy_prop_collection
 from ..core.cache import Cache, cached, content_hash
 from ..core.errors import NoFeaturesError, RosyError
 from ..core.progress import progress
-from ..field.connectivity import smooth_fans
+from ..field.connectivity import are_pairs, smooth_fans
 from ..field.surface import Surface, build_surface
 
 #: Ways to mark edges in Blender: RNA property, label, and description in the user interface.
@@ -241,8 +241,7 @@ def marked_edges(mesh: Mesh, mark: str) -> np.ndarray:
 
 def mark_sharp(mesh: Mesh, edges: np.ndarray) -> int:
     """Mark edges as sharp, given by (K, 2) vertex indices. Return how many different ones there are."""
-    ends, wanted = (np.sort(pairs.astype(np.int64)) for pairs in (_edge_vertices(mesh), edges))
-    is_wanted = np.isin(ends @ [len(mesh.vertices), 1], wanted @ [len(mesh.vertices), 1])
+    is_wanted = are_pairs(_edge_vertices(mesh), edges)
     mesh.edges.foreach_set("use_edge_sharp", _edge_flags(mesh, "use_edge_sharp") | is_wanted)
     mesh.update()
     return int(np.count_nonzero(is_wanted))

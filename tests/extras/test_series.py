@@ -31,14 +31,17 @@ def write_files(folder, mesh, suffix="vtu"):
         mesh.save(folder / f"step_{5 * number}.{suffix}")
 
 
+def write_collection(path, *steps):
+    """Write a .pvd file that lists files, given by their times and names, and return its path."""
+    entries = "".join(f'<DataSet timestep="{time}" file="{name}"/>' for time, name in steps)
+    path.write_text(f'<VTKFile type="Collection"><Collection>{entries}</Collection></VTKFile>')
+    return path
+
+
 def write_pvd(folder, mesh):
     write_files(folder, mesh)
-    entries = [
-        f'<DataSet timestep="{time}" file="step_{5 * k}.vtu"/>' for k, time in enumerate(TIMES)
-    ]
-    text = f'<VTKFile type="Collection"><Collection>{"".join(entries)}</Collection></VTKFile>'
-    (folder / "a.pvd").write_text(text)
-    return [folder / "a.pvd"]
+    steps = [(time, f"step_{5 * number}.vtu") for number, time in enumerate(TIMES)]
+    return [write_collection(folder / "a.pvd", *steps)]
 
 
 def write_series(folder, mesh):
@@ -106,13 +109,9 @@ def test_exodus_series(tmp_path, box):
 def test_steps_in_parts(tmp_path, sphere):
     """Files of a .pvd file with the same time are one step."""
     halves = [sphere.clip("z", invert=invert) for invert in (True, False)]
-    entries = ""
     for part, half in enumerate(halves):
         half.cast_to_unstructured_grid().save(tmp_path / f"{part}.vtu")
-        entries += f'<DataSet timestep="1" part="{part}" file="{part}.vtu"/>'
-    text = f'<VTKFile type="Collection"><Collection>{entries}</Collection></VTKFile>'
-    (tmp_path / "a.pvd").write_text(text)
-    (step,) = list_steps([tmp_path / "a.pvd"])
+    (step,) = list_steps([write_collection(tmp_path / "a.pvd", (1, "0.vtu"), (1, "1.vtu"))])
     mesh = step.read()
     assert len(mesh.face_start) - 1 == sum(half.n_cells for half in halves)
     assert len(mesh.vertices) < sum(half.n_points for half in halves), "the rims are joined"
@@ -132,25 +131,20 @@ def test_order_of_files(tmp_path):
 
 
 def test_series_without_files(tmp_path, error_of):
-    for name, text in (
-        ("a.pvd", '<VTKFile type="Collection"><Collection/></VTKFile>'),
-        ("a.vtu.series", '{"files": []}'),
-    ):
-        (tmp_path / name).write_text(text)
-        assert error_of(list_steps, [tmp_path / name]).endswith(f"{name}: lists no files")
-    (tmp_path / "a.vtu.series").write_text('{"files": [{"name": "none.vtu", "time": 0}]}')
-    assert "none.vtu: cannot be read" in error_of(list_steps, [tmp_path / "a.vtu.series"])
+    collection, series = write_collection(tmp_path / "a.pvd"), tmp_path / "a.vtu.series"
+    series.write_text('{"files": []}')
+    for path in (collection, series):
+        assert error_of(list_steps, [path]).endswith(f"{path.name}: lists no files")
+    series.write_text('{"files": [{"name": "none.vtu", "time": 0}]}')
+    assert "none.vtu: cannot be read" in error_of(list_steps, [series])
 
 
 def test_the_step_of_a_series(sphere, tmp_path, recwarn, error_of):
     """The last one, with a warning in the caller's file; or the given one, without."""
-    entries = ""
     for number in range(1, 4):
         sphere.point_data["rotation"] = np.asarray(sphere["rotation"]) * number
         sphere.save(tmp_path / f"{number}.vtp")
-        entries += f'<DataSet timestep="{number}" file="{number}.vtp"/>'
-    path = tmp_path / "a.pvd"
-    path.write_text(f'<VTKFile type="Collection"><Collection>{entries}</Collection></VTKFile>')
+    path = write_collection(tmp_path / "a.pvd", *((k, f"{k}.vtp") for k in range(1, 4)))
     last = rf.from_array(rf.Surface(path))
     (warning,) = recwarn.list
     assert warning.category is rf.RosyWarning and warning.filename == __file__

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from awkward import AWKWARD
 from scipy import sparse
-from scipy.spatial.transform import Rotation
-from shapes import from_triangles, icosphere, rebuilt
+from shapes import icosphere, rebuilt
 
 from rosy_addon.core.errors import RosyError
 from rosy_addon.field.convert import rotate_field
@@ -34,19 +33,6 @@ def angle_differences(surface, first, second, degree):
     x, y = surface.face_frames
     z, w = (to_representation(vectors, x, y, degree) for vectors in (first, second))
     return np.abs(np.angle(z * w.conj())) / degree
-
-
-def copies_of(surface, scale=3.0):
-    """The same mesh of triangles: vertices and corners in another order, and moved.
-
-    Yields each mesh with the (3, 3) rotation by which vectors are turned.
-    """
-    triangles = surface.corner_vertex.reshape(-1, 3)
-    order = np.random.default_rng(5).permutation(len(surface.vertices))
-    yield from_triangles(surface.vertices[order], np.argsort(order)[triangles]), np.eye(3)
-    yield from_triangles(surface.vertices, np.roll(triangles, 1, axis=1)), np.eye(3)
-    rotation = Rotation.from_rotvec([0.3, 1.0, -0.4]).as_matrix()
-    yield from_triangles(scale * surface.vertices @ rotation.T + (1, 2, 3), triangles), rotation
 
 
 def awkward_surface(name):
@@ -77,6 +63,14 @@ def write_off(path, surface):
     rows += [" ".join(map(str, [len(face), *face])) for face in faces]
     path.write_text("\n".join(rows) + "\n")
     return path
+
+
+def ply_header(form, *elements):
+    """Return the header of a .ply file; an element is its name, its number of rows, and its properties."""
+    lines = ["ply", f"format {form} 1.0", "comment made by hand"]
+    for name, count, *properties in elements:
+        lines += [f"element {name} {count}", *(f"property {each}" for each in properties)]
+    return "\n".join([*lines, "end_header", ""])
 
 
 def read_damaged(path, data, garbage, offset, read):

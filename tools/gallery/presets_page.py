@@ -69,7 +69,7 @@ def write_pages(folder: Path) -> None:
 
 def _read(path: Path) -> tuple[Surface, np.ndarray]:
     """Return the surface of a mesh file, and the matrix that rotates it so that z points up."""
-    return Surface(path), UP_AXIS_MATRIX[UP_AXIS_BY_SUFFIX[path.suffix]]
+    return Surface(path), UP_AXIS_MATRIX[UP_AXIS_BY_SUFFIX.get(path.suffix, "z")]
 
 
 def _write_presets(files: dict[str, tuple[Surface, np.ndarray]]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from ...core.errors import RosyError
 from ...core.file_io import read_bytes
 from ..blocks import as_float64
-from .plain import raw_field, without_numbers
+from .plain import raw_field
 from .polygons import RawField
 from .text_rows import read_rows
 
@@ -27,24 +27,20 @@ def read_dmat(path: Path) -> RawField:
     """
     data = read_bytes(path)
     header, _, rest = data.partition(b"\n")
-    if header.split() == [b"0", b"0"]:
+    is_binary = header.split() == [b"0", b"0"]
+    if is_binary:
         header, _, rest = rest.partition(b"\n")
-        columns, count = _size(path, header)
+    words = header.split()
+    if len(words) != 2 or not all(word.isdigit() for word in words):
+        raise RosyError(f"{path}: expected the numbers of columns and of rows at its beginning")
+    columns, count = map(int, words)
+    if is_binary:
         values = np.frombuffer(rest, "<f8", min(columns * count, len(rest) // 8))
     else:
-        columns, count = _size(path, header)
         values = read_rows(path, comment=None, data=b"\n" + rest).floats("entry of the matrix")
     if len(values) != columns * count:
         raise RosyError(f"{path}: declares {columns * count} numbers, but contains {len(values)}")
     if not count:
         raise RosyError(f"{path}: contains no numbers")
     matrix = as_float64(values.reshape(columns, count).T)
-    return raw_field(without_numbers(matrix, str(path), flags=True))
-
-
-def _size(path: Path, header: bytes) -> tuple[int, int]:
-    """Return the numbers of columns and of rows in a line `header`, before the numbers of a matrix."""
-    words = header.split()
-    if len(words) != 2 or not all(word.isdigit() for word in words):
-        raise RosyError(f"{path}: expected the numbers of columns and of rows at its beginning")
-    return int(words[0]), int(words[1])
+    return raw_field(matrix, str(path), flags=True)

@@ -7,7 +7,7 @@ import io
 
 import numpy as np
 
-from ..directional_field import field_directions
+from ..directional_field import stored_directions
 from ..rosy_field import RosyField
 from ..singularities import find_singularities
 from ..surface import Surface
@@ -44,8 +44,7 @@ def field_arrays(surface: Surface, field: RosyField) -> tuple[dict[str, np.ndarr
     vertex_arrays : dict of str to (V,) float64 ndarray
         "singularity": the index of each vertex, a multiple of 1/N.
     """
-    rows = field.source_directions
-    rows = field_directions(surface, field) if rows is None else rows
+    rows = stored_directions(surface, field)
     face_arrays = {f"{DIRECTION}{k + 1}": rows[:, k] for k in range(field.degree)}
     face_arrays["magnitude"] = field.magnitude
     index = np.zeros(len(surface.vertices))
@@ -141,7 +140,6 @@ def npz_bytes(surface: Surface, field: RosyField) -> bytes:
 
     Faces of different sizes are stored as `corner_vertex` and `face_start`; see `polygons.Polygons`.
     """
-    rows = field.source_directions
     vertices, indices = find_singularities(surface, field)
     mesh = {"faces": surface.faces}
     if isinstance(mesh["faces"], list):
@@ -152,7 +150,7 @@ def npz_bytes(surface: Surface, field: RosyField) -> bytes:
         vertices=surface.vertices,
         **mesh,
         degree=np.array(field.degree),
-        directions=field_directions(surface, field) if rows is None else rows,
+        directions=stored_directions(surface, field),
         magnitude=field.magnitude,
         singular_vertices=vertices,
         singular_indices=indices,

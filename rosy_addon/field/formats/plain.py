@@ -21,7 +21,9 @@ from ...core.errors import RosyError, counted
 from ...core.file_io import read_bytes
 from ...core.memory import check_memory
 from ..blocks import as_float64
-from ..rosy_field import MAX_DEGREE, check_degree
+from ..directional_field import stored_directions
+from ..rosy_field import MAX_DEGREE, RosyField, check_degree
+from ..surface import Surface
 from .polygons import Polygons, RawField
 from .text_rows import is_number, read_rows
 
@@ -68,43 +70,7 @@ def read_text(path: Path) -> RawField:
     values = rows.floats("part of a vector").reshape(-1, columns)
     if columns == 15 and not (values[:, 3:9] + values[:, 9:]).any():
         values = values[:, 3:]
-    return replace(raw_field(without_numbers(values, str(path))), header_count=header_count)
-
-
-def without_numbers(values: np.ndarray, source: str, flags: bool = False) -> np.ndarray:
-    """Return rows of 3 N numbers, without a first column that numbers the rows from 0 or 1.
-
-    Parameters
-    ----------
-    values : (n, k) float64 ndarray
-        At least one row.
-    source : str
-        Name of the file, for messages.
-    flags : bool
-        Whether a first column of the numbers 0 and 1 is left out as well.
-
-    Raises
-    ------
-    RosyError
-        If the other columns are not 3 N numbers for a degree N from 1 to `MAX_DEGREE`.
-    """
-    if values.shape[1] % 3 == 1:
-        first = values[:, 0]
-        is_number = first[0] in (0, 1) and (first - first[0] == np.arange(len(first))).all()
-        if is_number or (flags and np.isin(first, (0, 1)).all()):
-            values = values[:, 1:]
-    _check_columns(source, values.shape[1])
-    return values
-
-
-def _check_npy_size(data: bytes) -> None:
-    """Raise `ValueError` if the header of an `.npy` file declares more data than the file contains."""
-    file = io.BytesIO(data)
-    version = np.lib.format.read_magic(file)
-    if version in _NPY_HEADERS:
-        shape, _, dtype = _NPY_HEADERS[version](file)
-        if math.prod(shape) * dtype.itemsize > len(data):
-            raise ValueError(f"it declares the shape {shape}, which is more than it contains")
+    return replace(raw_field(values, str(path)), header_count=header_count)
 
 
 def read_npy(path: Path) -> RawField:
@@ -121,7 +87,13 @@ def read_npy(path: Path) -> RawField:
 def _load_npy(data: bytes, source: str) -> Any:
     """Return the array of an `.npy` file, given its contents; `source` is its name in messages."""
     try:
-        _check_npy_size(data)
+        file = io.BytesIO(data)
+        version = np.lib.format.read_magic(file)
+        if version in _NPY_HEADERS:
+            # numpy allocates what the header declares, even if the file contains less.
+            shape, _, dtype = _NPY_HEADERS[version](file)
+            if math.prod(shape) * dtype.itemsize > len(data):
+                raise ValueError(f"it declares the shape {shape}, which is more than it contains")
         return np.load(io.BytesIO(data), allow_pickle=False)
     except Exception as reason:  # numpy evaluates the header as Python, which can raise any error
         line = (str(reason).splitlines() or [type(reason).__name__])[0]
@@ -139,9 +111,7 @@ def _array_field(values: Any, source: str) -> RawField:
         raise RosyError(
             f"{source}: expected an array of shape (n, 3 N) or (n, N, 3), found {values.shape}"
         )
-    values = as_float64(values.reshape(len(values), -1))
-    _check_columns(source, values.shape[1])
-    return raw_field(values)
+    return raw_field(as_float64(values.reshape(len(values), -1)), source)
 
 
 def read_npz(path: Path) -> RawField:
@@ -230,10 +200,10 @@ def read_guide_strokes(path: Path) -> list[np.ndarray]:
     return strokes
 
 
-def npy_bytes(directions: np.ndarray) -> bytes:
-    """Return the contents of an `.npy` file that stores (F, N, 3) directions as an array (F, 3 N)."""
+def npy_bytes(surface: Surface, field: RosyField) -> bytes:
+    """Return the contents of an `.npy` file that stores all directions of a field as an array (F, 3 N)."""
     file = io.BytesIO()
-    np.save(file, directions.reshape(len(directions), -1))
+    np.save(file, stored_directions(surface, field).reshape(surface.face_count, -1))
     return file.getvalue()
 
 
@@ -248,11 +218,32 @@ def _check_columns(source: str, columns: int) -> None:
         )
 
 
-def raw_field(values: np.ndarray) -> RawField:
-    """Return (n, k) values as a `RawField` of member vectors, directions or tensors.
+def raw_field(values: np.ndarray, source: str, flags: bool = False) -> RawField:
+    """Return the rows of a file as member vectors, directions or tensors.
 
-    Rows of 9 values are tensors if all of them are symmetric 3 x 3 matrices, and 3 directions otherwise.
+    Rows of 9 values are tensors if all of them are symmetric 3 x 3 matrices, and 3 directions otherwise. A first
+    column that numbers the rows from 0 or 1 is left out.
+
+    Parameters
+    ----------
+    values : (n, k) float64 ndarray
+        At least one row.
+    source : str
+        Name of the file, for messages.
+    flags : bool
+        Whether a first column of the numbers 0 and 1 is left out as well.
+
+    Raises
+    ------
+    RosyError
+        If the other columns are not 2 numbers, or 3 N for a degree N from 1 to `MAX_DEGREE`.
     """
+    if values.shape[1] % 3 == 1:
+        first = values[:, 0]
+        is_number = first[0] in (0, 1) and (first - first[0] == np.arange(len(first))).all()
+        if is_number or (flags and np.isin(first, (0, 1)).all()):
+            values = values[:, 1:]
+    _check_columns(source, values.shape[1])
     matrices = values.reshape(len(values), -1, 2 if values.shape[1] == 2 else 3)
     if values.shape[1] == 9 and _are_symmetric(matrices):
         return RawField(matrices, 4, tensors=True)

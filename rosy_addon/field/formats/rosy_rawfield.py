@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from ...core.errors import RosyError, counted
+from ..directional_field import stored_directions
 from ..rosy_field import RosyField, check_degree
+from ..surface import Surface
 from .polygons import RawField
 from .text_rows import TextRows, abbreviate, format_lines, read_rows
 
@@ -30,8 +32,7 @@ def read_rosy(path: Path) -> RawField:
         (count,) = _read_header(rows, "count")
         return RawField(_vector_table(rows, 3, count, 1).reshape(-1, 1, 3), None, count)
     count, degree = _read_header(rows, "count", "degree")
-    table = _vector_table(rows, 3, count)
-    return RawField(table.reshape(-1, 1, 3), _validated_degree(rows, 1, degree), count)
+    return RawField(_vector_table(rows, 3, count).reshape(-1, 1, 3), degree, count)
 
 
 def read_rawfield(path: Path) -> RawField:
@@ -44,51 +45,42 @@ def read_rawfield(path: Path) -> RawField:
     """
     rows = read_rows(path, comment=None)
     degree, count = _read_header(rows, "degree", "count")
-    degree = _validated_degree(rows, 0, degree)
     return RawField(_vector_table(rows, 3 * degree, count).reshape(-1, degree, 3), degree, count)
 
 
-def rosy_text(field: RosyField) -> str:
+def rosy_text(_: Surface, field: RosyField) -> str:
     """Return the text of a `.rosy` file with the member vectors of a field."""
     return f"{len(field.vectors)}\n{field.degree}\n{format_lines(field.vectors)}"
 
 
-def rawfield_text(directions: np.ndarray) -> str:
-    """Return the text of a `.rawfield` file with (F, N, 3) directions."""
-    count, degree = directions.shape[:2]
-    return f"{degree} {count}\n{rows_text(directions)}"
+def rawfield_text(surface: Surface, field: RosyField) -> str:
+    """Return the text of a `.rawfield` file with all directions of a field."""
+    return f"{field.degree} {surface.face_count}\n{rows_text(surface, field)}"
 
 
-def rows_text(directions: np.ndarray) -> str:
-    """Return (F, N, 3) directions as text, with a row for each face."""
-    return format_lines(directions.reshape(len(directions), -1))
+def rows_text(surface: Surface, field: RosyField) -> str:
+    """Return all directions of a field as text, with a row of 3 N numbers for each face."""
+    return format_lines(stored_directions(surface, field).reshape(surface.face_count, -1))
 
 
 def _read_header(rows: TextRows, *names: str) -> list[int]:
     """Return the first one or two integers of a file; two are on one line or on two.
 
-    `names` are their names in messages.
+    `names` are their names in messages. One with the name "degree" must be a degree.
     """
     words = [word for line in rows.words[:2] for word in line]
     values = []
     for index, name in enumerate(names):
         try:
-            values.append(int(words[index]))
+            number = int(words[index])
+            values.append(check_degree(number) if name == "degree" else number)
         except IndexError:
             raise RosyError(f"{rows.path}: ends before the {name}") from None
-        except ValueError:
-            row = rows.row_of_word(index)
-            found = abbreviate(words[index])
-            raise rows.error(row, f"expected the {name}, a whole number, found {found}") from None
+        except ValueError as reason:  # also a `RosyError`
+            text = f"expected the {name}, a whole number, found {abbreviate(words[index])}"
+            text = str(reason) if isinstance(reason, RosyError) else text
+            raise rows.error(rows.row_of_word(index), text) from None
     return values
-
-
-def _validated_degree(rows: TextRows, word: int, degree: int) -> int:
-    """Return the result of `check_degree(degree)`. Its error names the file and the line of word `word`."""
-    try:
-        return check_degree(degree)
-    except RosyError as reason:
-        raise rows.error(rows.row_of_word(word), str(reason)) from None
 
 
 def _vector_table(rows: TextRows, columns: int, count: int, header: int = 2) -> np.ndarray:

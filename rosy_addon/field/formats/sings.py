@@ -10,6 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ..rosy_field import RosyField
+from ..singularities import find_singularities
+from ..surface import Surface
 from .text_rows import format_lines, read_rows
 
 #: File name extensions of the format.
@@ -42,7 +45,7 @@ def read_sings(path: Path) -> tuple[int, np.ndarray, np.ndarray]:
     return int(numbers[0]), numbers[2::2], numbers[3::2]
 
 
-def sings_text(degree: int, element: np.ndarray, index: np.ndarray) -> str:
-    """Return the text of a `.sings` file; the parameters are as in the result of `read_sings`."""
-    rows = np.stack([element, index], axis=1)
-    return f"{degree} {len(element)}\n{format_lines(rows)}"
+def sings_text(surface: Surface, field: RosyField) -> str:
+    """Return the text of a `.sings` file with the singularities of a field."""
+    rows = np.stack(find_singularities(surface, field), axis=1)
+    return f"{field.degree} {len(rows)}\n{format_lines(rows)}"

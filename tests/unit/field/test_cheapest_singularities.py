@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shapes import cylinder, globe, icosphere, torus
+from shapes import cylinder, icosphere, torus
 
-from rosy_addon.core.errors import RosyError
 from rosy_addon.field.analysis import dirichlet_energy
 from rosy_addon.field.cheapest_singularities import cheapest_singularities
 from rosy_addon.field.generate import GeneratorSettings, generate
@@ -60,8 +59,3 @@ def test_a_field_with_a_border_needs_no_more():
     )
     vertex, index = find_singularities(tube, generate(tube, settings, 4))
     assert vertex.tolist() == [150] and index.tolist() == [1]
-
-
-def test_bad_vertices_are_named():
-    with pytest.raises(RosyError, match="has no vertex 5000"):
-        cheapest_singularities(globe(8, 16), 4, [5000], [1])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from field_helpers import angle_differences
 from scipy.spatial import cKDTree
 from shapes import from_quads, icosphere, joined, plane, torus
 
@@ -39,9 +40,7 @@ def draw(combing: Combing, points: np.ndarray, batch: int = 1000, pressure: floa
 
 def angles(combing: Combing, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """(F,) degrees between the RoSys of (F, 3) members."""
-    system = combing.system
-    z = [system.to_representation(vectors) for vectors in (a, b)]
-    return np.degrees(np.abs(np.angle(z[0] * z[1].conj())) / system.degree)
+    return np.degrees(angle_differences(combing.system.surface, a, b, combing.system.degree))
 
 
 def on_torus(u: np.ndarray) -> np.ndarray:

@@ -43,6 +43,11 @@ def directions_at_angles(surface, angles, lengths):
     return np.stack(turned, axis=1) * np.array(lengths, dtype=float)[:, None]
 
 
+def in_changing_order(directions, count):
+    """(count, N, 3): the same N directions in each row, in another order than in the row before."""
+    return np.stack([np.roll(directions, row, axis=0) for row in range(count)])
+
+
 # --- the algebra ---------------------------------------------------------------------------------
 
 
@@ -91,13 +96,6 @@ def test_the_representation_is_the_product_of_the_directions():
         assert np.allclose(np.exp(1j * degree * first), (-1) ** (degree - 1) * w.prod(axis=1))
 
 
-def test_a_rosy_has_no_direction_ratios():
-    surface = icosphere(2)
-    angles = 0.3 + 2 * np.pi * np.arange(6) / 6
-    field = field_from_directions(surface, directions_at_angles(surface, angles, np.full(6, 2.0)))
-    assert field.direction_ratios is None and np.allclose(field.magnitude, 2)
-
-
 def test_opposite_directions_are_detected():
     surface = plane()
     pairs = np.array([0.0, 0.6, np.pi, np.pi + 0.6])
@@ -113,11 +111,8 @@ def test_directions_on_vertices_are_averaged_onto_faces():
     surface = plane(6, 6)
     angles = (0.1, 0.9, 0.1 + np.pi, 0.9 + np.pi)
     directions = np.array([(2 * np.cos(a), 2 * np.sin(a), 0) for a in angles])
-    vertex_directions = np.tile(directions, (len(surface.vertices), 1, 1))
-    # The order of the directions differs between vertices.
-    for vertex in range(len(vertex_directions)):
-        vertex_directions[vertex] = np.roll(vertex_directions[vertex], vertex, axis=0)
-    field = validated_directions(surface, vertex_directions, "test", domain="vertex")
+    rows = in_changing_order(directions, len(surface.vertices))
+    field = validated_directions(surface, rows, "test", domain="vertex")
     for actual in field_directions(surface, field):
         nearest = np.abs(actual[:, None] - directions).max(axis=2).min(axis=1)
         assert nearest.max() < 1e-9
@@ -179,10 +174,8 @@ def test_streaks_run_along_free_directions(method, angles):
     surface = plane(7, 7, 2.2)
     radians = np.radians(angles)
     directions = np.stack([np.cos(radians), np.sin(radians), 0 * radians], axis=1)
-    directions = np.tile(directions, (surface.face_count, 1, 1))
-    for face in range(surface.face_count):  # the order must not matter
-        directions[face] = np.roll(directions[face], face, axis=0)
-    gbuffer = project_from_above(surface, field_from_directions(surface, directions), 256)
+    field = field_from_directions(surface, in_changing_order(directions, surface.face_count))
+    gbuffer = project_from_above(surface, field, 256)
     (layer,) = degree_layers(gbuffer, WEAVE.with_settings({"method": method}))
     tone = layer.tone.reshape(256, 256)[32:-32, 32:-32]
     # From -5 to 175 degrees: no direction is near the ends.

@@ -20,6 +20,7 @@ from rosy_addon.field.surface import Surface
 from rosy_addon.field.validate import VectorPolicy
 
 BALL = icosphere(2)
+CROSS = field_directions(BALL, axis_field(BALL, 4, (0.3, -0.2, 1.0)))
 
 
 def free_directions(degree, seed=0):
@@ -112,8 +113,7 @@ def test_faces_that_are_not_finite_are_written_as_zero(degree, rosy, tmp_path):
 @pytest.mark.parametrize("ending", [".txt", ".vec"])
 def test_two_directions_that_are_nowhere_opposite_are_a_cross(kind, ending, tmp_path):
     """Rows as programs for quad meshes write them: one direction for each line of the cross."""
-    cross = field_directions(BALL, axis_field(BALL, 4, (0.3, -0.2, 1.0)))
-    rows = cross[:, :2].reshape(-1, 6)
+    rows = CROSS[:, :2].reshape(-1, 6)
     if kind == "numbered":
         rows = np.column_stack([np.arange(len(rows)), rows])
     elif kind == "centered":
@@ -122,7 +122,7 @@ def test_two_directions_that_are_nowhere_opposite_are_a_cross(kind, ending, tmp_
     path = tmp_path / f"a{ending}"
     np.savetxt(path, rows, header=header, comments="", delimiter=",")
     loaded = load_field(path, BALL)
-    assert np.allclose(field_directions(BALL, loaded.field)[:, 0], cross[:, 0])
+    assert np.allclose(field_directions(BALL, loaded.field)[:, 0], CROSS[:, 0])
     assert loaded.field.degree == 4 and loaded.field.direction_ratios is None
     assert ("nowhere opposite" in loaded.note) == (kind != "centered")
     assert load_field(path, BALL, 4).note == ""
@@ -131,12 +131,11 @@ def test_two_directions_that_are_nowhere_opposite_are_a_cross(kind, ending, tmp_
 
 
 def test_the_directions_of_a_cross_in_two_files(tmp_path, error_of):
-    cross = field_directions(BALL, axis_field(BALL, 4, (0.3, -0.2, 1.0)))
     paths = [tmp_path / "alpha.csv", tmp_path / "beta.csv"]
-    for path, rows in zip(paths, cross.swapaxes(0, 1), strict=False):
+    for path, rows in zip(paths, CROSS.swapaxes(0, 1), strict=False):
         np.savetxt(path, rows, delimiter=",", header="x,y,z", comments="")
     loaded = load_field(paths, BALL)
-    assert np.allclose(field_directions(BALL, loaded.field), cross, atol=1e-12)
+    assert np.allclose(field_directions(BALL, loaded.field), CROSS, atol=1e-12)
     assert "alpha.csv: rows have two directions that are nowhere opposite" in loaded.note
     paths[1].write_text("1 0 0\n")
     message = error_of(load_field, paths, BALL)
@@ -157,14 +156,13 @@ def test_two_numbers_on_a_flat_mesh_are_x_and_y(tmp_path):
 
 
 def test_opposite_directions_are_a_field_of_degree_2(tmp_path):
-    vectors = axis_field(BALL, 2, (0.3, -0.2, 1.0)).vectors
-    np.save(tmp_path / "a.npy", np.stack([vectors, -vectors], axis=1))
+    np.save(tmp_path / "a.npy", CROSS[:, ::2])
     assert read_field(tmp_path / "a.npy", BALL).degree == 2
 
 
 @pytest.mark.parametrize("degree", [None, 6])
 def test_rosy_files_without_a_degree(degree, tmp_path):
-    vectors = axis_field(BALL, 4, (0.3, -0.2, 1.0)).vectors
+    vectors = CROSS[:, 0]
     np.savetxt(tmp_path / "a.rosy", vectors, header=str(len(vectors)), comments="")
     field, note = load_field(tmp_path / "a.rosy", BALL, degree)
     assert field.degree == (degree or 4) and np.allclose(field.vectors, vectors)

@@ -30,11 +30,9 @@ def degrees_of(vectors):
 def diagonal():
     """A square of 2 x 2 squares of 2 triangles, and the (face, edge) of its rising diagonals."""
     points = [[x, y, 0.0] for y in range(3) for x in range(3)]
-    faces, rows = [], []
-    for corner in (0, 1, 3, 4):
-        faces += [[corner, corner + 1, corner + 4], [corner, corner + 4, corner + 3]]
-        rows.append((len(faces) - 1, 0))
-    return rf.Surface(points, faces, name="square"), rows
+    corner = np.array([0, 1, 3, 4])[:, None]
+    faces = np.stack([corner + (0, 1, 4), corner + (0, 4, 3)], axis=1).reshape(-1, 3)
+    return rf.Surface(points, faces, name="square"), [(face, 0) for face in (1, 3, 5, 7)]
 
 
 def test_features_follow_the_file(tmp_path):

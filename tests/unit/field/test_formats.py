@@ -119,10 +119,6 @@ def test_the_mesh_of_an_archive_tells_where_its_rows_are(tmp_path):
     assert np.abs(loaded.field.vectors - CROSS[:, 0])[order].max() < 1e-9
 
 
-def _archive(**arrays):
-    return lambda path: np.savez(path, **arrays)
-
-
 DAMAGED = {
     "a.dmat": (b"6 x\n", "expected the numbers of columns and of rows"),
     "b.dmat": (b"3 2\n1\n2\n", "declares 6 numbers, but contains 2"),
@@ -144,20 +140,20 @@ DAMAGED = {
     "f.txt": (b"1 2\n", "contains 1 row, but sphere has"),
     "f.npy": (b"hello", "is not a valid .npy file"),
     "a.npz": (b"hello", "is not a valid .npz file"),
-    "b.npz": (_archive(a=CROSS, b=CROSS), "several arrays can be the field; call it 'directions'"),
-    "c.npz": (_archive(a=np.arange(3)), "no array can be the field"),
-    "d.npz": (_archive(), "no array can be the field"),
-    "e.npz": (_archive(Q=CROSS.astype(object)), "is not a valid .npy file"),
+    "b.npz": (
+        archive_bytes(a=CROSS, b=CROSS),
+        "several arrays can be the field; call it 'directions'",
+    ),
+    "c.npz": (archive_bytes(a=np.arange(3)), "no array can be the field"),
+    "d.npz": (archive_bytes(), "no array can be the field"),
+    "e.npz": (archive_bytes(Q=CROSS.astype(object)), "is not a valid .npy file"),
 }
 
 
 @pytest.mark.parametrize("name", DAMAGED)
 def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
     content, expected = DAMAGED[name]
-    if callable(content):
-        content(tmp_path / name)
-    else:
-        (tmp_path / name).write_bytes(content)
+    (tmp_path / name).write_bytes(content)
     message = error_of(read_field, tmp_path / name, BALL)
     assert expected in message and str(tmp_path / name) in message and "\n" not in message
 

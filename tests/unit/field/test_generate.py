@@ -147,18 +147,6 @@ def test_principal_directions_of_a_torus():
     assert np.degrees(np.abs(np.angle(z)).max() / 4) < 0.5
 
 
-def test_curvature_follows_a_rotation_of_the_mesh():
-    surface = torus(24, 12)
-    rotation = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
-    rotation *= np.sign(np.linalg.det(rotation))
-    rotated = rebuilt(surface, surface.vertices @ rotation.T)
-    for degree in (2, 4):
-        original = curvature_field(surface, degree)
-        rotated_back = RosyField(degree, curvature_field(rotated, degree).vectors @ rotation)
-        z = face_representation(surface, original)
-        assert np.allclose(face_representation(surface, rotated_back), z, atol=1e-9)
-
-
 def test_an_axis_is_projected():
     surface = icosphere(2)
     field = axis_field(surface, 3, (0, 0, 5))

@@ -7,7 +7,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from field_helpers import read_damaged
+from field_helpers import ply_header, read_damaged
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
@@ -45,33 +45,14 @@ OFF 5 2 0
 4 0 1 2 3 255 0 0
 3 2 1 4
 """
-PLY_HEADER = """\
-ply
-format {format} 1.0
-comment made by hand
-element vertex 5
-property float x
-property float y
-property float z
-property uchar red
-element face 2
-property list uchar int vertex_indices
-property float quality
-element edge 1
-property int vertex1
-property int vertex2
-end_header
-"""
-PLY_BODY = """\
-0 0 0 9
-1 0 0 9
-1 1 0 9
-0 1 0 9
-1 0.5 0.001 9
-4 0 1 2 3 0.5
-3 2 1 4 0.5
-0 1
-"""
+PLY_HEADER = ply_header(
+    "{format}",
+    ("vertex", 5, "float x", "float y", "float z", "uchar red"),
+    ("face", 2, "list uchar int vertex_indices", "float quality"),
+    ("edge", 1, "int vertex1", "int vertex2"),
+)
+PLY_BODY = "".join(f"{x:g} {y:g} {z:g} 9\n" for x, y, z in VERTICES)
+PLY_BODY += "".join(f"{len(face)} {' '.join(map(str, face))} 0.5\n" for face in FACES) + "0 1\n"
 
 
 def ply_with_float_count(count: float) -> bytes:
@@ -147,18 +128,18 @@ def test_strips_of_a_ply_file(binary, tmp_path):
     points = np.concatenate([np.column_stack([ring, np.full(8, z)]) for z in (0.0, 1.0)])
     around = [(k % 8 + 8 * upper) for k in range(9) for upper in (1, 0)]
     strips = [[*around[:8], -1, *around[6:]], [0, 7, 1, 6, 2, 5, 3, 4]]
-    header = (
-        f"ply\nformat {'binary_little_endian' if binary else 'ascii'} 1.0\nelement vertex 16\n"
-        "property double x\nproperty double y\nproperty double z\nelement tristrips 2\n"
-        "property list int int vertex_indices\nend_header\n"
-    ).encode()
+    header = ply_header(
+        "binary_little_endian" if binary else "ascii",
+        ("vertex", 16, "double x", "double y", "double z"),
+        ("tristrips", 2, "list int int vertex_indices"),
+    )
     rows = [[len(strip), *strip] for strip in strips]
     if binary:
         body = points.tobytes() + b"".join(np.array(row, "<i4").tobytes() for row in rows)
     else:
         lines = [*points.tolist(), *rows]
         body = "".join(" ".join(map(str, line)) + "\n" for line in lines).encode()
-    (tmp_path / "a.ply").write_bytes(header + body)
+    (tmp_path / "a.ply").write_bytes(header.encode() + body)
     surface = Surface(tmp_path / "a.ply")
     assert surface.face_count == 16 + 6 and surface.euler_characteristic == 1
     outward = surface.face_center - (0.0, 0.0, 0.5)

@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
-from field_helpers import angle_differences, read_field
+from field_helpers import angle_differences, ply_header, read_field
 from shapes import from_triangles, icosphere
 
 import rosy_addon as rf
@@ -64,12 +64,10 @@ def test_the_numbers_in_an_archive(tmp_path):
 
 def test_vectors_of_a_ply_file(tmp_path, capfd):
     """Three properties are a vector, of vertices too."""
-    (tmp_path / "a.ply").write_text(
-        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
-        "property float z\nproperty float wind_x\nproperty float wind_y\nproperty float wind_z\n"
-        "element face 1\nproperty list uchar int vertex_indices\nproperty float u_x\nend_header\n"
-        "0 0 0 1 2 0\n1 0 0 1 2 0\n0 1 0 1 2 0\n3 0 1 2 5\n".replace("\\\n", "\n")
-    )
+    wind = (f"float {name}" for name in ("x", "y", "z", "wind_x", "wind_y", "wind_z"))
+    face = "face", 1, "list uchar int vertex_indices", "float u_x"
+    rows = "0 0 0 1 2 0\n1 0 0 1 2 0\n0 1 0 1 2 0\n3 0 1 2 5\n"
+    (tmp_path / "a.ply").write_text(ply_header("ascii", ("vertex", 3, *wind), face) + rows)
     surface = rf.Surface(tmp_path / "a.ply")
     assert surface.face_data == {"u_x": [5]}
     assert main(["info", str(tmp_path / "a.ply"), "--array", "wind", "--degree", "2"]) == 0

@@ -47,7 +47,7 @@ def block(holes: int, missing: int = 0) -> Surface:
 
 def spread_vertices(surface: Surface, count: int, seed: int) -> np.ndarray:
     """Interior vertices in random order, no two of which share a face."""
-    graph = graph_of(surface)
+    graph = face_graph(surface)
     is_interior = np.zeros(len(surface.vertices), dtype=bool)
     is_interior[surface.corner_vertex[graph.is_interior[graph.corner_node]]] = True
     faces = surface.corner_vertex.reshape(surface.face_count, -1)
@@ -57,10 +57,6 @@ def spread_vertices(surface: Surface, count: int, seed: int) -> np.ndarray:
             chosen.append(vertex)
             is_interior[faces[(faces == vertex).any(axis=1)]] = False
     return np.array(chosen)
-
-
-def graph_of(surface):
-    return face_graph(surface)
 
 
 @pytest.mark.parametrize("degree", [1, 2, 4, 6])
@@ -195,7 +191,7 @@ def least_squares(system: np.ndarray, sums: np.ndarray) -> np.ndarray:
 )
 def test_the_energy_is_that_of_a_dense_solver(surface, degree, vertex, index):
     """Which tries all multiples of a turn around the loops."""
-    faces = graph_of(surface)
+    faces = face_graph(surface)
     triangles = triangle_graph(faces)
     graph = triangles.graph
     edge = np.arange(len(graph.source))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import numpy as np
+from command_helpers import write_obj
 from shapes import plane
 
 from rosy_addon.cli.parser import main
@@ -43,10 +44,7 @@ def test_a_smaller_turn_is_no_tie():
 
 
 def test_info_counts_ties(tmp_path, capsys):
-    mesh, out = tmp_path / "a.obj", tmp_path / "a.txt"
-    rows = [f"v {x} {y} {z}" for x, y, z in SURFACE.vertices]
-    rows += ["f " + " ".join(str(v + 1) for v in face) for face in SURFACE.faces]
-    mesh.write_text("\n".join(rows) + "\n")
+    mesh, out = write_obj(tmp_path / "a.obj", SURFACE.vertices, SURFACE.faces), tmp_path / "a.txt"
     np.savetxt(out, turned_field(0).vectors)
     assert main(["info", str(mesh), str(out), "--degree", "4"]) == 0
     assert "30 edges where the field turns by 45 degrees" in capsys.readouterr().out

@@ -191,8 +191,8 @@ class ReferenceImages:
         #: By the name of a scene: a key of what the last result depends on, and this result.
         self._current: dict[str, tuple[Hashable, ReferenceRender]] = {}
 
-    def load_pending(self) -> None:
-        """Load the files that have been requested."""
+    def load_pending(self) -> bool:
+        """Load the files that have been requested. Return True, as all of them are loaded then."""
         for name, (file_key, image) in list(self._images.items()):
             if image is not None:
                 continue
@@ -200,6 +200,7 @@ class ReferenceImages:
                 self._images[name] = file_key, look_inputs.load_luminance(file_key[0])
             except REPORTED_ERRORS as error:
                 self._images[name] = file_key, error_text(error)
+        return True
 
     def current(self, scene: Scene, depsgraph: Depsgraph, look: Look) -> ReferenceRender | None:
         """Return the reference render of a scene.

@@ -150,7 +150,7 @@ def test_streaks_that_drift_have_no_previews(slow, view_input):
     shown = []
     for frame in range(1, 60):
         view = slow.update(POINTERS, Request(("view", frame), "view", view_input))
-        assert view.downscale == 1
+        assert view.shown.downscale == 1
         if view.texture not in shown:
             shown.append(view.texture)
     assert len(shown) >= 5 and {width for _, width, _ in shown} == {32}
@@ -162,7 +162,7 @@ def test_a_view_that_turns_while_streaks_drift_has_previews(slow, view_input):
     for frame in range(1, 4):
         slow.update(POINTERS, Request(("view", frame), "view", view_input))
     view = slow.update(POINTERS, Request(("turned", 4), "turned", view_input))
-    assert view.downscale == 2 and view.texture_key == ("turned", 4)
+    assert view.shown.downscale == 2 and view.shown.request.key == ("turned", 4)
     preview = view.texture
     view = slow.update(POINTERS, Request(("turned", 5), "turned", view_input))
     assert view.texture == preview, "previews do not drift"
@@ -174,7 +174,9 @@ def test_views_with_streaks_that_drift_take_turns(slow, view_input):
         for pointers in (POINTERS, (1, 3)):
             slow.update(pointers, Request(("view", frame), "view", view_input))
     views = slow.views.values()
-    assert all(view.texture_key[1] > 80 for view in views), [view.texture_key for view in views]
+    assert all(view.shown.request.key[1] > 80 for view in views), [
+        view.shown.request.key for view in views
+    ]
 
 
 class HelpedRenderer(NotingRenderer):
@@ -225,17 +227,19 @@ def test_previews_are_finished_and_final_pictures_abandoned(helper, view_input, 
     progressive = progressive_of(HelpedRenderer(), helper)
     updated(progressive, "first", view_input)
     progressive.update(POINTERS, Request("second", "second", view_input))
-    view = updated(progressive, "third", view_input, lambda view: view.texture_key == "second")
+    view = updated(
+        progressive, "third", view_input, lambda view: view.shown.request.key == "second"
+    )
     assert view.texture == ((), 16), "a preview is shown, though the view has changed again"
-    view = updated(progressive, "third", view_input, lambda view: view.texture_key == "third")
-    assert view.downscale == 2
+    view = updated(progressive, "third", view_input, lambda view: view.shown.request.key == "third")
+    assert view.shown.downscale == 2
     updated(progressive, "third", view_input, lambda view: view.picture is not None)
     final = view.picture
     assert final.downscale == 1
     view = updated(progressive, "fourth", view_input, lambda view: view.picture is not final)
-    assert view.texture_key == "third" and view.picture.downscale == 2
-    view = updated(progressive, "fourth", view_input, lambda view: view.downscale == 1)
-    assert view.texture == ((), 32) and view.texture_key == "fourth"
+    assert view.shown.request.key == "third" and view.picture.downscale == 2
+    view = updated(progressive, "fourth", view_input, lambda view: view.shown.downscale == 1)
+    assert view.texture == ((), 32) and view.shown.request.key == "fourth"
 
 
 @pytest.mark.slow

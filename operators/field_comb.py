@@ -13,7 +13,7 @@ from ..rosy_addon.jobs.comb_field import CombStroke
 from ..rosy_addon.ui import comb_brush, overlay
 from ..rosy_addon.ui.property_makers import brush_strength, choice, fraction, real, toggle
 from ..rosy_addon.ui.sidebar import use_property_columns
-from ..rosy_addon.viewport.brush_mouse import hold_mouse, release_mouse
+from ..rosy_addon.viewport.brush_mouse import current_mouse, release_mouse
 from ..rosy_addon.worker.job import Steps, part
 from .base import ACTIVE_FIELD, IDLE, Condition, selected_mesh_objects
 from .modal_job import ActiveMeshMixin, Job, ModalJobMixin
@@ -105,7 +105,7 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
             return super().invoke(context, event)
         self._is_away = False
         try:
-            self._mouse = hold_mouse(context, selected_mesh_objects(context)[0])
+            self._mouse = current_mouse(context, selected_mesh_objects(context)[0], holds=True)
             self._add(context, event)
         except REPORTED_ERRORS as error:
             release_mouse()

@@ -19,11 +19,7 @@ from ..annotation import arrow_marks, singularity_marks
 from ..annotation.arrow_marks import ArrowMarks
 from ..annotation.draw_marks import head_outline
 from ..annotation.index_labels import MAX_LABELS, place_indices
-from ..annotation.singularity_settings import (
-    shows_clusters,
-    shows_hidden_singularities,
-    shows_indices,
-)
+from ..annotation.singularity_settings import shows_hidden_singularities, shows_indices
 from ..compositor.look import Look
 from ..core.cache import Cache
 from ..core.color import from_hex
@@ -225,12 +221,9 @@ def draw_singularities(
     """
     dots = []
     for instance in with_field(view_input.instances):
-        found = look_up_singularities(instance, cache)
-        if isinstance(found, Preparation):
+        if isinstance(look_up_singularities(instance, cache), Preparation):
             continue
-        if shows_clusters(look):
-            found = singularity_marks.clusters_of(instance, found, cache)
-        vertex, index = found
+        vertex, index = singularity_marks.shown_singularities(instance, look, cache)
         points = instance.world_points()[vertex]
         kept = ~is_cut_away(points, view_input.clip_planes)
         dots.append(SingularityDots(points[kept], index[kept], instance.field.degree))

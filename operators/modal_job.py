@@ -264,7 +264,9 @@ class ModalJobMixin(RosyOperator):
         """Set the properties for the second call of the operator, so that it does not ask again."""
 
     def finish(self, context: Context, result: Any) -> None:
-        """Report the result of the job to the user."""
+        """Report the result of the job to the user. By default, it is reported if it is a text."""
+        if isinstance(result, str):
+            self.report_done(result)
 
     def act(self, context: Context) -> None:
         self.finish(context, run(self.begin(context)))

@@ -355,32 +355,20 @@ def surface_places(surface: Surface, distance: float, cache: Cache) -> SurfacePl
     density = CANDIDATES_PER_PLACE / level_distance(places.extent, last) ** 2
     triangle, barycentric, rank = surface_samples(surface, density)
     order = np.argsort(rank, kind="stable")
-    # The candidates of a level are the first ones in the order of their ranks.
-    triangle, barycentric, rank = triangle[order], barycentric[order], rank[order]
+    vertices = surface.in_rest_shape().vertices
     for level in range(places.level + 1, last + 1):
         report(level / (last + 1), "finding places of arrowheads")
-        density = CANDIDATES_PER_PLACE / level_distance(places.extent, level) ** 2
-        count = int(np.searchsorted(rank, density))
-        places = _with_level(surface, places, triangle[:count], barycentric[:count])
+        finest = level_distance(places.extent, level)
+        # The candidates of a level are the first ones in the order of their ranks.
+        new = order[: np.searchsorted(rank[order], CANDIDATES_PER_PLACE / finest**2)]
+        triangles = np.concatenate([places.triangle, triangle[new]])
+        weights = np.concatenate([places.barycentric, barycentric[new]])
+        distance = np.concatenate([places.distance, np.full(len(new), finest)])
+        corners = vertices[surface.triangle_vertex[triangles]]
+        chosen = spaced_points(np.einsum("nk,nki->ni", weights, corners), finest)
+        columns = triangles[chosen], weights[chosen], distance[chosen]
+        places = SurfacePlaces(*columns, level, places.extent)
     return cache.put(key, places)
-
-
-def _with_level(
-    surface: Surface, places: SurfacePlaces, triangle: np.ndarray, barycentric: np.ndarray
-) -> SurfacePlaces:
-    """Return `places` with one more level, whose points are chosen from candidates.
-
-    `triangle` and `barycentric` are the triangles and barycentric coordinates of the candidates.
-    """
-    level = places.level + 1
-    finest = level_distance(places.extent, level)
-    distance = np.concatenate([places.distance, np.full(len(triangle), finest)])
-    triangle = np.concatenate([places.triangle, triangle])
-    barycentric = np.concatenate([places.barycentric, barycentric])
-    corners = surface.in_rest_shape().vertices[surface.triangle_vertex[triangle]]
-    chosen = spaced_points(np.einsum("nk,nki->ni", barycentric, corners), finest)
-    columns = (column[chosen] for column in (triangle, barycentric, distance))
-    return SurfacePlaces(*columns, level, places.extent)
 
 
 def spaced_points(position: np.ndarray, spacing: float) -> np.ndarray:

@@ -11,10 +11,10 @@ from functools import partial
 from itertools import chain
 
 import bpy
-from bpy.types import Area, Context, Depsgraph, Scene, SpaceView3D
+from bpy.types import Area, Context, Depsgraph, SpaceView3D
 
 from ..annotation.singularity_settings import shows_singularities
-from ..compositor.flow import NO_DRIFT, Drift
+from ..compositor.flow import NO_DRIFT
 from ..compositor.look import Look, has_flow
 from ..core.cache import Cache
 from ..core.errors import REPORTED_ERRORS, DeviceError, RosyError, counted, error_text
@@ -323,6 +323,9 @@ class ViewportSession:
         if look.tone == "picture" and reference is None:
             self._redraw_when(self._references.load_pending)
             return None
+        self._has_shown_flow |= has_flow(look)
+        # Streaks drift with the frames of the scene, and with the clock.
+        frame = context.scene.frame_current_final + self.flow_clock.frames
         return ViewInput(
             instances=tuple(entry.instance for entry in visible),
             camera=camera,
@@ -330,14 +333,8 @@ class ViewportSession:
             lights=tuple(read_lights(depsgraph, camera.view)) if look.light == "scene" else (),
             reference=reference,
             clip_planes=view3d.clip_planes(context.region_data),
-            drift=self._drift(look, context.scene),
+            drift=drift_in_scene(context.scene, look, frame),
         )
-
-    def _drift(self, look: Look, scene: Scene) -> Drift:
-        """Return how far streaks have drifted at the current frame of a scene plus the frames of `flow_clock`."""
-        if has_flow(look):
-            self._has_shown_flow = True
-        return drift_in_scene(scene, look, scene.frame_current_final + self.flow_clock.frames)
 
     def _draw_text(self) -> None:
         """Draw the messages and the labels of singularities in a view."""

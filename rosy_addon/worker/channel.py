@@ -10,11 +10,11 @@ from __future__ import annotations
 import io
 import pickle
 import time
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from dataclasses import fields
 from itertools import count
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,24 @@ KEPT_CLASSES = (GuidedSystem, MeshInstance, ReferenceRender, RosyField, Surface,
 
 #: Largest number of bytes of an array that are sent at once.
 CHUNK_BYTES = 1 << 20
+
+
+class Message(NamedTuple):
+    """A message as it is received.
+
+    Attributes
+    ----------
+    forgotten : list of int
+        Numbers of kept objects that this process can drop.
+    stream : bytes
+        The pickle, without the data of arrays.
+    buffers : list of (n,) uint8 ndarray
+        The bytes of the arrays of the pickle.
+    """
+
+    forgotten: list[int]
+    stream: bytes
+    buffers: list[np.ndarray]
 
 
 class Channel:
@@ -51,10 +69,10 @@ class Channel:
         self._numbers = count()
         #: Objects that this process keeps, as later messages may refer to them, by number.
         self._kept: dict[int, Any] = {}
-        #: The generator that receives the next message in parts, and the message. The message is None until
+        #: The generator that receives messages in parts, and the next message. The message is None until
         #: it is complete.
         self._parts = _message_parts(connection)
-        self._message: tuple[list[int], bytes, list[np.ndarray]] | None = None
+        self._message: Message | None = None
 
     def has_received(self, seconds: float) -> bool:
         """Receive parts of the next message that are available, for some seconds.
@@ -68,7 +86,7 @@ class Channel:
         """
         deadline = time.monotonic() + seconds
         while self._message is None and self.connection.poll():
-            self._receive_part()
+            self._message = next(self._parts)
             if time.monotonic() > deadline:
                 break
         return self._message is not None
@@ -103,44 +121,32 @@ class Channel:
             If the other process has ended.
         """
         while self._message is None:
-            self._receive_part()
+            self._message = next(self._parts)
         (forgotten, stream, buffers), self._message = self._message, None
         for number in forgotten:
             del self._kept[number]
         return _Unpickler(stream, buffers, self._kept, self._package).load()
 
-    def _receive_part(self) -> None:
-        """Wait for the next part of a message."""
-        try:
-            next(self._parts)
-        except StopIteration as end:
-            self._message, self._parts = end.value, _message_parts(self.connection)
 
+def _message_parts(connection: Connection) -> Iterator[Message | None]:
+    """Receive messages in parts of up to `CHUNK_BYTES`.
 
-def _message_parts(
-    connection: Connection,
-) -> Generator[None, None, tuple[list[int], bytes, list[np.ndarray]]]:
-    """Receive a message: a generator that yields before it waits for each part of up to `CHUNK_BYTES`.
-
-    Returns
-    -------
-    forgotten : list of int
-        Numbers of kept objects that this process can drop.
-    stream : bytes
-        The pickle, without the data of arrays.
-    buffers : list of (n,) uint8 ndarray
-        The bytes of the arrays of the pickle.
+    Yields
+    ------
+    Message or None
+        None before the next part of a message is waited for; the message after its last part.
     """
-    forgotten, sizes = connection.recv()
-    yield
-    stream = connection.recv_bytes()
-    buffers = [np.empty(size, dtype=np.uint8) for size in sizes]
-    for buffer in buffers:
-        position = 0
-        while position < len(buffer):
-            yield
-            position += connection.recv_bytes_into(buffer, position)
-    return forgotten, stream, buffers
+    while True:
+        forgotten, sizes = connection.recv()
+        yield None
+        stream = connection.recv_bytes()
+        buffers = [np.empty(size, dtype=np.uint8) for size in sizes]
+        for buffer in buffers:
+            position = 0
+            while position < len(buffer):
+                yield None
+                position += connection.recv_bytes_into(buffer, position)
+        yield Message(forgotten, stream, buffers)
 
 
 class _Pickler(pickle.Pickler):

@@ -15,6 +15,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
+from conftest import member_vectors
 from window_steps import (
     call_in_view,
     fresh_scene,
@@ -71,13 +72,11 @@ def annotations_guide_a_field():
             "EXEC_DEFAULT", True, kind="guided", degree=2, guides={"ANNOTATIONS"}
         )
     mesh = bpy.context.object.data
-    vectors = np.empty(3 * len(mesh.polygons), dtype=np.float32)
-    mesh.attributes["rosy"].data.foreach_get("vector", vectors)
     center = np.array([face.center for face in mesh.polygons])
     x, y, z = center.T
     near = (np.abs(x - z) < 0.05) & (np.abs(x) < 0.4) & (y < 0.0)
     assert near.sum() > 5
-    direction = vectors.reshape(-1, 3)[near]
+    direction = member_vectors(mesh)[near]
     angle = np.degrees(np.arctan2(direction[:, 2], direction[:, 0])) % 180.0
     assert np.abs(angle - 45.0).max() < 5.0, angle
 
@@ -182,10 +181,7 @@ def comb():
 
 def field_bytes():
     """Return the vectors of the active object's field."""
-    attribute = bpy.context.object.data.attributes["rosy"]
-    vectors = np.empty(3 * len(attribute.data), dtype=np.float32)
-    attribute.data.foreach_get("vector", vectors)
-    return vectors.tobytes()
+    return member_vectors(bpy.context.object.data).tobytes()
 
 
 def shown_singularities():

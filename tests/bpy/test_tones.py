@@ -7,6 +7,7 @@ import os
 import bpy
 import numpy as np
 import pytest
+from harness.blender_data import attribute_values
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.core.color import to_linear
 from rosy.rosy_addon.core.errors import RosyError
@@ -236,8 +237,7 @@ def test_occlusion_is_stored_and_drawn(scene, wall):
     attribute = wall.data.attributes[OCCLUSION_ATTRIBUTE]
     assert (attribute.domain, attribute.data_type) == ("CORNER", "FLOAT")
     assert OCCLUSION_ATTRIBUTE not in floor.data.attributes
-    values = np.empty(16, dtype=np.float32)
-    attribute.data.foreach_get("value", values)
+    values = attribute_values(attribute)
     corner = np.array([loop.vertex_index for loop in wall.data.loops])
     height = np.array([wall.data.vertices[index].co.z for index in corner])
     # At the edge with the floor, which is practically infinite, half of the sky is visible.

@@ -7,7 +7,8 @@ import sys
 import bpy
 import numpy as np
 import pytest
-from conftest import attribute_values, contents, error_of, member_vectors
+from conftest import contents, error_of, member_vectors
+from harness.blender_data import attribute_values
 
 
 @pytest.mark.parametrize(("kind", "degree"), [("curvature", 4), ("axis", 12), ("uv", 4)])

@@ -28,23 +28,20 @@ from window_steps import (
 )
 
 
-def fresh_sphere():
+def fresh_sphere(segments=48, ring_count=24, **options):
     """Create a scene in which a sphere is the only object."""
     yield from fresh_scene()
     with in_view():
         bpy.ops.object.select_all(action="SELECT")
         bpy.ops.object.delete()
-        bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24)
+        bpy.ops.mesh.primitive_uv_sphere_add(segments=segments, ring_count=ring_count, **options)
 
 
 def annotations_guide_a_field():
     """A stroke of the Annotate tool across the middle of a sphere, drawn on its surface."""
-    yield from fresh_scene()
+    yield from fresh_sphere(64, 32, location=(0.5, 0.0, 0.0))
     scene = bpy.context.scene
-    with in_view():
-        bpy.ops.object.delete()
-        bpy.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, location=(0.5, 0.0, 0.0))
-        bpy.ops.view3d.view_axis(type="FRONT")
+    call_in_view(bpy.ops.view3d.view_axis, type="FRONT")
     view()[1].spaces.active.region_3d.view_distance = 5.0
     view()[1].spaces.active.region_3d.view_perspective = "ORTHO"
     yield 0.5

@@ -136,14 +136,15 @@ def add_field(obj, kind="curvature", degree=4, axis=(0.0, 0.0, 1.0)):
     return obj
 
 
-def set_vectors(mesh, vectors, name="rosy", domain="FACE", kind="FLOAT_VECTOR"):
+def set_attribute(mesh, values, name="rosy", domain="FACE", kind="FLOAT_VECTOR"):
     """Store values in a new attribute, as another program would."""
     old = mesh.attributes.get(name)
     if old is not None:
         mesh.attributes.remove(old)
     attribute = mesh.attributes.new(name, kind, domain)
-    key = "vector" if kind == "FLOAT_VECTOR" else "value"
-    attribute.data.foreach_set(key, np.asarray(vectors, dtype=np.float32).ravel())
+    key = {"VECTOR": "vector", "COLOR": "color"}.get(kind.rpartition("_")[2], "value")
+    number = np.int32 if kind == "INT" else np.float32
+    attribute.data.foreach_set(key, np.asarray(values, dtype=number).ravel())
     mesh.update()
 
 

@@ -8,7 +8,6 @@ import bpy
 import numpy as np
 import pytest
 from harness.blender_data import attribute_values
-from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.core.progress import listening
 from rosy.rosy_addon.jobs.draw_strokes import draw_strokes
 from rosy.rosy_addon.line_drawing.outline import OUTLINE_KINDS
@@ -21,6 +20,7 @@ from rosy.rosy_addon.scene.stroke_data import has_grease_pencil_drawings
 from rosy.rosy_addon.scene.stroke_objects import edited_strokes, remove_strokes, stroke_objects
 from rosy.rosy_addon.worker.job import Step
 from scenes import add_field, add_nodes, add_plane, contents, depsgraph, each_step, render
+from test_bad_input import assert_refused
 
 PLAIN = StrokeStyle(spacing=12, outline=True)
 BLACK = Pen(width=1.5)
@@ -311,11 +311,7 @@ def test_wrong_input_is_one_line_and_changes_nothing(monkey, camera, scene, prob
     elif problem == "away":
         monkey.location.y = -50.0
         bpy.context.view_layer.update()
-    before = contents()
-    with pytest.raises(RosyError) as caught:
-        draw_strokes(scene, **{"kind": "PENCIL", **options})
-    assert text in str(caught.value) and "\n" not in str(caught.value)
-    assert contents() == before
+    assert_refused(text, act=draw_strokes, **{"kind": "PENCIL", **options})
 
 
 def move_a_point(data):

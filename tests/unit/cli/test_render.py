@@ -60,17 +60,6 @@ def test_render_fields_of_others(name, shared_data, tmp_path):
 
 
 @pytest.mark.slow
-def test_fields_that_are_no_rosy_are_drawn_but_not_written_as_one(shared_data, tmp_path):
-    mesh = shared_data / "meshes" / "cheburashka.off"
-    field = shared_data / "fields" / "cheburashka-cf.rawfield"
-    done = rosy("render", mesh, field, "-o", tmp_path / "a.png", "--size", "64x64")
-    assert done.returncode == 0, done.stderr
-    done = rosy("field", mesh, field, "-o", tmp_path / "a.rosy")
-    assert_refused(done, "a.rosy", "do not form a RoSy")
-    assert not (tmp_path / "a.rosy").exists()
-
-
-@pytest.mark.slow
 def test_a_transferred_field_is_reported(sphere, tmp_path):
     made = tmp_path / "sphere.rosy"
     assert rosy("field", sphere, "-o", made).returncode == 0

@@ -77,6 +77,23 @@ def progressive():
     return progressive_of(NotingRenderer())
 
 
+def updated(progressive, key, view_input, until=lambda view: view.picture is None):
+    """Update a view as Blender redraws, until something is so, and return it."""
+    for _ in range(500):
+        start = time.process_time()
+        view = progressive.update(POINTERS, Request(key, key, view_input))
+        assert time.process_time() - start < 0.1
+        if until(view):
+            return view
+        while not progressive.poll():
+            time.sleep(0.005)
+    raise AssertionError("it was never so")
+
+
+def has_picture(view):
+    return view.texture is not None
+
+
 def test_each_step_of_the_first_picture_is_named_before_it_begins(progressive, view_input):
     done = progressive.renderer.done
     for _ in range(20):
@@ -102,19 +119,14 @@ def test_a_picture_that_fails_is_not_tried_again(progressive, view_input, failin
     renderer = progressive.renderer
     renderer.failing.add(failing)
     with pytest.raises(MemoryError):
-        for _ in range(20):
-            progressive.update(POINTERS, Request("key", "key", view_input))
+        updated(progressive, "key", view_input, has_picture)
     done_count = len(renderer.done)
     for _ in range(3):
         with pytest.raises(RosyError, match="not enough memory"):
             progressive.update(POINTERS, Request("key", "key", view_input))
     assert len(renderer.done) == done_count
     renderer.failing.clear()
-    for _ in range(20):
-        request = Request("another key", "another key", view_input)
-        if progressive.update(POINTERS, request).texture is not None:
-            return
-    raise AssertionError("it was not tried again")
+    assert updated(progressive, "another key", view_input, has_picture), "it is tried again"
 
 
 class SlowRenderer(NotingRenderer):
@@ -197,27 +209,14 @@ class HelpedRenderer(NotingRenderer):
         return view.instances, view.camera.width
 
 
-def updated(progressive, key, view_input, until=lambda view: view.picture is None):
-    """Update a view as Blender redraws, until something is so, and return it."""
-    for _ in range(500):
-        start = time.process_time()
-        view = progressive.update(POINTERS, Request(key, key, view_input))
-        assert time.process_time() - start < 0.1
-        if until(view):
-            return view
-        while not progressive.poll():
-            time.sleep(0.005)
-    raise AssertionError("it was never so")
-
-
 def test_what_the_helper_does_is_named(helper, view_input):
     progressive, shown = progressive_of(HelpedRenderer(), helper), []
 
-    def has_picture(view):
+    def is_done(view):
         shown.append(view.progress.label if view.progress else "")
-        return view.texture is not None
+        return has_picture(view)
 
-    view = updated(progressive, "key", view_input, has_picture)
+    view = updated(progressive, "key", view_input, is_done)
     assert view.texture == ((), 32) and view.progress is None and "drawing" in shown
 
 

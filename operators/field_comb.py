@@ -13,7 +13,7 @@ from ..rosy_addon.jobs.comb_field import CombStroke
 from ..rosy_addon.ui import comb_brush, overlay
 from ..rosy_addon.ui.property_makers import brush_strength, choice, fraction, real, toggle
 from ..rosy_addon.ui.sidebar import use_property_columns
-from ..rosy_addon.viewport.brush_mouse import hold_mouse, release_mouse
+from ..rosy_addon.viewport.brush_mouse import current_mouse, release_mouse
 from ..rosy_addon.worker.job import Steps, part
 from .base import ACTIVE_FIELD, IDLE, Condition, selected_mesh_objects
 from .modal_job import ActiveMeshMixin, Job, ModalJobMixin
@@ -105,7 +105,7 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
             return super().invoke(context, event)
         self._is_away = False
         try:
-            self._mouse = hold_mouse(context, selected_mesh_objects(context)[0])
+            self._mouse = current_mouse(context, selected_mesh_objects(context)[0], holds=True)
             self._add(context, event)
         except REPORTED_ERRORS as error:
             release_mouse()
@@ -119,13 +119,12 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
             if result != {"RUNNING_MODAL"} or self._job is not None:
                 release_mouse()
             return result
-        if event.type == "LEFTMOUSE" and event.value == "PRESS":
-            # The next stroke begins, so the job of this one is completed at once.
-            return self._settle_now(context) | {"PASS_THROUGH"}
-        result = super().modal(context, event)
+        # If the next stroke begins, the job of this one is completed at once.
+        is_next = event.type == "LEFTMOUSE" and event.value == "PRESS"
+        result = super().modal(context, event, runs_to_end=is_next)
         if result == {"CANCELLED"}:
             self._take_back()
-        return result
+        return result | {"PASS_THROUGH"} if is_next else result
 
     def _drag(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Handle an event while the mouse button is down. Return the operator's result for this event."""
@@ -194,21 +193,6 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         yield from line.settle()
         field = line.store()
         overlay.refresh(context, {line.mesh: field})
-
-    def _settle_now(self, context: bpy.types.Context) -> set[str]:
-        """Run the rest of the job without returning to Blender's event loop.
-
-        Return the result of the operator.
-        """
-        try:
-            self._job.finish(context)
-        except REPORTED_ERRORS as error:
-            self._take_back()
-            return self.report_error(error)
-        if self._job.is_done:
-            return {"FINISHED"}
-        self._take_back()
-        return {"CANCELLED"}
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Cancel the stroke and its job, and restore the field.

@@ -131,11 +131,11 @@ class ROSY_OT_field_convert(_FieldsJobMixin, Operator):
     )
     values: text("Values", "Name of the attribute or vertex group", search=_search_values)
 
-    def begin(self, context: Context) -> Steps[int]:
-        """Convert the fields of all selected meshes, then store them. The result is the number of meshes."""
+    def begin(self, context: Context) -> Steps[str]:
+        """Convert the fields of all selected meshes, then store them. The result is a message to the user."""
         converted = yield from self.each_mesh(context, self._converted)
         self.store_fields(context, converted)
-        return len(converted)
+        return f"Converted {counted(len(converted), 'field')}"
 
     def _converted(self, mesh: Mesh) -> Steps[RosyField]:
         """Return the steps of the job that computes the converted field of a mesh."""
@@ -152,9 +152,6 @@ class ROSY_OT_field_convert(_FieldsJobMixin, Operator):
         )
         field = yield Call(convert, (surface, field, conversion))
         return replace(field, source_directions=None)
-
-    def finish(self, context: Context, result: int) -> None:
-        self.report_done(f"Converted {counted(result, 'field')}")
 
     def draw(self, context: Context) -> None:
         draw_convert_settings(self.layout, self)
@@ -176,22 +173,21 @@ class ROSY_OT_field_store(_FieldsJobMixin, Operator):
         "'rosy_tangent' for tangents",
     )
 
-    def begin(self, context: Context) -> Steps[int]:
-        """Read the fields of all selected meshes, then store them. The result is the number of meshes."""
+    def begin(self, context: Context) -> Steps[str]:
+        """Read the fields of all selected meshes, then store them. The result is a message to the user."""
         if self.form == "TANGENT":
             guiding_angle = context.scene.rosy.look.guiding_angle
             tangents = yield from self.each_mesh(
                 context, lambda mesh: mesh_tangents.begin(mesh, guiding_angle, self.attribute)
             )
             assign_tangents(tangents, self.attribute)
-            return len(tangents)
-        yield Step(0.0, "reading the fields")
-        fields = {mesh: read_mesh_field(mesh) for mesh in self.required_data(context)}
-        assign_fields(fields, self.attribute, self.form)
-        return len(fields)
-
-    def finish(self, context: Context, result: int) -> None:
-        self.report_done(f"Stored {counted(result, 'field')} as {FORMS[self.form][0]}")
+            count = len(tangents)
+        else:
+            yield Step(0.0, "reading the fields")
+            fields = {mesh: read_mesh_field(mesh) for mesh in self.required_data(context)}
+            assign_fields(fields, self.attribute, self.form)
+            count = len(fields)
+        return f"Stored {counted(count, 'field')} as {FORMS[self.form][0]}"
 
     def draw(self, context: Context) -> None:
         draw_settings(self.layout, self, "form")

@@ -108,9 +108,6 @@ class ROSY_OT_field_import(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Im
         faces = counted(len(field.vectors), "face")
         return f"Read a field of degree {field.degree} on {faces} of '{obj.name}'"
 
-    def finish(self, context: bpy.types.Context, result: str) -> None:
-        self.report_done(result)
-
 
 class ROSY_FH_field(bpy.types.FileHandler):
     """Import field files that are dropped on the 3D view."""

@@ -157,7 +157,7 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
         self.store_fields(context, fields, self.attribute)
         names = [obj.name for obj in selected_mesh_objects(context) if obj.data in fields]
         target = f"'{names[0]}'" if len(fields) == 1 else counted(len(fields), "mesh", "meshes")
-        return f"a field of degree {self.degree} on {target}{notes and ': '}{notes}"
+        return f"Made a field of degree {self.degree} on {target}{notes and ': '}{notes}"
 
     def _generator_settings(
         self, context: Context, mesh: Mesh, surface: Surface
@@ -212,9 +212,6 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
 
     def required_data(self, context: Context) -> Iterable[ID]:
         return dict.fromkeys(obj.data for obj in selected_mesh_objects(context))
-
-    def finish(self, context: Context, result: str) -> None:
-        self.report_done(f"Made {result}")
 
     def draw(self, context: Context) -> None:
         draw_generator_settings(self.layout, self)

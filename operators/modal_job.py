@@ -7,6 +7,7 @@ with ``EXEC_DEFAULT``, or if there is no window, the job runs in Blender's proce
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from typing import Any
@@ -15,7 +16,7 @@ import bpy
 from bpy.types import ID, Context, Event, Object, WorkSpace
 from bpy_extras.io_utils import ExportHelper
 
-from ..rosy_addon.core.errors import REPORTED_ERRORS, as_sentence, telling_warnings
+from ..rosy_addon.core.errors import REPORTED_ERRORS, RosyWarning, as_sentence, telling_warnings
 from ..rosy_addon.scene.app_handlers import add_handlers, remove_handlers
 from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.ui import job_status
@@ -79,8 +80,6 @@ class Job:
         Why the job has ended; None while it runs.
     result : Any
         The result of the job once it is done.
-    note : str
-        A note for the user that is reported when the job has ended. Empty if there is none.
     """
 
     def __init__(self, context: Context, steps: Steps[Any], required_data: Iterable[ID]) -> None:
@@ -90,7 +89,6 @@ class Job:
         self.scene, self.view_layer = context.scene, context.view_layer
         self.stop_reason: str | None = None
         self.result: Any = None
-        self.note = ""
         HELPER.is_usable = uses_helper(context)
         self._runner = StepRunner(steps, HELPER)
         self.workspaces: list[WorkSpace] = []
@@ -152,7 +150,8 @@ class Job:
         """
         global _has_said_no_helper
         if uses_helper(context) and not _has_said_no_helper:
-            self.note, _has_said_no_helper = NO_HELPER, True
+            _has_said_no_helper = True
+            warnings.warn(NO_HELPER, RosyWarning, stacklevel=2)
         context.window.cursor_modal_set("WAIT")
         try:
             yield
@@ -265,7 +264,9 @@ class ModalJobMixin(RosyOperator):
         """Set the properties for the second call of the operator, so that it does not ask again."""
 
     def finish(self, context: Context, result: Any) -> None:
-        """Report the result of the job to the user."""
+        """Report the result of the job to the user. By default, it is reported if it is a text."""
+        if isinstance(result, str):
+            self.report_done(result)
 
     def act(self, context: Context) -> None:
         self.finish(context, run(self.begin(context)))
@@ -295,19 +296,17 @@ class ModalJobMixin(RosyOperator):
         }
         return self.call(getattr(bpy.ops.rosy, type(self).bl_idname.partition(".")[2]), **settings)
 
-    def modal(self, context: Context, event: Event) -> set[str]:
+    def modal(self, context: Context, event: Event, *, runs_to_end: bool = False) -> set[str]:
+        """Handle an event while the job runs. If `runs_to_end`, complete the job at once."""
         job = self._job
         if job.stop_reason is None and event.type == "ESC" and event.value == "PRESS":
             job.stop("cancelled")
-        elif job.stop_reason is None and event.type == "TIMER":
+        elif job.stop_reason is None and (runs_to_end or event.type == "TIMER"):
             try:
                 with telling_warnings(self.report_warnings):
-                    job.advance(context)
+                    (job.finish if runs_to_end else job.advance)(context)
             except REPORTED_ERRORS as error:
                 return self.report_error(error)
-            if job.note:
-                self.report_warnings(job.note)
-                job.note = ""
             if job.is_done:
                 self.finish(context, job.result)
                 return {"FINISHED"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,9 @@ HAS_USER_PRESETS = Condition(
     lambda _: preset_library.user_preset_keys(), "You have no presets yet: save one first"
 )
 
+#: The property that lets an operator replace a preset of the user.
+REPLACE = toggle("Replace Existing", "Replace your preset of the same name", options={"SKIP_SAVE"})
+
 
 def _preset_property(search: Any) -> Any:
     """Return the text property for the key of the preset that an operator acts on.
@@ -29,11 +33,6 @@ def _preset_property(search: Any) -> Any:
     """
     description = "Name of the preset. Empty: the active preset of the scene"
     return text("Preset", description, search=search, options={"SKIP_SAVE"})
-
-
-def _replace_property() -> Any:
-    """Return the boolean property that lets an operator replace a preset of the user."""
-    return toggle("Replace Existing", "Replace your preset of the same name", options={"SKIP_SAVE"})
 
 
 class _PresetOperator(RosyOperator):
@@ -99,7 +98,7 @@ class ROSY_OT_preset_save(_DescribedPreset, bpy.types.Operator):
     bl_label = "Save Preset"
     confirm_text = "Save"
 
-    replace: _replace_property()
+    replace: REPLACE
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         entry = preset_library.active_entry(context.scene.rosy)
@@ -107,9 +106,10 @@ class ROSY_OT_preset_save(_DescribedPreset, bpy.types.Operator):
 
     def draw(self, context: bpy.types.Context) -> None:
         super().draw(context)
-        if _is_user_preset(self.name):
-            self.layout.label(text="You already have a preset of this name", icon="INFO")
-            self.layout.prop(self, "replace")
+        with suppress(RosyError):  # the name may not be complete yet
+            if store.preset_key(self.name) in preset_library.user_preset_keys():
+                self.layout.label(text="You already have a preset of this name", icon="INFO")
+                self.layout.prop(self, "replace")
 
     def act(self, context: bpy.types.Context) -> None:
         settings = context.scene.rosy
@@ -120,14 +120,6 @@ class ROSY_OT_preset_save(_DescribedPreset, bpy.types.Operator):
         redraw()
 
 
-def _is_user_preset(name: str) -> bool:
-    """Return whether the user has a preset with this name."""
-    try:
-        return store.preset_key(name) in preset_library.user_preset_keys()
-    except RosyError:
-        return False
-
-
 class ROSY_OT_preset_rename(_DescribedPreset, bpy.types.Operator):
     """Change the name or the description of one of your presets"""
 
@@ -135,7 +127,7 @@ class ROSY_OT_preset_rename(_DescribedPreset, bpy.types.Operator):
     confirm_text = "Rename"
     conditions = (HAS_USER_PRESETS,)
 
-    preset: _preset_property(preset_library.search_user_presets)
+    preset: _preset_property(preset_library.user_preset_keys)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         return self.ask(context, preset_library.entries().get(_target_preset(self, context)))
@@ -155,7 +147,7 @@ class ROSY_OT_preset_remove(_PresetOperator, bpy.types.Operator):
     bl_label = "Delete Preset"
     conditions = (HAS_USER_PRESETS,)
 
-    preset: _preset_property(preset_library.search_user_presets)
+    preset: _preset_property(preset_library.user_preset_keys)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         name = preset_library.preset_name(_target_preset(self, context))
@@ -183,7 +175,7 @@ class ROSY_OT_preset_import(_PresetOperator, bpy.types.Operator, ImportHelper):
 
     filename_ext = ".json"
     filter_glob: file_filter(".json")
-    replace: _replace_property()
+    replace: REPLACE
 
     def act(self, context: bpy.types.Context) -> None:
         preset = store.read_preset(bpy.path.abspath(self.filepath))

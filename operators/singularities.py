@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import bpy
 
@@ -20,6 +19,16 @@ from ..rosy_addon.ui.property_makers import choice, fraction, integer, toggle
 from ..rosy_addon.worker.job import Call, Steps
 from .base import ACTIVE_FIELD, IDLE, IN_3D_VIEW, RosyOperator, selected_mesh_objects
 from .modal_job import ActiveMeshMixin, ModalJobMixin
+
+#: The property for the distance over which directions change, relative to `Surface.extent`.
+#: ``rosy.drag_singularity`` passes its value on to ``rosy.field_singularities``.
+REACH = fraction(
+    "Reach",
+    "Distance over which directions change, as a fraction of the size of the mesh. At least as "
+    "far as the singularity moves",
+    soft_max=0.5,
+    default=0.1,
+)
 
 
 class ROSY_OT_singularities(RosyOperator, bpy.types.Operator):
@@ -70,20 +79,6 @@ def _hide(context: bpy.types.Context, objects: list[bpy.types.Object]) -> None:
         singularity_points.remove_singularity_points(context.scene, obj)
 
 
-def _reach() -> Any:
-    """Return the property for the distance over which directions change, relative to `Surface.extent`.
-
-    ``rosy.drag_singularity`` passes its value on to ``rosy.field_singularities``.
-    """
-    return fraction(
-        "Reach",
-        "Distance over which directions change, as a fraction of the size of the mesh. At least as "
-        "far as the singularity moves",
-        soft_max=0.5,
-        default=0.1,
-    )
-
-
 class ROSY_OT_field_singularities(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
     """Move a singularity of the active mesh's field to another vertex, merge it with another one, split it, or make a pair"""
 
@@ -105,7 +100,7 @@ class ROSY_OT_field_singularities(ActiveMeshMixin, ModalJobMixin, bpy.types.Oper
     index: integer(
         "Index", "What is moved, in units of 1/N. 0: the whole index", soft_min=-4, soft_max=4
     )
-    reach: _reach()
+    reach: REACH
 
     def begin(self, context: bpy.types.Context) -> Steps[None]:
         """Return the steps of the job that changes the singularities of the field of the active mesh."""
@@ -133,7 +128,7 @@ class ROSY_OT_drag_singularity(RosyOperator, bpy.types.Operator):
         "Start at any vertex, and leave the opposite index there",
         options={"SKIP_SAVE"},
     )
-    reach: _reach()
+    reach: REACH
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         obj = selected_mesh_objects(context)[0]

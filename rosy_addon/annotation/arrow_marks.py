@@ -26,8 +26,9 @@ from ..projection.camera import Camera
 from ..projection.gbuffer import GBuffer, MeshInstance, SurfacePoints
 from ..projection.pixel_neighbors import screen_jacobians
 from ..projection.project import surface_points
+from ..projection.rest_coordinates import matrix_scale
 from ..projection.visible_vertices import ProjectedPoints, project_points
-from .progressive_samples import matrix_scale, progressive_samples, rest_areas, surface_samples
+from .progressive_samples import progressive_samples, rest_areas, surface_samples
 
 #: Colors of arrowheads and of their outlines.
 FILL_COLOR, OUTLINE_COLOR = "#141414", "#ffffff"
@@ -162,7 +163,10 @@ def arrow_marks(
     with progress(0.6, 0.9):
         gbuffer = surface_points(instances, camera, display, points, projected.position, cache)
     directions = _screen_directions(gbuffer)
-    is_usable = (np.abs(directions) >= MIN_FORESHORTENING).any(axis=1) & _faces_camera(gbuffer)
+    degree = np.asarray(gbuffer.instance_degrees)[gbuffer.instance_id]
+    least_facing = np.where(degree == 1, MIN_FACING, MIN_FACING_OF_SEVERAL)
+    is_usable = (np.abs(directions) >= MIN_FORESHORTENING).any(axis=1)
+    is_usable &= dot(gbuffer.geometric_normal, gbuffer.view_direction) >= least_facing
     if not is_exact:
         is_usable &= ~_seems_hidden(projected, gbuffer, spacing)
     usable = np.flatnonzero(is_usable)
@@ -190,10 +194,12 @@ def _places_in_order(
     parts = [SurfacePoints.of(0, np.empty(0, np.int32), np.empty((0, 3)))]
     keys = [np.empty((2, 0))]
     for number, instance in enumerate(instances):
-        scale = matrix_scale(instance)
-        if not has_arrows(instance) or not scale:
+        if not has_arrows(instance):
             continue
-        smallest = NEAREST_PLACES * spacing * _smallest_pixel(instance, camera) / scale
+        scale = matrix_scale(instance.matrix)
+        # The size of a pixel is 0 if the instance reaches behind the eye.
+        nearest = np.maximum(camera.depths(instance.world_bounds()).min(), 0.0)
+        smallest = NEAREST_PLACES * spacing * float(camera.pixel_sizes(nearest)) / scale
         places = surface_places(instance.surface, smallest, cache)
         points = SurfacePoints.of(number, places.triangle, places.barycentric)
         needed = _needed_distances(instance, camera, points, spacing)
@@ -216,26 +222,11 @@ def _needed_distances(
 ) -> np.ndarray:
     """Return (P,) float64: the smallest distance between arrowheads near each point, in world space.
 
-    `points` are P points of the instance. `spacing` is the distance of arrowheads on screen, in pixels. The
-    result is infinite behind the eye.
+    `points` are P points of the instance. `spacing` is the distance of arrowheads on screen, in pixels. Behind
+    the eye of a perspective camera, the result is infinite.
     """
-    world = instance.points_in_triangles(points.triangle, points.barycentric)
-    result = np.full(len(world), NEAREST_PLACES * spacing / camera.pixels_per_unit)
-    if camera.is_perspective:
-        depth = camera.depths(world)
-        result *= np.where(depth > 0, depth, np.inf)
-    return result
-
-
-def _smallest_pixel(instance: MeshInstance, camera: Camera) -> float:
-    """Return the size of a pixel at the nearest point of an instance, in world space.
-
-    It is 0 if the instance reaches behind the eye.
-    """
-    pixel = 1 / camera.pixels_per_unit
-    if not camera.is_perspective:
-        return pixel
-    return pixel * max(float(camera.depths(instance.world_bounds()).min()), 0.0)
+    depth = camera.depths(instance.points_in_triangles(points.triangle, points.barycentric))
+    return NEAREST_PLACES * spacing * camera.pixel_sizes(np.where(depth > 0, depth, np.inf))
 
 
 def _reach(degree: int, size: float) -> float:
@@ -275,13 +266,6 @@ def _screen_directions(gbuffer: GBuffer) -> np.ndarray:
     return result
 
 
-def _faces_camera(gbuffer: GBuffer) -> np.ndarray:
-    """Return (P,) bool: whether the surface faces the camera enough for arrowheads; see `MIN_FACING`."""
-    degree = np.asarray(gbuffer.instance_degrees)[gbuffer.instance_id]
-    limit = np.where(degree == 1, MIN_FACING, MIN_FACING_OF_SEVERAL)
-    return dot(gbuffer.geometric_normal, gbuffer.view_direction) >= limit
-
-
 def _seems_hidden(projected: ProjectedPoints, gbuffer: GBuffer, spacing: float) -> np.ndarray:
     """Return (P,) bool: whether points are probably hidden, judged only from the depths of the points around.
 
@@ -300,9 +284,7 @@ def _seems_hidden(projected: ProjectedPoints, gbuffer: GBuffer, spacing: float) 
         np.min([depth[row + dy, column + dx] for dy in (-1, 0, 1) for dx in (-1, 0, 1)], axis=0)
         for depth in (nearest, nearest_front)
     )
-    pixel = 1 / gbuffer.camera.pixels_per_unit
-    if gbuffer.camera.is_perspective:
-        pixel = pixel * projected.depth
+    pixel = gbuffer.camera.pixel_sizes(projected.depth)
     is_far = projected.depth - nearest > HIDDEN_SPACINGS * spacing * pixel
     return is_far | (~gbuffer.front_facing & (projected.depth > nearest_front))
 
@@ -368,51 +350,29 @@ def surface_places(surface: Surface, distance: float, cache: Cache) -> SurfacePl
     if places is None:
         extent = float(np.sqrt(rest_areas(surface).sum()))
         places = SurfacePlaces(np.empty(0, np.int32), np.empty((0, 3)), np.empty(0), -1, extent)
-    last = _wanted_level(places.extent, distance)
-    if places.level >= last:
+    # The first level whose points are at most `distance` apart, or `MAX_LEVEL` if none are.
+    levels = level_distance(places.extent, np.arange(MAX_LEVEL + 1))
+    last = min(int(np.count_nonzero(levels > distance)), MAX_LEVEL)
+    if places.level >= last or not places.extent:  # a surface without area has no points
         return places
     report(0.0, "finding places of arrowheads")
     density = CANDIDATES_PER_PLACE / level_distance(places.extent, last) ** 2
     triangle, barycentric, rank = surface_samples(surface, density)
     order = np.argsort(rank, kind="stable")
-    # The candidates of a level are the first ones in the order of their ranks.
-    triangle, barycentric, rank = triangle[order], barycentric[order], rank[order]
+    vertices = surface.in_rest_shape().vertices
     for level in range(places.level + 1, last + 1):
         report(level / (last + 1), "finding places of arrowheads")
-        density = CANDIDATES_PER_PLACE / level_distance(places.extent, level) ** 2
-        count = int(np.searchsorted(rank, density))
-        places = _with_level(surface, places, triangle[:count], barycentric[:count])
+        finest = level_distance(places.extent, level)
+        # The candidates of a level are the first ones in the order of their ranks.
+        new = order[: np.searchsorted(rank[order], CANDIDATES_PER_PLACE / finest**2)]
+        triangles = np.concatenate([places.triangle, triangle[new]])
+        weights = np.concatenate([places.barycentric, barycentric[new]])
+        distance = np.concatenate([places.distance, np.full(len(new), finest)])
+        corners = vertices[surface.triangle_vertex[triangles]]
+        chosen = spaced_points(np.einsum("nk,nki->ni", weights, corners), finest)
+        columns = triangles[chosen], weights[chosen], distance[chosen]
+        places = SurfacePlaces(*columns, level, places.extent)
     return cache.put(key, places)
-
-
-def _wanted_level(extent: float, distance: float) -> int:
-    """Return the first level whose points are at most `distance` apart, or `MAX_LEVEL` if none are.
-
-    The result is -1 if the surface has no area, that is, if `extent` is 0.
-    """
-    if not extent:
-        return -1
-    levels = level_distance(extent, np.arange(MAX_LEVEL + 1))
-    return min(int(np.count_nonzero(levels > distance)), MAX_LEVEL)
-
-
-def _with_level(
-    surface: Surface, places: SurfacePlaces, triangle: np.ndarray, barycentric: np.ndarray
-) -> SurfacePlaces:
-    """Return `places` with one more level, whose points are chosen from candidates.
-
-    `triangle`, (n,), and `barycentric`, (n, 3), are the triangles and barycentric coordinates of the
-    candidates.
-    """
-    level = places.level + 1
-    finest = level_distance(places.extent, level)
-    distance = np.concatenate([places.distance, np.full(len(triangle), finest)])
-    triangle = np.concatenate([places.triangle, triangle])
-    barycentric = np.concatenate([places.barycentric, barycentric])
-    corners = surface.in_rest_shape().vertices[surface.triangle_vertex[triangle]]
-    chosen = spaced_points(np.einsum("nk,nki->ni", barycentric, corners), finest)
-    columns = (column[chosen] for column in (triangle, barycentric, distance))
-    return SurfacePlaces(*columns, level, places.extent)
 
 
 def spaced_points(position: np.ndarray, spacing: float) -> np.ndarray:

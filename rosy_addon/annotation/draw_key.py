@@ -72,10 +72,10 @@ def draw_key(
     text, plate = (to_linear(from_hex(code)) for code in (colors.text, colors.plate))
     for box in layout.plates:
         _draw_plate(rgba, box, CORNER_RADIUS * layout.text_size, plate, colors.plate_opacity)
-    if layout.color_bar is not None:
-        _draw_color_bar(rgba, layout.color_bar, color_scale)
     for box in layout.strokes:
         _draw_rectangle(rgba, box, text)
+    if layout.color_bar is not None:
+        _draw_color_bar(rgba, layout.color_bar, color_scale)
     for dot in layout.dots:
         draw_dot(rgba, dot)
     is_dark = text.sum() < plate.sum()

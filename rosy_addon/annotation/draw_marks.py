@@ -110,21 +110,9 @@ def _draw_label(rgba: np.ndarray, label: Label, size: float) -> None:
     width = stroke_width(size) / 2
     reach = width + HALO * size + 1
     part, x, y = window(rgba, segments.min(axis=(0, 1)) - reach, segments.max(axis=(0, 1)) + reach)
-    distance = _distance_to_segments(x, y, segments)
+    distance = np.min([_edge_distance(x, y, *ends)[0] for ends in segments], axis=0)
     for color, radius in ((HALO_COLOR, width + HALO * size), (LABEL_COLOR, width)):
         draw_over(part, _linear_color(color), np.clip(radius + 0.5 - distance, 0, 1))
-
-
-def _distance_to_segments(x: np.ndarray, y: np.ndarray, segments: np.ndarray) -> np.ndarray:
-    """Return the distance from each point to the nearest of n segments.
-
-    `x` and `y` are the coordinates of the points, in any shape, which is also the shape of the result.
-    `segments` holds the (n, 2, 2) ends of the segments.
-    """
-    nearest = np.full(x.shape, np.inf)
-    for start, end in segments:
-        np.minimum(nearest, _edge_distance(x, y, start, end)[0], out=nearest)
-    return nearest
 
 
 # --- arrowheads --------------------------------------------------------------------------------------

@@ -91,7 +91,7 @@ def place_indices(
 ) -> list[tuple[str, float, float]]:
     """Place the index of each singularity beside its dot if there is room for it.
 
-    Singularities are handled in the given order.
+    Labels cover neither dots nor each other. Singularities are handled in the given order.
 
     Parameters
     ----------
@@ -104,63 +104,34 @@ def place_indices(
     label_size : callable
         Function that returns the width and the height, in pixels, of the label with a text.
     frame : (int, int)
-        Width and height of the picture, pixels.
+        Width and height of the picture in pixels. No label reaches beyond it.
 
     Returns
     -------
     list of (str, float, float)
         The text of each label that was placed, and x and y of its lower left corner in pixels.
     """
-    texts = [format_index(*pair) for pair in zip(index.tolist(), degree.tolist(), strict=True)]
-    sizes = np.array([label_size(text) for text in texts])
+    labels = []
     radii = dot_diameters(index, size) / 2 + OUTLINE * size
-    corners = place_labels(position, sizes, radii, frame).tolist()
-    labels = zip(texts, corners, strict=True)
-    return [(text, *corner) for text, corner in labels if np.isfinite(corner[0])]
+    low, high = position - radii[:, None], position + radii[:, None]
+    singularities = zip(position, radii.tolist(), index.tolist(), degree.tolist(), strict=True)
+    for dot, radius, *fraction in singularities:
+        text = format_index(*fraction)
+        extent = np.array(label_size(text))
+        for side in SIDES:
+            corner = dot + np.where(np.array(side) > 0, radius, -radius - extent)
+            is_inside = (corner >= 0).all() and (corner + extent <= frame).all()
+            is_covered = (corner < high) & (corner + extent > low)
+            if is_inside and not is_covered.all(axis=1).any():
+                labels.append((text, *corner.tolist()))
+                low, high = np.vstack([low, corner]), np.vstack([high, corner + extent])
+                break
+    return labels
 
 
 def stroke_width(size: float) -> float:
     """Return the width of the lines of labels in pixels, given the diameter of a dot of index 1 / N."""
     return max(STROKE_WIDTH * size, MIN_STROKE_WIDTH)
-
-
-def place_labels(
-    dots: np.ndarray, sizes: np.ndarray, radius: np.ndarray | float, frame: tuple[int, int]
-) -> np.ndarray:
-    """Choose a position beside its dot for each label, so that labels cover neither dots nor each other.
-
-    Labels are handled in the given order.
-
-    Parameters
-    ----------
-    dots : (K, 2) float ndarray
-        Centers of the dots in pixels, y up.
-    sizes : (K, 2) float ndarray
-        Widths and heights of the labels in pixels.
-    radius : (K,) ndarray or float
-        Radii of the dots, in pixels.
-    frame : (int, int)
-        Width and height of the picture in pixels. No label reaches beyond it.
-
-    Returns
-    -------
-    (K, 2) float64 ndarray
-        Lower left corners of the labels in pixels; NaN for labels for which there is no room.
-    """
-    dots, sizes = np.asarray(dots, dtype=np.float64), np.asarray(sizes, dtype=np.float64)
-    corners = np.full(dots.shape, np.nan)
-    radii = np.broadcast_to(radius, len(dots))
-    low, high = dots - radii[:, None], dots + radii[:, None]
-    for label, (dot, size, radius) in enumerate(zip(dots, sizes, radii.tolist(), strict=True)):
-        for side in SIDES:
-            corner = dot + np.where(np.array(side) > 0, radius, -radius - size)
-            is_inside = (corner >= 0).all() and (corner + size <= frame).all()
-            is_covered = (corner < high) & (corner + size > low)
-            if is_inside and not is_covered.all(axis=1).any():
-                corners[label] = corner
-                low, high = np.vstack([low, corner]), np.vstack([high, corner + size])
-                break
-    return corners
 
 
 # --- letters -------------------------------------------------------------------------------------

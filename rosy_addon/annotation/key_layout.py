@@ -110,7 +110,8 @@ class KeyLayout:
     texts : list of PlacedText
         Lines of text.
     strokes : list of Box
-        Lines, as thin rectangles, in the color of the text.
+        Lines, as thin rectangles, in the color of the text; and the frame of the color bar, as a rectangle
+        below its colors.
     dots : list of Dot
         Dots of the legend.
     color_bar : Box or None
@@ -334,9 +335,11 @@ class _Arrangement:
         bottom = max((height - self._plate_size(around + length)) / 2, lowest)
         left, bottom = self._add_plate(left, bottom, content, around + length)
         bar_bottom = bottom + round(CAP_HEIGHT / 2 * size)
-        right = left + round(BAR_WIDTH * size)
-        self.result.color_bar = bar = (left, bar_bottom, right, bar_bottom + length)
-        self.result.strokes += _frame_strokes(bar, stroke)
+        right, top = left + round(BAR_WIDTH * size), bar_bottom + length
+        self.result.color_bar = (left, bar_bottom, right, top)
+        # The colors are drawn over this rectangle, so that only its margin is seen.
+        frame = left - stroke, bar_bottom - stroke, right + stroke, top + stroke
+        self.result.strokes.append(frame)
         for fraction, label in ticks:
             y = bar_bottom + fraction * (length - stroke)
             end = right + round(TICK_LENGTH * size)
@@ -345,7 +348,7 @@ class _Arrangement:
             self._add_text(label, right + (TICK_LENGTH + LABEL_GAP) * size, baseline)
         for number, line in enumerate(title):
             above = TITLE_GAP + LINE * (len(title) - 1 - number)
-            self._add_text(line, left, bar_bottom + length + above * size)
+            self._add_text(line, left, top + above * size)
         return True
 
 
@@ -360,17 +363,6 @@ def _ticks(scale: ColorScale, max_steps: int, gap: float) -> list[tuple[float, s
     low, high = sorted((scale.low, scale.high))
     labels = tick_labels(low, high, max(max_steps, 1), gap)
     return [((value - low) / (high - low or 1.0), label) for value, label in labels]
-
-
-def _frame_strokes(box: Box, width: float) -> list[Box]:
-    """Return four rectangles that frame a box: lines of the given width just outside its edges."""
-    left, bottom, right, top = box
-    return [
-        (left - width, bottom - width, right + width, bottom),
-        (left - width, top, right + width, top + width),
-        (left - width, bottom, left, top),
-        (right, bottom, right + width, top),
-    ]
 
 
 def _index_label(entry: IndexCount, has_count: bool) -> str:

@@ -25,6 +25,7 @@ from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.pixel_blocks import part_of
 from ..projection.project import all_triangles
+from ..projection.rest_coordinates import matrix_scale
 
 #: Number of points per square on screen whose side is the given spacing.
 POINTS_PER_SPACING = 8
@@ -117,7 +118,7 @@ def progressive_samples(
     numbers, of_pieces = [np.empty(0, np.int64)], [np.empty(0, np.intp)]
     start = _with_points(clip, triangles, camera, spacing, offset)
     area = np.zeros(len(triangles))
-    area[start] = rest_areas(instance.surface, start) * matrix_scale(instance) ** 2
+    area[start] = rest_areas(instance.surface, start) * matrix_scale(instance.matrix) ** 2
     start = start[area[start] > 0]
     corners = np.broadcast_to(np.eye(3), (len(start), 3, 3))
     todo = _Pieces(start, corners, np.zeros(len(start), dtype=np.int64), 0)
@@ -212,15 +213,6 @@ def _screen_areas(
     is_cut = (np.abs(ndc) > 1).any(axis=(1, 2)) & (area > MAX_CUT_AREA * spacing**2)
     is_divided = is_cut | (farthest > MAX_DEPTH_RATIO * nearest)
     return area, ~is_in_front | (is_divided & (area > spacing**2 / POINTS_PER_SPACING))
-
-
-def matrix_scale(instance: MeshInstance) -> float:
-    """Return the mean scale of the matrix of an instance.
-
-    It is the cube root of the factor by which the matrix scales volumes.
-    """
-    a, b, c = np.asarray(instance.matrix, dtype=np.float64)[:3, :3]
-    return float(np.abs((np.cross(a, b) * c).sum()) ** (1 / 3))
 
 
 def rest_areas(surface: Surface, triangle: np.ndarray | None = None) -> np.ndarray:

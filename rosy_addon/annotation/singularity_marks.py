@@ -168,27 +168,19 @@ def shown_singularities(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the vertices and the indices of the dots of an instance: its singularities, or clusters of them.
 
-    The instance must have a field. All deformations of a mesh have the same singularities. The result is a
-    pair of (K,) int32 arrays; indices are in units of 1 / N. `settings` is a look or a stroke style.
+    A cluster is explained in `cluster_singularities`. The instance must have a field. All deformations of a
+    mesh have the same singularities. The result is a pair of (K,) int32 arrays; indices are in units of 1 / N.
+    `settings` is a look or a stroke style.
     """
-    surface, field = instance.surface, instance.field
+    surface, key = (
+        instance.surface.in_rest_shape(),
+        (instance.surface.rest_shape_key, instance.field),
+    )
     found = cache.get_or_create(
-        ("singularities", surface.rest_shape_key, field),
-        partial(find_singularities, surface.in_rest_shape(), field),
+        ("singularities", *key), partial(find_singularities, surface, instance.field)
     )
-    return clusters_of(instance, found, cache) if shows_clusters(settings) else found
-
-
-def clusters_of(
-    instance: MeshInstance, found: tuple[np.ndarray, np.ndarray], cache: Cache
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the singularities of an instance after near ones are merged to clusters.
-
-    `found` holds the vertices and the indices, in units of 1 / N, of all singularities. The result is of the
-    same form, with one singularity for each cluster; see `cluster_singularities`. It is stored in the cache.
-    """
-    surface = instance.surface.in_rest_shape()
-    return cache.get_or_create(
-        ("clusters", surface.rest_shape_key, instance.field),
-        partial(cluster_singularities, surface, *found, CLUSTER_REACH * surface.extent),
-    )
+    if not shows_clusters(settings):
+        return found
+    reach = CLUSTER_REACH * surface.extent
+    create = partial(cluster_singularities, surface, *found, reach)
+    return cache.get_or_create(("clusters", *key), create)

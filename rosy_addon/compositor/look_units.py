@@ -275,12 +275,10 @@ def pixel_world_size(points: np.ndarray, camera: Camera) -> float:
 
     The center is the center of their bounding box.
     """
-    if not camera.is_perspective:
-        return 1 / camera.pixels_per_unit
     low, high = points.min(axis=0), points.max(axis=0)
     depth = -(camera.view[2, :3] @ (low + high) / 2 + camera.view[2, 3])
     min_depth = max(MIN_DISTANCE_FACTOR * float(np.linalg.norm(high - low)), 1e-6)
-    return max(float(depth), min_depth) / camera.pixels_per_unit
+    return float(camera.pixel_sizes(max(float(depth), min_depth)))
 
 
 def instance_line_spacing(look: PixelLook, camera: Camera, instance: MeshInstance) -> float:

@@ -89,10 +89,8 @@ def pixel_size(points: np.ndarray, camera: Camera) -> np.ndarray:
 
     It is measured perpendicular to the axis of the camera.
     """
-    if not camera.is_perspective:
-        return np.full(len(points), 1 / camera.pixels_per_unit)
     depth = camera.depths(points)
-    return np.maximum(depth, 1e-6 * np.abs(depth).max(initial=0)) / camera.pixels_per_unit
+    return camera.pixel_sizes(np.maximum(depth, 1e-6 * np.abs(depth).max(initial=0)))
 
 
 def clip_to_visible(strokes: Strokes, camera: Camera, depth_buffer: DepthBuffer | None) -> Strokes:

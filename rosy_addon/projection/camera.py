@@ -122,6 +122,10 @@ class Camera:
         """Return the (...) depths of (..., 3) points in world space, along the axis of this camera."""
         return -(points @ self.view[2, :3] + self.view[2, 3])
 
+    def pixel_sizes(self, depth: np.ndarray) -> np.ndarray:
+        """Return the (n,) sides of a pixel in world space at (n,) depths, perpendicular to the camera axis."""
+        return (depth if self.is_perspective else np.ones_like(depth)) / self.pixels_per_unit
+
     def resized(self, width: int, height: int) -> Camera:
         """Return a camera with the same matrices and another picture size, in pixels.
 

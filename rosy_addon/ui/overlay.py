@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import RosyError
+from ..projection.rest_coordinates import matrix_scale
 from ..scene.app_handlers import add_handlers, remove_handlers
 from ..scene.singularity_points import (
     Singularities,
@@ -122,6 +123,6 @@ def _draw_labels() -> None:
 def offset_points(obj: bpy.types.Object, singularities: Singularities) -> np.ndarray:
     """Return (K, 3) positions of the dots of singularities in world space, slightly above the surface."""
     offset = SURFACE_OFFSET * max(obj.dimensions)
-    scale = np.cbrt(abs(np.linalg.det(np.array(obj.matrix_world)[:3, :3]))) or 1.0
+    scale = matrix_scale(obj.matrix_world)
     points = singularities.points + singularities.normals * (offset / scale)
     return to_world(obj, points)

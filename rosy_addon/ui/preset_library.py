@@ -110,8 +110,8 @@ def load_errors() -> list[str]:
     return _LIBRARY.load_errors
 
 
-def user_preset_keys() -> list[str]:
-    """Return the keys of the user's own presets."""
+def user_preset_keys(_owner: Any = None, _context: Any = None, _typed: str = "") -> list[str]:
+    """Return the keys of the user's own presets. This is also a function for the search of a text property."""
     return [key for key, entry in entries().items() if entry.is_user]
 
 
@@ -124,11 +124,6 @@ def preset_name(key: str) -> str:
 def search_presets(_owner: Any, _context: Any, _typed: str) -> list[str]:
     """Return the keys of all presets, for the search of a text property."""
     return list(entries())
-
-
-def search_user_presets(_owner: Any, _context: Any, _typed: str) -> list[str]:
-    """Return the keys of the user's own presets, for the search of a text property."""
-    return user_preset_keys()
 
 
 def active_entry(settings: Any) -> PresetEntry | None:

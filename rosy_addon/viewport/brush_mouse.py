@@ -83,22 +83,18 @@ _current: tuple[tuple[str, int], BrushMouse] | None = None
 _is_held = False
 
 
-def current_mouse(context: Context, obj: Object) -> BrushMouse:
+def current_mouse(context: Context, obj: Object, *, holds: bool = False) -> BrushMouse:
     """Return the `BrushMouse` of an object in the region of the context.
 
-    It is created again after each change of the scene, unless `hold_mouse` keeps it.
+    It is created again after each change of the scene. If `holds`, it is created now, and kept until
+    `release_mouse`, whatever changes.
     """
+    global _current, _is_held
     key = obj.name, context.region.as_pointer()
-    if _current is None or (_current[0] != key and not _is_held):
-        _read(context, obj)
-    return _current[1]
-
-
-def hold_mouse(context: Context, obj: Object) -> BrushMouse:
-    """Return the `BrushMouse` of an object, and keep it until `release_mouse`, whatever changes."""
-    global _is_held
-    _read(context, obj)
-    _is_held = True
+    if holds or _current is None or (_current[0] != key and not _is_held):
+        _current = key, BrushMouse(context, obj)
+        add_handlers(_HANDLERS)
+    _is_held |= holds
     return _current[1]
 
 
@@ -112,12 +108,6 @@ def unregister() -> None:
     """Forget the object that was read, and stop watching for changes."""
     release_mouse()
     remove_handlers(_HANDLERS)
-
-
-def _read(context: Context, obj: Object) -> None:
-    global _current
-    _current = (obj.name, context.region.as_pointer()), BrushMouse(context, obj)
-    add_handlers(_HANDLERS)
 
 
 def _after_change(*_: Any) -> None:

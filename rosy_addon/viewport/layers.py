@@ -116,27 +116,20 @@ class LayerStates:
         if self._is_resolving:
             return
         updates = () if depsgraph is None else depsgraph.updates
+        updates = [update for update in updates if update.id.original.id_type in RELEVANT_ID_TYPES]
         changed_names, remeshed_names = set(), set()
-        is_relevant = False
         for update in updates:
-            datablock = update.id.original
-            if datablock.id_type not in RELEVANT_ID_TYPES:
-                continue
-            is_relevant = True
+            datablock, objects = update.id.original, bpy.data.objects
             if datablock.id_type == "IMAGE":
                 changed_names |= {
-                    obj.name_full for obj in bpy.data.objects if obj.rosy.tone_image == datablock
+                    obj.name_full for obj in objects if obj.rosy.tone_image == datablock
                 }
-            if not update.is_updated_geometry:
-                continue
-            if datablock.id_type == "MESH":
-                remeshed_names |= {
-                    obj.name_full for obj in bpy.data.objects if obj.data == datablock
-                }
-            elif datablock.id_type == "OBJECT":
+            elif datablock.id_type == "MESH" and update.is_updated_geometry:
+                remeshed_names |= {obj.name_full for obj in objects if obj.data == datablock}
+            elif datablock.id_type == "OBJECT" and update.is_updated_geometry:
                 changed_names.add(datablock.name_full)
         for (scene_name, _), layer in self._layers.items():
-            if scene_name == scene.name and (is_relevant or depsgraph is None):
+            if scene_name == scene.name and (updates or depsgraph is None):
                 layer.reader.invalidate(changed_names, topology_changed=False)
                 layer.reader.invalidate(remeshed_names)
                 layer.request = None
@@ -191,8 +184,8 @@ class ReferenceImages:
         #: By the name of a scene: a key of what the last result depends on, and this result.
         self._current: dict[str, tuple[Hashable, ReferenceRender]] = {}
 
-    def load_pending(self) -> None:
-        """Load the files that have been requested."""
+    def load_pending(self) -> bool:
+        """Load the files that have been requested. Return True, as all of them are loaded then."""
         for name, (file_key, image) in list(self._images.items()):
             if image is not None:
                 continue
@@ -200,6 +193,7 @@ class ReferenceImages:
                 self._images[name] = file_key, look_inputs.load_luminance(file_key[0])
             except REPORTED_ERRORS as error:
                 self._images[name] = file_key, error_text(error)
+        return True
 
     def current(self, scene: Scene, depsgraph: Depsgraph, look: Look) -> ReferenceRender | None:
         """Return the reference render of a scene.

@@ -19,18 +19,14 @@ from ..annotation import arrow_marks, singularity_marks
 from ..annotation.arrow_marks import ArrowMarks
 from ..annotation.draw_marks import head_outline
 from ..annotation.index_labels import MAX_LABELS, place_indices
-from ..annotation.singularity_settings import (
-    shows_clusters,
-    shows_hidden_singularities,
-    shows_indices,
-)
+from ..annotation.singularity_settings import shows_hidden_singularities, shows_indices
 from ..compositor.look import Look
 from ..core.cache import Cache
 from ..core.color import from_hex
 from ..core.errors import as_sentence
 from ..field.singularities import find_singularities
 from ..gpu.preparation import Preparation
-from ..projection.gbuffer import MeshInstance
+from ..projection.gbuffer import MeshInstance, with_field
 from ..projection.visible_vertices import is_cut_away
 from ..rendering.marks import view_arrows
 from ..rendering.view_input import ViewInput
@@ -62,16 +58,21 @@ MAX_EXACT_TRIANGLES = 200_000
 ARC_POINTS = 4
 
 
-def pixel_frames(context: Context, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the vectors of one pixel at (K, 3) points in world space, in the region that is drawn.
+def _facing_triangles(
+    context: Context, points: np.ndarray, offset: np.ndarray, nearness: np.ndarray
+) -> np.ndarray:
+    """Return the (K M, 3) float32 corners of triangles at K points, facing the eye, in world space.
 
-    Returns
-    -------
-    right, up : (K, 3) float64 ndarray
-        Vectors in world space that are as long as a pixel and parallel to the view plane.
-    nearer : (K, 3) float64 ndarray
-        Vectors of the same length toward the eye. A point that moves along its vector does not move on
-        screen.
+    Parameters
+    ----------
+    context : bpy.types.Context
+        Context of the region that is drawn.
+    points : (K, 3) ndarray
+        World space.
+    offset : (K, M, 2) ndarray
+        M corners of triangles at each point, in pixels from the point, parallel to the view plane.
+    nearness : (K,) ndarray
+        Distance in pixels by which the triangles are moved toward the eye. This does not move them on screen.
     """
     view, window = context.region_data, context.region
     view_to_world = np.array(view.view_matrix.inverted())
@@ -80,17 +81,44 @@ def pixel_frames(context: Context, points: np.ndarray) -> tuple[np.ndarray, np.n
     if view.is_perspective:
         depth = (eye - points) @ back
         toward_eye = (eye - points) / depth[:, None]
-    pixel = (depth * (2 / (view.window_matrix[0][0] * window.width)))[:, None]
-    return pixel * right, pixel * up, pixel * toward_eye
+    pixel = depth * (2 / (view.window_matrix[0][0] * window.width))
+    step = offset @ np.stack([right, up]) + (nearness[:, None] * toward_eye)[:, None]
+    return (points[:, None] + pixel[:, None, None] * step).reshape(-1, 3).astype(np.float32)
 
 
-def _draw_triangles(vertices: np.ndarray, code: str, opacity: float) -> None:
-    """Draw triangles, given their (n, 3) corners in world space, in a hex color."""
-    if not len(vertices):  # Blender cannot make a batch without vertices
-        return
+def _fan(outline: np.ndarray) -> np.ndarray:
+    """Return the (3 n, 2) corners of the triangles between the origin and the n edges of a closed outline."""
+    ends = outline, np.roll(outline, -1, axis=0)
+    return np.stack([np.zeros_like(outline), *ends], axis=1).reshape(-1, 2)
+
+
+def _unit_vectors(first: float, last: float, count: int = ARC_POINTS) -> np.ndarray:
+    """Return (count, 2) unit vectors, at equal steps from the first to the last angle, in radians."""
+    angles = np.linspace(first, last, count)
+    return np.stack([np.cos(angles), np.sin(angles)], axis=1)
+
+
+def _draw_triangles(parts: Sequence[tuple[np.ndarray, str]], *, shows_hidden: bool = False) -> None:
+    """Draw triangles in a view. Surfaces in front of them hide them.
+
+    Parameters
+    ----------
+    parts : sequence of ((n, 3) ndarray, str)
+        Corners of triangles in world space, and their color. Later parts cover earlier ones.
+    shows_hidden : bool
+        Whether the triangles are also drawn over the surfaces that hide them, with less opacity.
+    """
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-    shader.uniform_float("color", (*from_hex(code).tolist(), opacity))
-    batch_for_shader(shader, "TRIS", {"pos": vertices}).draw(shader)
+    gpu.state.blend_set("ALPHA")
+    hidden = ("NONE", singularity_marks.HIDDEN_OPACITY)
+    for depth_test, opacity in (*[hidden] * shows_hidden, ("LESS_EQUAL", 1.0)):
+        gpu.state.depth_test_set(depth_test)
+        for vertices, code in parts:
+            if len(vertices):  # Blender cannot make a batch without vertices
+                shader.uniform_float("color", (*from_hex(code).tolist(), opacity))
+                batch_for_shader(shader, "TRIS", {"pos": vertices}).draw(shader)
+    gpu.state.depth_test_set("NONE")
+    gpu.state.blend_set("NONE")
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,37 +181,6 @@ def look_up_singularities(
     return Preparation(call, SINGULARITY_SECONDS * len(surface.triangles), partial(cache.put, key))
 
 
-def singularity_dots(
-    instance: MeshInstance, look: Look, cache: Cache, clip_planes: np.ndarray | None
-) -> SingularityDots | None:
-    """Return the singularities of an instance with a field, without those that clip planes cut away.
-
-    Parameters
-    ----------
-    instance : MeshInstance
-    look : Look
-        Decides whether near singularities are one dot.
-    cache : Cache
-        Stores the singularities of fields.
-    clip_planes : (6, 4) float64 ndarray or None
-        Plane equations in world space. The negative side of each plane is cut away.
-
-    Returns
-    -------
-    SingularityDots or None
-        None if the singularities have not been computed yet.
-    """
-    found = look_up_singularities(instance, cache)
-    if isinstance(found, Preparation):
-        return None
-    if shows_clusters(look):
-        found = singularity_marks.clusters_of(instance, found, cache)
-    vertex, index = found
-    points = instance.world_points()[vertex]
-    kept = ~is_cut_away(points, clip_planes)
-    return SingularityDots(points[kept], index[kept], instance.field.degree)
-
-
 def draw_dots(
     context: Context, objects: Sequence[SingularityDots], size: float, *, shows_hidden: bool = False
 ) -> None:
@@ -198,70 +195,42 @@ def draw_dots(
     shows_hidden : bool
         Whether hidden dots are drawn as well, with less opacity.
     """
-    if shows_hidden:
-        gpu.state.blend_set("ALPHA")
-        _draw_all(context, objects, size, singularity_marks.HIDDEN_OPACITY)
-        gpu.state.blend_set("NONE")
-    gpu.state.depth_test_set("LESS_EQUAL")
-    _draw_all(context, objects, size, 1.0)
-    gpu.state.depth_test_set("NONE")
-
-
-def draw_singularities(
-    context: Context, view_input: ViewInput, look: Look, overlay: ViewOverlay, cache: Cache
-) -> None:
-    """Draw the dots of a view, and store in its overlay the dots that get labels.
-
-    `view_input` has the instances and the clip planes. `look` is the look of the scene; in the look of
-    `view_input`, dots are switched off.
-    """
-    found = [
-        singularity_dots(instance, look, cache, view_input.clip_planes)
-        for instance in view_input.instances
-        if instance.field is not None
-    ]
-    dots = [one for one in found if one is not None]
-    draw_dots(context, dots, look.singularity_size, shows_hidden=shows_hidden_singularities(look))
-    if shows_indices(look):
-        overlay.labeled = dots, look.singularity_size
-
-
-def _draw_all(
-    context: Context, objects: Sequence[SingularityDots], size: float, opacity: float
-) -> None:
     outline = singularity_marks.OUTLINE * size
+    disc = _fan(_unit_vectors(0.0, 2 * np.pi, DISC_SEGMENTS + 1)[:-1])
+    parts = []
     for dots in objects:
         radii = singularity_marks.dot_diameters(dots.index, size) / 2
         for sign, code in singularity_marks.COLOR_BY_SIGN.items():
             chosen = np.sign(dots.index) == sign
             points, radius = dots.points[chosen], radii[chosen]
             # The outline first, slightly behind the dot.
-            for part_radius, depth_offset, color in (
+            for part_radius, nearness, color in (
                 (radius + outline, 2 * radius, singularity_marks.OUTLINE_COLOR),
                 (radius, 3 * radius, code),
             ):
-                vertices = _disc_triangles(context, points, part_radius, depth_offset)
-                _draw_triangles(vertices, color, opacity)
+                offset = part_radius[:, None, None] * disc
+                parts.append((_facing_triangles(context, points, offset, nearness), color))
+    _draw_triangles(parts, shows_hidden=shows_hidden)
 
 
-def _disc_triangles(
-    context: Context, points: np.ndarray, radius: np.ndarray, depth_offset: np.ndarray
-) -> np.ndarray:
-    """Return the (n, 3) corners of the triangles of a disc at each of K points, facing the camera.
+def draw_singularities(
+    context: Context, view_input: ViewInput, look: Look, overlay: ViewOverlay, cache: Cache
+) -> None:
+    """Draw the dots of a view, and store in its overlay those that get labels.
 
-    Points and corners are in world space. The (K,) radii and the (K,) offsets toward the camera are in
-    pixels.
+    Singularities that have not been computed yet are left out.
     """
-    right, up, nearer = pixel_frames(context, points)
-    angles = np.linspace(0, 2 * np.pi, DISC_SEGMENTS + 1)
-    x, y = (
-        np.stack([np.zeros(DISC_SEGMENTS), values[:-1], values[1:]], axis=1).reshape(-1, 1)
-        for values in (np.cos(angles), np.sin(angles))
-    )
-    center = points + depth_offset[:, None] * nearer
-    circle = x * right[:, None] + y * up[:, None]
-    vertices = center[:, None] + radius[:, None, None] * circle
-    return vertices.reshape(-1, 3).astype(np.float32)
+    dots = []
+    for instance in with_field(view_input.instances):
+        if isinstance(look_up_singularities(instance, cache), Preparation):
+            continue
+        vertex, index = singularity_marks.shown_singularities(instance, look, cache)
+        points = instance.world_points()[vertex]
+        kept = ~is_cut_away(points, view_input.clip_planes)
+        dots.append(SingularityDots(points[kept], index[kept], instance.field.degree))
+    draw_dots(context, dots, look.singularity_size, shows_hidden=shows_hidden_singularities(look))
+    if shows_indices(look):
+        overlay.labeled = dots, look.singularity_size
 
 
 def draw_labels(context: Context, objects: Sequence[SingularityDots], size: float) -> None:
@@ -288,15 +257,10 @@ def draw_labels(context: Context, objects: Sequence[SingularityDots], size: floa
             place = location_3d_to_region_2d(context.region, context.region_data, Vector(point))
             if place is not None and not is_occluded(context, point):
                 labels.append((place, index, dots.degree))
-    places, indices, degrees = zip(*labels, strict=True) if labels else ((), (), ())
-    for text, left, bottom in place_indices(
-        np.array(places),
-        np.array(indices),
-        np.array(degrees),
-        size,
-        partial(blf.dimensions, font_id),
-        (context.region.width, context.region.height),
-    ):
+    columns = map(np.array, zip(*labels, strict=True)) if labels else np.empty((3, 0))
+    frame = context.region.width, context.region.height
+    label_size = partial(blf.dimensions, font_id)
+    for text, left, bottom in place_indices(*columns, size, label_size, frame):
         blf.position(font_id, left, bottom, 0)
         blf.draw(font_id, text)
     blf.disable(font_id, blf.SHADOW)
@@ -329,13 +293,14 @@ def draw_view_arrowheads(
         is_exact = triangles <= MAX_EXACT_TRIANGLES
         overlay.arrowheads = key, view_arrows(view, cache, is_exact=is_exact)
     marks = overlay.arrowheads[1]
-    gpu.state.depth_test_set("LESS_EQUAL")
-    for grown, code, nearness in (
-        (marks.outline, arrow_marks.OUTLINE_COLOR, NEARNESS - OUTLINE_DISTANCE),
-        (0.0, arrow_marks.FILL_COLOR, NEARNESS),
-    ):
-        _draw_triangles(_head_triangles(context, marks, grown, nearness * marks.size), code, 1.0)
-    gpu.state.depth_test_set("NONE")
+    parts = [
+        (_head_triangles(context, marks, grown, nearness * marks.size), code)
+        for grown, code, nearness in (
+            (marks.outline, arrow_marks.OUTLINE_COLOR, NEARNESS - OUTLINE_DISTANCE),
+            (0.0, arrow_marks.FILL_COLOR, NEARNESS),
+        )
+    ]
+    _draw_triangles(parts)
 
 
 def _head_triangles(
@@ -346,21 +311,15 @@ def _head_triangles(
     The outline of each arrowhead is moved outward by `grown` pixels, and the arrowhead is moved toward the
     camera by `nearness` pixels.
     """
-    corners = _outline_triangles(head_outline(marks.size), grown)
+    corners = _fan(_grown_outline(head_outline(marks.size), grown))
     forward, left = marks.direction, marks.direction[:, ::-1] * (-1, 1)
-    offset = (marks.position - marks.place)[:, None] + (
-        corners[:, :1] * forward[:, None] + corners[:, 1:] * left[:, None]
-    )
-    right, up, nearer = pixel_frames(context, marks.anchor)
-    nearness = nearness + SLOPE * np.hypot(*(marks.position - marks.place).T)[:, None]
-    vertices = (marks.anchor + nearness * nearer)[:, None] + (
-        offset[..., :1] * right[:, None] + offset[..., 1:] * up[:, None]
-    )
-    return vertices.reshape(-1, 3).astype(np.float32)
+    step = marks.position - marks.place
+    offset = step[:, None] + (corners[:, :1] * forward[:, None] + corners[:, 1:] * left[:, None])
+    return _facing_triangles(context, marks.anchor, offset, nearness + SLOPE * np.hypot(*step.T))
 
 
-def _outline_triangles(outline: np.ndarray, grown: float) -> np.ndarray:
-    """Return the (n, 2) corners, in pixels, of triangles that fill an arrowhead and a margin around it.
+def _grown_outline(outline: np.ndarray, grown: float) -> np.ndarray:
+    """Return the (n, 2) corners, in pixels, of the outline of an arrowhead with a margin around it.
 
     The margin is `grown` pixels wide and has round corners. `outline` is the result of `head_outline`.
     """
@@ -371,15 +330,7 @@ def _outline_triangles(outline: np.ndarray, grown: float) -> np.ndarray:
     )
     half = [tip + grown * _unit_vectors(0.0, side), barb + grown * _unit_vectors(side, back)]
     half = np.concatenate([*half, [notch + (grown / np.cos(back), 0.0)]])
-    points = np.concatenate([half, (half * (1, -1))[-2:0:-1]])
-    center = np.zeros_like(points)
-    return np.stack([center, points, np.roll(points, -1, axis=0)], axis=1).reshape(-1, 2)
-
-
-def _unit_vectors(first: float, last: float) -> np.ndarray:
-    """Return (`ARC_POINTS`, 2) unit vectors, at equal steps from the first to the last angle, in radians."""
-    angles = np.linspace(first, last, ARC_POINTS)
-    return np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    return np.concatenate([half, (half * (1, -1))[-2:0:-1]])
 
 
 #: Color of messages: RGBA, display values.

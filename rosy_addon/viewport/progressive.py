@@ -79,6 +79,8 @@ class Work:
         Seconds of work so far, without the work of the helper process.
     time : float
         When it was worked on last, in seconds of a monotonic clock.
+    texture : texture or None
+        The finished picture. None if no field is visible.
     """
 
     view: ViewState
@@ -89,56 +91,43 @@ class Work:
     buffer: int = 0
     seconds: float = 0.0
     time: float = 0.0
+    texture: Any = None
 
 
 @dataclass(eq=False)
 class ViewState:
     """The picture that one region of a 3D view shows, and the work on its next picture.
 
-    A key identifies everything that a picture depends on. A still key identifies everything but the drift
-    of the streaks.
-
     Attributes
     ----------
-    texture : texture or None
-        The picture that is shown. None if there is no picture yet, or no field is visible.
-    texture_key : hashable
-        The key of the picture that is shown.
-    texture_still_key : hashable
-        The still key of the picture that is shown.
-    downscale : int
-        Width of a pixel of the picture that is shown, in pixels of the view.
-    buffer : int
-        Which of the view's two images for final pictures is shown, or was shown last.
+    shown : Work or None
+        The picture that is shown. None if there is no picture yet.
     items : list
         Draw items of the meshes that are prepared.
-    requested_key, requested_still_key : hashable
-        The keys of the picture that was requested last.
+    requested : Request or None
+        The request that was made last.
     requested_time : float
-        When `requested_still_key` was requested first, in seconds of a monotonic clock.
+        When a request with its still key was made first, in seconds of a monotonic clock.
     picture : Work or None
         The picture that is being rendered.
     progress : Step or None
         The step that is done next. Only set while there is no picture yet.
-    error : str or None
-        Why the picture with the still key `error_key` could not be rendered.
-    error_key : hashable
-        The still key of the picture that could not be rendered.
+    failed : (hashable, str) or None
+        The still key of a picture that could not be rendered, and the reason.
     """
 
-    texture: Any = None
-    texture_key: Hashable = None
-    texture_still_key: Hashable = None
-    downscale: int = 1
-    buffer: int = 0
+    shown: Work | None = None
     items: list[Any] = field(default_factory=list)
-    requested_key: Hashable = None
-    requested_still_key: Hashable = None
+    requested: Request | None = None
     requested_time: float = 0.0
     picture: Work | None = None
     progress: Step | None = None
-    error: str | None = None
-    error_key: Hashable = None
+    failed: tuple[Hashable, str] | None = None
+
+    @property
+    def texture(self) -> Any:
+        """The texture of the picture that is shown. None if there is none, or no field is visible."""
+        return None if self.shown is None else self.shown.texture
 
     @property
     def is_rendering(self) -> bool:
@@ -265,20 +254,20 @@ class ProgressiveRenderer:
             If this picture cannot be rendered. Later calls for it raise a RosyError with the same message.
         """
         view = self.views.setdefault(view_pointers, ViewState())
-        view.requested_key = request.key
-        if request.still_key != view.requested_still_key:
-            view.requested_still_key, view.requested_time = request.still_key, time.monotonic()
-        if view.error is not None and view.error_key == request.still_key:
-            raise RosyError(view.error)
-        view.error = None
+        if view.requested is None or view.requested.still_key != request.still_key:
+            view.requested_time = time.monotonic()
+        view.requested = request
+        if view.failed is not None and view.failed[0] == request.still_key:
+            raise RosyError(view.failed[1])
+        view.failed = None
         try:
             prepared = self._prepared(view, request)
             if prepared is not None:
                 self._update_picture(view, prepared)
         except Exception as error:
-            view.error, view.error_key = error_text(error), request.still_key
+            view.failed = request.still_key, error_text(error)
             view.stop_rendering()
-            view.texture = view.texture_key = view.texture_still_key = None
+            view.shown = None
             raise
         return view
 
@@ -317,7 +306,8 @@ class ProgressiveRenderer:
         view_input = request.view_input
         preview_downscale, full_downscale = self.renderer.downscale_factors
         view.items = self.renderer.upload(view_input.instances, view_input.look.display)
-        if view.texture_key == request.key and view.downscale == full_downscale:
+        shown, shows_final = view.shown, self._shows_final(view)
+        if shows_final and shown.request.key == request.key:
             return
         picture = view.picture
         if picture is not None:
@@ -333,10 +323,10 @@ class ProgressiveRenderer:
             self._start(view, request, full_downscale)
         elif seconds <= FRAME_BUDGET_SECONDS:
             self._start(view, request, full_downscale, is_at_once=True)
-        elif view.texture_still_key != request.still_key:
+        elif shown is None or shown.request.still_key != request.still_key:
             self._start(view, request, preview_downscale, is_at_once=True)
             self._schedule_redraw(IDLE_SECONDS)
-        elif view.downscale != full_downscale and not is_at_rest:
+        elif not shows_final and not is_at_rest:
             self._schedule_redraw(IDLE_SECONDS)
         else:
             self._start(view, request, full_downscale)
@@ -371,14 +361,19 @@ class ProgressiveRenderer:
         for other in others:
             other.stop_rendering()
         is_final = downscale == self.renderer.downscale_factors[1]
-        # A final picture that is shown must not be overwritten: the other image is used.
-        buffer = 1 - view.buffer if _shows(view, downscale) and not is_at_once else view.buffer
+        buffer = 0 if view.shown is None else view.shown.buffer
+        if self._shows_final(view) and not is_at_once:
+            buffer = 1 - buffer  # the final picture that is shown must not be overwritten
         view_input = downscaled(request.view_input, downscale)
         target = id(view), downscale, buffer if is_final else 0
         steps = self.renderer.texture_steps(view.items, view_input, target)
         runner = StepRunner(steps, self._helper)
         view.picture = Work(view, request, runner, is_at_once, downscale, buffer)
         self._render(view)
+
+    def _shows_final(self, view: ViewState) -> bool:
+        """Return whether a view shows a final picture, which may be outdated."""
+        return view.shown is not None and view.shown.downscale == self.renderer.downscale_factors[1]
 
     def _must_wait(self, view: ViewState) -> bool:
         """Return whether a view must wait, because another view is already waiting to be rendered."""
@@ -391,18 +386,17 @@ class ProgressiveRenderer:
     def _render(self, view: ViewState) -> None:
         """Continue the picture of a view, and show it once it is done."""
         picture, full_downscale = view.picture, self.renderer.downscale_factors[1]
-        shows_final = _shows(view, full_downscale)
-        end = self._continue(view, picture, DRIFT_SLICE_SECONDS if shows_final else SLICE_SECONDS)
+        seconds = DRIFT_SLICE_SECONDS if self._shows_final(view) else SLICE_SECONDS
+        end = self._continue(view, picture, seconds)
         if end is None:
             return
         if picture.is_at_once or not self._seconds_per_megapixel:
             ratio = 1.0 if picture.downscale == full_downscale else PREVIEW_COST_RATIO
             megapixels = ratio * self._megapixels(view, picture.request)
             self._update_estimate(picture.seconds + picture.runner.helper_seconds, megapixels)
-        view.texture, view.downscale, view.buffer = end.value, picture.downscale, picture.buffer
-        view.texture_key, view.texture_still_key = picture.request[:2]
-        view.picture = None
-        if view.texture_key != view.requested_key:
+        picture.texture = end.value
+        view.shown, view.picture = picture, None
+        if picture.request.key != view.requested.key:
             self._schedule_redraw(0.0)
 
     def _update_estimate(self, seconds: float, megapixels: float) -> None:
@@ -452,11 +446,6 @@ class ProgressiveRenderer:
             self._schedule_redraw(0.0)
         else:
             self._schedule_poll()
-
-
-def _shows(view: ViewState, downscale: int) -> bool:
-    """Return whether a view shows a picture with a given downscale factor."""
-    return view.texture is not None and view.downscale == downscale
 
 
 def downscaled(view_input: ViewInput, downscale: int) -> ViewInput:

@@ -11,10 +11,10 @@ from functools import partial
 from itertools import chain
 
 import bpy
-from bpy.types import Area, Context, Depsgraph, Scene, SpaceView3D
+from bpy.types import Area, Context, Depsgraph, SpaceView3D
 
 from ..annotation.singularity_settings import shows_singularities
-from ..compositor.flow import NO_DRIFT, Drift
+from ..compositor.flow import NO_DRIFT
 from ..compositor.look import Look, has_flow
 from ..core.cache import Cache
 from ..core.errors import REPORTED_ERRORS, DeviceError, RosyError, counted, error_text
@@ -113,7 +113,7 @@ class ViewportSession:
             select_viewport_renderer(device),
             self._helper,
             self._schedule_redraw,
-            lambda: self._schedule(POLL_SECONDS, self._poll_helper),
+            lambda: self._redraw_when(self.progressive.poll, POLL_SECONDS),
         )
 
     # --- switching -------------------------------------------------------------------------------
@@ -170,35 +170,6 @@ class ViewportSession:
         stop()
         return None
 
-    def _tag_redraw(self) -> None:
-        """Tag the live views for a redraw, in which rendering continues."""
-        view3d.redraw(self.spaces)
-
-    def _poll_helper(self) -> float | None:
-        """Timer: tag the live views for a redraw once `ProgressiveRenderer.poll` returns True.
-
-        Return the seconds until the next call; None to end the timer.
-        """
-        if not self.progressive.poll():
-            return POLL_SECONDS
-        view3d.redraw(self.spaces)
-        return None
-
-    def _resolve_topologies(self) -> float | None:
-        """Timer: call `LayerStates.resolve_topologies` until all data is read that views wait for.
-
-        Return the seconds until the next call; None to end the timer.
-        """
-        if not self.layers.resolve_topologies():
-            return 0.0
-        view3d.redraw(self.spaces)
-        return None
-
-    def _load_references(self) -> None:
-        """Load the pictures that tones come from."""
-        self._references.load_pending()
-        view3d.redraw(self.spaces)
-
     def _advance_flow(self) -> float | None:
         """Timer: advance the clock of the streaks, and tag the views for a redraw.
 
@@ -218,7 +189,7 @@ class ViewportSession:
             and self.flow_clock.advance(now, rate)
         ):
             self._has_shown_flow = False
-            view3d.redraw(self.spaces)
+            self._tag_redraw()
         return 1 / rate
 
     def _schedule(self, seconds: float, function: Callable[[], float | None]) -> None:
@@ -229,6 +200,21 @@ class ViewportSession:
 
     def _schedule_redraw(self, seconds: float) -> None:
         self._schedule(seconds, self._tag_redraw)
+
+    def _tag_redraw(self) -> None:
+        """Tag the live views for a redraw, in which rendering continues."""
+        view3d.redraw(self.spaces)
+
+    def _redraw_when(self, is_ready: Callable[[], bool], seconds: float = 0.0) -> None:
+        """Call a function every so many seconds until it returns True, then tag the views for a redraw."""
+
+        def call() -> float | None:
+            if not is_ready():
+                return seconds
+            self._tag_redraw()
+            return None
+
+        self._schedule(seconds, self._timers.setdefault(is_ready, call))
 
     # --- drawing ---------------------------------------------------------------------------------
 
@@ -314,7 +300,7 @@ class ViewportSession:
         include_occluders = self.progressive.renderer.needs_occluders or look.shadows
         layer = self.layers.read(context, depsgraph, look, include_occluders=include_occluders)
         if layer.reader.has_unresolved:
-            self._schedule(0.0, self._resolve_topologies)
+            self._redraw_when(self.layers.resolve_topologies)
         if layer.is_starting:
             self._schedule_redraw(0.0)
             return None
@@ -335,8 +321,11 @@ class ViewportSession:
         check_sources(sources, read_request(context.scene, look))
         reference = self._references.current(context.scene, depsgraph, look)
         if look.tone == "picture" and reference is None:
-            self._schedule(0.0, self._load_references)
+            self._redraw_when(self._references.load_pending)
             return None
+        self._has_shown_flow |= has_flow(look)
+        # Streaks drift with the frames of the scene, and with the clock.
+        frame = context.scene.frame_current_final + self.flow_clock.frames
         return ViewInput(
             instances=tuple(entry.instance for entry in visible),
             camera=camera,
@@ -344,14 +333,8 @@ class ViewportSession:
             lights=tuple(read_lights(depsgraph, camera.view)) if look.light == "scene" else (),
             reference=reference,
             clip_planes=view3d.clip_planes(context.region_data),
-            drift=self._drift(look, context.scene),
+            drift=drift_in_scene(context.scene, look, frame),
         )
-
-    def _drift(self, look: Look, scene: Scene) -> Drift:
-        """Return how far streaks have drifted at the current frame of a scene plus the frames of `flow_clock`."""
-        if has_flow(look):
-            self._has_shown_flow = True
-        return drift_in_scene(scene, look, scene.frame_current_final + self.flow_clock.frames)
 
     def _draw_text(self) -> None:
         """Draw the messages and the labels of singularities in a view."""

@@ -10,10 +10,11 @@ from __future__ import annotations
 import io
 import pickle
 import time
-from collections.abc import Generator
+from collections.abc import Iterator
 from dataclasses import fields
+from itertools import count
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,6 +33,24 @@ KEPT_CLASSES = (GuidedSystem, MeshInstance, ReferenceRender, RosyField, Surface,
 CHUNK_BYTES = 1 << 20
 
 
+class Message(NamedTuple):
+    """A message as it is received.
+
+    Attributes
+    ----------
+    forgotten : list of int
+        Numbers of kept objects that this process can drop.
+    stream : bytes
+        The pickle, without the data of arrays.
+    buffers : list of (n,) uint8 ndarray
+        The bytes of the arrays of the pickle.
+    """
+
+    forgotten: list[int]
+    stream: bytes
+    buffers: list[np.ndarray]
+
+
 class Channel:
     """One end of a connection to another process of this package.
 
@@ -47,13 +66,13 @@ class Channel:
         self._package = package
         #: Objects that the other process keeps, by id, each with its number there.
         self._sent: dict[int, tuple[int, Any]] = {}
-        self._last_number = 0
+        self._numbers = count()
         #: Objects that this process keeps, as later messages may refer to them, by number.
         self._kept: dict[int, Any] = {}
-        #: The generator that receives the next message in parts, and the message. The message is None until
+        #: The generator that receives messages in parts, and the next message. The message is None until
         #: it is complete.
         self._parts = _message_parts(connection)
-        self._message: tuple[list[int], bytes, list[np.ndarray]] | None = None
+        self._message: Message | None = None
 
     def has_received(self, seconds: float) -> bool:
         """Receive parts of the next message that are available, for some seconds.
@@ -67,7 +86,7 @@ class Channel:
         """
         deadline = time.monotonic() + seconds
         while self._message is None and self.connection.poll():
-            self._receive_part()
+            self._message = next(self._parts)
             if time.monotonic() > deadline:
                 break
         return self._message is not None
@@ -82,17 +101,16 @@ class Channel:
         OSError
             If the other process has ended.
         """
-        pickler = _Pickler(self._sent, self._last_number)
+        pickler = _Pickler(self._sent, self._numbers)
         pickler.dump(message)
-        forgotten = [number for number, _ in self._sent.values() if number not in pickler.used]
+        forgotten = [number for key, (number, _) in self._sent.items() if key not in pickler.used]
         arrays = [buffer.raw() for buffer in pickler.buffers]
         self.connection.send((forgotten, [array.nbytes for array in arrays]))
         self.connection.send_bytes(pickler.stream.getbuffer())
         for array in arrays:
             for start in range(0, array.nbytes, CHUNK_BYTES):
                 self.connection.send_bytes(array[start : start + CHUNK_BYTES])
-        self._last_number = pickler.last_number
-        self._sent = {id(kept): (number, kept) for number, kept in pickler.used.items()}
+        self._sent = pickler.used
 
     def receive(self) -> Any:
         """Wait for the next object from the other process, and return it.
@@ -103,48 +121,39 @@ class Channel:
             If the other process has ended.
         """
         while self._message is None:
-            self._receive_part()
+            self._message = next(self._parts)
         (forgotten, stream, buffers), self._message = self._message, None
         for number in forgotten:
             del self._kept[number]
         return _Unpickler(stream, buffers, self._kept, self._package).load()
 
-    def _receive_part(self) -> None:
-        """Wait for the next part of a message."""
-        try:
-            next(self._parts)
-        except StopIteration as end:
-            self._message, self._parts = end.value, _message_parts(self.connection)
 
+def _message_parts(connection: Connection) -> Iterator[Message | None]:
+    """Receive messages in parts of up to `CHUNK_BYTES`.
 
-def _message_parts(
-    connection: Connection,
-) -> Generator[None, None, tuple[list[int], bytes, list[np.ndarray]]]:
-    """Receive a message: a generator that yields before it waits for each part of up to `CHUNK_BYTES`.
-
-    Returns
-    -------
-    forgotten : list of int
-        Numbers of kept objects that this process can drop.
-    stream : bytes
-        The pickle, without the data of arrays.
-    buffers : list of (n,) uint8 ndarray
-        The bytes of the arrays of the pickle.
+    Yields
+    ------
+    Message or None
+        None before the next part of a message is waited for; the message after its last part.
     """
-    forgotten, sizes = connection.recv()
-    yield
-    stream = connection.recv_bytes()
-    buffers = [np.empty(size, dtype=np.uint8) for size in sizes]
-    for buffer in buffers:
-        position = 0
-        while position < len(buffer):
-            yield
-            position += connection.recv_bytes_into(buffer, position)
-    return forgotten, stream, buffers
+    while True:
+        forgotten, sizes = connection.recv()
+        yield None
+        stream = connection.recv_bytes()
+        buffers = [np.empty(size, dtype=np.uint8) for size in sizes]
+        for buffer in buffers:
+            position = 0
+            while position < len(buffer):
+                yield None
+                position += connection.recv_bytes_into(buffer, position)
+        yield Message(forgotten, stream, buffers)
 
 
 class _Pickler(pickle.Pickler):
     """A pickler that writes a number in place of each object that the other process keeps.
+
+    An object of `KEPT_CLASSES` that is sent for the first time is written as a new number, its class and its
+    fields. Cached properties are left out.
 
     Attributes
     ----------
@@ -152,51 +161,37 @@ class _Pickler(pickle.Pickler):
         The pickle, without the data of arrays.
     buffers : list of pickle.PickleBuffer
         The data of the arrays.
-    used : dict of int to object
-        Objects of `KEPT_CLASSES` in the message, by number.
-    last_number : int
-        The largest number that was given to an object so far.
+    used : dict of int to (int, object)
+        Objects of `KEPT_CLASSES` in the message, by id, each with its number.
     """
 
-    def __init__(self, sent: dict[int, tuple[int, Any]], last_number: int) -> None:
+    def __init__(self, sent: dict[int, tuple[int, Any]], numbers: Iterator[int]) -> None:
         self.stream, self.buffers = io.BytesIO(), []
         super().__init__(self.stream, 5, buffer_callback=self.buffers.append)
-        self._sent, self.last_number = sent, last_number
-        self.used: dict[int, Any] = {}
+        self._sent, self._numbers = sent, numbers
+        self.used: dict[int, tuple[int, Any]] = {}
 
-    def persistent_id(self, obj: Any) -> int | None:
-        """Return the number of an object that the other process keeps; None for other objects."""
-        if not isinstance(obj, KEPT_CLASSES) or id(obj) not in self._sent:
-            return None
-        number = self._sent[id(obj)][0]
-        self._use(number, obj)
-        return number
-
-    def _use(self, number: int, obj: Any) -> None:
-        """Record in `used` that the message contains a kept object.
-
-        Do the same for kept objects in its fields.
-        """
-        self.used[number] = obj
-        for value in vars(obj).values():
-            if isinstance(value, KEPT_CLASSES):
-                self.persistent_id(value)
-
-    def reducer_override(self, obj: Any) -> Any:
-        """Pickle an object of `KEPT_CLASSES` that is sent for the first time: as a new number and its fields.
-
-        Cached properties are left out. Other objects are pickled as usual.
-        """
+    def persistent_id(self, obj: Any) -> int | tuple[int, type, dict[str, Any]] | None:
+        """Return what is written for an object of `KEPT_CLASSES`; None for other objects."""
         if not isinstance(obj, KEPT_CLASSES):
-            return NotImplemented
-        self.last_number += 1
-        self.used[self.last_number] = obj
-        state = {field.name: getattr(obj, field.name) for field in fields(obj)}
-        return _keep, (self.last_number, type(obj), state)
+            return None
+        self._use(id(obj))
+        if id(obj) in self.used:
+            return self.used[id(obj)][0]
+        number = next(self._numbers)
+        self.used[id(obj)] = number, obj
+        return number, type(obj), {field.name: getattr(obj, field.name) for field in fields(obj)}
+
+    def _use(self, key: int) -> None:
+        """Record that the message contains the object with an id, and those in its fields, if they were sent."""
+        if key in self._sent:
+            self.used[key] = self._sent[key]
+            for value in vars(self._sent[key][1]).values():
+                self._use(id(value))
 
 
 class _Unpickler(pickle.Unpickler):
-    """An unpickler that returns kept objects for their numbers.
+    """An unpickler that keeps the objects that `_Pickler` has numbered, and returns them for their numbers.
 
     It also replaces the name of this package in the other process by its name in this process.
     """
@@ -207,26 +202,17 @@ class _Unpickler(pickle.Unpickler):
         super().__init__(io.BytesIO(stream), buffers=buffers)
         self._kept, self._package = kept, package
 
-    def persistent_load(self, number: int) -> Any:
-        """Return the kept object with a number."""
-        return self._kept[number]
+    def persistent_load(self, written: Any) -> Any:
+        """Return the object for what `_Pickler.persistent_id` has returned."""
+        if isinstance(written, int):
+            return self._kept[written]
+        number, kind, state = written
+        self._kept[number] = kept = object.__new__(kind)
+        vars(kept).update(state)
+        return kept
 
     def find_class(self, module: str, name: str) -> Any:
         """Return a class or function, given its module in the other process and its name."""
         if module == self._package or module.startswith(f"{self._package}."):
             module = PACKAGE + module.removeprefix(self._package)
-        found = super().find_class(module, name)
-        return self._keep if found is _keep else found
-
-    def _keep(self, number: int, kind: type, state: dict[str, Any]) -> Any:
-        self._kept[number] = kept = object.__new__(kind)
-        vars(kept).update(state)
-        return kept
-
-
-def _keep(number: int, kind: type, state: dict[str, Any]) -> Any:
-    """Placeholder that is never called: pickles name it as the function that creates an object.
-
-    In its place, `_Unpickler` calls its own method `_keep`, which creates the object and keeps it.
-    """
-    raise NotImplementedError
+        return super().find_class(module, name)

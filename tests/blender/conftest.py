@@ -18,7 +18,7 @@ else:
     import bpy
 
     sys.path.insert(0, str(Path(__file__).parents[1]))
-    from harness.blender_data import contents, member_vectors, pixels  # noqa: F401
+    from harness.blender_data import contents, member_vectors, pixels, render_image  # noqa: F401
 
 EXTENSION = "bl_ext.user_default.rosy"
 

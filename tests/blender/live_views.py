@@ -79,9 +79,13 @@ def wait_for_final_pictures():
         session = session_module()._session
         final_downscale = session.progressive.renderer.downscale_factors[1]
         views = session.progressive.views.values()
-        keys_are_final = all(s.texture_key == s.requested_key is not None for s in views)
-        is_sharp = all(state.downscale == final_downscale for state in views)
-        return len(drawn) >= 3 and views and keys_are_final and is_sharp
+        are_final = all(
+            view.shown is not None
+            and view.shown.request.key == view.requested.key
+            and view.shown.downscale == final_downscale
+            for view in views
+        )
+        return len(drawn) >= 3 and views and are_final
 
     with redraws() as drawn:
         yield from wait_until(rests)

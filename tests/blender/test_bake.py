@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from conftest import pixels, run_blender
+from conftest import pixels, render_image, run_blender
 
 
 def baked_images():
@@ -25,15 +25,9 @@ def hatching_node(obj):
 
 def render(scene, folder):
     """Render the scene with Cycles: (H, W, 4) display values, sampled at the centers of pixels."""
-    scene.render.engine = "CYCLES"
     scene.cycles.samples, scene.cycles.use_denoising = 4, False
     scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 0.01
-    scene.render.film_transparent = True
-    scene.render.image_settings.file_format = "PNG"
-    scene.render.image_settings.color_mode = "RGBA"
-    scene.render.filepath = str(folder / "cycles.png")
-    bpy.ops.render.render(write_still=True)
-    return pixels(bpy.data.images.load(scene.render.filepath))
+    return render_image(scene, folder / "cycles.png", "CYCLES")
 
 
 def plane_in_frame(scene):

@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from conftest import contents, error_of, member_vectors
+from harness.blender_data import attribute_values
 
 
 @pytest.mark.parametrize(("kind", "degree"), [("curvature", 4), ("axis", 12), ("uv", 4)])
@@ -439,8 +440,7 @@ def test_fields_are_compared(suzanne):
     assert bpy.ops.rosy.field_compare() == {"FINISHED"}  # with the only other one
     attribute = mesh.attributes["Difference"]
     assert (attribute.domain, attribute.data_type) == ("FACE", "FLOAT")
-    values = np.empty(len(mesh.polygons), dtype=np.float32)
-    attribute.data.foreach_get("value", values)
+    values = attribute_values(attribute)
     defined = np.isfinite(values)
     assert defined.mean() > 0.9 and np.allclose(values[defined], np.degrees(0.2), atol=0.01)
     assert (settings.color_attribute, settings.look.hue) == ("Difference", "values")

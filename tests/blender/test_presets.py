@@ -47,14 +47,10 @@ def test_presets_are_saved_in_the_folder_of_the_extension(scene):
     assert look().ink == "soft"
     assert bpy.ops.rosy.preset_apply(preset="my-ink") == {"FINISHED"}
     assert (look().length, look().ink) == (90, "hatch")
-
-
-def test_presets_are_replaced_only_on_request(scene):
-    save()
     look().length = 7
     assert "already" in error_of(save)
     assert save(replace=True) == {"FINISHED"}
-    assert json.loads((folder() / "my-ink.json").read_text())["look"] == {"length": 7}
+    assert json.loads((folder() / "my-ink.json").read_text())["look"]["length"] == 7
 
 
 def test_rename_and_delete(scene):

@@ -8,7 +8,7 @@ from itertools import pairwise
 import bpy
 import numpy as np
 import pytest
-from conftest import contents, pixels
+from conftest import contents, render_image
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -25,15 +25,8 @@ def render_strokes(scene, path, engine="BLENDER_WORKBENCH"):
     """Render the strokes alone, and return the (H, W) alpha, rows from the top."""
     for obj in bpy.data.objects:
         obj.hide_render = obj.type == "MESH"
-    scene.render.engine = engine
-    scene.render.film_transparent = True
-    settings = scene.render.image_settings
-    settings.file_format, settings.color_mode, settings.color_depth = "PNG", "RGBA", "8"
-    if engine == "CYCLES":
-        scene.cycles.samples, scene.cycles.use_denoising = 32, False
-    scene.render.filepath = str(path)
-    bpy.ops.render.render(write_still=True)
-    return pixels(bpy.data.images.load(str(path)))[::-1, :, 3]
+    scene.cycles.samples, scene.cycles.use_denoising = 32, False
+    return render_image(scene, path, engine)[::-1, :, 3]
 
 
 def coverage_of_svg(path, width, height, subpixels=6):

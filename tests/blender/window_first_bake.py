@@ -12,7 +12,6 @@ import sys
 from pathlib import Path
 
 import bpy
-from mathutils import Euler, Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
 import window_steps
@@ -186,18 +185,14 @@ def live_suzanne():
     preferences().live_first_field = True
     bpy.ops.wm.read_homefile(use_empty=True)
     yield 1.0
-    space = view()[1].spaces.active
     yield from window_steps.open_tab()
     with in_view():
         add_suzanne(2)
         bpy.ops.object.shade_smooth()
         bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="smoothest", degree=4)
         bpy.ops.object.select_all(action="DESELECT")
-    rotation = Euler((1.3, 0.0, 0.4)).to_quaternion()
-    space.region_3d.view_rotation = rotation
     # The sidebar covers the right third of the view.
-    space.region_3d.view_location = rotation @ Vector((0.75, 0.0, 0.0))
-    space.region_3d.view_distance = 4.3
+    window_steps.turn_view((1.3, 0.0, 0.4), 4.3, 0.75)
     yield from wait_for_live_view()
     yield from save_picture("live")
 

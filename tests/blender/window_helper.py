@@ -19,6 +19,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 from conftest import contents, pixels
+from monkey_checks import handlers
 from run import is_running
 from window_steps import (
     RESULTS,
@@ -120,6 +121,7 @@ def test_escape_ends_the_helper_at_once():
     assert contents() == before
     yield 0.3
     assert helper_id() not in (None, first), "there is no helper for the next job"
+    assert not handlers()
 
 
 def test_a_helper_that_is_killed():

@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 
 import bpy
-from mathutils import Euler, Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
 from conftest import add_suzanne
@@ -23,6 +22,7 @@ from window_steps import (
     rosy,
     run_steps,
     save_part,
+    turn_view,
     view,
     wait_until,
 )
@@ -64,7 +64,7 @@ def live():
         bpy.ops.object.shade_smooth()
     yield from open_tab()
     call_in_view(bpy.ops.rosy.field_generate, "EXEC_DEFAULT", True, kind="form", degree=4)
-    turn_view()
+    turn_view(VIEW, DISTANCE, SIDEBAR)
     session = rosy("rosy_addon.viewport.session")
     yield 2.0
     yield from wait_until(lambda: not session.messages(view()[1]), PATIENCE)
@@ -83,14 +83,6 @@ def baked():
     call_in_view(bpy.ops.rosy.show_here)
     yield 10.0
     yield from save_view("window-baked")
-
-
-def turn_view():
-    space = view()[1].spaces.active
-    rotation = Euler(VIEW).to_quaternion()
-    space.region_3d.view_rotation = rotation
-    space.region_3d.view_location = rotation @ Vector((SIDEBAR, 0.0, 0.0))
-    space.region_3d.view_distance = DISTANCE
 
 
 run_steps(live, baked)

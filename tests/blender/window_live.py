@@ -251,7 +251,7 @@ def test_every_frame_is_drawn(monkey):
 
     def record():
         views = session_module()._session.progressive.views.values()
-        shows = all(state.texture_key == state.requested_key for state in views)
+        shows = all(view.shown and view.shown.request.key == view.requested.key for view in views)
         steps.append((bpy.context.scene.frame_current, shows))
 
     with redraws(record):
@@ -397,7 +397,7 @@ def shown_phases():
     """Return how far the streaks in the views have drifted."""
     views = session_module()._session.progressive.views.values()
     return [
-        next(part.phase for part in view_state.texture_key if hasattr(part, "phase"))
+        next(part.phase for part in view_state.shown.request.key if hasattr(part, "phase"))
         for view_state in views
     ]
 
@@ -421,7 +421,7 @@ def test_streaks_drift_while_they_are_played(monkey):
 
     def drifts():
         for view_state in session.progressive.views.values():
-            downscales.add(view_state.downscale)
+            downscales.add(view_state.shown.downscale)
         phases.extend(phase for phase in shown_phases() if phase not in phases)
         return len(phases) > 4
 

@@ -19,6 +19,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from mathutils import Euler, Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
 from conftest import add_camera, add_suzanne
@@ -144,6 +145,14 @@ def fresh_scene(size=(320, 240)):
         scene.camera = add_camera("Camera", (0.0, -4.5, 1.0), (math.radians(78), 0.0, 0.0))
         add_suzanne(2)
         bpy.ops.ed.undo_push(message="fresh scene")
+
+
+def turn_view(angles, distance, sidebar):
+    """Turn the 3D view to Euler angles, and move it to the left of the sidebar."""
+    region_3d, rotation = view()[1].spaces.active.region_3d, Euler(angles).to_quaternion()
+    region_3d.view_rotation = rotation
+    region_3d.view_location = rotation @ Vector((sidebar, 0.0, 0.0))
+    region_3d.view_distance = distance
 
 
 def scene_with_field(size=(320, 240)):

@@ -15,6 +15,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
+from conftest import member_vectors
 from window_steps import (
     call_in_view,
     fresh_scene,
@@ -27,23 +28,20 @@ from window_steps import (
 )
 
 
-def fresh_sphere():
+def fresh_sphere(segments=48, ring_count=24, **options):
     """Create a scene in which a sphere is the only object."""
     yield from fresh_scene()
     with in_view():
         bpy.ops.object.select_all(action="SELECT")
         bpy.ops.object.delete()
-        bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24)
+        bpy.ops.mesh.primitive_uv_sphere_add(segments=segments, ring_count=ring_count, **options)
 
 
 def annotations_guide_a_field():
     """A stroke of the Annotate tool across the middle of a sphere, drawn on its surface."""
-    yield from fresh_scene()
+    yield from fresh_sphere(64, 32, location=(0.5, 0.0, 0.0))
     scene = bpy.context.scene
-    with in_view():
-        bpy.ops.object.delete()
-        bpy.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, location=(0.5, 0.0, 0.0))
-        bpy.ops.view3d.view_axis(type="FRONT")
+    call_in_view(bpy.ops.view3d.view_axis, type="FRONT")
     view()[1].spaces.active.region_3d.view_distance = 5.0
     view()[1].spaces.active.region_3d.view_perspective = "ORTHO"
     yield 0.5
@@ -71,13 +69,11 @@ def annotations_guide_a_field():
             "EXEC_DEFAULT", True, kind="guided", degree=2, guides={"ANNOTATIONS"}
         )
     mesh = bpy.context.object.data
-    vectors = np.empty(3 * len(mesh.polygons), dtype=np.float32)
-    mesh.attributes["rosy"].data.foreach_get("vector", vectors)
     center = np.array([face.center for face in mesh.polygons])
     x, y, z = center.T
     near = (np.abs(x - z) < 0.05) & (np.abs(x) < 0.4) & (y < 0.0)
     assert near.sum() > 5
-    direction = vectors.reshape(-1, 3)[near]
+    direction = member_vectors(mesh)[near]
     angle = np.degrees(np.arctan2(direction[:, 2], direction[:, 0])) % 180.0
     assert np.abs(angle - 45.0).max() < 5.0, angle
 
@@ -182,10 +178,7 @@ def comb():
 
 def field_bytes():
     """Return the vectors of the active object's field."""
-    attribute = bpy.context.object.data.attributes["rosy"]
-    vectors = np.empty(3 * len(attribute.data), dtype=np.float32)
-    attribute.data.foreach_get("vector", vectors)
-    return vectors.tobytes()
+    return member_vectors(bpy.context.object.data).tobytes()
 
 
 def shown_singularities():

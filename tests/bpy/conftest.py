@@ -29,6 +29,7 @@ else:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     _import_extension()
     importlib.import_module("rosy.rosy_addon.ui.properties").ensure_registered()
+    from scenes import add_camera, add_field, add_monkey, add_plane, empty_scene
 
 
 @pytest.fixture(autouse=True)
@@ -40,8 +41,6 @@ def empty_cache():
 @pytest.fixture
 def scene():
     """An empty scene, 128 x 128 pixels, view transform Standard."""
-    from scenes import empty_scene
-
     scene = empty_scene(128)
     scene.view_settings.view_transform = "Standard"
     return scene
@@ -50,8 +49,6 @@ def scene():
 @pytest.fixture
 def camera(scene):
     """A camera at (0, -5, 0.5) that looks at the origin and renders the scene."""
-    from scenes import add_camera
-
     scene.camera = add_camera("Camera", (0.0, -5.0, 0.5))
     return scene.camera
 
@@ -59,14 +56,10 @@ def camera(scene):
 @pytest.fixture
 def monkey(scene):
     """Suzanne with a curvature field of degree 4."""
-    from scenes import add_field, add_monkey
-
     return add_field(add_monkey())
 
 
 @pytest.fixture
 def wall(scene, camera):
     """A square across the view, of four faces, with a field of degree 2."""
-    from scenes import add_field, add_plane
-
     return add_field(add_plane(cuts=2), "axis", 2, (1.0, 0.0, 0.2))

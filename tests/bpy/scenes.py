@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from harness.blender_data import contents, member_vectors, pixels  # noqa: F401
+from harness.blender_data import contents, member_vectors, pixels, render_image  # noqa: F401
 from mathutils import Vector
 from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.field.generate import GeneratorSettings, generate
@@ -136,34 +136,27 @@ def add_field(obj, kind="curvature", degree=4, axis=(0.0, 0.0, 1.0)):
     return obj
 
 
-def set_vectors(mesh, vectors, name="rosy", domain="FACE", kind="FLOAT_VECTOR"):
+def set_attribute(mesh, values, name="rosy", domain="FACE", kind="FLOAT_VECTOR"):
     """Store values in a new attribute, as another program would."""
     old = mesh.attributes.get(name)
     if old is not None:
         mesh.attributes.remove(old)
     attribute = mesh.attributes.new(name, kind, domain)
-    key = "vector" if kind == "FLOAT_VECTOR" else "value"
-    attribute.data.foreach_set(key, np.asarray(vectors, dtype=np.float32).ravel())
+    key = {"VECTOR": "vector", "COLOR": "color"}.get(kind.rpartition("_")[2], "value")
+    number = np.int32 if kind == "INT" else np.float32
+    attribute.data.foreach_set(key, np.asarray(values, dtype=number).ravel())
     mesh.update()
 
 
 def render(scene, path, *, samples=16, box=True, engine="CYCLES"):
     """Render the scene, and return (H, W, 4) linear values, not premultiplied."""
-    scene.render.engine = engine
     scene.display.render_aa = "32"
     cycles = scene.cycles
     cycles.device, cycles.samples, cycles.seed = "CPU", samples, 1
     cycles.use_denoising = cycles.use_adaptive_sampling = False
     cycles.pixel_filter_type = "BOX" if box else "BLACKMAN_HARRIS"
     cycles.filter_width = 1.0 if box else 1.5
-    scene.render.film_transparent = True
-    settings = scene.render.image_settings
-    settings.file_format, settings.color_mode, settings.color_depth = "OPEN_EXR", "RGBA", "32"
-    scene.render.filepath = str(path)
-    bpy.ops.render.render(write_still=True)
-    image = bpy.data.images.load(str(path))
-    values = pixels(image).copy()
-    bpy.data.images.remove(image)
+    values = render_image(scene, path, engine)
     alpha = values[..., 3:]
     np.divide(values[..., :3], alpha, out=values[..., :3], where=alpha > 0)
     return values

@@ -282,19 +282,6 @@ def test_a_cluster_renders_all_frames(file, tmp_path, cluster):
     assert frames_of(tmp_path / "two") == frames_of(tmp_path / "one")
 
 
-@pytest.mark.parametrize(
-    ("options", "expected"),
-    [
-        (["--jobs", "2"], "give --frames"),
-        (["--frames", "1-3", "--jobs", "0"], "a whole number from 1"),
-        (["--frames", "3-1"], "expected A"),
-    ],
-)
-def test_invalid_options_are_refused(options, expected, file, tmp_path, capsys):
-    assert main(["bake", str(file), "--out", str(tmp_path / "out"), *options]) == 2
-    assert expected in capsys.readouterr().err
-
-
 def test_a_cluster_that_does_not_answer(file, tmp_path, monkeypatch):
     monkeypatch.setenv("DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT", "1s")
     address = "tcp://127.0.0.1:1"

@@ -86,16 +86,6 @@ def test_a_key_is_not_listed_among_the_pictures(colored):
     assert not keys()
 
 
-def test_a_key_that_shows_nothing_is_not_made(colored):
-    colored.rosy.key = True
-    for name in ("key_bar", "key_legend"):
-        setattr(colored.rosy, name, False)
-    bake(colored)
-    assert not keys()
-    colored.rosy.key_caption = "A head"
-    assert len(keys()) == 1
-
-
 def test_a_panoramic_camera_has_no_key(colored):
     colored.rosy.key = True
     bake(colored)
@@ -162,7 +152,10 @@ def test_only_orthographic_cameras_have_a_scale_bar(colored):
     colored.rosy.key = True
     colored.rosy.key_bar = colored.rosy.key_legend = False
     bake(colored)
-    assert not keys()
+    assert not keys(), "a key that shows nothing is not made"
+    for caption in ("A head", ""):
+        colored.rosy.key_caption = caption
+        assert len(keys()) == bool(caption)
     colored.camera.data.type, colored.camera.data.ortho_scale = "ORTHO", 8.0
     bake(colored)
     (obj,) = keys()

@@ -11,13 +11,11 @@ from rosy.rosy_addon.scene.bake_records import list_bakes
 from rosy.rosy_addon.scene.look_inputs import ReadRequest
 from rosy.rosy_addon.scene.read_view import read_turntable
 from rosy.rosy_addon.scene.scene_reader import read_scene
-from scenes import add_uv, depsgraph, expect_error
+from scenes import add_uv, depsgraph, expect_error, set_attribute
 
 
 def set_values(mesh, values, name="Angle"):
-    attribute = mesh.attributes.get(name) or mesh.attributes.new(name, "FLOAT", "FACE")
-    attribute.data.foreach_set("value", values)
-    mesh.update()
+    set_attribute(mesh, values, name, kind="FLOAT")
 
 
 def values_of(name, obj):

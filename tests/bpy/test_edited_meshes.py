@@ -21,7 +21,7 @@ from scenes import (
     member_vectors,
     read_instances,
     read_live,
-    set_vectors,
+    set_attribute,
 )
 
 #: Turned about all axes, so that no symmetry of the objects hides a mistake.
@@ -125,7 +125,7 @@ def test_vectors_that_were_stored_later_are_not_turned(scene):
     apply_transform(plane)
     turned = read_mesh_field(plane.data).vectors
     np.testing.assert_allclose(turned, [[np.cos(0.5), 0, -np.sin(0.5)]], atol=1e-6)
-    set_vectors(plane.data, [[0.0, 0.0, 1.0]])
+    set_attribute(plane.data, [[0.0, 0.0, 1.0]])
     np.testing.assert_allclose(read_mesh_field(plane.data).vectors, [[0, 0, 1]], atol=1e-6)
 
 
@@ -157,7 +157,7 @@ def broken(scene, monkey):
     vectors = np.roll(member_vectors(add_field(other).data), 1, axis=1)
     for name in [a.name for a in other.data.attributes if "rosy" in a.name]:
         other.data.attributes.remove(other.data.attributes[name])
-    set_vectors(other.data, vectors)
+    set_attribute(other.data, vectors)
     return other
 
 

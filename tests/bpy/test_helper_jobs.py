@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from harness.steps import finished
 from rosy.rosy_addon.field.combing import GuideBrush
 from rosy.rosy_addon.jobs.animation import bake_animation
 from rosy.rosy_addon.jobs.bake import bake
@@ -17,7 +18,7 @@ from rosy.rosy_addon.scene.pictures import OutputSettings
 from rosy.rosy_addon.worker.helper import Helper
 from rosy.rosy_addon.worker.job import run
 from rosy.rosy_addon.worker.step_runner import StepRunner
-from scenes import add_field, member_vectors, pixels, set_vectors
+from scenes import add_field, member_vectors, pixels, set_attribute
 
 
 @pytest.fixture(scope="module")
@@ -32,14 +33,7 @@ def run_with(helper):
     """A function that runs the steps of a job, given "in place" or "helper"."""
 
     def run_beside(steps):
-        runner = StepRunner(steps, helper)
-        while True:
-            while not runner.poll():
-                helper.wait(5.0)
-            try:
-                runner.advance()
-            except StopIteration as end:
-                return end.value
+        return finished(StepRunner(steps, helper), helper)
 
     return lambda where, steps: run(steps) if where == "in place" else run_beside(steps)
 
@@ -61,7 +55,7 @@ def strokes(run_with, where, scene, monkey):
 
 
 def difference(run_with, where, scene, monkey):
-    set_vectors(monkey.data, member_vectors(monkey.data), "other")
+    set_attribute(monkey.data, member_vectors(monkey.data), "other")
     add_field(monkey, kind="axis")
     return run_with(where, store_difference.begin(monkey.data, "other"))[2].difference.angle
 

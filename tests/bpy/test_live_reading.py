@@ -17,7 +17,7 @@ from scenes import (
     member_vectors,
     read_instances,
     read_live,
-    set_vectors,
+    set_attribute,
 )
 
 
@@ -204,7 +204,7 @@ def test_too_little_memory_is_a_message(monkey, monkeypatch, mesh_kind):
 
 def test_edit_mode_names_a_field_that_cannot_be_read(scene):
     plane = add_plane(cuts=2)
-    set_vectors(plane.data, np.tile([1.0, 0.0, 0.0], (9, 1)), domain="POINT")
+    set_attribute(plane.data, np.tile([1.0, 0.0, 0.0], (9, 1)), domain="POINT")
     bpy.context.view_layer.objects.active = plane
     bpy.ops.object.mode_set(mode="EDIT")
     reader = SceneReader()

@@ -35,7 +35,7 @@ from scenes import (
     link,
     member_vectors,
     read_instances,
-    set_vectors,
+    set_attribute,
 )
 
 
@@ -89,7 +89,7 @@ def test_vectors_on_points_and_corners(scene, domain):
     plane = add_plane(cuts=3)
     mesh = plane.data
     count = {"POINT": len(mesh.vertices), "CORNER": len(mesh.loops)}[domain]
-    set_vectors(mesh, np.tile([0.6, 0.0, 0.8], (count, 1)), domain=domain)
+    set_attribute(mesh, np.tile([0.6, 0.0, 0.8], (count, 1)), domain=domain)
     mesh.rosy.degree = 3
     field = read_mesh_field(mesh)
     expected = RosyField(3, np.tile([0.6, 0.0, 0.8], (9, 1)))
@@ -101,7 +101,7 @@ def test_vectors_on_points_and_corners(scene, domain):
 def test_angles(scene):
     """About the face's normal, counter-clockwise from its first edge."""
     plane = add_plane(cuts=1)
-    set_vectors(plane.data, [np.pi / 6], kind="FLOAT")
+    set_attribute(plane.data, [np.pi / 6], kind="FLOAT")
     plane.data.rosy.degree = 5
     field = read_mesh_field(plane.data)
     # The face points to -y. Seen from there, x points to the right and z up.
@@ -114,7 +114,7 @@ def add_directions(mesh, degree, angle_offset=0.0, length_factor=1.0):
     for index in range(degree):
         angle = 2 * np.pi * index / degree + 0.2 + (angle_offset if index == 1 else 0.0)
         vectors = np.cos(angle) * x + np.sin(angle) * y
-        set_vectors(mesh, vectors * (length_factor if index == 1 else 1.0), f"dir{index}")
+        set_attribute(mesh, vectors * (length_factor if index == 1 else 1.0), f"dir{index}")
 
 
 @pytest.mark.parametrize(
@@ -186,7 +186,7 @@ def test_directions_replace_an_earlier_field(scene):
 def test_two_directions_are_the_lines_of_a_cross(scene):
     mesh = add_plane(cuts=2).data
     for name, axis in zip(("dir0", "dir1"), mesh_surface(mesh).face_frames, strict=True):
-        set_vectors(mesh, axis, name)
+        set_attribute(mesh, axis, name)
     with pytest.warns(RosyWarning, match="dir0 to dir1: rows have two directions that are nowhere"):
         assert read_mesh_field(mesh).degree == 4
     assert read_mesh_field(mesh, degree=2).degree == 2
@@ -264,7 +264,7 @@ def test_the_field_has_no_preferred_member(scene, camera, monkey, modifier):
     vectors = member_vectors(mesh).astype(np.float64)
     across = np.cross(surface.face_normal, vectors)
     angle = (np.arange(len(vectors)) % 4 * np.pi / 2)[:, None]
-    set_vectors(mesh, np.cos(angle) * vectors + np.sin(angle) * across)
+    set_attribute(mesh, np.cos(angle) * vectors + np.sin(angle) * across)
     second = project(read_instances(depsgraph()), view)
     np.testing.assert_array_equal(first.pixel, second.pixel)
     scale = np.abs(first.representation).max()
@@ -324,7 +324,7 @@ def test_evaluated_fields_of_other_forms(scene, monkey):
     mesh = monkey.data
     z = representation(mesh, read_mesh_field(mesh))
     angle = np.where(np.abs(z) > 0, np.angle(z) / 4, 0.0)
-    set_vectors(mesh, angle, kind="FLOAT")
+    set_attribute(mesh, angle, kind="FLOAT")
     modifier = monkey.modifiers.new("Subdivision", "SUBSURF")
     modifier.levels = 1
     (instance,) = read_instances(depsgraph())

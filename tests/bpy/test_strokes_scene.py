@@ -7,7 +7,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon.core.errors import RosyError
+from harness.blender_data import attribute_values
 from rosy.rosy_addon.core.progress import listening
 from rosy.rosy_addon.jobs.draw_strokes import draw_strokes
 from rosy.rosy_addon.line_drawing.outline import OUTLINE_KINDS
@@ -20,6 +20,7 @@ from rosy.rosy_addon.scene.stroke_data import has_grease_pencil_drawings
 from rosy.rosy_addon.scene.stroke_objects import edited_strokes, remove_strokes, stroke_objects
 from rosy.rosy_addon.worker.job import Step
 from scenes import add_field, add_nodes, add_plane, contents, depsgraph, each_step, render
+from test_bad_input import assert_refused
 
 PLAIN = StrokeStyle(spacing=12, outline=True)
 BLACK = Pen(width=1.5)
@@ -30,12 +31,6 @@ PENCIL = "GREASEPENCIL" if has_grease_pencil_drawings() else "GPENCIL"
 
 def view(scene):
     return camera_of_object(scene, depsgraph(), scene.camera)
-
-
-def values(attribute, key="value", columns=1):
-    result = np.empty(columns * len(attribute.data), dtype=np.float32)
-    attribute.data.foreach_get(key, result)
-    return result.reshape(-1, columns) if columns > 1 else result
 
 
 def pencil_strokes(layer):
@@ -89,18 +84,20 @@ def test_curves_hold_the_strokes_and_their_attributes(monkey, camera, scene):
     ):
         found = {(attributes[name].domain, attributes[name].data_type) for name in names}
         assert found == {(domain, kind)}
-    np.testing.assert_array_equal(values(attributes["family"]), strokes.family)
-    member = values(attributes["member"], "vector", 3)
-    normal = values(attributes["surface_normal"], "vector", 3)
+    np.testing.assert_array_equal(attribute_values(attributes["family"]), strokes.family)
+    member = attribute_values(attributes["member"], "vector", 3)
+    normal = attribute_values(attributes["surface_normal"], "vector", 3)
     has_member = member.any(axis=1)
     assert np.allclose(np.linalg.norm(member[has_member], axis=1), 1, atol=1e-4)
-    points = values(attributes["position"], "vector", 3)
+    points = attribute_values(attributes["position"], "vector", 3)
     camera_view = view(scene)
     first = np.array([curve.first_point_index for curve in data.curves])
     begins = strokes.start[:-1]
     np.testing.assert_allclose(member[first], strokes.member[begins], atol=1e-4)
     np.testing.assert_allclose(normal[first], strokes.normal[begins], atol=1e-4)
-    np.testing.assert_array_equal(values(attributes["face_index"])[first], strokes.face[begins])
+    np.testing.assert_array_equal(
+        attribute_values(attributes["face_index"])[first], strokes.face[begins]
+    )
     positions, _ = project_to_pixels(points[first].astype(float), camera_view)
     np.testing.assert_allclose(
         positions, project_to_pixels(strokes.points[strokes.start[:-1]], camera_view)[0], atol=0.01
@@ -314,11 +311,7 @@ def test_wrong_input_is_one_line_and_changes_nothing(monkey, camera, scene, prob
     elif problem == "away":
         monkey.location.y = -50.0
         bpy.context.view_layer.update()
-    before = contents()
-    with pytest.raises(RosyError) as caught:
-        draw_strokes(scene, **{"kind": "PENCIL", **options})
-    assert text in str(caught.value) and "\n" not in str(caught.value)
-    assert contents() == before
+    assert_refused(text, act=draw_strokes, **{"kind": "PENCIL", **options})
 
 
 def move_a_point(data):

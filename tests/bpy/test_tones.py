@@ -7,6 +7,7 @@ import os
 import bpy
 import numpy as np
 import pytest
+from harness.blender_data import attribute_values
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.core.color import to_linear
 from rosy.rosy_addon.core.errors import RosyError
@@ -21,17 +22,9 @@ from rosy.rosy_addon.scene.look_inputs import (
 )
 from rosy.rosy_addon.scene.pictures import read_output_settings
 from rosy.rosy_addon.scene.scene_reader import SceneReader, read_scene
-from scenes import add_field, add_mesh, add_uv, depsgraph, expect_error, read_live
+from scenes import add_field, add_mesh, add_uv, depsgraph, expect_error, read_live, set_attribute
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-
-
-def add_attribute(mesh, name, domain, kind, values):
-    attribute = mesh.attributes.new(name, kind, domain)
-    key = "color" if "COLOR" in kind else "value"
-    data_type = np.int32 if kind == "INT" else np.float32
-    attribute.data.foreach_set(key, np.asarray(values, dtype=data_type).ravel())
-    mesh.update()
 
 
 def add_image(name="Board", values=((0.0, 1.0), (0.5, 0.25)), *, as_float=False, space=None):
@@ -73,7 +66,7 @@ def test_attributes_of_all_domains(wall, domain, kind):
     if "COLOR" in kind:
         values = np.stack([numbers, 1 - numbers, 0.3 + 0 * numbers, 1 + 0 * numbers], axis=1)
         expected = values[:, :3] @ LUMINANCE
-    add_attribute(mesh, "Ink", domain, kind, values)
+    set_attribute(mesh, values, "Ink", domain, kind)
     corner = np.array([loop.vertex_index for loop in mesh.loops])
     face = np.repeat(np.arange(4), 4)
     element = {"POINT": corner, "FACE": face, "CORNER": np.arange(len(corner))}[domain]
@@ -83,20 +76,20 @@ def test_attributes_of_all_domains(wall, domain, kind):
 
 
 def test_the_default_is_the_active_color_attribute(wall):
-    add_attribute(wall.data, "Some", "POINT", "FLOAT_COLOR", np.full((9, 4), 0.2))
-    add_attribute(wall.data, "Paint", "POINT", "FLOAT_COLOR", np.full((9, 4), 0.7))
+    set_attribute(wall.data, np.full((9, 4), 0.2), "Some", "POINT", "FLOAT_COLOR")
+    set_attribute(wall.data, np.full((9, 4), 0.7), "Paint", "POINT", "FLOAT_COLOR")
     wall.data.color_attributes.active_color_name = "Paint"
     tone = tone_of(ToneRequest("attribute")).values
     np.testing.assert_allclose(tone, 0.7, atol=1e-6)
 
 
 def test_objects_without_the_attribute_have_no_tone(wall, monkey):
-    add_attribute(wall.data, "Ink", "POINT", "FLOAT", np.zeros(9))
+    set_attribute(wall.data, np.zeros(9), "Ink", "POINT", "FLOAT")
     assert tone_of(ToneRequest("attribute", "Ink"), "Suzanne") is None
 
 
 def test_missing_attributes(wall, monkey):
-    add_attribute(wall.data, "Paint", "POINT", "FLOAT", np.zeros(9))
+    set_attribute(wall.data, np.zeros(9), "Paint", "POINT", "FLOAT")
     with pytest.raises(RosyError) as caught:
         read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("attribute", "Pain")))
     for name in ("'Pain'", "'Paint'", "'Plane'", "'Suzanne'"):
@@ -107,7 +100,7 @@ def test_missing_attributes(wall, monkey):
 def test_unsuitable_attributes(wall):
     rosy, ink = (ToneRequest("attribute", name) for name in ("rosy", "Ink"))
     expect_error("object 'Plane', attribute 'rosy': expected", tone_of, rosy)
-    add_attribute(wall.data, "Ink", "POINT", "FLOAT", np.full(9, np.nan))
+    set_attribute(wall.data, np.full(9, np.nan), "Ink", "POINT", "FLOAT")
     expect_error("attribute 'Ink': has values that are not finite", tone_of, ink)
 
 
@@ -215,7 +208,7 @@ def test_a_live_view_reads_values_again_when_they_change(wall, kind):
     def values_of(mesh):
         return mesh.color_values if kind == "numbers" else mesh.tone and mesh.tone.values
 
-    add_attribute(wall.data, "Ink", "POINT", "FLOAT", np.zeros(9))
+    set_attribute(wall.data, np.zeros(9), "Ink", "POINT", "FLOAT")
     reader = SceneReader()
     first, second = (read_live(reader, request_for_ink)[0].instance for _ in range(2))
     assert second is first and not values_of(first).any()
@@ -236,8 +229,7 @@ def test_occlusion_is_stored_and_drawn(scene, wall):
     attribute = wall.data.attributes[OCCLUSION_ATTRIBUTE]
     assert (attribute.domain, attribute.data_type) == ("CORNER", "FLOAT")
     assert OCCLUSION_ATTRIBUTE not in floor.data.attributes
-    values = np.empty(16, dtype=np.float32)
-    attribute.data.foreach_get("value", values)
+    values = attribute_values(attribute)
     corner = np.array([loop.vertex_index for loop in wall.data.loops])
     height = np.array([wall.data.vertices[index].co.z for index in corner])
     # At the edge with the floor, which is practically infinite, half of the sky is visible.
@@ -258,7 +250,7 @@ def test_occlusion_of_meshes_with_new_faces(scene, wall):
 
 
 def test_occlusion_does_not_replace_other_attributes(scene, wall):
-    add_attribute(wall.data, OCCLUSION_ATTRIBUTE, "POINT", "FLOAT", np.arange(9))
-    with pytest.raises(RosyError, match="mesh 'Plane' already has an attribute 'Occlusion'"):
-        store_occlusion(depsgraph(), [wall], direction_count=4)
+    set_attribute(wall.data, np.arange(9), OCCLUSION_ATTRIBUTE, "POINT", "FLOAT")
+    message = "mesh 'Plane' already has an attribute 'Occlusion'"
+    expect_error(message, store_occlusion, depsgraph(), [wall], direction_count=4)
     assert wall.data.attributes[OCCLUSION_ATTRIBUTE].data[3].value == 3

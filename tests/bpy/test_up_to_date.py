@@ -21,7 +21,7 @@ from rosy.rosy_addon.projection.camera import look_at, perspective_camera
 from rosy.rosy_addon.scene import staleness
 from rosy.rosy_addon.scene.bake_records import list_bakes
 from rosy.rosy_addon.scene.cameras import VIEW_NAME
-from scenes import add_camera, add_field, add_plane, empty_scene, link, pixels, set_vectors
+from scenes import add_camera, add_field, add_plane, empty_scene, link, pixels, set_attribute
 
 SIZE = 40
 
@@ -77,9 +77,7 @@ def tone(scene):
 def add_tone(value=0.5):
     for name in ("Sheet", "Plain"):
         mesh = obj(name).data
-        attribute = mesh.attributes.get("dark") or mesh.attributes.new("dark", "FLOAT", "POINT")
-        attribute.data.foreach_set("value", np.full(len(mesh.vertices), value, dtype=np.float32))
-        mesh.update()
+        set_attribute(mesh, np.full(len(mesh.vertices), value), "dark", "POINT", "FLOAT")
 
 
 def colors(scene):
@@ -219,7 +217,7 @@ def move_vertex(scene):
 
 def write_field(scene):
     mesh = obj("Plain").data
-    set_vectors(mesh, np.tile((1.0, 0.0, 1.0), (len(mesh.polygons), 1)))
+    set_attribute(mesh, np.tile((1.0, 0.0, 1.0), (len(mesh.polygons), 1)))
 
 
 def remove_field(scene):

@@ -52,6 +52,26 @@ def pixels(image):
 
 def member_vectors(mesh, name="rosy"):
     """Return the (n, 3) vectors of an attribute."""
-    values = np.empty(3 * len(mesh.attributes[name].data), dtype=np.float32)
-    mesh.attributes[name].data.foreach_get("vector", values)
-    return values.reshape(-1, 3)
+    return attribute_values(mesh.attributes[name], "vector", 3)
+
+
+def render_image(scene, path, engine):
+    """Render the scene to a .png or .exr file: (H, W, 4) values of the file, rows from the bottom."""
+    is_exr = str(path).endswith(".exr")
+    scene.render.engine, scene.render.film_transparent = engine, True
+    settings = scene.render.image_settings
+    settings.file_format, settings.color_mode = "OPEN_EXR" if is_exr else "PNG", "RGBA"
+    settings.color_depth = "32" if is_exr else "8"
+    scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(str(path))
+    values = pixels(image)
+    bpy.data.images.remove(image)
+    return values
+
+
+def attribute_values(attribute, key="value", columns=1):
+    """Return the (n,) or (n, columns) float32 values of an attribute."""
+    values = np.empty(columns * len(attribute.data), dtype=np.float32)
+    attribute.data.foreach_get(key, values)
+    return values.reshape(-1, columns) if columns > 1 else values

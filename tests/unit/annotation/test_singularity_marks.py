@@ -12,7 +12,7 @@ from shapes import globe, icosphere, instance_of, plane, torus
 from rosy_addon.annotation.draw_marks import draw_marks
 from rosy_addon.annotation.index_labels import (
     LETTERS,
-    place_labels,
+    place_indices,
     placed_labels,
     text_segments,
     text_width,
@@ -203,17 +203,23 @@ def test_labels_stay_in_the_frame_with_their_halos(size):
 
 
 def test_a_label_is_above_and_to_the_right_of_its_dot():
-    assert place_labels([(10, 20)], [(30, 12)], 5, (90, 90)).tolist() == [[15, 25]]
+    dots = np.array([(10, 20)]), np.array([1]), np.array([4])
+    assert place_indices(*dots, 10.0, lambda _: (30, 12), (90, 90)) == [("+1/4", 17.0, 27.0)]
 
 
 def test_labels_cover_neither_each_other_nor_dots():
     random = np.random.default_rng(1)
-    dots, sizes = random.uniform(0, 400, (120, 2)), random.uniform((20, 10), (30, 12), (120, 2))
-    corners = place_labels(dots, sizes, 4, (400, 400))
-    has_place = ~np.isnan(corners[:, 0])
-    assert 40 < has_place.sum() < 120
-    low, high = corners[has_place], (corners + sizes)[has_place]
+    dots, index = random.uniform(0, 400, (120, 2)), random.integers(1, 5, 120)
+
+    def label_size(text):
+        return 6.0 * len(text) + 4, 3.0 * len(text)
+
+    labels = place_indices(dots, index, np.full(120, 4), 6.0, label_size, (400, 400))
+    assert 40 < len(labels) < 120
+    low = np.array([label[1:] for label in labels])
+    high = low + [label_size(text) for text, _, _ in labels]
     assert low.min() >= 0 and high.max() <= 400
     overlaps = ((low[:, None] < high) & (high[:, None] > low)).all(axis=2)
     assert overlaps.sum() == len(low)
-    assert not ((dots[:, None] + 4 > low) & (dots[:, None] - 4 < high)).all(axis=2).any()
+    radii = 3.0 * np.sqrt(index)[:, None, None]
+    assert not ((dots[:, None] + radii > low) & (dots[:, None] - radii < high)).all(axis=2).any()

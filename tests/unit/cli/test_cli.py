@@ -43,6 +43,7 @@ REFUSED = {
     "a folder": ("render {mesh} -o tests", "tests: cannot be written: it is a folder"),
     "format": ("field {mesh} -o {out}", "cannot be written as a field"),
     "view": ("{render} --view nan,0", "view nan,0"),
+    "jobs": ("bake a.blend --out {out} --jobs 2", "give --frames"),
 }
 
 
@@ -77,6 +78,7 @@ def test_bad_input_in_a_process_of_its_own(sphere, tmp_path):
         ["render", "a.off", "-o", "b", "--size", "big"],
         ["turntable", "a.off", "-o", "b.gif", "--rate", "1e300"],
         ["turntable", "a.off", "-o", "b.gif", "--pictures", "99999999999"],
+        ["bake", "a.blend", "--save", "--frames", "1-3", "--jobs", "0"],
     ],
 )
 def test_wrong_usage_is_status_2(words):

@@ -52,13 +52,6 @@ def test_a_kind_without_directions_is_noted(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_conflicting_degrees(sphere, tmp_path):
-    assert main(["field", str(sphere), "-o", str(tmp_path / "a.rosy"), "--degree", "6"]) == 0
-    done = rosy("info", sphere, tmp_path / "a.rosy", "--degree", 4)
-    assert_refused(done, "a.rosy: the field has degree 6, but degree 4 was requested")
-
-
-@pytest.mark.slow
 def test_undefined_vectors_on_request(sphere, tmp_path):
     path = tmp_path / "a.rosy"
     assert main(["field", str(sphere), "-o", str(path)]) == 0
@@ -133,19 +126,6 @@ def test_strokes_and_guides(sphere, tmp_path):
     done = rosy("field", sphere, "-o", out, "--strokes", tmp_path / "none.txt")
     assert_refused(done, "contains no stroke")
     assert_refused(rosy("field", sphere, "-o", out, "--generate", "uv"), "has no UV map")
-
-
-@pytest.mark.slow
-def test_the_uv_map_of_a_file(shared_data, tmp_path):
-    mesh = shared_data / "meshes" / "spot.obj"
-    out = tmp_path / "a.rosy"
-    assert rosy("field", mesh, "-o", out, "--generate", "uv").returncode == 0
-    assert facts_of(mesh, out)["undefined_faces"] == 0
-    smooth = tmp_path / "b.rosy"
-    done = rosy("field", mesh, "-o", smooth, "--generate", "guided", "--uv", "--reach", "0.02")
-    assert done.returncode == 0, done.stderr
-    facts, rough = facts_of(mesh, smooth, "--against", out), facts_of(mesh, out)
-    assert facts["energy"] < rough["energy"] and facts["against"]["mean"] < 15
 
 
 def test_info_says_that_borders_coincide(tmp_path, capsys):

@@ -10,7 +10,6 @@ from shapes import icosphere, torus
 
 import rosy_addon as rf
 from rosy_addon.extras.command_line import main
-from rosy_addon.field.surface import Surface
 from rosy_addon.image_io.png import write_png
 
 
@@ -32,17 +31,7 @@ def test_render_writes_a_picture(words, ring, tmp_path):
     pixels = pixels_of(tmp_path / "a.png")
     assert pixels.shape == (64, 96, 4)
     covered = pixels[..., 3] == 255
-    assert 0.1 < covered.mean() < 0.9
-
-
-def test_the_default_preset_is_no_preset(ring, tmp_path):
-    """Two commands draw the same picture, to the last byte."""
-    common = ["render", str(ring), "--size", "40x40", "-o"]
-    assert main([*common, str(tmp_path / "a.png")]) == 0
-    assert main([*common, str(tmp_path / "b.png"), "--preset", "default"]) == 0
-    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-    alpha = pixels_of(tmp_path / "a.png")[..., 3]
-    assert ((alpha > 0) & (alpha < alpha.max())).any()
+    assert 0.1 < covered.mean() < 0.9 and ((pixels[..., 3] > 0) & ~covered).any()
 
 
 def test_y_is_up_in_off_files_by_default(tmp_path):
@@ -68,17 +57,6 @@ def test_render_fields_of_others(name, shared_data, tmp_path):
     assert done.returncode == 0, done.stderr
     ink = pixels_of(tmp_path / "a.png")
     assert ink[ink[..., 3] == 255][:, :3].std() > 15
-
-
-@pytest.mark.slow
-def test_fields_that_are_no_rosy_are_drawn_but_not_written_as_one(shared_data, tmp_path):
-    mesh = shared_data / "meshes" / "cheburashka.off"
-    field = shared_data / "fields" / "cheburashka-cf.rawfield"
-    done = rosy("render", mesh, field, "-o", tmp_path / "a.png", "--size", "64x64")
-    assert done.returncode == 0, done.stderr
-    done = rosy("field", mesh, field, "-o", tmp_path / "a.rosy")
-    assert_refused(done, "a.rosy", "do not form a RoSy")
-    assert not (tmp_path / "a.rosy").exists()
 
 
 @pytest.mark.slow
@@ -112,30 +90,23 @@ def test_unused_vertices_change_nothing(tmp_path):
 # --- tones ----------------------------------------------------------------------------------------
 
 
-def write_ply(path, surface: Surface, **columns):
-    """Write a .ply file with further columns of vertices, integers as bytes and others as floats."""
-    kinds = {k: "uchar" if v.dtype.kind in "iu" else "float" for k, v in columns.items()}
-    head = ["ply", "format ascii 1.0", f"element vertex {len(surface.vertices)}"]
-    head += [f"property float {axis}" for axis in "xyz"]
-    head += [f"property {kind} {name}" for name, kind in kinds.items()]
-    head += [f"element face {surface.face_count}", "property list uchar int vertex_indices"]
-    head.append("end_header")
-    rows = zip(surface.vertices.tolist(), *(v.tolist() for v in columns.values()), strict=True)
-    lines = [" ".join(map(repr, [*position, *values])) for position, *values in rows]
-    faces = np.split(surface.corner_vertex, surface.face_start[1:-1])
-    lines += [" ".join(map(str, [len(face), *face])) for face in faces]
-    path.write_text("\n".join(head + lines) + "\n")
-    return path
-
-
 @pytest.fixture(scope="module")
 def painted(tmp_path_factory):
     """A ball that is dark on the left and light on the right, in its colors and in a number."""
     ball = icosphere(4)
-    right = ball.vertices[:, 0] > 0
-    colors = dict.fromkeys(("red", "green", "blue"), np.where(right, 230, 60))
+    floats, colors = ("x", "y", "z", "cavity"), ("red", "green", "blue")
+    head = ["ply", "format ascii 1.0", f"element vertex {len(ball.vertices)}"]
+    head += [f"property float {name}" for name in floats]
+    head += [f"property uchar {name}" for name in colors]
+    head += [f"element face {ball.face_count}", "property list uchar int vertex_indices"]
+    paint = [(0.8, 230, 230, 230) if x > 0 else (0.1, 60, 60, 60) for x in ball.vertices[:, 0]]
+    rows = [(*point, *values) for point, values in zip(ball.vertices.tolist(), paint, strict=True)]
+    rows += [(3, *corners) for corners in ball.corner_vertex.reshape(-1, 3).tolist()]
     path = tmp_path_factory.mktemp("painted") / "ball.ply"
-    return write_ply(path, ball, **colors, cavity=np.where(right, 0.8, 0.1))
+    path.write_text(
+        "\n".join([*head, "end_header", *(" ".join(map(str, row)) for row in rows), ""])
+    )
+    return path
 
 
 @pytest.mark.parametrize(

@@ -77,6 +77,23 @@ def progressive():
     return progressive_of(NotingRenderer())
 
 
+def updated(progressive, key, view_input, until=lambda view: view.picture is None):
+    """Update a view as Blender redraws, until something is so, and return it."""
+    for _ in range(500):
+        start = time.process_time()
+        view = progressive.update(POINTERS, Request(key, key, view_input))
+        assert time.process_time() - start < 0.1
+        if until(view):
+            return view
+        while not progressive.poll():
+            time.sleep(0.005)
+    raise AssertionError("it was never so")
+
+
+def has_picture(view):
+    return view.texture is not None
+
+
 def test_each_step_of_the_first_picture_is_named_before_it_begins(progressive, view_input):
     done = progressive.renderer.done
     for _ in range(20):
@@ -102,19 +119,14 @@ def test_a_picture_that_fails_is_not_tried_again(progressive, view_input, failin
     renderer = progressive.renderer
     renderer.failing.add(failing)
     with pytest.raises(MemoryError):
-        for _ in range(20):
-            progressive.update(POINTERS, Request("key", "key", view_input))
+        updated(progressive, "key", view_input, has_picture)
     done_count = len(renderer.done)
     for _ in range(3):
         with pytest.raises(RosyError, match="not enough memory"):
             progressive.update(POINTERS, Request("key", "key", view_input))
     assert len(renderer.done) == done_count
     renderer.failing.clear()
-    for _ in range(20):
-        request = Request("another key", "another key", view_input)
-        if progressive.update(POINTERS, request).texture is not None:
-            return
-    raise AssertionError("it was not tried again")
+    assert updated(progressive, "another key", view_input, has_picture), "it is tried again"
 
 
 class SlowRenderer(NotingRenderer):
@@ -150,7 +162,7 @@ def test_streaks_that_drift_have_no_previews(slow, view_input):
     shown = []
     for frame in range(1, 60):
         view = slow.update(POINTERS, Request(("view", frame), "view", view_input))
-        assert view.downscale == 1
+        assert view.shown.downscale == 1
         if view.texture not in shown:
             shown.append(view.texture)
     assert len(shown) >= 5 and {width for _, width, _ in shown} == {32}
@@ -162,7 +174,7 @@ def test_a_view_that_turns_while_streaks_drift_has_previews(slow, view_input):
     for frame in range(1, 4):
         slow.update(POINTERS, Request(("view", frame), "view", view_input))
     view = slow.update(POINTERS, Request(("turned", 4), "turned", view_input))
-    assert view.downscale == 2 and view.texture_key == ("turned", 4)
+    assert view.shown.downscale == 2 and view.shown.request.key == ("turned", 4)
     preview = view.texture
     view = slow.update(POINTERS, Request(("turned", 5), "turned", view_input))
     assert view.texture == preview, "previews do not drift"
@@ -174,7 +186,9 @@ def test_views_with_streaks_that_drift_take_turns(slow, view_input):
         for pointers in (POINTERS, (1, 3)):
             slow.update(pointers, Request(("view", frame), "view", view_input))
     views = slow.views.values()
-    assert all(view.texture_key[1] > 80 for view in views), [view.texture_key for view in views]
+    assert all(view.shown.request.key[1] > 80 for view in views), [
+        view.shown.request.key for view in views
+    ]
 
 
 class HelpedRenderer(NotingRenderer):
@@ -195,27 +209,14 @@ class HelpedRenderer(NotingRenderer):
         return view.instances, view.camera.width
 
 
-def updated(progressive, key, view_input, until=lambda view: view.picture is None):
-    """Update a view as Blender redraws, until something is so, and return it."""
-    for _ in range(500):
-        start = time.process_time()
-        view = progressive.update(POINTERS, Request(key, key, view_input))
-        assert time.process_time() - start < 0.1
-        if until(view):
-            return view
-        while not progressive.poll():
-            time.sleep(0.005)
-    raise AssertionError("it was never so")
-
-
 def test_what_the_helper_does_is_named(helper, view_input):
     progressive, shown = progressive_of(HelpedRenderer(), helper), []
 
-    def has_picture(view):
+    def is_done(view):
         shown.append(view.progress.label if view.progress else "")
-        return view.texture is not None
+        return has_picture(view)
 
-    view = updated(progressive, "key", view_input, has_picture)
+    view = updated(progressive, "key", view_input, is_done)
     assert view.texture == ((), 32) and view.progress is None and "drawing" in shown
 
 
@@ -225,17 +226,19 @@ def test_previews_are_finished_and_final_pictures_abandoned(helper, view_input, 
     progressive = progressive_of(HelpedRenderer(), helper)
     updated(progressive, "first", view_input)
     progressive.update(POINTERS, Request("second", "second", view_input))
-    view = updated(progressive, "third", view_input, lambda view: view.texture_key == "second")
+    view = updated(
+        progressive, "third", view_input, lambda view: view.shown.request.key == "second"
+    )
     assert view.texture == ((), 16), "a preview is shown, though the view has changed again"
-    view = updated(progressive, "third", view_input, lambda view: view.texture_key == "third")
-    assert view.downscale == 2
+    view = updated(progressive, "third", view_input, lambda view: view.shown.request.key == "third")
+    assert view.shown.downscale == 2
     updated(progressive, "third", view_input, lambda view: view.picture is not None)
     final = view.picture
     assert final.downscale == 1
     view = updated(progressive, "fourth", view_input, lambda view: view.picture is not final)
-    assert view.texture_key == "third" and view.picture.downscale == 2
-    view = updated(progressive, "fourth", view_input, lambda view: view.downscale == 1)
-    assert view.texture == ((), 32) and view.texture_key == "fourth"
+    assert view.shown.request.key == "third" and view.picture.downscale == 2
+    view = updated(progressive, "fourth", view_input, lambda view: view.shown.downscale == 1)
+    assert view.texture == ((), 32) and view.shown.request.key == "fourth"
 
 
 @pytest.mark.slow

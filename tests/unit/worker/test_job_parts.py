@@ -8,6 +8,7 @@ import sys
 import time
 
 import pytest
+from harness.steps import finished
 
 from rosy_addon.core.errors import RosyError
 from rosy_addon.core.progress import listening
@@ -87,17 +88,6 @@ def test_a_cancelled_job_kills_its_program(tmp_path):
     steps.close()
     time.sleep(0.7)
     assert not path.exists()
-
-
-def finished(runner, helper):
-    """Run steps to their end, and return their result."""
-    while True:
-        while not runner.poll():
-            helper.wait(0.1)
-        try:
-            runner.advance()
-        except StopIteration as end:
-            return end.value
 
 
 def called(function, *arguments):

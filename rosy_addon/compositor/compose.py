@@ -204,7 +204,10 @@ class _Canvas:
         self.spread = np.zeros((count if draws_thresholds else 0, 1), dtype=np.float32)
 
     def picture(self, strip: Strip) -> tuple[np.ndarray, np.ndarray]:
-        """Return two images of a strip: its colors, and the `spread` (empty if no thresholds are drawn)."""
+        """Return two images of a strip: its colors, and how far the thresholds of ink in its pixels spread.
+
+        The second image has no channels if colors are drawn instead of thresholds.
+        """
         rgba = self._resolved(self.color, strip.drawn_rows)
         if not self.draws_thresholds:
             return rgba, rgba[:, :0]

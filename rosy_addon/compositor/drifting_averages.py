@@ -85,7 +85,7 @@ class MovingKernel:
         share : (n,) float32 ndarray
             Length of each kernel as a fraction of `length`, 0 to 1.
         forward : (n,) float32 ndarray
-            Fraction of the kernel that drifts forward, 0 to 1.
+            Weight of the noise that drifts forward, 0 to 1. The rest of the weight drifts backward.
         behind, ahead : (n,) intp ndarray
             Steps to the backward and the forward end of each streamline. Negative numbers count as 0.
 

@@ -335,7 +335,7 @@ def line_images(
     Returns
     -------
     images, break_images : LicImages or None
-        Images of the lines; None if lines are even. Images of shorter streamlines, which tell where lines
+        Images of the lines; None if lines are evenly spaced, as these need no noise. Images of shorter streamlines, which tell where lines
         break; None if lines do not break.
     """
     looks = [] if is_even(look) else [look]

@@ -73,7 +73,7 @@ def _best_match_sampler(
     candidates : (P + 1, N) complex64 ndarray
         Members in the view plane, where they are matched. Row P is 0.
     direction_tables : (P + 1, N, 4) float32 ndarray
-        The table of `direction_table` of each member, on screen.
+        x and y of each member on screen, and the gradient of its angle, from `direction_table`.
     line : int
         Index of the member along which the streamlines start.
     block : slice
@@ -310,7 +310,7 @@ def direction_table(
     direction : (P,) complex64 ndarray
         Directions on screen.
     member : (P,) complex64 ndarray
-        The same directions in the view plane. A neighbor that differs by more than half the angle
+        The same directions rotated into the view plane, where they are at equal angles. A neighbor that differs by more than half the angle
         between members is on another member, and is ignored.
     degree : int
         Degree of the field.

@@ -247,7 +247,8 @@ class Sheets:
         Parameters
         ----------
         spacing : int
-            Difference between the numbers in `covering` of successive sheets that are needed.
+            Difference between the numbers that two successive needed sheets have in the covering: 2 if every
+            other sheet is not needed (the opposites of an odd degree), otherwise 1.
 
         Returns
         -------

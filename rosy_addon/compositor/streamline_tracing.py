@@ -39,7 +39,7 @@ class TracedLanes:
     ----------
     covering : Covering
     seeds : (n,) intp ndarray
-        Indices of lines.
+        The states at which the lines start: sheet times `Covering.cell_count`, plus cell.
     max_steps : int
         Steps in each direction.
 
@@ -52,7 +52,7 @@ class TracedLanes:
     position : (m,) complex64 ndarray
         Offset from the center of the cell, in pixels.
     total : (m, K) complex64 ndarray
-        Sum of the noise so far, to which the caller adds.
+        Sum of the noise so far in K channels, to which the caller adds.
     """
 
     #: Names of the arrays with an element for each lane.

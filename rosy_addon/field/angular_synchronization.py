@@ -72,7 +72,7 @@ class PhaseGraph:
 
     @cached_property
     def strength(self) -> np.ndarray:
-        """(m,) float64: the weight |a| + |b| of each entry."""
+        """(m,) float64: the weight |a| + |b| of each relation between two nodes, with its factors `a` and `b`."""
         return np.abs(self.a) + np.abs(self.b)
 
     @cached_property

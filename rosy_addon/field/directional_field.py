@@ -281,6 +281,7 @@ def _tensor_directions(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return (F, 3) stored members and (F, 4) `direction_ratios` of the crosses along eigenvectors.
 
+    Each direction has the length of its eigenvalue; the ratios are these lengths relative to their mean.
     `tensors` holds (F, 3, 3) symmetric tensors, and x, y are the (F, 3) face frames (see `tensor_field`).
     """
     a = np.einsum("fi,fij,fj->f", x, tensors, x)

@@ -88,7 +88,7 @@ class FaceGraph:
 
     @property
     def node_count(self) -> int:
-        """n, the number of vertex nodes."""
+        """n, the number of vertices, counted once for each fan of faces around them."""
         return len(self.is_interior)
 
     @property

@@ -143,7 +143,7 @@ class Frame:
         return self.resources.image(name, self.size, texel_format, layers)
 
     def box_of_kind(self, kind: FieldKind) -> Box:
-        """Return the box of the pixels that instances with a field of this kind can cover."""
+        """Return the box of the pixels that instances with a field of this degree and symmetry can cover."""
         items = zip(self.items, self.boxes, strict=True)
         return union_box(box for item, box in items if item.kind == kind)
 

@@ -81,7 +81,10 @@ def _render_surfaces(frame: Frame, visibility: Any) -> None:
 
 
 def _sample_entries(frame: Frame, samples: Frame) -> Any:
-    """Return an image of the samples, with the pixel whose surface each sample shows."""
+    """Return an image that holds, for each sample, the pixel of `frame` from which it takes its shading.
+
+    It is a pixel nearby that shows the same surface. `samples` is the frame with several samples per pixel.
+    """
     entries = samples.image("sample_entries", "R32F")
     samples.clear(entries, "R32F")
     visibility = samples.textures["visibility"]

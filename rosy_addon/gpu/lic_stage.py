@@ -133,7 +133,10 @@ def _streaks(
 
 
 def _ink_textures(frame: Frame, kind: FieldKind) -> dict[str, Any]:
-    """Return the lookup tables of the ink, and placeholders for images that the look does not use."""
+    """Return the lookup tables from tone to ink, by name, and images for the samplers that the look leaves unset.
+
+    Every sampler of the shader needs an image, also those of the outline and the paper grain.
+    """
     resources, look = frame.resources, frame.look
     result = {
         "ink_thresholds": lookup_tables.thresholds(resources, look.for_symmetry(kind.symmetry)),

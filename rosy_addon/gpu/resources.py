@@ -155,8 +155,9 @@ class GpuResources:
     def mesh_lookups(
         self, instances: Sequence[MeshInstance], display: str
     ) -> list[Callable[[], GpuMesh | Preparation]]:
-        """Return for each mesh instance a function that looks up its mesh; see `prepare_steps`.
+        """Return for each mesh instance a function that looks up its mesh.
 
+        It returns a `Preparation`, which a helper process runs, if the mesh is not on the device yet.
         `display` is the shading of the surface, "smooth" or "flat".
         """
         kinds = field_kinds(instance.field for instance in with_field(instances))

@@ -179,7 +179,10 @@ def light_uniforms(look: Look, lights: Sequence[Light]) -> list[dict[str, Any]]:
 
 
 def tone_uniforms(look: Look, camera: Camera, reference: ReferenceRender | None) -> dict[str, Any]:
-    """Return the uniforms of the tone pass that all instances share."""
+    """Return the uniforms of the tone pass that all instances share.
+
+    `reference` is the render whose luminance is the tone, or None if the look uses none.
+    """
     scale, black = tone_curve(look)
     to_reference = np.zeros((4, 4)) if reference is None else reference.reprojection(camera)
     return {

@@ -33,7 +33,7 @@ def _channel_pixels(gbuffer: GBuffer, channel: FieldChannel) -> np.ndarray:
 def fill_pixels(
     gbuffer: GBuffer, pixels: slice | np.ndarray, triangle: np.ndarray, corner_field: CornerField
 ) -> None:
-    """Write the normals, the representation and the channels at some pixels of one instance.
+    """Write the normals, the representation and the other channels of the field at pixels of one instance.
 
     `pixels` are indices into the G-buffer, and `triangle` holds the visible triangle of each of them.
     `corner_field` must be in camera space.

@@ -292,7 +292,10 @@ def remove_applied_picture(data: ID | None) -> None:
 
 
 def _applied_attributes(data: ID | None) -> list[str]:
-    """Return the names of the attributes of RoSy's modifier that are stored on a mesh."""
+    """Return the names of the attributes that are left on a mesh if the user has applied RoSy's modifier.
+
+    The list is empty if `data` is not a mesh that can be edited.
+    """
     if not isinstance(data, Mesh) or not is_editable(data):
         return []
     return [name for name in (CLIP_ATTRIBUTE, MATERIAL_ATTRIBUTE) if name in data.attributes]

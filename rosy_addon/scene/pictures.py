@@ -307,7 +307,11 @@ def apply_texture(
 
 
 def _image_stem(settings: OutputSettings, name: str, kind: str = "camera") -> Path | None:
-    """Return the path of an image file without its suffix (see `picture_stem`); None if it is packed."""
+    """Return the path of an image file without its suffix; None if the image is packed.
+
+    `name` is the name of what the picture belongs to: a camera or, if `kind` is not "camera", an object. The
+    kind is part of the name of the file (`picture_stem`).
+    """
     return None if settings.folder is None else settings.folder / picture_stem(name, kind)
 
 

@@ -265,25 +265,20 @@ def _from_triangles(mesh: Any, faces: NDArray[Any]) -> MeshArrays:
     """Return the arrays of a triangle mesh of trimesh or Open3D, given its (F, 3) faces."""
     vertices = np.asarray(mesh.vertices)
     faces = faces.reshape(-1, 3)
-    visual = getattr(mesh, "visual", None)
+    visual: Any = getattr(mesh, "visual", None)
     uv = np.asarray(getattr(mesh, "triangle_uvs", getattr(visual, "uv", None)))
     is_uv = uv.shape in ((len(vertices), 2), (faces.size, 2))
     vertex_data = dict(getattr(mesh, "vertex_attributes", {}))
-    colors = _vertex_colors(mesh)
-    if colors.shape[0] == len(vertices):
+    colors = getattr(mesh, "vertex_colors", ())
+    if getattr(visual, "kind", None) == "vertex":
+        colors = np.asarray(visual.vertex_colors) / 255.0
+    colors = np.asarray(colors, dtype=np.float64)
+    if len(colors) == len(vertices):
         vertex_data.update(zip(("red", "green", "blue"), colors.T, strict=False))
     face_start = np.arange(len(faces) + 1) * 3
     face_data = dict(getattr(mesh, "face_attributes", {}))
     uv = uv if is_uv and len(uv) else None
     return MeshArrays(vertices, faces.ravel(), face_start, uv, vertex_data, face_data)
-
-
-def _vertex_colors(mesh: Any) -> NDArray[np.float64]:
-    """Return the (V, 3) or (V, 4) vertex colors, from 0 to 1; an empty array if there are none."""
-    visual: Any = getattr(mesh, "visual", None)
-    if getattr(visual, "kind", None) == "vertex":
-        return np.asarray(visual.vertex_colors) / 255.0
-    return np.asarray(getattr(mesh, "vertex_colors", np.empty((0, 3))), dtype=np.float64)
 
 
 def _without_copied_faces(arrays: MeshArrays) -> tuple[MeshArrays, int]:

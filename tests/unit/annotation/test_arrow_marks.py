@@ -158,6 +158,11 @@ def test_undefined_faces_have_no_arrowheads():
     assert not len(arrows([MeshInstance(surface, np.eye(4), nowhere)]))
 
 
+def test_an_object_that_is_scaled_to_a_plane_has_arrowheads():
+    flat = np.diag([1.0, 0.0, 1.0, 1.0])
+    assert len(arrows([replace(instance_of(icosphere(3), 1), matrix=flat)])) > 50
+
+
 @pytest.mark.slow
 def test_arrowheads_stay_on_the_surface_while_the_camera_turns():
     instance = instance_of(torus(96, 48), 1)

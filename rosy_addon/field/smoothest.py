@@ -1,13 +1,17 @@
-"""Compute the smoothest field of degree N (Knöppel, Crane, Pinkall and Schröder, SIGGRAPH 2013).
+"""Compute the smoothest field of degree N: the field of unit vectors with the least Dirichlet energy that is found.
 
-The eigenvector of the connection Laplacian of degree N that has the smallest eigenvalue is computed at the nodes, which
-are the vertices (see `field.connection`), and transported to the faces. Then the energy of unit vectors is reduced.
-Disconnected components of a mesh are solved separately.
+The energy is a sum over the edges between faces (`unit_descent.FaceEnergy`). Its eigenvectors with the two smallest
+eigenvalues minimize it among all fields of the same L2 norm (Knöppel, Crane, Pinkall and Schröder, SIGGRAPH 2013). They are
+small in some regions, and there their directions cost nothing. So they are diffused over shorter and shorter distances,
+after each of which the field gets length 1 again (Merriman, Bence and Osher 1992; for crosses, Viertel and Osting 2019).
+This moves singularities and cancels pairs. The first, long distances are diffused on a coarse multigrid level, the
+shorter ones on finer levels. Then the angles of the faces descend to a local minimum.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -15,74 +19,52 @@ import numpy as np
 from ..core.errors import RosyError
 from ..core.memory import raise_mmap_threshold
 from ..core.progress import progress, report
-from .connection import Connection, build_connection, laplacian
+from .conjugate_gradient import conjugate_gradient
 from .free_rotation import freely_rotated
 from .representation import complex_bincount, from_representation, unit_complex
 from .rosy_field import RosyField, check_degree
 from .sparse_multigrid import CSRMatrix, Level, hierarchy, w_cycle
 from .surface import Surface
-from .surface_averages import SurfaceAverages
-from .unit_descent import DIFFUSION_TIMES, diffuse, face_energy, least_unit_field
+from .unit_descent import FEW_FACES, descend, face_energy, least_of_few
 
-#: The eigensolver stops when the eigenvector changes by less than this in an iteration (the sine of
-#: an angle). With `TOLERANCE`, the energy has about eight correct digits. Meshes of up to
-#: `SMALL_MESH_NODES` nodes use the smaller tolerance, so that the field does not depend on the
-#: numbering of the vertices. On larger meshes, separating almost equal eigenvectors would take
-#: seconds and make no visible difference.
-TOLERANCE, SMALL_MESH_TOLERANCE, SMALL_MESH_NODES = 1e-4, 1e-8, 30_000
-MAX_ITERATIONS = 60
-
-#: The starts are computed on the finest multigrid level with at most this number of nodes.
-START_NODES = 5_000
-
-
-class Effort(NamedTuple):
-    """How exactly the energy of unit vectors is minimized, on meshes of up to a number of nodes.
-
-    Attributes
-    ----------
-    most_nodes : float
-    eigenvector, diffusion : float
-        Tolerances of the eigenvectors from which the descent starts, and of their diffusion.
-    descent : float
-        The descent ends when a step reduces the energy by less than this fraction.
-    rounds : int
-        How many times singularities are moved.
-    """
-
-    most_nodes: float
-    eigenvector: float
-    diffusion: float
-    descent: float
-    rounds: int
-
-
-#: The first makes the field independent of the numbering, to 0.1 degrees, except where two minima are as good. In the
-#: others, the gain of the last step is about what is left to gain: with 1e-4, energies were 0.02 to 0.06 % above those of
-#: a descent to the end, and 0.03 % with 1e-3 on 200,000 faces: less than 0.1 %.
-EFFORTS = (
-    Effort(START_NODES, 1e-7, 1e-7, 1e-13, 8),
-    Effort(SMALL_MESH_NODES, 1e-3, 1e-2, 1e-4, 1),
-    Effort(np.inf, 1e-3, 1e-2, 1e-3, 0),
-)
-
-#: Number of eigenvectors that are starts. On a bumpy torus of 1,800
-#: faces, the second one leads to 45 % less energy at degree 2. With five, the energy of ten fields was the same to 0.1 %,
-#: except for one that was 1.5 % lower.
-START_COUNT = 3
+#: The eigensolver stops when the eigenvector changes by less than this in an iteration (the sine of an angle), so that the
+#: field does not depend on the random numbers from which it starts.
+TOLERANCE = 1e-10
+MAX_ITERATIONS = 100
 
 #: Largest number of iterations on each intermediate multigrid level. They save iterations on the finest
 #: level.
 COARSE_ITERATIONS = 12
 
+#: Number of eigenvectors from which the search starts, on the finest multigrid level with at most this number of unknowns.
+#: On a bumpy torus of 1,800 faces, the second one leads to 45 % less energy at degree 2. With 2,000 unknowns, the search takes up
+#: to twice as long, for energies that are equal on average.
+START_COUNT, START_UNKNOWNS = 2, 500
+
+#: Smallest part of the energy by which the second eigenvector has to be better. On the torus, it is better by 24 % when both
+#: are diffused. On a part of a head with a mirror plane, it is by 19 %, but its field is not symmetric.
+LEAST_START_GAIN = 0.22
+
+#: With at most this number of faces, the search starts on the faces themselves: mirror symmetry is kept, which the multigrid
+#: levels do not have. With more faces, it would take too long.
+SMALL_MESH_FACES = 1_500
+
+#: Diffusion times of the starts, relative to the area, and a further time after which their energies are compared.
+START_TIMES, CHOICE_TIME = (0.1, 0.03, 0.01), 0.003
+
+#: Number of diffusion times on each multigrid level, and the residual of the linear solver, relative to the right-hand
+#: side. With three times, energies on nine meshes are 1 % higher on average; with 1e-2, they are 0.5 % higher.
+TIMES_PER_LEVEL, DIFFUSION_TOLERANCE = 5, 5e-2
+
 #: Factor of the mass matrix that is added to the matrix for multigrid, in units of 4 pi / area.
 SPECTRAL_SHIFT = 0.02
 
 
+LABEL = "diffusing the field"
+
+
 def smoothest_field(surface: Surface, degree: int) -> RosyField:
     """Compute the field of unit vectors with the least Dirichlet energy that is found.
-
-    It starts from fields with little energy among all fields of the same L2 norm; see `field.unit_descent`.
 
     Parameters
     ----------
@@ -103,47 +85,23 @@ def smoothest_field(surface: Surface, degree: int) -> RosyField:
     """
     degree = check_degree(degree)
     raise_mmap_threshold()
-    connection = build_connection(surface)
-    if not connection.mass.any():
-        raise RosyError(f"{surface.name}: no face has an area")
-    mass, component = connection.positive_mass, connection.component
-    effort = next(each for each in EFFORTS if len(mass) <= each.most_nodes)
-    with progress(0.1, 0.3):
-        levels = hierarchy(laplacian(connection, degree, spectral_shift(mass)), SMALL_MESH_NODES)
-    with progress(0.3, 0.6):
-        starts = _starts(_eigenproblem(levels, mass, component), effort)
-    del levels
-    report(0.6, "averaging the field on the faces")
     x, y = surface.face_frames
-    averages = SurfaceAverages(surface, connection, x, y)
     is_defined = (surface.face_area > 0) & x.any(axis=1)
-    means = [unit_complex(averages.face_sums(z, degree), otherwise=1) for z in starts]
-    with progress(0.6, 0.95):
-        energy = face_energy(surface, degree, is_defined)
-        means = [np.where(is_defined, mean, 0) for mean in means]
-        z = least_unit_field(energy, means, effort.descent, effort.rounds)
-    del connection, averages, energy  # they take as much memory as the rest needs
+    if not is_defined.any():
+        raise RosyError(f"{surface.name}: no face has an area")
+    energy = face_energy(surface, degree, is_defined)
+    mass = energy.area
+    with progress(0.1, 0.4):
+        levels = hierarchy(energy.matrix(spectral_shift(mass)))
+    with progress(0.4, 0.8):
+        z = _diffused_eigenvector(_eigenproblem(levels, mass, energy.component))
+    del levels
+    with progress(0.8, 0.95):
+        z = np.where(is_defined, z, 0)
+        z = least_of_few(energy, z) if len(z) <= FEW_FACES else descend(energy, z)
     report(0.95, "rotating the field")
     z = freely_rotated(surface, z, degree)
     return RosyField(degree, from_representation(z, x, y, degree))
-
-
-def smallest_eigenvectors(connection: Connection, degree: int) -> tuple[np.ndarray, np.ndarray]:
-    """Compute, on each connected component, the eigenvector of L z = e M z with the smallest eigenvalue e.
-
-    L is the connection Laplacian of this degree, and M the mass matrix.
-
-    Returns
-    -------
-    z : (n,) complex128 ndarray
-        Values of the eigenvectors at the nodes; z* M z is 1 on each component.
-    energy : (components,) float64 ndarray
-        The eigenvalues e.
-    """
-    mass = connection.positive_mass
-    shift = spectral_shift(mass)
-    z, energy = eigenproblem(laplacian(connection, degree, shift), mass, connection.component)
-    return z, energy - shift
 
 
 def spectral_shift(mass: np.ndarray) -> float:
@@ -177,9 +135,8 @@ def eigenproblem(
     """
     with progress(0.0, 0.35):
         levels = hierarchy(matrix)
-    tolerance = TOLERANCE if len(matrix) > SMALL_MESH_NODES else SMALL_MESH_TOLERANCE
     with progress(0.35, 1.0):
-        vectors, energy = _eigenvectors(_eigenproblem(levels, mass, component), tolerance)
+        vectors, energy = _eigenvectors(_eigenproblem(levels, mass, component))
     return vectors[0], energy
 
 
@@ -201,11 +158,21 @@ class _Eigenproblem(NamedTuple):
         """Return the problem whose finest level has the given index here."""
         return _Eigenproblem(*(each[index:] for each in self))
 
-    def diffused(self, z: np.ndarray, times: Sequence[float], tolerance: float) -> np.ndarray:
-        """Return (n,) representations on the finest level, diffused; see `unit_descent.diffuse`."""
-        mass, component = self.masses[0], self.components[0]
+    def diffused(self, z: np.ndarray, times: Sequence[float]) -> np.ndarray:
+        """Return (n,) representations on the finest level, diffused and normalized for each of the times.
+
+        Times are relative to the area of the connected component.
+        """
+        mass, component, z = self.masses[0], self.components[0], unit_complex(z, otherwise=1)
         area = np.bincount(component, mass)[component]
-        return diffuse(self.levels, mass, area, z, times, tolerance)
+        for index, time in enumerate(times):
+            rate = mass / (time * area)
+            matrix = self.levels[0].matrix.plus_diagonal(rate)
+            scale = partial(np.multiply, 1 / matrix.diagonal)
+            with progress(index / len(times), (index + 1) / len(times)):
+                z = conjugate_gradient(matrix, rate * z, DIFFUSION_TOLERANCE, scale, LABEL, z)
+            z = unit_complex(z, otherwise=1)
+        return z
 
 
 def _eigenproblem(levels: list[Level], mass: np.ndarray, component: np.ndarray) -> _Eigenproblem:
@@ -221,45 +188,49 @@ def _eigenproblem(levels: list[Level], mass: np.ndarray, component: np.ndarray) 
     return _Eigenproblem(levels, masses, components)
 
 
-def _starts(problem: _Eigenproblem, effort: Effort) -> list[np.ndarray]:
-    """Return representations of modulus 1 at n nodes from which the descent starts.
+def _diffused_eigenvector(problem: _Eigenproblem) -> np.ndarray:
+    """Return (n,) representations of modulus 1 with little energy: one of two diffused eigenvectors.
 
-    They are the eigenvectors with the least eigenvalues, diffused. On meshes with more than `START_NODES` nodes there is
-    only one: of the eigenvectors on a coarse level, on each connected component the one with the least energy when it is
-    diffused. It is interpolated to the nodes, and diffused on the way.
+    The eigenvectors are computed on the finest level with at most `START_UNKNOWNS` unknowns, and diffused. On each
+    connected component, the first one is taken, unless the second one has much less energy (`LEAST_START_GAIN`). It is
+    interpolated and diffused from level to level.
     """
-    is_small = [len(level.matrix) <= START_NODES for level in problem.levels]
-    first = is_small.index(True) if is_small[-1] else len(is_small) - 1
+    counts = [len(mass) for mass in problem.masses]
+    is_start = [n <= START_UNKNOWNS for n in counts[:-1]]
+    first = 0 if counts[0] <= SMALL_MESH_FACES else [*is_start, True].index(True)
     coarse = problem.below(first)
     eigenvectors: list[list[np.ndarray]] = []
     starts = []
     for index in range(START_COUNT):
-        with progress(index / START_COUNT, (index + 1) / START_COUNT):
-            vectors, _ = _eigenvectors(coarse, effort.eigenvector, eigenvectors)
-            eigenvectors.append(vectors)
-            starts.append(coarse.diffused(vectors[0], DIFFUSION_TIMES, effort.diffusion))
-    if first == 0:
-        return starts
+        with progress(0.3 * index, 0.3 * index + 0.2):
+            eigenvectors.append(_eigenvectors(coarse, eigenvectors)[0])
+        with progress(0.3 * index + 0.2, 0.3 * index + 0.3):
+            starts.append(coarse.diffused(eigenvectors[-1][0], START_TIMES))
     products = _ComponentProducts(coarse.masses[0], coarse.components[0])
-    energies = [products.sums(z.conj() * (coarse.levels[0].matrix @ z)).real for z in starts]
+    ends = [coarse.diffused(z, [CHOICE_TIME]) for z in starts]
+    energies = [products.sums(z.conj() * (coarse.levels[0].matrix @ z)).real for z in ends]
+    energies[0] = (1 - LEAST_START_GAIN) * energies[0]
     z = np.choose(np.argmin(energies, axis=0)[coarse.components[0]], starts)
-    for index in reversed(range(first)):
-        z = unit_complex(problem.levels[index].prolongation @ z)
-        if index:
-            z = problem.below(index).diffused(z, DIFFUSION_TIMES[-1:], effort.diffusion)
-    return [z]
+    time = START_TIMES[-1]
+    for index in reversed(range(first + 1)):
+        if index < first:
+            z = problem.levels[index].prolongation @ z
+        count = len(z)
+        times = np.geomspace(time, min(time, 1 / count), TIMES_PER_LEVEL)
+        with progress(1 - 0.4 * (index + 1) / (first + 1), 1 - 0.4 * index / (first + 1)):
+            z = problem.below(index).diffused(z, times)
+        time = 2 / count
+    return z
 
 
 def _eigenvectors(
-    problem: _Eigenproblem, tolerance: float, others: Sequence[list[np.ndarray]] = ()
+    problem: _Eigenproblem, others: Sequence[list[np.ndarray]] = ()
 ) -> tuple[list[np.ndarray], np.ndarray]:
     """Return the eigenvectors of `eigenproblem` on all levels, and the eigenvalues on the finest.
 
     Parameters
     ----------
     problem : _Eigenproblem
-    tolerance : float
-        See `_lobpcg`.
     others : sequence of list
         Earlier results, with smaller eigenvalues. The new eigenvectors are orthogonal to these.
     """
@@ -275,7 +246,7 @@ def _eigenvectors(
         with progress(start, start + 0.3 / len(levels) if index else 1.0):
             known = [other[index] for other in others]
             parts = levels[index:], masses[index], components[index]
-            z, energy = _lobpcg(*parts, z, tolerance, max_iterations, known)
+            z, energy = _lobpcg(*parts, z, max_iterations, known)
         vectors.insert(0, z)
         if index:
             z = levels[index - 1].prolongation @ z
@@ -287,7 +258,6 @@ def _lobpcg(
     mass: np.ndarray,
     component: np.ndarray,
     z: np.ndarray,
-    tolerance: float,
     max_iterations: int,
     known: Sequence[np.ndarray] = (),
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -303,8 +273,6 @@ def _lobpcg(
         Connected component of each node.
     z : (n,) complex128 ndarray
         The initial vector.
-    tolerance : float
-        Change of the vector in an iteration, a sine of an angle, at which the iteration stops.
     max_iterations : int
     known : sequence of (n,) complex128 ndarray
         Orthonormal vectors to which the result is orthogonal on each component: eigenvectors found before.
@@ -340,7 +308,7 @@ def _lobpcg(
         kept = np.stack([coefficients[:, 0], np.ones(len(energy))], axis=1)
         current = products.normalize(products.combine([current, step], kept))
         previous_step = [products.normalize(step)]
-        if change < tolerance:
+        if change < TOLERANCE:
             break
     return current[0], energy
 

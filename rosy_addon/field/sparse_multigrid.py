@@ -24,7 +24,7 @@ from .blocks import concatenated_ranges, run_starts
 SINGULAR_SHIFT = 1e-10
 
 #: A level with at most this number of unknowns is the coarsest one, and is solved with a dense inverse.
-DIRECT_SOLVE_SIZE = 400
+DIRECT_SOLVE_SIZE = 100
 
 #: Number of rows that are processed at once, so that their entries fit in the cache of a CPU core.
 BLOCK_ROWS = 1 << 12
@@ -35,6 +35,10 @@ BLOCKS_PER_REPORT = 4
 #: A matrix entry below this fraction of the largest off-diagonal entry, in both of its rows, is weak: it does
 #: not connect two unknowns in an aggregate.
 STRENGTH_THRESHOLD = 0.08
+
+#: Diagonal elements that differ by a few times 1e-5 of their mean get unrelated hashes; rounding errors do not
+#: change the order.
+HASH_FACTOR = 1e5
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,7 +256,7 @@ class Level:
     inverse: np.ndarray | None
 
 
-def hierarchy(matrix: CSRMatrix, smoothed_size: int | None = None) -> list[Level]:
+def hierarchy(matrix: CSRMatrix) -> list[Level]:
     """Build the multigrid levels of a positive definite matrix.
 
     Coarsening stops when a level is small enough for a dense inverse, or when aggregation no longer
@@ -262,9 +266,6 @@ def hierarchy(matrix: CSRMatrix, smoothed_size: int | None = None) -> list[Level
     ----------
     matrix : CSRMatrix
         The (n, n) matrix, Hermitian.
-    smoothed_size : int, optional
-        If n is larger, the prolongation of the finest level is not smoothed. This takes half the time, but a
-        W-cycle then reduces the error less.
 
     Returns
     -------
@@ -284,14 +285,11 @@ def hierarchy(matrix: CSRMatrix, smoothed_size: int | None = None) -> list[Level
             with progress(parts[0], parts[1], label):
                 aggregation = _aggregates(matrix)
         if aggregation is None or aggregation[1] > 0.8 * len(matrix):
-            inverse = _dense_inverse(matrix) if len(matrix) <= 4 * DIRECT_SOLVE_SIZE else None
+            inverse = dense_inverse(matrix) if len(matrix) <= 4 * DIRECT_SOLVE_SIZE else None
             levels.append(Level(matrix, None, jacobi_weight, inverse))
             return levels
         with progress(parts[1], parts[2], label):
-            if not levels and smoothed_size is not None and len(matrix) > smoothed_size:
-                prolongation = _plain_prolongation(*aggregation)
-            else:
-                prolongation = _smoothed_prolongation(matrix, jacobi_weight, *aggregation)
+            prolongation = _smoothed_prolongation(matrix, jacobi_weight, *aggregation)
         levels.append(Level(matrix, prolongation, jacobi_weight, None))
         with progress(parts[2], parts[3], label):
             product = matrix_product(matrix, prolongation)
@@ -316,7 +314,7 @@ def add_diagonal(levels: list[Level], diagonal: np.ndarray) -> list[Level]:
     result = []
     for level in levels:
         matrix = level.matrix.plus_diagonal(diagonal)
-        inverse = None if level.inverse is None else _dense_inverse(matrix)
+        inverse = None if level.inverse is None else dense_inverse(matrix)
         result.append(Level(matrix, level.prolongation, _jacobi_weights(matrix), inverse))
         if level.prolongation is not None:
             p = level.prolongation
@@ -376,7 +374,7 @@ def _positive_diagonal(matrix: CSRMatrix) -> np.ndarray:
     return np.maximum(diagonal, SINGULAR_SHIFT * diagonal.max())
 
 
-def _dense_inverse(matrix: CSRMatrix) -> np.ndarray:
+def dense_inverse(matrix: CSRMatrix) -> np.ndarray:
     """Return the inverse of a sparse matrix as a dense array.
 
     If the matrix is singular, its diagonal is enlarged a little. The inverse is used as a preconditioner, so
@@ -389,14 +387,6 @@ def _dense_inverse(matrix: CSRMatrix) -> np.ndarray:
     except np.linalg.LinAlgError:
         np.fill_diagonal(dense, (1 + SINGULAR_SHIFT) * _positive_diagonal(matrix))
         return np.linalg.inv(dense)
-
-
-def _plain_prolongation(aggregate: np.ndarray, count: int, phase: np.ndarray) -> CSRMatrix:
-    """Return the (n, count) prolongation matrix that is not smoothed: the entry of a row is its phase.
-
-    `aggregate`, `count` and `phase` are results of `_aggregates`.
-    """
-    return CSRMatrix(np.arange(len(aggregate) + 1), aggregate, phase, count)
 
 
 def _smoothed_prolongation(
@@ -450,7 +440,11 @@ def _aggregates(matrix: CSRMatrix) -> tuple[np.ndarray, int, np.ndarray]:
 
     # A root of a new aggregate is a free unknown whose random priority is the largest among the free unknowns
     # that are at most two steps away.
-    priority = np.random.default_rng(0).permutation(count)
+    # The priority is a hash of the diagonal, so that it does not depend on the numbering of the unknowns.
+    mean = max(float(matrix.diagonal.mean()), 1e-300)
+    hashes = np.round(HASH_FACTOR * matrix.diagonal / mean % 1, 6)
+    priority = np.empty(count, dtype=np.intp)
+    priority[np.lexsort((np.random.default_rng(0).permutation(count), hashes))] = np.arange(count)
     free, root = np.ones(count, dtype=bool), np.zeros(count, dtype=bool)
     while free.any():
         report(1 - np.count_nonzero(free) / count, "building multigrid levels")

@@ -77,7 +77,7 @@ def test_a_field_depends_on_the_shape_alone(name, kind, degree):
         as_lines = kind == "features" and change == "reversed" and degree % 2
         members = 2 * degree if as_lines else degree
         turned = angle_differences(surface, actual, expected, members)
-        assert turned.max() < (1e-5 if kind == "smoothest" else np.radians(0.1)), change
+        assert turned.max() < np.radians(0.1), change
 
 
 @pytest.mark.parametrize("degree", [2, 3, 6])

@@ -12,9 +12,17 @@ from shapes import from_triangles, icosphere, joined, plane, rebuilt, torus
 from rosy_addon.core.errors import RosyError
 from rosy_addon.field.connection import build_connection, laplacian
 from rosy_addon.field.singularities import find_singularities
-from rosy_addon.field.smoothest import smallest_eigenvectors, smoothest_field
+from rosy_addon.field.smoothest import eigenproblem, smoothest_field, spectral_shift
 
 BALL = bumpy(icosphere(4))
+
+
+def smallest_eigenvectors(connection, degree):
+    """The eigenvector of each component of the connection Laplacian with the smallest eigenvalue, and this eigenvalue."""
+    mass = connection.positive_mass
+    shift = spectral_shift(mass)
+    z, energy = eigenproblem(laplacian(connection, degree, shift), mass, connection.component)
+    return z, energy - shift
 
 
 # --- the connection --------------------------------------------------------------------------------

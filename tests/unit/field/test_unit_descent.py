@@ -100,11 +100,11 @@ def test_another_eigenvector_gives_less_energy():
 
 @pytest.mark.slow
 def test_coarse_start_reaches_the_energy_of_a_fine_one(monkeypatch):
-    """On 20,480 faces, the starts are computed on a multigrid level with fewer nodes."""
-    surface = bumpy(icosphere(5))
+    """With more than 1,500 faces, the eigenvectors are computed on a coarse multigrid level."""
+    surface = bumpy(icosphere(4))
     energies = []
-    for nodes in (5_000, 50_000):
-        monkeypatch.setattr(smoothest, "START_NODES", nodes)
+    for faces in (smoothest.SMALL_MESH_FACES, 50_000):
+        monkeypatch.setattr(smoothest, "SMALL_MESH_FACES", faces)
         energies.append(dirichlet_energy(surface, smoothest.smoothest_field(surface, 4)))
     assert energies[0] < 1.02 * energies[1]
 
@@ -126,9 +126,9 @@ def test_no_other_kind_has_less_energy(surface, degree):
 
 def test_parts_of_very_different_sizes_are_solved_alone():
     """Diffusion times are relative to the area of each component."""
-    ball = bumpy(icosphere(2))
+    ball = bumpy(icosphere(3))
     alone = dirichlet_energy(ball, smoothest_field(ball, 4))
     points = np.concatenate([ball.vertices, 1e-3 * ball.vertices + 9])
     triangles = ball.corner_vertex.reshape(-1, 3)
     both = from_triangles(points, np.concatenate([triangles, triangles + len(ball.vertices)]))
-    assert dirichlet_energy(both, smoothest_field(both, 4)) == pytest.approx(2 * alone, rel=0.02)
+    assert dirichlet_energy(both, smoothest_field(both, 4)) == pytest.approx(2 * alone, rel=0.04)

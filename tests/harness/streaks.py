@@ -94,3 +94,44 @@ def persistence(
         values_at_distance = ndimage.map_coordinates(image, position, order=1, mode="nearest")
         correlations.append(correlation(values_at_start, values_at_distance))
     return np.array(correlations)
+
+
+def local_correlation(
+    a: np.ndarray, b: np.ndarray, weight: np.ndarray, deviation: float
+) -> np.ndarray:
+    """Return the (H, W) correlation of two (H, W) pictures under a Gaussian window around each pixel.
+
+    `weight` is 1 where the pictures count and 0 where not; NaN is returned where it is 0.
+    """
+
+    def mean(values: np.ndarray) -> np.ndarray:
+        return ndimage.gaussian_filter(values * weight, deviation, mode="constant")
+
+    a, b = a.astype(np.float64), b.astype(np.float64)
+    total_weight = mean(np.ones_like(a))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean_a, mean_b = mean(a) / total_weight, mean(b) / total_weight
+        product = mean(a * b) / total_weight - mean_a * mean_b
+        spread_a = mean(a * a) / total_weight - mean_a**2
+        spread_b = mean(b * b) / total_weight - mean_b**2
+        result = product / np.sqrt(spread_a * spread_b)
+    return np.where(weight > 0, result, np.nan)
+
+
+def peak_to_floor(spectrum: np.ndarray, lines: int, first: float) -> float:
+    """Return the power along the directions of a field relative to that midway between them.
+
+    Parameters
+    ----------
+    spectrum : (bins,) ndarray
+    lines : int
+        Number of different orientations of the N members.
+    first : float
+        One of these orientations, in degrees.
+    """
+    bins = len(spectrum)
+    smooth = ndimage.gaussian_filter1d(spectrum, 1.5 * bins / 180, mode="wrap")
+    position = (first + 180 / lines * np.arange(lines)) * bins / 180
+    on_lines = np.rint(position - 0.5).astype(int) % bins
+    between = np.rint(position - 0.5 + bins / lines / 2).astype(int) % bins
+    return float(smooth[on_lines].mean() / smooth[between].mean())

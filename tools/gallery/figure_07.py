@@ -7,7 +7,7 @@ from scipy import ndimage
 
 from rosy_addon.field.rosy_field import RosyField
 from tests.harness.planar import DegreeLayer
-from tests.harness.streaks import correlation, orientation_spectrum, peaks
+from tests.harness.streaks import correlation, local_correlation, orientation_spectrum, peaks
 
 from .looks import RED, SOLID
 from .page import fill_tables, listed, picture
@@ -88,7 +88,7 @@ def _sphere() -> list[list[object]]:
     tones = {name: _frame(layer, layer.images.blend[:, 0]) for name, layer in layers.items()}
     covered = _frame(layers[in_plane], 1.0)
     local = {
-        name: _local_correlation(tones[name], tones[brute], covered, 3.0 * SAMPLES)
+        name: local_correlation(tones[name], tones[brute], covered, 3.0 * SAMPLES)
         for name in (among, in_plane)
     }
     left, top, right, bottom = box = _worst_box(local[in_plane] - local[among], covered)
@@ -119,28 +119,6 @@ def _sphere() -> list[list[object]]:
 def _frame(layer: DegreeLayer, values: np.ndarray | float) -> np.ndarray:
     """Return the (P,) values of the pixels of a layer as an (H, W) image, 0 elsewhere."""
     return frame_of(values, layer.pixel, (SIZE * SAMPLES,) * 2)
-
-
-def _local_correlation(
-    a: np.ndarray, b: np.ndarray, weight: np.ndarray, deviation: float
-) -> np.ndarray:
-    """Return the (H, W) correlation of two (H, W) pictures under a Gaussian window around each pixel.
-
-    `weight` is 1 where the pictures count and 0 where not; NaN is returned where it is 0.
-    """
-
-    def mean(values: np.ndarray) -> np.ndarray:
-        return ndimage.gaussian_filter(values * weight, deviation, mode="constant")
-
-    a, b = a.astype(np.float64), b.astype(np.float64)
-    total_weight = mean(np.ones_like(a))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        mean_a, mean_b = mean(a) / total_weight, mean(b) / total_weight
-        product = mean(a * b) / total_weight - mean_a * mean_b
-        spread_a = mean(a * a) / total_weight - mean_a**2
-        spread_b = mean(b * b) / total_weight - mean_b**2
-        result = product / np.sqrt(spread_a * spread_b)
-    return np.where(weight > 0, result, np.nan)
 
 
 def _worst_box(improvement: np.ndarray, covered: np.ndarray) -> tuple[int, int, int, int]:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.figure import Figure
-from scipy import ndimage
 
-from tests.harness.streaks import mean_spectrum
+from tests.harness.streaks import mean_spectrum, peak_to_floor
 
 from .figure_06 import MEMBER, constant
 from .looks import MEASURED, PLANE
@@ -31,7 +30,7 @@ def write() -> None:
     rows = []
     for degree, spectrum in spectra.items():
         lines = degree if degree % 2 else degree // 2
-        rows.append([degree, lines, f"{_peak_to_floor(spectrum, lines, np.degrees(MEMBER)):.1f}"])
+        rows.append([degree, lines, f"{peak_to_floor(spectrum, lines, np.degrees(MEMBER)):.1f}"])
     fill_tables("figure-10", rows)
 
 
@@ -42,25 +41,6 @@ def _spectrum(degree: int) -> np.ndarray:
         tone = compose_field(constant(MEMBER, degree), degree, SIZE, look).layer.tone
         total += mean_spectrum(channel(tone, SIZE)[40:-40, 40:-40], SIDE, BINS) / SEEDS
     return total
-
-
-def _peak_to_floor(spectrum: np.ndarray, lines: int, first: float) -> float:
-    """Return the power along the directions of a field relative to that midway between them.
-
-    Parameters
-    ----------
-    spectrum : (bins,) ndarray
-    lines : int
-        Number of different orientations of the N members.
-    first : float
-        One of these orientations, in degrees.
-    """
-    bins = len(spectrum)
-    smooth = ndimage.gaussian_filter1d(spectrum, 1.5 * bins / 180, mode="wrap")
-    position = (first + 180 / lines * np.arange(lines)) * bins / 180
-    on_lines = np.rint(position - 0.5).astype(int) % bins
-    between = np.rint(position - 0.5 + bins / lines / 2).astype(int) % bins
-    return float(smooth[on_lines].mean() / smooth[between].mean())
 
 
 def _chart(spectra: dict[int, np.ndarray]) -> np.ndarray:

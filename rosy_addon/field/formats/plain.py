@@ -154,7 +154,8 @@ def read_npz(path: Path) -> RawField:
     if degree.shape == () and degree.dtype.kind in "iu" and raw.values.shape[1] in (1, int(degree)):
         raw = replace(raw, degree=check_degree(int(degree)))
     polygons = _polygons(*(arrays[name] for name in mesh)) if mesh else None
-    return replace(raw, polygons=polygons)
+    # RoSy itself writes directions of faces, also if there are as many vertices.
+    return replace(raw, polygons=polygons, domain="face" if name == _FIELD_NAMES[0] else None)
 
 
 def _has_vectors(shape: tuple[int, ...]) -> bool:

@@ -25,7 +25,7 @@ MAX_PIXELS = 12.0
 SQUARE = turned(plane(8, 8), 2)
 TOP_CAMERA = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 300, 300, scale=3.0)
 
-SPHERE = instance_of(icosphere(4), 4)
+SPHERE = instance_of(icosphere(4), 4, "axis")
 FRONT_CAMERA = perspective_camera(look_at((0.5, -4, 1), (0, 0, 0)), 400, 360, fov=np.radians(40))
 
 

@@ -213,7 +213,7 @@ def test_singularities_are_found():
 
     The surface has no symmetry, so that no zero lies on an edge.
     """
-    surface = bumpy(icosphere(3))
+    surface = bumpy(icosphere(4))
     for degree in (1, 2, 3, 4, 6):
         mesh = build_tangent_mesh(instance_of(surface, degree))
         assert np.isclose(singularities(mesh)[2].sum(), 2)

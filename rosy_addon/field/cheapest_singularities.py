@@ -24,6 +24,9 @@ from .sparse_multigrid import CSRMatrix, from_edges
 from .surface import Surface
 from .turning_angles import least_angles, potential_solver
 
+#: Tolerance of the eigenvector whose singularities are moved then.
+START_TOLERANCE = 1e-5
+
 #: Largest number of rounds in which singularities move to neighboring vertices.
 MAX_STEPS = 60
 
@@ -74,7 +77,7 @@ def cheapest_singularities(
     mass = np.maximum(surface.face_area, 1e-12 * surface.face_area.mean())
     matrix = _energy(graph, degree, angle, spectral_shift(mass) * mass)
     with progress(0.35, 0.6):
-        z, _ = eigenproblem(matrix, mass, graph.component)
+        z, _ = eigenproblem(matrix, mass, graph.component, START_TOLERANCE)
     field = RosyField(degree, from_representation(unit_complex(z), x, y, degree))
     with progress(0.6, 0.65):
         found, found_index = find_singularities(surface, field)

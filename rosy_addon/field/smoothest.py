@@ -113,7 +113,7 @@ def spectral_shift(mass: np.ndarray) -> float:
 
 
 def eigenproblem(
-    matrix: CSRMatrix, mass: np.ndarray, component: np.ndarray
+    matrix: CSRMatrix, mass: np.ndarray, component: np.ndarray, tolerance: float = TOLERANCE
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute, on each connected component, the eigenvector of A z = e M z with the smallest eigenvalue e.
 
@@ -125,6 +125,9 @@ def eigenproblem(
         The diagonal of M.
     component : (n,) int32 ndarray
         Connected component of each node.
+    tolerance : float
+        Change of the vector in an iteration at which the iteration stops, as the sine of an angle. With 1e-4, the
+        eigenvalue has about eight correct digits.
 
     Returns
     -------
@@ -136,7 +139,8 @@ def eigenproblem(
     with progress(0.0, 0.35):
         levels = hierarchy(matrix)
     with progress(0.35, 1.0):
-        vectors, energy = _eigenvectors(_eigenproblem(levels, mass, component))
+        problem = _eigenproblem(levels, mass, component)
+        vectors, energy = _eigenvectors(problem, tolerance=tolerance)
     return vectors[0], energy
 
 
@@ -224,7 +228,9 @@ def _diffused_eigenvector(problem: _Eigenproblem) -> np.ndarray:
 
 
 def _eigenvectors(
-    problem: _Eigenproblem, others: Sequence[list[np.ndarray]] = ()
+    problem: _Eigenproblem,
+    others: Sequence[list[np.ndarray]] = (),
+    tolerance: float = TOLERANCE,
 ) -> tuple[list[np.ndarray], np.ndarray]:
     """Return the eigenvectors of `eigenproblem` on all levels, and the eigenvalues on the finest.
 
@@ -233,6 +239,8 @@ def _eigenvectors(
     problem : _Eigenproblem
     others : sequence of list
         Earlier results, with smaller eigenvalues. The new eigenvectors are orthogonal to these.
+    tolerance : float
+        Change of the vector in an iteration at which the iteration stops, as the sine of an angle.
     """
     levels, masses, components = problem
     random = np.random.default_rng(0)
@@ -246,7 +254,7 @@ def _eigenvectors(
         with progress(start, start + 0.3 / len(levels) if index else 1.0):
             known = [other[index] for other in others]
             parts = levels[index:], masses[index], components[index]
-            z, energy = _lobpcg(*parts, z, max_iterations, known)
+            z, energy = _lobpcg(*parts, z, max_iterations, tolerance, known)
         vectors.insert(0, z)
         if index:
             z = levels[index - 1].prolongation @ z
@@ -259,7 +267,8 @@ def _lobpcg(
     component: np.ndarray,
     z: np.ndarray,
     max_iterations: int,
-    known: Sequence[np.ndarray] = (),
+    tolerance: float,
+    known: Sequence[np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Minimize the Rayleigh quotient on each connected component by LOBPCG (Knyazev 2001).
 
@@ -274,6 +283,8 @@ def _lobpcg(
     z : (n,) complex128 ndarray
         The initial vector.
     max_iterations : int
+    tolerance : float
+        Change of the vector in an iteration at which the iteration stops, as the sine of an angle.
     known : sequence of (n,) complex128 ndarray
         Orthonormal vectors to which the result is orthogonal on each component: eigenvectors found before.
 
@@ -308,7 +319,7 @@ def _lobpcg(
         kept = np.stack([coefficients[:, 0], np.ones(len(energy))], axis=1)
         current = products.normalize(products.combine([current, step], kept))
         previous_step = [products.normalize(step)]
-        if change < TOLERANCE:
+        if change < tolerance:
             break
     return current[0], energy
 

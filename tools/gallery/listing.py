@@ -103,7 +103,7 @@ def _presets(monkey: Surface, form: RosyField) -> Image.Image:
         preset = load_preset(name)
         look = preset.look.with_settings({"supersampling": 2})
         field = form if look.hue != "magnitude" else curved
-        paper = look.paper_color if look.ink == "hatch" else "#ffffff"
+        paper = look.paper_color if look.ink != "soft" else "#ffffff"
         shots.append((monkey, field, look, (-26.0, 6.0), preset.name, paper))
     return _labeled(shots, 4, CAPTION * 3 // 4, CAPTION + 14, 0.04)
 

@@ -95,7 +95,7 @@ def _write_presets(files: dict[str, tuple[Surface, np.ndarray]]) -> None:
             for name, size in zip(names, (LARGE, SMALL, SMALL), strict=True)
         ]
         shown = np.concatenate([drawn[0], np.concatenate(drawn[1:], axis=1)])
-        colors = HATCHING_COLORS if preset.look.ink == "hatch" else COLORS
+        colors = HATCHING_COLORS if preset.look.ink != "soft" else COLORS
         picture = Image.fromarray(shown).quantize(
             colors, Image.Quantize.MEDIANCUT, kmeans=2, dither=Image.Dither.NONE
         )

@@ -25,7 +25,7 @@ CHANGES: dict[str, tuple[object, ...]] = {
 
 def measure(bench: Bench) -> None:
     """Time first and later bakes of the ball (`cases.ball`) in Blender."""
-    peer("mathutils")  # there only with Blender
+    peer("bpy")
     from rosy_addon.core.cache import BAKE_CACHE
     from rosy_addon.jobs.bake import bake
 

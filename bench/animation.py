@@ -19,7 +19,7 @@ TRIANGLES, FRAMES = 50_000, 80
 
 def measure(bench: Bench) -> None:
     """Time the whole command, with its start, for frames of a ball that changes its shape."""
-    peer("mathutils")  # there only with Blender
+    peer("bpy")
     import bpy
 
     scene = cases.ball_scene(TRIANGLES)

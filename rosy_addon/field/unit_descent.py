@@ -99,6 +99,13 @@ class FaceEnergy:
         """(F,) int32: the connected component of each face."""
         return connected_components(len(self.area), np.stack([self.source, self.target], axis=1))
 
+    @cached_property
+    def edge_response(self) -> np.ndarray:
+        """(I, F) float64: phases of the faces when the phase at an edge turns by 1 more, per unit of its weight."""
+        diagonal = self.diagonal * (1 + 1e-9)
+        response = dense_inverse(from_edges(self.target, self.source, -self.weight, diagonal))
+        return response[self.target] - response[self.source]
+
     def matrix(self, shift: float) -> CSRMatrix:
         """Return the (F, F) matrix A for which z* A z is the energy, plus `shift` times the areas on the diagonal."""
         diagonal = self.diagonal + shift * self.area
@@ -155,11 +162,7 @@ def with_moves(energy: FaceEnergy, z: np.ndarray) -> np.ndarray:
     z : (F,) complex128 ndarray
         Representations of modulus 1; those that are 0 stay 0.
     """
-    count = len(z)
-    diagonal = energy.diagonal * (1 + 1e-9)
-    response = dense_inverse(from_edges(energy.target, energy.source, -energy.weight, diagonal))
-    # Phases of the faces when the phase at an edge turns by 1 more, per unit of its weight.
-    per_edge = response[energy.target] - response[energy.source]
+    count, per_edge = len(z), energy.edge_response
     edges = np.arange(len(energy.weight))
     resistance = per_edge[edges, energy.target] - per_edge[edges, energy.source]
     barrier = np.pi * (1 - energy.weight * resistance)

@@ -134,7 +134,8 @@ def noise_sample(surface: Surface, noise_angle: float) -> np.ndarray:
     center = np.average(surface.face_center, axis=0, weights=surface.face_area)
     distance = np.linalg.norm(surface.vertices - center, axis=1)
     around = np.bincount(surface.corner_vertex, surface.face_area[surface.corner_face], count)
-    measures = [each / max(float(each.mean()), 1e-300) for each in (distance, around)]
+    used = surface.used_vertices
+    measures = [each / max(float(each[used].mean()), 1e-300) for each in (distance, around)]
     place = NOISE_RATE * sum(measures) % 1
     # Uniform from -1 to 1, times the square root of 3: the variance is 1. Displacements are outward, also if all faces
     # are reversed.
@@ -147,9 +148,9 @@ def noise_sample(surface: Surface, noise_angle: float) -> np.ndarray:
     displaced = face_area_vectors(surface.vertices + probe * sample, *faces)
     turn = weighted_median(angle_between(vectors, displaced), area)
     by_angle = probe * noise_angle / turn if turn > 0 else 0.0
-    edges, used = surface.edges, surface.used_vertices
-    actual = np.median(np.abs(_roughness(surface.vertices, normal, edges.ends)[used]))
-    unit = np.median(np.abs(_roughness(sample, normal, edges.ends)[used]))
+    ends = surface.edges.ends
+    actual = np.median(np.abs(_roughness(surface.vertices, normal, ends)[used]))
+    unit = np.median(np.abs(_roughness(sample, normal, ends)[used]))
     by_roughness = actual / unit if unit > 0 else 0.0
     return min(by_angle, by_roughness) * sample
 

@@ -36,9 +36,17 @@ BLOCKS_PER_REPORT = 4
 #: not connect two unknowns in an aggregate.
 STRENGTH_THRESHOLD = 0.08
 
-#: Diagonal elements that differ by a few times 1e-5 of their mean get unrelated hashes; rounding errors do not
-#: change the order.
-HASH_FACTOR = 1e5
+#: Matrix elements that differ by this part of the mean diagonal element have other hashes. Rounding errors change few.
+HASH_PRECISION = 1e-6
+
+#: Number of links from an unknown to those elements on which its hash depends.
+HASH_ROUNDS = 4
+
+#: Largest number of images of an unknown under the symmetries of a mesh: the order of the group of the cube.
+MAX_IMAGES = 48
+
+#: Difference of two connections, relative to the stronger one, that is a rounding error.
+EQUAL_STRENGTH = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -416,6 +424,79 @@ def _smoothed_prolongation(
     return _assemble_by_rows(matrix, count, entries)
 
 
+def _orders(matrix: CSRMatrix) -> np.ndarray:
+    """Return two orders of the unknowns, as (2, n) ranks: they do not depend on the numbering of the unknowns.
+
+    An unknown is ordered by a hash of the matrix elements in its neighborhood (Weisfeiler and Leman 1968). Unknowns
+    with equal hashes are images of each other under symmetries of the mesh. If there are at most `MAX_IMAGES`,
+    the second order reverses them, so that a choice in both orders is no choice between images. More of them are
+    in random order.
+    """
+    count = len(matrix)
+    unit = max(float(matrix.diagonal.mean()), 1e-300) * HASH_PRECISION
+    element = np.rint(np.abs(matrix.data) / unit).astype(np.int64).view(np.uint64)
+    hashes = np.zeros(count, dtype=np.uint64)
+    for _ in range(HASH_ROUNDS):
+        terms = _scrambled(hashes.take(matrix.indices) + _scrambled(element))
+        hashes = _scrambled(hashes + np.add.reduceat(terms, matrix.indptr[:-1]))
+    _, image, images = np.unique(hashes, return_inverse=True, return_counts=True)
+    ranks = np.empty((2, count), dtype=np.intp)
+    random = np.random.default_rng(0).permutation(count)
+    is_few = images[image] <= MAX_IMAGES
+    for rank, numbers in zip(ranks, (random, np.where(is_few, -random, random)), strict=True):
+        rank[np.lexsort((numbers, image))] = np.arange(count)
+    return ranks
+
+
+def _scrambled(values: np.ndarray) -> np.ndarray:
+    """Return uint64 values whose bits depend on all bits of the given ones (SplitMix64, Steele et al. 2014)."""
+    values = (values ^ (values >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    values = (values ^ (values >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return values ^ (values >> np.uint64(31))
+
+
+def _roots(links: CSRMatrix, orders: np.ndarray) -> np.ndarray:
+    """Return the roots of new aggregates, as (n,) bool: unknowns that are at least three links apart.
+
+    A free unknown that comes last, in both orders, among the free ones at most two links away is a root. If the orders
+    differ, none of its images is one.
+
+    Parameters
+    ----------
+    links : (n, n) CSRMatrix
+        Its data say which entries are links, as bool.
+    orders : (2, n) intp ndarray
+        Two orders of the unknowns; see `_orders`.
+    """
+    count = len(links)
+    free, root = np.ones(count, dtype=bool), np.zeros(count, dtype=bool)
+    near = links  # the rows of unknowns that are free or linked to free ones
+    unknowns = np.arange(count)
+
+    def max_over_links(values: np.ndarray) -> np.ndarray:
+        """Return the maximum of (n,) values over the links of each unknown, -1 where no free one is near."""
+        result = np.full(count, -1)
+        result[unknowns] = np.maximum.reduceat(
+            np.where(near.data, values.take(near.indices), -1), near.indptr[:-1]
+        )
+        return result
+
+    while free.any():
+        report(1 - np.count_nonzero(free) / count, "building multigrid levels")
+        is_last = [
+            free & (max_over_links(max_over_links(np.where(free, order, -1))) == order)
+            for order in orders
+        ]
+        new_roots = is_last[0] & is_last[1]
+        root |= new_roots
+        free &= max_over_links(max_over_links(new_roots.astype(np.intp))) < 1
+        free &= ~(is_last[0] | is_last[1])
+        is_near = max_over_links(free.astype(np.intp)) > 0
+        near = near.rows(np.flatnonzero(is_near[unknowns]))
+        unknowns = np.flatnonzero(is_near)
+    return root
+
+
 def _aggregates(matrix: CSRMatrix) -> tuple[np.ndarray, int, np.ndarray]:
     """Group the unknowns into aggregates of strongly connected neighbors.
 
@@ -433,37 +514,29 @@ def _aggregates(matrix: CSRMatrix) -> tuple[np.ndarray, int, np.ndarray]:
     strength = np.where(row == column, 0, np.abs(matrix.data))
     largest = np.maximum.reduceat(strength, matrix.indptr[:-1])
     strength[strength < STRENGTH_THRESHOLD * np.minimum(largest[row], largest[column])] = 0
-    linked = (strength > 0) | (row == column)
-
-    def max_over_neighbors(values: np.ndarray) -> np.ndarray:
-        return np.maximum.reduceat(np.where(linked, values.take(column), -1), matrix.indptr[:-1])
-
-    # A root of a new aggregate is a free unknown whose random priority is the largest among the free unknowns
-    # that are at most two steps away.
-    # The priority is a hash of the diagonal, so that it does not depend on the numbering of the unknowns.
-    mean = max(float(matrix.diagonal.mean()), 1e-300)
-    hashes = np.round(HASH_FACTOR * matrix.diagonal / mean % 1, 6)
-    priority = np.empty(count, dtype=np.intp)
-    priority[np.lexsort((np.random.default_rng(0).permutation(count), hashes))] = np.arange(count)
-    free, root = np.ones(count, dtype=bool), np.zeros(count, dtype=bool)
-    while free.any():
-        report(1 - np.count_nonzero(free) / count, "building multigrid levels")
-        free_priority = np.where(free, priority, -1)
-        new_roots = free & (max_over_neighbors(max_over_neighbors(free_priority)) == priority)
-        root |= new_roots
-        free &= max_over_neighbors(max_over_neighbors(new_roots.astype(np.intp))) < 1
+    links = replace(matrix, data=(strength > 0) | (row == column))
+    orders = _orders(matrix)
+    root = _roots(links, orders)
     aggregate = np.full(count, -1)
     aggregate[root] = np.arange(np.count_nonzero(root))
     phase = np.ones(count, dtype=matrix.data.dtype)
+    root_order = np.where(root, orders, -1)
     for _ in range(2):
         report(1.0, "building multigrid levels")
-        # A free unknown joins the aggregate of the neighbor with the strongest connection.
+        # A free unknown joins the aggregate of the neighbor with the strongest connection. If equal ones lead to
+        # roots of different orders, the larger one wins in both orders, or none.
         weight = np.where(aggregate[column] >= 0, strength, 0)
         strongest = np.maximum.reduceat(weight, matrix.indptr[:-1])[row]
-        entry = np.flatnonzero((weight == strongest) & (strongest > 0) & (aggregate[row] < 0))
+        is_strongest = (weight >= (1 - EQUAL_STRENGTH) * strongest) & (strongest > 0)
+        is_best = is_strongest & (aggregate[row] < 0)
+        for order in root_order:
+            rank = np.where(is_strongest, order[column], -1)
+            is_best &= rank == np.maximum.reduceat(rank, matrix.indptr[:-1])[row]
+        entry = np.flatnonzero(is_best)
         unknown, neighbor = row[entry], column[entry]
         phase[unknown] = -matrix.data[entry] / np.abs(matrix.data[entry]) * phase[neighbor]
         aggregate[unknown] = aggregate[neighbor]
+        root_order[:, unknown] = root_order[:, neighbor]
     singleton = aggregate < 0
     aggregate[singleton] = np.count_nonzero(root) + np.arange(np.count_nonzero(singleton))
     return aggregate, int(aggregate.max()) + 1, phase

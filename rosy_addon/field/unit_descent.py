@@ -82,6 +82,11 @@ class FaceEnergy:
         """Return the energy of (F,) representations of modulus 1."""
         return 2 * float((self.weight - self.products(z).real).sum())
 
+    def of_components(self, z: np.ndarray, component: np.ndarray) -> np.ndarray:
+        """Return the energy on each connected component, given the (F,) component of each face."""
+        values = 2 * (self.weight - self.products(z).real)
+        return np.bincount(component[self.target], values, int(component.max()) + 1)
+
     def sums(self, values: np.ndarray) -> np.ndarray:
         """Return (F,) sums of (I,) real values: added at the target of each edge, subtracted at its source."""
         count = len(self.area)

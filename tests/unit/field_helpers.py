@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from awkward import AWKWARD
 from scipy import sparse
-from shapes import icosphere, rebuilt
+from shapes import from_triangles, icosphere, rebuilt
 
 from rosy_addon.core.errors import RosyError
 from rosy_addon.field.convert import rotate_field
@@ -98,3 +98,12 @@ def ellipsoid(subdivisions, axes=(1.0, 0.8, 0.6)):
 def read_field(*arguments, **settings):
     """`load_field` without the note."""
     return load_field(*arguments, **settings).field
+
+
+def symmetric_head(subdivisions=3):
+    """A surface with one mirror plane, x = 0, and the mirror image of each of its faces."""
+    ball = icosphere(subdivisions)
+    x, y, z = ball.vertices.T
+    out = 1 + 0.2 * np.sin(2 * y + 1) * np.cos(2 * x) + 0.15 * np.sin(3 * z + y)
+    vertices = ball.vertices * out[:, None] * (1.0, 1.3, 1.1)
+    return from_triangles(vertices, ball.corner_vertex.reshape(-1, 3))

@@ -4,21 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from field_helpers import angle_differences, bumpy
+from field_helpers import angle_differences, bumpy, symmetric_head
 from shapes import cylinder, from_triangles, icosphere, plane
 
 from rosy_addon.field.smoothest import smoothest_field
 
 BALL = bumpy(icosphere(3))
 MIRROR = np.diag([-1.0, 1.0, 1.0])
-
-
-def symmetric_head():
-    """A surface with one mirror plane, x = 0, and the mirror image of each of its faces."""
-    x, y, z = icosphere(3).vertices.T
-    out = 1 + 0.2 * np.sin(2 * y + 1) * np.cos(2 * x) + 0.15 * np.sin(3 * z + y)
-    vertices = icosphere(3).vertices * out[:, None] * (1.0, 1.3, 1.1)
-    return from_triangles(vertices, icosphere(3).corner_vertex.reshape(-1, 3))
 
 
 @pytest.mark.parametrize("degree", range(1, 7))

@@ -100,11 +100,11 @@ def test_another_eigenvector_gives_less_energy():
 
 @pytest.mark.slow
 def test_coarse_start_reaches_the_energy_of_a_fine_one(monkeypatch):
-    """With more than 1,500 faces, the eigenvectors are computed on a coarse multigrid level."""
+    """The search starts on a coarse multigrid level."""
     surface = bumpy(icosphere(4))
     energies = []
-    for faces in (smoothest.SMALL_MESH_FACES, 50_000):
-        monkeypatch.setattr(smoothest, "SMALL_MESH_FACES", faces)
+    for unknowns in (smoothest.START_UNKNOWNS, 50_000):
+        monkeypatch.setattr(smoothest, "START_UNKNOWNS", unknowns)
         energies.append(dirichlet_energy(surface, smoothest.smoothest_field(surface, 4)))
     assert energies[0] < 1.02 * energies[1]
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..annotation.singularity_settings import singularity_dots_choice, singularity_size_number
+from ..core.color import alpha_from_hex
 from ..core.settings import (
     Stage,
     always,
@@ -57,6 +58,11 @@ def crease_angle_of(look: Any) -> float | None:
 def is_hatched(look: Any) -> bool:
     """Return whether lines are drawn with ink on paper."""
     return look.ink != "soft"
+
+
+def has_clear_paper(look: Any) -> bool:
+    """Return whether what is behind the ink shows through the paper."""
+    return is_hatched(look) and alpha_from_hex(look.paper_color) < 1
 
 
 def is_even(look: Any) -> bool:

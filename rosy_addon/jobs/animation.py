@@ -169,7 +169,7 @@ def bake_animation(
                 states = {one.frame: one.state for one in drawn}
                 camera, sequence = drawn[-1].camera, result.sequence
                 pictures.apply_sequence(
-                    scene, scene_data, sequence, camera, settings, source, states, key
+                    scene, scene_data, sequence, camera, settings, source, states, last_look, key
                 )
             update_camera_planes(scene)
         return results

@@ -98,7 +98,8 @@ def bake_texture(scene: Scene, objects: Sequence[Object]) -> Steps[list[TextureR
     results = []
     for obj, uv_map, texture, state, hatching in drawn:
         image = apply_texture(
-            scene, obj, uv_map, texture.tiles, settings, state, content, hatching, is_udim=is_udim
+            *(scene, obj, uv_map, texture.tiles, settings, state, content, look, hatching),
+            is_udim=is_udim,
         )
         results.append(TextureResult(obj, image, (texture.note,) if texture.note else ()))
     return results

@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 from bpy.types import ID, Image, Material, Mesh, Node, NodeTree, Object
 
+from ..compositor.look import Look, has_clear_paper
 from ..projection.camera import Camera
 from ..rendering.picture_images import NEUTRAL_GRAY
 from .datablocks import KEY_TAG, OWNED_TAG, Track, is_editable, rosy_modifiers
@@ -71,6 +72,7 @@ def new_material(
     camera: Camera,
     track: Track,
     settings: OutputSettings,
+    look: Look,
     hatching: Hatching | None = None,
 ) -> Material:
     """Create a material that shows a picture. It looks the same in Cycles and EEVEE.
@@ -82,6 +84,9 @@ def new_material(
     If `hatching` is given, the material draws hatching in the present light on the surface
     (`hatching_shader`), and the settings of emission and diffuse reflection are not used.
 
+    If the paper of ink is transparent, so is the material between the lines. Only front faces have ink, so that a
+    line is not drawn twice.
+
     Parameters
     ----------
     image : bpy.types.Image
@@ -91,6 +96,8 @@ def new_material(
     track : function
         Called with each new datablock, which it returns; see `datablocks.rollback_on_error`.
     settings : OutputSettings
+    look : Look
+        The look of the picture.
     hatching : Hatching, optional
         How hatching is drawn. Given if the image has thresholds of ink instead of colors.
     """
@@ -124,6 +131,14 @@ def new_material(
         scaled_color = build.scaled(color, settings.diffuse)
         reflected = build("ShaderNodeBsdfDiffuse", {"Color": scaled_color}).outputs[0]
         shader = build("ShaderNodeAddShader", {0: emitted, 1: reflected}).outputs[0]
+        if has_clear_paper(look):
+            is_back = build("ShaderNodeNewGeometry").outputs["Backfacing"]
+            is_front = build.math("SUBTRACT", 1.0, is_back)
+            coverage = build.math("MULTIPLY", image_node.outputs["Alpha"], is_front)
+            if is_inside is not None:
+                coverage = build.math("MULTIPLY", coverage, is_inside)
+            transparent = build("ShaderNodeBsdfTransparent").outputs["BSDF"]
+            shader = build.mix_shaders(coverage, transparent, shader)
     build("ShaderNodeOutputMaterial", {"Surface": shader})
     return material
 

@@ -20,6 +20,7 @@ import numpy as np
 from bpy.types import Image, Material, NodeTree, Object, Scene
 
 from ..annotation.key_contents import PictureKey
+from ..compositor.look import Look, has_clear_paper
 from ..compositor.picture import Picture
 from ..compositor.picture_key import picture_key
 from ..core.errors import RosyError
@@ -184,7 +185,7 @@ def apply_picture(
     name, stem = f"{NAME_PREFIX}{camera.name}", _image_stem(settings, camera.name)
     with datablocks.rollback_on_error() as track:
         image = track(new_image(name, image_data, is_color=hatching is None, stem=stem))
-        material = picture_nodes.new_material(image, camera, track, settings, hatching)
+        material = picture_nodes.new_material(image, camera, track, settings, view.look, hatching)
         matrices = _object_to_clip_matrices(scene_data, camera)
         node_groups = _new_groups(material, matrices, track)
     size, key = image_size(image_data), picture_key(view.look, picture)
@@ -202,6 +203,7 @@ def apply_sequence(
     settings: OutputSettings,
     source: CameraSource | None,
     states: Mapping[int, PictureState],
+    look: Look,
     key: PictureKey,
 ) -> None:
     """Apply an image sequence to the objects of a scene. It replaces an earlier sequence of the same name.
@@ -222,6 +224,8 @@ def apply_sequence(
         The camera of all frames. None: each frame was drawn from the camera that renders it.
     states : mapping of int to PictureState
         The state of the scene that each frame was drawn from.
+    look : Look
+        The look of the last frame.
     key : PictureKey
         Contents of the key (legend) of the pictures.
     """
@@ -229,7 +233,7 @@ def apply_sequence(
     with datablocks.rollback_on_error() as track:
         image = track(load_sequence(sequence.path, settings.as_float))
         image.name = f"{NAME_PREFIX}{sequence.name}"
-        material = picture_nodes.new_material(image, camera, track, settings)
+        material = picture_nodes.new_material(image, camera, track, settings, look)
         picture_nodes.set_sequence_frames(material, sequence.first, sequence.last)
         node_groups = _new_groups(material, dict.fromkeys(scene_data.objects), track)
     store_record(
@@ -254,6 +258,7 @@ def apply_texture(
     settings: OutputSettings,
     state: PictureState,
     content: str,
+    look: Look,
     hatching: texture_nodes.Hatching | None,
     *,
     is_udim: bool,
@@ -275,6 +280,8 @@ def apply_texture(
         The state of the scene that the texture was drawn from.
     content : str
         What the image shows; see `surface_texture.draw.CONTENTS`.
+    look : Look
+        The look of the texture.
     hatching : Hatching or None
         How the material draws hatching, if the image has thresholds of ink. None if it does not.
     is_udim : bool
@@ -292,7 +299,8 @@ def apply_texture(
     create, image_data = (new_tiled_image, tiles) if is_udim else (new_image, first)
     with datablocks.rollback_on_error() as track:
         image = track(create(name, image_data, is_color=is_color, stem=stem))
-        add_shader = texture_nodes.color_shader
+        is_clear = content == "look" and has_clear_paper(look)
+        add_shader = partial(texture_nodes.color_shader, is_clear=is_clear)
         if content == "anisotropy":
             add_shader = partial(texture_nodes.brushed_metal_shader, uv_map=uv_map)
         elif hatching is not None:

@@ -55,9 +55,14 @@ def new_texture_material(
     return material
 
 
-def color_shader(build: NodeBuilder, image_node: Node) -> NodeSocket:
-    """Add a diffuse shader with the colors of an image, and return its output."""
+def color_shader(build: NodeBuilder, image_node: Node, *, is_clear: bool = False) -> NodeSocket:
+    """Add a diffuse shader with the colors of an image, and return its output.
+
+    `is_clear` says whether the shader is transparent where the image is.
+    """
     inputs = {"Base Color": image_node.outputs["Color"], "Roughness": 1.0}
+    if is_clear:
+        inputs["Alpha"] = image_node.outputs["Alpha"]
     return build("ShaderNodeBsdfPrincipled", inputs).outputs["BSDF"]
 
 

@@ -86,6 +86,32 @@ def test_a_relit_picture_is_the_picture_of_any_tone(scene, tmp_path):
     assert not bpy.data.node_groups and not bpy.data.materials and not baked_images()
 
 
+def test_clear_paper_shows_what_is_behind(with_field, scene, tmp_path):
+    """A red wall is behind Suzanne. Each pixel is wall where the picture has no ink, and ink where it is full."""
+    bpy.ops.mesh.primitive_plane_add(size=30.0, location=(0, 3, 0), rotation=(np.pi / 2, 0.0, 0.0))
+    wall = bpy.data.materials.new("Wall")
+    wall.use_nodes = True
+    wall.node_tree.nodes.clear()
+    emission = wall.node_tree.nodes.new("ShaderNodeEmission")
+    emission.inputs["Color"].default_value = (1.0, 0.0, 0.0, 1.0)
+    output = wall.node_tree.nodes.new("ShaderNodeOutputMaterial")
+    wall.node_tree.links.new(emission.outputs[0], output.inputs["Surface"])
+    bpy.context.object.data.materials.append(wall)
+    look = scene.rosy.look
+    look.ink, look.ink_color, look.supersampling = "hatch", (0.0, 0.0, 0.0), 1
+    look.paper_color = (1.0, 1.0, 1.0, 0.0)
+    assert bpy.ops.rosy.bake() == {"FINISHED"}
+    alpha, image = pixels(baked_images()[0])[..., 3], render(scene, tmp_path)
+    np.testing.assert_allclose(
+        image[alpha == 0][:, :3], [[1, 0, 0]] * (alpha == 0).sum(), atol=2 / 255
+    )
+    ink = image[alpha == 1][:, :3]
+    assert len(ink) > 100
+    assert (
+        ink.max(axis=1) < 2 / 255
+    ).mean() > 0.9  # at silhouettes, other samples miss the surface
+
+
 def test_bake_animation(with_field, scene, tmp_path):
     """The frames of the scene, and then two of them, which are up to date."""
     scene.frame_start, scene.frame_end = 1, 4

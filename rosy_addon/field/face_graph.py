@@ -98,6 +98,33 @@ class FaceGraph:
         vertex[self.corner_node] = self.surface.corner_vertex
         return vertex
 
+    @property
+    def can_be_singular(self) -> np.ndarray:
+        """(n,) bool: whether the vertex of each node has an index: its faces are connected around it, all of them.
+
+        `singularities.find_singularities` finds indices at the same vertices.
+        """
+        vertex = self.node_vertex
+        return self.is_interior & (np.bincount(vertex)[vertex] == 1)
+
+    def turning(self, z: np.ndarray, degree: int) -> np.ndarray:
+        """Return (I,) angles in radians by which a field turns from the source to the target face of each edge.
+
+        `z` holds the (F,) representations of the field, of this degree.
+        """
+        transported = z[self.source] * np.exp(1j * degree * self.unfolding)
+        return np.angle(z[self.target] * transported.conj()) / degree
+
+    def index_range(self, degree: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the (n,) float64 least and largest index of a field at each interior node, in units of 1 / N.
+
+        From face to face the field turns by less than pi / N, so around a node with k faces by less than k pi / N.
+        `degree` is N.
+        """
+        half = np.bincount(self.corner_node, minlength=self.node_count) / 2
+        flat = self.defect * degree / (2 * np.pi)
+        return np.floor(flat - half) + 1, np.ceil(flat + half) - 1
+
     def turn_around_nodes(self, angle: np.ndarray) -> np.ndarray:
         """Return (n,) float64 sums of angles at the edges, counter-clockwise around each vertex node.
 

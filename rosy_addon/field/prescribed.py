@@ -27,9 +27,10 @@ from .face_graph import LABEL, FaceGraph, face_graph
 from .frames import normalize
 from .representation import complex_bincount, from_representation, to_representation, unit_complex
 from .rosy_field import RosyField, check_degree
+from .singularities import find_singularities
 from .sparse_multigrid import CSRMatrix, Level, from_edges, hierarchy, w_cycle
 from .surface import Surface
-from .turning_angles import added_resistance, turning_angles
+from .turning_angles import MAX_TURN, added_resistance, turning_angles
 
 #: Residual norm at which the solver stops, relative to the norm of the right-hand side.
 TOLERANCE = 1e-8
@@ -94,13 +95,15 @@ def prescribed_field(
     Raises
     ------
     RosyError
-        If a vertex cannot be singular (at a border, or not in the mesh), if the indices do not have the sum
-        that a closed surface needs, or if the field would turn by pi / N or more between two faces.
+        If a vertex cannot be singular (at a border, or not in the mesh) or is given twice, if there are too
+        few faces around it for its index, if the indices do not have the sum that a closed surface needs, or
+        if the field would turn by pi / N or more between two faces.
     """
     degree = check_degree(degree)
     raise_mmap_threshold()
     x, y = surface.face_frames
     graph = face_graph(surface)
+    check_indices(graph, degree, vertex, index)
     angle, direction = _turning(graph, degree, vertex, index, graph.defect)
     z = np.exp(1j * degree * direction) * x.any(axis=1)
     points, face = surface.vertices[surface.corner_vertex], surface.corner_face
@@ -112,7 +115,9 @@ def prescribed_field(
         if reach > 0:
             with progress(0.9, 1.0):
                 z = _bent(graph, degree, angle, z, target, reach)
-    return RosyField(degree, from_representation(z, x, y, degree))
+    field = RosyField(degree, from_representation(z, x, y, degree))
+    _check_found(surface, field, vertex, index)
+    return field
 
 
 def change_singularities(
@@ -151,8 +156,7 @@ def change_singularities(
     z = unit_complex(to_representation(field.vectors, x, y, degree))
     is_defined = z != 0
     graph = face_graph(surface, is_defined)
-    transported = z[graph.source] * np.exp(1j * degree * graph.unfolding)
-    present = np.angle(z[graph.target] * transported.conj()) / degree
+    present = graph.turning(z, degree)
     no_defect = np.zeros(graph.node_count)
     added, direction = _turning(graph, degree, vertex, change, no_defect, present)
     turned = np.exp(1j * degree * direction) * is_defined
@@ -208,10 +212,19 @@ def _bent(
 
 
 def index_at_nodes(graph: FaceGraph, vertex: np.ndarray, index: np.ndarray) -> np.ndarray:
-    """Return (n,) int64: the singularity index of each vertex node, from the indices of some vertices.
+    """Return (n,) int64: the singularity index of each vertex node, from the indices of some vertices."""
+    result = np.zeros(graph.node_count, dtype=np.int64)
+    result[nodes_of_vertices(graph, vertex)] = index
+    return result
 
-    A vertex whose faces are not connected around it has several nodes. The first of these nodes gets the
-    index of the vertex.
+
+def nodes_of_vertices(graph: FaceGraph, vertex: np.ndarray) -> np.ndarray:
+    """Return the (K,) vertex nodes of K vertices that can be singular.
+
+    Raises
+    ------
+    RosyError
+        If a vertex is not in the mesh, cannot be singular, or is given twice.
     """
     surface, vertex_count = graph.surface, len(graph.surface.vertices)
     vertex = np.asarray(vertex, dtype=np.int64)
@@ -222,17 +235,58 @@ def index_at_nodes(graph: FaceGraph, vertex: np.ndarray, index: np.ndarray) -> n
             f"{vertex_count - 1}"
         )
     node_of_vertex = np.full(vertex_count, -1)
-    interior = np.flatnonzero(graph.is_interior[graph.corner_node])[::-1]
-    node_of_vertex[surface.corner_vertex[interior]] = graph.corner_node[interior]
+    regular = np.flatnonzero(graph.can_be_singular)
+    node_of_vertex[graph.node_vertex[regular]] = regular
     node = node_of_vertex[vertex]
     if (node < 0).any():
         raise RosyError(
-            f"{surface.name}: vertex {vertex[node < 0][0]} cannot be singular, because it is at a border, "
-            "at faces without area, or has no face: choose another vertex"
+            f"{surface.name}: vertex {vertex[node < 0][0]} cannot be singular, because it is at a border or at "
+            "faces without area, has no face, or joins parts that share nothing else: choose another vertex"
         )
-    result = np.zeros(graph.node_count, dtype=np.int64)
-    np.add.at(result, node, index)
-    return result
+    given_twice = np.bincount(vertex) > 1
+    if given_twice.any():
+        raise RosyError(
+            f"{surface.name}: vertex {given_twice.argmax()} is given more than once: give its index once"
+        )
+    return node
+
+
+def check_indices(graph: FaceGraph, degree: int, vertex: np.ndarray, index: np.ndarray) -> None:
+    """Check that there are enough faces around each of K vertices for its index, in units of 1 / N.
+
+    Raises
+    ------
+    RosyError
+        If an index is outside of `FaceGraph.index_range`, or if a vertex cannot be singular.
+    """
+    node, index = nodes_of_vertices(graph, vertex), np.asarray(index)
+    low, high = (limit[node] for limit in graph.index_range(degree))
+    wrong = np.flatnonzero((index < low) | (index > high))
+    if len(wrong):
+        first = wrong[0]
+        raise RosyError(
+            f"{graph.surface.name}: vertex {vertex[first]} cannot have the index {index[first]}/{degree}: the "
+            f"faces around it allow {low[first]:.0f}/{degree} to {high[first]:.0f}/{degree}: spread the index "
+            "over several vertices, or choose one with more faces"
+        )
+
+
+def _check_found(surface: Surface, field: RosyField, vertex: np.ndarray, index: np.ndarray) -> None:
+    """Check that a field has the given singularities and no other ones.
+
+    Raises
+    ------
+    RosyError
+        If it has others, because of rounding errors at faces that are nearly lines or points.
+    """
+    found = set(zip(*(array.tolist() for array in find_singularities(surface, field)), strict=True))
+    given = set(zip(np.asarray(vertex).tolist(), np.asarray(index).tolist(), strict=True))
+    wrong = sorted(found ^ {pair for pair in given if pair[1]})
+    if wrong:
+        raise RosyError(
+            f"{surface.name}: rounding errors would change the index at vertex {wrong[0][0]}: merge vertices that "
+            "coincide, and dissolve faces that are nearly lines or points"
+        )
 
 
 def _check_sums(graph: FaceGraph, needed: np.ndarray, given: np.ndarray, degree: int) -> None:
@@ -264,7 +318,7 @@ def _check_sums(graph: FaceGraph, needed: np.ndarray, given: np.ndarray, degree:
 
 
 def _check_angles(graph: FaceGraph, degree: int, angle: np.ndarray) -> None:
-    """Check that a field turns by less than pi / N (half the angle between two members) from face to face.
+    """Check that a field turns by clearly less than pi / N from face to face: half the angle between members.
 
     Raises
     ------
@@ -272,9 +326,10 @@ def _check_angles(graph: FaceGraph, degree: int, angle: np.ndarray) -> None:
         If it turns by more. Then other members of the two faces are nearest to each other, and the field has
         other singularities than requested.
     """
-    if not len(angle) or np.abs(angle).max() < np.pi / degree:
+    limit = MAX_TURN * np.pi / degree
+    if np.abs(angle).max(initial=0.0) < limit:
         return
-    is_fast = np.abs(angle) >= np.pi / degree
+    is_fast = np.abs(angle) >= limit
     ends = np.stack([graph.tail, graph.head])[:, is_fast]
     worst = graph.node_vertex[graph.head[np.abs(angle).argmax()]]
     raise TurningError(
@@ -333,7 +388,7 @@ def guided_rotation(
     penalty = np.where(is_guide, penalty, 0.0)
     stiffness = 1 / graph.conductance
     wanted = np.angle(offset) / degree
-    sector, limit = 2 * np.pi / degree, np.pi / degree
+    sector, limit = 2 * np.pi / degree, MAX_TURN * np.pi / degree
     angle = None
     for attempt in range(MAX_ATTEMPTS):
         rest = 0.5**attempt

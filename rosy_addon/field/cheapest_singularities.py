@@ -15,7 +15,7 @@ from ..core.errors import RosyError
 from ..core.progress import progress, report
 from .blocks import neighbors_of_nodes
 from .face_graph import LABEL, FaceGraph, face_graph
-from .prescribed import check_indices, index_at_nodes
+from .prescribed import check_index_ranges, index_at_nodes
 from .rosy_field import check_degree
 from .smoothest import eigenproblem, spectral_shift
 from .sparse_multigrid import CSRMatrix, from_edges
@@ -69,7 +69,7 @@ def cheapest_singularities(
     if not surface.face_frames[0].any():
         raise RosyError(f"{surface.name}: no face has an area")
     graph = face_graph(surface)
-    check_indices(graph, degree, vertex, index)
+    check_index_ranges(graph, degree, vertex, index)
     given = index_at_nodes(graph, vertex, index)
     required = 2 * np.pi / degree * (given - _spread(graph, given))
     with progress(0.1, 0.3):
@@ -78,8 +78,7 @@ def cheapest_singularities(
     matrix = _energy(graph, degree, angle, spectral_shift(mass) * mass)
     with progress(0.35, 0.6):
         z, _ = eigenproblem(matrix, mass, graph.component, START_TOLERANCE)
-    turn = graph.turn_around_nodes(graph.turning(z, degree)) + graph.defect
-    total = np.where(graph.is_interior, np.rint(turn * degree / (2 * np.pi)), 0).astype(np.int64)
+    total = graph.indices(graph.turning(z, degree), degree)
     is_taken = ~graph.can_be_singular | np.isin(graph.node_vertex, vertex)
     with progress(0.6, 1.0):
         added = _settled(graph, degree, given, total - given, is_taken)

@@ -22,7 +22,7 @@ from .analysis import edge_lengths
 from .blocks import concatenated_ranges, mask, neighbors_of_nodes
 from .connectivity import connected_components, connected_corners, sums_from_roots
 from .frames import dot
-from .representation import edge_unfolding
+from .representation import edge_unfolding, matching_angles
 from .singularities import signed_corner_angles
 from .surface import Surface
 
@@ -112,8 +112,15 @@ class FaceGraph:
 
         `z` holds the (F,) representations of the field, of this degree.
         """
-        transported = z[self.source] * np.exp(1j * degree * self.unfolding)
-        return np.angle(z[self.target] * transported.conj()) / degree
+        return matching_angles(self.surface, z, degree, self.halfedges)
+
+    def indices(self, turning: np.ndarray, degree: int) -> np.ndarray:
+        """Return the (n,) int64 singularity indices at the nodes, in units of 1 / N; 0 at nodes that are not interior.
+
+        `turning` holds the (I,) angles of `turning`, and `degree` is N.
+        """
+        turns = (self.turn_around_nodes(turning) + self.defect) / (2 * np.pi)
+        return np.where(self.is_interior, np.rint(degree * turns), 0).astype(np.int64)
 
     def index_range(self, degree: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the (n,) float64 least and largest index of a field at each interior node, in units of 1 / N.

@@ -27,7 +27,6 @@ from .face_graph import LABEL, FaceGraph, face_graph
 from .frames import normalize
 from .representation import complex_bincount, from_representation, to_representation, unit_complex
 from .rosy_field import RosyField, check_degree
-from .singularities import find_singularities
 from .sparse_multigrid import CSRMatrix, Level, from_edges, hierarchy, w_cycle
 from .surface import Surface
 from .turning_angles import MAX_TURN, added_resistance, turning_angles
@@ -103,8 +102,9 @@ def prescribed_field(
     raise_mmap_threshold()
     x, y = surface.face_frames
     graph = face_graph(surface)
-    check_indices(graph, degree, vertex, index)
-    angle, direction = _turning(graph, degree, vertex, index, graph.defect)
+    check_index_ranges(graph, degree, vertex, index)
+    node_index = index_at_nodes(graph, vertex, index)
+    angle, direction = _turning(graph, degree, node_index, graph.defect)
     z = np.exp(1j * degree * direction) * x.any(axis=1)
     points, face = surface.vertices[surface.corner_vertex], surface.corner_face
     edge_z = to_representation(points[surface.next_corner] - points, x[face], y[face], degree)
@@ -115,9 +115,8 @@ def prescribed_field(
         if reach > 0:
             with progress(0.9, 1.0):
                 z = _bent(graph, degree, angle, z, target, reach)
-    field = RosyField(degree, from_representation(z, x, y, degree))
-    _check_found(surface, field, vertex, index)
-    return field
+    _check_result(graph, degree, z, node_index)
+    return RosyField(degree, from_representation(z, x, y, degree))
 
 
 def change_singularities(
@@ -157,36 +156,34 @@ def change_singularities(
     is_defined = z != 0
     graph = face_graph(surface, is_defined)
     present = graph.turning(z, degree)
-    no_defect = np.zeros(graph.node_count)
-    added, direction = _turning(graph, degree, vertex, change, no_defect, present)
+    node_change = index_at_nodes(graph, vertex, change)
+    added, direction = _turning(graph, degree, node_change, 0 * graph.defect, present)
     turned = np.exp(1j * degree * direction) * is_defined
     turned *= _rotation_to(z, turned, graph.component)
     with progress(0.9, 1.0):
         turned = _bent(graph, degree, present + added, turned, z, reach)
+    _check_result(graph, degree, turned, graph.indices(present, degree) + node_change, present)
     return RosyField(degree, magnitude * from_representation(turned, x, y, degree))
 
 
 def _turning(
     graph: FaceGraph,
     degree: int,
-    vertex: np.ndarray,
-    index: np.ndarray,
+    node_index: np.ndarray,
     defect: np.ndarray,
     present: np.ndarray | float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return (I,) turning angles and (F,) directions, in radians, of a field with given singularity indices.
 
-    For a new field, `index` holds the singularity indices of the vertices, and `defect` the (n,) angle
-    defects of the vertex nodes. If an existing field is changed, `index` holds the changes of its indices,
-    `defect` is 0, and `present` holds its (I,) turning angles. The first result is then the change of these
-    angles. Directions are angles in the frames of the faces.
+    For a new field, `node_index` holds the (n,) singularity indices of the vertex nodes, and `defect` their
+    angle defects. If an existing field is changed, `node_index` holds the changes of its indices, `defect` is
+    0, and `present` holds its (I,) turning angles. The first result is then the change of these angles.
+    Directions are angles in the frames of the faces.
     """
-    node_index = index_at_nodes(graph, vertex, index)
     _check_sums(graph, defect * (degree / (2 * np.pi)), node_index, degree)
     required = 2 * np.pi / degree * node_index - defect
     with progress(0.2, 0.85):
         angle, direction = turning_angles(graph, degree, required, present)
-    _check_angles(graph, degree, present + angle)
     report(0.85, LABEL)
     return angle, direction
 
@@ -207,7 +204,6 @@ def _bent(
     """
     penalty = graph.surface.face_area / reach / reach
     angle = guided_rotation(graph, degree, turning, z, target, penalty)
-    _check_angles(graph, degree, turning + angle[graph.target] - angle[graph.source])
     return z * np.exp(1j * degree * angle)
 
 
@@ -251,7 +247,9 @@ def nodes_of_vertices(graph: FaceGraph, vertex: np.ndarray) -> np.ndarray:
     return node
 
 
-def check_indices(graph: FaceGraph, degree: int, vertex: np.ndarray, index: np.ndarray) -> None:
+def check_index_ranges(
+    graph: FaceGraph, degree: int, vertex: np.ndarray, index: np.ndarray
+) -> None:
     """Check that there are enough faces around each of K vertices for its index, in units of 1 / N.
 
     Raises
@@ -268,24 +266,6 @@ def check_indices(graph: FaceGraph, degree: int, vertex: np.ndarray, index: np.n
             f"{graph.surface.name}: vertex {vertex[first]} cannot have the index {index[first]}/{degree}: the "
             f"faces around it allow {low[first]:.0f}/{degree} to {high[first]:.0f}/{degree}: spread the index "
             "over several vertices, or choose one with more faces"
-        )
-
-
-def _check_found(surface: Surface, field: RosyField, vertex: np.ndarray, index: np.ndarray) -> None:
-    """Check that a field has the given singularities and no other ones.
-
-    Raises
-    ------
-    RosyError
-        If it has others, because of rounding errors at faces that are nearly lines or points.
-    """
-    found = set(zip(*(array.tolist() for array in find_singularities(surface, field)), strict=True))
-    given = set(zip(np.asarray(vertex).tolist(), np.asarray(index).tolist(), strict=True))
-    wrong = sorted(found ^ {pair for pair in given if pair[1]})
-    if wrong:
-        raise RosyError(
-            f"{surface.name}: rounding errors would change the index at vertex {wrong[0][0]}: merge vertices that "
-            "coincide, and dissolve faces that are nearly lines or points"
         )
 
 
@@ -317,27 +297,45 @@ def _check_sums(graph: FaceGraph, needed: np.ndarray, given: np.ndarray, degree:
     )
 
 
-def _check_angles(graph: FaceGraph, degree: int, angle: np.ndarray) -> None:
-    """Check that a field turns by clearly less than pi / N from face to face: half the angle between members.
+def _check_result(
+    graph: FaceGraph,
+    degree: int,
+    z: np.ndarray,
+    node_index: np.ndarray,
+    present: np.ndarray | float = 0.0,
+) -> None:
+    """Check that a field has the requested indices, and no new ties (see `MAX_TURN`).
+
+    Parameters
+    ----------
+    graph : FaceGraph
+    degree : int
+        N.
+    z : (F,) complex ndarray
+        Representation of the field.
+    node_index : (n,) int ndarray
+        Requested index at each vertex node, in units of 1 / N.
+    present : (I,) ndarray or float
+        Turning angles of the field before it was changed, in radians. It may have ties.
 
     Raises
     ------
     TurningError
-        If it turns by more. Then other members of the two faces are nearest to each other, and the field has
-        other singularities than requested.
+        If the index is another one at an interior node, or if there are new ties. The requested field then
+        turns by pi / N or more between two faces, so that other members of these faces are nearest to each other.
     """
-    limit = MAX_TURN * np.pi / degree
-    if np.abs(angle).max(initial=0.0) < limit:
-        return
-    is_fast = np.abs(angle) >= limit
-    ends = np.stack([graph.tail, graph.head])[:, is_fast]
-    worst = graph.node_vertex[graph.head[np.abs(angle).argmax()]]
-    raise TurningError(
-        np.unique(graph.node_vertex[ends]),
-        f"{graph.surface.name}: near vertex {worst}, a field of degree {degree} with these singularities would "
-        "turn too fast for the size of the faces: subdivide the mesh, move singularities apart, or choose "
-        "smaller indices",
-    )
+    turning, limit = graph.turning(z, degree), MAX_TURN * np.pi / degree
+    is_tie = (np.abs(turning) > limit) & (np.abs(present) <= limit)
+    is_wrong = graph.is_interior & (graph.indices(turning, degree) != node_index)
+    is_wrong |= mask(graph.node_count, np.stack([graph.tail, graph.head])[:, is_tie])
+    if is_wrong.any():
+        vertices = np.unique(graph.node_vertex[is_wrong])
+        raise TurningError(
+            vertices,
+            f"{graph.surface.name}: near vertex {vertices[0]}, a field of degree {degree} with these singularities "
+            "would turn too fast for the size of the faces: subdivide the mesh, move singularities apart, or "
+            "choose smaller indices",
+        )
 
 
 def _rotation_to(target: np.ndarray, z: np.ndarray, component: np.ndarray) -> np.ndarray:
@@ -421,7 +419,7 @@ def _system(graph: FaceGraph, stiffness: np.ndarray, penalty: np.ndarray) -> CSR
     """
     ends = np.concatenate([graph.source, graph.target])
     diagonal = np.bincount(ends, np.tile(stiffness, 2), len(penalty))
-    diagonal += penalty + REGULARIZATION * np.where(diagonal > 0, diagonal, 1.0)
+    diagonal = diagonal + penalty + REGULARIZATION * np.where(diagonal > 0, diagonal, 1.0)
     return from_edges(graph.source, graph.target, -stiffness, diagonal)
 
 

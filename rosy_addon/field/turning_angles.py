@@ -101,8 +101,10 @@ def turning_angles(
         if np.abs(angle + present).max(initial=0.0) < limit:
             break
         factor = added_resistance(angle, present, limit)
-        triangles = triangles.with_resistance(factor)
         edges = np.flatnonzero(factor > 1)
+        if not len(edges):  # only the present angles are too large
+            break
+        triangles = triangles.with_resistance(factor)
         with progress(1 - 0.2 * 0.5**attempt, 1 - 0.1 * 0.5**attempt):
             changed = _least_angles_near(triangles.graph, required, loops, between, edges)
             if changed is None:

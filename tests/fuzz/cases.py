@@ -15,8 +15,9 @@ from numpy.random import Generator
 
 from .damage import damaged, random_word
 from .files import FIELD_SUFFIXES, field_bytes, guide_bytes, png_bytes, preset_bytes
-from .meshes import WRITERS, Polygons, mesh_bytes, random_mesh
+from .meshes import WRITERS, Polygons, closed_mesh, mesh_bytes, random_mesh
 from .options import random_options
+from .singular import singularities_changed, singularity_bytes
 
 
 @dataclass
@@ -40,6 +41,9 @@ class Case:
         SIGINT, as by Ctrl-C, or SIGKILL.
     own_process : bool
         Whether to start Python anew instead of forking, which takes ten times as long.
+    fault : callable, optional
+        Takes the folder after a run with the status 0, and returns what is wrong with what was written, or an
+        empty text.
     """
 
     arguments: list[str]
@@ -49,6 +53,7 @@ class Case:
     stop_after: float | None = None
     stop_signal: signal.Signals = signal.SIGINT
     own_process: bool = False
+    fault: Callable[[Path], str] | None = None
 
     def may_write(self, name: str) -> bool:
         """Whether the run may write a file."""
@@ -72,6 +77,9 @@ _OUTPUTS = {
     ),
     "turntable": (".gif",),
 }
+
+#: Extensions of files from which the singularities of a field on faces can be read again.
+SINGULAR_SUFFIXES = (".rosy", ".rawfield", ".txt", ".npy", ".npz", ".sings")
 
 
 def _write(rng: Generator, folder: Path, name: str, data: bytes, damage: float = 0.0) -> str:
@@ -165,6 +173,29 @@ def _guide_case(rng: Generator, folder: Path) -> Case:
     if name.endswith(".obj") and rng.random() < 0.4:
         options += ["--uv"]
     return _command(rng, folder, [name], options, rate=0.06)
+
+
+def _prescribed_case(rng: Generator, folder: Path) -> Case:
+    """Given singularities on a mesh that is closed, open, in parts or not manifold."""
+    is_closed = rng.random() < 0.6
+    mesh = closed_mesh(rng) if is_closed else random_mesh(rng, faults=int(rng.random() < 0.4))
+    name = _write_mesh(rng, folder, mesh, str(rng.choice([".obj", ".off", ".ply"])))
+    given = _write(rng, folder, "a.sings", singularity_bytes(rng, mesh))
+    output = f"out{rng.choice(SINGULAR_SUFFIXES)}"
+    arguments = ["field", name, "--generate", "prescribed", "--singularities", given, "-o", output]
+    add_missing = bool(rng.random() < 0.6)
+    arguments += ["--add-missing"] * add_missing
+    if rng.random() < 0.3:
+        degree = int((folder / given).read_bytes().split()[0])
+        guides = _write(rng, folder, "guides.rosy", field_bytes(rng, ".rosy", mesh, degree))
+        arguments += ["--guides", guides, "--undefined", "--off-surface=project"]
+        arguments.append(f"--reach={rng.choice([0.0, 0.01, 0.1, 1.0])}")
+
+    def fault(folder: Path) -> str:
+        files = (folder / file for file in (name, given, output))
+        return singularities_changed(*files, add_missing=add_missing)
+
+    return Case(arguments, {output}, fault=fault)
 
 
 def _option_case(rng: Generator, folder: Path) -> Case:
@@ -292,6 +323,7 @@ CATEGORIES: dict[str, tuple[Callable[[Generator, Path], Case], int]] = {
     "mesh-files": (_mesh_file_case, 10),
     "field-files": (_field_file_case, 10),
     "guides": (_guide_case, 10),
+    "prescribed": (_prescribed_case, 10),
     "options": (_option_case, 10),
     "looks": (_look_case, 10),
     "tones": (_tone_case, 10),

@@ -162,6 +162,13 @@ def test_a_cone_turns_evenly_around_its_apex(degree, index):
     assert errors(field, outward, around, (index / degree - 1) * azimuth).max() < 0.1
 
 
+def test_a_face_without_neighbors_follows_its_guide():
+    """Its matrix has no edges: adding to its integers was an error of numpy."""
+    surface = from_triangles([(0, 0, 0), (2, 0, 0), (0, 1, 0)], [(0, 1, 2)])
+    field = prescribed_field(surface, 4, [], [], np.array([[3.0, 4.0, 0.0]]), reach=0.1)
+    np.testing.assert_allclose(np.sort(np.abs(field.vectors[0])), [0, 0.6, 0.8], atol=1e-9)
+
+
 def test_guides_turn_the_whole_field():
     surface = globe(12, 24)
     last = len(surface.vertices) - 1

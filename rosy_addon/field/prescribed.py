@@ -29,7 +29,7 @@ from .representation import complex_bincount, from_representation, to_representa
 from .rosy_field import RosyField, check_degree
 from .sparse_multigrid import CSRMatrix, Level, from_edges, hierarchy, w_cycle
 from .surface import Surface
-from .turning_angles import MAX_TURN, added_resistance, turning_angles
+from .turning_angles import added_resistance, turning_angles
 
 #: Residual norm at which the solver stops, relative to the norm of the right-hand side.
 TOLERANCE = 1e-8
@@ -162,7 +162,7 @@ def change_singularities(
     turned *= _rotation_to(z, turned, graph.component)
     with progress(0.9, 1.0):
         turned = _bent(graph, degree, present + added, turned, z, reach)
-    _check_result(graph, degree, turned, graph.indices(present, degree) + node_change, present)
+    _check_result(graph, degree, turned, graph.indices(present, degree) + node_change)
     return RosyField(degree, magnitude * from_representation(turned, x, y, degree))
 
 
@@ -297,37 +297,17 @@ def _check_sums(graph: FaceGraph, needed: np.ndarray, given: np.ndarray, degree:
     )
 
 
-def _check_result(
-    graph: FaceGraph,
-    degree: int,
-    z: np.ndarray,
-    node_index: np.ndarray,
-    present: np.ndarray | float = 0.0,
-) -> None:
-    """Check that a field has the requested indices, and no new ties (see `MAX_TURN`).
-
-    Parameters
-    ----------
-    graph : FaceGraph
-    degree : int
-        N.
-    z : (F,) complex ndarray
-        Representation of the field.
-    node_index : (n,) int ndarray
-        Requested index at each vertex node, in units of 1 / N.
-    present : (I,) ndarray or float
-        Turning angles of the field before it was changed, in radians. It may have ties.
+def _check_result(graph: FaceGraph, degree: int, z: np.ndarray, node_index: np.ndarray) -> None:
+    """Check that a field with the (F,) representations z has the requested (n,) indices at the vertex nodes.
 
     Raises
     ------
     TurningError
-        If the index is another one at an interior node, or if there are new ties. The requested field then
-        turns by pi / N or more between two faces, so that other members of these faces are nearest to each other.
+        If the index is another one at an interior node. A field with the requested index would turn by pi / N or
+        more between two faces near it, so that other members of these faces are nearest to each other.
     """
-    turning, limit = graph.turning(z, degree), MAX_TURN * np.pi / degree
-    is_tie = (np.abs(turning) > limit) & (np.abs(present) <= limit)
-    is_wrong = graph.is_interior & (graph.indices(turning, degree) != node_index)
-    is_wrong |= mask(graph.node_count, np.stack([graph.tail, graph.head])[:, is_tie])
+    found = graph.indices(graph.turning(z, degree), degree)
+    is_wrong = graph.is_interior & (found != node_index)
     if is_wrong.any():
         vertices = np.unique(graph.node_vertex[is_wrong])
         raise TurningError(
@@ -386,7 +366,7 @@ def guided_rotation(
     penalty = np.where(is_guide, penalty, 0.0)
     stiffness = 1 / graph.conductance
     wanted = np.angle(offset) / degree
-    sector, limit = 2 * np.pi / degree, MAX_TURN * np.pi / degree
+    sector, limit = 2 * np.pi / degree, np.pi / degree
     angle = None
     for attempt in range(MAX_ATTEMPTS):
         rest = 0.5**attempt

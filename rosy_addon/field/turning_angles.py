@@ -25,17 +25,12 @@ from .blocks import mask
 from .conjugate_gradient import conjugate_gradient
 from .connectivity import connected_components
 from .face_graph import LABEL, FaceGraph, SpanningForest, spanning_forest, triangle_graph
-from .representation import TIE_TURNS
 from .sparse_multigrid import CSRMatrix, from_edges, hierarchy, w_cycle
 
 #: Residual norm at which the solver stops, relative to the norm of the right-hand side.
 TOLERANCE = 1e-10
 
-#: Largest angle by which a field may turn between two faces, relative to pi / N. This is as far below a tie
-#: (`representation.TIE_TURNS`) as a tie is below pi / N, so that rounding errors of files do not make it one.
-MAX_TURN = 1 - 4 * TIE_TURNS
-
-#: A field may not turn by more than `MAX_TURN` between two faces. Number of attempts to reduce larger angles, and
+#: A field may not turn by pi / N or more between two faces. Number of attempts to reduce larger angles, and
 #: the fraction of pi / N up to which the angle at an edge needs no reduction.
 MAX_ATTEMPTS, ANGLE_MARGIN = 24, 0.8
 
@@ -96,7 +91,7 @@ def turning_angles(
     with progress(0.2, 0.8):
         drop = least_angles(triangles.graph, degree, required, loops, present_between)
     between, to_center = triangles.graph.conductance * drop, triangles.turns_to_centers(drop)
-    limit, angle = MAX_TURN * np.pi / degree, triangles.on_faces(between, to_center)
+    limit, angle = np.pi / degree, triangles.on_faces(between, to_center)
     for attempt in range(MAX_ATTEMPTS):
         if np.abs(angle + present).max(initial=0.0) < limit:
             break

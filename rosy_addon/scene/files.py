@@ -15,7 +15,7 @@ from ..preset_files.store import default_user_folder
 
 
 def open_blend(path: Path) -> None:
-    """Open a .blend file. It replaces the file that is open.
+    """Open a .blend file, without running scripts and drivers in it. It replaces the file that is open.
 
     Raises
     ------
@@ -24,7 +24,8 @@ def open_blend(path: Path) -> None:
     """
     check_readable(path)
     try:
-        bpy.ops.wm.open_mainfile(filepath=os.path.realpath(path), load_ui=False)
+        name = os.path.realpath(path)
+        bpy.ops.wm.open_mainfile(filepath=name, load_ui=False, use_scripts=False)
     except RuntimeError as reason:
         raise RosyError(f"{path}: cannot be read: {_one_line(reason)}") from None
 

@@ -241,6 +241,7 @@ def _potential_matrix(graph: FaceGraph) -> CSRMatrix:
     _, first = np.unique(graph.node_component, return_index=True)
     tied = first[~mask(len(first), graph.node_component[~graph.is_interior])]
     diagonal[tied] += diagonal[tied] / 6
+    diagonal[diagonal == 0] = 1.0  # at an edge whose two sides are the same face
     inside = graph.is_interior[tail] & graph.is_interior[head]
     tail, head = unknown[tail[inside]], unknown[head[inside]]
     return from_edges(tail, head, -conductance[inside], diagonal[graph.is_interior])

@@ -169,6 +169,14 @@ def test_a_face_without_neighbors_follows_its_guide():
     np.testing.assert_allclose(np.sort(np.abs(field.vectors[0])), [0, 0.6, 0.8], atol=1e-9)
 
 
+def test_a_face_that_touches_itself_is_refused_in_one_line():
+    """Its corner at vertex 3 is inside of the face, where the equation of the potential is 0 = 0."""
+    points = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0.2, 0.2, 0)]
+    surface = build_surface(np.array(points), np.array([0, 1, 2, 0, 3]), np.array([0, 5]))
+    with pytest.raises(RosyError, match="would turn too fast"):
+        prescribed_field(surface, 4, [], [])
+
+
 def test_guides_turn_the_whole_field():
     surface = globe(12, 24)
     last = len(surface.vertices) - 1

@@ -287,9 +287,8 @@ def prescribed(
     ([10, 200], [1, -1])
     """
     if isinstance(singularities, Mapping):
-        vertex = np.array(list(singularities), dtype=np.int64)
         degree = 4 if degree is None else degree
-        index = _whole_indices(surface, singularities, degree)
+        vertex, index = _whole_indices(surface, singularities, degree)
     else:
         path = os.fspath(singularities)
         own, vertex, index = read_sings(Path(path))
@@ -306,8 +305,10 @@ def prescribed(
     return generated(surface, settings, degree)
 
 
-def _whole_indices(surface: Surface, singularities: Mapping[int, float], degree: int) -> np.ndarray:
-    """Return (K,) int64: the indices of singularities in units of 1 / `degree`, in the order of the mapping.
+def _whole_indices(
+    surface: Surface, singularities: Mapping[int, float], degree: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the (K,) int64 vertices and indices of singularities, indices in units of 1 / `degree`.
 
     `singularities` has the index of each singularity by its vertex: an int is in units of 1 / `degree`,
     another number is the index itself.
@@ -315,17 +316,24 @@ def _whole_indices(surface: Surface, singularities: Mapping[int, float], degree:
     Raises
     ------
     RosyError
-        If an index is not a multiple of 1 / `degree`.
+        If a vertex or an index is not such a number, or has more than 31 bits.
     """
-    indices = []
+    rows: list[tuple[int, int]] = []
     for vertex, index in singularities.items():
-        units = index if isinstance(index, Integral) else float(index) * degree
-        if abs(units - round(units)) > 1e-6 * degree:
+        if not (isinstance(vertex, Integral) and abs(vertex) < 2**31):
             raise RosyError(
-                f"{surface.name}: the index {index} at vertex {vertex} is not a multiple of 1/{degree}"
+                f"{surface.name}: has no vertex {vertex}: vertices are whole numbers below "
+                f"{len(surface.vertices)}"
             )
-        indices.append(round(units))
-    return np.array(indices, dtype=np.int64)
+        units = index if isinstance(index, Integral) else float(index) * degree
+        if not (abs(units) < 2**31 and abs(units - round(units)) <= 1e-6 * degree):
+            raise RosyError(
+                f"{surface.name}: the index {index} at vertex {vertex} is not a multiple of 1/{degree}, or too "
+                f"large: give 1 (int) or {1 / degree:g} (float) for 1/{degree}"
+            )
+        rows.append((int(vertex), round(units)))
+    pairs = np.array(rows, dtype=np.int64).reshape(-1, 2)
+    return pairs[:, 0], pairs[:, 1]
 
 
 def along_axis(surface: Surface, axis: Sequence[float] = (0.0, 0.0, 1.0), degree: int = 4) -> Field:

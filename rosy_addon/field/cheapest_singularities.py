@@ -15,10 +15,8 @@ from ..core.errors import RosyError
 from ..core.progress import progress, report
 from .blocks import neighbors_of_nodes
 from .face_graph import LABEL, FaceGraph, face_graph
-from .prescribed import index_at_nodes
-from .representation import from_representation, unit_complex
-from .rosy_field import RosyField, check_degree
-from .singularities import find_singularities
+from .prescribed import check_index_ranges, index_at_nodes
+from .rosy_field import check_degree
 from .smoothest import eigenproblem, spectral_shift
 from .sparse_multigrid import CSRMatrix, from_edges
 from .surface import Surface
@@ -63,13 +61,15 @@ def cheapest_singularities(
     Raises
     ------
     RosyError
-        If a vertex cannot be singular (at a border, or not in the mesh), or if no face has an area.
+        If a vertex cannot be singular (at a border, or not in the mesh) or is given twice, if there are too
+        few faces around it for its index, if there is no other vertex for what is missing, or if no face has
+        an area.
     """
     degree = check_degree(degree)
-    x, y = surface.face_frames
-    if not x.any():
+    if not surface.face_frames[0].any():
         raise RosyError(f"{surface.name}: no face has an area")
     graph = face_graph(surface)
+    check_index_ranges(graph, degree, vertex, index)
     given = index_at_nodes(graph, vertex, index)
     required = 2 * np.pi / degree * (given - _spread(graph, given))
     with progress(0.1, 0.3):
@@ -78,12 +78,15 @@ def cheapest_singularities(
     matrix = _energy(graph, degree, angle, spectral_shift(mass) * mass)
     with progress(0.35, 0.6):
         z, _ = eigenproblem(matrix, mass, graph.component, START_TOLERANCE)
-    field = RosyField(degree, from_representation(unit_complex(z), x, y, degree))
-    with progress(0.6, 0.65):
-        found, found_index = find_singularities(surface, field)
-    total = index_at_nodes(graph, found, found_index)
-    with progress(0.65, 1.0):
-        added = _settled(graph, degree, given, total - given)
+    total = graph.indices(graph.turning(z, degree), degree)
+    is_taken = ~graph.can_be_singular | np.isin(graph.node_vertex, vertex)
+    with progress(0.6, 1.0):
+        added = _settled(graph, degree, given, total - given, is_taken)
+    if added[is_taken].any():
+        raise RosyError(
+            f"{surface.name}: no vertex is left for the singularities that are missing: give fewer singularities, or "
+            "subdivide the mesh"
+        )
     node = np.flatnonzero(added)
     return np.concatenate([vertex, graph.node_vertex[node]]), np.concatenate([index, added[node]])
 
@@ -105,27 +108,29 @@ def _spread(graph: FaceGraph, given: np.ndarray) -> np.ndarray:
     return node_area * (total / np.where(component_area > 0, component_area, 1))[component]
 
 
-def _settled(graph: FaceGraph, degree: int, given: np.ndarray, added: np.ndarray) -> np.ndarray:
+def _settled(
+    graph: FaceGraph, degree: int, given: np.ndarray, added: np.ndarray, is_taken: np.ndarray
+) -> np.ndarray:
     """Return the (n,) int64 indices of added singularities after moving them to where they add least energy.
 
     `given` and `added` hold the (n,) indices of the given singularities, which stay, and of the added ones
-    before they are moved. No added singularity stays at a given one, if possible. The index is 0 at nodes
-    without a singularity.
+    before they are moved. The index is 0 at nodes without a singularity. `is_taken` says of each node whether
+    no singularity can be added there: no added singularity stays there, if possible.
     """
     if not added.any():
         return added
     with progress(0.0, 0.2):
         potential_of = potential_solver(graph, TOLERANCE)
     unit = 2 * np.pi / degree
-    neighbors = _Neighbors(graph)
+    neighbors = _Neighbors(graph, degree, is_taken)
     best, best_potential, least, share = added, None, np.inf, 1.0
     for step in range(MAX_STEPS):
         report(1 - 0.8 * 0.95**step, LABEL)
         charge = unit * (given + added) - graph.defect
         potential = potential_of(charge)
         energy = float(charge[graph.is_interior] @ potential[graph.is_interior])
-        # Added singularities that are still at given ones have to leave them, even if that adds energy.
-        if energy < least or (best[given != 0] != 0).any():
+        # Added singularities that are still at taken nodes have to leave them, even if that adds energy.
+        if energy < least or best[is_taken].any():
             best, best_potential, least = added, potential, energy
         else:
             share *= 0.5
@@ -140,14 +145,16 @@ def _settled(graph: FaceGraph, degree: int, given: np.ndarray, added: np.ndarray
 class _Neighbors:
     """The vertices to which the singularity at a vertex can move: its neighbors along mesh edges.
 
-    Vertices are represented by the *vertex nodes* of a `FaceGraph`.
+    Vertices are represented by the *vertex nodes* of a `FaceGraph`. `is_taken` says of each node whether no
+    singularity can be added there.
     """
 
-    def __init__(self, graph: FaceGraph) -> None:
+    def __init__(self, graph: FaceGraph, degree: int, is_taken: np.ndarray) -> None:
         csr = neighbors_of_nodes(graph.node_count, graph.tail, graph.head)
         self._start, self._neighbor, edge = csr
         self._resistance = EDGE_RESISTANCE / np.tile(graph.conductance, 2)[edge]
-        self._is_interior = graph.is_interior
+        self._is_interior, self._is_taken = graph.is_interior, is_taken
+        self._low, self._high = graph.index_range(degree)
 
     def step(
         self, added: np.ndarray, given: np.ndarray, unit: float, potential: np.ndarray, share: float
@@ -155,7 +162,8 @@ class _Neighbors:
         """Return (n,) int64 indices of the added singularities after one round of moves.
 
         Singularities whose move to a neighbor reduces the energy are moved to the best neighbor. Added
-        singularities at a given one must leave it, and are moved first.
+        singularities at a taken node must leave it, by one unit in each round, and are moved first: to a node
+        without a singularity of the same sign, else out over the border, else to any other node.
 
         Parameters
         ----------
@@ -174,21 +182,30 @@ class _Neighbors:
         for node in np.flatnonzero(added).tolist():
             around = slice(self._start[node], self._start[node + 1])
             others = self._neighbor[around]
-            charge = unit * added[node]
+            must_leave = bool(self._is_taken[node])
+            moved = int(np.sign(added[node])) if must_leave else int(added[node])
+            charge, sum_there = unit * moved, given[others] + added[others] + moved
             change = 2 * charge * (potential[others] - potential[node])
             change += charge**2 * self._resistance[around]
-            is_free = (given[others] == 0) & (added[others] * added[node] <= 0)
-            change[~is_free | ~self._is_interior[others]] = np.inf
+            fits = (self._low[others] <= sum_there) & (sum_there <= self._high[others])
+            is_free = ~self._is_taken[others] & fits
+            choices = [is_free & (added[others] * moved <= 0)]
+            if must_leave:
+                choices += [~self._is_interior[others], is_free, self._is_interior[others]]
+            allowed = next((choice for choice in choices if choice.any()), choices[0])
+            change[~allowed] = np.inf
             least = float(change.min(initial=np.inf))
-            must_leave = given[node] != 0
             if least < 0 or (must_leave and least < np.inf):
-                moves.append((not must_leave, least, node, int(others[change.argmin()])))
+                other = int(others[change.argmin()])
+                moves.append((not must_leave, least, node, other, moved))
         moves.sort()
         result = added.copy()
-        for *_, node, other in moves[: max(1, round(share * len(moves)))]:
-            if result[node] == added[node] and result[other] * result[node] <= 0:
-                result[other] += result[node]
-                result[node] = 0
+        for *_, node, other, moved in moves[: max(1, round(share * len(moves)))]:
+            may_add = result[other] * moved <= 0 or added[other] * moved > 0
+            if result[node] == added[node] and may_add:
+                result[other] += moved
+                result[node] -= moved
+        result[~self._is_interior] = 0
         return result
 
 

@@ -90,7 +90,10 @@ def conjugate_gradient(
         image = matrix @ direction
         if is_fixed is not None:
             image[is_fixed] = 0
-        step = current / _real_inner_product(direction, image)
+        curvature = _real_inner_product(direction, image)
+        if current == 0 or curvature == 0:  # the numbers are too small for their squares
+            break
+        step = current / curvature
         solution += step * direction
         residual -= step * image
         previous = current

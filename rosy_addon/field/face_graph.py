@@ -22,7 +22,7 @@ from .analysis import edge_lengths
 from .blocks import concatenated_ranges, mask, neighbors_of_nodes
 from .connectivity import connected_components, connected_corners, sums_from_roots
 from .frames import dot
-from .representation import edge_unfolding
+from .representation import edge_unfolding, matching_angles
 from .singularities import signed_corner_angles
 from .surface import Surface
 
@@ -97,6 +97,40 @@ class FaceGraph:
         vertex = np.empty(self.node_count, dtype=np.int32)
         vertex[self.corner_node] = self.surface.corner_vertex
         return vertex
+
+    @property
+    def can_be_singular(self) -> np.ndarray:
+        """(n,) bool: whether the vertex of each node has an index: its faces are connected around it, all of them.
+
+        `singularities.find_singularities` finds indices at the same vertices.
+        """
+        vertex = self.node_vertex
+        return self.is_interior & (np.bincount(vertex)[vertex] == 1)
+
+    def turning(self, z: np.ndarray, degree: int) -> np.ndarray:
+        """Return (I,) angles in radians by which a field turns from the source to the target face of each edge.
+
+        `z` holds the (F,) representations of the field, of this degree.
+        """
+        return matching_angles(self.surface, z, degree, self.halfedges)
+
+    def indices(self, turning: np.ndarray, degree: int) -> np.ndarray:
+        """Return the (n,) int64 singularity indices at the nodes, in units of 1 / N; 0 at nodes that are not interior.
+
+        `turning` holds the (I,) angles of `turning`, and `degree` is N.
+        """
+        turns = (self.turn_around_nodes(turning) + self.defect) / (2 * np.pi)
+        return np.where(self.is_interior, np.rint(degree * turns), 0).astype(np.int64)
+
+    def index_range(self, degree: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the (n,) float64 least and largest index of a field at each interior node, in units of 1 / N.
+
+        From face to face the field turns by less than pi / N, so around a node with k faces by less than k pi / N.
+        `degree` is N.
+        """
+        half = np.bincount(self.corner_node, minlength=self.node_count) / 2
+        flat = self.defect * degree / (2 * np.pi)
+        return np.floor(flat - half) + 1, np.ceil(flat + half) - 1
 
     def turn_around_nodes(self, angle: np.ndarray) -> np.ndarray:
         """Return (n,) float64 sums of angles at the edges, counter-clockwise around each vertex node.

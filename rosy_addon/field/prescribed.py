@@ -94,14 +94,17 @@ def prescribed_field(
     Raises
     ------
     RosyError
-        If a vertex cannot be singular (at a border, or not in the mesh), if the indices do not have the sum
-        that a closed surface needs, or if the field would turn by pi / N or more between two faces.
+        If a vertex cannot be singular (at a border, or not in the mesh) or is given twice, if there are too
+        few faces around it for its index, if the indices do not have the sum that a closed surface needs, or
+        if the field would turn by pi / N or more between two faces.
     """
     degree = check_degree(degree)
     raise_mmap_threshold()
     x, y = surface.face_frames
     graph = face_graph(surface)
-    angle, direction = _turning(graph, degree, vertex, index, graph.defect)
+    check_index_ranges(graph, degree, vertex, index)
+    node_index = index_at_nodes(graph, vertex, index)
+    angle, direction = _turning(graph, degree, node_index, graph.defect)
     z = np.exp(1j * degree * direction) * x.any(axis=1)
     points, face = surface.vertices[surface.corner_vertex], surface.corner_face
     edge_z = to_representation(points[surface.next_corner] - points, x[face], y[face], degree)
@@ -112,6 +115,7 @@ def prescribed_field(
         if reach > 0:
             with progress(0.9, 1.0):
                 z = _bent(graph, degree, angle, z, target, reach)
+    _check_result(graph, degree, z, node_index)
     return RosyField(degree, from_representation(z, x, y, degree))
 
 
@@ -151,38 +155,35 @@ def change_singularities(
     z = unit_complex(to_representation(field.vectors, x, y, degree))
     is_defined = z != 0
     graph = face_graph(surface, is_defined)
-    transported = z[graph.source] * np.exp(1j * degree * graph.unfolding)
-    present = np.angle(z[graph.target] * transported.conj()) / degree
-    no_defect = np.zeros(graph.node_count)
-    added, direction = _turning(graph, degree, vertex, change, no_defect, present)
+    present = graph.turning(z, degree)
+    node_change = index_at_nodes(graph, vertex, change)
+    added, direction = _turning(graph, degree, node_change, 0 * graph.defect, present)
     turned = np.exp(1j * degree * direction) * is_defined
     turned *= _rotation_to(z, turned, graph.component)
     with progress(0.9, 1.0):
         turned = _bent(graph, degree, present + added, turned, z, reach)
+    _check_result(graph, degree, turned, graph.indices(present, degree) + node_change)
     return RosyField(degree, magnitude * from_representation(turned, x, y, degree))
 
 
 def _turning(
     graph: FaceGraph,
     degree: int,
-    vertex: np.ndarray,
-    index: np.ndarray,
+    node_index: np.ndarray,
     defect: np.ndarray,
     present: np.ndarray | float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return (I,) turning angles and (F,) directions, in radians, of a field with given singularity indices.
 
-    For a new field, `index` holds the singularity indices of the vertices, and `defect` the (n,) angle
-    defects of the vertex nodes. If an existing field is changed, `index` holds the changes of its indices,
-    `defect` is 0, and `present` holds its (I,) turning angles. The first result is then the change of these
-    angles. Directions are angles in the frames of the faces.
+    For a new field, `node_index` holds the (n,) singularity indices of the vertex nodes, and `defect` their
+    angle defects. If an existing field is changed, `node_index` holds the changes of its indices, `defect` is
+    0, and `present` holds its (I,) turning angles. The first result is then the change of these angles.
+    Directions are angles in the frames of the faces.
     """
-    node_index = index_at_nodes(graph, vertex, index)
     _check_sums(graph, defect * (degree / (2 * np.pi)), node_index, degree)
     required = 2 * np.pi / degree * node_index - defect
     with progress(0.2, 0.85):
         angle, direction = turning_angles(graph, degree, required, present)
-    _check_angles(graph, degree, present + angle)
     report(0.85, LABEL)
     return angle, direction
 
@@ -203,15 +204,23 @@ def _bent(
     """
     penalty = graph.surface.face_area / reach / reach
     angle = guided_rotation(graph, degree, turning, z, target, penalty)
-    _check_angles(graph, degree, turning + angle[graph.target] - angle[graph.source])
     return z * np.exp(1j * degree * angle)
 
 
 def index_at_nodes(graph: FaceGraph, vertex: np.ndarray, index: np.ndarray) -> np.ndarray:
-    """Return (n,) int64: the singularity index of each vertex node, from the indices of some vertices.
+    """Return (n,) int64: the singularity index of each vertex node, from the indices of some vertices."""
+    result = np.zeros(graph.node_count, dtype=np.int64)
+    result[nodes_of_vertices(graph, vertex)] = index
+    return result
 
-    A vertex whose faces are not connected around it has several nodes. The first of these nodes gets the
-    index of the vertex.
+
+def nodes_of_vertices(graph: FaceGraph, vertex: np.ndarray) -> np.ndarray:
+    """Return the (K,) vertex nodes of K vertices that can be singular.
+
+    Raises
+    ------
+    RosyError
+        If a vertex is not in the mesh, cannot be singular, or is given twice.
     """
     surface, vertex_count = graph.surface, len(graph.surface.vertices)
     vertex = np.asarray(vertex, dtype=np.int64)
@@ -222,17 +231,42 @@ def index_at_nodes(graph: FaceGraph, vertex: np.ndarray, index: np.ndarray) -> n
             f"{vertex_count - 1}"
         )
     node_of_vertex = np.full(vertex_count, -1)
-    interior = np.flatnonzero(graph.is_interior[graph.corner_node])[::-1]
-    node_of_vertex[surface.corner_vertex[interior]] = graph.corner_node[interior]
+    regular = np.flatnonzero(graph.can_be_singular)
+    node_of_vertex[graph.node_vertex[regular]] = regular
     node = node_of_vertex[vertex]
     if (node < 0).any():
         raise RosyError(
-            f"{surface.name}: vertex {vertex[node < 0][0]} cannot be singular, because it is at a border, "
-            "at faces without area, or has no face: choose another vertex"
+            f"{surface.name}: vertex {vertex[node < 0][0]} cannot be singular, because it is at a border or at "
+            "faces without area, has no face, or joins parts that share nothing else: choose another vertex"
         )
-    result = np.zeros(graph.node_count, dtype=np.int64)
-    np.add.at(result, node, index)
-    return result
+    given_twice = np.bincount(vertex) > 1
+    if given_twice.any():
+        raise RosyError(
+            f"{surface.name}: vertex {given_twice.argmax()} is given more than once: give its index once"
+        )
+    return node
+
+
+def check_index_ranges(
+    graph: FaceGraph, degree: int, vertex: np.ndarray, index: np.ndarray
+) -> None:
+    """Check that there are enough faces around each of K vertices for its index, in units of 1 / N.
+
+    Raises
+    ------
+    RosyError
+        If an index is outside of `FaceGraph.index_range`, or if a vertex cannot be singular.
+    """
+    node, index = nodes_of_vertices(graph, vertex), np.asarray(index)
+    low, high = (limit[node] for limit in graph.index_range(degree))
+    wrong = np.flatnonzero((index < low) | (index > high))
+    if len(wrong):
+        first = wrong[0]
+        raise RosyError(
+            f"{graph.surface.name}: vertex {vertex[first]} cannot have the index {index[first]}/{degree}: the "
+            f"faces around it allow {low[first]:.0f}/{degree} to {high[first]:.0f}/{degree}: spread the index "
+            "over several vertices, or choose one with more faces"
+        )
 
 
 def _check_sums(graph: FaceGraph, needed: np.ndarray, given: np.ndarray, degree: int) -> None:
@@ -263,26 +297,25 @@ def _check_sums(graph: FaceGraph, needed: np.ndarray, given: np.ndarray, degree:
     )
 
 
-def _check_angles(graph: FaceGraph, degree: int, angle: np.ndarray) -> None:
-    """Check that a field turns by less than pi / N (half the angle between two members) from face to face.
+def _check_result(graph: FaceGraph, degree: int, z: np.ndarray, node_index: np.ndarray) -> None:
+    """Check that a field with the (F,) representations z has the requested (n,) indices at the vertex nodes.
 
     Raises
     ------
     TurningError
-        If it turns by more. Then other members of the two faces are nearest to each other, and the field has
-        other singularities than requested.
+        If the index is another one at an interior node. A field with the requested index would turn by pi / N or
+        more between two faces near it, so that other members of these faces are nearest to each other.
     """
-    if not len(angle) or np.abs(angle).max() < np.pi / degree:
-        return
-    is_fast = np.abs(angle) >= np.pi / degree
-    ends = np.stack([graph.tail, graph.head])[:, is_fast]
-    worst = graph.node_vertex[graph.head[np.abs(angle).argmax()]]
-    raise TurningError(
-        np.unique(graph.node_vertex[ends]),
-        f"{graph.surface.name}: near vertex {worst}, a field of degree {degree} with these singularities would "
-        "turn too fast for the size of the faces: subdivide the mesh, move singularities apart, or choose "
-        "smaller indices",
-    )
+    found = graph.indices(graph.turning(z, degree), degree)
+    is_wrong = graph.is_interior & (found != node_index)
+    if is_wrong.any():
+        vertices = np.unique(graph.node_vertex[is_wrong])
+        raise TurningError(
+            vertices,
+            f"{graph.surface.name}: near vertex {vertices[0]}, a field of degree {degree} with these singularities "
+            "would turn too fast for the size of the faces: subdivide the mesh, move singularities apart, or "
+            "choose smaller indices",
+        )
 
 
 def _rotation_to(target: np.ndarray, z: np.ndarray, component: np.ndarray) -> np.ndarray:
@@ -366,7 +399,7 @@ def _system(graph: FaceGraph, stiffness: np.ndarray, penalty: np.ndarray) -> CSR
     """
     ends = np.concatenate([graph.source, graph.target])
     diagonal = np.bincount(ends, np.tile(stiffness, 2), len(penalty))
-    diagonal += penalty + REGULARIZATION * np.where(diagonal > 0, diagonal, 1.0)
+    diagonal = diagonal + penalty + REGULARIZATION * np.where(diagonal > 0, diagonal, 1.0)
     return from_edges(graph.source, graph.target, -stiffness, diagonal)
 
 

@@ -119,7 +119,9 @@ def edge_unfolding(surface: Surface, a: np.ndarray, b: np.ndarray) -> np.ndarray
     return unit_complex(unfolding, otherwise=1)
 
 
-def matching_angles(surface: Surface, z: np.ndarray, degree: int) -> np.ndarray:
+def matching_angles(
+    surface: Surface, z: np.ndarray, degree: int, halfedges: np.ndarray | None = None
+) -> np.ndarray:
     """Return the angle between matching members of the two faces at each interior edge.
 
     The faces are unfolded into one plane. A member of the first face matches the nearest member of
@@ -132,11 +134,13 @@ def matching_angles(surface: Surface, z: np.ndarray, degree: int) -> np.ndarray:
         Representations in the frames `Surface.face_frames`.
     degree : int
         N of the representations.
+    halfedges : (I, 2) int ndarray, optional
+        Rows of `Edges.halfedges`; by default all of them.
 
     Returns
     -------
     (I,) float64 ndarray
-        For each row of `Edges.halfedges`: counter-clockwise angle in radians from a member of the first face
+        For each row: counter-clockwise angle in radians from a member of the first face
         to the nearest member of the second face, from -pi / N to pi / N. At ties (see `TIE_TURNS`) it is
         pi / N from the face with the smaller index, whatever the rounding errors.
     """
@@ -148,7 +152,8 @@ def matching_angles(surface: Surface, z: np.ndarray, degree: int) -> np.ndarray:
         angle[is_tie(angle)] = np.pi
         return angle / degree
 
-    return by_rows(angles, *surface.edges.halfedges.T)
+    halfedges = surface.edges.halfedges if halfedges is None else halfedges
+    return by_rows(angles, *halfedges.T)
 
 
 def is_tie(angle: np.ndarray) -> np.ndarray:

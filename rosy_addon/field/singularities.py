@@ -9,6 +9,7 @@ import numpy as np
 from ..core.errors import counted
 from ..core.progress import report
 from .blocks import mask
+from .connectivity import connected_corners
 from .frames import dot
 from .polygon_arrays import face_blocks, next_corners
 from .representation import face_representation, is_tie, matching_angles
@@ -24,8 +25,8 @@ def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, 
     vertex. It is an integer multiple of 2 pi / N; this integer is the index in units of 1 / N. On a closed
     surface, the indices in these units sum to N times the Euler characteristic (Poincaré-Hopf theorem).
 
-    No index is computed for vertices on a boundary or a nonmanifold edge, or next to a face where
-    the field is undefined.
+    No index is computed for vertices on a boundary or a nonmanifold edge, next to a face where the field is
+    undefined, or where parts of the surface meet that share no edge there.
 
     Parameters
     ----------
@@ -56,7 +57,20 @@ def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, 
     has_index[edges.ends[~mask(len(edges.ends), edges.interior)]] = False
     has_index[corner_vertex[(z == 0)[surface.corner_face]]] = False
     vertex = np.flatnonzero(has_index & (index != 0)).astype(np.int32)
+    vertex = vertex[_fan_counts(surface, vertex) == 1]
     return vertex, index[vertex]
+
+
+def _fan_counts(surface: Surface, vertex: np.ndarray) -> np.ndarray:
+    """Return the (K,) number of groups of faces at each of K vertices. Faces of a group are connected by edges there."""
+    is_chosen = mask(len(surface.vertices), vertex)
+    a, b = surface.edges.halfedges.T
+    tail, head = surface.corner_vertex[a], surface.corner_vertex[b]
+    is_near = is_chosen[tail] | is_chosen[head]
+    fan = connected_corners(a[is_near], b[is_near], surface.next_corner)
+    corner = np.flatnonzero(is_chosen[surface.corner_vertex])
+    first = corner[np.unique(fan[corner], return_index=True)[1]]
+    return np.bincount(surface.corner_vertex[first], minlength=len(is_chosen))[vertex]
 
 
 def count_ties(surface: Surface, field: RosyField) -> int:

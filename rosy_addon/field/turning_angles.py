@@ -96,8 +96,10 @@ def turning_angles(
         if np.abs(angle + present).max(initial=0.0) < limit:
             break
         factor = added_resistance(angle, present, limit)
-        triangles = triangles.with_resistance(factor)
         edges = np.flatnonzero(factor > 1)
+        if not len(edges):  # only the present angles are too large
+            break
+        triangles = triangles.with_resistance(factor)
         with progress(1 - 0.2 * 0.5**attempt, 1 - 0.1 * 0.5**attempt):
             changed = _least_angles_near(triangles.graph, required, loops, between, edges)
             if changed is None:
@@ -239,6 +241,7 @@ def _potential_matrix(graph: FaceGraph) -> CSRMatrix:
     _, first = np.unique(graph.node_component, return_index=True)
     tied = first[~mask(len(first), graph.node_component[~graph.is_interior])]
     diagonal[tied] += diagonal[tied] / 6
+    diagonal[diagonal == 0] = 1.0  # at an edge whose two sides are the same face
     inside = graph.is_interior[tail] & graph.is_interior[head]
     tail, head = unknown[tail[inside]], unknown[head[inside]]
     return from_edges(tail, head, -conductance[inside], diagonal[graph.is_interior])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import unicodedata
 import zlib
@@ -15,7 +16,7 @@ from ..preset_files.store import default_user_folder
 
 
 def open_blend(path: Path) -> None:
-    """Open a .blend file. It replaces the file that is open.
+    """Open a .blend file, without running scripts and drivers in it. It replaces the file that is open.
 
     Raises
     ------
@@ -24,9 +25,14 @@ def open_blend(path: Path) -> None:
     """
     check_readable(path)
     try:
-        bpy.ops.wm.open_mainfile(filepath=os.path.realpath(path), load_ui=False)
+        name = os.path.realpath(path)
+        bpy.ops.wm.open_mainfile(filepath=name, load_ui=False, use_scripts=False)
     except RuntimeError as reason:
         raise RosyError(f"{path}: cannot be read: {_one_line(reason)}") from None
+    if (
+        not bpy.app.binary_path
+    ):  # the module bpy 4.2 crashes at its end if a driver was not allowed to run
+        atexit.register(bpy.ops.wm.read_factory_settings, use_empty=True)
 
 
 def save_blend() -> str:

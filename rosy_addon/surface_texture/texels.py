@@ -29,8 +29,9 @@ from .charts import UvCharts
 #: Largest number of tiles of a UV map.
 MAX_TILES = 100
 
-#: In the numbering of UDIM, the number of the tile at the origin, and the number of tiles in a row.
-FIRST_TILE, TILES_PER_ROW = 1001, 10
+#: In the numbering of UDIM, the number of the tile at the origin, the number of tiles in a row, and the number
+#: of rows: Blender has tiles from 1001 to 2000.
+FIRST_TILE, TILES_PER_ROW, TILE_ROWS = 1001, 10, 100
 
 #: Label of the progress.
 LABEL = "finding texels"
@@ -187,10 +188,10 @@ def texture_frame(charts: UvCharts, size: int, name: str, is_udim: bool = False)
                 f"{name}: its UV map reaches over more than {MAX_TILES} tiles: scale it to u and v "
                 "from 0 to 1"
             )
-    if is_udim and any(not 0 <= u < TILES_PER_ROW or v < 0 for u, v in tiles):
+    if is_udim and not all(0 <= u < TILES_PER_ROW and 0 <= v < TILE_ROWS for u, v in tiles):
         raise RosyError(
             f"{name}: its UV map reaches beyond the tiles that UDIM numbers: move its charts to "
-            f"u from 0 to {TILES_PER_ROW} and v above 0"
+            f"u from 0 to {TILES_PER_ROW} and v from 0 to {TILE_ROWS}"
         )
     return TextureFrame(size, tuple(sorted(tiles, key=lambda tile: tile[::-1])), is_udim)
 

@@ -10,6 +10,8 @@ Modules in order of dependence:
     options     options of a command, from its parser, and values of settings
     meshes      polygon meshes with faults of geometry and topology, and their files
     files       files of fields, guides, pictures and presets
+    singular    files of singularities, and what became of them
+    uv_maps     UV maps with tiles, and the files of tiles
     cases       the categories: files, a command line, and what it may write
     execution   the processes
     verdicts    what is wrong with a run

@@ -15,8 +15,11 @@ from numpy.random import Generator
 
 from .damage import damaged, random_word
 from .files import FIELD_SUFFIXES, field_bytes, guide_bytes, png_bytes, preset_bytes
-from .meshes import WRITERS, Polygons, mesh_bytes, random_mesh
+from .meshes import WRITERS, Polygons, closed_mesh, mesh_bytes, random_mesh
 from .options import random_options
+from .singular import singularities_changed, singularity_bytes
+from .uv_maps import OUTPUTS as UV_OUTPUTS
+from .uv_maps import make_tiles, tile_fault, tile_names, uv_mesh_bytes
 
 
 @dataclass
@@ -40,6 +43,9 @@ class Case:
         SIGINT, as by Ctrl-C, or SIGKILL.
     own_process : bool
         Whether to start Python anew instead of forking, which takes ten times as long.
+    fault : callable, optional
+        Takes the folder after a run with the status 0, and returns what is wrong with what was written, or an
+        empty text.
     """
 
     arguments: list[str]
@@ -49,6 +55,7 @@ class Case:
     stop_after: float | None = None
     stop_signal: signal.Signals = signal.SIGINT
     own_process: bool = False
+    fault: Callable[[Path], str] | None = None
 
     def may_write(self, name: str) -> bool:
         """Whether the run may write a file."""
@@ -72,6 +79,9 @@ _OUTPUTS = {
     ),
     "turntable": (".gif",),
 }
+
+#: Extensions of files from which the singularities of a field on faces can be read again.
+SINGULAR_SUFFIXES = (".rosy", ".rawfield", ".txt", ".npy", ".npz", ".sings")
 
 
 def _write(rng: Generator, folder: Path, name: str, data: bytes, damage: float = 0.0) -> str:
@@ -167,6 +177,29 @@ def _guide_case(rng: Generator, folder: Path) -> Case:
     return _command(rng, folder, [name], options, rate=0.06)
 
 
+def _prescribed_case(rng: Generator, folder: Path) -> Case:
+    """Given singularities on a mesh that is closed, open, in parts or not manifold."""
+    is_closed = rng.random() < 0.6
+    mesh = closed_mesh(rng) if is_closed else random_mesh(rng, faults=int(rng.random() < 0.4))
+    name = _write_mesh(rng, folder, mesh, str(rng.choice([".obj", ".off", ".ply"])))
+    given = _write(rng, folder, "a.sings", singularity_bytes(rng, mesh))
+    output = f"out{rng.choice(SINGULAR_SUFFIXES)}"
+    arguments = ["field", name, "--generate", "prescribed", "--singularities", given, "-o", output]
+    add_missing = bool(rng.random() < 0.6)
+    arguments += ["--add-missing"] * add_missing
+    if rng.random() < 0.3:
+        degree = int((folder / given).read_bytes().split()[0])
+        guides = _write(rng, folder, "guides.rosy", field_bytes(rng, ".rosy", mesh, degree))
+        arguments += ["--guides", guides, "--undefined", "--off-surface=project"]
+        arguments.append(f"--reach={rng.choice([0.0, 0.01, 0.1, 1.0])}")
+
+    def fault(folder: Path) -> str:
+        files = (folder / file for file in (name, given, output))
+        return singularities_changed(*files, add_missing=add_missing)
+
+    return Case(arguments, {output}, fault=fault)
+
+
 def _option_case(rng: Generator, folder: Path) -> Case:
     """Many options, some of them without sense, on an undamaged mesh."""
     name = _write_mesh(rng, folder, random_mesh(rng, faults=0))
@@ -212,27 +245,36 @@ def _tone_case(rng: Generator, folder: Path) -> Case:
 
 
 def _texture_case(rng: Generator, folder: Path) -> Case:
-    """A texture for a UV map that may reach far, overlap, or have no area."""
-    mesh = random_mesh(rng, faults=int(rng.random() < 0.3))
-    inputs = [_write_mesh(rng, folder, mesh, ".obj")]
-    if rng.random() < 0.5:  # few values, so that corners coincide
-        data, scale = (folder / inputs[0]).read_bytes(), 10.0 ** rng.uniform(-6, 6)
-        rows = [b"vt %.9g %.9g" % (scale * x, scale * y) for x, y in rng.random((9, 2))]
-        lines = [
-            rows[i % 9] if line[:2] == b"vt" else line for i, line in enumerate(data.split(b"\n"))
-        ]
-        (folder / inputs[0]).write_bytes(b"\n".join(lines))
+    """A texture for a UV map that may have tiles, reach far, overlap, or have no area."""
+    is_closed = rng.random() < 0.4
+    mesh = closed_mesh(rng) if is_closed else random_mesh(rng, faults=int(rng.random() < 0.3))
+    tiles: set[int] = set()
+    if rng.random() < 0.6:
+        data, tiles = uv_mesh_bytes(rng, mesh)
+    else:
+        data = mesh_bytes(rng, ".obj", mesh)
+        if rng.random() < 0.5:  # few values, so that corners coincide
+            scale = 10.0 ** rng.uniform(-6, 6)
+            rows = [b"vt %.9g %.9g" % (scale * x, scale * y) for x, y in rng.random((9, 2))]
+            lines = data.split(b"\n")
+            lines = [rows[i % 9] if line[:2] == b"vt" else line for i, line in enumerate(lines)]
+            data = b"\n".join(lines)
+    inputs = [_write(rng, folder, "mesh.obj", data)]
     if rng.random() < 0.3:
         inputs.append(_write_field(rng, folder, mesh))
     leave_out = {"size", *({"generate", "degree"} if len(inputs) > 1 else ())}
     words = random_options(rng, "texture", rate=0.12, leave_out=leave_out)
-    size = str(
-        rng.choice([16, 32, 64, 200, 400, 8, 99999], p=[0.3, 0.3, 0.2, 0.1, 0.08, 0.01, 0.01])
-    )
+    sizes = [16, 32, 64, 200, 400, 8, 99999]
+    size = int(rng.choice(sizes, p=[0.4, 0.35, 0.18, 0.03, 0.02, 0.01, 0.01]))
     words += ["--set", "ink=hatch"] * int(rng.random() < 0.5)
-    output = "out.<UDIM>.png" if rng.random() < 0.2 else "out.png"
-    outputs = {output, *(f"out.{number}.png" for number in range(1001, 2001))}
-    return Case(["texture", *inputs, *words, "--size", size, "-o", output], outputs=outputs)
+    output = str(rng.choice(UV_OUTPUTS))
+    make_tiles(rng, folder, output, tiles)
+
+    def fault(folder: Path) -> str:
+        return tile_fault(folder, output, size, tiles, is_exact=is_closed)
+
+    arguments = ["texture", *inputs, *words, "--size", str(size), "-o", output]
+    return Case(arguments, tile_names(output), fault=fault)
 
 
 def _path_case(rng: Generator, folder: Path) -> Case:
@@ -292,6 +334,7 @@ CATEGORIES: dict[str, tuple[Callable[[Generator, Path], Case], int]] = {
     "mesh-files": (_mesh_file_case, 10),
     "field-files": (_field_file_case, 10),
     "guides": (_guide_case, 10),
+    "prescribed": (_prescribed_case, 10),
     "options": (_option_case, 10),
     "looks": (_look_case, 10),
     "tones": (_tone_case, 10),

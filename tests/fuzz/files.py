@@ -23,10 +23,10 @@ FIELD_SUFFIXES = (
 )
 
 
-def field_bytes(rng: Generator, suffix: str, mesh: Polygons) -> bytes:
-    """Return the contents of a field file for a mesh: mostly one that fits it."""
+def field_bytes(rng: Generator, suffix: str, mesh: Polygons, degree: int | None = None) -> bytes:
+    """Return the contents of a field file for a mesh: mostly one that fits it. By default any degree."""
     points, faces = mesh
-    degree = int(rng.choice([1, 2, 3, 4, 4, 6, 7, 12]))
+    degree = degree or int(rng.choice([1, 2, 3, 4, 4, 6, 7, 12]))
     if suffix == ".sings":
         rows = [(int(rng.integers(len(points))), int(rng.integers(-4, 5))) for _ in range(5)]
         return _text([(degree, len(rows)), *rows])

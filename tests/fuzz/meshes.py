@@ -96,6 +96,59 @@ def _pieces(rng: Generator) -> Polygons:
     return points, faces
 
 
+def closed_mesh(rng: Generator) -> Polygons:
+    """Return one or two closed surfaces with few or some faces, which may share a vertex, moved at random."""
+    points, faces = CLOSED[rng.integers(len(CLOSED))](rng)
+    if rng.random() < 0.3:
+        more_points, more_faces = CLOSED[rng.integers(len(CLOSED))](rng)
+        number = np.arange(len(more_points)) + len(points)
+        if rng.random() < 0.5:
+            number[rng.integers(len(more_points))] = rng.integers(len(points))
+        faces += [tuple(number[list(face)].tolist()) for face in more_faces]
+        points = np.concatenate([points, more_points + 4])
+    noise = rng.choice([0.0, 0.0, 0.03, 0.2]) * rng.normal(size=points.shape)
+    return points + noise, faces
+
+
+def _prism(rng: Generator) -> Polygons:
+    """A prism of several stories whose ends are polygons, or points, from which triangles go out."""
+    count, stories = int(rng.choice([3, 3, 4, 5, 6, 9, 15])), int(rng.choice([0, 1, 1, 2, 5, 9]))
+    angle = 2 * np.pi * np.arange(count) / count
+    ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    points = np.concatenate([ring + (0, 0, z) for z in range(stories + 1)])
+    corner = np.arange(count)
+    step = np.stack([corner, np.roll(corner, -1), np.roll(corner, -1) + count, corner + count], 1)
+    faces = [tuple(face) for z in range(stories) for face in (step + z * count).tolist()]
+    for end, first in ((-1, 0), (1, stories * count)):
+        polygon = (corner + first)[:: -1 if end < 0 else 1].tolist()
+        if stories and rng.random() < 0.5:
+            faces.append(tuple(polygon))
+            continue
+        apex = len(points)
+        points = np.concatenate([points, [(0, 0, stories * (end > 0) + end)]])
+        faces += [(polygon[i - 1], polygon[i], apex) for i in range(count)]
+    return points, faces
+
+
+def _ring(rng: Generator) -> Polygons:
+    """A torus of quads."""
+    columns, rows = (int(count) for count in rng.integers(3, 16, 2))
+    u, v = (part.ravel() for part in np.indices((columns, rows)))
+    tube = 2 * np.pi * v / rows
+    radius, around = 2 + np.cos(tube), 2 * np.pi * u / columns
+    points = np.stack([radius * np.cos(around), radius * np.sin(around), np.sin(tube)], axis=1)
+    right, top = (u + 1) % columns, (v + 1) % rows
+    corners = [u * rows + v, right * rows + v, right * rows + top, u * rows + top]
+    return points, [tuple(face) for face in np.stack(corners, axis=1).tolist()]
+
+
+def _tetrahedron(rng: Generator) -> Polygons:
+    points = np.array([(1, 1, 1), (-1, -1, 1), (-1, 1, -1), (1, -1, -1)], dtype=float)
+    return points, [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
+
+
+CLOSED: tuple[Callable[[Generator], Polygons], ...] = (_prism, _prism, _ring, _tetrahedron)
+
 SHAPES: tuple[Callable[[Generator], Polygons], ...] = (
     *(_sheet, _sheet, _sheet, _cube, _star, _soup, _fan, _pieces),
 )

@@ -18,7 +18,7 @@ from rosy_addon.preset_files.store import preset_keys
 from .damage import random_word
 
 #: Options that `random_options` does not choose: cases give these files and names themselves.
-_FILES = "mesh field fields output strokes guides field_mesh against singularities tone_image tone_picture"
+_FILES = "mesh field fields output strokes guides field_mesh against singularities tone_image tone_picture edges"
 _OTHERS = "help scene tone_values color_values uv object camera frames all_cameras out save jobs"
 FILE_OPTIONS = frozenset(f"{_FILES} {_OTHERS} scheduler array step".split())
 

@@ -40,6 +40,7 @@ class Verdict(Enum):
     MEMORY = "memory"
     HALF_WRITTEN = "file half written"
     STRAY = "stray or changed file"
+    WRONG = "not what was asked"
     NOT_REPEATED = "other bytes when repeated"
 
     @property
@@ -86,10 +87,12 @@ def judge(case: Case, run: Run, folder: Path) -> tuple[Verdict, str]:
                 return Verdict.HALF_WRITTEN, f"{name}: {fault}"
             if run.status not in (0, 130, 141, -signal.SIGKILL, 1):
                 return Verdict.STATUS, f"status {run.status}, but {name} was written"
-    return _judge_status(case, run, stderr, killed)
+    return _judge_status(case, run, stderr, killed, folder)
 
 
-def _judge_status(case: Case, run: Run, stderr: str, killed: bool) -> tuple[Verdict, str]:
+def _judge_status(
+    case: Case, run: Run, stderr: str, killed: bool, folder: Path
+) -> tuple[Verdict, str]:
     lines = stderr.splitlines()
     if killed:
         return Verdict.ENDED, "killed"
@@ -106,6 +109,8 @@ def _judge_status(case: Case, run: Run, stderr: str, killed: bool) -> tuple[Verd
             if "-o" in case.arguments and not any(written):
                 # The same bytes as before are right, but no case begins with these.
                 return Verdict.STATUS, "status 0, but nothing was written"
+            if case.fault and (fault := case.fault(folder)):
+                return Verdict.WRONG, fault
             return Verdict.DONE, ""
         case 2:
             usage = bool(lines) and lines[0].startswith("usage:")

@@ -378,3 +378,8 @@ def test_indices_are_fractions_or_units(error_of):
     assert (units.vectors == fractions.vectors).all() and (fractions.singularities.index == 1).all()
     message = error_of(rf.prescribed, surface, {0: 0.3, 1: 1.7}, 4)
     assert "0.3 at vertex 0 is not a multiple of 1/4" in message
+    for index in (float("nan"), float("inf"), 10**30):
+        message = error_of(rf.prescribed, surface, {0: index}, 4)
+        assert f"the index {index} at vertex 0 is not a multiple of 1/4, or too large" in message
+    for vertex in (0.5, 10**30, "a"):
+        assert f"has no vertex {vertex}: " in error_of(rf.prescribed, surface, {vertex: 1}, 4)

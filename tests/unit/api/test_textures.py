@@ -66,6 +66,16 @@ def test_tiles_have_files_of_their_own(tmp_path, error_of):
     assert "no <UDIM>" in error_of(texture.save, tmp_path / "square.png")
 
 
+def test_tiles_end_where_blender_numbers_none(error_of):
+    """It has 1001 to 2000; a tile above was written, and was missing in Blender."""
+    square = rf.Surface(*SQUARE, name="square", uv=UV + (9, 99))
+    assert list(rf.texture(square, rf.along_uv(square), size=16, udim=True).tiles) == [2000]
+    for beyond in ((9, 100), (10, 99), (-1, 0)):
+        square = rf.Surface(*SQUARE, name="square", uv=UV + beyond)
+        message = error_of(rf.texture, square, rf.along_uv(square), size=16, udim=True)
+        assert "move its charts to u from 0 to 10 and v from 0 to 100" in message
+
+
 def test_a_texture_without_tiles_is_tile_1001():
     """Wherever its charts are."""
     square = rf.Surface(*SQUARE, name="square", uv=UV * (1, 0.7) - (2.0, 1.0))

@@ -7,6 +7,7 @@ import pytest
 from field_helpers import read_field
 from shapes import cube, icosphere, plane
 
+from rosy_addon.core.errors import RosyWarning
 from rosy_addon.field.array_field import SurfaceArrays, array_field, find_array
 from rosy_addon.field.validate import VectorPolicy, vertex_normals
 
@@ -95,7 +96,8 @@ def test_the_same_as_npy(columns, domain, sphere, tmp_path):
 def test_velocity_across_a_surface(domain, box):
     """The tangential component on every face of a cube; degree 1, as these are vectors."""
     velocity = np.array([1.0, 2.0, 3.0])
-    field = array_field(constant(box, domain, velocity))
+    with pytest.warns(RosyWarning, match="off the surface; their tangential parts are read"):
+        field = array_field(constant(box, domain, velocity))
     normal = box.face_normal
     assert field.degree == 1
     assert field.vectors == pytest.approx(velocity - (normal @ velocity)[:, None] * normal)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import awkward
 import numpy as np
 import pytest
 from shapes import cylinder, icosphere, torus
 
+from rosy_addon.core.errors import RosyError
 from rosy_addon.field.analysis import dirichlet_energy
 from rosy_addon.field.cheapest_singularities import cheapest_singularities
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.prescribed import prescribed_field
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.smoothest import smoothest_field
+from rosy_addon.field.surface import build_surface
 
 
 def energy_of(surface, degree, vertex, index):
@@ -40,6 +43,28 @@ def test_given_ones_stay_and_the_sum_is_right():
             assert index[:count].tolist() == sign.tolist()
             assert len(set(vertex.tolist())) == len(vertex)
             assert index.sum() == 4 * characteristic
+
+
+@pytest.mark.parametrize("points, faces", [awkward.octahedron(), awkward.cube()], ids=["8", "6"])
+def test_given_ones_are_found_on_few_faces_or_refused(points, faces):
+    """Where all neighbors of a given vertex are singular, what is added stayed at the given one."""
+    random, made = np.random.default_rng(5), 0
+    start = np.cumsum([0, *map(len, faces)])
+    surface = build_surface(np.array(points, dtype=float), np.concatenate(faces), start)
+    for _ in range(40):
+        given = random.permutation(len(points))[: random.integers(1, 4)]
+        index, degree = random.integers(-1, 3, len(given)), int(random.choice([1, 2, 4, 6]))
+        settings = GeneratorSettings("prescribed", singularities=(given, index), add_missing=True)
+        try:
+            field = generate(surface, settings, degree)
+        except RosyError:
+            continue
+        found = np.zeros(len(points), dtype=int)
+        vertex, found_index = find_singularities(surface, field)
+        found[vertex] = found_index
+        assert found[given].tolist() == index.tolist()
+        made += 1
+    assert made > 10
 
 
 def test_one_given_costs_no_more_than_the_smoothest_field():

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import itertools
 
+import awkward
 import numpy as np
 import pytest
-from shapes import cylinder, from_quads, globe, icosphere, torus
+from shapes import cylinder, from_quads, from_triangles, globe, icosphere, torus
 
 from rosy_addon.core.errors import RosyError
 from rosy_addon.field import prescribed, turning_angles
@@ -16,6 +17,21 @@ from rosy_addon.field.prescribed import prescribed_field
 from rosy_addon.field.representation import face_representation, matching_angles
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.surface import Surface, build_surface
+
+
+def tetrahedron() -> Surface:
+    return from_triangles(
+        [(1, 1, 1), (-1, -1, 1), (-1, 1, -1), (1, -1, -1)],
+        [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)],
+    )
+
+
+def two_octahedra() -> Surface:
+    """Two octahedra that share vertex 5, and nothing else."""
+    points, faces = map(np.array, awkward.octahedron())
+    mirrored = np.array([6, 7, 8, 9, 10, 5])[faces[:, ::-1]]
+    points = np.concatenate([points, (2 * points[5] - points)[:5]])
+    return from_triangles(points, np.concatenate([faces, mirrored]))
 
 
 def block(holes: int, missing: int = 0) -> Surface:
@@ -146,6 +162,21 @@ def test_a_cone_turns_evenly_around_its_apex(degree, index):
     assert errors(field, outward, around, (index / degree - 1) * azimuth).max() < 0.1
 
 
+def test_a_face_without_neighbors_follows_its_guide():
+    """Its matrix has no edges: adding to its integers was an error of numpy."""
+    surface = from_triangles([(0, 0, 0), (2, 0, 0), (0, 1, 0)], [(0, 1, 2)])
+    field = prescribed_field(surface, 4, [], [], np.array([[3.0, 4.0, 0.0]]), reach=0.1)
+    np.testing.assert_allclose(np.sort(np.abs(field.vectors[0])), [0, 0.6, 0.8], atol=1e-9)
+
+
+def test_a_face_that_touches_itself_is_refused_in_one_line():
+    """Its corner at vertex 3 is inside of the face, where the equation of the potential is 0 = 0."""
+    points = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0.2, 0.2, 0)]
+    surface = build_surface(np.array(points), np.array([0, 1, 2, 0, 3]), np.array([0, 5]))
+    with pytest.raises(RosyError, match="would turn too fast"):
+        prescribed_field(surface, 4, [], [])
+
+
 def test_guides_turn_the_whole_field():
     surface = globe(12, 24)
     last = len(surface.vertices) - 1
@@ -171,6 +202,14 @@ def test_all_singularities_are_found_again(holes, missing, degree):
     order = np.argsort(vertex)
     np.testing.assert_array_equal(found, vertex[order])
     np.testing.assert_array_equal(found_index, index[order])
+
+
+def test_there_is_no_index_where_parts_share_only_a_vertex():
+    """Smooth fields on both parts were said to have the index -1 there."""
+    surface, vertex = two_octahedra(), [0, 1, 6, 7]
+    field = prescribed_field(surface, 1, vertex, [1, 1, 1, 1])
+    found, index = find_singularities(surface, field)
+    assert found.tolist() == vertex and index.tolist() == [1, 1, 1, 1]
 
 
 def least_squares(system: np.ndarray, sums: np.ndarray) -> np.ndarray:
@@ -233,10 +272,20 @@ def test_the_energy_is_that_of_a_dense_solver(surface, degree, vertex, index):
     "surface, vertex, index, message",
     [
         (torus(), [10], [1], "add up to 1/4, but this closed surface needs 0/4"),
-        (icosphere(2), [0], [4], "add up to 4/4, but this closed surface needs 8/4"),
+        (icosphere(2), [0], [2], "add up to 2/4, but this closed surface needs 8/4"),
         (icosphere(2), [9999], [8], "has no vertex 9999: its vertices are numbered 0 to 161"),
         (cylinder(12, 4), [0], [1], "vertex 0 cannot be singular, because it is at a border"),
-        (icosphere(2), [0, 1], [30, -22], "would turn too fast for the size of the faces"),
+        # With exactly pi / N between its faces, a tetrahedron could have these or others.
+        (
+            tetrahedron(),
+            [0, 1, 2, 3],
+            [3, 3, 1, 1],
+            "would turn too fast for the size of the faces",
+        ),
+        (tetrahedron(), [0], [10**9], "index 1000000000/4: the faces around it allow 1/4 to 3/4"),
+        (tetrahedron(), [0], [0], "index 0/4: the faces around it allow 1/4 to 3/4"),
+        (torus(), [10, 30, 10], [1, -2, 1], "vertex 10 is given more than once"),
+        (two_octahedra(), [5], [1], "vertex 5 cannot be singular, because it .* joins parts"),
     ],
 )
 def test_what_is_not_possible(surface, vertex, index, message):

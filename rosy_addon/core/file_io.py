@@ -6,6 +6,7 @@ import os
 import platform
 import re
 import secrets
+import shutil
 import stat
 import time
 import zlib
@@ -162,8 +163,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     check_writable(path)
     target = Path(os.path.realpath(path))
     remove_leftovers(target.parent)
-    token = f"{_host_token()}-{os.getpid()}-{secrets.token_hex(8)}"
-    temporary = target.with_name(f".rosy-{token}{target.suffix}")
+    temporary = target.with_name(temporary_name(target.suffix))
     try:
         yield temporary
         if target.exists():
@@ -176,8 +176,13 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         raise
 
 
+def temporary_name(suffix: str = "") -> str:
+    """Return a new name for a temporary file or folder of this process, which `remove_leftovers` recognizes."""
+    return f".rosy-{_host_token()}-{os.getpid()}-{secrets.token_hex(8)}{suffix}"
+
+
 def remove_leftovers(folder: str | os.PathLike[str]) -> None:
-    """Delete the temporary files that processes left in a folder because they were killed while writing.
+    """Delete the temporary files and folders that processes left in a folder because they were killed.
 
     Files of processes that are running, or that may be running on another machine, are kept, unless they are
     older than `LEFTOVER_SECONDS`.
@@ -191,7 +196,10 @@ def remove_leftovers(folder: str | os.PathLike[str]) -> None:
                 age = time.time() - entry.stat(follow_symlinks=False).st_mtime
                 is_own_host = match["host"] == _host_token()
                 if age > LEFTOVER_SECONDS or (is_own_host and not _is_running(int(match["pid"]))):
-                    os.unlink(entry.path)
+                    if entry.is_dir(follow_symlinks=False):
+                        shutil.rmtree(entry.path)
+                    else:
+                        os.unlink(entry.path)
 
 
 def _host_token() -> str:

@@ -66,10 +66,7 @@ def own_descriptor(handle: int) -> int:
 
 
 def interrupt(_number: int, _frame: object) -> None:
-    """Handle Ctrl-C: stop the command, and ignore further signals.
-
-    A Ctrl-C arrives twice: from the terminal and from `extras.blender`.
-    """
+    """Handle Ctrl-C: stop the command, and ignore further signals, so that it can remove its files."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     raise KeyboardInterrupt
 

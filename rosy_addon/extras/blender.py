@@ -20,13 +20,14 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
+from importlib.util import find_spec
 from pathlib import Path
 from typing import BinaryIO, TextIO
 
 from ..cli.options import Options, user_presets_folder
 from ..core.errors import RosyError
 from ..rendering.turntable import Encoder
-from ..worker.lifeline import Lifeline
+from ..worker.lifeline import PROCESS_LIFELINE, Lifeline
 from ..worker.program import run_program
 from ..worker.start import inheriting
 
@@ -212,6 +213,9 @@ def run_in_blender(
     """
     if options.blender is None:
         with suppress(ImportError):
+            if find_spec("bpy") is not None:
+                # Blender creates a temporary folder, and leaves it if this process is killed.
+                os.environ["TMPDIR"] = str(PROCESS_LIFELINE.folder)
             importlib.import_module("bpy")
             return
     if path is None:

@@ -149,5 +149,5 @@ class Lifeline:
                 self._guard[1].send(item)
 
 
-#: The lifeline of the helper processes of this process.
-HELPER_LIFELINE = Lifeline()
+#: The lifeline of the helper processes of this process. It is never closed.
+PROCESS_LIFELINE = Lifeline()

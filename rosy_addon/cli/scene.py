@@ -2,13 +2,29 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from ..core.errors import RosyError
+from ..worker.lifeline import PROCESS_LIFELINE
 from .options import Options
 from .streams import print_error
+
+
+def import_blender() -> None:
+    """Import Blender's Python module. Its temporary folder is removed with this process, even if it is killed.
+
+    Raises
+    ------
+    ImportError
+        If it is not installed.
+    """
+    if "bpy" not in sys.modules:
+        os.environ["TMPDIR"] = str(PROCESS_LIFELINE.folder)
+    import bpy  # noqa: F401
 
 
 def open_scene(options: Options, command: str, path: Path | None) -> Any:

@@ -11,7 +11,6 @@ status 0. If there is no report, Blender itself failed, and its log says why.
 
 from __future__ import annotations
 
-import importlib
 import json
 import os
 import re
@@ -20,14 +19,14 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
-from importlib.util import find_spec
 from pathlib import Path
 from typing import BinaryIO, TextIO
 
 from ..cli.options import Options, user_presets_folder
+from ..cli.scene import import_blender
 from ..core.errors import RosyError
 from ..rendering.turntable import Encoder
-from ..worker.lifeline import PROCESS_LIFELINE, Lifeline
+from ..worker.lifeline import Lifeline
 from ..worker.program import run_program
 from ..worker.start import inheriting
 
@@ -213,10 +212,7 @@ def run_in_blender(
     """
     if options.blender is None:
         with suppress(ImportError):
-            if find_spec("bpy") is not None:
-                # Blender creates a temporary folder, and leaves it if this process is killed.
-                os.environ["TMPDIR"] = str(PROCESS_LIFELINE.folder)
-            importlib.import_module("bpy")
+            import_blender()
             return
     if path is None:
         raise RosyError(f"{command}: no input: give SCENE.blend")

@@ -69,9 +69,10 @@ def _items_until_the_end(end: Connection) -> list[int | str]:
 
 
 def kill_group(group: int) -> None:
-    """Kill all processes of a group."""
-    with suppress(OSError):  # there is none
-        os.killpg(group, signal.SIGKILL)
+    """Kill all processes of a group. Windows has no groups."""
+    if sys.platform != "win32":
+        with suppress(OSError):  # there is none
+            os.killpg(group, signal.SIGKILL)
 
 
 def remove_folder(folder: str) -> None:

@@ -9,7 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from functools import cached_property
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -24,13 +24,13 @@ from .start import start_module
 START_SECONDS = 1.0
 
 
-class Lifeline:
+class Lifeline(AbstractContextManager["Lifeline"]):
     """Programs and a temporary folder that end with this process, even if it is killed.
 
     A guard process has one end of a connection to this process, and leads a process group. Programs join the
     group while they are started, and the programs that these start are in it too. When this process ends, for
-    whatever reason, the connection closes, and the guard process kills the group and removes the folder. So does
-    `close`. On Windows, which has no groups, only the programs themselves are killed.
+    whatever reason, the connection closes, and the guard process kills the group and removes the folder. The end
+    of the block does so too. On Windows, which has no groups, only the programs themselves are killed.
 
     Examples
     --------
@@ -42,23 +42,18 @@ class Lifeline:
     """
 
     def __init__(self) -> None:
-        self._guard: tuple[subprocess.Popen[bytes], Connection] | None = None
         self._processes: list[subprocess.Popen[bytes]] = []
         self._folder: Path | None = None
 
-    def __enter__(self) -> Lifeline:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     @cached_property
+    def _guard(self) -> tuple[subprocess.Popen[bytes], Connection]:
+        """The guard process, which is started when it is first needed, and the connection to it."""
+        return start_module("worker.guard", group=0)
+
+    @property
     def group(self) -> int:
-        """ID of the process group, for `start_module`; 0 if the guard process cannot be started."""
-        with suppress(OSError):
-            self._guard = start_module("worker.guard", group=0)
-            return self._guard[0].pid
-        return 0
+        """ID of the process group, for `start_module`. An `OSError` is raised if there can be no guard process."""
+        return self._guard[0].pid
 
     @property
     def folder(self) -> Path:
@@ -113,41 +108,32 @@ class Lifeline:
     def interrupt(self, seconds: float) -> None:
         """Interrupt the programs, as Ctrl-C does, and wait up to some seconds for their end."""
         if sys.platform != "win32":  # there, Ctrl-C has reached the programs already
-            if self._guard is not None:
-                self._guard[1].poll(START_SECONDS)  # until the guard process ignores interrupts
-            for group in self._groups():
-                with suppress(OSError):
-                    os.killpg(group, signal.SIGINT)
+            self._guard[1].poll(START_SECONDS)  # until the guard process ignores interrupts
+            with suppress(OSError):
+                os.killpg(self.group, signal.SIGINT)
         deadline = time.monotonic() + seconds
         with suppress(subprocess.TimeoutExpired, KeyboardInterrupt):
             for process in self._processes:
                 process.wait(max(deadline - time.monotonic(), 0.0))
 
-    def close(self) -> None:
+    def __exit__(self, *_: object) -> None:
         """Kill the programs that still run, and remove the folder."""
-        processes = list(self._processes)
-        if self._guard is not None:
-            processes.append(self._guard[0])
-            self._guard[1].close()
-        for process in processes:
+        if "_guard" not in vars(self):  # nothing was started
+            return
+        self._guard[1].close()
+        for process in (*self._processes, self._guard[0]):
             process.kill()  # does nothing if it has ended
             process.wait()
-        if sys.platform != "win32":
-            for group in self._groups():
-                kill_group(group)
+        kill_group(self.group)
         if self._folder is not None:
             remove_folder(str(self._folder))
 
-    def _groups(self) -> list[int]:
-        """Return the process groups of the programs. Without a guard process, each program has its own."""
-        return [process.pid for process in self._processes] if self._guard is None else [self.group]
-
     def _tell_guard(self, item: int | str) -> None:
         """Let the guard process end a program or remove a folder, given its ID or path, with this process."""
-        with suppress(OSError):  # without a guard process, `close` still does so
-            if self.group and self._guard is not None:
-                self._guard[1].send(item)
+        connection = self._guard[1]
+        with suppress(OSError):  # without a guard process, the block's end still does so
+            connection.send(item)
 
 
-#: The lifeline of the helper processes of this process. It is never closed.
+#: The lifeline of the helper processes of this process, and the folder for as long as it runs.
 PROCESS_LIFELINE = Lifeline()

@@ -15,7 +15,6 @@ from conftest import ROOT
 from harness.processes import becomes_true, marked_processes
 
 from rosy_addon.core.errors import RosyError
-from rosy_addon.worker import lifeline as module
 from rosy_addon.worker.frame_workers import run_local
 from rosy_addon.worker.lifeline import Lifeline
 
@@ -122,20 +121,6 @@ def test_the_next_start_removes_folders_of_killed_processes(tmp_path, monkeypatc
     with Lifeline() as running, Lifeline() as lifeline:
         folders = {running.folder, lifeline.folder}
         assert set(tmp_path.iterdir()) == folders and left not in folders
-
-
-def test_without_a_guard_process_all_ends_with_the_lifeline(monkeypatch):
-    def refuse(*_, **__):
-        raise OSError("too many processes")
-
-    monkeypatch.setattr(module, "start_module", refuse)
-    monkeypatch.setenv("ROSY_TEST", uuid.uuid4().hex)
-    mark = os.environ["ROSY_TEST"]
-    with Lifeline() as lifeline:
-        process = lifeline.start(WRAPPED, stdout=subprocess.PIPE)
-        assert process.stdout.readline() == b"begun\n" and len(marked_processes(mark)) == 2
-    process.stdout.close()
-    assert becomes_true(lambda: not marked_processes(mark)) and not lifeline.folder.exists()
 
 
 def test_no_temporary_folder_is_one_line(monkeypatch):

@@ -21,12 +21,14 @@ from rosy_addon.worker.lifeline import Lifeline
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads the list of processes")
 
 #: A program behind another one, as Blender is behind the scripts of some installations. It writes to
-#: its temporary folder as long as it lives.
+#: its temporary folder as long as it lives, also when that is gone.
 SCRIPT = """
-import os, pathlib, time
+import contextlib, os, pathlib, time
 print("begun", flush=True)
 while True:
-    pathlib.Path(os.environ["TMPDIR"], f"{os.getpid()}-{time.time()}").touch()
+    time.sleep(0.001)
+    with contextlib.suppress(OSError):
+        pathlib.Path(os.environ["TMPDIR"], f"{os.getpid()}-{time.time()}").touch()
 """
 WRAPPED = ["sh", "-c", f"{sys.executable} -c '{SCRIPT}'; exit"]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -21,10 +22,19 @@ def import_blender() -> None:
     ------
     ImportError
         If it is not installed.
+    KeyboardInterrupt
+        After the import, if Ctrl-C was pressed during it. Blender would catch the exception.
     """
     if "bpy" not in sys.modules:
         os.environ["TMPDIR"] = str(PROCESS_LIFELINE.folder)
-    import bpy  # noqa: F401
+    interrupts: list[int] = []
+    previous = signal.signal(signal.SIGINT, lambda number, _: interrupts.append(number))
+    try:
+        import bpy  # noqa: F401
+    finally:
+        signal.signal(signal.SIGINT, previous)
+    if interrupts:
+        raise KeyboardInterrupt
 
 
 def open_scene(options: Options, command: str, path: Path | None) -> Any:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
 from pathlib import Path
 
-#: Seconds within which processes end after the one that started them.
+#: Seconds within which processes end after the one that started them, if they have a core.
 END_SECONDS = 2.0
 
 
@@ -32,8 +33,12 @@ def marked_processes(mark: str) -> dict[int, str]:
 
 
 def becomes_true(condition: Callable[[], bool], seconds: float = END_SECONDS) -> bool:
-    """Wait until a condition is true, but not for longer than some seconds. Return whether it is."""
-    deadline = time.monotonic() + seconds
+    """Wait until a condition is true, but not for longer than some seconds. Return whether it is.
+
+    If more processes run than there are cores, it waits longer in proportion.
+    """
+    share = max(os.getloadavg()[0] / (os.cpu_count() or 1), 1.0)
+    deadline = time.monotonic() + seconds * share
     while not (is_true := condition()) and time.monotonic() < deadline:
         time.sleep(0.02)
     return is_true

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import bpy
 import pytest
-from harness.processes import becomes_true, marked_processes
+from harness.processes import all_end
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -89,4 +89,4 @@ def test_ctrl_c_and_closed_pipes_end_blender_as_well(saved, tmp_path):
     assert (interrupted.returncode, errors) == (130, "rosy: stopped\n")
     assert closed.wait(timeout=60) == 141
     assert closed.stderr.read() == ""
-    assert becomes_true(lambda: not marked_processes(mark))
+    assert all_end(mark)

@@ -17,7 +17,7 @@ from pathlib import Path
 from rosy_addon.core.file_io import remove_leftovers
 
 from ..harness.forked import fork_command
-from ..harness.processes import becomes_true, marked_processes
+from ..harness.processes import all_end, marked_processes
 from .cases import Case
 
 #: Seconds of the processor after which a run counts as hanging; seconds after which it does so even
@@ -78,8 +78,7 @@ def _left_over(folder: Path, was_killed: bool) -> str:
     If it was killed, its temporary files and folders are removed first, as by the next start.
     """
     temporary = folder.with_suffix(".tmp")
-    becomes_true(lambda: not marked_processes(str(temporary)))
-    left = marked_processes(str(temporary))
+    left = {} if all_end(str(temporary)) else marked_processes(str(temporary))
     for pid in left:
         os.kill(pid, signal.SIGKILL)
     for place in (temporary, folder, *filter(Path.is_dir, folder.iterdir())) if was_killed else ():

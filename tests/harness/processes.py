@@ -42,3 +42,11 @@ def becomes_true(condition: Callable[[], bool], seconds: float = END_SECONDS) ->
     while not (is_true := condition()) and time.monotonic() < deadline:
         time.sleep(0.02)
     return is_true
+
+
+def all_end(mark: str) -> bool:
+    """Wait for the end of all processes whose environment contains a text. Return whether they have ended.
+
+    They are listed twice, as the list may lack a process that was started while it was made.
+    """
+    return becomes_true(lambda: not (marked_processes(mark) or marked_processes(mark)))

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from conftest import ROOT
-from harness.processes import becomes_true, marked_processes
+from harness.processes import all_end, becomes_true, marked_processes
 
 from rosy_addon.core.errors import RosyError
 from rosy_addon.worker.frame_workers import run_local
@@ -83,7 +83,7 @@ def test_nothing_outlives_the_process_that_started_it(name, number, kill, tmp_pa
         assert becomes_true(lambda: len(marked_processes(mark)) == count, 20.0)
         kill(process.pid, number)
         process.wait()
-        assert becomes_true(lambda: not marked_processes(mark)), marked_processes(mark)
+        assert all_end(mark), marked_processes(mark)
         assert becomes_true(lambda: not list(tmp_path.iterdir()))
 
 
@@ -94,7 +94,7 @@ def test_programs_that_others_started_end_with_the_lifeline(tmp_path, monkeypatc
         process = lifeline.start(WRAPPED, stdout=subprocess.PIPE)
         assert process.stdout.readline() == b"begun\n" and len(marked_processes(mark)) == 3
     process.stdout.close()
-    assert becomes_true(lambda: not marked_processes(mark)) and not lifeline.folder.exists()
+    assert all_end(mark) and not lifeline.folder.exists()
 
 
 def test_interrupted_programs_may_remove_their_files(tmp_path):

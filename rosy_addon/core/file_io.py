@@ -6,7 +6,6 @@ import os
 import platform
 import re
 import secrets
-import shutil
 import stat
 import time
 import zlib
@@ -163,7 +162,8 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     check_writable(path)
     target = Path(os.path.realpath(path))
     remove_leftovers(target.parent)
-    temporary = target.with_name(temporary_name(target.suffix))
+    token = f"{_host_token()}-{os.getpid()}-{secrets.token_hex(8)}"
+    temporary = target.with_name(f".rosy-{token}{target.suffix}")
     try:
         yield temporary
         if target.exists():
@@ -176,13 +176,8 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         raise
 
 
-def temporary_name(suffix: str = "") -> str:
-    """Return a new name for a temporary file or folder of this process, which `remove_leftovers` recognizes."""
-    return f".rosy-{_host_token()}-{os.getpid()}-{secrets.token_hex(8)}{suffix}"
-
-
 def remove_leftovers(folder: str | os.PathLike[str]) -> None:
-    """Delete the temporary files and folders that processes left in a folder because they were killed.
+    """Delete the temporary files that processes left in a folder because they were killed while writing.
 
     Files of processes that are running, or that may be running on another machine, are kept, unless they are
     older than `LEFTOVER_SECONDS`.
@@ -196,10 +191,7 @@ def remove_leftovers(folder: str | os.PathLike[str]) -> None:
                 age = time.time() - entry.stat(follow_symlinks=False).st_mtime
                 is_own_host = match["host"] == _host_token()
                 if age > LEFTOVER_SECONDS or (is_own_host and not _is_running(int(match["pid"]))):
-                    if entry.is_dir(follow_symlinks=False):
-                        shutil.rmtree(entry.path)
-                    else:
-                        os.unlink(entry.path)
+                    os.unlink(entry.path)
 
 
 def _host_token() -> str:

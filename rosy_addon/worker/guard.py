@@ -18,10 +18,6 @@ from .start import own_end
 #: Seconds for which a folder is removed again and again if processes that were killed still write to it.
 REMOVE_SECONDS = 1.0
 
-#: Seconds between two changes of the time of a temporary folder. They show that it is in use, as folders count
-#: as abandoned after a day (`core.file_io`).
-TOUCH_SECONDS = 3600.0
-
 
 def main(handle: str) -> None:
     """Wait until the parent ends. Then kill the process group of this process, and remove folders.
@@ -55,15 +51,12 @@ def main(handle: str) -> None:
 
 
 def _items_until_the_end(end: Connection) -> list[int | str]:
-    """Return what the parent has sent when it has ended. Until then, touch the folders."""
+    """Return what the parent has sent, when it has ended."""
     items: list[int | str] = []
     with suppress(OSError):  # the parent has ended already, but what it has sent is still there
         end.send("ready")
     with suppress(EOFError, OSError):
         while True:
-            while not end.poll(TOUCH_SECONDS):
-                for folder in filter(os.path.isdir, items):
-                    os.utime(folder)
             items.append(end.recv())
     return items
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import secrets
 import signal
 import subprocess
 import sys
@@ -16,9 +17,15 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import RosyError
-from ..core.file_io import os_error_text, remove_leftovers, temporary_name
+from ..core.file_io import os_error_text
 from .guard import kill_group, remove_folder
 from .start import start_module
+
+if sys.platform != "win32":
+    import fcntl
+
+#: Age in seconds from which a folder that is not locked counts as abandoned. It is locked right after it is created.
+ABANDONED_SECONDS = 60.0
 
 #: Longest wait in seconds until the guard process has started. It takes some ten milliseconds.
 START_SECONDS = 1.0
@@ -44,6 +51,7 @@ class Lifeline(AbstractContextManager["Lifeline"]):
     def __init__(self) -> None:
         self._processes: list[subprocess.Popen[bytes]] = []
         self._folder: Path | None = None
+        self._lock: int | None = None
 
     @cached_property
     def _guard(self) -> tuple[subprocess.Popen[bytes], Connection]:
@@ -67,11 +75,12 @@ class Lifeline(AbstractContextManager["Lifeline"]):
         if self._folder is not None:
             return self._folder
         try:
-            parent = tempfile.gettempdir()
-            remove_leftovers(parent)
-            self._folder = Path(parent, temporary_name())
+            parent = Path(tempfile.gettempdir())
+            _remove_abandoned_folders(parent)
+            self._folder = parent / f"rosy-{secrets.token_hex(8)}"
             self._tell_guard(str(self._folder))
             self._folder.mkdir(mode=0o700)
+            self._lock = _lock(self._folder)
         except OSError as error:
             reason = os_error_text(error)
             raise RosyError(
@@ -127,12 +136,41 @@ class Lifeline(AbstractContextManager["Lifeline"]):
         kill_group(self.group)
         if self._folder is not None:
             remove_folder(str(self._folder))
+        if self._lock is not None:
+            os.close(self._lock)
 
     def _tell_guard(self, item: int | str) -> None:
         """Let the guard process end a program or remove a folder, given its ID or path, with this process."""
         connection = self._guard[1]
         with suppress(OSError):  # without a guard process, the block's end still does so
             connection.send(item)
+
+
+def _lock(folder: Path) -> int | None:
+    """Lock a folder until this process ends, and return the descriptor of the lock.
+
+    Return None if another process has locked it, and on Windows, which cannot lock folders.
+    """
+    if sys.platform == "win32":
+        return None
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(descriptor)
+        return None
+    return descriptor
+
+
+def _remove_abandoned_folders(parent: Path) -> None:
+    """Remove the temporary folders of processes that were killed together with their guard processes."""
+    for folder in parent.glob("rosy-" + 16 * "[0-9a-f]"):
+        with suppress(OSError):  # another process may remove it, or it is of another user
+            if time.time() - folder.stat().st_mtime > ABANDONED_SECONDS:
+                lock = _lock(folder)
+                if lock is not None:
+                    remove_folder(str(folder))
+                    os.close(lock)
 
 
 #: The lifeline of the helper processes of this process, and the folder for as long as it runs.

@@ -44,7 +44,7 @@ class Run:
         Largest resident memory.
     left : str
         Processes and temporary folders that are left, if the case has a process of its own: processes
-        `END_SECONDS` after it, folders after another process has started.
+        `END_SECONDS` after it, and folders.
     """
 
     status: int | None
@@ -75,13 +75,13 @@ def execute(case: Case, folder: Path) -> Run:
 def _left_over(folder: Path, was_killed: bool) -> str:
     """Return which processes and temporary folders a run has left.
 
-    If it was killed, its temporary files and folders are removed first, as by the next start.
+    If it was killed, remove its temporary files, as the next start does.
     """
     temporary = folder.with_suffix(".tmp")
     left = {} if all_end(str(temporary)) else marked_processes(str(temporary))
     for pid in left:
         os.kill(pid, signal.SIGKILL)
-    for place in (temporary, folder, *filter(Path.is_dir, folder.iterdir())) if was_killed else ():
+    for place in (folder, *filter(Path.is_dir, folder.iterdir())) if was_killed else ():
         remove_leftovers(place)
     found = [*left.values(), *(path.name for path in temporary.iterdir())]
     shutil.rmtree(temporary)

@@ -120,7 +120,9 @@ def test_the_next_start_removes_folders_of_killed_processes(tmp_path, monkeypatc
     environment = os.environ | {"TMPDIR": str(tmp_path)}
     subprocess.run([sys.executable, "-c", code], env=environment, check=False)
     (left,) = tmp_path.iterdir()
+    os.utime(left, (0, 0))
     with Lifeline() as running, Lifeline() as lifeline:
+        os.utime(running.folder, (0, 0))
         folders = {running.folder, lifeline.folder}
         assert set(tmp_path.iterdir()) == folders and left not in folders
 

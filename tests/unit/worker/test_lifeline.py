@@ -65,18 +65,27 @@ time.sleep(100)
 }
 
 
+@pytest.fixture
+def mark(monkeypatch):
+    """A text in the environment of all processes that the test starts. Those that are left are killed."""
+    mark = uuid.uuid4().hex
+    monkeypatch.setenv("ROSY_TEST", mark)
+    yield mark
+    for pid in marked_processes(mark):
+        os.kill(pid, signal.SIGKILL)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PROGRAMS)
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
 @pytest.mark.parametrize("kill", [os.kill, os.killpg])
-def test_nothing_outlives_the_process_that_started_it(name, number, kill, tmp_path):
+def test_nothing_outlives_the_process_that_started_it(name, number, kill, mark, tmp_path):
     """Neither processes nor folders, if the process gets a signal, or its group as from a terminal."""
     program, count = PROGRAMS[name]
-    mark = uuid.uuid4().hex
     with subprocess.Popen(
         [sys.executable, "-c", f"import sys, time\nsys.path.insert(0, {str(ROOT)!r})\n{program}"],
         stdout=subprocess.PIPE,
-        env=os.environ | {"TMPDIR": str(tmp_path), "ROSY_TEST": mark},
+        env=os.environ | {"TMPDIR": str(tmp_path)},
         start_new_session=True,
     ) as process:
         assert process.stdout.readline() == b"begun\n"
@@ -87,9 +96,7 @@ def test_nothing_outlives_the_process_that_started_it(name, number, kill, tmp_pa
         assert becomes_true(lambda: not list(tmp_path.iterdir()))
 
 
-def test_programs_that_others_started_end_with_the_lifeline(tmp_path, monkeypatch):
-    monkeypatch.setenv("ROSY_TEST", uuid.uuid4().hex)
-    mark = os.environ["ROSY_TEST"]
+def test_programs_that_others_started_end_with_the_lifeline(mark):
     with Lifeline() as lifeline:
         process = lifeline.start(WRAPPED, stdout=subprocess.PIPE)
         assert process.stdout.readline() == b"begun\n" and len(marked_processes(mark)) == 3

@@ -9,12 +9,12 @@ def register() -> None:
     import bpy
 
     from .operators import registration as operators
-    from .rosy_addon.cli.parser import main
+    from .rosy_addon.cli.parser import main_in_extension
     from .rosy_addon.ui import registration as ui
 
     ui.register()
     operators.register()
-    _cli_command = bpy.utils.register_cli_command("rosy", main)
+    _cli_command = bpy.utils.register_cli_command("rosy", main_in_extension)
 
 
 def unregister() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -108,6 +109,15 @@ def main(
     except SystemExit as exit_request:  # argparse: 0 after the help, 2 for a usage error
         return int(exit_request.code)
     return EXIT_OK
+
+
+def main_in_extension(argv: Sequence[str]) -> int:
+    """Run a command of Blender's own command line, and return its exit status.
+
+    Blender without a window ignores Ctrl-C, so that a command would go on.
+    """
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    return main(argv)
 
 
 def _build_parser(prog: str, extras: Extras = NO_EXTRAS) -> CommandParser:

@@ -14,6 +14,7 @@ from ..rendering.turntable import NO_ENCODER, Encoder, check_video_path
 from ..surface_texture.draw import CONTENTS, MAX_MARGIN, MAX_SIZE, MIN_SIZE
 from .mesh_field import add_mesh_options, load_mesh_and_field
 from .options import CommandParser, Options, add_subcommand, float_between, float_tuple, int_between
+from .scene import import_blender
 from .streams import print_line
 
 
@@ -84,6 +85,7 @@ def video_encoder(options: Options) -> Encoder | None:
     encode = encode or find_ffmpeg()
     if encode is None:
         with suppress(ImportError):
+            import_blender()
             from ..scene.video import encode_video as encode
     if encode is None and find_blender_encoder is not None:
         encode = find_blender_encoder(None)

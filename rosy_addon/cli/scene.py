@@ -2,13 +2,39 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from ..core.errors import RosyError
+from ..worker.lifeline import PROCESS_LIFELINE
 from .options import Options
 from .streams import print_error
+
+
+def import_blender() -> None:
+    """Import Blender's Python module. Its temporary folder is removed with this process, even if it is killed.
+
+    Raises
+    ------
+    ImportError
+        If it is not installed.
+    KeyboardInterrupt
+        After the import, if Ctrl-C was pressed during it. Blender would catch the exception.
+    """
+    if "bpy" not in sys.modules:
+        os.environ["TMPDIR"] = str(PROCESS_LIFELINE.folder)
+    interrupts: list[int] = []
+    previous = signal.signal(signal.SIGINT, lambda number, _: interrupts.append(number))
+    try:
+        import bpy  # noqa: F401
+    finally:
+        signal.signal(signal.SIGINT, previous)
+    if interrupts:
+        raise KeyboardInterrupt
 
 
 def open_scene(options: Options, command: str, path: Path | None) -> Any:

@@ -11,25 +11,24 @@ status 0. If there is no report, Blender itself failed, and its log says why.
 
 from __future__ import annotations
 
-import importlib
 import json
 import os
 import re
 import shutil
-import signal
 import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import BinaryIO, TextIO
 
 from ..cli.options import Options, user_presets_folder
+from ..cli.scene import import_blender
 from ..core.errors import RosyError
 from ..rendering.turntable import Encoder
+from ..worker.lifeline import Lifeline
 from ..worker.program import run_program
-from ..worker.start import guarded, inheriting
+from ..worker.start import inheriting
 
 #: The oldest version of Blender that RoSy runs in.
 OLDEST_VERSION = (4, 2)
@@ -78,7 +77,7 @@ USUAL_PLACES = {
 
 #: Longest times in seconds for Blender to print its version, and to end after an interrupt. After the second
 #: one it is killed.
-VERSION_SECONDS, STOP_SECONDS = 60.0, 5.0
+VERSION_SECONDS, STOP_SECONDS = 60.0, 1.0
 
 
 def find_blender(requested: str | None = None) -> str:
@@ -174,12 +173,14 @@ def _program(path: Path) -> str | None:
 
 def blender_version(program: str) -> tuple[int, ...] | None:
     """Return the version of a Blender program, such as (4, 2, 1). None if the program is not Blender."""
-    streams = {"stdin": subprocess.DEVNULL, "capture_output": True}
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
     try:
-        done = subprocess.run([program, "-b", "--version"], timeout=VERSION_SECONDS, **streams)
+        with Lifeline() as lifeline:
+            process = lifeline.start([program, "-b", "--version"], **streams)
+            output, _ = process.communicate(timeout=VERSION_SECONDS)
     except (OSError, subprocess.TimeoutExpired):
         return None
-    match = re.search(rb"^Blender (\d+)\.(\d+)(?:\.(\d+))?", done.stdout, re.MULTILINE)
+    match = re.search(rb"^Blender (\d+)\.(\d+)(?:\.(\d+))?", output, re.MULTILINE)
     return tuple(int(part) for part in match.groups(b"0")) if match else None
 
 
@@ -211,7 +212,7 @@ def run_in_blender(
     """
     if options.blender is None:
         with suppress(ImportError):
-            importlib.import_module("bpy")
+            import_blender()
             return
     if path is None:
         raise RosyError(f"{command}: no input: give SCENE.blend")
@@ -240,8 +241,9 @@ def run_job(program: str, arguments: Sequence[str]) -> int:
         If the user interrupted Blender before the command began, or the command did not end soon after.
     """
     with ExitStack() as stack:
-        log = stack.enter_context(tempfile.TemporaryFile())
-        report = stack.enter_context(tempfile.TemporaryFile("a+b", buffering=0))
+        lifeline = stack.enter_context(Lifeline())
+        log = stack.enter_context(open(lifeline.folder / "log", "w+b"))
+        report = stack.enter_context(open(lifeline.folder / "report", "a+b", buffering=0))
         descriptors = [_copy(sys.stdout, 1, stack), _copy(sys.stderr, 2, stack), report.fileno()]
         handles = _handles(descriptors)
         job = {
@@ -254,22 +256,21 @@ def run_job(program: str, arguments: Sequence[str]) -> int:
         for stream in (sys.stdout, sys.stderr):
             if stream is not None:
                 stream.flush()
-        process = subprocess.Popen(
+        process = lifeline.start(
             [program, *BLENDER_OPTIONS, "--python", str(SCRIPT), "--", json.dumps(job)],
-            stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=subprocess.STDOUT,
             # A sandboxed Blender (Flatpak, Snap) has other folders of user data.
-            env=os.environ | {"ROSY_PRESETS": str(user_presets_folder())},
+            env={"ROSY_PRESETS": str(user_presets_folder())},
             **inheriting(handles),
         )
-        with guarded(process):
-            try:
-                process.wait()
-            except KeyboardInterrupt:
-                _interrupt(process, report)
-                if len(_report_words(report)) < 2:
-                    raise
+        try:
+            process.wait()
+        except KeyboardInterrupt:
+            if _report_words(report):  # before the command has begun, Blender ignores interrupts
+                lifeline.interrupt(STOP_SECONDS)
+            if len(_report_words(report)) < 2:
+                raise
         words = _report_words(report)
         if len(words) < 2:
             raise RosyError(f"{program}: {_failure(process.returncode, log)}")
@@ -303,18 +304,6 @@ def _handles(descriptors: list[int]) -> list[int]:
     import msvcrt
 
     return [msvcrt.get_osfhandle(descriptor) for descriptor in descriptors]
-
-
-def _interrupt(process: subprocess.Popen[bytes], report: BinaryIO) -> None:
-    """Interrupt the command that Blender runs, and wait for its end, but not for long.
-
-    Before the command has begun, Blender ignores interrupts, so nothing is done.
-    """
-    if _report_words(report):
-        if sys.platform != "win32":  # on Windows, Ctrl-C has reached Blender already
-            process.send_signal(signal.SIGINT)
-        with suppress(subprocess.TimeoutExpired, KeyboardInterrupt):
-            process.wait(STOP_SECONDS)
 
 
 def _report_words(report: BinaryIO) -> list[bytes]:

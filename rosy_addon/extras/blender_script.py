@@ -27,6 +27,7 @@ import os
 import signal
 import sys
 import traceback
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -38,6 +39,7 @@ def run(job: dict[str, Any]) -> None:
         os.fdopen(descriptor, "w", encoding=encoding, errors=handling)
         for descriptor, (encoding, handling) in zip(descriptors, job["encodings"], strict=True)
     )
+    main_in_blender = import_main(job)  # an interrupt in an import may become another exception
     blender_errors, sys.stderr = sys.stderr, errors
     signal.signal(signal.SIGINT, interrupt)
     if hasattr(signal, "SIGPIPE"):
@@ -45,7 +47,7 @@ def run(job: dict[str, Any]) -> None:
         signal.signal(signal.SIGPIPE, signal.SIG_IGN)
     os.write(report, b"begun\n")
     try:
-        status = run_command(job, output)
+        status = main_in_blender(job["arguments"], output)
     except BaseException:
         traceback.print_exc()
         status = 1
@@ -66,24 +68,20 @@ def own_descriptor(handle: int) -> int:
 
 
 def interrupt(_number: int, _frame: object) -> None:
-    """Handle Ctrl-C: stop the command, and ignore further signals.
-
-    A Ctrl-C arrives twice: from the terminal and from `extras.blender`.
-    """
+    """Handle Ctrl-C: stop the command, and ignore further signals, so that it can remove its files."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     raise KeyboardInterrupt
 
 
-def run_command(job: dict[str, Any], output: TextIO) -> int:
-    """Import the package and run the command, which prints to `output`."""
+def import_main(job: dict[str, Any]) -> Callable[[list[str], TextIO], int]:
+    """Import the package, and return the function that runs a command, given its arguments and its output."""
     name, file = job["package"], Path(job["folder"], "__init__.py")
     # As the file is an __init__.py, its folder is searched for submodules.
     spec = importlib.util.spec_from_file_location(name, file)
     package = importlib.util.module_from_spec(spec)
     sys.modules[name] = package
     spec.loader.exec_module(package)
-    command_line = importlib.import_module(f"{name}.extras.command_line")
-    return command_line.main_in_blender(job["arguments"], output)
+    return importlib.import_module(f"{name}.extras.command_line").main_in_blender
 
 
 if __name__ == "__main__":

@@ -98,19 +98,24 @@ def _python_runner() -> Callable[[list[str]], tuple[int, str, str]]:
     local to this one. Dask pickles local functions by value, so that the scheduler can unpickle it without
     RoSy.
     """
+    package = PACKAGE
 
     def run_python(words: list[str]) -> tuple[int, str, str]:
         """Run Python with some arguments, and return its exit status, standard output and standard error."""
+        import importlib
         import subprocess
         import sys
 
         from distributed import get_worker
 
+        lifeline = importlib.import_module(f"{package}.worker.lifeline").Lifeline()
         worker = get_worker()
         tasks, key = worker.state.tasks, worker.get_current_task()
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "stdin": subprocess.DEVNULL}
-        command = [sys.executable, *words]
-        with subprocess.Popen(command, text=True, errors="replace", **pipes) as process:
+        streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        with lifeline:
+            process = lifeline.start(
+                [sys.executable, *words], text=True, errors="replace", **streams
+            )
             # If the client has ended, nobody needs the result.
             while key in tasks and tasks[key].state != "cancelled":
                 try:
@@ -118,8 +123,7 @@ def _python_runner() -> Callable[[list[str]], tuple[int, str, str]]:
                     return process.returncode, output, errors
                 except subprocess.TimeoutExpired:
                     continue
-            process.terminate()
-            output, errors = process.communicate()
-            return process.returncode, output, errors
+            lifeline.interrupt(1.0)
+            return process.returncode, "", ""
 
     return run_python

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,7 +24,7 @@ from ..image_io.png import png_bytes
 from ..projection.camera import orbit_camera
 from ..projection.gbuffer import MeshInstance
 from ..worker.job import Call, Steps, call_steps, part, run
-from ..worker.start import GuardedFolder
+from ..worker.lifeline import Lifeline
 from .draw import bake_picture, draw_picture
 from .view_input import ViewInput
 
@@ -198,8 +197,7 @@ def video_steps(
         Takes the arguments of an `Encoder`, and returns the steps of a job that encodes an .mp4.
     """
     pictures = []
-    with nullcontext("") if is_gif(path) else GuardedFolder() as name:
-        folder = Path(name)
+    with Lifeline() as lifeline:
         for index, view in enumerate(views):
             width, height = view.camera.size
             if is_gif(path) and not index:
@@ -213,10 +211,11 @@ def video_steps(
             if is_gif(path):
                 pictures.append(frame)
             else:
-                write_bytes(folder / f"{index:05d}.png", frame)
+                write_bytes(lifeline.folder / f"{index:05d}.png", frame)
         label = "encoding the video"
         if is_gif(path):
             return (yield Call(gif_bytes, (pictures, fps), ENCODING_START, label=label))
+        folder = lifeline.folder
         video, even_size = folder / "video.mp4", (width // 2 * 2, height // 2 * 2)
         steps = encode(folder, count, even_size, fps, video)
         yield from part(steps, ENCODING_START, 1.0, label)

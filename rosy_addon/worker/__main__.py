@@ -19,12 +19,12 @@ from .start import own_end
 #: Seconds without a function call after which the caches of the helper process are cleared.
 IDLE_SECONDS = 120.0
 
-#: Seconds between two reports of progress. At each of them the helper checks whether its parent has ended.
+#: Seconds between two reports of progress.
 REPORT_SECONDS = 0.05
 
 
 class _Reporter:
-    """A listener that sends progress to the parent process, and ends this process if the parent has ended."""
+    """A listener that sends progress to the parent process."""
 
     def __init__(self, channel: Channel) -> None:
         self._channel, self._next_time = channel, 0.0
@@ -35,12 +35,8 @@ class _Reporter:
             return
         self._next_time = now + REPORT_SECONDS
         try:
-            # During a call, the parent sends nothing, but may end.
-            has_ended = self._channel.connection.poll()
             self._channel.send(("progress", fraction, label))
-        except OSError:
-            has_ended = True
-        if has_ended:
+        except OSError:  # the parent has ended
             os._exit(1)
 
 

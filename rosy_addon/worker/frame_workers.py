@@ -6,17 +6,15 @@ at the same time. This module does not depend on what the command does.
 
 from __future__ import annotations
 
-import os
 import re
 import reprlib
 import subprocess
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from ..core.errors import RosyError
-from .start import GuardedFolder, guarded
+from .lifeline import Lifeline
 
 #: Largest frame number in Blender.
 MAX_FRAME = 1_048_574
@@ -24,8 +22,8 @@ MAX_FRAME = 1_048_574
 #: Seconds between two looks at the output of the processes.
 POLL_SECONDS = 0.05
 
-#: Seconds after `terminate` until a process that still runs is killed.
-STOP_SECONDS = 10.0
+#: Seconds after an interrupt until a process that still runs is killed.
+STOP_SECONDS = 1.0
 
 
 def parse_frames(text: str) -> Sequence[int]:
@@ -69,7 +67,7 @@ def run_local(command: Sequence[str], frames: Sequence[int], process_count: int)
     """Run a command for all frames, in several processes of this machine.
 
     Process i of n gets the frames with the indices i, i + n, i + 2 n and so on, so that slow parts of an
-    animation are shared evenly. If the generator is closed, the processes are terminated.
+    animation are shared evenly. If the generator is closed, the processes are interrupted.
 
     Parameters
     ----------
@@ -92,21 +90,25 @@ def run_local(command: Sequence[str], frames: Sequence[int], process_count: int)
     """
     process_count = max(min(process_count, len(frames)), 1)
     workers: list[_Worker] = []
-    with ExitStack() as stack:
-        folder = Path(stack.enter_context(GuardedFolder()))
-        for index in range(process_count):
-            worker = _Worker(command, frames[index::process_count], folder / f"{index}.log")
-            workers.append(worker)
-            stack.enter_context(guarded(worker.process))
-            stack.callback(worker.stop)
-        running = list(workers)
-        while running:
-            # Output is read after this check, so the output of an ended process is complete.
-            ended = [worker for worker in running if worker.process.poll() is not None]
-            for worker in running:
-                yield from worker.new_lines()
-            running = [worker for worker in running if worker not in ended]
-            time.sleep(POLL_SECONDS if running else 0.0)
+    with Lifeline() as lifeline:
+        try:
+            for index in range(process_count):
+                log = lifeline.folder / f"{index}.log"
+                workers.append(_Worker(lifeline, command, frames[index::process_count], log))
+            running = list(workers)
+            while running:
+                # Output is read after this check, so the output of an ended process is complete.
+                ended = [worker for worker in running if worker.process.poll() is not None]
+                for worker in running:
+                    yield from worker.new_lines()
+                running = [worker for worker in running if worker not in ended]
+                time.sleep(POLL_SECONDS if running else 0.0)
+        except BaseException:
+            lifeline.interrupt(STOP_SECONDS)
+            raise
+        finally:
+            for worker in workers:
+                worker.log.close()
     failures = [
         f"frames {format_frames(worker.frames)}: {error_line(worker.lines)}"
         for worker in workers
@@ -126,21 +128,23 @@ class _Worker:
     frames : sequence of int
         Frame numbers that the process works on.
     process : subprocess.Popen
+    log : binary file
     lines : list of str
         Lines of output that were read so far.
     """
 
-    def __init__(self, command: Sequence[str], frames: Sequence[int], log: Path) -> None:
+    def __init__(
+        self, lifeline: Lifeline, command: Sequence[str], frames: Sequence[int], log: Path
+    ) -> None:
         self.frames, self.lines = frames, []
         with log.open("wb") as output:
-            self.process = subprocess.Popen(
+            self.process = lifeline.start(
                 [*command, f"--frames={format_frames(frames)}"],
-                stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT,
-                env=os.environ | {"OMP_NUM_THREADS": "1"},
+                env={"OMP_NUM_THREADS": "1"},
             )
-        self._log = log.open("rb")
+        self.log = log.open("rb")
         self._partial_line = b""
 
     def new_lines(self) -> list[str]:
@@ -148,20 +152,13 @@ class _Worker:
 
         Once the process has ended, this includes a last line without a line break.
         """
-        *lines, self._partial_line = (self._partial_line + self._log.read()).split(b"\n")
+        *lines, self._partial_line = (self._partial_line + self.log.read()).split(b"\n")
         if self.process.returncode is not None and self._partial_line:
             lines.append(self._partial_line)
             self._partial_line = b""
         texts = [line.decode(errors="replace").rstrip("\r") for line in lines]
         self.lines += texts
         return texts
-
-    def stop(self) -> None:
-        """Ask the process to end if it still runs, and wait for that, but not for long."""
-        self._log.close()
-        self.process.terminate()
-        with suppress(subprocess.TimeoutExpired):
-            self.process.wait(STOP_SECONDS)
 
 
 def format_frames(frames: Sequence[int]) -> str:

@@ -10,6 +10,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from .channel import Channel
+from .lifeline import PROCESS_LIFELINE
 from .start import PACKAGE, STARTED_PACKAGE, start_module
 
 #: Seconds after which a helper process that is not ready counts as lost.
@@ -86,7 +87,7 @@ class Helper:
             raise HelperLostError("no helper process is wanted, or none can be started", False)
         try:
             self._process, connection = start_module(
-                "worker", PACKAGE, environment=self._environment
+                "worker", PACKAGE, environment=self._environment, group=PROCESS_LIFELINE.group
             )
         except OSError as error:
             raise HelperLostError(f"no helper process can be started: {error}", False) from None

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import subprocess
-import tempfile
 from collections.abc import Sequence
 from contextlib import suppress
 
 from .job import Step, Steps, job
-from .start import guarded
+from .lifeline import Lifeline
 
 #: Longest wait for the end of the program in each step of the job, in seconds.
 WAIT_SECONDS = 0.02
@@ -32,14 +31,11 @@ def run_program(command: Sequence[str], label: str) -> Steps[tuple[int, str]]:
     output : str
         Standard output and standard error of the program.
     """
-    with tempfile.TemporaryFile() as log:
-        process = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT
-        )
-        with guarded(process):
-            while process.poll() is None:
-                yield Step(0.0, label)
-                with suppress(subprocess.TimeoutExpired):
-                    process.wait(WAIT_SECONDS)
+    with Lifeline() as lifeline, open(lifeline.folder / "log", "w+b") as log:
+        process = lifeline.start(command, stdout=log, stderr=subprocess.STDOUT)
+        while process.poll() is None:
+            yield Step(0.0, label)
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(WAIT_SECONDS)
         log.seek(0)
         return process.returncode, log.read().decode(errors="replace")

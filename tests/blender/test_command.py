@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
+
 import bpy
 import pytest
 from conftest import run_blender
@@ -37,3 +41,27 @@ def test_bad_input_is_one_line_and_status_2(saved, tmp_path):
     assert "Nobody" in line
     assert "Traceback" not in output
     assert not list(tmp_path.glob("*.png"))
+
+
+def test_ctrl_c_stops_the_command(saved, tmp_path):
+    """Blender alone would ignore it."""
+    words = [
+        "-b",
+        saved,
+        "--command",
+        "rosy",
+        "bake",
+        "--frames",
+        "1-90",
+        "--out",
+        tmp_path / "out",
+    ]
+    process = subprocess.Popen(
+        [bpy.app.binary_path, *map(str, words)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
+    lines = []
+    for line in process.stdout:
+        if line.startswith(b"frame ") and not lines:
+            os.kill(process.pid, signal.SIGINT)
+        lines += [line] * (bool(lines) or line.startswith(b"frame "))
+    assert process.wait(timeout=60) == 130 and b"rosy: stopped\n" in lines

@@ -7,21 +7,22 @@ import re
 import signal
 import subprocess
 import sys
-import time
+import uuid
 from pathlib import Path
 
 import bpy
 import pytest
+from harness.processes import all_end
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def start(*arguments):
+def start(*arguments, **variables):
     """Start ``python -m rosy_addon`` in a process group of its own."""
     return subprocess.Popen(
         [sys.executable, "-m", "rosy_addon", *map(str, arguments)],
         cwd=ROOT,
-        env=os.environ | {"ROSY_BLENDER": bpy.app.binary_path},
+        env=os.environ | {"ROSY_BLENDER": bpy.app.binary_path} | variables,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -35,18 +36,6 @@ def run(*arguments):
     process = start(*arguments)
     output, errors = process.communicate(timeout=240)
     return process.returncode, output, errors
-
-
-def group_ends(process):
-    """Return whether all processes of the group of an ended process end soon as well."""
-    deadline = time.monotonic() + 20
-    while time.monotonic() < deadline:
-        try:
-            os.killpg(process.pid, 0)
-        except ProcessLookupError:
-            return True
-        time.sleep(0.05)
-    return False
 
 
 @pytest.fixture
@@ -89,14 +78,15 @@ def test_bad_input_is_one_line_and_status_2(saved, tmp_path):
 
 def test_ctrl_c_and_closed_pipes_end_blender_as_well(saved, tmp_path):
     arguments = ("bake", saved, "--frames", "1-90", "--size", "800x800", "--out")
-    interrupted = start(*arguments, tmp_path / "interrupted")
+    mark = uuid.uuid4().hex
+    interrupted = start(*arguments, tmp_path / "interrupted", ROSY_TEST=mark)
     assert interrupted.stdout.readline().startswith("frame ")
     os.killpg(interrupted.pid, signal.SIGINT)
-    closed = start(*arguments, tmp_path / "closed")
+    closed = start(*arguments, tmp_path / "closed", ROSY_TEST=mark)
     assert closed.stdout.readline().startswith("frame ")
     closed.stdout.close()
     _, errors = interrupted.communicate(timeout=60)
     assert (interrupted.returncode, errors) == (130, "rosy: stopped\n")
     assert closed.wait(timeout=60) == 141
     assert closed.stderr.read() == ""
-    assert group_ends(interrupted) and group_ends(closed)
+    assert all_end(mark)

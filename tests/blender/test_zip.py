@@ -36,9 +36,9 @@ def in_worker(*names):
 #: its own helpers in Blender's Python, and pickles and pipes are only between these. Of multiprocessing,
 #: only the connections are used: it neither starts nor finds processes.
 QUESTIONED_MODULES = {
-    "subprocess": in_worker("frame_workers", "start", "helper", "program"),
+    "subprocess": in_worker("frame_workers", "start", "lifeline", "helper", "program"),
     "pickle": in_worker("channel", "__main__"),
-    "multiprocessing": in_worker("start", "helper", "channel", "pool"),
+    "multiprocessing": in_worker("start", "guard", "lifeline", "helper", "channel", "pool"),
     "ctypes": {"core/memory.py"},
 }
 

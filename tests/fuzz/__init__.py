@@ -12,6 +12,7 @@ Modules in order of dependence:
     files       files of fields, guides, pictures and presets
     singular    files of singularities, and what became of them
     uv_maps     UV maps with tiles, and the files of tiles
+    signals     commands that start other processes, and their files
     cases       the categories: files, a command line, and what it may write
     execution   the processes
     verdicts    what is wrong with a run

@@ -17,6 +17,7 @@ from .damage import damaged, random_word
 from .files import FIELD_SUFFIXES, field_bytes, guide_bytes, png_bytes, preset_bytes
 from .meshes import WRITERS, Polygons, closed_mesh, mesh_bytes, random_mesh
 from .options import random_options
+from .signals import write_command
 from .singular import singularities_changed, singularity_bytes
 from .uv_maps import OUTPUTS as UV_OUTPUTS
 from .uv_maps import make_tiles, tile_fault, tile_names, uv_mesh_bytes
@@ -40,7 +41,8 @@ class Case:
     stop_after : float, optional
         Seconds after which the run gets a signal.
     stop_signal : Signals
-        SIGINT, as by Ctrl-C, or SIGKILL.
+    stops_group : bool
+        Whether the signal goes to the process group, as from a terminal, or to the first process alone.
     own_process : bool
         Whether to start Python anew instead of forking, which takes ten times as long.
     fault : callable, optional
@@ -54,6 +56,7 @@ class Case:
     stdout: str = "file"
     stop_after: float | None = None
     stop_signal: signal.Signals = signal.SIGINT
+    stops_group: bool = False
     own_process: bool = False
     fault: Callable[[Path], str] | None = None
 
@@ -323,8 +326,22 @@ def _stream_case(rng: Generator, folder: Path) -> Case:
         case 2:
             case.environment |= {"PYTHONIOENCODING": "ascii", "LC_ALL": "C"}
         case _:
-            case.stop_after = float(rng.uniform(0.0, 1.0))
-            case.stop_signal = (signal.SIGINT, signal.SIGKILL)[rng.integers(2)]
+            _stop(rng, case, 1.0)
+    return case
+
+
+def _stop(rng: Generator, case: Case, seconds: float) -> None:
+    """Let a random signal stop a case within some seconds."""
+    case.own_process, case.stop_after = True, float(rng.uniform(0.0, seconds))
+    signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL)
+    case.stop_signal, case.stops_group = signals[rng.integers(4)], bool(rng.random() < 0.5)
+
+
+def _signal_case(rng: Generator, folder: Path) -> Case:
+    """A signal to a command that starts other processes, at any moment."""
+    arguments, outputs, seconds = write_command(rng, folder)
+    case = Case(arguments, outputs)
+    _stop(rng, case, seconds)
     return case
 
 
@@ -341,4 +358,5 @@ CATEGORIES: dict[str, tuple[Callable[[Generator, Path], Case], int]] = {
     "textures": (_texture_case, 10),
     "paths": (_path_case, 5),
     "streams": (_stream_case, 2),
+    "signals": (_signal_case, 1),
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import resource
+import shutil
 import signal
 import stat
 import subprocess
@@ -13,7 +14,10 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
+from rosy_addon.core.file_io import remove_leftovers
+
 from ..harness.forked import fork_command
+from ..harness.processes import all_end, marked_processes
 from .cases import Case
 
 #: Seconds of the processor after which a run counts as hanging; seconds after which it does so even
@@ -38,6 +42,9 @@ class Run:
         Of the processor.
     peak_bytes : int
         Largest resident memory.
+    left : str
+        Processes and temporary folders that are left, if the case has a process of its own: processes
+        `END_SECONDS` after it, and folders.
     """
 
     status: int | None
@@ -47,6 +54,7 @@ class Run:
     after: dict[str, str]
     seconds: float
     peak_bytes: int
+    left: str
 
 
 def execute(case: Case, folder: Path) -> Run:
@@ -55,12 +63,29 @@ def execute(case: Case, folder: Path) -> Run:
     streams = [folder.with_suffix(suffix) for suffix in (".stdout", ".stderr")]
     pid = (_start_process if case.own_process else _fork)(case, folder, streams)
     status, usage = _wait(pid, case)
+    left = _left_over(folder, status is not None and status < 0) if case.own_process else ""
     seconds = usage.ru_utime + usage.ru_stime
     stdout, stderr = (path.read_bytes() for path in streams)
     for path in streams:
         path.unlink()
     peak = usage.ru_maxrss * (1 if sys.platform == "darwin" else 1024)
-    return Run(status, stdout, stderr, before, listing(folder), seconds, peak)
+    return Run(status, stdout, stderr, before, listing(folder), seconds, peak, left)
+
+
+def _left_over(folder: Path, was_killed: bool) -> str:
+    """Return which processes and temporary folders a run has left.
+
+    If it was killed, remove its temporary files, as the next start does.
+    """
+    temporary = folder.with_suffix(".tmp")
+    left = {} if all_end(str(temporary)) else marked_processes(str(temporary))
+    for pid in left:
+        os.kill(pid, signal.SIGKILL)
+    for place in (folder, *filter(Path.is_dir, folder.iterdir())) if was_killed else ():
+        remove_leftovers(place)
+    found = [*left.values(), *(path.name for path in temporary.iterdir())]
+    shutil.rmtree(temporary)
+    return ", ".join(found)
 
 
 def listing(folder: Path) -> dict[str, str]:
@@ -91,7 +116,8 @@ def _fork(case: Case, folder: Path, streams: list[Path]) -> int:
 
 def _start_process(case: Case, folder: Path, streams: list[Path]) -> int:
     """Start a case as ``python -m rosy_addon``. Return the number of the process."""
-    read_end = None
+    read_end, temporary = None, folder.with_suffix(".tmp")
+    temporary.mkdir()
     with streams[0].open("wb") as stdout, streams[1].open("wb") as stderr:
         output = stdout
         if case.stdout == "closed":
@@ -106,8 +132,9 @@ def _start_process(case: Case, folder: Path, streams: list[Path]) -> int:
             stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=stderr,
-            env=environment | case.environment,
+            env=environment | case.environment | {"TMPDIR": str(temporary)},
             preexec_fn=_set_limits,
+            start_new_session=True,
         )
         if isinstance(output, int):
             os.close(output)
@@ -134,7 +161,7 @@ def _wait(pid: int, case: Case) -> tuple[int | None, resource.struct_rusage]:
         seconds = time.perf_counter() - start
         if case.stop_after is not None and seconds > case.stop_after and not was_stopped:
             was_stopped = True
-            os.kill(pid, case.stop_signal)
+            (os.killpg if case.stops_group else os.kill)(pid, case.stop_signal)
         elif seconds > TIME_LIMIT and not timed_out:
             timed_out = True
             os.kill(pid, signal.SIGKILL)

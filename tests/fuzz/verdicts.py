@@ -41,6 +41,7 @@ class Verdict(Enum):
     HALF_WRITTEN = "file half written"
     STRAY = "stray or changed file"
     WRONG = "not what was asked"
+    LEFT = "process or temporary folder left"
     NOT_REPEATED = "other bytes when repeated"
 
     @property
@@ -67,7 +68,9 @@ def judge(case: Case, run: Run, folder: Path) -> tuple[Verdict, str]:
         return Verdict.ENDED, "interrupted before RoSy started"
     if "Traceback" in stderr:
         return Verdict.TRACEBACK, stderr.strip().splitlines()[-1]
-    killed = case.stop_after is not None and run.status == -signal.SIGKILL
+    killed = case.stop_after is not None and run.status == -case.stop_signal
+    if run.left:
+        return Verdict.LEFT, run.left
     if run.status < 0 and not killed:
         return Verdict.CRASH, signal.Signals(-run.status).name
     if re.search(r"\w+Warning\b", stderr):
@@ -77,15 +80,13 @@ def judge(case: Case, run: Run, folder: Path) -> tuple[Verdict, str]:
             return Verdict.CONTROL, repr(text[max(unsafe.start() - 40, 0) :][:80])
     if run.peak_bytes > MEMORY_BYTES:
         return Verdict.MEMORY, f"{run.peak_bytes / 2**30:.1f} GiB"
-    if stray := _stray_files(case, run, killed):
+    if stray := _stray_files(case, run):
         return Verdict.STRAY, stray
     for name in sorted(filter(case.may_write, run.after)):
-        if killed and Path(name).name.startswith(".rosy-"):
-            continue  # nothing can remove the temporary file of a process that is killed
         if run.after[name] != run.before.get(name) and (folder / name).is_file():
             if fault := _file_fault(folder / name):
                 return Verdict.HALF_WRITTEN, f"{name}: {fault}"
-            if run.status not in (0, 130, 141, -signal.SIGKILL, 1):
+            if run.status not in (0, 130, 141, 1) and not killed:
                 return Verdict.STATUS, f"status {run.status}, but {name} was written"
     return _judge_status(case, run, stderr, killed, folder)
 
@@ -138,12 +139,10 @@ def _stopped_early(run: Run, stderr: str) -> bool:
     return interrupted and "rosy_addon" not in stderr
 
 
-def _stray_files(case: Case, run: Run, killed: bool) -> str:
+def _stray_files(case: Case, run: Run) -> str:
     """Return what was changed that should not have been, or an empty text."""
     for name in sorted(run.before.keys() | run.after.keys()):
         if case.may_write(name) or run.before.get(name) == run.after.get(name):
-            continue
-        if killed and Path(name).name.startswith(".rosy-"):
             continue
         change = "new" if name not in run.before else "changed" if name in run.after else "gone"
         return f"{name}: {change}"

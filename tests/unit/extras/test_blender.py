@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 
 import pytest
+from conftest import ROOT
+from harness.processes import becomes_true
 
 from rosy_addon.core.errors import RosyError
 from rosy_addon.extras import blender
@@ -85,3 +88,18 @@ def test_a_blender_that_fails_is_one_line(install, tmp_path, capfd):
     assert output == ""
     expected = f"rosy: {program}: Blender ended by signal 9 before the command did: no library\n"
     assert errors == expected
+
+
+def test_ctrl_c_while_blender_is_imported(tmp_path):
+    """The command stops after the import. Blender's module would go on, and print a traceback."""
+    lines = "try:", "    os.kill(os.getpid(), signal.SIGINT)", "except KeyboardInterrupt:"
+    (tmp_path / "bpy.py").write_text(
+        "\n".join(("import os, signal", *lines, "    print('caught')"))
+    )
+    (tmp_path / "tmp").mkdir()
+    variables = {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}", "TMPDIR": str(tmp_path / "tmp")}
+    words = [sys.executable, "-m", "rosy_addon", "bake", "a.blend", "--save"]
+    settings = {"cwd": tmp_path, "env": os.environ | variables, "check": False}
+    done = subprocess.run(words, capture_output=True, **settings)
+    assert (done.returncode, done.stdout, done.stderr) == (130, b"", b"rosy: stopped\n")
+    assert becomes_true(lambda: not list((tmp_path / "tmp").iterdir()))

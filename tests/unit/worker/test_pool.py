@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from harness.processes import becomes_true, is_running
 from shapes import torus
 
 from rosy_addon.compositor.look import Look
@@ -23,9 +22,6 @@ from rosy_addon.rendering.draw import draw_picture, picture_groups
 from rosy_addon.rendering.view_input import ViewInput
 from rosy_addon.worker import start
 from rosy_addon.worker.pool import POOL
-
-sys.path.append(str(Path(__file__).parent))
-from test_helper import has_ended
 
 #: Fields with many lines need many strips.
 DEGREE, WIDTH, HEIGHT = 11, 160, 1216
@@ -112,7 +108,7 @@ def test_a_picture_that_is_stopped_ends_busy_helpers():
 
     with pytest.raises(KeyboardInterrupt), listening(stop):
         drawn(VIEW, 2)
-    assert all(has_ended(pid, 0.2) for pid in pids if pid)
+    assert becomes_true(lambda: not any(is_running(pid) for pid in pids if pid), 0.2)
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ from bpy.types import Image
 
 from ..core.errors import RosyError
 from ..core.file_io import make_folder, replacing, write_bytes
+from ..image_io.exr import is_whole_exr
 from ..image_io.image_data import ImageData, image_size
 
 
@@ -172,7 +173,7 @@ def _write_images(contents: Mapping[Path, ImageData]) -> None:
             if isinstance(image_data, bytes):
                 temporary.write_bytes(image_data)
             else:
-                with _reporting(path):
+                with _checking(temporary, path):
                     _write_half_floats(temporary, image_data)
 
 
@@ -214,7 +215,7 @@ def _save_image(image: Image, image_data: ImageData, stem: Path) -> None:
     path = image_path(stem, image.is_float)
     make_folder(path.parent)
     if image.is_float:
-        with replacing(path) as (temporary,), _reporting(path):
+        with replacing(path) as (temporary,), _checking(temporary, path):
             image.file_format, image.filepath_raw = "OPEN_EXR", str(temporary)
             image.save()
     else:
@@ -226,15 +227,19 @@ def _save_image(image: Image, image_data: ImageData, stem: Path) -> None:
 
 
 @contextmanager
-def _reporting(path: Path) -> Iterator[None]:
-    """Context manager: raise the error of Blender that a file cannot be written as a `RosyError`.
+def _checking(temporary: Path, path: Path) -> Iterator[None]:
+    """Context manager: check that Blender, in the block, has written a whole .exr to a temporary path of `path`.
 
-    Blender does not say why. `replacing` has checked all else, so the disk is most likely full.
+    Blender does not say why it cannot write a file. `replacing` has checked all else, so the disk is most
+    likely full. If only the end of the file does not fit, Blender does not notice.
     """
+    reason = None
     try:
         yield
     except RuntimeError as error:
-        raise RosyError(f"{path}: cannot be written by Blender: is the disk full?") from error
+        reason = error
+    if reason is not None or not is_whole_exr(temporary):
+        raise RosyError(f"{path}: cannot be written by Blender: is the disk full?") from reason
 
 
 def _blend_relative(path: Path) -> str:

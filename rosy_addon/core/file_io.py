@@ -40,9 +40,9 @@ TEMPORARY_NAME = re.compile(r"\.rosy-(?P<machine>[0-9a-f]{8})-[0-9a-f]{16}(\.\w+
 #: Age in seconds above which a temporary file counts as abandoned.
 LEFTOVER_SECONDS = 24 * 3600
 
-#: Number of attempts to lock a folder, and seconds between them. Another process locks it exclusively only
-#: while it deletes leftovers, which takes milliseconds.
-LOCK_ATTEMPTS, LOCK_PAUSE = 20, 0.05
+#: Number of attempts to lock a folder, and seconds after each. Another process locks it exclusively only while
+#: it deletes leftovers, which takes milliseconds.
+LOCK_ATTEMPTS, LOCK_PAUSE = 10, 0.02
 
 #: Functions that return paths of further inputs: in Blender, the open file and what it links.
 INPUT_LISTERS: list[Callable[[], Iterable[str]]] = []
@@ -312,24 +312,23 @@ def check_writable(path: str | os.PathLike[str], *, follow_links: bool = False) 
         missing, or if the folder or the file is not writable.
     """
     with system_errors(path, "cannot be written"):
-        target, mode = _target(path, follow_links), None
+        target, mode = _target(path, follow_links), 0
         # From Python 3.14 on, the methods of Path hide errors, such as a name that is too long.
         with suppress(FileNotFoundError, NotADirectoryError):
             mode = os.lstat(target).st_mode
         folder = (target if Path(path).is_symlink() else Path(path)).parent
-        is_link = mode is not None and stat.S_ISLNK(mode)
+        is_file, is_link = stat.S_ISREG(mode), stat.S_ISLNK(mode)
         if is_link and follow_links:  # even after it was resolved, so it leads to itself
             raise RosyError(f"{path}: cannot be written: it is a link to itself")
-        if mode is not None and stat.S_ISDIR(mode):
+        if stat.S_ISDIR(mode):
             raise RosyError(f"{path}: cannot be written: it is a folder")
-        if mode is not None and not stat.S_ISREG(mode) and not is_link:
+        if mode and not is_file and not is_link:
             raise RosyError(f"{path}: cannot be written: it is not a regular file")
         if not folder.is_dir():
             raise RosyError(f"{path}: cannot be written: the folder {folder} does not exist")
-        is_file = mode is not None and not is_link
         if not os.access(folder, os.W_OK) or (is_file and not os.access(target, os.W_OK)):
             raise RosyError(f"{path}: cannot be written: permission denied")
-        if mode is not None and _is_input(target):
+        if mode and _is_input(target):
             raise RosyError(f"{path}: is also an input: choose another output file")
 
 

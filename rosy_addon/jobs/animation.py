@@ -36,7 +36,7 @@ from ..projection.camera import Camera
 from ..rendering.marks import sequence_key
 from ..rendering.view_input import ViewInput
 from ..scene import pictures
-from ..scene.blender_images import frame_path, write_frame
+from ..scene.blender_images import frame_path, write_images
 from ..scene.cameras import CameraSource, frame_camera
 from ..scene.evaluated_field import temp_attributes
 from ..scene.files import picture_stem
@@ -306,7 +306,7 @@ def _frame_steps(
             )
             _, image_data = yield from part(steps, start, stop)
             sidecar.unlink(missing_ok=True)
-            write_frame(path, image_data)
+            write_images({path: image_data})
             write_bytes(sidecar, _sidecar_text(input_hash, path))
         state = replace(state, device=device)
         drawn.append(_Frame(name, frame, view.camera, up_to_date, state))

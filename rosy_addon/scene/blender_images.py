@@ -111,7 +111,7 @@ def _load_tiles(name: str, tiles: Mapping[int, ImageData], stem: Path, is_color:
         number: image_path(stem.with_name(f"{stem.name}.{number}"), as_float)
         for number in sorted(tiles)
     }
-    _write_images({path: tiles[number] for number, path in paths.items()})
+    write_images({path: tiles[number] for number, path in paths.items()})
     first = next(iter(paths.values()))
     image = bpy.data.images.load(_blend_relative(first), check_existing=False)
     image.name = name
@@ -144,28 +144,22 @@ def _suffix(as_float: bool) -> str:
     return ".exr" if as_float else ".png"
 
 
-def write_frame(path: Path, image_data: ImageData) -> None:
-    """Write a frame of an image sequence as an 8-bit .png or as an .exr with half floats.
+def write_images(contents: Mapping[Path, ImageData]) -> None:
+    """Write frames of image sequences, or UDIM tiles, as 8-bit .png files or as .exr files with half floats.
 
-    If writing fails, no partial file is left.
+    If one of them cannot be written, none is, and no partial file is left.
 
     Parameters
     ----------
-    path : Path
-        The file, with its suffix.
-    image_data : ImageData
-        The bytes of a PNG file, or an array of linear values, which is written as an .exr.
+    contents : mapping of Path to ImageData
+        For each file, with its suffix, the bytes of a PNG file, or an array of linear values, which is written
+        as an .exr.
 
     Raises
     ------
     RosyError
-        If the file cannot be written.
+        If a file cannot be written.
     """
-    _write_images({path: image_data})
-
-
-def _write_images(contents: Mapping[Path, ImageData]) -> None:
-    """Write image files as `write_frame` does, all of them or, if one cannot be written, none."""
     for path in contents:
         make_folder(path.parent)
     with replacing(*contents) as temporaries:

@@ -17,7 +17,7 @@ from rosy.rosy_addon.jobs.animation import bake_animation
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.jobs.bake_texture import bake_texture
 from rosy.rosy_addon.jobs.draw_strokes import draw_strokes
-from rosy.rosy_addon.scene.blender_images import new_image, new_tiled_image, write_frame
+from rosy.rosy_addon.scene.blender_images import new_image, new_tiled_image, write_images
 from scenes import add_uv, expect_error
 
 OLD = b"the previous contents"
@@ -139,7 +139,7 @@ def noise(size):
 #: Functions that write two .exr files: full floats, half floats and tiles.
 EXR_WRITERS = {
     "picture": lambda path: new_image("a", noise(64), stem=path.with_suffix("")),
-    "frame": lambda path: write_frame(path, noise(64)),
+    "frame": lambda path: write_images({path: noise(64)}),
     "tiles": lambda path: new_tiled_image(
         "a", {1001: noise(8), 1002: noise(64)}, stem=path.with_suffix("")
     ),

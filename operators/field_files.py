@@ -193,6 +193,7 @@ class ROSY_OT_field_export(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Ex
                 )
         else:
             field = read_mesh_field(mesh, surface=surface)
-        check_writable(path)
-        write_bytes(path, (yield Call(field_file, (path, field, surface))))
+        check_writable(path, follow_links=True)
+        contents = yield Call(field_file, (path, field, surface))
+        write_bytes(path, contents, follow_links=True)
         return path

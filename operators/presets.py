@@ -200,5 +200,5 @@ class ROSY_OT_preset_export(_PresetOperator, bpy.types.Operator, ExportHelper):
     def act(self, context: bpy.types.Context) -> None:
         path = Path(bpy.path.abspath(self.filepath))
         preset = store.load_preset(_target_preset(self, context), user_presets_folder())
-        store.write_preset(path, preset)
+        store.write_preset(path, preset, follow_links=True)
         self.report_done(f"Wrote {path}")

@@ -65,7 +65,7 @@ class ROSY_OT_turntable(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Expor
 
     def begin(self, context: bpy.types.Context) -> Steps[Path]:
         path = Path(bpy.path.abspath(self.filepath))
-        check_writable(path)
+        check_writable(path, follow_links=True)
         check_video_path(path)
         return render_turntable.begin(
             context.scene,

@@ -96,7 +96,7 @@ class Drawing:
             contents = self.svg.encode()
         else:
             contents = polyline_file(suffix, self._strokes, self._camera, self._pen, self._up)
-        write_bytes(path, contents)
+        write_bytes(path, contents, follow_links=True)
 
 
 def strokes(

@@ -222,7 +222,8 @@ def save_figures(path: str | os.PathLike[str], figures: Figure | Sequence[Figure
     """
     pages = list(figures) if isinstance(figures, Sequence) else [figures]
     check_figure_path(Path(path), len(pages))
-    write_bytes(path, load_drawing().encode_figures(pages, Path(path).suffix.lower()))
+    contents = load_drawing().encode_figures(pages, Path(path).suffix.lower())
+    write_bytes(path, contents, follow_links=True)
 
 
 def check_figure_path(path: Path, count: int = 1) -> None:

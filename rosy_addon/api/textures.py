@@ -12,13 +12,15 @@ from numpy.typing import ArrayLike
 
 from ..compositor.flow import Drift
 from ..compositor.look import Look, is_hatched
-from ..compositor.picture import Picture
+from ..compositor.picture import Picture, check_png_path
 from ..compositor.shading import Light
 from ..core.color import to_linear
 from ..core.errors import RosyError
+from ..core.file_io import replacing
 from ..field.field import Field
 from ..field.frames import unit_direction
 from ..field.surface import Surface
+from ..image_io.png import png_bytes
 from ..projection.gbuffer import MeshInstance
 from ..surface_texture.draw import CONTENTS, DEFAULT_MARGIN, DEFAULT_SIZE, draw_texture
 from .field import warn
@@ -79,7 +81,8 @@ class Texture:
         Parameters
         ----------
         path : path-like
-            ``<UDIM>`` in the name of the file stands for the number of the tile, as in Blender.
+            ``<UDIM>`` in the name of the file stands for the number of the tile, as in Blender. All tiles are
+            written, or none. A tile replaces a link of its name, and not the target of the link.
 
         Raises
         ------
@@ -88,12 +91,18 @@ class Texture:
             file cannot be written.
         """
         path = Path(path)
-        if len(self.tiles) > 1 and UDIM_TOKEN not in path.name:
-            raise RosyError(
-                f"{path}: the name of the file has no {UDIM_TOKEN} for the number of the tile"
-            )
-        for number, picture in self.tiles.items():
-            picture.save(path.with_name(path.name.replace(UDIM_TOKEN, str(number))))
+        if UDIM_TOKEN not in path.name:
+            if len(self.tiles) > 1:
+                raise RosyError(
+                    f"{path}: the name of the file has no {UDIM_TOKEN} for the number of the tile"
+                )
+            self._first().save(path)
+            return
+        check_png_path(path)
+        names = [path.name.replace(UDIM_TOKEN, str(number)) for number in self.tiles]
+        with replacing(*map(path.with_name, names)) as temporaries:
+            for temporary, picture in zip(temporaries, self.tiles.values(), strict=True):
+                temporary.write_bytes(png_bytes(picture.rgba))
 
 
 def texture(

@@ -18,7 +18,7 @@ import numpy as np
 from ..api.pictures import DEFAULT_VIEW, TONE_SOURCES, VERTEX_COLOR, picture_look
 from ..compositor.look import Look
 from ..core.errors import RosyError
-from ..core.file_io import check_writable
+from ..core.file_io import add_input, check_writable
 from ..core.settings import Number, Numbers, Setting, Switch, settings_of
 from ..field.rosy_field import check_degree
 from ..field.up_axis import UP_AXIS_MATRIX
@@ -219,16 +219,14 @@ class Options(argparse.Namespace):
             If the name has another extension, the file cannot be written, or another option names it as
             an input.
         """
-        check_writable(self.output)
-        if suffix and self.output.suffix.lower() != suffix:
-            raise RosyError(f"{self.output}: the name of the file must end in {suffix}")
-        if not os.path.exists(self.output):
-            return
         for name, value in vars(self).items():
             for path in value if isinstance(value, list) else [value]:
-                is_path = name != "output" and isinstance(path, (str, os.PathLike))
-                if is_path and os.path.exists(path) and os.path.samefile(path, self.output):
-                    raise RosyError(f"{self.output}: is also an input: choose another output file")
+                if name != "output" and isinstance(path, (str, os.PathLike)):
+                    add_input(path)
+                    add_input(str(path).partition("=")[2])  # of TITLE=FIELD
+        check_writable(self.output, follow_links=True)
+        if suffix and self.output.suffix.lower() != suffix:
+            raise RosyError(f"{self.output}: the name of the file must end in {suffix}")
 
     def check_only_for(self, kind: str, file: Path | str) -> None:
         """Raise an error if an option of `CommandParser.only_for` is given for a file of another kind.

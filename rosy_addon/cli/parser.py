@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import REPORTED_ERRORS, error_text, telling_warnings
-from ..core.file_io import os_error_text
+from ..core.file_io import guarding_inputs, os_error_text
 from ..rendering.turntable import Encoder
 from .bake import add_bake_command
 from .field import add_compare_command, add_field_command, add_info_command
@@ -89,7 +89,7 @@ def main(
     try:
         parser = _build_parser(prog, extras)
         options = parser.parse_args(_join_negative_values(arguments), Options())
-        with telling_warnings(print_error):
+        with guarding_inputs(), telling_warnings(print_error):
             options.run(options)
         output_stream().flush()
     except REPORTED_ERRORS as error:

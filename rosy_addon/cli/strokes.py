@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import re
 import sys
 from dataclasses import replace
@@ -14,6 +13,7 @@ from typing import Any
 from .. import api
 from ..api.pictures import DEFAULT_SIZE
 from ..core.errors import RosyError
+from ..core.file_io import check_writable
 from ..field.mesh_io import READERS
 from ..line_drawing.polyline_files import check_drawing_suffix
 from ..line_drawing.style import StrokeStyle
@@ -100,10 +100,13 @@ def _draw_scene_strokes(options: Options) -> None:
     scene = open_scene(options, "strokes", options.mesh)
     if options.frames is None:
         _draw_frame_strokes(options, scene, output)
-    for frame in frames:
+    paths = {frame: _path_of_frame(output, frame) for frame in frames}
+    for path in paths.values():
+        check_writable(path, follow_links=path == output)
+    for frame, path in paths.items():
         scene.frame_set(frame)
         try:
-            _draw_frame_strokes(options, scene, _path_of_frame(output, frame))
+            _draw_frame_strokes(options, scene, path)
         except RosyError as error:
             raise RosyError(f"frame {frame}: {error}") from None
 
@@ -132,7 +135,9 @@ def _draw_frame_strokes(options: Options, scene: Any, path: Path) -> None:
     objects = requested_objects(options) or target_objects(scene, layer)
     style = read_stroke_style(settings).with_settings(options.requested_settings())
     pen = pen_of(options, read_pen(settings))
-    output = {"kind": "FILE", "path": Path(os.path.realpath(path)), "size": options.size}
+    # Names with the number of a frame are not those that the user has given, so links are not followed.
+    output = {"kind": "FILE", "path": path.absolute(), "follow_links": path == options.output}
+    output |= {"size": options.size}
     result = draw_strokes(scene, objects=objects, camera=camera, style=style, pen=pen, **output)
     print_warnings(result.notes)
     print_line(f"{result.camera}: {result.path}")

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from ..annotation.singularity_marks import SingularityMarks
 from ..core.errors import RosyError
-from ..image_io.png import png_bytes, to_srgb_uint8, write_png
+from ..core.file_io import write_bytes
+from ..image_io.png import png_bytes, to_srgb_uint8
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -80,9 +81,14 @@ class Picture:
         RosyError
             If the name does not end in ``.png``, or the file cannot be written.
         """
-        if Path(path).suffix.lower() != ".png":
-            raise RosyError(f"{path}: the name of the file must end in .png")
-        write_png(path, self.rgba)
+        check_png_path(path)
+        write_bytes(path, png_bytes(self.rgba), follow_links=True)
+
+
+def check_png_path(path: str | os.PathLike[str]) -> None:
+    """Raise a `RosyError` if the name of a file does not end in ``.png``."""
+    if Path(path).suffix.lower() != ".png":
+        raise RosyError(f"{path}: the name of the file must end in .png")
 
 
 def common_color_range(ranges: Collection[tuple[float, float]]) -> tuple[float, float] | None:

@@ -1,4 +1,8 @@
-"""Read whole files and write them atomically. All errors are raised as `RosyError`."""
+"""Read whole files and write them atomically. All errors are raised as `RosyError`.
+
+No file is replaced that is an input: `check_writable` compares each output with all inputs. These are the files
+that were read in a `guarding_inputs` block, and the files that `INPUT_LISTERS` return.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +11,20 @@ import platform
 import re
 import secrets
 import stat
+import sys
 import time
 import zlib
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from contextvars import ContextVar
 from pathlib import Path
 from typing import BinaryIO
 
 from .errors import RosyError
 from .memory import check_memory, format_bytes
+
+if sys.platform != "win32":
+    import fcntl
 
 #: A file counts as binary if one of this number of bytes at its beginning is zero.
 HEAD_BYTES = 4096
@@ -24,12 +33,39 @@ HEAD_BYTES = 4096
 #: that each word and each line takes while the file is parsed.
 COUNTED_BYTES, WORD_MEMORY, LINE_MEMORY = 1 << 16, 110, 200
 
-#: Pattern of the names of temporary files. They contain a hash of the name of the machine, the id of the
-#: process that writes the file, and a random number.
-TEMPORARY_NAME = re.compile(r"\.rosy-(?P<host>[0-9a-f]{8})-(?P<pid>\d{1,10})-[0-9a-f]{16}(\.\w+)?$")
+#: Pattern of the names of temporary files. They contain a hash that identifies the machine, and a random
+#: number.
+TEMPORARY_NAME = re.compile(r"\.rosy-(?P<machine>[0-9a-f]{8})-[0-9a-f]{16}(\.\w+)?$")
 
 #: Age in seconds above which a temporary file counts as abandoned.
 LEFTOVER_SECONDS = 24 * 3600
+
+#: Number of attempts to lock a folder, and seconds after each. Another process locks it exclusively only while
+#: it deletes leftovers, which takes milliseconds.
+LOCK_ATTEMPTS, LOCK_PAUSE = 10, 0.02
+
+#: Functions that return paths of further inputs: in Blender, the open file and what it links.
+INPUT_LISTERS: list[Callable[[], Iterable[str]]] = []
+
+#: Paths of the files that were read in a `guarding_inputs` block; None outside of one.
+_read_files: ContextVar[set[str] | None] = ContextVar("rosy_read_files", default=None)
+
+
+@contextmanager
+def guarding_inputs() -> Iterator[None]:
+    """Context manager: in its block, no file is replaced that was read in the block before."""
+    token = _read_files.set(set())
+    try:
+        yield
+    finally:
+        _read_files.reset(token)
+
+
+def add_input(path: str | os.PathLike[str]) -> None:
+    """Note that a file is an input. `guarding_inputs` then guards it, also if it has not been read yet."""
+    read_files = _read_files.get()
+    if read_files is not None:
+        read_files.add(os.fspath(path))
 
 
 def read_bytes(
@@ -75,6 +111,7 @@ def open_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         if not stat.S_ISREG(os.stat(path).st_mode) and not os.path.isdir(path):
             raise RosyError(f"{path}: cannot be read: it is not a regular file")
         with open(path, "rb") as file:
+            add_input(path)
             yield file
 
 
@@ -130,50 +167,104 @@ def check_parsing_memory(path: str | os.PathLike[str], binary_memory: float) -> 
     check_memory(size * memory_per_byte, subject, "choose a smaller file")
 
 
-def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
+def write_bytes(path: str | os.PathLike[str], data: bytes, *, follow_links: bool = False) -> None:
     """Write a file atomically: a reader finds either the old contents or all new contents.
+
+    `follow_links` is as for `replacing`.
 
     Raises
     ------
     RosyError
         If the folder is missing, or the file cannot be written. An existing file is then not changed.
     """
-    with replacing(path) as temporary, open(temporary, "xb") as file:
+    with replacing(path, follow_links=follow_links) as (temporary,), open(temporary, "xb") as file:
         file.write(data)
 
 
 @contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Context manager: replace a file atomically. A reader finds either the old contents or all new contents.
+def replacing(*paths: str | os.PathLike[str], follow_links: bool = False) -> Iterator[list[Path]]:
+    """Context manager: replace files atomically. A reader finds either the old contents or all new contents.
 
-    Links are followed. The permissions of an existing file are kept.
+    All files are checked before one is written, and all are written before one is replaced. The permissions
+    of existing files are kept.
+
+    Parameters
+    ----------
+    *paths : path-like
+    follow_links : bool
+        Whether the target of a link is replaced, and not the link itself. It is meant for paths that the user
+        has named. The name of a file that RoSy has chosen may be a link that somebody else has made.
 
     Yields
     ------
-    Path
-        A temporary path in the same folder, with the same suffix. The block writes the new contents to it. At
-        the end of the block, the temporary file replaces the target. If there is an error, it is deleted.
+    list of Path
+        For each path, a temporary path in the same folder, with the same suffix. The block writes the new
+        contents to it. At the end of the block, the temporary files replace their targets. If there is an
+        error, they are deleted.
 
     Raises
     ------
     RosyError
         If `check_writable` raises it, or if an `OSError` is raised in the block.
     """
-    check_writable(path)
-    target = Path(os.path.realpath(path))
-    remove_leftovers(target.parent)
-    token = f"{_host_token()}-{os.getpid()}-{secrets.token_hex(8)}"
-    temporary = target.with_name(f".rosy-{token}{target.suffix}")
-    try:
-        yield temporary
-        if target.exists():
-            os.chmod(temporary, target.stat().st_mode & 0o777)
-        os.replace(temporary, target)
-    except BaseException as error:  # an interrupt as well
-        temporary.unlink(missing_ok=True)
-        if isinstance(error, OSError):
-            raise RosyError(f"{path}: cannot be written: {os_error_text(error)}") from error
-        raise
+    for path in paths:
+        check_writable(path, follow_links=follow_links)
+    targets = [_target(path, follow_links) for path in paths]
+    token = _machine_token()
+    temporaries = [
+        target.with_name(f".rosy-{token}-{secrets.token_hex(8)}{target.suffix}")
+        for target in targets
+    ]
+    with ExitStack() as locks:
+        for folder in {target.parent for target in targets}:
+            remove_leftovers(folder)
+            locks.enter_context(_folder_lock(folder))
+        try:
+            yield temporaries
+            for temporary, target in zip(temporaries, targets, strict=True):
+                if target.is_file() and not target.is_symlink():
+                    os.chmod(temporary, target.stat().st_mode & 0o777)
+            for temporary, target in zip(temporaries, targets, strict=True):
+                os.replace(temporary, target)
+        except BaseException as error:  # an interrupt as well
+            for temporary in temporaries:
+                temporary.unlink(missing_ok=True)
+            if isinstance(error, OSError):
+                reason = os_error_text(error)
+                raise RosyError(f"{paths[0]}: cannot be written: {reason}") from error
+            raise
+
+
+def _target(path: str | os.PathLike[str], follow_links: bool) -> Path:
+    """Return the path of the file that is replaced when `path` is written."""
+    return Path(os.path.realpath(path) if follow_links else path)
+
+
+@contextmanager
+def _folder_lock(folder: str | os.PathLike[str], *, exclusive: bool = False) -> Iterator[bool]:
+    """Context manager: lock a folder, and yield whether it is locked.
+
+    Processes that write to the folder share the lock. A process that gets the lock exclusively knows that none
+    of them runs. The lock holds on the whole machine, also for processes in other containers, which cannot see
+    each other, and ends with its process. Windows has no such lock.
+    """
+    if sys.platform == "win32":
+        yield False
+        return
+    operation = fcntl.LOCK_NB | (fcntl.LOCK_EX if exclusive else fcntl.LOCK_SH)
+    is_locked = False
+    with ExitStack() as stack:
+        with suppress(OSError):
+            descriptor = os.open(folder, os.O_RDONLY)
+            stack.callback(os.close, descriptor)
+            # It does not wait for long, as the lock may be of the program that has started this one.
+            for _ in range(1 if exclusive else LOCK_ATTEMPTS):
+                with suppress(BlockingIOError):
+                    fcntl.flock(descriptor, operation)
+                    is_locked = True
+                    break
+                time.sleep(LOCK_PAUSE)
+        yield is_locked
 
 
 def remove_leftovers(folder: str | os.PathLike[str]) -> None:
@@ -182,59 +273,75 @@ def remove_leftovers(folder: str | os.PathLike[str]) -> None:
     Files of processes that are running, or that may be running on another machine, are kept, unless they are
     older than `LEFTOVER_SECONDS`.
     """
-    with suppress(OSError), os.scandir(folder) as entries:
-        for entry in entries:
-            match = TEMPORARY_NAME.match(entry.name)
-            if match is None:
-                continue
+    names: list[str] = []
+    with suppress(OSError):
+        names = [name for name in os.listdir(folder) if TEMPORARY_NAME.match(name)]
+    if not names:
+        return
+    own_prefix = f".rosy-{_machine_token()}-"
+    with _folder_lock(folder, exclusive=True) as is_unused:
+        for name in names:
+            path = os.path.join(folder, name)
             with suppress(OSError):
-                age = time.time() - entry.stat(follow_symlinks=False).st_mtime
-                is_own_host = match["host"] == _host_token()
-                if age > LEFTOVER_SECONDS or (is_own_host and not _is_running(int(match["pid"]))):
-                    os.unlink(entry.path)
+                age = time.time() - os.lstat(path).st_mtime
+                if age > LEFTOVER_SECONDS or (is_unused and name.startswith(own_prefix)):
+                    os.unlink(path)
 
 
-def _host_token() -> str:
-    """Return 8 hexadecimal digits that identify this machine: a hash of its name."""
-    return f"{zlib.crc32(platform.node().encode()):08x}"
+def _machine_token() -> str:
+    """Return 8 hexadecimal digits that identify this machine since its start.
+
+    They are a hash of the ID that Linux has made at its start, which is the same in all containers, or else
+    of the name of the machine.
+    """
+    identity = platform.node()
+    with suppress(OSError):
+        identity = Path("/proc/sys/kernel/random/boot_id").read_text()
+    return f"{zlib.crc32(identity.encode()):08x}"
 
 
-def _is_running(pid: int) -> bool:
-    """Return whether a process of this machine is running. Return True if this is not known."""
-    if os.name != "posix":
-        return True  # on other systems, the signal 0 ends a process
-    try:
-        os.kill(pid, 0)
-    except (OSError, OverflowError) as error:
-        return not isinstance(error, ProcessLookupError)
-    return True
-
-
-def check_writable(path: str | os.PathLike[str]) -> None:
+def check_writable(path: str | os.PathLike[str], *, follow_links: bool = False) -> None:
     """Check that a file could be written. Call this before long work that computes its contents.
+
+    `follow_links` is as for `replacing`.
 
     Raises
     ------
     RosyError
-        If the path exists and is not a regular file, if its name is too long, if its folder is missing, or if
-        the folder or the file is not writable.
+        If the path exists and is not a regular file, or is an input, if its name is too long, if its folder is
+        missing, or if the folder or the file is not writable.
     """
     with system_errors(path, "cannot be written"):
-        target = Path(os.path.realpath(path))
+        target, mode = _target(path, follow_links), 0
         # From Python 3.14 on, the methods of Path hide errors, such as a name that is too long.
         with suppress(FileNotFoundError, NotADirectoryError):
-            os.lstat(target)
+            mode = os.lstat(target).st_mode
         folder = (target if Path(path).is_symlink() else Path(path)).parent
-        if target.is_symlink():  # even after it was resolved, so it leads to itself
+        is_file, is_link = stat.S_ISREG(mode), stat.S_ISLNK(mode)
+        if is_link and follow_links:  # even after it was resolved, so it leads to itself
             raise RosyError(f"{path}: cannot be written: it is a link to itself")
-        if target.is_dir():
+        if stat.S_ISDIR(mode):
             raise RosyError(f"{path}: cannot be written: it is a folder")
-        if target.exists() and not target.is_file():
+        if mode and not is_file and not is_link:
             raise RosyError(f"{path}: cannot be written: it is not a regular file")
         if not folder.is_dir():
             raise RosyError(f"{path}: cannot be written: the folder {folder} does not exist")
-        if not os.access(folder, os.W_OK) or (target.exists() and not os.access(target, os.W_OK)):
+        if not os.access(folder, os.W_OK) or (is_file and not os.access(target, os.W_OK)):
             raise RosyError(f"{path}: cannot be written: permission denied")
+        if mode and _is_input(target):
+            raise RosyError(f"{path}: is also an input: choose another output file")
+
+
+def _is_input(path: Path) -> bool:
+    """Return whether an existing file is an input. The input may have another path that leads to the file."""
+    status = os.lstat(path)
+    inputs = {*(_read_files.get() or ()), *(name for names in INPUT_LISTERS for name in names())}
+    for name in inputs:
+        for status_of in (os.stat, os.lstat):
+            with suppress(OSError, ValueError):
+                if os.path.samestat(status_of(name), status):
+                    return True
+    return False
 
 
 def check_folder(folder: str | os.PathLike[str]) -> None:

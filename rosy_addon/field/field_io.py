@@ -342,7 +342,7 @@ def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface
     --------
     load_field : Description of the formats.
     """
-    write_bytes(path, field_file(path, field, surface))
+    write_bytes(path, field_file(path, field, surface), follow_links=True)
     if Path(path).suffix.lower() == ".obj":
         members = vertex_members(surface, field)
         stored = validated_field(surface, members, field.degree, str(path), domain="vertex")

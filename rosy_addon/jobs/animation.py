@@ -11,6 +11,7 @@ write to one folder; at worst they draw a frame twice.
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -23,13 +24,19 @@ from bpy.types import Object, Scene
 from ..compositor.look import Look, has_flow
 from ..core.cache import Cache, content_hash
 from ..core.errors import RosyError
-from ..core.file_io import check_folder, check_writable, read_bytes, remove_leftovers, write_bytes
+from ..core.file_io import (
+    check_folder,
+    check_writable,
+    remove_leftovers,
+    system_errors,
+    write_bytes,
+)
 from ..gpu.select import image_steps, select_device
 from ..projection.camera import Camera
 from ..rendering.marks import sequence_key
 from ..rendering.view_input import ViewInput
 from ..scene import pictures
-from ..scene.blender_images import frame_path, write_frame
+from ..scene.blender_images import frame_path, write_images
 from ..scene.cameras import CameraSource, frame_camera
 from ..scene.evaluated_field import temp_attributes
 from ..scene.files import picture_stem
@@ -287,18 +294,19 @@ def _frame_steps(
         up_to_date = (
             path.is_file()
             and sidecar.is_file()
-            and read_bytes(sidecar) == _sidecar_text(input_hash, path)
+            and _own_bytes(sidecar) == _sidecar_text(input_hash, path)
         )
         if not up_to_date:
-            if sidecar.exists():
-                check_writable(sidecar)
+            for output in (path, sidecar):
+                if os.path.lexists(output):
+                    check_writable(output)
             # The G-buffer is kept if streaks drift, as it may be the same in the next frame.
             steps = image_steps(
                 view, device, settings.as_float, keep_gbuffers=has_flow(look), workers=workers
             )
             _, image_data = yield from part(steps, start, stop)
             sidecar.unlink(missing_ok=True)
-            write_frame(path, image_data)
+            write_images({path: image_data})
             write_bytes(sidecar, _sidecar_text(input_hash, path))
         state = replace(state, device=device)
         drawn.append(_Frame(name, frame, view.camera, up_to_date, state))
@@ -315,8 +323,14 @@ def _path_of_frame(
 
 def _sidecar_text(input_hash: bytes, path: Path) -> bytes:
     """Return the contents of the sidecar file of the picture at `path`."""
-    picture_hash = content_hash(np.frombuffer(read_bytes(path), dtype=np.uint8))
+    picture_hash = content_hash(np.frombuffer(_own_bytes(path), dtype=np.uint8))
     return f"{SIDECAR_HEADER}\n{input_hash.hex()}\n{picture_hash.hex()}\n".encode()
+
+
+def _own_bytes(path: Path) -> bytes:
+    """Return the contents of a picture or a sidecar file. It is no input (`read_bytes`): it may be replaced."""
+    with system_errors(path, "cannot be read"):
+        return path.read_bytes()
 
 
 def _input_hash(view: ViewInput, device: str, settings: pictures.OutputSettings) -> bytes:

@@ -79,6 +79,7 @@ def bake(
     )
     BAKE_CACHE.evict_over_limit()
     pictures.check_targets(scene_data.objects, settings)
+    pictures.check_files(settings, [view.camera.name for view in views])
     states = read_picture_states(scene, depsgraph, sources, scene_data.mesh_states)
     device = select_device(settings.device, look)
     drawings = []

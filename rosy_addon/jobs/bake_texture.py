@@ -14,7 +14,13 @@ from ..scene.look_inputs import color_attribute_of
 from ..scene.look_properties import drift_in_scene, read_look
 from ..scene.meshes import uv_map_name
 from ..scene.picture_state import bakes_light, read_texture_state
-from ..scene.pictures import apply_texture, check_targets, read_output_settings
+from ..scene.pictures import (
+    apply_texture,
+    check_files,
+    check_targets,
+    read_output_settings,
+    texture_kind,
+)
 from ..scene.read_view import read_lights, read_texture_input, scene_depsgraph
 from ..scene.texture_nodes import Hatching
 from ..surface_texture.draw import TextureSettings, draw_texture_images, texture_colors_values
@@ -69,13 +75,14 @@ def bake_texture(scene: Scene, objects: Sequence[Object]) -> Steps[list[TextureR
         for obj in objects
     }
     check_targets(objects, settings)
+    is_udim = scene.rosy.texture_udim
+    check_files(settings, [obj.name for obj in objects], texture_kind(content), is_udim=is_udim)
     depsgraph = scene_depsgraph(scene)
     lights = None
     if bakes_light(scene.rosy, look):
         lights = read_lights(depsgraph, np.eye(4))  # in world space
         if not lights:
             raise RosyError(f"scene '{scene.name}' has no lights: add one, or turn Bake Light off")
-    is_udim = scene.rosy.texture_udim
     drift = drift_in_scene(scene, look, scene.frame_current_final)
     texture_settings = TextureSettings(
         scene.rosy.texture_size, scene.rosy.texture_margin, is_udim, content, drift

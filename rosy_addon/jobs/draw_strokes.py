@@ -63,6 +63,7 @@ def draw_strokes(
     style: StrokeStyle | None = None,
     pen: Pen | None = None,
     size: tuple[int, int] | None = None,
+    follow_links: bool = True,
 ) -> Steps[StrokeResult]:
     """Cover the objects of a scene with strokes along their fields.
 
@@ -92,6 +93,9 @@ def draw_strokes(
     size : (int, int), optional
         Width and height in pixels of the picture to which lengths in pixels refer. By default the render
         resolution of the scene.
+    follow_links : bool
+        Whether the target of a link is replaced, if `path` is one, and not the link itself. Links at the path
+        that is set in the scene are not followed, as somebody else may have made the file.
 
     Returns
     -------
@@ -108,9 +112,10 @@ def draw_strokes(
     style = read_stroke_style(settings) if style is None else style
     pen = read_pen(settings) if pen is None else pen
     if kind == "FILE":
+        follow_links = follow_links and path is not None
         path = absolute_path(str(settings.filepath if path is None else path))
         suffix = check_drawing_suffix(path)
-        check_writable(path)
+        check_writable(path, follow_links=follow_links)
     depsgraph = scene_depsgraph(scene)
     source = render_camera(scene) if camera is None else camera
     view = resolve_camera(scene, depsgraph, source, render_size(scene) if size is None else size)
@@ -122,7 +127,7 @@ def draw_strokes(
     inputs = StrokeInput(scene_data.instances, view, style, pen, lights)
     if kind == "FILE":
         drawing, contents = yield Call(drawing_file, (suffix, inputs))
-        write_bytes(path, contents)
+        write_bytes(path, contents, follow_links=follow_links)
         return StrokeResult(view.name, drawing, path=path, notes=scene_data.warnings)
     drawing, curves = yield Call(drawing_curves, (inputs, followed), 0.0, 0.97)
     yield Step(0.97, "storing the strokes")

@@ -84,7 +84,7 @@ def render_turntable(
     draw = partial(_frame_steps, device=device, as_gif=as_gif, still=still, workers=workers)
     contents = yield from turntable.video_steps(draw, views, count, path, rate, encode_video.begin)
     yield Step(1.0, "writing the file")
-    write_bytes(path, contents)
+    write_bytes(path, contents, follow_links=True)
     return path
 
 

@@ -213,8 +213,12 @@ def read_preset(path: str | os.PathLike[str]) -> Preset:
         raise RosyError(f"{path}: {reason}") from None
 
 
-def write_preset(path: str | os.PathLike[str], preset: Preset) -> None:
+def write_preset(
+    path: str | os.PathLike[str], preset: Preset, *, follow_links: bool = False
+) -> None:
     """Write a preset file with the settings that differ from the default look.
+
+    `follow_links` says whether the target of a link is replaced, and not the link itself.
 
     Raises
     ------
@@ -224,7 +228,7 @@ def write_preset(path: str | os.PathLike[str], preset: Preset) -> None:
     _validated(preset)
     data = preset._asdict() | {"look": changed_settings(preset.look)}
     text = json.dumps(data, indent=2, ensure_ascii=False) + "\n"
-    write_bytes(path, text.encode("utf-8"))
+    write_bytes(path, text.encode("utf-8"), follow_links=follow_links)
 
 
 def changed_settings(look: Look) -> dict[str, Any]:

@@ -167,7 +167,8 @@ def turntable(
         return call_steps(encode, *arguments)
 
     draw_steps = partial(call_steps, draw_numbered)
-    write_bytes(path, run(video_steps(draw_steps, views, count, path, fps, encode_steps)))
+    contents = run(video_steps(draw_steps, views, count, path, fps, encode_steps))
+    write_bytes(path, contents, follow_links=True)
     return path
 
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
+import numpy as np
 from bpy.types import Image
 
 from ..core.errors import RosyError
-from ..core.file_io import check_writable, make_folder, replacing, write_bytes
+from ..core.file_io import make_folder, replacing, write_bytes
+from ..image_io.exr import is_whole_exr
 from ..image_io.image_data import ImageData, image_size
 
 
@@ -104,10 +107,11 @@ def _load_tiles(name: str, tiles: Mapping[int, ImageData], stem: Path, is_color:
     values are colors instead of data.
     """
     as_float = not all(isinstance(tile, bytes) for tile in tiles.values())
-    suffix = _suffix(as_float)
-    paths = {number: stem.with_name(f"{stem.name}.{number}{suffix}") for number in sorted(tiles)}
-    for number, path in paths.items():
-        write_frame(path, tiles[number])
+    paths = {
+        number: image_path(stem.with_name(f"{stem.name}.{number}"), as_float)
+        for number in sorted(tiles)
+    }
+    write_images({path: tiles[number] for number, path in paths.items()})
     first = next(iter(paths.values()))
     image = bpy.data.images.load(_blend_relative(first), check_existing=False)
     image.name = name
@@ -127,7 +131,12 @@ def frame_path(stem: Path, frame: int, as_float: bool) -> Path:
 
     The suffix is .exr if `as_float`, otherwise .png.
     """
-    return stem.with_name(f"{stem.name}_{frame:04d}{_suffix(as_float)}")
+    return image_path(stem.with_name(f"{stem.name}_{frame:04d}"), as_float)
+
+
+def image_path(stem: Path, as_float: bool) -> Path:
+    """Return the path of an image file: stem, suffix. The stem may have dots."""
+    return stem.with_name(stem.name + _suffix(as_float))
 
 
 def _suffix(as_float: bool) -> str:
@@ -135,39 +144,44 @@ def _suffix(as_float: bool) -> str:
     return ".exr" if as_float else ".png"
 
 
-def write_frame(path: Path, image_data: ImageData) -> None:
-    """Write a frame of an image sequence, or a UDIM tile, as an 8-bit .png or as an .exr with half floats.
+def write_images(contents: Mapping[Path, ImageData]) -> None:
+    """Write frames of image sequences, or UDIM tiles, as 8-bit .png files or as .exr files with half floats.
 
-    If writing fails, no partial file is left.
+    If one of them cannot be written, none is, and no partial file is left.
 
     Parameters
     ----------
-    path : Path
-        The file, with its suffix.
-    image_data : ImageData
-        The bytes of a PNG file, or an array of linear values, which is written as an .exr.
+    contents : mapping of Path to ImageData
+        For each file, with its suffix, the bytes of a PNG file, or an array of linear values, which is written
+        as an .exr.
 
     Raises
     ------
     RosyError
-        If the file cannot be written.
+        If a file cannot be written.
     """
-    make_folder(path.parent)
-    if isinstance(image_data, bytes):
-        write_bytes(path, image_data)
-        return
-    image = bpy.data.images.new(path.stem, *image_size(image_data), alpha=True, float_buffer=True)
+    for path in contents:
+        make_folder(path.parent)
+    with replacing(*contents) as temporaries:
+        for temporary, (path, image_data) in zip(temporaries, contents.items(), strict=True):
+            if isinstance(image_data, bytes):
+                temporary.write_bytes(image_data)
+            else:
+                with _checking(temporary, path):
+                    _write_half_floats(temporary, image_data)
+
+
+def _write_half_floats(path: Path, pixels: np.ndarray) -> None:
+    """Write an array of linear values to a file, as an .exr with half floats."""
+    image = bpy.data.images.new(path.stem, *image_size(pixels), alpha=True, float_buffer=True)
     # Blender takes the output format from a scene. A temporary one leaves the user's unchanged.
     scene = bpy.data.scenes.new(path.stem)
     try:
         image.colorspace_settings.name = "Non-Color"
-        image.pixels.foreach_set(image_data.ravel())
+        image.pixels.foreach_set(pixels.ravel())
         settings = scene.render.image_settings
         settings.file_format, settings.color_mode, settings.color_depth = "OPEN_EXR", "RGBA", "16"
-        with replacing(path) as temporary:
-            image.save_render(str(temporary), scene=scene)
-    except RuntimeError as reason:
-        raise RosyError(f"{path}: cannot be written: {reason}") from reason
+        image.save_render(str(path), scene=scene)
     finally:
         bpy.data.images.remove(image)
         bpy.data.scenes.remove(scene)
@@ -192,22 +206,34 @@ def _save_image(image: Image, image_data: ImageData, stem: Path) -> None:
     `stem` is the path without the suffix. If the image has pixels in single precision, Blender writes them as
     an .exr file. Otherwise `image_data` has the bytes of a PNG file, which are written as they are.
     """
-    path = stem.with_name(f"{stem.name}{_suffix(image.is_float)}")
+    path = image_path(stem, image.is_float)
     make_folder(path.parent)
     if image.is_float:
-        check_writable(path)
-        image.file_format = "OPEN_EXR"
-        image.filepath_raw = str(path)
-        try:
+        with replacing(path) as (temporary,), _checking(temporary, path):
+            image.file_format, image.filepath_raw = "OPEN_EXR", str(temporary)
             image.save()
-        except RuntimeError as reason:
-            raise RosyError(f"{path}: cannot be written: {reason}") from reason
     else:
         write_bytes(path, image_data)
         image.file_format = "PNG"
     image.source = "FILE"
     image.filepath = _blend_relative(path)
     image.reload()
+
+
+@contextmanager
+def _checking(temporary: Path, path: Path) -> Iterator[None]:
+    """Context manager: check that Blender, in the block, has written a whole .exr to a temporary path of `path`.
+
+    Blender does not say why it cannot write a file. `replacing` has checked all else, so the disk is most
+    likely full. If only the end of the file does not fit, Blender does not notice.
+    """
+    reason = None
+    try:
+        yield
+    except RuntimeError as error:
+        reason = error
+    if reason is not None or not is_whole_exr(temporary):
+        raise RosyError(f"{path}: cannot be written by Blender: is the disk full?") from reason
 
 
 def _blend_relative(path: Path) -> str:

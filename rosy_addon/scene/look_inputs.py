@@ -280,6 +280,19 @@ def reference_path(scene: Scene) -> Path:
     return Path(bpy.path.abspath(filename))
 
 
+def input_files() -> list[str]:
+    """Return the paths of the files that drawing reads, which RoSy must not replace.
+
+    These are the open .blend file, what it links for its objects (libraries, caches of simulations, fonts and
+    volumes), and the images and reference renders of tones.
+    """
+    blocks = [*bpy.data.libraries, *bpy.data.cache_files, *bpy.data.fonts, *bpy.data.volumes]
+    blocks += [obj.rosy.tone_image for obj in bpy.data.objects if obj.rosy.tone_image is not None]
+    paths = [bpy.path.abspath(block.filepath, library=block.library) for block in blocks]
+    paths += [str(reference_path(scene)) for scene in bpy.data.scenes if scene.rosy.tone_picture]
+    return [bpy.data.filepath, *paths]
+
+
 def load_reference(
     scene: Scene,
     depsgraph: Depsgraph,

@@ -11,6 +11,7 @@ transformed, and slides over one that deforms. A texture is mapped by a UV map, 
 
 from __future__ import annotations
 
+import glob
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -24,7 +25,7 @@ from ..compositor.look import Look, has_clear_paper
 from ..compositor.picture import Picture
 from ..compositor.picture_key import picture_key
 from ..core.errors import RosyError
-from ..core.file_io import check_folder
+from ..core.file_io import check_folder, check_writable
 from ..image_io.image_data import ImageData, image_size
 from ..projection.camera import Camera
 from ..rendering.view_input import ViewInput
@@ -37,7 +38,7 @@ from .bake_records import (
     recorded_materials,
     store_record,
 )
-from .blender_images import load_sequence, new_image, new_tiled_image
+from .blender_images import image_path, load_sequence, new_image, new_tiled_image
 from .cameras import CameraSource
 from .files import output_folder, picture_stem
 from .keys import update_keys
@@ -140,6 +141,32 @@ def check_targets(objects: Iterable[Object], settings: OutputSettings) -> None:
             )
     if settings.folder is not None:
         check_folder(settings.folder)
+
+
+def check_files(
+    settings: OutputSettings, names: Iterable[str], kind: str = "camera", *, is_udim: bool = False
+) -> None:
+    """Check that the files of pictures can be replaced, if they exist. It is called before they are drawn.
+
+    Parameters
+    ----------
+    settings : OutputSettings
+    names : iterable of str
+        Names of the cameras or, if `kind` is not "camera", of the objects; see `picture_stem`.
+    kind : str
+    is_udim : bool
+        Whether the pictures have UDIM tiles. All files that may be tiles are checked.
+
+    Raises
+    ------
+    RosyError
+        If a file is an input, is not a regular file, or is not writable.
+    """
+    for name in names if settings.folder is not None else ():
+        path = image_path(_image_stem(settings, name, kind), settings.as_float)
+        pattern = glob.escape(path.stem) + ".[0-9]*" * is_udim + path.suffix
+        for existing in path.parent.glob(pattern):
+            check_writable(existing)
 
 
 def apply_picture(
@@ -293,7 +320,7 @@ def apply_texture(
         If the file cannot be written.
     """
     name = f"{NAME_PREFIX}{obj.name}"
-    stem = _image_stem(settings, obj.name, "texture" if content == "look" else content)
+    stem = _image_stem(settings, obj.name, texture_kind(content))
     first = next(iter(tiles.values()))
     is_color = content == "look" and hatching is None
     create, image_data = (new_tiled_image, tiles) if is_udim else (new_image, first)
@@ -312,6 +339,11 @@ def apply_texture(
     # The object can still show its pictures, but no longer an earlier texture.
     _show_on_objects(node_groups, keep_textures=False)
     return image
+
+
+def texture_kind(content: str) -> str:
+    """Return the kind of the files of a texture (see `picture_stem`), given what the texture shows."""
+    return "texture" if content == "look" else content
 
 
 def _image_stem(settings: OutputSettings, name: str, kind: str = "camera") -> Path | None:

@@ -7,6 +7,7 @@ import atexit
 import bpy
 
 from ..compositor.look import Look
+from ..core.file_io import INPUT_LISTERS
 from ..field.rosy_field import MAX_DEGREE
 from ..gpu.select import RENDER_DEVICES
 from ..line_drawing.style import StrokeStyle
@@ -15,6 +16,7 @@ from ..scene.camera_planes import update_backdrops
 from ..scene.datablocks import has_rosy_properties
 from ..scene.field_attributes import DEFAULT_DEGREE, DEFAULT_FIELD_NAME
 from ..scene.keys import update_keys
+from ..scene.look_inputs import input_files
 from ..surface_texture import draw as texture_drawing
 from . import preset_library
 from .property_makers import (
@@ -414,10 +416,12 @@ def register() -> None:
     _register_classes()
     for id_type, group in POINTER_PROPERTIES:
         id_type.rosy = bpy.props.PointerProperty(type=group, name="RoSy")
+    INPUT_LISTERS.append(input_files)
 
 
 def unregister() -> None:
     """Remove the properties."""
+    INPUT_LISTERS.remove(input_files)
     for id_type, _ in POINTER_PROPERTIES:
         del id_type.rosy
     _unregister_classes()

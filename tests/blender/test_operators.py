@@ -384,6 +384,24 @@ def test_exports_and_imports(suzanne, tmp_path):
             np.testing.assert_array_equal(member_vectors(suzanne.data), before)
 
 
+def test_no_operator_replaces_the_open_file(suzanne, tmp_path):
+    """Not through a link either."""
+    path = tmp_path / "saved.blend"
+    bpy.ops.rosy.field_generate(kind="axis", degree=4)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    before = path.read_bytes()
+    for operator, suffix, settings in (
+        (bpy.ops.rosy.field_export, ".rosy", {}),
+        (bpy.ops.rosy.strokes, ".svg", {"kind": "FILE"}),
+        (bpy.ops.rosy.turntable, ".gif", {"pictures": 2, "width": 16, "height": 16}),
+        (bpy.ops.rosy.preset_export, ".json", {"preset": "plaid"}),
+    ):
+        link = tmp_path / f"link{suffix}"
+        link.symlink_to(path)
+        assert "is also an input" in error_of(operator, filepath=str(link), **settings)
+        assert link.is_symlink() and path.read_bytes() == before
+
+
 def test_what_is_imported_from_other_programs(suzanne, tmp_path):
     """A cross in two files, with vectors off the surface; and feature edges."""
     mesh = suzanne.data

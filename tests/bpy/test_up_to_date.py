@@ -15,7 +15,7 @@ import pytest
 from mathutils import Matrix
 from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.gpu.select import automatic_device
-from rosy.rosy_addon.image_io.png import write_png
+from rosy.rosy_addon.image_io.png import png_bytes
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.projection.camera import look_at, perspective_camera
 from rosy.rosy_addon.scene import staleness
@@ -110,7 +110,7 @@ def tone_image(scene):
 def write_reference(scene, value):
     rgba = np.ones((SIZE, SIZE, 4), dtype=np.float32)
     rgba[: SIZE // 2, :, :3] = value
-    write_png(Path(scene.rosy.tone_picture), rgba)
+    Path(scene.rosy.tone_picture).write_bytes(png_bytes(rgba))
 
 
 def tone_picture(scene):

@@ -15,6 +15,7 @@ from numpy.random import Generator
 
 from .damage import damaged, random_word
 from .files import FIELD_SUFFIXES, field_bytes, guide_bytes, png_bytes, preset_bytes
+from .links import link_case
 from .meshes import WRITERS, Polygons, closed_mesh, mesh_bytes, random_mesh
 from .options import random_options
 from .signals import write_command
@@ -311,6 +312,11 @@ def _path_case(rng: Generator, folder: Path) -> Case:
     return case
 
 
+def _link_case(rng: Generator, folder: Path) -> Case:
+    """Links at the path of the output, at the folder of the output, or at the paths of tiles."""
+    return Case(*link_case(rng, folder))
+
+
 def _stream_case(rng: Generator, folder: Path) -> Case:
     """Closed, full and ASCII streams, interrupts and kills, in processes of their own."""
     name = _write_mesh(rng, folder, random_mesh(rng, faults=0))
@@ -357,6 +363,7 @@ CATEGORIES: dict[str, tuple[Callable[[Generator, Path], Case], int]] = {
     "tones": (_tone_case, 10),
     "textures": (_texture_case, 10),
     "paths": (_path_case, 5),
+    "links": (_link_case, 5),
     "streams": (_stream_case, 2),
     "signals": (_signal_case, 1),
 }

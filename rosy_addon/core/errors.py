@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-#: Characters that could change how a terminal shows a message, or that XML cannot hold: control characters
-#: except tab and newline, characters that change the direction of text, bytes of names that are not UTF-8
-#: (lone surrogates), and noncharacters. Names in files may contain them.
+#: Characters that could change how a terminal shows a message, or that files of figures cannot hold: control
+#: characters except tab and newline, characters that change the direction of text, bytes of names that are not
+#: UTF-8 (lone surrogates), the byte order mark, and noncharacters. Names in files may contain them.
 UNSAFE = re.compile(
-    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]"
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufeff\ufffe\uffff]"
 )
 
 #: Patterns of a quoted name in a message, and of a message that begins with an English word, not with the

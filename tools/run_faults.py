@@ -25,7 +25,12 @@ from working_tree import ROOT, copy_working_tree
 
 #: The environment whose Python runs the tests of each lane. Those of lane "blender" build a zip and run it in
 #: a full Blender.
-PYTHON = {"unit": ".venv", "bpy42": ".venv-bpy42", "blender": ".venv-bpy42"}
+PYTHON = {
+    "unit": ".venv",
+    "extras": ".venv-extras",
+    "bpy42": ".venv-bpy42",
+    "blender": ".venv-bpy42",
+}
 
 #: Seconds after which the tests of a fault are stopped; the fault then counts as missed.
 TIME_LIMIT = 900

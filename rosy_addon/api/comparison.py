@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import RosyError, RosyWarning
+from ..core.errors import RosyError, RosyWarning, one_line
 from ..field.analysis import DEFAULT_REACH, SingularityMatching, format_degrees, match_on_surface
 from ..field.field import Difference, Field
 from ..field.surface import is_same_surface
@@ -107,12 +107,15 @@ class Comparison:
         return row
 
     def cells(self) -> list[list[str]]:
-        """Return the table as texts: a row of titles, then a row for each field. A missing value is "-"."""
+        """Return the table as texts: a row of titles, then a row for each field. A missing value is "-".
+
+        Line breaks and control characters in titles of fields are escaped.
+        """
         columns = _COLUMNS | (_DIFFERENCE_COLUMNS if self.differences else {})
         cells = [["field", *columns]]
         for row in self.rows:
             values = [write(row[key]) if key in row else "-" for key, write in columns.values()]
-            cells.append([row["title"], *values])
+            cells.append([one_line(row["title"]), *values])
         return cells
 
     def to_text(self) -> str:
@@ -123,7 +126,7 @@ class Comparison:
         formats = [f"{{:<{widths[0]}}}", *(f"{{:>{width}}}" for width in widths[1:])]
         lines = ["  ".join(formats).format(*row).rstrip() for row in cells]
         if self.differences:
-            first = next(iter(self.fields))
+            first = one_line(next(iter(self.fields)))
             lines.append(f"Angles and matched singularities are those to '{first}'.")
         return "\n".join(lines)
 

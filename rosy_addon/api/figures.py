@@ -48,6 +48,9 @@ LIMITS = {"width": (0.5, 100.0), "dpi": (10, 2400), "largest_angle": (0.0, 360.0
 #: Limits of the height of a panel, relative to its width.
 MIN_ASPECT, MAX_ASPECT = 0.4, 1.6
 
+#: Smallest width of a panel in inches, which has room for the letter in front of its title.
+MIN_PANEL_WIDTH = 0.2
+
 #: Default of the largest number of panels side by side. Width of the empty border of a panel, as a fraction
 #: of the panel.
 MAX_COLUMNS, MARGIN = 3, 0.02
@@ -128,14 +131,15 @@ def figure(
     Returns
     -------
     matplotlib.figure.Figure
-        ``savefig`` writes it as ``.pdf``, ``.svg`` or ``.png``. Journals want TrueType fonts in a ``.pdf``:
-        set ``matplotlib.rcParams["pdf.fonttype"] = 42``.
+        ``savefig`` writes it as ``.pdf``, ``.svg`` or ``.png``. It is drawn with the defaults of matplotlib:
+        a ``matplotlibrc`` and ``rcParams`` do not apply. To change a figure, set properties of its parts:
+        ``for text in page.findobj(Text): text.set_fontfamily("serif")``.
 
     Raises
     ------
     RosyError
-        If matplotlib is not installed, there is no field or nothing to compare, or for the same reasons as
-        `render`.
+        If matplotlib is not installed, there is no field or nothing to compare, the panels are too narrow,
+        or for the same reasons as `render`.
 
     Examples
     --------
@@ -167,6 +171,9 @@ def figure(
     has_key = shows_singularities(look) or color_bar is not None or "differences" in parts
     points = np.concatenate([instance.face_points() for instance in instances.values()])
     pixels = drawing.panel_width(width, columns, has_key, dpi)
+    if pixels < MIN_PANEL_WIDTH * dpi and set(parts) != {"table"}:
+        room = f"a width of {width:g} inches has no room for {counted(columns, 'column')} of panels"
+        raise RosyError(f"{name}: {room}: choose a larger width, or fewer columns")
     camera = _panel_camera(points, view, pixels, perspective=not orthographic)
     studio = Studio(comparison, instances, camera, look, workers)
     rows = []
@@ -200,6 +207,9 @@ def _comparison_of(
 
 def save_figures(path: str | os.PathLike[str], figures: Figure | Sequence[Figure]) -> None:
     """Write figures to a file, with embedded fonts and text as text.
+
+    A `RosyWarning` names letters that the font of matplotlib lacks. Other signs are drawn for them in a ``.pdf``
+    or ``.png``, and in formulas. In other texts of an ``.svg``, the program that shows it has more fonts.
 
     Parameters
     ----------

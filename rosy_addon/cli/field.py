@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import logging
+import os
+from collections.abc import Iterator
+from contextlib import chdir, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -214,13 +218,33 @@ def run_compare(options: Options) -> None:
     if options.output is not None:
         check_figure_path(options.output)
         options.check_output()
-        load_drawing()
+        with _no_matplotlibrc():
+            load_drawing()
     arguments = options.picture_arguments(api.figure, options.mesh)
     comparison = api.compare(_load_fields(options), reach=options.reach)
     if options.output is not None:
         _draw(options.output, comparison, arguments)
     write = {"text": comparison.to_text, "json": comparison.to_json, "latex": comparison.to_latex}
     print_line(write[options.format]())
+
+
+@contextmanager
+def _no_matplotlibrc() -> Iterator[None]:
+    """Context manager: matplotlib finds no ``matplotlibrc`` if it is imported in the block.
+
+    It would read the one of the current folder, which may be from a stranger, and which may be no text or a
+    pipe. Figures do not use its settings. Messages of matplotlib, such as one about its cache, are dropped.
+    """
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
+    previous = os.environ.get("MATPLOTLIBRC")
+    os.environ["MATPLOTLIBRC"] = os.devnull
+    try:
+        with chdir(Path(__file__).parent):
+            yield
+    finally:
+        del os.environ["MATPLOTLIBRC"]
+        if previous is not None:
+            os.environ["MATPLOTLIBRC"] = previous
 
 
 def _draw(path: Path, comparison: api.Comparison, arguments: dict[str, Any]) -> None:
@@ -253,6 +277,6 @@ def _load_fields(options: Options) -> dict[str, api.Field]:
 def _titled_source(text: str) -> tuple[str, str]:
     """Split an argument of the form [TITLE=]FIELD, and return the title and the source of the field."""
     title, separator, source = text.partition("=")
-    if separator and source and not Path(text).exists():
+    if separator and source and not os.path.exists(text):  # a text may be too long for a path
         return title, source
     return (text.capitalize() if text in GENERATORS else Path(text).stem), text

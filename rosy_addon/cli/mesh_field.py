@@ -21,6 +21,16 @@ JOIN_TEXT = (
     "simulations. Also remove faces that have the same corners as others, as on a two-sided sheet"
 )
 
+#: The options that name inputs of generated fields, and the kinds of fields that use them.
+INPUT_KINDS = {
+    "strokes": ["guided"],
+    "guides": ["guided", "prescribed"],
+    "firmness": ["guided"],
+    "edges": ["features", "guided"],
+    "singularities": ["prescribed"],
+    "uv": ["guided"],
+}
+
 
 def add_mesh_options(parser: CommandParser) -> None:
     """Add the arguments MESH and FIELD, and the options that generate a field."""
@@ -58,8 +68,7 @@ def _add_generator_options(parser: CommandParser) -> None:
     )
     parser.add_argument("--generate", choices=list(GENERATORS), help=text)
     for name, setting in settings_of(GeneratorSettings).items():
-        kinds = [kind for kind in GENERATORS if name in options_of(kind)]
-        if kinds:
+        if kinds := _kinds_with(name):
             parser.add_setting_option(setting, f"; for --generate {', '.join(kinds)}")
     text = "strokes on the mesh that a guided field follows: rows x y z, with an empty line between two strokes"
     parser.add_value("--strokes", "FILE", text, Path)
@@ -117,15 +126,18 @@ def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
         raise RosyError(f"{mesh}: --step applies only to files of simulations, such as .vtu")
     if options.array is not None and has_source:
         raise RosyError(f"{mesh}: give either --array, or a field file or --generate")
+    is_array = (is_simulation and not has_source) or options.array is not None
+    kind = None if options.field or is_array else _generated_kind(options)
+    _check_generator_options(options, kind)
     up, join = getattr(options, "up", None), getattr(options, "join", None)
     surface = api.Surface(mesh, up=up, step=options.step, join=join)
     if options.field:
         field = read_field(options, options.field, surface, options.degree)
-    elif (is_simulation and not has_source) or options.array is not None:
+    elif kind is None:
         policies = {"nonfinite": options.nonfinite, "off_surface": options.off_surface}
         field = api.from_array(surface, options.array, options.degree, **policies)
     else:
-        field = _generate_field(options, surface)
+        field = _generate_field(options, surface, kind)
     return surface, field
 
 
@@ -137,14 +149,38 @@ def read_field(
     return api.read_field(path, surface, degree, **policies, mesh=options.field_mesh)
 
 
-def _generate_field(options: Options, surface: api.Surface) -> api.Field:
-    """Generate a field of the kind that the options name."""
-    has_guides = options.strokes is not None or options.guides is not None
-    kind = options.generate or ("guided" if has_guides else "form")
-    if options.edges is not None and options.generate is None and not has_guides:
-        kind = "features"
-    if options.singularities is not None and options.generate is None:
-        kind = "prescribed"
+def _kinds_with(setting: str) -> list[str]:
+    """Return the kinds of generated fields that have a setting of `GeneratorSettings`."""
+    return [kind for kind in GENERATORS if setting in options_of(kind)]
+
+
+def _generated_kind(options: Options) -> str:
+    """Return the kind of field to generate: of the option --generate, or the one that the inputs call for."""
+    if options.generate is not None:
+        return options.generate
+    if options.singularities is not None:
+        return "prescribed"
+    if options.strokes is not None or options.guides is not None:
+        return "guided"
+    return "form" if options.edges is None else "features"
+
+
+def _check_generator_options(options: Options, kind: str | None) -> None:
+    """Raise an error if an option is given that has no effect on a field of this kind.
+
+    `kind` is None for a field that is read and not generated.
+    """
+    for name in (*INPUT_KINDS, *settings_of(GeneratorSettings)):
+        kinds = INPUT_KINDS.get(name) or _kinds_with(name)
+        if getattr(options, name, None) not in (None, False) and kind not in kinds:
+            option = f"--{name.replace('_', '-')}"
+            raise RosyError(
+                f"{options.mesh}: {option} applies only to --generate {', '.join(kinds)}"
+            )
+
+
+def _generate_field(options: Options, surface: api.Surface, kind: str) -> api.Field:
+    """Generate a field of a kind with the inputs that the options name."""
     names = {"degree", *options_of(kind)}
     arguments = {name: value for name, value in vars(options).items() if name in names}
     if options.degree is None and kind != "prescribed":
@@ -153,14 +189,12 @@ def _generate_field(options: Options, surface: api.Surface) -> api.Field:
         if options.singularities is None:
             raise RosyError(f"{options.mesh}: give the singularities: --singularities FILE.sings")
         arguments["singularities"] = options.singularities
-    if (edges := options.edges) is not None:
-        if kind not in ("features", "guided"):
-            raise RosyError(f"{edges}: --edges applies only to --generate features and guided")
-        arguments["edges"] = edges
+    if options.edges is not None:
+        arguments["edges"] = options.edges
     if kind == "guided":
         arguments |= {"uv": options.uv, "vectors_have_firmness": options.firmness}
         if options.strokes is not None:
             arguments["strokes"] = read_guide_strokes(options.strokes)
-    if kind in ("guided", "prescribed") and options.guides is not None:
+    if options.guides is not None:
         arguments["vectors"] = read_field(options, options.guides, surface, arguments["degree"])
     return GENERATOR_FUNCTIONS[kind](surface, **arguments)

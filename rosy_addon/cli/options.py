@@ -314,7 +314,8 @@ def add_subcommand(
         A function of `api` that the command calls with its options; see `api_arguments`. The defaults of its
         keyword parameters are the defaults of the options.
     """
-    name, text = run.__name__.removeprefix("run_"), run.__doc__.splitlines()[0]
+    # With `python -OO` there are no docstrings: the help of the command is then empty.
+    name, text = run.__name__.removeprefix("run_"), (run.__doc__ or "").partition("\n")[0]
     parser = subparsers.add_parser(name, help=text, description=text)
     if function is not None:
         parser.set_defaults(**inspect.getfullargspec(function).kwonlydefaults)

@@ -18,7 +18,7 @@ from .field import add_compare_command, add_field_command, add_info_command
 from .options import CommandParser, Options
 from .pictures import add_render_command, add_texture_command, add_turntable_command
 from .presets import add_presets_command
-from .streams import discard_output, output_stream, print_error
+from .streams import OutputError, discard_output, output_stream, print_error, writing_output
 from .strokes import add_strokes_command
 
 #: Commands that may need Blender.
@@ -91,7 +91,8 @@ def main(
         options = parser.parse_args(_join_negative_values(arguments), Options())
         with guarding_inputs(), telling_warnings(print_error):
             options.run(options)
-        output_stream().flush()
+        with writing_output():
+            output_stream().flush()
     except REPORTED_ERRORS as error:
         print_error(error_text(error))
         return EXIT_USER_ERROR
@@ -101,11 +102,14 @@ def main(
     except BrokenPipeError:  # the program that reads the output has ended
         discard_output()
         return EXIT_BROKEN_PIPE
-    except OSError as error:
-        where = error.filename or "standard output"
-        print_error(f"{where}: {os_error_text(error)}")
+    except OutputError as error:
+        print_error(str(error))
         discard_output()
         return EXIT_OUTPUT_ERROR
+    except OSError as error:  # of a file or folder that no function has named in a `RosyError`
+        where = "" if error.filename is None else f"{error.filename}: "
+        print_error(f"{where}{os_error_text(error)}")
+        return EXIT_USER_ERROR
     except SystemExit as exit_request:  # argparse: 0 after the help, 2 for a usage error
         return int(exit_request.code)
     return EXIT_OK

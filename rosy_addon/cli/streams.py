@@ -4,12 +4,33 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TextIO
 
-from ..core.errors import escape_unsafe
+from ..core.errors import escape_unsafe, one_line
+from ..core.file_io import os_error_text
 
 #: The stream that commands print to. None: `sys.stdout`.
 _own_output: TextIO | None = None
+
+
+class OutputError(Exception):
+    """The error that standard output cannot be written."""
+
+
+@contextmanager
+def writing_output() -> Iterator[None]:
+    """Context manager: raise errors of the operating system in its block, which writes output, as `OutputError`.
+
+    The error that the reader of the output has ended (`BrokenPipeError`) is not changed.
+    """
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise OutputError(f"standard output: {os_error_text(error)}") from error
 
 
 def output_stream() -> TextIO:
@@ -44,12 +65,13 @@ def printable(text: str, encoding: str | None = None) -> str:
 def print_line(text: str, file: TextIO | None = None) -> None:
     """Print a text, escaped by `printable`, to a stream (by default standard output), and flush it."""
     file = output_stream() if file is None else file
-    print(printable(text, getattr(file, "encoding", None)), file=file, flush=True)
+    with writing_output():
+        print(printable(text, getattr(file, "encoding", None)), file=file, flush=True)
 
 
 def print_error(text: str) -> None:
     """Print a line to the error stream: ``rosy:`` and a message."""
-    print_line("rosy: " + text.replace("\n", "\\n"), sys.stderr)
+    print_line("rosy: " + one_line(text), sys.stderr)
 
 
 def discard_output() -> None:

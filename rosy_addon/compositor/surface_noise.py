@@ -262,7 +262,7 @@ def instance_hashes(names: Sequence[str]) -> np.ndarray:
     counts: Counter[str] = Counter()
     hashes = []
     for name in (name.replace("\\", "/").rpartition("/")[2] for name in names):
-        hashes.append(zlib.crc32(f"{name} {counts[name]}".encode()))
+        hashes.append(zlib.crc32(f"{name} {counts[name]}".encode(errors="surrogatepass")))
         counts[name] += 1
     return np.array(hashes, dtype=np.uint32)
 

@@ -6,9 +6,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-#: Characters that could change how a terminal shows a message: control characters except tab and newline, and
-#: characters that change the direction of text. Names in files may contain them.
-UNSAFE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+#: Characters that could change how a terminal shows a message, or that files of figures cannot hold: control
+#: characters except tab and newline, characters that change the direction of text, bytes of names that are not
+#: UTF-8 (lone surrogates), the byte order mark, and noncharacters. Names in files may contain them.
+UNSAFE = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufeff\ufffe\uffff]"
+)
 
 #: Patterns of a quoted name in a message, and of a message that begins with an English word, not with the
 #: name of a file, a setting or an attribute.
@@ -21,6 +24,17 @@ def escape_unsafe(text: str) -> str:
     return UNSAFE.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
+def one_line(text: str) -> str:
+    """Return a text as one line that is safe to print: line breaks, tabs and `UNSAFE` characters are escaped.
+
+    Examples
+    --------
+    >>> one_line("two\\nlines")
+    'two\\\\nlines'
+    """
+    return escape_unsafe(text.replace("\n", "\\n").replace("\t", "\\t"))
+
+
 class RosyError(ValueError):
     """An error that the user can correct, with a message of one line.
 
@@ -30,7 +44,7 @@ class RosyError(ValueError):
     """
 
     def __init__(self, message: str) -> None:
-        super().__init__(escape_unsafe(message.replace("\n", "\\n").replace("\t", "\\t")))
+        super().__init__(one_line(message))
 
 
 class RosyWarning(UserWarning):

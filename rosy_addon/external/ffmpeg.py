@@ -26,8 +26,9 @@ def find_encoder() -> Encoder | None:
 
     def encode(folder: Path, count: int, size: tuple[int, int], fps: float, path: Path) -> None:
         """Encode the pictures in a folder; see `Encoder`."""
+        pictures = f"{folder}/".replace("%", "%%") + "%05d.png"
         command = [
-            program, "-v", "error", "-y", "-framerate", f"{fps:g}", "-i", f"{folder}/%05d.png",
+            program, "-v", "error", "-y", "-framerate", f"{fps:g}", "-i", pictures,
             "-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p", str(path),
         ]  # fmt: skip
         status, output = run_program(command, "encoding the video")

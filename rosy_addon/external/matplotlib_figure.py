@@ -6,22 +6,28 @@
 from __future__ import annotations
 
 import io
+import logging
 import re
 import textwrap
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_pdf import PdfPages
+from matplotlib.cbook import is_math_text
 from matplotlib.cm import ScalarMappable
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgba_array
 from matplotlib.figure import Figure as Figure
-from matplotlib.font_manager import FontProperties
+from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.lines import Line2D
+from matplotlib.text import Text
 from matplotlib.textpath import text_to_path
 
 from ..annotation.figure_parts import ColorBar, Panel, Row
@@ -34,7 +40,7 @@ from ..annotation.singularity_marks import (
     OUTLINE_COLOR,
     SingularityMarks,
 )
-from ..core.errors import RosyError
+from ..core.errors import RosyError, RosyWarning, one_line
 from ..field.singularities import format_index
 
 #: Font sizes in points, of titles and of all other text.
@@ -55,6 +61,13 @@ SCALE_BAR_SHARE = 0.3
 
 INK = "#141414"
 
+#: Settings of matplotlib in which figures differ from its defaults: fonts are embedded as TrueType in a .pdf,
+#: as journals ask; in an .svg, text stays text, and equal figures give equal bytes.
+FILE_SETTINGS = {"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "rosyfields"}
+
+#: Number of letters that the warning about letters without a glyph names.
+NAMED_LETTERS = 20
+
 #: Drawing orders: marks are drawn over the lines that connect them (order 2), and the cross at the largest
 #: angle over marks.
 MARK_ORDER = 3
@@ -63,8 +76,7 @@ MARK_ORDER = 3
 def encode_figures(figures: Sequence[Figure], suffix: str) -> bytes:
     """Return the contents of a file with figures: the pages of a .pdf, or a single figure as .svg or .png.
 
-    Fonts are embedded as TrueType in a .pdf, as journals ask. In an .svg, text stays text. Equal figures
-    give equal bytes.
+    Equal figures give equal bytes.
 
     Parameters
     ----------
@@ -74,25 +86,78 @@ def encode_figures(figures: Sequence[Figure], suffix: str) -> bytes:
     Raises
     ------
     RosyError
-        If a text between dollar signs is not a formula that matplotlib can read.
+        If a text between dollar signs is not a formula that matplotlib can read, or a text is smaller than a
+        pixel.
     """
-    fonts = {"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "rosyfields"}
     contents = io.BytesIO()
-    try:
-        with matplotlib.rc_context(fonts):
-            if suffix == ".pdf":
-                with PdfPages(contents, metadata={"CreationDate": None}) as pages:
-                    for figure in figures:
-                        pages.savefig(figure)
-            else:
-                metadata = {"Date": None} if suffix == ".svg" else {}
-                figures[0].savefig(contents, format=suffix[1:], metadata=metadata)
-    except ValueError as error:
-        if not re.search(r"\bParse\w*Exception\b", str(error)):
-            raise
-        formula = str(error).strip().splitlines()[0]
-        raise RosyError(f"{formula}: is not a formula: write \\$ for a dollar sign") from None
+    with own_settings():
+        if suffix == ".pdf":
+            with PdfPages(contents, metadata={"CreationDate": None}) as pages:
+                for figure in figures:
+                    pages.savefig(figure)
+        else:
+            metadata = {"Date": None} if suffix == ".svg" else {}
+            figures[0].savefig(contents, format=suffix[1:], metadata=metadata)
     return contents.getvalue()
+
+
+@contextmanager
+def own_settings() -> Iterator[None]:
+    """Context manager: let matplotlib draw with its defaults and `FILE_SETTINGS`, and raise its errors as `RosyError`.
+
+    A file ``matplotlibrc`` of the user, or of the current folder, may set fonts and sizes, and start LaTeX.
+    With the defaults, the same figure has the same bytes everywhere. The settings of the user apply again
+    after the block. What matplotlib reports about letters without a glyph is dropped.
+
+    Raises
+    ------
+    RosyError
+        If a text between dollar signs is not a formula, or a text is smaller than a pixel.
+    """
+    log = logging.getLogger("matplotlib")
+    level = log.level
+    try:
+        with matplotlib.rc_context(), warnings.catch_warnings():
+            matplotlib.rcdefaults()
+            matplotlib.rcParams.update(FILE_SETTINGS)
+            warnings.filterwarnings("ignore", "Glyph .* missing")
+            log.setLevel(logging.ERROR)
+            yield
+    except (ValueError, RuntimeError) as error:
+        first_line = str(error).strip().partition("\n")[0]
+        if re.search(r"\bParse\w*Exception\b", str(error)):
+            message = f"{first_line}: is not a formula: write \\$ for a dollar sign"
+            raise RosyError(message) from None
+        if "FT_Set_Char_Size" in str(error):
+            message = "a text of the figure is smaller than a pixel: choose a larger width or resolution, or shorter titles"
+            raise RosyError(message) from None
+        raise
+    finally:
+        log.setLevel(level)
+
+
+def _warn_of_missing_letters(figure: Figure, only_formulas: bool) -> None:
+    """Warn of the letters in a figure for which its fonts have no glyph.
+
+    In an .svg, matplotlib chooses the glyphs of texts with formulas alone (`only_formulas`). All other texts are
+    shown with the fonts of its viewer.
+    """
+    letters_by_families: dict[tuple[str, ...], set[str]] = {}
+    for text in figure.findobj(Text):
+        if not only_formulas or is_math_text(text.get_text()):
+            letters = letters_by_families.setdefault(tuple(text.get_fontfamily()), set())
+            letters.update("".join(text.get_text().split()))
+    missing: set[str] = set()
+    for families, letters in letters_by_families.items():
+        paths = [findfont(FontProperties(family=[family])) for family in families]
+        glyphs = {code for path in paths for code in get_font(path).get_charmap()}
+        missing |= {letter for letter in letters if ord(letter) not in glyphs}
+    if missing:
+        names = "".join(sorted(missing)[:NAMED_LETTERS])
+        rest = " and others" if len(missing) > NAMED_LETTERS else ""
+        cure = "write an .svg, without formulas in texts that have these letters"
+        message = f"the font of the figure has no glyph for {names}{rest}: {cure}"
+        warnings.warn(message, RosyWarning, stacklevel=3)
 
 
 def panel_width(width: float, columns: int, has_key: bool, dpi: int) -> int:
@@ -113,8 +178,18 @@ def panel_width(width: float, columns: int, has_key: bool, dpi: int) -> int:
     return max(int(room / columns * dpi), 1)
 
 
-class NotebookFigure(Figure):
-    """A figure that a notebook shows as a picture, without pyplot."""
+class FieldFigure(Figure):
+    """A figure that is written with `own_settings`. A notebook shows it as a picture, without pyplot."""
+
+    def savefig(self, fname: Any, **keywords: Any) -> None:
+        """Write the figure, as `matplotlib.figure.Figure.savefig` does, with `own_settings`.
+
+        A `RosyWarning` names letters that the font lacks.
+        """
+        with own_settings():
+            super().savefig(fname, **keywords)
+            kind = keywords.get("format") or str(fname)
+            _warn_of_missing_letters(self, only_formulas=kind.lower().endswith("svg"))
 
     def _repr_png_(self) -> bytes:
         contents = io.BytesIO()
@@ -156,7 +231,7 @@ class Page:
     def _figure(self) -> Figure:
         """The matplotlib figure."""
         size = self.width, max(self._height, 0.1)
-        return NotebookFigure(figsize=size, dpi=self.dpi)
+        return FieldFigure(figsize=size, dpi=self.dpi)
 
     # --- places --------------------------------------------------------------------------------
 
@@ -173,8 +248,8 @@ class Page:
     def _caption_lines(self) -> list[str]:
         letters = max(int(self.width * POINTS / (TITLE_SIZE * LETTER_WIDTH)), 8)
         lines = []
-        for paragraph in self.caption.splitlines():
-            lines += textwrap.wrap(paragraph, letters) or [""]
+        for paragraph in self.caption.split("\n") if self.caption else []:
+            lines += textwrap.wrap(one_line(paragraph), letters) or [""]
         return lines
 
     @cached_property
@@ -207,24 +282,29 @@ class Page:
         return self._figure.add_axes(place)
 
     def _text(self, left: float, top: float, text: str, size: float, **options: object) -> None:
-        """Write a line of text with its upper left corner at (`left`, `top`), inches. `size` is in points."""
+        """Write a line of text with its upper left corner at (`left`, `top`), inches. `size` is in points.
+
+        Characters that a file cannot hold are escaped by `one_line`.
+        """
         baseline = top + 0.8 * _text_height(size)
         place = left / self.width, 1 - baseline / self._height
-        self._figure.text(*place, text, fontsize=size, color=INK, va="baseline", **options)
+        style = {"fontsize": size, "color": INK, "va": "baseline"}
+        self._figure.text(*place, one_line(text), **style, **options)
 
     # --- drawing -------------------------------------------------------------------------------
 
     def draw(self) -> Figure:
-        """Draw all contents, and return the figure."""
+        """Draw all contents with `own_settings`, and return the figure."""
         top = 0.0
-        for row in self.rows:
-            self._draw_row(row, top)
-            top += self._row_height(row) + ROW_GAP
-        if self.table:
-            self._draw_table(top)
-        top += self._table_height
-        for number, line in enumerate(self._caption_lines):
-            self._text(0.0, top + (number + 0.25) * _text_height(TITLE_SIZE), line, TITLE_SIZE)
+        with own_settings():
+            for row in self.rows:
+                self._draw_row(row, top)
+                top += self._row_height(row) + ROW_GAP
+            if self.table:
+                self._draw_table(top)
+            top += self._table_height
+            for number, line in enumerate(self._caption_lines):
+                self._text(0.0, top + (number + 0.25) * _text_height(TITLE_SIZE), line, TITLE_SIZE)
         return self._figure
 
     def _draw_row(self, row: Row, top: float) -> None:
@@ -284,7 +364,7 @@ class Page:
             colors = colors.reversed()
         mappable = ScalarMappable(Normalize(low, high if high > low else low + 1), colors)
         drawn = Colorbar(axes, mappable)
-        drawn.set_label(bar.label, fontsize=TEXT_SIZE, color=INK)
+        drawn.set_label(one_line(bar.label), fontsize=TEXT_SIZE, color=INK)
         drawn.ax.tick_params(labelsize=TEXT_SIZE, width=0.5, length=2, color=INK)
         drawn.outline.set_linewidth(0.5)
         drawn.solids.set_edgecolor("face")
@@ -397,4 +477,4 @@ def _draw_scale_bar(axes: Axes, length: float, text: str, dpi: int) -> None:
     margin, gap = 0.06 * dpi, 0.03 * dpi
     ends = [margin, margin + length]
     axes.plot(ends, [margin, margin], color=INK, linewidth=1.2, solid_capstyle="butt")
-    axes.text(margin, margin + gap, text, fontsize=TEXT_SIZE, color=INK, va="bottom")
+    axes.text(margin, margin + gap, one_line(text), fontsize=TEXT_SIZE, color=INK, va="bottom")

@@ -56,6 +56,8 @@ def encode_video(folder: Path, count: int, size: tuple[int, int], fps: float, pa
         render.ffmpeg.audio_codec = "NONE"
         render.use_file_extension = False
         render.filepath = str(path)
+        if bpy.app.version >= (5, 0, 0):  # names in braces are replaced
+            render.filepath = render.filepath.replace("{", "{{").replace("}", "}}")
         bpy.ops.render.render(animation=True, scene=scene.name)
     finally:
         bpy.data.scenes.remove(scene)

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import io
+import os
 import re
+import subprocess
+import sys
+from pathlib import Path
 from xml.etree import ElementTree
 
+import matplotlib
 import numpy as np
 import pytest
 import pyvista as pv
@@ -18,6 +23,11 @@ from rosy_addon.projection.camera import orbit_camera
 
 #: Small and fast.
 SMALL = {"dpi": 60, "supersampling": 1}
+
+ROOT = Path(__file__).resolve().parents[2]
+
+#: Settings that a matplotlibrc may have. LaTeX is not installed.
+USER_SETTINGS = {"font.family": "serif", "lines.linewidth": 5, "text.usetex": True, "font.size": 30}
 
 
 @pytest.fixture(scope="module")
@@ -185,6 +195,82 @@ def test_files(fields, tmp_path):
         rf.save_figures(tmp_path / "a.jpg", pages[0])
 
 
+def svg_texts(path):
+    """The texts of an .svg file."""
+    nodes = ElementTree.parse(path).getroot().iter("{http://www.w3.org/2000/svg}text")
+    return ["".join(node.itertext()).strip() for node in nodes]
+
+
+@pytest.mark.parametrize("suffix", ["pdf", "svg", "png"])
+def test_settings_of_matplotlib_change_nothing(fields, tmp_path, suffix):
+    """A figure is drawn and written with the defaults, also by `savefig`, and the settings stay."""
+    parts = {"parts": ("fields", "differences", "table"), "scale_bar": "mm", **SMALL}
+    metadata = {"CreationDate": None} if suffix == "pdf" else {"Date": None}
+    metadata = {} if suffix == "png" else metadata
+    files = [tmp_path / f"{name}.{suffix}" for name in ("default", "user", "saved")]
+    rf.save_figures(files[0], rf.figure(fields, **parts))
+    with matplotlib.rc_context(USER_SETTINGS | {"savefig.facecolor": "red"}):
+        figure = rf.figure(fields, **parts)
+        rf.save_figures(files[1], figure)
+        figure.savefig(files[2], metadata=metadata)
+        assert matplotlib.rcParams["font.size"] == 30
+    default, user, saved = (file.read_bytes() for file in files)
+    assert default == user == saved
+
+
+def test_a_matplotlibrc_of_the_folder_is_not_read(tmp_path, surface):
+    """Its bytes are not even text; the file that the environment names has settings."""
+    folder = tmp_path / "from a stranger"
+    folder.mkdir()
+    pv.PolyData.from_regular_faces(surface.vertices, surface.faces).save(folder / "ball.ply")
+    (folder / "matplotlibrc").write_bytes(b"\xff\xfe")
+    rows = [f"{name}: {value}" for name, value in USER_SETTINGS.items()]
+    (tmp_path / "rc").write_text("\n".join(rows))
+    words = ["compare", "ball.ply", "form", "-o", "a.svg", "--dpi", "50"]
+    done = subprocess.run(
+        [sys.executable, "-m", "rosy_addon", *words],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "MATPLOTLIBRC": str(tmp_path / "rc")},
+        capture_output=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert b"DejaVu Sans" in (folder / "a.svg").read_bytes()
+
+
+def test_titles_may_have_any_characters(fields, tmp_path):
+    """Names of files may have bytes that are no text, and control characters, which XML cannot hold."""
+    titles = "a\udcff", "b\x01\x1b[31m", "c\u202e\ufeff\ufffe", "two\nlines\t", "&<>\"'\u2028"
+    titled = dict.fromkeys(titles, fields["Ours"])
+    parts = {"parts": ("fields", "differences", "table"), "caption": f"{titles[1]}\n{titles[0]}"}
+    figure = rf.figure(titled, scale_bar="\x02", color_label="\x03", **parts, **SMALL)
+    rf.save_figures(tmp_path / "a.svg", figure)
+    texts = svg_texts(tmp_path / "a.svg")
+    for text in ("a\\udcff", "b\\x01\\x1b[31m", "c\\u202e\\ufeff\\ufffe", "two\\nlines\\t"):
+        assert text in texts, text  # of the table
+        assert any(f") {text} vs. " in title or title.endswith(f") {text}") for title in texts)
+    rf.save_figures(tmp_path / "a.pdf", figure)
+    rf.save_figures(tmp_path / "a.png", figure)
+
+
+def test_letters_without_a_glyph_are_named(fields, tmp_path, recwarn, capfd):
+    """Boxes are drawn for them, except by the viewer of an .svg outside of formulas."""
+    one, other = fields.values()
+    rf.save_figures(tmp_path / "a.svg", rf.figure({"\u65e5\u672c": one, "b": other}, **SMALL))
+    assert not recwarn.list and "(a) \u65e5\u672c" in svg_texts(tmp_path / "a.svg")
+    figure = rf.figure({"\u65e5\u672c": one, "$\u8a9e$": other}, **SMALL)
+    for name, letters in (
+        ("a.svg", "\u8a9e"),
+        ("a.pdf", "\u65e5\u672c\u8a9e"),
+        ("a.png", "\u65e5\u672c\u8a9e"),
+    ):
+        for write in (rf.save_figures, lambda path, page: page.savefig(path)):
+            with pytest.warns(rf.RosyWarning, match=f"no glyph for {letters}: write an") as warned:
+                write(tmp_path / name, figure)
+            assert len(warned) == 1
+    assert capfd.readouterr().err == ""  # matplotlib would say it in its own words
+
+
 def test_a_notebook_shows_a_figure(fields):
     picture = rf.figure(fields["Ours"], **SMALL)._repr_png_()
     with Image.open(io.BytesIO(picture)) as image:
@@ -208,11 +294,14 @@ def test_what_a_figure_refuses(fields, error_of):
         ({"dpi": 3}, "from 10 to 2400"),
         ({"width": float("nan")}, "from 0.5 to 100"),
         ({"gian": 3}, "unknown setting 'gian'"),
+        ({"width": 0.5, "columns": 100}, "0.5 inches has no room for 100 columns of panels"),
     ):
         assert message in error_of(rf.figure, fields, **arguments)
     mixed = [fields["Ours"], rf.form(other)]
     assert "no other field" in error_of(rf.figure, mixed, parts="differences")
     assert len(panels_of(rf.figure(mixed, **SMALL))) == 2
+    tiny = rf.figure(fields, parts=("table",), width=1, dpi=10)
+    assert "smaller than a pixel" in error_of(rf.save_figures, "a.png", tiny)
 
 
 def test_the_command(tmp_path, rosy, fields, surface):

@@ -14,6 +14,7 @@ Modules in order of dependence:
     uv_maps     UV maps with tiles, and the files of tiles
     signals     commands that start other processes, and their files
     links       links at the paths of outputs
+    names       titles, labels and names of files
     cases       the categories: files, a command line, and what it may write
     execution   the processes
     verdicts    what is wrong with a run

@@ -8,6 +8,7 @@ import stat
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from .damage import damaged, random_word
 from .files import FIELD_SUFFIXES, field_bytes, guide_bytes, png_bytes, preset_bytes
 from .links import link_case
 from .meshes import WRITERS, Polygons, closed_mesh, mesh_bytes, random_mesh
+from .names import hostile_stem, hostile_text
 from .options import random_options
 from .signals import write_command
 from .singular import singularities_changed, singularity_bytes
@@ -351,6 +353,38 @@ def _signal_case(rng: Generator, folder: Path) -> Case:
     return case
 
 
+def _name_case(rng: Generator, folder: Path) -> Case:
+    """Titles, labels and names of files with hostile characters, in figures and other files."""
+    points, faces = random_mesh(rng, faults=0)
+    mesh, suffix = (points, faces[:60]), list(WRITERS)[rng.integers(4)]
+    mesh_name, field_name = (hostile_stem(rng) + ending for ending in (suffix, ".rosy"))
+    (folder / mesh_name).write_bytes(mesh_bytes(rng, suffix, mesh))
+    (folder / field_name).write_bytes(field_bytes(rng, ".rosy", mesh))
+    if rng.random() < 0.2:
+        case = _command(rng, folder, [mesh_name, field_name], rate=0.0)
+        if case.outputs:
+            case.arguments[-1] = hostile_stem(rng) + Path(case.outputs.pop()).suffix
+            case.outputs = {case.arguments[-1]}
+        return case
+    kinds = ["form", "form", "form", "curvature", "curvature", "smoothest", field_name]
+    sources = rng.choice(kinds, rng.integers(1, 4))
+    fields = [
+        f"{hostile_text(rng)}={name}" if rng.random() < 0.8 else str(name) for name in sources
+    ]
+    leave_out = {"caption", "scale_bar", "format", "dpi"}
+    words = random_options(rng, "compare", rate=0.05, leave_out=leave_out)
+    for option in ("--caption", "--scale-bar", "--color-label"):
+        words += [f"{option}={hostile_text(rng)}"] if rng.random() < 0.3 else []
+    words += ["--set=supersampling=1", f"--dpi={rng.integers(15, 50)}"]
+    words += [f"--format={('text', 'json', 'latex')[rng.integers(3)]}"]
+    output = f"{hostile_stem(rng)}.{('pdf', 'svg', 'png')[rng.integers(3)]}"
+    case = Case(["compare", *words, "-o", output, mesh_name, *fields], outputs={output})
+    if rng.random() < 0.03:  # matplotlib is then imported in the folder
+        (folder / "matplotlibrc").write_bytes(damaged(rng, b"font.size: 99\ntext.usetex: True\n"))
+        case.own_process = True
+    return case
+
+
 #: The function of each category, and how often it occurs.
 CATEGORIES: dict[str, tuple[Callable[[Generator, Path], Case], int]] = {
     "shapes": (_shape_case, 10),
@@ -367,3 +401,5 @@ CATEGORIES: dict[str, tuple[Callable[[Generator, Path], Case], int]] = {
     "streams": (_stream_case, 2),
     "signals": (_signal_case, 1),
 }
+if find_spec("matplotlib"):
+    CATEGORIES["names"] = (_name_case, 5)

@@ -10,9 +10,14 @@ import shutil
 import tempfile
 import time
 from collections import Counter
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
+
+from rosy_addon.api.figures import load_drawing
+from rosy_addon.cli.streams import print_line
+from rosy_addon.core.errors import RosyError
 
 from .cases import CATEGORIES, Case, make_case
 from .execution import Run, execute
@@ -71,6 +76,8 @@ def main() -> int:
 
 def _run_share(options: argparse.Namespace, index: int) -> list[Outcome]:
     """Run the cases of one process, every `options.jobs`-th from an index on, and print faults."""
+    with suppress(RosyError):
+        load_drawing()  # which then takes no time in each case
     categories = options.category or list(CATEGORIES)
     shares = {name: CATEGORIES[name][1] for name in categories}
     outcomes, done, start = [], dict.fromkeys(categories, 0), time.monotonic()
@@ -84,8 +91,7 @@ def _run_share(options: argparse.Namespace, index: int) -> list[Outcome]:
         if number % options.jobs == index:
             outcomes.append(outcome := _run_case(category, seed, options.keep))
             if outcome.verdict.is_fault or options.verbose:
-                text = f"{category} {seed}: {outcome.verdict.value}: {outcome.reason}"
-                print(text, flush=True)
+                print_line(f"{category} {seed}: {outcome.verdict.value}: {outcome.reason}")
     return outcomes
 
 
@@ -121,4 +127,6 @@ def _keep(target: Path, folder: Path, case: Case, run: Run, text: str) -> None:
         if path.is_file() and not path.is_symlink():
             shutil.copy2(path, target)
     command = shlex.join(["python", "-m", "rosy_addon", *case.arguments]).encode(errors="replace")
-    (target / "fault.txt").write_bytes(b"\n".join([command, text.encode(), run.stderr]))
+    (target / "fault.txt").write_bytes(
+        b"\n".join([command, text.encode(errors="replace"), run.stderr])
+    )

@@ -6,6 +6,7 @@ import io
 import json
 import re
 import signal
+import zlib
 from enum import Enum
 from pathlib import Path
 from xml.etree import ElementTree
@@ -118,7 +119,7 @@ def _judge_status(
             errors = [line for line in lines if re.match(r"(rosy|[\w. -]*): ", line)]
             if not lines or (run.stdout and case.arguments[0] in ("render", "field", "info")):
                 return Verdict.MESSAGE, f"stdout {run.stdout[:80]!r}, stderr {stderr[:80]!r}"
-            if not usage and (len(errors) != len(lines) or len(lines) > 3):
+            if not usage and len(errors) != len(lines):  # notes, then the error
                 return Verdict.MESSAGE, stderr.strip()[:300]
             return Verdict.REFUSED, lines[-1]
         case 130 if case.stop_after is not None:
@@ -155,12 +156,30 @@ def _stdout_fault(case: Case, run: Run) -> str:
     def refuse(constant: str) -> None:
         raise ValueError(f"{constant} is not JSON")
 
-    if "--json" in case.arguments and case.stdout == "file" and "--help" not in case.arguments:
+    is_json = not {"--json", "--format=json"}.isdisjoint(case.arguments)
+    if is_json and case.stdout == "file" and "--help" not in case.arguments:
         try:
             json.loads(run.stdout, parse_constant=refuse)
         except ValueError as error:
             return str(error)
     return ""
+
+
+def _pdf_fault(data: bytes) -> str:
+    """Return what is wrong with a .pdf: its table has to point to every object, and streams are compressed."""
+    if not data.startswith(b"%PDF-1") or not data.endswith(b"%%EOF\n"):
+        return "the beginning or the end is missing"
+    start = int(re.search(rb"startxref\s+(\d+)\s+%%EOF\s*$", data)[1])
+    head, *rows = data[start : data.index(b"trailer", start)].splitlines()[1:]
+    if int(head.split()[1]) != len(rows) or not data.startswith(b"xref", start):
+        return "the table of objects is cut"
+    for number, row in enumerate(rows):
+        place, _, kind = row.split()
+        if kind == b"n" and not data.startswith(b"%d 0 obj" % number, int(place)):
+            return f"object {number} is in another place"
+    for stream in re.finditer(rb"/FlateDecode.*?stream\r?\n(.*?)\nendstream", data, re.DOTALL):
+        zlib.decompress(stream[1])
+    return "" if b"/Type /Page\n" in data or b"/Type /Page " in data else "there is no page"
 
 
 def _file_fault(path: Path) -> str:
@@ -173,6 +192,8 @@ def _file_fault(path: Path) -> str:
                     for frame in range(getattr(picture, "n_frames", 1)):
                         picture.seek(frame)
                         picture.load()
+            case ".pdf":
+                return _pdf_fault(data)
             case ".svg":
                 ElementTree.fromstring(data)
                 # Colors are as the user wrote them.
@@ -194,6 +215,6 @@ def _file_fault(path: Path) -> str:
             case ".ply":
                 if not all(np.isfinite(column).all() for column in read_values(path).values()):
                     return "a number is not finite"
-    except (OSError, ValueError, SyntaxError, RosyError, ElementTree.ParseError) as error:
+    except (OSError, ValueError, TypeError, SyntaxError, RosyError, zlib.error) as error:
         return f"{type(error).__name__}: {error}"
     return ""

@@ -83,6 +83,17 @@ def test_singularities_match_within_reach(sphere):
     assert [row["matched"] for row in narrow[1:]] == [3, 2]
 
 
+def test_a_title_is_one_line_of_a_table(sphere):
+    one = rf.form(sphere)
+    comparison = rf.compare({"two\nlines\x1b\udcff": one, "b": one})
+    text, latex = str(comparison), comparison.to_latex()
+    assert (
+        text.splitlines()[1].startswith(r"two\nlines\x1b\udcff  ") and len(text.splitlines()) == 4
+    )
+    assert r"two\textbackslash{}nlines\textbackslash{}x1b\textbackslash{}udcff & 4" in latex
+    assert comparison.rows[0]["title"] == "two\nlines\x1b\udcff"
+
+
 def test_tables(sphere):
     one = rf.form(sphere)
     comparison = rf.compare({"50 % & more_1": one, "b": one.rotated(0.1)})

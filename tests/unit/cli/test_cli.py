@@ -42,6 +42,14 @@ REFUSED = {
     "no folder": ("render {mesh} -o no/folder/a.png", "the folder no/folder does not exist"),
     "a folder": ("render {mesh} -o tests", "tests: cannot be written: it is a folder"),
     "format": ("field {mesh} -o {out}", "cannot be written as a field"),
+    "strokes and singularities": (
+        "info {mesh} --singularities a.sings --strokes a.txt",
+        "--strokes applies only to --generate guided",
+    ),
+    "guides of a file": ("info {mesh} a.rosy --guides b.rosy", "--guides applies only to"),
+    "uv of form": ("info {mesh} --uv", "--uv applies only to --generate guided"),
+    "reach of form": ("{render} --reach 0.1", "--reach applies only to --generate curvature"),
+    "no title": (f"compare {{mesh}} {'x' * 256}.rosy", ".rosy: cannot be read: file name too long"),
     "view": ("{render} --view nan,0", "view nan,0"),
     "jobs": ("bake a.blend --out {out} --jobs 2", "give --frames"),
 }
@@ -220,6 +228,48 @@ def test_paths_that_cannot_be_opened(tmp_path, capsys, monkeypatch):
             assert main(words) == 2
             assert f"presets cannot be read: {expected}" in capsys.readouterr().err
         assert "plaid" in preset_files(folder)
+
+
+def test_a_title_may_be_longer_than_the_name_of_a_file(sphere, capsys):
+    assert main(["compare", str(sphere), f"{'x' * 256}=form", "form"]) == 0
+    assert capsys.readouterr().out.splitlines()[1].startswith(f"{'x' * 256}  ")
+
+
+def test_an_error_is_the_last_line_after_notes(sphere, tmp_path, capsys):
+    """What was assumed is said when it is assumed, also if there is an error later."""
+    rows = tmp_path / "rows.txt"
+    main(["field", str(sphere), "-o", str(rows), "--generate", "axis", "--degree", "1"])
+    rows.write_text("".join(rows.read_text().splitlines(True)[-1280:]))
+    assert main(["info", str(sphere), str(rows), "--against", "none.rosy"]) == 2
+    note, error = capsys.readouterr().err.splitlines()
+    assert "no degree is stated" in note and error.startswith("rosy: none.rosy: cannot be read")
+
+
+@pytest.mark.slow
+def test_commands_without_docstrings(sphere):
+    """Python leaves them out if it is told to."""
+    for words, expected in ((["info", str(sphere)], "degree 4"), (["--help"], "VERB")):
+        command = [sys.executable, "-OO", "-m", "rosy_addon", *words]
+        assert expected in subprocess.check_output(command, cwd=ROOT, text=True)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no limit of the size of files")
+def test_no_temporary_folder(sphere):
+    """No file can be written, so Python finds no folder for temporary files."""
+    import resource
+
+    words = ["turntable", str(sphere), "-o", "film.mp4", "--size", "16x16", "--pictures", "2"]
+    done = subprocess.run(
+        [sys.executable, "-m", "rosy_addon", *words],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0)),
+        check=False,
+    )
+    assert done.returncode == 2 and done.stderr.count("\n") == 1
+    assert done.stderr.startswith("rosy: no ") and "temporary" in done.stderr
 
 
 @pytest.mark.slow

@@ -150,3 +150,4 @@ def test_instances_have_different_noise():
     assert instance_hashes(["z", *names])[1:].tolist() == instance_hashes(names).tolist()
     # A mesh file looks the same in every folder.
     assert instance_hashes(["some/ball.obj"]) == instance_hashes(["C:\\other\\ball.obj"])
+    assert instance_hashes(["bytes\udcff.obj"]) != instance_hashes(["bytes\udcfe.obj"])

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rosy_addon.core.errors import as_sentence, counted
+from rosy_addon.core.errors import RosyError, as_sentence, counted
 
 
 @pytest.mark.parametrize(
@@ -22,6 +22,12 @@ from rosy_addon.core.errors import as_sentence, counted
 )
 def test_only_words_get_a_capital(message, shown):
     assert as_sentence(message) == shown
+
+
+def test_an_error_can_be_written_in_any_encoding_of_unicode():
+    """A name of a file may have bytes that are no text; Python reads them as lone surrogates."""
+    error = str(RosyError("a\udcff\ud800\uffff\x1b\n\t: is missing"))
+    assert error == r"a\udcff\ud800\uffff\x1b\n\t: is missing" and error.encode()
 
 
 def test_one_is_singular():

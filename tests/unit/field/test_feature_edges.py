@@ -54,7 +54,7 @@ def test_the_command_line(tmp_path, capfd):
     assert main(words) == 0
     assert degrees_of(np.load(out)) % 90 == pytest.approx(45)
     assert main([*words, "--generate", "form"]) == 2
-    assert "--edges applies only to --generate features and guided" in capfd.readouterr().err
+    assert "--edges applies only to --generate features, guided" in capfd.readouterr().err
 
 
 DAMAGED = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import sys
+import tempfile
 
 import numpy as np
 import pytest
@@ -158,8 +159,10 @@ def test_a_cancelled_video_leaves_no_file(tmp_path):
 
 
 @pytest.mark.slow
-def test_an_mp4_with_ffmpeg(tmp_path):
-    """As many pictures as drawn come back, and their colors."""
+def test_an_mp4_with_ffmpeg(tmp_path, monkeypatch):
+    """As many pictures as drawn come back, and their colors. The temporary folder has a name like a pattern."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "100%d%%"))
+    (tmp_path / "100%d%%").mkdir()
     imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
     views = turntable_views(BALL, QUICK, 4, (64, 48), (0.0, 0.0))
     path = tmp_path / "film.mp4"

@@ -67,6 +67,11 @@ MIN_TURN_RATIO = 1e-6
 def singularities(mesh: TangentMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Find the zeros of the interpolated field.
 
+    The field turns along each edge of a triangle. If it turns by nearly half a turn, the two triangles at the edge may
+    see it turn to different sides, because the field is not quite continuous there: a zero near the edge is then in both
+    triangles, or in none. The side of the smaller turn is taken in both triangles. So the sum of the indices is the
+    Euler characteristic (Poincare-Hopf theorem), unless triangles are too large for the curvature.
+
     Returns
     -------
     triangle : (n,) int32 ndarray
@@ -74,18 +79,26 @@ def singularities(mesh: TangentMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray
     weights : (n, 3) float64 ndarray
         Barycentric coordinates of the zeros.
     index : (n,) float64 ndarray
-        Singularity index, 1/N or -1/N: how many times a member of the field rotates on a path around the
+        Singularity index, a multiple of 1/N: how many times a member of the field rotates on a path around the
         zero.
     """
     z = mesh.z
+    turn = np.angle(z[:, [2, 0, 1]] * z[:, [1, 2, 0]].conj())  # along edge k
+    other_turn = np.where(mesh.neighbor < 0, -turn, turn[mesh.neighbor, mesh.neighbor_edge])
+    excess = np.rint((turn + other_turn) / (2 * np.pi))
+    is_first = np.arange(len(z))[:, None] < mesh.neighbor
+    size, other_size = np.abs(turn), np.abs(other_turn)
+    excess[(size < other_size) | ((size == other_size) & ~is_first)] = 0
+    winding = np.rint(turn.sum(axis=1) / (2 * np.pi) - excess.sum(axis=1))
     # The point 0 divides the triangle of the three values z into three triangles. These are twice their
     # signed areas.
     sub_area = (z[:, [1, 2, 0]].conj() * z[:, [2, 0, 1]]).imag
-    area = sub_area.sum(axis=1)
-    is_turning = np.abs(area) > MIN_TURN_RATIO * (z.real**2 + z.imag**2).sum(axis=1)
-    triangle = np.flatnonzero(is_turning & (sub_area * np.sign(area)[:, None] >= 0).all(axis=1))
-    weights = sub_area[triangle] / area[triangle, None]
-    return triangle.astype(np.int32), weights, np.sign(area[triangle]) / mesh.degree
+    is_wide = np.abs(sub_area.sum(axis=1)) > MIN_TURN_RATIO * (z.real**2 + z.imag**2).sum(axis=1)
+    triangle = np.flatnonzero((winding != 0) & (is_wide | excess.any(axis=1)))
+    weights = np.maximum(sub_area[triangle] * np.sign(winding[triangle])[:, None], 0)
+    weights[~weights.any(axis=1)] = 1
+    weights /= weights.sum(axis=1, keepdims=True)
+    return triangle.astype(np.int32), weights, winding[triangle] / mesh.degree
 
 
 def seeds_around_singularities(mesh: TangentMesh, spacing: np.ndarray) -> SurfaceParticles:

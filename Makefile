@@ -126,8 +126,8 @@ site: test-notebooks
 	NO_MKDOCS_2_WARNING=1 $(EXTRAS) -m mkdocs build --strict
 	$(EXTRAS) tools/site/check.py dist/site
 
-fuzz: .venv/ready
-	$(DEV) -m tests.fuzz --seed $(FUZZ_SEED) --seconds $(FUZZ_SECONDS)
+fuzz: .venv-extras/ready
+	$(EXTRAS) -m tests.fuzz --seed $(FUZZ_SEED) --seconds $(FUZZ_SECONDS)
 
 zip: .venv-bpy42/ready
 	$(OLDEST) tools/build_zip.py dist

@@ -10,6 +10,7 @@ Modules in order of dependence:
     options     options of a command, from its parser, and values of settings
     meshes      polygon meshes with faults of geometry and topology, and their files
     files       files of fields, guides, pictures and presets
+    simulations files of simulations, with references to other files
     cases       the categories: files, a command line, and what it may write
     execution   the processes
     verdicts    what is wrong with a run

@@ -8,6 +8,7 @@ import stat
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -235,6 +236,16 @@ def _texture_case(rng: Generator, folder: Path) -> Case:
     return Case(["texture", *inputs, *words, "--size", size, "-o", output], outputs=outputs)
 
 
+def _simulation_case(rng: Generator, folder: Path) -> Case:
+    """A file of a simulation, damaged or with references to pipes, devices and itself."""
+    from .simulations import write_simulation
+
+    name = write_simulation(rng, folder)
+    command = "info" if rng.random() < 0.8 else None
+    options = ["--step", str(rng.integers(4))] * int(rng.random() < 0.1)
+    return _command(rng, folder, [name], options, command=command, rate=0.02)
+
+
 def _path_case(rng: Generator, folder: Path) -> Case:
     """Paths that are not plain files, too long, linked, odd, or the input itself."""
     name = _write_mesh(rng, folder, random_mesh(rng, faults=0))
@@ -299,3 +310,5 @@ CATEGORIES: dict[str, tuple[Callable[[Generator, Path], Case], int]] = {
     "paths": (_path_case, 5),
     "streams": (_stream_case, 2),
 }
+if find_spec("pyvista"):
+    CATEGORIES["simulations"] = (_simulation_case, 2)

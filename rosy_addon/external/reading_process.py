@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 
 from ..core.errors import RosyError
 from ..core.file_io import open_file
-from ..core.memory import available_memory, format_bytes, limit_memory
+from ..core.memory import available_memory, limit_memory
 from ..worker.helper import Helper, HelperLostError
 
 #: Seconds after which reading is given up, and seconds that are added for each megabyte of the files. meshio, the
@@ -64,9 +64,6 @@ def read_in_helper(
     free = available_memory()
     seconds = READ_SECONDS + SECONDS_PER_MEGABYTE * 1e-6 * _size_with_named_files(paths)
     end, outcome = time.monotonic() + seconds, None
-    need = "it needs more memory than is free"
-    if free is not None:
-        need += f" ({format_bytes(free)})"
     try:
         HELPER.submit(_call_with_limit, os.getcwd(), free, function, *arguments)
         while outcome is None and time.monotonic() < end:
@@ -76,11 +73,13 @@ def read_in_helper(
             return outcome()
         reason = f"its reader did not end in {seconds:.0f} seconds: it is damaged: write it again"
     except MemoryError:
-        reason = f"{need}: choose a smaller file"
+        reason = "it needs more memory than is free: choose a smaller file"
     except HelperLostError as error:
         if not error.has_started:
             return function(*arguments)
-        reason = f"its reader crashed: it is damaged, or {need}: write it again, or a smaller one"
+        reason = (
+            "its reader crashed: it is damaged, or needs more memory than is free: write it again"
+        )
     finally:
         if outcome is None:
             HELPER.close()

@@ -112,7 +112,7 @@ def _judge_status(case: Case, run: Run, stderr: str, killed: bool) -> tuple[Verd
             errors = [line for line in lines if re.match(r"(rosy|[\w. -]*): ", line)]
             if not lines or (run.stdout and case.arguments[0] in ("render", "field", "info")):
                 return Verdict.MESSAGE, f"stdout {run.stdout[:80]!r}, stderr {stderr[:80]!r}"
-            if not usage and (len(errors) != len(lines) or len(lines) > 4):
+            if not usage and (len(errors) != len(lines) or len(lines) > 6):
                 return Verdict.MESSAGE, stderr.strip()[:300]
             return Verdict.REFUSED, lines[-1]
         case 130 if case.stop_after is not None:

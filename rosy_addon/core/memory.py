@@ -169,7 +169,24 @@ def _address_space() -> list[int]:
     import resource  # not on Windows
 
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
-    if limit == resource.RLIM_INFINITY:
-        return []
-    pages = int(Path("/proc/self/statm").read_text().split()[0])
-    return [limit - pages * os.sysconf("SC_PAGE_SIZE")]
+    return [] if limit == resource.RLIM_INFINITY else [limit - _used_address_space()]
+
+
+def _used_address_space() -> int:
+    """Return how many bytes of address space this process uses."""
+    return int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def limit_memory(count: int | None) -> None:
+    """Let this process allocate at most some more bytes of memory; None removes an earlier limit.
+
+    It has an effect only on Linux. Elsewhere, the address space of a process cannot be limited, or cannot be measured.
+    """
+    if sys.platform == "linux":
+        import resource
+
+        _, most = resource.getrlimit(resource.RLIMIT_AS)
+        limit = most if count is None else _used_address_space() + count
+        if most != resource.RLIM_INFINITY:
+            limit = min(limit, most)
+        resource.setrlimit(resource.RLIMIT_AS, (limit, most))

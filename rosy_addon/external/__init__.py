@@ -6,6 +6,7 @@ If the library of a module is missing, a `RosyError` is raised: by the module, o
     ffmpeg             encodes .mp4 videos with ffmpeg
     matplotlib_figure  draws figures with matplotlib
     gmsh_file          reads .msh files of Gmsh, with pyvista
+    reading_process    calls functions that read files in a helper process, with limits of time and memory
     simulation_files   reads meshes with arrays from files of simulations, with pyvista and meshio
     vtk_surface        extracts the surface of VTK datasets, with pyvista
 """

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import math
 import os
 import re
 import sys
@@ -26,6 +27,7 @@ from ..core.file_io import check_readable, open_file, read_bytes
 from ..field.mesh_arrays import MeshArrays
 from ..field.mesh_io import must_end_in
 from .gmsh_file import is_gmsh, read_gmsh
+from .reading_process import read_in_helper
 from .vtk_surface import surface_arrays
 
 #: Suffixes of files that VTK reads. Files of the second and third format may hold several time steps.
@@ -76,12 +78,17 @@ class Step:
 
     def read(self) -> MeshArrays:
         """Read the surface of the step, with the arrays at its points and cells."""
-        datasets = [_read_dataset(path, self.index) for path in self.paths]
-        suffix = self.paths[0].suffix.lower()
-        has_parts, repeats_blocks = suffix in PARTED_SUFFIXES, suffix in XDMF_SUFFIXES
-        with _reporting(self.paths[0]):
-            arrays = surface_arrays(datasets, self.name, has_parts, repeats_blocks)
-        return _without_gaps(arrays, self.name) if suffix == ".msh" else arrays
+        return read_in_helper(self.paths, _read_step, self)
+
+
+def _read_step(step: Step) -> MeshArrays:
+    """Read the surface of a step in this process; see `Step.read`."""
+    datasets = [_read_dataset(path, step.index) for path in step.paths]
+    suffix = step.paths[0].suffix.lower()
+    has_parts, repeats_blocks = suffix in PARTED_SUFFIXES, suffix in XDMF_SUFFIXES
+    with _reporting(step.paths[0]):
+        arrays = surface_arrays(datasets, step.name, has_parts, repeats_blocks)
+    return _without_gaps(arrays, step.name) if suffix == ".msh" else arrays
 
 
 def _without_gaps(arrays: MeshArrays, name: str) -> MeshArrays:
@@ -230,11 +237,16 @@ def _steps_of(path: Path) -> list[Step]:
         return _listed_steps(path)
     times: Sequence[float] = ()
     if suffix in (*XDMF_SUFFIXES, *EXODUS_SUFFIXES):
-        with _reporting(path):
-            times = _times(_time_reader(path))
+        times = read_in_helper([path], _read_times, path)
     if len(times) > 1:
         return [Step((path,), index, float(time)) for index, time in enumerate(times)]
     return [Step((path,), time=float(times[0]) if len(times) else None)]
+
+
+def _read_times(path: Path) -> Sequence[float]:
+    """Return the times of the steps in an XDMF or Exodus II file, read in this process."""
+    with _reporting(path):
+        return _times(_time_reader(path))
 
 
 def _listed_steps(path: Path) -> list[Step]:
@@ -248,8 +260,17 @@ def _listed_steps(path: Path) -> list[Step]:
             entries = [(entry["time"], entry["name"]) for entry in json.loads(text)["files"]]
         parts: dict[float, list[Path]] = {}
         for time, name in entries:
-            parts.setdefault(float(time), []).append(path.parent / name)
-    except (ElementTree.ParseError, ValueError, TypeError, KeyError, RecursionError):
+            if not math.isfinite(number := float(time)):
+                raise ValueError
+            parts.setdefault(number, []).append(path.parent / name)
+    except (
+        ElementTree.ParseError,
+        ArithmeticError,
+        LookupError,
+        ValueError,
+        TypeError,
+        RecursionError,
+    ):
         raise RosyError(f"{path}: is damaged, or not one of ParaView's lists of files") from None
     if not parts:
         raise RosyError(f"{path}: lists no files")

@@ -6,8 +6,14 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..core.memory import check_memory
+
 #: Number of rows of an array (faces, corners, edges) in a block. A block takes hundredths of a second.
 ROWS_PER_BLOCK = 1 << 16
+
+#: Number of elements from which `concatenated_ranges` estimates memory, and bytes that its callers need for each
+#: element: measured with `sparse_multigrid.matrix_product`, which has the longest ranges.
+MANY_ELEMENTS, BYTES_PER_ELEMENT = 1 << 24, 50
 
 #: One or several arrays, as the result of a function.
 Arrays = np.ndarray | tuple[np.ndarray, ...]
@@ -108,8 +114,19 @@ def concatenated_ranges(first: np.ndarray, count: np.ndarray) -> np.ndarray:
     --------
     >>> concatenated_ranges(np.array([5, 10]), np.array([3, 2])).tolist()
     [5, 6, 7, 10, 11]
+
+    Raises
+    ------
+    RosyError
+        If the work with so many numbers needs more memory than is free. That happens if a face has thousands of
+        corners, or a vertex thousands of faces.
     """
     stop = np.cumsum(count)
+    if len(stop) and stop[-1] > MANY_ELEMENTS:
+        advice = "divide faces with thousands of corners, and vertices with thousands of faces"
+        check_memory(
+            BYTES_PER_ELEMENT * float(stop[-1]), f"a matrix with {stop[-1]:,} terms", advice
+        )
     shift = first + count
     shift -= stop
     result = np.repeat(shift, count)

@@ -7,7 +7,7 @@ opposite angles (Pinkall and Polthier, *Computing Discrete Minimal Surfaces and 
 simpler factor is the distance between the two face centers, divided by the length of the edge. It equals
 the exact factor only if the line between the centers is perpendicular to the edge.
 
-A face with more than three corners is divided into a fan of triangles. Its direction is the mean direction of
+A face with more than three corners is divided into a chain of triangles. Its direction is the mean direction of
 its triangles.
 """
 
@@ -22,9 +22,11 @@ from .analysis import edge_lengths
 from .blocks import concatenated_ranges, mask, neighbors_of_nodes
 from .connectivity import connected_components, connected_corners, sums_from_roots
 from .frames import dot
+from .polygon_arrays import next_corners
 from .representation import edge_unfolding, matching_angles
 from .singularities import signed_corner_angles
 from .surface import Surface
+from .triangulate import chain_corners
 
 #: Smallest and largest conductance of an edge, relative to the median of all edges.
 MAX_CONDUCTANCE_RATIO = 1e4
@@ -264,7 +266,8 @@ def spanning_forest(node_count: int, first: np.ndarray, second: np.ndarray) -> S
 
 @dataclass(frozen=True, eq=False)
 class TriangleGraph:
-    """The graph of the triangles of a surface, where each face is a fan of triangles around its first corner.
+    """The graph of the triangles of a surface, where each face is a chain of triangles; see
+    `triangulate.chain_corners`.
 
     Attributes
     ----------
@@ -361,26 +364,23 @@ def triangle_graph(faces: FaceGraph) -> TriangleGraph:
     """Return the graph of the triangles of a surface, given the graph of its faces."""
     surface, size = faces.surface, np.diff(faces.surface.face_start)
     face = np.repeat(np.arange(len(size)), size - 2)
-    first_triangle = np.cumsum(size - 2) - (size - 2)
-    rank = np.arange(len(face)) - first_triangle[face]
-    apex = surface.face_start[face]
-    corner = np.stack([apex, apex + rank + 1, apex + rank + 2], axis=1)
+    rank = np.arange(len(face)) - (np.cumsum(size - 2) - (size - 2))[face]
+    local, opposite_next = chain_corners(rank, size[face])
+    corner = surface.face_start[face][:, None] + local
     cotangent, area = _cotangents(surface.vertices[surface.corner_vertex[corner]])
-    # Edges between faces. An edge at the first corner of its face, the apex of the fan, belongs to the
-    # first or to the last triangle.
-    triangles, weights = [], []
-    for start in faces.halfedges.T:
-        owner = surface.corner_face[start]
-        place = start - surface.face_start[owner]
-        last = size[owner] - 1
-        triangle = first_triangle[owner] + np.clip(place - 1, 0, last - 2)
-        opposite = np.where(place == 0, 2, np.where(place == last, 1, 0))
-        triangles.append(triangle)
-        weights.append(cotangent[triangle, opposite] / 2)
-    # Edges within faces, between each triangle of a fan and the next one.
+    # Edges between faces. For each corner, the side of a triangle that starts there and is an edge of the face.
+    tail, head = corner.ravel(), np.roll(corner, -1, axis=1).ravel()
+    sides = np.flatnonzero(head == next_corners(surface.face_start)[tail])
+    side = np.empty(len(surface.corner_vertex), dtype=np.intp)
+    side[tail[sides]] = sides
+    triangles = [side[start] // 3 for start in faces.halfedges.T]
+    weights = [
+        cotangent[side[start] // 3, (side[start] + 2) % 3] / 2 for start in faces.halfedges.T
+    ]
+    # Edges within faces, between each triangle and the next one.
     inner = np.flatnonzero(rank > 0)
     triangles = [np.concatenate(pair) for pair in zip(triangles, (inner - 1, inner), strict=True)]
-    inner_weights = cotangent[inner - 1, 1] / 2, cotangent[inner, 2] / 2
+    inner_weights = cotangent[inner - 1, opposite_next[inner - 1]] / 2, cotangent[inner, 2] / 2
     weights = [np.concatenate(pair) for pair in zip(weights, inner_weights, strict=True)]
     weight = np.stack(weights, axis=1)
     graph = replace(
@@ -389,7 +389,7 @@ def triangle_graph(faces: FaceGraph) -> TriangleGraph:
         target=triangles[1],
         unfolding=np.concatenate([faces.unfolding, np.zeros(len(inner))]),
         tail=np.concatenate([faces.tail, faces.corner_node[corner[inner, 1]]]),
-        head=np.concatenate([faces.head, faces.corner_node[apex[inner]]]),
+        head=np.concatenate([faces.head, faces.corner_node[corner[inner, 0]]]),
         conductance=weight.sum(axis=1),
         component=faces.component[face],
     )

@@ -19,6 +19,10 @@ CHUNK_SIZE = 512
 #: Number of faces whose corners are processed at once.
 FACES_PER_BLOCK = 1 << 14
 
+#: Faces with more corners are not divided into fans. In a Laplacian, the apex of a fan is a neighbor of all corners,
+#: and on coarser grids of `sparse_multigrid` most pairs of its k neighbors become neighbors: k^2 / 4 of them.
+MAX_FAN = 256
+
 #: A diagonal is flipped if this makes its cotangents larger by more than this. If all corners of a face lie on a circle,
 #: the sums are 0, and differ by rounding errors.
 EQUAL_COTANGENTS = 1e-6
@@ -53,7 +57,8 @@ def triangulate(
     -----
     A convex face becomes a fan around its first corner. A face with a single flat or reflex corner becomes
     a fan around that corner. All other corners are visible from it, because shortest paths inside a polygon
-    bend only at reflex corners. The remaining faces, usually few, are ear-clipped in a Python loop.
+    bend only at reflex corners. A convex face with more than `MAX_FAN` corners becomes a strip. The remaining faces,
+    usually few, are ear-clipped in a Python loop.
     """
     size = np.diff(face_start)
     apex = np.zeros(len(size), dtype=np.int32)
@@ -148,9 +153,10 @@ def _gain_of_flips(corners: np.ndarray) -> np.ndarray:
 
 
 def _triangle_fans(face_start: np.ndarray, apex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return `triangles` and `triangle_face` (see `triangulate`) if each face is split into a fan.
+    """Return `triangles` and `triangle_face` (see `triangulate`) if each face is split into a fan or a strip.
 
-    `apex` holds, for each of F faces, the corner around which the fan is, counted from 0 within the face.
+    `apex` holds, for each of F faces, the corner around which the fan is, counted from 0 within the face; strips
+    begin there.
     """
     size = np.diff(face_start)
     count = size - 2
@@ -158,9 +164,33 @@ def _triangle_fans(face_start: np.ndarray, apex: np.ndarray) -> tuple[np.ndarray
     first_triangle = (np.cumsum(count) - count)[triangle_face]
     step = np.arange(len(triangle_face), dtype=np.int32) - first_triangle
     first, size, apex = face_start[triangle_face], size[triangle_face], apex[triangle_face]
-    local, size = np.stack([apex, apex + step + 1, apex + step + 2], axis=1), size[:, None]
-    np.subtract(local, size, out=local, where=local >= size)
+    local = (chain_corners(step, size)[0] + apex[:, None]) % size[:, None]
     return (first[:, None] + local).astype(np.int32), triangle_face
+
+
+def chain_corners(rank: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners of the triangles of faces. Each triangle has a side in common with the next one.
+
+    They are a fan around the first corner of the face or, in a face with more than `MAX_FAN` corners, a strip between
+    its two sides.
+
+    Parameters
+    ----------
+    rank, size : (T,) int ndarray
+        Number of the triangle in its face, from 0, and the number of corners of the face.
+
+    Returns
+    -------
+    corners : (T, 3) int ndarray
+        Corners, counted from 0 in the face, counter-clockwise. The last one is not in the previous triangle.
+    opposite_next : (T,) int ndarray
+        The corner, 0 or 1, that is not in the next triangle.
+    """
+    half, odd = np.divmod(np.where(size > MAX_FAN, rank, 0), 2)
+    is_fan = size <= MAX_FAN
+    second = np.where(is_fan, rank + 1, half + odd + 1)
+    third = np.where(is_fan, rank + 2, np.where(odd, -half - 1, half + 2))
+    return np.stack([-half, second, third], axis=1) % size[:, None], 1 - odd
 
 
 def _fan_apexes(
@@ -196,7 +226,7 @@ def _fan_apexes(
             not_convex = sine.min(axis=1) <= COLLINEAR_SINE
             apex[group] = np.where(not_convex, sharpest, 0)
             if count > 4:
-                needs_ears[group] = (sine <= COLLINEAR_SINE).sum(axis=1) > 1
+                needs_ears[group] = (sine <= COLLINEAR_SINE).sum(axis=1) > (count <= MAX_FAN)
     return apex, needs_ears
 
 

@@ -22,12 +22,18 @@ from ..core.cache import Cache, cached, content_hash
 from ..core.color import luminance, to_linear
 from ..core.errors import RosyError
 from ..core.file_io import check_readable
+from ..core.memory import check_memory
+from ..field.blocks import ROWS_PER_BLOCK, row_blocks
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 from .cameras import camera_of_object, render_camera
 from .datablocks import has_rosy_properties
 from .face_values import COLOR_TYPES, corner_scalars, filled_attribute
 from .meshes import read_uvs
+
+#: Memory in bytes of each pixel while the luminance of an image is read: four float32 numbers, and the luminance in
+#: blocks and as a whole.
+LUMINANCE_BYTES = 4 * 4 + 2 * 4
 
 
 @dataclass(frozen=True)
@@ -357,18 +363,24 @@ def image_luminance(image: Image) -> np.ndarray:
     Raises
     ------
     RosyError
-        If the image has no pixels.
+        If the image has no pixels, or there is not enough memory.
     """
     width, height = image.size
     if not (width and height and len(image.pixels)):
         raise RosyError(f"image '{image.name}' has no pixels: check the path of its file")
-    rgba = np.empty(4 * width * height, dtype=np.float32)
-    image.pixels.foreach_get(rgba)
-    rgba = rgba.reshape(height, width, 4)
-    alpha = rgba[..., 3:]
-    if image.is_float:
-        # Float images have premultiplied alpha.
-        np.divide(rgba[..., :3], alpha, out=rgba[..., :3], where=alpha > 0)
-    elif image.colorspace_settings.name != "Non-Color":
-        rgba[..., :3] = to_linear(rgba[..., :3])
-    return luminance(rgba)
+    subject = f"image '{image.name}': a tone of {width} x {height} pixels"
+    check_memory(LUMINANCE_BYTES * width * height, subject, "choose a smaller image")
+    pixels = np.empty((height, width, 4), dtype=np.float32)
+    image.pixels.foreach_get(pixels.reshape(-1))
+
+    def block_luminance(rgba: np.ndarray) -> np.ndarray:
+        alpha = rgba[..., 3:]
+        if image.is_float:
+            # Float images have premultiplied alpha.
+            np.divide(rgba[..., :3], alpha, out=rgba[..., :3], where=alpha > 0)
+        elif image.colorspace_settings.name != "Non-Color":
+            rgba[..., :3] = to_linear(rgba[..., :3])
+        return luminance(rgba)
+
+    blocks = row_blocks(height, max(ROWS_PER_BLOCK // width, 1))
+    return np.concatenate([block_luminance(pixels[block]) for block in blocks])

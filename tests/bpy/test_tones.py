@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tracemalloc
 
 import bpy
 import numpy as np
@@ -118,6 +119,20 @@ def test_luminance_of_images():
     clear = bpy.data.images.new("clear", 2, 2, alpha=True)
     clear.pixels.foreach_set(np.zeros(16, dtype=np.float32))
     np.testing.assert_allclose(image_luminance(clear), 1)
+
+
+def test_memory_of_a_large_image(monkeypatch):
+    """The need is estimated before pixels are read, within a factor of two of the measured one."""
+    image = bpy.data.images.new("large", 2000, 1000)
+    assert len(image.pixels)
+    tracemalloc.start()
+    image_luminance(image)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    monkeypatch.setattr("rosy.rosy_addon.core.memory.available_memory", lambda: 2 * peak)
+    image_luminance(image)
+    monkeypatch.setattr("rosy.rosy_addon.core.memory.available_memory", lambda: peak // 2)
+    expect_error("image 'large': a tone of 2000 x 1000 pixels needs", image_luminance, image)
 
 
 def test_missing_images_and_uv_maps(wall):

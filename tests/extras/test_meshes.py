@@ -206,6 +206,18 @@ def test_truncated_file(tmp_path, sphere, error_of):
     assert error_of(read_simulation, path).startswith(f"{path}: cannot be read: ")
 
 
+def test_a_file_that_crashes_vtk(tmp_path, sphere, error_of, capfd):
+    """The helper process that reads it ends, and another one reads the next file."""
+    path = tmp_path / "a.vtp"
+    sphere.save(path)
+    good = path.read_bytes()
+    path.write_bytes(good.replace(b'NumberOfComponents="3"', b'NumberOfComponents="-9"'))
+    assert error_of(read_simulation, path).startswith(f"{path}: cannot be read: its reader crashed")
+    path.write_bytes(good)
+    assert read_simulation(path).polygons.face_count == sphere.n_cells
+    assert tuple(capfd.readouterr()) == ("", "")
+
+
 def test_files_without_a_surface(tmp_path, error_of):
     pv.Line().save(tmp_path / "line.vtp")
     message = error_of(read_simulation, tmp_path / "line.vtp")

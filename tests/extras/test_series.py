@@ -135,6 +135,9 @@ def test_series_without_files(tmp_path, error_of):
     series.write_text('{"files": []}')
     for path in (collection, series):
         assert error_of(list_steps, [path]).endswith(f"{path.name}: lists no files")
+    for time in ("9" * 400, "1e999", "NaN"):
+        series.write_text(f'{{"files": [{{"name": "a.vtu", "time": {time}}}]}}')
+        assert "a.vtu.series: is damaged" in error_of(list_steps, [series])
     series.write_text('{"files": [{"name": "none.vtu", "time": 0}]}')
     assert "none.vtu: cannot be read" in error_of(list_steps, [series])
 

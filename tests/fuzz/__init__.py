@@ -15,6 +15,7 @@ Modules in order of dependence:
     signals     commands that start other processes, and their files
     links       links at the paths of outputs
     names       titles, labels and names of files
+    simulations files of simulations, with references to other files
     cases       the categories: files, a command line, and what it may write
     execution   the processes
     verdicts    what is wrong with a run

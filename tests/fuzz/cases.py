@@ -283,6 +283,16 @@ def _texture_case(rng: Generator, folder: Path) -> Case:
     return Case(arguments, tile_names(output), fault=fault)
 
 
+def _simulation_case(rng: Generator, folder: Path) -> Case:
+    """A file of a simulation, damaged or with references to pipes, devices and itself."""
+    from .simulations import write_simulation
+
+    name = write_simulation(rng, folder)
+    command = "info" if rng.random() < 0.8 else None
+    options = ["--step", str(rng.integers(4))] * int(rng.random() < 0.1)
+    return _command(rng, folder, [name], options, command=command, rate=0.02)
+
+
 def _path_case(rng: Generator, folder: Path) -> Case:
     """Paths that are not plain files, too long, linked, odd, or the input itself."""
     name = _write_mesh(rng, folder, random_mesh(rng, faults=0))
@@ -403,3 +413,5 @@ CATEGORIES: dict[str, tuple[Callable[[Generator, Path], Case], int]] = {
 }
 if find_spec("matplotlib"):
     CATEGORIES["names"] = (_name_case, 5)
+if find_spec("pyvista"):
+    CATEGORIES["simulations"] = (_simulation_case, 2)

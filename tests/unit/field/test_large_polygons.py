@@ -1,0 +1,74 @@
+"""Faces with hundreds of corners: solvers need memory for each corner, not for each pair of corners."""
+
+from __future__ import annotations
+
+import tracemalloc
+
+import numpy as np
+import pytest
+
+import rosy_addon as rf
+from rosy_addon.field import triangulate
+from rosy_addon.field.blocks import concatenated_ranges
+from rosy_addon.field.triangulate import MAX_FAN, chain_corners
+
+
+def cylinder(corners: int) -> rf.Surface:
+    """A cylinder with a polygon at each end."""
+    angle = np.arange(corners) * 2 * np.pi / corners
+    ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    first, second = np.arange(corners), np.roll(np.arange(corners), -1)
+    sides = np.stack([first, first + corners, second + corners, second], axis=1)
+    faces = [first.tolist(), *sides.tolist(), (first[::-1] + corners).tolist()]
+    return rf.Surface(np.concatenate([ring, ring + [0, 0, 1]]), faces)
+
+
+SOLVERS = {
+    "form": rf.form,
+    "guided": lambda surface: rf.guided(surface, strokes=[[[0.1, 0, 0], [0.6, 0.1, 0]]]),
+    "prescribed": lambda surface: rf.prescribed(surface, {1: 1}, add_missing=True),
+    "smoothed": lambda surface: rf.along_axis(surface, (1, 0.3, 0.2)).smoothed(0.1),
+}
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_memory(name):
+    surface = cylinder(700)
+    tracemalloc.start()
+    SOLVERS[name](surface)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 50e6
+
+
+def test_a_strip_and_a_fan_give_the_same_field(monkeypatch):
+    """All corners are on a circle, so the weights of all diagonals are 0."""
+    surface, given = cylinder(300), {300 // 8 * k: 1 for k in range(8)}
+    strip = rf.prescribed(surface, given).representation
+    monkeypatch.setattr(triangulate, "MAX_FAN", 1000)
+    fan = rf.prescribed(surface, given).representation
+    assert MAX_FAN < 300 and strip == pytest.approx(fan, abs=1e-5)
+
+
+def test_triangles_of_a_strip():
+    """Each triangle is counter-clockwise and continues the previous one, and no corner is in many."""
+    count = MAX_FAN + 1
+    angle = np.arange(count) * 2 * np.pi / count
+    points = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    strip, opposite_next = chain_corners(np.arange(count - 2), np.full(count - 2, count))
+    a, b, c = points[strip].swapaxes(0, 1)
+    areas = np.cross(b - a, c - a)[:, 2] / 2
+    assert areas.min() > 0 and areas.sum() == pytest.approx(count / 2 * np.sin(2 * np.pi / count))
+    for row in range(count - 3):
+        kept = set(strip[row]) - {strip[row][opposite_next[row]]}
+        assert kept == set(strip[row + 1][:2])
+    corners = np.arange(count, dtype=np.int32)
+    triangles, _ = triangulate.triangulate(points, corners, np.array([0, count], np.int32))
+    assert np.array_equal(triangles, strip) and np.bincount(strip.ravel()).max() == 3
+
+
+def test_estimate(monkeypatch, error_of):
+    """Where every pair of neighbors counts, as around a vertex of many faces, memory is estimated first."""
+    monkeypatch.setattr("rosy_addon.core.memory.available_memory", lambda: 10**9)
+    message = error_of(concatenated_ranges, np.zeros(3, dtype=np.intp), np.full(3, 10**7))
+    assert message.startswith("a matrix with 30,000,000 terms needs about 1.5 GB of memory")

@@ -303,7 +303,9 @@ def link_or_append(monkey: Monkey) -> None:
     linked = [obj for obj in objects() if obj.library is not None]
     is_full = len(bpy.data.objects) >= MAX_OBJECTS or len(bpy.data.libraries) > 2
     if linked and monkey.chance(0.5):
-        monkey.pick(linked).override_create(remap_local_usages=True)
+        obj = monkey.pick(linked).override_create(remap_local_usages=True)
+        if obj is not None and obj.data is not None and monkey.chance(0.3):
+            obj.data.override_create(remap_local_usages=True)
     if is_full or not to_object_mode(monkey):
         return
     path = monkey.folder / f"library{monkey.random.randrange(3)}.blend"

@@ -237,8 +237,8 @@ def test_attributes_of_the_user_with_the_same_name_stay(name, tmp_path):
         attributes.new(name, "FLOAT_VECTOR", "FACE")
     remove_bakes(scene)
     for other in ("Plain", "Sheet"):
-        names = [key for key in obj(other).data.attributes.keys() if key.startswith("rosy_")]
-        assert names == [name]
+        names = [attribute.name for attribute in obj(other).data.attributes]
+        assert [found for found in names if found.startswith("rosy_")] == [name]
 
 
 def test_objects_without_materials_have_no_slots_afterwards(tmp_path):

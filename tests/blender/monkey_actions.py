@@ -294,6 +294,8 @@ def any_operator(monkey: Monkey) -> None:
             settings["stroke"] = list(_stroke(monkey))
         elif prop.identifier in ("skip_browser", "replace"):
             settings[prop.identifier] = True  # no dialog
+        elif prop.identifier == "directions":  # the default takes minutes on a busy machine
+            settings["directions"] = monkey.value(prop)
         elif prop.identifier == "film":
             settings["film"] = ".gif"
         elif prop.type not in ("POINTER", "COLLECTION") and monkey.chance(0.3):

@@ -121,10 +121,10 @@ def _add_object(state: Fingerprint, path: str, obj: bpy.types.Object) -> None:
     state[f"{path}/basis"] = (
         *(obj.data and obj.data.name, parent, obj.hide_render, obj.hide_viewport),
         None if obj.animation_data else _plain(obj.matrix_basis),
-        obj.add_rest_position_attribute,
         # Cycles adds its settings to objects when a file is opened.
         sorted(set(obj.keys()) - {"rosy", "cycles"}),
     )
+    state[f"{path}/rest"] = obj.add_rest_position_attribute
     state[f"{path}/collections"] = sorted(collection.name for collection in obj.users_collection)
     state[f"{path}/slots"] = [(s.link, _user_name(s.material)) for s in obj.material_slots]
     state[f"{path}/groups"] = [group.name for group in obj.vertex_groups]

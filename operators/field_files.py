@@ -33,6 +33,8 @@ class ROSY_OT_field_import(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Im
     bl_label = "Import Field"
     conditions = EDITABLE
 
+    #: Blender's popup for a dropped file counts the files of this property. Only one is read.
+    files = ()
     filename_ext = ".rosy"
     filter_glob: file_filter(*READ_SUFFIXES, *EDGE_SUFFIXES)
     degree: integer(

@@ -181,10 +181,32 @@ def test_a_job_keeps_to_the_object_that_was_selected():
             assert any("'First' was deleted" in report for report in reports) == is_deleted, reports
 
 
+def test_a_dialog_keeps_to_the_object_that_was_selected():
+    """The user selects another object while a dialog is open, and then confirms it."""
+    path = str(RESULTS.with_suffix(".rosy"))
+    for operator, settings in (("bake_texture", {}), ("field_import", {"filepath": path})):
+        yield from two_spheres()
+        mesh = bpy.data.meshes["First"]
+        mesh.uv_layers.remove(mesh.uv_layers[0])
+        call_in_view(bpy.ops.rosy.field_export, "EXEC_DEFAULT", filepath=path)
+        mesh.attributes["rosy"].data[0].vector *= 2.0
+        before = fingerprint()
+        start = getattr(bpy.ops.rosy, operator)
+        assert call_in_view(start, "INVOKE_DEFAULT", True, **settings) == {"RUNNING_MODAL"}
+        yield 0.5
+        select("Second")
+        press("RET")
+        yield 0.5
+        yield from wait_for_job()
+        differences = changes(before, fingerprint(), ("context", "owned/*", "scenes/*"))
+        assert {re.split("[/:]", path)[1] for path in differences} == {"First"}, differences
+
+
 def two_spheres():
     """Create a scene of two spheres with fields. The first one is selected."""
     bpy.ops.wm.read_homefile(use_empty=True)
     yield 0.2
+    bpy.context.scene.rosy.texture_size = 64
     with in_view():
         for name in ("Second", "First"):
             bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)

@@ -142,7 +142,7 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
     ) -> Steps[str]:
         """Generate fields, then store them. The result is a message to the user.
 
-        `errors` are those of meshes that have been left out.
+        `errors` has the errors of meshes that have been left out.
         """
         fields, fields_on_surfaces = {}, []
         for (mesh, surface, settings), start, stop in shares(inputs, 0.9):

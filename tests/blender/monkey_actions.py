@@ -294,11 +294,11 @@ def any_operator(monkey: Monkey) -> None:
             settings["stroke"] = list(_stroke(monkey))
         elif prop.identifier in ("skip_browser", "replace"):
             settings[prop.identifier] = True  # no dialog
-        elif prop.identifier == "directions":  # the default takes minutes on a busy machine
-            settings["directions"] = monkey.value(prop)
         elif prop.identifier == "film":
             settings["film"] = ".gif"
-        elif prop.type not in ("POINTER", "COLLECTION") and monkey.chance(0.3):
+        elif prop.type not in ("POINTER", "COLLECTION") and (
+            prop.identifier in LIMITS or monkey.chance(0.3)  # defaults may take minutes
+        ):
             settings[prop.identifier] = monkey.value(prop)
     if operator == "bake_animation":
         settings |= {"step": 1, "first": 1, "last": monkey.pick([1, 2, 3, 0])}

@@ -1,12 +1,15 @@
 """Jobs that are disturbed: while they run, the monkey selects, deletes, renames and cancels.
 
 Without a window, Blender runs a job to its end at once. `disturb_jobs` lets operators run them as in a window,
-as a `Job` with a helper process, and acts between its steps.
+as a `Job`, and acts between its steps. So that a seed repeats a run, there is no helper process, and each
+`Job.advance` makes one step.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import count
+from types import SimpleNamespace
 
 import bpy
 from monkey_actions import Monkey, meshes, objects
@@ -17,6 +20,9 @@ def disturb_jobs(monkey: Monkey) -> None:
     """Disturb a share of the jobs of all operators, from now on."""
     modal_job = rosy("operators.modal_job")
     run_in_place = modal_job.ModalJobMixin.act
+    modal_job.uses_helper = lambda _: False
+    seconds = count(0.0, 0.8 * modal_job.SLICE_SECONDS)
+    modal_job.time = SimpleNamespace(monotonic=seconds.__next__)
 
     def act(operator: bpy.types.Operator, context: bpy.types.Context) -> None:
         if not monkey.chance(monkey.disturbance):
@@ -29,7 +35,6 @@ def disturb_jobs(monkey: Monkey) -> None:
                 while job.stop_reason is None:
                     disturb(monkey, job)
                     job.advance(context)
-                    rosy("rosy_addon.worker.helper").HELPER.wait(0.02)
             finally:
                 job.stop("an error")
         if not job.is_done:

@@ -14,7 +14,6 @@ from ..rosy_addon.scene.cameras import CameraSource, camera_of_view, render_came
 from ..rosy_addon.scene.computed_attributes import OCCLUSION_ATTRIBUTE, store_occlusion
 from ..rosy_addon.scene.files import output_folder
 from ..rosy_addon.scene.pictures import BakeResult, read_output_settings, show_bake
-from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.ui.main_panel import SHADING_WITHOUT_MATERIALS
 from ..rosy_addon.ui.preferences import worker_count
 from ..rosy_addon.ui.properties import CAMERA_ITEMS
@@ -33,6 +32,10 @@ class ROSY_OT_bake(ModalJobMixin, bpy.types.Operator):
     conditions = (IDLE, VISIBLE_FIELD)
 
     camera: choice("Camera", "Camera to draw from", CAMERA_ITEMS)
+
+    def find_objects(self, context: bpy.types.Context) -> list[bpy.types.Object]:
+        cameras = [camera for camera in self._cameras(context) if not isinstance(camera, Camera)]
+        return [*super().find_objects(context), *cameras]
 
     def begin(self, context: bpy.types.Context) -> Steps[list[BakeResult]]:
         return bake.begin(
@@ -109,6 +112,10 @@ class ROSY_OT_bake_animation(ModalJobMixin, bpy.types.Operator):
     def take_answer(self, context: bpy.types.Context) -> None:
         context.scene.rosy.directory = self.directory
 
+    def find_objects(self, context: bpy.types.Context) -> list[bpy.types.Object]:
+        cameras = scene_cameras(context.scene) if self.all_cameras else []
+        return [*super().find_objects(context), *cameras]
+
     def begin(self, context: bpy.types.Context) -> Steps[list[SequenceResult]]:
         scene = context.scene
         first, last, step = self._frame_settings(scene)
@@ -154,8 +161,7 @@ class ROSY_OT_occlusion(ModalJobMixin, bpy.types.Operator):
 
     def begin(self, context: bpy.types.Context) -> Steps[None]:
         depsgraph = context.evaluated_depsgraph_get()
-        objects = field_objects(context.view_layer)
-        return store_occlusion.begin(depsgraph, objects, direction_count=self.directions)
+        return store_occlusion.begin(depsgraph, self.objects, direction_count=self.directions)
 
     def finish(self, context: bpy.types.Context, result: None) -> None:
         settings = context.scene.rosy

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import bpy
@@ -18,7 +20,7 @@ from ..rosy_addon.jobs.bake_texture import TextureResult, bake_texture
 from ..rosy_addon.scene.datablocks import is_editable
 from ..rosy_addon.scene.field_attributes import has_field
 from ..rosy_addon.ui.property_makers import toggle
-from ..rosy_addon.worker.job import Step, Steps
+from ..rosy_addon.worker.job import Steps, reverting
 from .base import ACTIVE_FIELD, IDLE, selected_mesh_objects
 from .modal_job import ModalJobMixin
 
@@ -45,7 +47,8 @@ class ROSY_OT_bake_texture(ModalJobMixin, Operator):
 
         Return the result of the operator; None if nothing is asked.
         """
-        if self.unwrap or not self._without_uv_map(context):
+        self._missing = [obj.name for obj in self._without_uv_map()]
+        if self.unwrap or not self._missing:
             return None
         return context.window_manager.invoke_props_dialog(self, width=340, confirm_text="Unwrap")
 
@@ -53,17 +56,17 @@ class ROSY_OT_bake_texture(ModalJobMixin, Operator):
         self.unwrap = True
 
     def draw(self, context: Context) -> None:
-        names = ", ".join(f"'{obj.name}'" for obj in self._without_uv_map(context))
+        names = ", ".join(f"'{name}'" for name in self._missing)
         column = self.layout.column(align=True)
         column.label(text=f"No UV map: {names}", icon="ERROR")
         column.label(text="Unwrap with Smart UV Project, and bake the texture?")
 
     def begin(self, context: Context) -> Steps[list[TextureResult]]:
-        missing = self._without_uv_map(context) if self.unwrap else []
-        steps = bake_texture.begin(context.scene, self.required_data(context))
+        missing = self._without_uv_map() if self.unwrap else []
+        steps = bake_texture.begin(context.scene, self.objects)
         return _with_uv_maps(context, missing, steps) if missing else steps
 
-    def required_data(self, context: Context) -> list[Object]:
+    def find_objects(self, context: Context) -> list[Object]:
         return [obj for obj in selected_mesh_objects(context) if has_field(obj)]
 
     def finish(self, context: Context, result: list[TextureResult]) -> None:
@@ -71,11 +74,9 @@ class ROSY_OT_bake_texture(ModalJobMixin, Operator):
         self.report_done(f"Baked the texture of {names}")
         self.report_warnings(*(text for texture in result for text in texture.warnings))
 
-    def _without_uv_map(self, context: Context) -> list[Object]:
+    def _without_uv_map(self) -> list[Object]:
         return [
-            obj
-            for obj in self.required_data(context)
-            if not obj.data.uv_layers and not obj.rosy.texture_uv_map
+            obj for obj in self.objects if not obj.data.uv_layers and not obj.rosy.texture_uv_map
         ]
 
 
@@ -113,21 +114,15 @@ def _with_uv_maps(context: Context, objects: Sequence[Object], steps: Steps[Any]
         layer.data.foreach_set("uv", uv)
         # Blender adds a number if the mesh has another attribute of this name.
         map_names[mesh] = layer.name
-    with_cleanup = _with_removal(map_names, steps)
-    next(with_cleanup)  # has started, so it removes the maps also if it is closed
-    return with_cleanup
+    return reverting(steps, partial(_remove_uv_maps, map_names))
 
 
-def _with_removal(map_names: Mapping[Mesh, str], steps: Steps[Any]) -> Steps[Any]:
-    """Run the steps of a job. If the job does not finish, remove UV maps, given by name for each mesh."""
-    try:
-        yield Step(0.0, "unwrapping")
-        return (yield from steps)
-    except BaseException:
-        for mesh, name in map_names.items():
+def _remove_uv_maps(map_names: Mapping[Mesh, str]) -> None:
+    """Remove UV maps, given by name for each mesh that still exists."""
+    for mesh, name in map_names.items():
+        with suppress(ReferenceError):
             if (layer := mesh.uv_layers.get(name)) is not None:
                 mesh.uv_layers.remove(layer)
-        raise
 
 
 def _unwrapped(context: Context, mesh: Mesh) -> np.ndarray:
@@ -136,14 +131,15 @@ def _unwrapped(context: Context, mesh: Mesh) -> np.ndarray:
     A copy of the mesh is unwrapped, because Blender's operator needs a visible object, and changes which
     faces are hidden and selected.
     """
-    active, selected = context.view_layer.objects.active, list(context.selected_objects)
+    objects = context.view_layer.objects
+    active, selected = objects.active, list(objects.selected)
     copy = bpy.data.objects.new("RoSy Unwrapping", mesh.copy())
     try:
         context.scene.collection.objects.link(copy)
         for obj in selected:
             obj.select_set(False)
         copy.select_set(True)
-        context.view_layer.objects.active = copy
+        objects.active = copy
         bpy.ops.object.mode_set(mode="EDIT")
         bpy.ops.mesh.reveal(select=False)
         bpy.ops.mesh.select_all(action="SELECT")
@@ -159,4 +155,4 @@ def _unwrapped(context: Context, mesh: Mesh) -> np.ndarray:
         bpy.data.meshes.remove(data)
         for obj in selected:
             obj.select_set(True)
-        context.view_layer.objects.active = active
+        objects.active = active

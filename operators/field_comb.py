@@ -14,9 +14,9 @@ from ..rosy_addon.ui import comb_brush, overlay
 from ..rosy_addon.ui.property_makers import brush_strength, choice, fraction, real, toggle
 from ..rosy_addon.ui.sidebar import use_property_columns
 from ..rosy_addon.viewport.brush_mouse import current_mouse, release_mouse
-from ..rosy_addon.worker.job import Steps, part
-from .base import ACTIVE_FIELD, IDLE, Condition, selected_mesh_objects
-from .modal_job import ActiveMeshMixin, Job, ModalJobMixin
+from ..rosy_addon.worker.job import Steps, part, reverting
+from .base import ACTIVE_FIELD, IDLE, Condition
+from .modal_job import ActiveMeshMixin, Job, ModalJobMixin, deleted_object
 
 #: Modes of the view in which the field can be combed.
 MODES = ("OBJECT", "SCULPT")
@@ -92,7 +92,7 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         """
         if not len(self.stroke):
             raise RosyError("the stroke has no points: give some, or drag in the 3D view")
-        line = self._start_line(context)
+        line = self._start_line()
         for point in self.stroke:
             if point.is_start:
                 line.lift()
@@ -104,8 +104,9 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         if len(self.stroke) or context.region_data is None:
             return super().invoke(context, event)
         self._is_away = False
+        self.resolve_objects(context)
         try:
-            self._mouse = current_mouse(context, selected_mesh_objects(context)[0], holds=True)
+            self._mouse = current_mouse(context, self.objects[0], holds=True)
             self._add(context, event)
         except REPORTED_ERRORS as error:
             release_mouse()
@@ -122,8 +123,6 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         # If the next stroke begins, the job of this one is completed at once.
         is_next = event.type == "LEFTMOUSE" and event.value == "PRESS"
         result = super().modal(context, event, runs_to_end=is_next)
-        if result == {"CANCELLED"}:
-            self._take_back()
         return result | {"PASS_THROUGH"} if is_next else result
 
     def _drag(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -141,12 +140,13 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
                     return {"CANCELLED"}
                 self._line.lift()
                 self._line.show()
-                self._job = Job(context, self._settle(context, self._line), [self._line.mesh])
+                steps = reverting(self._settle(context, self._line), self._line.restore)
+                self._job = Job(context, steps, self._objects)
         except REPORTED_ERRORS as error:
             self._take_back()
             return self.report_error(error)
-        except ReferenceError:  # the mesh was deleted
-            return {"CANCELLED"}
+        except ReferenceError:
+            return self.report_error(RosyError(f"'{deleted_object(self._objects)}' was deleted"))
         return {"RUNNING_MODAL"}
 
     def _take_back(self) -> None:
@@ -174,19 +174,19 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         if self._line is None:
             comb = context.scene.rosy.comb
             self.radius, self.strength = self._mouse.radius(place, comb.size), comb.strength
-            self._line = self._start_line(context)
+            self._line = self._start_line()
         point = self.stroke.add()
         point.location, point.pressure = place, event.pressure
         point.is_start = len(self.stroke) > 1 and self._is_away
         self._is_away = False
         return self._line.extend(np.array([point.location]), np.array([point.pressure]))
 
-    def _start_line(self, context: bpy.types.Context) -> CombStroke:
+    def _start_line(self) -> CombStroke:
         effect = self.effect.lower()
         brush = GuideBrush(
             self.radius, self.strength, effect, self.exact, self.front_faces, self.mirror
         )
-        return CombStroke(selected_mesh_objects(context)[0].data, brush, self.reach)
+        return CombStroke(self.meshes[0], brush, self.reach)
 
     def _settle(self, context: bpy.types.Context, line: CombStroke) -> Steps[None]:
         """Return the steps of the job that solves for the field after the stroke `line`, and stores it."""

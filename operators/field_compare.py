@@ -39,9 +39,7 @@ class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, Operator):
     )
 
     def begin(self, context: Context) -> Steps[tuple[str, int, FieldComparison]]:
-        return computed_attributes.store_difference.begin(
-            selected_mesh_objects(context)[0].data, self.other
-        )
+        return computed_attributes.store_difference.begin(self.objects[0].data, self.other)
 
     def finish(self, context: Context, result: tuple[str, int, FieldComparison]) -> None:
         other, degree, comparison = result

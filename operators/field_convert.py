@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from math import pi
 from typing import Any
 
-from bpy.types import ID, Context, Mesh, Operator, OperatorProperties
+from bpy.types import Context, Mesh, Object, Operator, OperatorProperties
 
 from ..rosy_addon.core.errors import RosyError, counted
 from ..rosy_addon.field.convert import Conversion, convert
@@ -64,18 +64,16 @@ class _FieldsJobMixin(ModalJobMixin):
 
     conditions = EDITABLE_FIELD
 
-    def required_data(self, context: Context) -> Iterable[ID]:
-        return dict.fromkeys(obj.data for obj in selected_mesh_objects(context) if has_field(obj))
+    def find_objects(self, context: Context) -> list[Object]:
+        return [obj for obj in selected_mesh_objects(context) if has_field(obj)]
 
-    def each_mesh(
-        self, context: Context, begin: Callable[[Mesh], Steps[Any]]
-    ) -> Steps[dict[Mesh, Any]]:
-        """Run a job for each selected mesh. Return the results by mesh.
+    def each_mesh(self, begin: Callable[[Mesh], Steps[Any]]) -> Steps[dict[Mesh, Any]]:
+        """Run a job for each mesh. Return the results by mesh.
 
         `begin` returns the steps of the job for a mesh.
         """
         results = {}
-        for mesh, start, stop in shares(self.required_data(context)):
+        for mesh, start, stop in shares(self.meshes):
             results[mesh] = yield from part(begin(mesh), start, stop)
         yield Step(1.0, "storing the fields")
         return results
@@ -133,7 +131,7 @@ class ROSY_OT_field_convert(_FieldsJobMixin, Operator):
 
     def begin(self, context: Context) -> Steps[str]:
         """Convert the fields of all selected meshes, then store them. The result is a message to the user."""
-        converted = yield from self.each_mesh(context, self._converted)
+        converted = yield from self.each_mesh(self._converted)
         self.store_fields(context, converted)
         return f"Converted {counted(len(converted), 'field')}"
 
@@ -178,13 +176,13 @@ class ROSY_OT_field_store(_FieldsJobMixin, Operator):
         if self.form == "TANGENT":
             guiding_angle = context.scene.rosy.look.guiding_angle
             tangents = yield from self.each_mesh(
-                context, lambda mesh: mesh_tangents.begin(mesh, guiding_angle, self.attribute)
+                lambda mesh: mesh_tangents.begin(mesh, guiding_angle, self.attribute)
             )
             assign_tangents(tangents, self.attribute)
             count = len(tangents)
         else:
             yield Step(0.0, "reading the fields")
-            fields = {mesh: read_mesh_field(mesh) for mesh in self.required_data(context)}
+            fields = {mesh: read_mesh_field(mesh) for mesh in self.meshes}
             assign_fields(fields, self.attribute, self.form)
             count = len(fields)
         return f"Stored {counted(count, 'field')} as {FORMS[self.form][0]}"

@@ -23,7 +23,7 @@ from ..rosy_addon.scene.mesh_fields import read_mesh_field
 from ..rosy_addon.scene.meshes import mark_sharp, mesh_label, mesh_surface
 from ..rosy_addon.ui.property_makers import choice, file_filter, integer, text
 from ..rosy_addon.worker.job import Call, Steps
-from .base import EDITABLE, selected_mesh_objects, sync_suffix
+from .base import EDITABLE, sync_suffix
 from .modal_job import ActiveMeshMixin, FileJobMixin
 
 
@@ -33,6 +33,8 @@ class ROSY_OT_field_import(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Im
     bl_label = "Import Field"
     conditions = EDITABLE
 
+    #: Blender's popup for a dropped file counts the files of this property. Only one is read.
+    files = ()
     filename_ext = ".rosy"
     filter_glob: file_filter(*READ_SUFFIXES, *EDGE_SUFFIXES)
     degree: integer(
@@ -85,7 +87,7 @@ class ROSY_OT_field_import(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Im
 
     def begin(self, context: bpy.types.Context) -> Steps[str]:
         """Read the field or the edges from the file, then store them. The result is a message to the user."""
-        obj = selected_mesh_objects(context)[0]
+        obj = self.objects[0]
         mesh, surface = obj.data, mesh_surface(obj.data)
         path = bpy.path.abspath(self.filepath)
         if Path(path).suffix.lower() in EDGE_SUFFIXES:
@@ -178,7 +180,7 @@ class ROSY_OT_field_export(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Ex
 
     def begin(self, context: bpy.types.Context) -> Steps[Path]:
         """Read the field or the combed guides of the active mesh, and write them to the file."""
-        mesh = selected_mesh_objects(context)[0].data
+        mesh = self.objects[0].data
         surface, path = mesh_surface(mesh), Path(bpy.path.abspath(self.filepath))
         if self.content == "GUIDES":
             if path.suffix.lower() not in GUIDE_FORMATS:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
 import numpy as np
-from bpy.types import ID, Context, Mesh, Object, Operator
+from bpy.types import Context, Mesh, Object, Operator
 
 from ..rosy_addon.core.errors import NoFeaturesError, RosyError, counted
 from ..rosy_addon.field.generate import GeneratorSettings, generate
@@ -115,14 +114,17 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
         ),
     }
 
+    def find_objects(self, context: Context) -> list[Object]:
+        return selected_mesh_objects(context)
+
     def begin(self, context: Context) -> Steps[str]:
-        """Generate the fields of all selected meshes, then store them. The result is a message to the user.
+        """Read all selected meshes and their guides. Return the steps of the job that generates the fields.
 
         A mesh without features to follow, or on which the field is undefined everywhere, is left out and
         reported. If no other mesh is selected, an error is raised.
         """
-        inputs, fields, fields_on_surfaces, errors = [], {}, [], []
-        for mesh in self.required_data(context):
+        inputs, errors = [], []
+        for mesh in self.meshes:
             surface = mesh_surface(mesh)
             try:
                 settings = self._generator_settings(context, mesh, surface)
@@ -130,6 +132,19 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
                 errors.append(error)
                 continue
             inputs.append((mesh, surface, settings))
+        return self._generate(context, inputs, errors)
+
+    def _generate(
+        self,
+        context: Context,
+        inputs: list[tuple[Mesh, Surface, GeneratorSettings]],
+        errors: list[RosyError],
+    ) -> Steps[str]:
+        """Generate fields, then store them. The result is a message to the user.
+
+        `errors` has the errors of meshes that have been left out.
+        """
+        fields, fields_on_surfaces = {}, []
         for (mesh, surface, settings), start, stop in shares(inputs, 0.9):
             try:
                 field = yield Call(generate, (surface, settings, self.degree), start, stop)
@@ -155,7 +170,7 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
         describe = partial(description, count_singularities=is_cheap)
         notes = yield Call(describe, (fields_on_surfaces,), 0.9)
         self.store_fields(context, fields, self.attribute)
-        names = [obj.name for obj in selected_mesh_objects(context) if obj.data in fields]
+        names = [obj.name for obj in self.objects if obj.data in fields]
         target = f"'{names[0]}'" if len(fields) == 1 else counted(len(fields), "mesh", "meshes")
         return f"Made a field of degree {self.degree} on {target}{notes and ': '}{notes}"
 
@@ -163,7 +178,7 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
         self, context: Context, mesh: Mesh, surface: Surface
     ) -> GeneratorSettings:
         """Return the settings of the generator for a mesh. They contain the guides, read from the scene."""
-        owner = next(obj for obj in selected_mesh_objects(context) if obj.data == mesh)
+        owner = next(obj for obj in self.objects if obj.data == mesh)
         kind_guides = {"features": {"EDGES"}, "uv": {"UV"}, "guided": self.guides}
         guide_kinds = kind_guides.get(self.kind, ())
         values = read_settings(self, GeneratorSettings)
@@ -209,9 +224,6 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
                 f"object '{self.guide}' is not a Grease Pencil, curve or empty of this scene"
             )
         return [obj]
-
-    def required_data(self, context: Context) -> Iterable[ID]:
-        return dict.fromkeys(obj.data for obj in selected_mesh_objects(context))
 
     def draw(self, context: Context) -> None:
         draw_generator_settings(self.layout, self)

@@ -8,15 +8,21 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
 from typing import Any
 
 import bpy
-from bpy.types import ID, Context, Event, Object, WorkSpace
+from bpy.types import Context, Event, Mesh, Object, WorkSpace
 from bpy_extras.io_utils import ExportHelper
 
-from ..rosy_addon.core.errors import REPORTED_ERRORS, RosyWarning, as_sentence, telling_warnings
+from ..rosy_addon.core.errors import (
+    REPORTED_ERRORS,
+    RosyError,
+    RosyWarning,
+    as_sentence,
+    telling_warnings,
+)
 from ..rosy_addon.scene.app_handlers import add_handlers, remove_handlers
 from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.ui import job_status
@@ -61,6 +67,21 @@ def stop_current_job() -> None:
         _current_job.stop("RoSy was disabled")
 
 
+def deleted_object(objects: Mapping[str, Object]) -> str | None:
+    """Return the name of an object that was deleted since its name was read; None if there is none.
+
+    An object that is in no scene counts as deleted: Blender keeps it while something else refers to it.
+    """
+    for name, obj in objects.items():
+        try:
+            is_deleted = not obj.users_scene
+        except ReferenceError:
+            is_deleted = True
+        if is_deleted:
+            return name
+    return None
+
+
 class Job:
     """A job that runs in a window, with its timer, handlers and progress display.
 
@@ -71,8 +92,8 @@ class Job:
     ----------
     context : bpy.types.Context
     steps : Steps
-    required_data : iterable of bpy.types.ID
-        Datablocks that the job needs. It stops if one of them is deleted.
+    objects : mapping of str to bpy.types.Object
+        The objects that the job works on, by name. It stops if one of them is deleted.
 
     Attributes
     ----------
@@ -82,10 +103,10 @@ class Job:
         The result of the job once it is done.
     """
 
-    def __init__(self, context: Context, steps: Steps[Any], required_data: Iterable[ID]) -> None:
+    def __init__(self, context: Context, steps: Steps[Any], objects: Mapping[str, Object]) -> None:
         """Start the timer, the handlers and the progress display, and make this the current job."""
         global _current_job
-        self.required_data = list(required_data)
+        self.objects = objects
         self.scene, self.view_layer = context.scene, context.view_layer
         self.stop_reason: str | None = None
         self.result: Any = None
@@ -159,21 +180,13 @@ class Job:
             context.window.cursor_modal_restore()
 
     def _abort_reason(self, context: Context) -> str | None:
-        """Return why the job cannot continue; None if it can.
-
-        Raises
-        ------
-        ReferenceError
-            If required data was deleted.
-        """
+        """Return why the job cannot continue; None if it can."""
         if context.scene != self.scene:
             return "another scene was chosen"
         if context.view_layer != self.view_layer:  # jobs use the depsgraph of the view layer
             return "another view layer was chosen"
-        for data_block in self.required_data:
-            if isinstance(data_block, Object) and not data_block.users_scene:
-                return f"'{data_block.name}' was deleted"
-        return None
+        name = deleted_object(self.objects)
+        return None if name is None else f"'{name}' was deleted"
 
     def _show_progress(self, context: Context, step: Step | None) -> None:
         """If the progress has changed, show it at the cursor, in the status bar and in the sidebars."""
@@ -225,10 +238,26 @@ class ModalJobMixin(RosyOperator):
     It implements act, invoke, execute, modal and cancel. Blender frees an operator when its dialog or file
     browser is confirmed. So the operator is then called a second time, with the answer in its properties, to
     do the work.
+
+    The objects that the operator works on are found once, when it is invoked (`find_objects`). The selection
+    may change while a dialog is open or the job runs.
     """
 
     _job: Job | None = None
     _has_asked = False
+
+    #: The objects that the operator works on, by their names when it was invoked.
+    _objects: Mapping[str, Object] = {}
+
+    @property
+    def objects(self) -> list[Object]:
+        """The objects that the operator works on."""
+        return list(self._objects.values())
+
+    @property
+    def meshes(self) -> list[Mesh]:
+        """The meshes of the objects, each once."""
+        return list(dict.fromkeys(obj.data for obj in self.objects))
 
     #: Sentence for the user that says in which state the scene or files are after the job was cancelled.
     cancel_note = "nothing was changed"
@@ -243,12 +272,16 @@ class ModalJobMixin(RosyOperator):
         """
         raise NotImplementedError
 
-    def required_data(self, context: Context) -> Iterable[ID]:
-        """Return the datablocks that the job needs. It stops if one of them is deleted.
+    def find_objects(self, context: Context) -> list[Object]:
+        """Return the objects that the operator works on. Its job stops if one of them is deleted.
 
         By default, these are all visible objects with a field.
         """
         return field_objects(context.view_layer)
+
+    def resolve_objects(self, context: Context) -> None:
+        """Set the objects that the operator works on, when it is invoked."""
+        self._objects = {obj.name_full: obj for obj in self.find_objects(context)}
 
     def ask(self, context: Context, event: Event) -> set[str] | None:
         """Open a dialog or a file browser, and return the result of the operator. None if nothing is asked.
@@ -269,16 +302,19 @@ class ModalJobMixin(RosyOperator):
             self.report_done(result)
 
     def act(self, context: Context) -> None:
+        self.resolve_objects(context)
         self.finish(context, run(self.begin(context)))
 
     def invoke(self, context: Context, event: Event) -> set[str]:
         if bpy.app.background or context.window is None:
             return self.execute(context)
         try:
+            self.resolve_objects(context)
             if (question := self.ask(context, event)) is not None:
                 self._has_asked = True
                 return question
-            self._job = Job(context, self.begin(context), self.required_data(context))
+            with telling_warnings(self.report_warnings):
+                self._job = Job(context, self.begin(context), self._objects)
         except REPORTED_ERRORS as error:
             return self.report_error(error)
         context.window_manager.modal_handler_add(self)
@@ -287,6 +323,8 @@ class ModalJobMixin(RosyOperator):
     def execute(self, context: Context) -> set[str]:
         if not self._has_asked:
             return super().execute(context)
+        if (deleted := deleted_object(self._objects)) is not None:
+            return self.report_error(RosyError(f"object '{deleted}' was deleted: start again"))
         self.take_answer(context)
         names = self.properties.bl_rna.properties.keys()
         settings = {
@@ -294,7 +332,9 @@ class ModalJobMixin(RosyOperator):
             for name in names
             if name != "rna_type" and self.properties.is_property_set(name)
         }
-        return self.call(getattr(bpy.ops.rosy, type(self).bl_idname.partition(".")[2]), **settings)
+        operator = getattr(bpy.ops.rosy, type(self).bl_idname.partition(".")[2])
+        with context.temp_override(selected_objects=self.objects):
+            return self.call(operator, **settings)
 
     def modal(self, context: Context, event: Event, *, runs_to_end: bool = False) -> set[str]:
         """Handle an event while the job runs. If `runs_to_end`, complete the job at once."""
@@ -326,9 +366,8 @@ class ActiveMeshMixin:
 
     conditions = EDITABLE_FIELD
 
-    def required_data(self, context: Context) -> Iterable[ID]:
-        obj = selected_mesh_objects(context)[0]
-        return obj, obj.data
+    def find_objects(self, context: Context) -> list[Object]:
+        return selected_mesh_objects(context)[:1]
 
 
 class FileJobMixin(ModalJobMixin):

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import bpy
 
-from ..rosy_addon.core.errors import REPORTED_ERRORS, counted
+from ..rosy_addon.core.errors import REPORTED_ERRORS, RosyError, counted
 from ..rosy_addon.field.singularities import format_index
 from ..rosy_addon.field.singularity_changes import OUTSIDE, move_index
 from ..rosy_addon.scene import singularity_points
@@ -104,7 +104,7 @@ class ROSY_OT_field_singularities(ActiveMeshMixin, ModalJobMixin, bpy.types.Oper
 
     def begin(self, context: bpy.types.Context) -> Steps[None]:
         """Return the steps of the job that changes the singularities of the field of the active mesh."""
-        mesh = selected_mesh_objects(context)[0].data
+        mesh = self.objects[0].data
         surface = mesh_surface(mesh)
         field = read_mesh_field(mesh, surface=surface)
         reach = self.reach * surface.extent
@@ -131,10 +131,11 @@ class ROSY_OT_drag_singularity(RosyOperator, bpy.types.Operator):
     reach: REACH
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        obj = selected_mesh_objects(context)[0]
+        self._obj = selected_mesh_objects(context)[0]
+        self._name = self._obj.name
         mouse = event.mouse_region_x, event.mouse_region_y
         try:
-            self._drag = singularity_handles.start_drag(context, obj, mouse, self.make_pair)
+            self._drag = singularity_handles.start_drag(context, self._obj, mouse, self.make_pair)
         except REPORTED_ERRORS as error:
             return self.report_error(error)
         if self._drag is None:
@@ -143,6 +144,14 @@ class ROSY_OT_drag_singularity(RosyOperator, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        try:
+            return self._follow(context, event)
+        except ReferenceError:
+            self.cancel(context)
+            return self.report_error(RosyError(f"'{self._name}' was deleted"))
+
+    def _follow(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Handle an event of the drag. Return the operator's result for this event."""
         mouse = event.mouse_region_x, event.mouse_region_y
         if event.type in {"MOUSEMOVE", "INBETWEEN_MOUSEMOVE"}:
             self._drag.move(context, mouse)
@@ -156,13 +165,14 @@ class ROSY_OT_drag_singularity(RosyOperator, bpy.types.Operator):
             self.cancel(context)
             if target is None or target == source:
                 return {"CANCELLED"}
-            return self.call(
-                bpy.ops.rosy.field_singularities,
-                source=source,
-                target=target,
-                index=1 if self.make_pair else 0,
-                reach=self.reach,
-            )
+            with context.temp_override(selected_objects=[self._obj]):
+                return self.call(
+                    bpy.ops.rosy.field_singularities,
+                    source=source,
+                    target=target,
+                    index=1 if self.make_pair else 0,
+                    reach=self.reach,
+                )
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:

@@ -15,7 +15,7 @@ from ..rosy_addon.rendering.turntable import check_video_path
 from ..rosy_addon.ui.preferences import worker_count
 from ..rosy_addon.ui.property_makers import choice, file_filter, integer, real, toggle
 from ..rosy_addon.worker.job import Steps
-from .base import ACTIVE_FIELD, IDLE, selected_mesh_objects, sync_suffix
+from .base import ACTIVE_FIELD, IDLE, sync_suffix
 from .modal_job import ActiveMeshMixin, FileJobMixin
 
 #: Azimuth of the first picture, in degrees.
@@ -69,7 +69,7 @@ class ROSY_OT_turntable(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Expor
         check_video_path(path)
         return render_turntable.begin(
             context.scene,
-            selected_mesh_objects(context)[0],
+            self.objects[0],
             path,
             count=self.pictures,
             rate=self.rate,

@@ -98,6 +98,7 @@ class CombStroke:
         return field
 
     def restore(self) -> None:
-        """Restore the field that the mesh had before the first call of `show`."""
+        """Restore the field that the mesh had before the first call of `show`. Later calls have no effect."""
         if self._vectors_before is not None:
             overwrite_vectors(self.mesh, self._vectors_before)
+            self._vectors_before = None

@@ -20,7 +20,13 @@ from ..compositor.look import Look
 from ..core.errors import RosyError
 from ..projection.camera import Camera
 from .cameras import FRAME_CAMERAS, CameraSource, frame_camera
-from .datablocks import delete_owned, delete_unused, removable_modifiers, rosy_modifiers
+from .datablocks import (
+    delete_owned,
+    delete_unused,
+    removable_modifiers,
+    remove_picture_modifiers,
+    rosy_modifiers,
+)
 from .keys import update_camera_planes
 from .look_properties import read_look
 from .picture_nodes import (
@@ -397,8 +403,7 @@ def remove_bakes(scene: Scene) -> RemovalCounts:
         bpy.ops.object.mode_set(mode="OBJECT")
     try:
         for obj in objects:
-            for modifier in removable_modifiers(obj):
-                obj.modifiers.remove(modifier)
+            remove_picture_modifiers(obj)
             remove_applied_picture(obj.data)
     finally:
         if is_editing:

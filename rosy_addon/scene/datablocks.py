@@ -38,13 +38,34 @@ def rosy_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     return [modifier for modifier in obj.modifiers if _is_rosy_modifier(modifier)]
 
 
+def _is_from_library(modifier: bpy.types.Modifier) -> bool:
+    """Return whether a library override has a modifier from its library."""
+    return modifier.id_data.override_library is not None and modifier.is_override_data
+
+
 def removable_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
-    """Return the modifiers that RoSy added to an object, and that are not linked from a library."""
+    """Return the modifiers that RoSy added or changed in this file, and not in a library.
+
+    If a library override has RoSy's modifier from its library, this modifier shows a picture of this file by
+    another node group.
+    """
     if obj.library is not None:
         return []
-    is_override = obj.override_library is not None
-    modifiers = rosy_modifiers(obj)
-    return [modifier for modifier in modifiers if not (is_override and modifier.is_override_data)]
+    return [
+        modifier
+        for modifier in rosy_modifiers(obj)
+        if modifier.node_group.library is None or not _is_from_library(modifier)
+    ]
+
+
+def remove_picture_modifiers(obj: bpy.types.Object) -> None:
+    """Remove the modifiers of `removable_modifiers`, or give them the node groups of their library again."""
+    for modifier in removable_modifiers(obj):
+        if _is_from_library(modifier):
+            original = obj.override_library.reference.modifiers.get(modifier.name)
+            modifier.node_group = None if original is None else original.node_group
+        else:
+            obj.modifiers.remove(modifier)
 
 
 def user_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
@@ -135,5 +156,10 @@ def has_rosy_properties() -> bool:
 
 
 def is_editable(datablock: bpy.types.ID) -> bool:
-    """Return whether a datablock can be changed: it is local, or a library override."""
-    return datablock.library is None and getattr(datablock, "is_editable", True)
+    """Return whether a datablock can be changed: it is local, or a library override, but not of a mesh.
+
+    Blender (4.2 to 5.2) ignores values that are written to attributes of a mesh that is an override.
+    """
+    is_mesh_override = isinstance(datablock, bpy.types.Mesh) and datablock.override_library
+    is_local = datablock.library is None and getattr(datablock, "is_editable", True)
+    return is_local and not is_mesh_override

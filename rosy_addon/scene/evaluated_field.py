@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -231,12 +231,14 @@ def temp_attributes(
         yield layouts
     finally:
         for obj in rest_enabled:
-            obj.add_rest_position_attribute = False
+            with suppress(ReferenceError):  # the user may have deleted some
+                obj.add_rest_position_attribute = False
         for mesh in set(temp_meshes):
-            for name in list(mesh.attributes.keys()):
-                if name.startswith((FACE_NORMAL_ATTRIBUTE, TEMP_FIELD_ATTRIBUTE)):
-                    mesh.attributes.remove(mesh.attributes[name])
-            mesh.update_tag()
+            with suppress(ReferenceError):
+                for name in list(mesh.attributes.keys()):
+                    if name.startswith((FACE_NORMAL_ATTRIBUTE, TEMP_FIELD_ATTRIBUTE)):
+                        mesh.attributes.remove(mesh.attributes[name])
+                mesh.update_tag()
         if rest_enabled or temp_meshes:
             depsgraph.update()
 

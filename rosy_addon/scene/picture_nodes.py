@@ -33,6 +33,9 @@ CLIP_ATTRIBUTE = "rosy_projection"
 #: applies the modifier and then removes the picture.
 MATERIAL_ATTRIBUTE = "rosy_material"
 
+#: Types and domains of these attributes. The user's attributes may have the same names, but other types.
+_ATTRIBUTE_TYPES = {CLIP_ATTRIBUTE: ("FLOAT_VECTOR", "POINT"), MATERIAL_ATTRIBUTE: ("INT", "FACE")}
+
 _OUTSIDE_COLOR = (NEUTRAL_GRAY, NEUTRAL_GRAY, NEUTRAL_GRAY, 1.0)
 
 
@@ -313,7 +316,12 @@ def _applied_attributes(data: ID | None) -> list[str]:
     """
     if not isinstance(data, Mesh) or not is_editable(data):
         return []
-    return [name for name in (CLIP_ATTRIBUTE, MATERIAL_ATTRIBUTE) if name in data.attributes]
+    return [
+        name
+        for name, kind in _ATTRIBUTE_TYPES.items()
+        if (attribute := data.attributes.get(name))
+        and (attribute.data_type, attribute.domain) == kind
+    ]
 
 
 def _restore_material_indices(mesh: Mesh) -> None:

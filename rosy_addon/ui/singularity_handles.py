@@ -51,7 +51,8 @@ class Drag:
         self.target: int | None = None
         self._obj = obj
         self._region = region
-        self._ends = _own_points(bpy.context, obj)[[source]]
+        #: Points of the line in world space: the drawing does not need the object, which may be deleted.
+        self._ends = to_world(obj, _own_points(bpy.context, obj)[[source]])
         add = SpaceView3D.draw_handler_add
         self._handler: Any = add(self._draw, (), "WINDOW", "POST_PIXEL")
 
@@ -60,7 +61,7 @@ class Drag:
         points = _own_points(context, self._obj)
         self.target = _vertex_under(context, self._obj, points, mouse)
         vertices = [self.source] if self.target is None else [self.source, self.target]
-        self._ends = points[vertices]
+        self._ends = to_world(self._obj, points[vertices])
         redraw()
 
     def stop(self) -> None:
@@ -74,7 +75,7 @@ class Drag:
         context = bpy.context
         if context.region != self._region:
             return
-        points = to_pixels(context.region, context.region_data, to_world(self._obj, self._ends))
+        points = to_pixels(context.region, context.region_data, self._ends)
         angle = np.linspace(0, 2 * np.pi, RING_SEGMENTS + 1)
         ring = RING_RADIUS * np.stack([np.cos(angle), np.sin(angle)], axis=1)
         scale = context.preferences.system.ui_scale

@@ -143,6 +143,26 @@ def part(
         steps.close()
 
 
+def reverting(steps: Steps[Result], revert: Callable[[], object]) -> Steps[Result]:
+    """Return the steps of a job that calls `revert` if it does not end with a result.
+
+    It may have failed or been cancelled, also before its first step. Use this for changes that were made
+    before the job begins.
+    """
+
+    def guarded() -> Steps[Result]:
+        try:
+            yield Step(0.0, "starting")
+            return (yield from steps)
+        except BaseException:
+            revert()
+            raise
+
+    guard = guarded()
+    next(guard)  # to close a generator that has not started would not run its `except`
+    return guard
+
+
 def shares(items: Iterable[Item], stop: float = 1.0) -> Iterator[tuple[Item, float, float]]:
     """Iterate over what a job works on, each item with the progress of the job when it begins and ends.
 

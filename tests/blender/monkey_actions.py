@@ -17,14 +17,26 @@ from random import Random
 from typing import Any
 
 import bpy
-from monkey_checks import CheckError, allowed_changes, changes, check_message, fingerprint, is_owned
+from monkey_checks import (
+    CheckError,
+    Fingerprint,
+    allowed_changes,
+    changes,
+    check_message,
+    fingerprint,
+    is_owned,
+)
 
 #: Names that a user, or a script, can give, and names of data that RoSy or the monkey makes.
 NAMES = (
     "a/b\\c", "line\nbreak\ttab", "\x01\x1b[31m", "é 日本 🙂", "x" * 200, "", " ", ".", "..", "con",
     "%s {0} {x}", "'quote\" `", "-flag", "a.001", "RoSy Camera", "rosy", "rosy_guides", "dir0", "mine",
     "position", "Suzanne", "Eye", "UVMap", "Weights", "Occlusion", "default", "engraving",
+    "rosy_material", "rosy_projection", "rosy_angle", "material_index",
 )  # fmt: skip
+
+#: Probability that a job is disturbed while it runs.
+DISTURBANCE = 0.5
 
 #: Largest number of faces, vertices and objects that the monkey makes.
 MAX_FACES, MAX_OBJECTS = 1500, 14
@@ -73,12 +85,18 @@ class Monkey:
         Prints what an action does.
     outcomes : Counter
         How often each operator of RoSy did something, and how often it failed.
+    before : dict
+        The fingerprint of the file before the operator of RoSy that runs.
+    disturbance : float
+        Probability that the next job is disturbed.
     """
 
     def __init__(self, folder: Path, note: Callable) -> None:
         self.folder, self.note = folder, note
         self.random = Random()
         self.outcomes: Counter[tuple[str, str]] = Counter()
+        self.before: Fingerprint = {}
+        self.disturbance = DISTURBANCE
 
     def chance(self, probability: float) -> bool:
         return self.random.random() < probability
@@ -101,7 +119,7 @@ class Monkey:
         """Call an operator of RoSy, and check its errors and what it changes."""
         function = getattr(bpy.ops.rosy, operator)
         self.note(f"rosy.{operator} {settings}")
-        allowed, before, error = allowed_changes(operator), fingerprint(), None
+        allowed, self.before, error = allowed_changes(operator), fingerprint(), None
         try:
             function("EXEC_DEFAULT", True, **settings)
         except RuntimeError as raised:
@@ -109,7 +127,7 @@ class Monkey:
             check_message(error)
             self.note(f"    {error.strip()}")
         self.outcomes[operator, "failed" if error else "did"] += 1
-        if differences := changes(before, fingerprint(), () if error else allowed):
+        if differences := changes(self.before, fingerprint(), () if error else allowed):
             verb = f"failed ({error.strip()}), but changed" if error else "changed"
             raise CheckError(f"rosy.{operator} {verb} " + "; ".join(differences[:8]))
 
@@ -181,6 +199,11 @@ def meshes(*, editable: bool = True) -> list[bpy.types.Object]:
     ]
 
 
+def active_mesh() -> bpy.types.Mesh | None:
+    obj = bpy.context.view_layer.objects.active
+    return obj.data if obj is not None and obj.type == "MESH" else None
+
+
 def to_object_mode(monkey: Monkey) -> bool:
     return bpy.context.mode == "OBJECT" or monkey.blender("object.mode_set", mode="OBJECT")
 
@@ -219,6 +242,8 @@ def is_small(mesh: bpy.types.Mesh, factor: int = 1) -> bool:
 def field_in_view(monkey: Monkey) -> None:
     """Make a field on a mesh in front of a camera, so that there is something to draw."""
     scene = bpy.context.scene
+    if not any(len(obj.data.polygons) > 4 for obj in meshes()) and to_object_mode(monkey):
+        monkey.blender("mesh.primitive_monkey_add")
     obj = monkey.pick([obj for obj in meshes() if len(obj.data.polygons) > 4])
     if obj is None or obj.library is not None or not select(monkey, obj):
         return
@@ -271,7 +296,9 @@ def any_operator(monkey: Monkey) -> None:
             settings[prop.identifier] = True  # no dialog
         elif prop.identifier == "film":
             settings["film"] = ".gif"
-        elif prop.type not in ("POINTER", "COLLECTION") and monkey.chance(0.3):
+        elif prop.type not in ("POINTER", "COLLECTION") and (
+            prop.identifier in LIMITS or monkey.chance(0.3)  # defaults may take minutes
+        ):
             settings[prop.identifier] = monkey.value(prop)
     if operator == "bake_animation":
         settings |= {"step": 1, "first": 1, "last": monkey.pick([1, 2, 3, 0])}
@@ -280,8 +307,8 @@ def any_operator(monkey: Monkey) -> None:
 
 def _stroke(monkey: Monkey) -> Iterator[dict]:
     """Yield the points of a stroke of the comb, at vertices of the active mesh."""
-    obj = bpy.context.view_layer.objects.active
-    vertices = list(obj.data.vertices) if obj is not None and obj.type == "MESH" else []
+    mesh = active_mesh()
+    vertices = [] if mesh is None else list(mesh.vertices)
     for _ in range(monkey.random.randrange(6)):
         location = tuple(monkey.pick(vertices).co) if vertices else (0.0, 0.0, 0.0)
         point = {"location": location, "is_start": monkey.pick([False, False, True])}
@@ -306,6 +333,26 @@ def bake(monkey: Monkey) -> None:
         field_in_view(monkey)
     camera = monkey.pick(["SCENE", "SCENE", "SCENE", "ALL"])
     monkey.rosy("bake", camera=camera)
+
+
+@action(3)
+def texture(monkey: Monkey) -> None:
+    if monkey.chance(0.8):
+        field_in_view(monkey)
+    monkey.rosy("bake_texture", unwrap=monkey.chance(0.8))
+
+
+@action(3)
+def comb(monkey: Monkey) -> None:
+    """Comb a field, sometimes one that is stored in another form."""
+    field_in_view(monkey)
+    if monkey.chance(0.3):
+        monkey.rosy("field_store", form="ANGLE", attribute="rosy_angle")
+        mesh = active_mesh()
+        if mesh is not None and "rosy" in mesh.attributes and mesh.library is None:
+            mesh.attributes.remove(mesh.attributes["rosy"])
+            mesh.rosy.attribute = "rosy_angle"
+    monkey.rosy("field_comb", stroke=list(_stroke(monkey)), radius=monkey.pick([0.1, 0.5, 2.0]))
 
 
 @action(3)

@@ -31,6 +31,9 @@ VALUE_PROPERTIES = {
     **dict.fromkeys(("FLOAT2", "FLOAT_VECTOR"), "vector"),
 }
 
+#: Data types and domains of the attributes that a modifier of RoSy leaves in a mesh if it is applied.
+APPLIED = {"rosy_projection": ("FLOAT_VECTOR", "POINT"), "rosy_material": ("INT", "FACE")}
+
 #: Values by paths, such as objects/Cube/modifiers.
 Fingerprint = dict[str, Any]
 
@@ -118,10 +121,10 @@ def _add_object(state: Fingerprint, path: str, obj: bpy.types.Object) -> None:
     state[f"{path}/basis"] = (
         *(obj.data and obj.data.name, parent, obj.hide_render, obj.hide_viewport),
         None if obj.animation_data else _plain(obj.matrix_basis),
-        obj.add_rest_position_attribute,
         # Cycles adds its settings to objects when a file is opened.
         sorted(set(obj.keys()) - {"rosy", "cycles"}),
     )
+    state[f"{path}/rest"] = obj.add_rest_position_attribute
     state[f"{path}/collections"] = sorted(collection.name for collection in obj.users_collection)
     state[f"{path}/slots"] = [(s.link, _user_name(s.material)) for s in obj.material_slots]
     state[f"{path}/groups"] = [group.name for group in obj.vertex_groups]
@@ -148,7 +151,9 @@ def _add_mesh(state: Fingerprint, path: str, mesh: bpy.types.Mesh) -> None:
     for attribute in mesh.attributes:
         digest = None if mesh.is_editmode else _attribute_digest(attribute)
         description = attribute.data_type, attribute.domain, digest
-        state[f"{path}/attributes/{attribute.name}"] = description
+        is_applied = APPLIED.get(attribute.name) == description[:2]
+        place = f"picture/{full_name(mesh)}" if is_applied else f"{path}/attributes"
+        state[f"{place}/{attribute.name}"] = description
 
 
 def _attribute_digest(attribute: bpy.types.Attribute) -> str | None:
@@ -202,10 +207,7 @@ FURTHER = {
     "occlusion": ("meshes/*/attributes/Occlusion",),
     "bake_texture": ("meshes/SELECTED/*", "context"),
     # What a modifier of RoSy that the user has applied left in a mesh.
-    "remove": (
-        *("meshes/*/materials", "objects/*/slots", "meshes/*/attributes/rosy_projection"),
-        *("meshes/*/attributes/rosy_material", "meshes/*/attributes/material_index"),
-    ),
+    "remove": ("meshes/*/materials", "objects/*/slots", "meshes/*/attributes/material_index"),
 }
 
 
@@ -245,15 +247,31 @@ def leftovers() -> list[str]:
         if not kind.startswith(COPIED)
     ]
     for obj in bpy.data.objects:
-        if obj.library is not None or obj.override_library is not None or obj.type == "CURVES":
+        if obj.library is not None or obj.type == "CURVES":
             continue
         groups = [getattr(modifier, "node_group", None) for modifier in obj.modifiers]
+        if obj.override_library is not None:  # the library may have modifiers
+            groups = [group for group in groups if group is not None and group.library is None]
         left += [f"a modifier of '{obj.name}'" for g in groups if g is not None and is_owned(g)]
-    prefixes = ("rosy_stand_in", "rosy_face_normal", "rosy_projection", "rosy_material")
     for mesh in bpy.data.meshes:
-        names = [] if mesh.library is not None else mesh.attributes.keys()
-        left += [f"'{name}' of '{mesh.name}'" for name in names if name.startswith(prefixes)]
+        if mesh.library is None and mesh.override_library is None:
+            left += [
+                f"'{attribute.name}' of '{mesh.name}'"
+                for attribute in mesh.attributes
+                if attribute.name.startswith(("rosy_stand_in", "rosy_face_normal"))
+                or APPLIED.get(attribute.name) == (attribute.data_type, attribute.domain)
+            ]
     return left
+
+
+def whole_state() -> Fingerprint:
+    """Return the fingerprint with the users and custom properties of all datablocks, and RoSy's handlers."""
+    state = fingerprint() | {"handlers": handlers()}
+    for kind, block in all_datablocks():
+        # Blender 4.3 stores settings of extensions with custom properties, also if they are only read.
+        names = sorted({*block.keys()} - {"rosy", "cycles"})
+        state[f"{kind}/{full_name(block)}/properties"] = names, block.users
+    return state
 
 
 def handlers() -> list[str]:

@@ -14,14 +14,30 @@ import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
 import monkey_blender  # noqa: F401  adds its actions
-from monkey_actions import ACTIONS, Monkey, action, meshes, select
-from monkey_checks import CheckError, all_datablocks, handlers, leftovers, resident_megabytes, rosy
+from monkey_actions import ACTIONS, DISTURBANCE, Monkey, action, field_in_view, meshes, select
+from monkey_checks import (
+    CheckError,
+    all_datablocks,
+    changes,
+    handlers,
+    leftovers,
+    resident_megabytes,
+    rosy,
+    whole_state,
+)
+from monkey_jobs import disturb_jobs
 
 #: Number of parts of a run. After each, everything is removed and the memory is measured.
 PARTS = 8
 
 #: Megabytes by which the memory may grow in the second half of a run.
 MAX_GROWTH = 150.0
+
+#: Operators whose results can be removed, with settings.
+MADE = {
+    "bake": {"camera": "ALL"}, "bake_texture": {"unwrap": False}, "singularities": {"show": "BOTH"},
+    "strokes": {"kind": "PENCIL", "camera": "SCENE", "replace": True},
+}  # fmt: skip
 
 #: Seconds after which a step counts as hanging: its Python stack is printed, and Blender ends.
 STEP_SECONDS = 120.0
@@ -53,6 +69,7 @@ def say(text: str) -> None:
 def run(options: argparse.Namespace) -> None:
     """Do random actions, and check each of them; exit if a check fails."""
     monkey = Monkey(options.folder, lambda text: say(f"  {text}"))
+    disturb_jobs(monkey)
     megabytes: list[int] = []
     restart(monkey)
     for step in range(options.steps):
@@ -115,6 +132,26 @@ def remove_everything(monkey: Monkey) -> None:
         bpy.ops.outliner.orphans_purge(do_recursive=True)
     if left := leftovers():
         raise CheckError("left after everything was removed: " + "; ".join(left[:8]))
+
+
+@action(2)
+def make_and_remove(monkey: Monkey) -> None:
+    """Remove what RoSy has just made, and check that the file is as it was before."""
+    if bpy.context.mode != "OBJECT" or any(obj.library for obj in bpy.data.objects):
+        return
+    monkey.disturbance = 0.0
+    remove_everything(monkey)
+    field_in_view(monkey)
+    bpy.ops.outliner.orphans_purge(do_recursive=True)
+    bpy.context.view_layer.update()
+    before = whole_state()
+    for operator, settings in monkey.random.sample(list(MADE.items()), 2):
+        monkey.rosy(operator, **settings)
+    remove_everything(monkey)
+    bpy.context.view_layer.update()
+    monkey.disturbance = DISTURBANCE
+    if differences := changes(before, whole_state(), ("context",)):
+        raise CheckError("after Remove, " + "; ".join(differences[:8]))
 
 
 if __name__ == "__main__":

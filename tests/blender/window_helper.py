@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import sys
 import time
@@ -19,12 +20,13 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 from conftest import contents, pixels
-from monkey_checks import handlers
+from monkey_checks import changes, fingerprint, handlers
 from run import is_running
 from window_steps import (
     RESULTS,
     call_in_view,
     descendants,
+    in_view,
     preferences,
     press,
     rosy,
@@ -144,6 +146,79 @@ def test_a_helper_that_is_killed():
     yield from wait_for_job()
     assert contents() == before
     assert_reported("has ended twice")
+
+
+#: Operators that change what is selected, with settings.
+CHANGES = {
+    "field_generate": {"kind": "smoothest", "degree": 6},
+    "field_convert": {"degree": 8},
+    "field_store": {"form": "ANGLE"},
+    "field_singularities": {"source": 3, "target": 20, "index": 1},
+    "field_comb": {
+        "stroke": [{"name": "", "location": (1, 0, 0), "pressure": 1, "is_start": True}]
+    },
+    "bake_texture": {"unwrap": True},
+}
+
+
+def test_a_job_keeps_to_the_object_that_was_selected():
+    """Another selection changes nothing. If the object is deleted, the job ends with one line."""
+    for operator, settings in CHANGES.items():
+        for is_deleted in (False, True):
+            yield from two_spheres()
+            before, report_count = fingerprint(), len(report_texts())
+            start = getattr(bpy.ops.rosy, operator)
+            assert call_in_view(start, "INVOKE_DEFAULT", True, **settings) == {"RUNNING_MODAL"}
+            select("Second")
+            if is_deleted:
+                bpy.data.objects.remove(bpy.data.objects["First"])
+            yield from wait_for_job()
+            differences = changes(before, fingerprint(), ("context", "owned/*", "scenes/*"))
+            changed = {re.split("[/:]", path)[1] for path in differences}
+            assert changed == {"First"}, differences
+            reports = report_texts()[report_count:]
+            assert not any("Error" in report for report in reports), reports
+            assert any("'First' was deleted" in report for report in reports) == is_deleted, reports
+
+
+def test_a_dialog_keeps_to_the_object_that_was_selected():
+    """The user selects another object while a dialog is open, and then confirms it."""
+    path = str(RESULTS.with_suffix(".rosy"))
+    for operator, settings in (("bake_texture", {}), ("field_import", {"filepath": path})):
+        yield from two_spheres()
+        mesh = bpy.data.meshes["First"]
+        mesh.uv_layers.remove(mesh.uv_layers[0])
+        call_in_view(bpy.ops.rosy.field_export, "EXEC_DEFAULT", filepath=path)
+        mesh.attributes["rosy"].data[0].vector *= 2.0
+        before = fingerprint()
+        start = getattr(bpy.ops.rosy, operator)
+        assert call_in_view(start, "INVOKE_DEFAULT", True, **settings) == {"RUNNING_MODAL"}
+        yield 0.5
+        select("Second")
+        press("RET")
+        yield 0.5
+        yield from wait_for_job()
+        differences = changes(before, fingerprint(), ("context", "owned/*", "scenes/*"))
+        assert {re.split("[/:]", path)[1] for path in differences} == {"First"}, differences
+
+
+def two_spheres():
+    """Create a scene of two spheres with fields. The first one is selected."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    yield 0.2
+    bpy.context.scene.rosy.texture_size = 64
+    with in_view():
+        for name in ("Second", "First"):
+            bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
+            bpy.context.object.name = bpy.context.object.data.name = name
+            bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="axis", degree=4)
+
+
+def select(name):
+    """Select an object alone."""
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(obj.name == name)
+    bpy.context.view_layer.objects.active = bpy.data.objects[name]
 
 
 def test_without_a_helper():

@@ -386,6 +386,16 @@ def test_override_can_be_drawn(library):
     assert baked.objects == (local,)
 
 
+def test_an_override_of_a_mesh_cannot_be_written(library):
+    """Blender would ignore the values without a word."""
+    local = link(linked(library, "objects", "Suzanne")).override_create(remap_local_usages=True)
+    mesh = local.data.override_create(remap_local_usages=True)
+    field = read_mesh_field(mesh)
+    expect_error("'Suzanne' is linked from its library", write_mesh_field, mesh, field)
+    (baked,) = bake(bpy.context.scene)
+    assert baked.objects == (local,) and mesh == local.data
+
+
 @pytest.mark.parametrize("as_float", [False, True])
 def test_unwritable_folder(scene, camera, monkey, tmp_path, as_float):
     scene.rosy.store = "SAVED"

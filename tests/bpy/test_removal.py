@@ -206,6 +206,41 @@ def test_a_linked_object_is_left_alone(tmp_path):
     assert contents() == before
 
 
+def test_an_override_shows_the_picture_of_its_library_again(tmp_path):
+    path = baked_file(tmp_path)
+    scene = empty_scene(24)
+    scene.camera = add_camera()
+    append(path, link=True)
+    override = obj("Plain").override_create(remap_local_usages=True)
+    bpy.context.view_layer.update()
+    group = override.modifiers["RoSy"].node_group
+    before = contents()
+    assert not has_pictures(scene)
+    bake(scene)
+    assert override.modifiers["RoSy"].node_group != group
+    show_bake(scene, "Camera")
+    remove_bakes(scene)
+    assert override.modifiers["RoSy"].node_group == group
+    assert contents() == before and not has_pictures(scene)
+
+
+@pytest.mark.parametrize("name", ["rosy_material", "rosy_projection"])
+def test_attributes_of_the_user_with_the_same_name_stay(name, tmp_path):
+    """Only an attribute of RoSy's type and domain comes from its modifier."""
+    scene = build()
+    bake(scene)
+    apply("Plain")(tmp_path)
+    for other in ("Plain", "Sheet"):
+        attributes = obj(other).data.attributes
+        if name in attributes:
+            attributes.remove(attributes[name])
+        attributes.new(name, "FLOAT_VECTOR", "FACE")
+    remove_bakes(scene)
+    for other in ("Plain", "Sheet"):
+        names = [attribute.name for attribute in obj(other).data.attributes]
+        assert [found for found in names if found.startswith("rosy_")] == [name]
+
+
 def test_objects_without_materials_have_no_slots_afterwards(tmp_path):
     """Blender crashes if an object with more slots than its mesh has materials is joined."""
     scene = build()

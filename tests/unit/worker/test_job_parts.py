@@ -12,7 +12,7 @@ from harness.steps import finished
 
 from rosy_addon.core.errors import RosyError
 from rosy_addon.core.progress import listening
-from rosy_addon.worker.job import Call, Step, job, part, run
+from rosy_addon.worker.job import Call, Step, job, part, reverting, run
 from rosy_addon.worker.program import run_program
 from rosy_addon.worker.step_runner import StepRunner
 
@@ -70,6 +70,21 @@ def test_closing_a_whole_closes_its_parts():
     next(steps)
     steps.close()
     assert closed
+
+
+def test_a_job_without_a_result_is_reverted():
+    """Also if it is cancelled before its first step, but not if it ends with a result."""
+    for number, outcome in ((5, "failed"), (6, "done"), (5, "closed")):
+        reverted = []
+        steps = reverting(halves.begin(number), lambda reverted=reverted: reverted.append(True))
+        if outcome == "closed":
+            steps.close()
+        elif outcome == "failed":
+            with pytest.raises(RosyError, match="odd"):
+                run(steps)
+        else:
+            assert run(steps) == 9
+        assert reverted == ([] if outcome == "done" else [True])
 
 
 def test_programs():

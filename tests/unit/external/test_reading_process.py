@@ -52,6 +52,7 @@ def test_names_of_ordinary_files(tmp_path):
     assert read_in_helper([tmp_path / "a.vtm"], len, "abc") == 3
 
 
+@pytest.mark.slow
 def test_time_and_memory_have_limits(tmp_path, error_of, monkeypatch):
     path = tmp_path / "a.vtu"
     path.touch()

@@ -31,6 +31,7 @@ SOLVERS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SOLVERS)
 def test_memory(name):
     surface = cylinder(700)

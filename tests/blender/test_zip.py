@@ -48,6 +48,7 @@ HELPER_FILE = "worker/start.py"
 
 #: Files that look for others beside themselves, to read or to run them.
 FILES_WITH_PATHS = {
+    "cli/field.py": "a folder without settings of matplotlib",
     "gpu/passes.py": "shaders",
     "preset_files/store.py": "presets",
     "scene/video.py": "the script that encodes videos",

@@ -61,11 +61,15 @@ def smooth_field(surface, degree, families=1):
 
     An axis field is not suitable, because all N members run into the ends of the axis. There, brute
     force follows the N directions and the covering the lines through a pixel, and streamlines that
-    differ in the last digit diverge.
+    differ in the last digit diverge. For the same reason, streamlines of degree 1 are circles around the axis: they do
+    not leave one singularity and run into another.
     """
-    field = generate(surface, "smoothest", degree)
+    vectors = np.cross(AXIS, surface.face_normal)
+    vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
+    if degree > 1:
+        vectors = generate(surface, "smoothest", degree).vectors
     magnitude = 0.8 + 0.4 * np.sin(3 * face_centers(surface) @ np.array(AXIS) + 1)
-    return RosyField(degree, field.vectors * magnitude[:, None], family_count=families)
+    return RosyField(degree, vectors * magnitude[:, None], family_count=families)
 
 
 def field_at_angles(surface, degree, offsets, lengths=1.0):

@@ -180,7 +180,7 @@ def test_samples_show_what_numpy_draws(card, preset):
     assert inside.sum() > 10_000
     np.testing.assert_allclose(of_card.mean(), of_numpy.mean(), rtol=0.01)
     np.testing.assert_allclose(of_card.std(), of_numpy.std(), rtol=0.03)
-    assert np.corrcoef(of_card.ravel(), of_numpy.ravel())[0, 1] > 0.94
+    assert np.corrcoef(of_card.ravel(), of_numpy.ravel())[0, 1] > 0.93
 
 
 @pytest.mark.parametrize("paper", ["#ffffff00", "#e0c08080"])

@@ -22,7 +22,7 @@ from ..core.memory import raise_mmap_threshold
 from ..core.progress import progress, report
 from .conjugate_gradient import conjugate_gradient
 from .free_rotation import freely_rotated
-from .representation import complex_bincount, from_representation, unit_complex
+from .representation import complex_bincount, from_representation, is_tie, unit_complex
 from .rosy_field import RosyField, check_degree
 from .sparse_multigrid import CSRMatrix, Level, hierarchy, w_cycle
 from .surface import Surface
@@ -45,6 +45,10 @@ START_COUNT, START_UNKNOWNS = 4, 500
 #: Of starts whose energies differ by less than this part, the first is taken. With 0.01, less symmetric fields with up to 4 %
 #: less energy are chosen, and the energies of fields on twelve meshes are equal on average.
 EQUAL_ENERGY = 0.05
+
+#: Largest part of the weights that the gradient is at a saddle: a rounding error. Standard deviation of the random angles,
+#: in radians, that are added there.
+SADDLE_GRADIENT, SADDLE_NUDGE = 1e-6, 0.1
 
 #: Diffusion times of the starts, relative to the area of the connected component, and on each finer level, relative to the
 #: mean area of its unknowns.
@@ -136,8 +140,7 @@ def eigenproblem(
         levels = hierarchy(matrix)
     with progress(0.35, 1.0):
         problem = _eigenproblem(levels, mass, component)
-        vectors, energy = _eigenvectors(problem, tolerance=tolerance)
-    return vectors[0], energy
+        return _eigenvector(problem, tolerance)
 
 
 class _Eigenproblem(NamedTuple):
@@ -166,6 +169,25 @@ class _Eigenproblem(NamedTuple):
         weight = np.abs(value)
         ends = matrix.indices[entry], matrix.row_indices[entry]
         return FaceEnergy(*ends, weight, -value / weight, self.masses[0])
+
+    def least_eigenvectors(self, count: int) -> np.ndarray:
+        """Return (count, n) eigenvectors with the smallest eigenvalues on each connected component of the finest level.
+
+        A component with fewer unknowns has its first eigenvector several times. Matrices of components are dense.
+        """
+        mass, component = self.masses[0], self.components[0]
+        vectors = np.empty((count, len(mass)), dtype=np.complex128)
+        parts = np.split(
+            np.argsort(component, kind="stable"), np.cumsum(np.bincount(component))[:-1]
+        )
+        for part in parts:
+            report(0.0, LABEL)
+            scale = 1 / np.sqrt(mass[part])
+            matrix = self.levels[0].matrix.rows(part).columns(part).dense()
+            eigenvectors = np.linalg.eigh(scale[:, None] * matrix * scale)[1]
+            column = np.where(np.arange(count) < len(part), np.arange(count), 0)
+            vectors[:, part] = (scale[:, None] * eigenvectors[:, column]).T
+        return vectors
 
     def diffused(self, z: np.ndarray, times: Sequence[float]) -> np.ndarray:
         """Return (n,) representations on the finest level, diffused and normalized for each of the times.
@@ -211,15 +233,13 @@ def _diffused_eigenvector(problem: _Eigenproblem) -> np.ndarray:
     )
     coarse = problem.below(first)
     component, energy = coarse.components[0], coarse.energy()
-    unknowns = np.bincount(component)
-    eigenvectors: list[list[np.ndarray]] = []
-    starts, energies = [], []
-    for index in range(START_COUNT):
+    starts, energies, random = [], [], np.random.default_rng(0)
+    for index, z in enumerate(coarse.least_eigenvectors(START_COUNT)):
         with progress(0.5 * index / START_COUNT, 0.5 * (index + 1) / START_COUNT):
-            eigenvectors.append(_eigenvectors(coarse, eigenvectors)[0])
-            # Components of few unknowns have fewer eigenvectors: the last ones consist of rounding errors.
-            z = np.where(unknowns[component] > index, eigenvectors[-1][0], eigenvectors[0][0])
-            starts.append(descend(energy, coarse.diffused(z, START_TIMES), CHOICE_GAIN))
+            z = coarse.diffused(z, START_TIMES)
+            if _is_at_saddle(energy, z):
+                z = z * np.exp(1j * SADDLE_NUDGE * random.standard_normal(len(z)))
+            starts.append(descend(energy, z, CHOICE_GAIN))
         energies.append(energy.of_components(starts[-1], component))
     is_least = energies <= (1 + EQUAL_ENERGY) * np.min(energies, axis=0)
     z = np.choose(is_least.argmax(axis=0)[component], starts)
@@ -232,38 +252,32 @@ def _diffused_eigenvector(problem: _Eigenproblem) -> np.ndarray:
     return z
 
 
-def _eigenvectors(
-    problem: _Eigenproblem,
-    others: Sequence[list[np.ndarray]] = (),
-    tolerance: float = TOLERANCE,
-) -> tuple[list[np.ndarray], np.ndarray]:
-    """Return the eigenvectors of `eigenproblem` on all levels, and the eigenvalues on the finest.
+def _is_at_saddle(energy: FaceEnergy, z: np.ndarray) -> bool:
+    """Return whether the energy has no gradient at (n,) representations, and is largest for the turn at an edge.
 
-    Parameters
-    ----------
-    problem : _Eigenproblem
-    others : sequence of list
-        Earlier results, with smaller eigenvalues. The new eigenvectors are orthogonal to these.
-    tolerance : float
-        Change of the vector in an iteration at which the iteration stops, as the sine of an angle.
+    On some solids, eigenvectors turn by exactly half a turn across edges, and descend nowhere.
     """
+    products = energy.products(z)
+    has_gradient = np.abs(energy.sums(products.imag)) > SADDLE_GRADIENT * energy.diagonal
+    return bool(is_tie(np.angle(products)).any() and not has_gradient.any())
+
+
+def _eigenvector(problem: _Eigenproblem, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the eigenvector of `eigenproblem` and its eigenvalues, as there, found from level to level."""
     levels, masses, components = problem
     random = np.random.default_rng(0)
     count = len(masses[-1])
     z = random.standard_normal(count) + 1j * random.standard_normal(count)
-    vectors: list[np.ndarray] = []
     for index in reversed(range(len(levels))):
         is_between = 0 < index < len(levels) - 1
         max_iterations = COARSE_ITERATIONS if is_between else MAX_ITERATIONS
         start = 0.3 - 0.3 * index / len(levels)
         with progress(start, start + 0.3 / len(levels) if index else 1.0):
-            known = [other[index] for other in others]
             parts = levels[index:], masses[index], components[index]
-            z, energy = _lobpcg(*parts, z, max_iterations, tolerance, known)
-        vectors.insert(0, z)
+            z, energy = _lobpcg(*parts, z, max_iterations, tolerance)
         if index:
             z = levels[index - 1].prolongation @ z
-    return vectors, energy
+    return z, energy
 
 
 def _lobpcg(
@@ -273,7 +287,6 @@ def _lobpcg(
     z: np.ndarray,
     max_iterations: int,
     tolerance: float,
-    known: Sequence[np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Minimize the Rayleigh quotient on each connected component by LOBPCG (Knyazev 2001).
 
@@ -290,8 +303,6 @@ def _lobpcg(
     max_iterations : int
     tolerance : float
         Change of the vector in an iteration at which the iteration stops, as the sine of an angle.
-    known : sequence of (n,) complex128 ndarray
-        Orthonormal vectors to which the result is orthogonal on each component: eigenvectors found before.
 
     Returns
     -------
@@ -302,7 +313,6 @@ def _lobpcg(
     """
     matrix, products = levels[0].matrix, _ComponentProducts(mass, component)
     # Each vector is stored as a pair with its image: the product of the matrix and the vector.
-    z = products.without(known, z)
     current = products.normalize(np.stack([z, matrix @ z]))
     previous_step: list[np.ndarray] = []
     energy = products.sums(current[0].conj() * current[1]).real
@@ -311,7 +321,7 @@ def _lobpcg(
         report(1 - 0.95**iteration, "solving for the smoothest field")
         z, image = current
         direction = w_cycle(levels, image - products.at_nodes(energy) * (mass * z))
-        direction = products.without([*known, z], direction)
+        direction = products.without(z, direction)
         search = products.normalize(np.stack([direction, matrix @ direction]))
         basis = [current, search, *previous_step]
         vectors, images = zip(*basis, strict=True)
@@ -352,12 +362,10 @@ class _ComponentProducts:
         """Return (components,) norms of an (n,) vector on each component, weighted by the masses."""
         return np.sqrt(self.sums(self._mass * (vector.real**2 + vector.imag**2)).real)
 
-    def without(self, known: Sequence[np.ndarray], vector: np.ndarray) -> np.ndarray:
-        """Return the part of a vector that is orthogonal to known orthonormal vectors, on each component."""
-        for each in known:
-            overlap = self.sums(self._mass * (each.conj() * vector))
-            vector = vector - self.at_nodes(overlap) * each
-        return vector
+    def without(self, known: np.ndarray, vector: np.ndarray) -> np.ndarray:
+        """Return the part of a vector that is orthogonal to a known vector of norm 1, on each component."""
+        overlap = self.sums(self._mass * (known.conj() * vector))
+        return vector - self.at_nodes(overlap) * known
 
     def normalize(self, pair: np.ndarray) -> np.ndarray:
         """Divide a pair in place by the norm of the vector, on each component, and return it.

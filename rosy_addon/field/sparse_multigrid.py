@@ -111,6 +111,12 @@ class CSRMatrix:
             entries = entries[np.unique(self.row_indices[entries], return_index=True)[1]]
         return entries
 
+    def dense(self) -> np.ndarray:
+        """Return the matrix as a dense array, (n, column_count)."""
+        result = np.zeros((len(self), self.column_count), dtype=self.data.dtype)
+        np.add.at(result, (self.row_indices, self.indices), self.data)
+        return result
+
     def entries_of_rows(self, rows: np.ndarray) -> np.ndarray:
         """Return the positions of the entries of the given rows, row by row, as intp."""
         return concatenated_ranges(self.indptr[:-1][rows], np.diff(self.indptr)[rows])
@@ -388,8 +394,7 @@ def dense_inverse(matrix: CSRMatrix) -> np.ndarray:
     If the matrix is singular, its diagonal is enlarged a little. The inverse is used as a preconditioner, so
     this changes the rate of convergence and not the solution.
     """
-    dense = np.zeros((len(matrix), len(matrix)), dtype=matrix.data.dtype)
-    np.add.at(dense, (matrix.row_indices, matrix.indices), matrix.data)
+    dense = matrix.dense()
     try:
         return np.linalg.inv(dense)
     except np.linalg.LinAlgError:

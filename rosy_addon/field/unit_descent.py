@@ -25,6 +25,10 @@ LAST_STEPS, LEAST_GAIN, MAX_STEPS = 5, 1e-3, 300
 #: Largest weight of an edge, relative to the median. Edges of slivers would make the matrix ill-conditioned.
 MAX_WEIGHT_RATIO = 1e4
 
+#: Largest median of the weights that counts, which are near 1 on good meshes. If most faces are slivers, the energies of
+#: others would be rounding errors.
+MAX_MEDIAN = 1e4
+
 #: Smallest second derivative along the search direction, relative to that of a field that turns nowhere.
 MIN_CURVATURE_RATIO = 0.1
 
@@ -124,7 +128,8 @@ def face_energy(surface: Surface, degree: int, is_defined: np.ndarray) -> FaceEn
     a, b = halfedges.T
     length, distance = by_rows(partial(edge_lengths, surface), a, b)
     weight = np.divide(length, distance, out=np.zeros_like(length), where=distance > 0)
-    weight = np.minimum(weight, MAX_WEIGHT_RATIO * np.median(weight)) if len(a) else weight
+    largest = MAX_WEIGHT_RATIO * min(float(np.median(weight)), MAX_MEDIAN) if len(a) else 0.0
+    weight = np.minimum(weight, largest)
     transport = power(by_rows(partial(edge_unfolding, surface), a, b), degree)
     area = surface.face_area
     area = np.maximum(area, 1e-12 * max(float(area.mean()), 1e-300))

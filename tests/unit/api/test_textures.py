@@ -100,6 +100,7 @@ def test_a_constant_magnitude_has_one_color(draw):
     assert len(color) > 1000 and np.ptp(color.astype(int), axis=0).max() <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("draw", [rf.render, rf.texture])
 @pytest.mark.parametrize("ink", ["soft", "hatch", "even"])
 def test_regions_without_data_are_left_out(draw, ink):
@@ -150,6 +151,7 @@ def test_textures_that_are_refused(error_of):
     assert "has no UV map" in error_of(rf.texture, rf.Surface(*SQUARE, name="square"))
 
 
+@pytest.mark.slow
 def test_hatching_for_one_light():
     """The ink of a texture has the tone of the light; without a light it has thresholds of all tones."""
     square = rf.Surface(*SQUARE, name="square", uv=np.array(SQUARE[0])[:, :2])

@@ -95,6 +95,7 @@ def test_wrong_usage_is_status_2(words):
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_files_may_be_named_after_options(sphere, tmp_path):
     field = tmp_path / "f.npy"
     assert rosy("field", "-o", field, "--generate", "axis", sphere, "--degree", 1).returncode == 0

@@ -113,6 +113,7 @@ def test_looks_without_flow_do_not_drift():
         assert pixel_look(look, drift=Drift(0.3)).lic_key() == pixel_look(look).lic_key()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degree", [1, 3])
 def test_streaks_drift_along_directions(degree):
     look = Look(flow=1.0, length=20)
@@ -135,6 +136,7 @@ def test_lines_drift_toward_the_guiding_angle():
     assert best_shift(first, second, (1, 0), -6) == pytest.approx(-6, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_loop_closes():
     look, count = Look(flow=1.0, length=20), 24
     frames = [member(0.4, 1, look, drift_at(look, at, count)) for at in (0, 1, 12, 13, count - 1)]

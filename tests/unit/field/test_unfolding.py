@@ -42,6 +42,7 @@ def with_reversed_faces(surface: Surface, share: float) -> Surface:
     return Surface(surface.vertices, triangles)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [with_folds, with_reversed_faces])
 @pytest.mark.parametrize(("share", "median", "most"), BOUNDS)
 def test_the_field_of_the_form_hardly_changes(make, share, median, most):

@@ -27,6 +27,7 @@ FAR = perspective_camera(look_at((0, -40, 10), (0, 0, 0)), 80, 60)
 CLOSE = orthographic_camera(look_at((0, -3, 0.5), (0.6, 0, 0)), 120, 100, scale=0.8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("camera", [SIDE, FAR, CLOSE], ids=["side", "far", "close"])
 def test_every_triangle_that_is_not_hidden_is_seen(camera):
     """A sphere behind a torus: rays to points on a third of its triangles meet nothing else."""

@@ -208,6 +208,7 @@ def test_around_singularities_strokes_are_alike_on_all_sides(degree, sign, phase
     assert gaps.nearest_distance.min() >= 0.5
 
 
+@pytest.mark.slow
 def test_singularities_are_found():
     """The sum of the indices is the Euler characteristic (Poincare-Hopf theorem), also if zeros are on edges."""
     for surface in (bumpy(icosphere(4)), icosphere(3), icosphere(2), bumpy(torus(60, 30))):

@@ -177,7 +177,7 @@ def test_faces_without_area_in_the_map_end_streamlines():
 
 def test_bad_maps_and_looks_are_named(error_of):
     """Each is refused in one line that says what to do."""
-    instance = instance_of(cube(), 4)
+    instance = instance_of(cube(), 1)
     uv = np.tile([(0.0, 0.0), (1, 0), (1, 1), (0, 1)], (6, 1))
     wrong = uv.copy()
     wrong[9] = np.nan

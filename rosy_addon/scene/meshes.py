@@ -176,12 +176,13 @@ def read_uvs(mesh: Mesh, name: str = "", label: str | None = None) -> np.ndarray
     """
     label = mesh_label(mesh) if label is None else label
     name = uv_map_name(mesh, name, label)
-    values = read_attribute(mesh, name, np.float32, 2)
-    if values is None:
+    # Not read as an attribute: on evaluated meshes, another one may have the same name.
+    values = mesh.uv_layers[name].uv
+    if not len(values):
         raise RosyError(
             f"{label}: UV map '{name}' cannot be read in edit mode: leave edit mode (Tab) first"
         )
-    return values
+    return read_collection(values, "vector", np.float32, 2)
 
 
 def polygon_arrays(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:

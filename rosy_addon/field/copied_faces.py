@@ -48,7 +48,11 @@ def split_mix(key: np.ndarray) -> np.ndarray:
 
     For the multiples 0, 1, 2 and so on of `SPLIT_MIX_GAMMA`, the hashes are a pseudorandom sequence.
     """
-    key = key + SPLIT_MIX_GAMMA
+    return scrambled(key + SPLIT_MIX_GAMMA)
+
+
+def scrambled(key: np.ndarray) -> np.ndarray:
+    """Return uint64 numbers whose bits depend on all bits of the given ones: the last step of `split_mix`."""
     key = (key ^ key >> np.uint64(30)) * np.uint64(0xBF58476D1CE4E5B9)
     key = (key ^ key >> np.uint64(27)) * np.uint64(0x94D049BB133111EB)
     return key ^ key >> np.uint64(31)

@@ -18,6 +18,7 @@ import numpy as np
 
 from ..core.progress import progress, report
 from .blocks import concatenated_ranges, run_starts
+from .copied_faces import scrambled
 
 #: Relative increase of the diagonal of a singular matrix, and smallest value on a diagonal, relative to the
 #: largest value.
@@ -439,11 +440,11 @@ def _orders(matrix: CSRMatrix) -> np.ndarray:
     """
     count = len(matrix)
     unit = max(float(matrix.diagonal.mean()), 1e-300) * HASH_PRECISION
-    element = np.rint(np.abs(matrix.data) / unit).astype(np.int64).view(np.uint64)
+    element = scrambled(np.rint(np.abs(matrix.data) / unit).astype(np.int64).view(np.uint64))
     hashes = np.zeros(count, dtype=np.uint64)
     for _ in range(HASH_ROUNDS):
-        terms = _scrambled(hashes.take(matrix.indices) + _scrambled(element))
-        hashes = _scrambled(hashes + np.add.reduceat(terms, matrix.indptr[:-1]))
+        terms = scrambled(hashes.take(matrix.indices) + element)
+        hashes = scrambled(hashes + np.add.reduceat(terms, matrix.indptr[:-1]))
     _, image, images = np.unique(hashes, return_inverse=True, return_counts=True)
     ranks = np.empty((2, count), dtype=np.intp)
     random = np.random.default_rng(0).permutation(count)
@@ -451,13 +452,6 @@ def _orders(matrix: CSRMatrix) -> np.ndarray:
     for rank, numbers in zip(ranks, (random, np.where(is_few, -random, random)), strict=True):
         rank[np.lexsort((numbers, image))] = np.arange(count)
     return ranks
-
-
-def _scrambled(values: np.ndarray) -> np.ndarray:
-    """Return uint64 values whose bits depend on all bits of the given ones (SplitMix64, Steele et al. 2014)."""
-    values = (values ^ (values >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    values = (values ^ (values >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return values ^ (values >> np.uint64(31))
 
 
 def _roots(links: CSRMatrix, orders: np.ndarray) -> np.ndarray:

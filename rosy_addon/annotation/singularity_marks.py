@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.cache import Cache
+from ..core.cache import Cache, cached
 from ..core.progress import progress
 from ..field.singularities import find_singularities
 from ..field.singularity_changes import CLUSTER_REACH, cluster_singularities
@@ -172,15 +172,11 @@ def shown_singularities(
     mesh have the same singularities. The result is a pair of (K,) int32 arrays; indices are in units of 1 / N.
     `settings` is a look or a stroke style.
     """
-    surface, key = (
-        instance.surface.in_rest_shape(),
-        (instance.surface.rest_shape_key, instance.field),
-    )
-    found = cache.get_or_create(
-        ("singularities", *key), partial(find_singularities, surface, instance.field)
-    )
+    surface = instance.surface.in_rest_shape()
+    key = instance.surface.rest_shape_key, instance.field
+    create = partial(find_singularities, surface, instance.field)
+    found = cached(cache, create, "singularities", *key)
     if not shows_clusters(settings):
         return found
-    reach = CLUSTER_REACH * surface.extent
-    create = partial(cluster_singularities, surface, *found, reach)
-    return cache.get_or_create(("clusters", *key), create)
+    create = partial(cluster_singularities, surface, *found, CLUSTER_REACH * surface.extent)
+    return cached(cache, create, "clusters", *key)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.cache import Cache
+from ..core.cache import Cache, cached
 from ..field.frames import dot, normalize
 from ..projection.gbuffer import GBuffer
 from ..projection.shadow_maps import light_cameras, shadow_visibility
@@ -141,12 +141,10 @@ def light_visibility(
     """
     if look.shading == 0 or not look.shadows:
         return []
-    cache = Cache() if cache is None else cache
     visibility = []
     for light in lights_of(look, lights):
         vector = np.asarray(light.vector, dtype=np.float64)
         cameras = light_cameras(gbuffer.instances, gbuffer.camera, light.kind, vector)
         compute = functools.partial(shadow_visibility, gbuffer, cameras)
-        key = "shadow", gbuffer, light.kind, vector.tobytes()
-        visibility.append(cache.get_or_create(key, compute))
+        visibility.append(cached(cache, compute, "shadow", gbuffer, light.kind, vector))
     return visibility

@@ -27,7 +27,7 @@ from .face_graph import LABEL, FaceGraph, face_graph
 from .frames import normalize
 from .representation import complex_bincount, from_representation, to_representation, unit_complex
 from .rosy_field import RosyField, check_degree
-from .sparse_multigrid import CSRMatrix, Level, from_edges, hierarchy, w_cycle
+from .sparse_multigrid import Level, from_edges, hierarchy, w_cycle
 from .surface import Surface
 from .turning_angles import added_resistance, turning_angles
 
@@ -196,14 +196,60 @@ def _bent(
     target: np.ndarray,
     reach: float,
 ) -> np.ndarray:
-    """Return (F,) representations z after rotating them toward a target, with the same singularities.
+    """Rotate the field on each face to follow guides, without a change of its singularities.
 
-    `target` holds the (F,) representations to reach, 0 on faces without a guide. `turning` holds the (I,)
-    angles in radians by which the field z turns from the source to the target face of each edge. The
-    influence of the guides falls off over the distance `reach`, in object space.
+    Parameters
+    ----------
+    graph : FaceGraph
+    degree : int
+        N.
+    turning : (I,) ndarray
+        Angles in radians by which the field turns from the source to the target face of each edge.
+    z : (F,) complex ndarray
+        Representation of the field, of modulus 1 or 0.
+    target : (F,) complex ndarray
+        Representation of the guides; 0 on faces without a guide.
+    reach : float
+        Distance over which the influence of the guides falls off, in object space.
+
+    Returns
+    -------
+    (F,) complex ndarray
+        Representation of the rotated field. It turns by less than pi / N across each edge, unless the guides
+        require more.
     """
+    # The squared difference from a guide has this weight, and the squared change of the angle across an edge of
+    # conductance 1 has the weight 1.
     penalty = graph.surface.face_area / reach / reach
-    angle = guided_rotation(graph, degree, turning, z, target, penalty)
+    offset = target * z.conj()
+    is_guide = (offset != 0) & (penalty > 0)
+    if not is_guide.any():
+        return z
+    penalty = np.where(is_guide, penalty, 0.0)
+    stiffness = 1 / graph.conductance
+    wanted = np.angle(offset) / degree
+    sector, limit = 2 * np.pi / degree, np.pi / degree
+    angle = None
+    for attempt in range(MAX_ATTEMPTS):
+        rest = 0.5**attempt
+        with progress(1 - rest, 1 - 0.9 * rest):
+            levels = _levels(graph, stiffness, penalty)
+        if angle is None:
+            pull = penalty * unit_complex(offset)
+            with progress(1 - 0.9 * rest, 1 - 0.7 * rest):
+                angle = _initial_angle(graph, stiffness, levels, pull) / degree
+        for index in range(MAX_ROUNDS):
+            multiple = np.rint((angle - wanted) / sector)
+            rhs = penalty * (wanted + sector * multiple)
+            shares = (0.5 + 0.2 * 0.5**step for step in (index, index + 1))
+            with progress(*(1 - share * rest for share in shares)):
+                angle = _solve(levels, rhs)
+            if np.array_equal(multiple[is_guide], np.rint((angle - wanted) / sector)[is_guide]):
+                break
+        added = angle[graph.target] - angle[graph.source]
+        if np.abs(turning + added).max(initial=0.0) < limit:
+            break
+        stiffness = stiffness * added_resistance(added, turning, limit)
     return z * np.exp(1j * degree * angle)
 
 
@@ -328,90 +374,21 @@ def _rotation_to(target: np.ndarray, z: np.ndarray, component: np.ndarray) -> np
     return unit_complex(total, otherwise=1)[component]
 
 
-def guided_rotation(
-    graph: FaceGraph,
-    degree: int,
-    turning: np.ndarray,
-    z: np.ndarray,
-    target: np.ndarray,
-    penalty: np.ndarray,
-) -> np.ndarray:
-    """Compute the angle by which a field is rotated on each face to follow guides.
-
-    Parameters
-    ----------
-    graph : FaceGraph
-    degree : int
-        N.
-    turning : (I,) ndarray
-        Angles in radians by which the field turns from the source to the target face of each edge.
-    z : (F,) complex ndarray
-        Representation of the field, of modulus 1 or 0.
-    target : (F,) complex ndarray
-        Representation of the guides; 0 on faces without a guide.
-    penalty : (F,) ndarray
-        Weight of the squared difference from the guide. The squared change of the angle across an edge of
-        conductance 1 has the weight 1.
-
-    Returns
-    -------
-    (F,) float64 ndarray
-        Counter-clockwise angle in radians. The rotated field turns by less than pi / N across each edge,
-        unless the guides require more.
-    """
-    offset = target * z.conj()
-    is_guide = (offset != 0) & (penalty > 0)
-    if not is_guide.any():
-        return np.zeros(len(z))
-    penalty = np.where(is_guide, penalty, 0.0)
-    stiffness = 1 / graph.conductance
-    wanted = np.angle(offset) / degree
-    sector, limit = 2 * np.pi / degree, np.pi / degree
-    angle = None
-    for attempt in range(MAX_ATTEMPTS):
-        rest = 0.5**attempt
-        matrix = _system(graph, stiffness, penalty)
-        with progress(1 - rest, 1 - 0.9 * rest):
-            levels = hierarchy(matrix)
-        if angle is None:
-            with progress(1 - 0.9 * rest, 1 - 0.7 * rest):
-                angle = _initial_angle(graph, stiffness, matrix, levels, offset, penalty)
-            angle /= degree
-        for index in range(MAX_ROUNDS):
-            multiple = np.rint((angle - wanted) / sector)
-            rhs = penalty * (wanted + sector * multiple)
-            shares = (0.5 + 0.2 * 0.5**step for step in (index, index + 1))
-            with progress(*(1 - share * rest for share in shares)):
-                angle = _solve(matrix, rhs, levels)
-            if np.array_equal(multiple[is_guide], np.rint((angle - wanted) / sector)[is_guide]):
-                break
-        added = angle[graph.target] - angle[graph.source]
-        if np.abs(turning + added).max(initial=0.0) < limit:
-            break
-        stiffness = stiffness * added_resistance(added, turning, limit)
-    return angle
-
-
-def _system(graph: FaceGraph, stiffness: np.ndarray, penalty: np.ndarray) -> CSRMatrix:
-    """Return the matrix of the Laplacian of the graph of faces, with the penalty added to its diagonal.
+def _levels(graph: FaceGraph, stiffness: np.ndarray, penalty: np.ndarray) -> list[Level]:
+    """Return multigrid levels of the Laplacian of the graph of faces, with the penalty added to its diagonal.
 
     `stiffness` holds the (I,) weights of the edges, and `penalty` the (F,) weights of the guides.
     """
     ends = np.concatenate([graph.source, graph.target])
     diagonal = np.bincount(ends, np.tile(stiffness, 2), len(penalty))
     diagonal = diagonal + penalty + REGULARIZATION * np.where(diagonal > 0, diagonal, 1.0)
-    return from_edges(graph.source, graph.target, -stiffness, diagonal)
+    return hierarchy(from_edges(graph.source, graph.target, -stiffness, diagonal))
 
 
 def _initial_angle(
-    graph: FaceGraph,
-    stiffness: np.ndarray,
-    matrix: CSRMatrix,
-    levels: list[Level],
-    offset: np.ndarray,
-    penalty: np.ndarray,
+    graph: FaceGraph, stiffness: np.ndarray, levels: list[Level], pull: np.ndarray
 ) -> np.ndarray:
-    """Return a first estimate of N times the (F,) angles that `guided_rotation` computes.
+    """Return a first estimate of N times the (F,) angles by which `_bent` rotates a field.
 
     The phase by which z must be rotated to reach the guide is known on faces with a guide, up to multiples of
     2 pi. First, unit complex numbers with these phases are smoothed over all faces. Then the phases of the
@@ -423,35 +400,28 @@ def _initial_angle(
     graph : FaceGraph
     stiffness : (I,) float64 ndarray
         Weights of the edges.
-    matrix : CSRMatrix
-        Result of `_system`, with the penalty.
     levels : list of Level
-        Multigrid levels of `matrix`.
-    offset : (F,) complex128 ndarray
-        Numbers whose phase takes z to the guide; 0 on faces without a guide.
-    penalty : (F,) float64 ndarray
-        Weights of the guides; 0 on faces without a guide.
+        Result of `_levels`, with the penalty.
+    pull : (F,) complex128 ndarray
+        Numbers whose phase takes z to the guide, and whose modulus is the weight of the guide; 0 on faces
+        without a guide.
     """
-    unit = unit_complex(offset)
     with progress(0.0, 0.3):
-        mean = _solve(matrix, penalty * unit, levels)
+        mean = _solve(levels, pull)
     difference = np.angle(mean[graph.target] * mean[graph.source].conj())
-    count = len(offset)
+    count = len(pull)
     divergence = np.bincount(graph.target, stiffness * difference, count)
     divergence -= np.bincount(graph.source, stiffness * difference, count)
-    laplacian = _system(graph, stiffness, np.zeros(count))
-    with progress(0.3, 1.0):
-        angle = _solve(laplacian, divergence, None)
-    rest = penalty * unit * np.exp(-1j * angle)
+    with progress(0.3, 0.6):
+        free_levels = _levels(graph, stiffness, np.zeros(count))
+    with progress(0.6, 1.0):
+        angle = _solve(free_levels, divergence)
+    rest = pull * np.exp(-1j * angle)
     parts = int(graph.component.max(initial=-1)) + 1
     return angle + np.angle(complex_bincount(graph.component, rest, parts))[graph.component]
 
 
-def _solve(matrix: CSRMatrix, rhs: np.ndarray, levels: list[Level] | None) -> np.ndarray:
-    """Solve ``matrix @ solution = rhs`` by the conjugate gradient method, preconditioned by a W-cycle.
-
-    `levels` holds the multigrid levels of the matrix; None to build them.
-    """
-    precondition = None if levels is None else partial(w_cycle, levels)
-    label = "turning the field to the guides"
-    return conjugate_gradient(matrix, rhs, TOLERANCE, precondition, label)
+def _solve(levels: list[Level], rhs: np.ndarray) -> np.ndarray:
+    """Solve the system of the first level by the conjugate gradient method, preconditioned by a W-cycle."""
+    cycle, label = partial(w_cycle, levels), "turning the field to the guides"
+    return conjugate_gradient(levels[0].matrix, rhs, TOLERANCE, cycle, label)

@@ -23,7 +23,7 @@ from functools import partial
 
 import numpy as np
 
-from ..core.cache import Cache
+from ..core.cache import Cache, cached
 from ..core.progress import report
 from ..field.frames import dot_components, transform_components
 from ..field.representation import signed_power
@@ -155,9 +155,8 @@ def cached_corner_field(
     """
     surface, field = instance.surface, instance.field
     create = partial(field_at_corners, surface, instance.matrix, field, display)
-    cache = Cache() if cache is None else cache
-    linear = np.ascontiguousarray(np.asarray(instance.matrix, dtype=np.float64)[:3, :3])
-    return cache.get_or_create(("corner field", surface, field, linear.tobytes(), display), create)
+    linear = np.asarray(instance.matrix, dtype=np.float64)[:3, :3]
+    return cached(cache, create, "corner field", surface, field, linear, display)
 
 
 def _fan_values(

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.cache import Cache, content_hash
+from ..core.cache import Cache, cached
 from ..core.progress import progress, report
 from ..field.connectivity import connected_components
 from ..field.creases import find_creases
@@ -80,6 +80,5 @@ def cached_outline_mesh(
     if similarity_scale(linear) is not None:
         linear = np.eye(3)
     create = partial(outline_mesh, surface, linear, crease_angle)
-    cache = Cache() if cache is None else cache
-    shape_key = surface.rest_shape_key, content_hash(surface.corner_fan)
-    return cache.get_or_create(("outline mesh", *shape_key, linear.tobytes(), crease_angle), create)
+    shape_key = surface.rest_shape_key, surface.corner_fan
+    return cached(cache, create, "outline mesh", *shape_key, linear, crease_angle)

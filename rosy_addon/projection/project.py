@@ -225,10 +225,8 @@ def cached_project(
     The key consists of the instances (by identity), the camera (by value), the display and the
     number of samples.
     """
-    return cache.get_or_create(
-        ("G-buffer", tuple(instances), camera.key, camera.name, display, samples),
-        partial(project, instances, camera, display, cache, samples),
-    )
+    key = "G-buffer", tuple(instances), camera.key, camera.name, display, samples
+    return cache.get_or_create(key, partial(project, instances, camera, display, cache, samples))
 
 
 def check_instances(instances: MeshInstances, camera: Camera, display: str) -> None:

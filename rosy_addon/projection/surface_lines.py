@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from ..core.cache import Cache, content_hash
+from ..core.cache import Cache, cached
 from ..core.memory import check_memory
 from ..core.progress import progress, report
 from ..field.bisection import BisectionTree, bisect
@@ -89,7 +89,7 @@ def cached_surface_lines(
     Lines are shared by all cameras, and by instances of equal size. `spacing` is the distance between
     neighboring lines in world space, if the mesh is not deformed.
     """
-    surface, field, cache = instance.surface, instance.field, Cache() if cache is None else cache
+    surface, field = instance.surface, instance.field
     stretch, scale = rest_matrix(instance.matrix), matrix_scale(instance.matrix)
     # Rounded, as rotated matrices have rounding errors.
     spacing = float(f"{spacing / scale:.5g}")
@@ -98,10 +98,8 @@ def cached_surface_lines(
     # Deformations do not change what the lines depend on.
     normals = surface.corner_normal if surface.rest_vertices is None else None
     field_parts = field.degree, field.vectors, field.direction_ratios
-    content = content_hash(surface.corner_fan, normals, *field_parts, stretch)
-    return cache.get_or_create(
-        ("surface lines", surface.rest_shape_key, content, display, spacing, max_triangles), create
-    )
+    content = surface.rest_shape_key, surface.corner_fan, normals, *field_parts, stretch
+    return cached(cache, create, "surface lines", *content, display, spacing, max_triangles)
 
 
 def surface_lines(

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from ..core.cache import Cache
+from ..core.cache import Cache, cached
 from ..core.progress import progress, report
 from ..field.feature_curvature import feature_curvature
 from ..field.frames import dot
@@ -114,9 +114,8 @@ def feature_curvatures(gbuffer: GBuffer, cache: Cache) -> np.ndarray:
     for instance_id, blocks, (start, stop) in gbuffer.instance_blocks():
         surface = gbuffer.instances[instance_id].surface
         with progress(start, stop):
-            corners = cache.get_or_create(
-                ("feature curvature", surface.rest_shape_key), partial(feature_curvature, surface)
-            )
+            create = partial(feature_curvature, surface)
+            corners = cached(cache, create, "feature curvature", surface.rest_shape_key)
         for block in blocks:
             report(stop, "measuring features")
             values = corners.take(gbuffer.triangle[block], axis=0)

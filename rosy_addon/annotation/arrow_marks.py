@@ -23,6 +23,7 @@ from ..field.directional_field import evaluate_harmonics, field_symmetry
 from ..field.frames import dot
 from ..field.surface import Surface
 from ..projection.camera import Camera
+from ..projection.field_channel import deviations
 from ..projection.gbuffer import GBuffer, MeshInstance, SurfacePoints
 from ..projection.pixel_neighbors import screen_jacobians
 from ..projection.project import surface_points
@@ -255,8 +256,7 @@ def _screen_directions(gbuffer: GBuffer) -> np.ndarray:
         member = np.exp(1j * np.angle(z)[:, None] / number + turns)
         harmonics = [
             (order, values[of_degree, None].astype(np.complex128))
-            for (kind, order), values in gbuffer.channels.items()
-            if kind == "deviation"
+            for order, values in deviations(gbuffer.channels)
         ]
         if harmonics:
             member = member * evaluate_harmonics(harmonics, member)

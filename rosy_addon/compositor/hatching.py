@@ -166,11 +166,8 @@ class HatchedLines(NamedTuple):
             coverage = _above_threshold(streak, target_coverage, statistics.threshold, look, slope)
         if self.undirected is not None:
             undefined, spots = self.spots(line)
-            target, thresholds = (
-                target_coverage[undefined],
-                look_streak_statistics(look).disc_threshold,
-            )
-            coverage[undefined] = _above_threshold(spots, target, thresholds, look)
+            target, table = target_coverage[undefined], look_streak_statistics(look).disc_threshold
+            coverage[undefined] = _above_threshold(spots, target, table, look)
         return coverage
 
 

@@ -185,10 +185,8 @@ def inks_of(look: Look, families: int = 1) -> Inks:
 
 def is_light(look: Look) -> bool:
     """Return whether the ink is lighter than the paper, by luminance."""
-    ink_luminance, paper_luminance = (
-        to_linear(from_hex(code)) @ LUMINANCE_WEIGHTS for code in (look.ink_color, look.paper_color)
-    )
-    return bool(ink_luminance > paper_luminance)
+    ink, paper = (to_linear(from_hex(code)) for code in (look.ink_color, look.paper_color))
+    return bool(ink @ LUMINANCE_WEIGHTS > paper @ LUMINANCE_WEIGHTS)
 
 
 def _ink_series(code: str, count: int) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 from ..core.progress import progress, report
 from ..field.directional_field import evaluate_harmonics
 from ..field.symmetry import FieldSymmetry
-from ..projection.field_channel import FieldChannel
+from ..projection.field_channel import FieldChannel, deviations
 from ..projection.gbuffer import GBuffer
 from ..projection.pixel_blocks import BLOCK_PIXELS, part_of, reported_blocks
 from ..projection.pixel_neighbors import neighbor_masks, screen_jacobians
@@ -113,8 +113,7 @@ class PixelField:
 
         See `field.directional_field`.
         """
-        channels = self.channels.items()
-        return [(number, values) for (kind, number), values in channels if kind == "deviation"]
+        return deviations(self.channels)
 
     @property
     def symmetry(self) -> FieldSymmetry:

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..core.progress import progress
 from ..projection.gbuffer import GBuffer
-from ..projection.pixel_blocks import reported_blocks
+from ..projection.pixel_blocks import part_of, reported_blocks
 from ..projection.rest_coordinates import RestCoordinates, matrix_scale, rest_coordinates
 from .image_noise import (
     BLUR_FACTOR,
@@ -103,7 +103,7 @@ def surface_noise(
     instance_hash = instance_hashes([instance.surface.name for instance in gbuffer.instances])
     total = np.zeros((channels, len(gbuffer.pixel)), dtype=np.float32)
     for block in reported_blocks(len(gbuffer.pixel), STEP_LABEL, 0.3, 0.6):
-        block_rest = rest.block(block)
+        block_rest = part_of(rest, (..., block))
         instance_id = gbuffer.instance_id[block]
         scale = cell_scale(units, instance_id, block_rest.pixel_size, smallest / cell)
         if detail:

@@ -16,7 +16,7 @@ import numpy as np
 from ..core.deterministic_trig import cos_sin, unit_phasor
 from ..core.progress import progress
 from ..projection.gbuffer import GBuffer
-from ..projection.pixel_blocks import reported_blocks
+from ..projection.pixel_blocks import part_of, reported_blocks
 from ..projection.rest_coordinates import rest_coordinates
 from .look import is_hatched
 from .look_units import PixelLook
@@ -90,7 +90,8 @@ def wobble_angle(gbuffer: GBuffer, look: PixelLook) -> np.ndarray:
             position = np.stack([column, row, 0 * row]).astype(np.float32)
             size = np.ones(len(row), dtype=np.float32)
         else:
-            block_rest, min_scale = rest.block(block), look.supersampling / look.line_width
+            block_rest = part_of(rest, (..., block))
+            min_scale = look.supersampling / look.line_width
             instance_id = gbuffer.instance_id[block]
             scale = cell_scale(units, instance_id, block_rest.pixel_size, min_scale)
             position, size = block_rest.at_offset(0, 0), block_rest.pixel_size * scale

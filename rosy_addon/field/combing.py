@@ -182,9 +182,8 @@ def start_combing(
     edges = max(reach / surface.mean_edge_length, MIN_REACH_EDGES)
     weak_guides = unit_z / (1 + edges**2)
     guides = np.where(guides == 0, weak_guides, guides)
-    start = (
-        system.averages.node_sums(unit_z, system.degree) / system.averages.connection.positive_mass
-    )
+    averages = system.averages
+    start = averages.node_sums(unit_z, system.degree) / averages.connection.positive_mass
     return Combing(system, guides, start, np.where(magnitude > 0, magnitude, 1.0))
 
 

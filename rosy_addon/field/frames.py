@@ -136,13 +136,20 @@ def tangent_frame(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     ----------
     Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 6(1), 2017.
     """
-    nx, ny, nz = normals[..., 0], normals[..., 1], normals[..., 2]
-    sign = np.copysign(np.ones_like(nz), nz)
+    x, y = tangent_frame_components(np.moveaxis(normals, -1, 0))
+    return np.stack(x, axis=-1), np.stack(y, axis=-1)
+
+
+def tangent_frame_components(
+    normal: Sequence[np.ndarray],
+) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Return the result of `tangent_frame` for normals that are given as three arrays, of x, y and z."""
+    nx, ny, nz = normal
+    sign = np.copysign(nz.dtype.type(1), nz)
     a = -1 / (sign + nz)
     b = nx * ny * a
-    x = np.stack([1 + sign * nx * nx * a, sign * b, -sign * nx], axis=-1)
-    y = np.stack([b, sign + ny * ny * a, -ny], axis=-1)
-    return x, y
+    x = [1 + sign * nx * nx * a, sign * b, -sign * nx]
+    return x, [b, sign + ny * ny * a, -ny]
 
 
 def view_frame(toward_eye: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -25,14 +25,14 @@ import numpy as np
 
 from ..core.cache import Cache, cached
 from ..core.progress import report
-from ..field.frames import dot_components, transform_components
+from ..field.frames import dot_components, tangent_frame_components, transform_components
 from ..field.representation import signed_power
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from .face_values import TangentValues, face_values
 from .field_channel import REPRESENTATION, FieldChannel, rotation_order
 from .gbuffer import MeshInstance
-from .pixel_blocks import part_of, pixel_blocks
+from .pixel_blocks import pixel_blocks
 from .vector_components import (
     VectorComponents,
     cofactor_matrix,
@@ -40,7 +40,6 @@ from .vector_components import (
     normalize_components,
     polygon_normals,
     relative_to_first,
-    tangent_frame_components,
 )
 
 
@@ -82,10 +81,6 @@ class CornerField:
     def representation(self) -> np.ndarray:
         """z at each corner, (3, T) complex64."""
         return self.channels[REPRESENTATION]
-
-    def part(self, triangle: np.ndarray) -> CornerField:
-        """Return the field and the normals of the triangles with (n,) indices."""
-        return part_of(self, (..., triangle))
 
     def rotated(self, rotation: np.ndarray) -> CornerField:
         """Return a copy in another space: all vectors are rotated by a (3, 3) matrix."""

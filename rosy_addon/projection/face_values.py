@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..field.directional_field import field_harmonics
-from ..field.frames import dot_components, transform_components
+from ..field.frames import dot_components, tangent_frame_components, transform_components
 from ..field.representation import signed_power
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
@@ -20,7 +20,6 @@ from .vector_components import (
     polygon_angles,
     polygon_normals,
     relative_to_first,
-    tangent_frame_components,
 )
 
 #: Relative tolerance of `similarity_scale`: the rounding error of Blender's single precision

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import numpy as np
+
 #: Key of a complex value of a field. ("deviation", j) is the harmonic C_j of `field.directional_field`.
 #: ("family", m) is the representation, of degree N / m, of the line that the stored member is on: a line
 #: is a pair of opposite members.
@@ -19,3 +23,8 @@ def rotation_order(channel: FieldChannel, degree: int) -> int:
     """
     kind, number = channel
     return -number if kind == "deviation" else degree // number
+
+
+def deviations(channels: Mapping[FieldChannel, np.ndarray]) -> list[tuple[int, np.ndarray]]:
+    """Return the harmonics among the channels of a field, as pairs of the order j and C_j. Empty for a RoSy."""
+    return [(order, values) for (kind, order), values in channels.items() if kind == "deviation"]

@@ -23,7 +23,7 @@ from .barycentrics import LABEL, barycentrics
 from .camera import Camera, pixel_rays, z_at_depth
 from .corner_field import cached_corner_field
 from .gbuffer import GBuffer, MeshInstance, MeshInstances, SurfacePoints, with_field
-from .pixel_blocks import reported_blocks
+from .pixel_blocks import part_of, reported_blocks
 from .pixel_coverage import pixel_coverage
 from .pixel_values import fill_pixels
 from .rasterized_samples import SampledTriangles, rasterize_samples
@@ -212,7 +212,8 @@ def surface_points(
         instance = instances[instance_id]
         with progress(0.1, 1.0):
             corner_field = cached_corner_field(instance, display, cache)
-        corner_field = corner_field.part(points.triangle[chosen]).rotated(camera.view[:3, :3])
+        corner_field = part_of(corner_field, (..., points.triangle[chosen]))
+        corner_field = corner_field.rotated(camera.view[:3, :3])
         fill_pixels(gbuffer, chosen, np.arange(len(chosen)), corner_field)
     return gbuffer
 

@@ -14,7 +14,6 @@ from ..field.polygon_arrays import box_corners
 from ..field.surface import Surface
 from .camera import Camera
 from .gbuffer import GBuffer, MeshInstance
-from .pixel_blocks import part_of
 from .project import clip_vertices
 
 #: Text that the user sees while this step runs.
@@ -52,10 +51,6 @@ class RestCoordinates:
     weights_dy: np.ndarray
     rest_corners: np.ndarray
     pixel_size: np.ndarray
-
-    def block(self, pixels: slice) -> RestCoordinates:
-        """Return the coordinates of a block of pixels."""
-        return part_of(self, (..., pixels))
 
     def at_offset(self, dx: float, dy: float) -> np.ndarray:
         """Return the (3, P) float32 rest positions at an offset from the pixel centers.

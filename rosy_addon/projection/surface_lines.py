@@ -17,17 +17,16 @@ from ..core.progress import progress, report
 from ..field.bisection import BisectionTree, bisect
 from ..field.curvature import with_smooth_normals
 from ..field.directional_field import evaluate_harmonics, field_symmetry
-from ..field.frames import dot_components, transform_components
-from ..field.representation import signed_power
+from ..field.frames import dot_components, tangent_frame_components, transform_components
+from ..field.representation import signed_power, unit_complex
 from ..field.rosy_field import RosyField
 from ..field.stripe_pattern import CornerDirections, StripePattern, stripe_pattern
 from ..field.surface import Surface
 from .corner_field import CornerField, field_at_corners, transport_phase
 from .face_values import SIMILARITY_EPS, similarity_scale
-from .field_channel import rotation_order
+from .field_channel import deviations
 from .gbuffer import MeshInstance
 from .rest_coordinates import matrix_scale
-from .vector_components import tangent_frame_components
 
 #: Longest edge of the triangles on which the phase is computed, in distances between lines.
 MAX_EDGE = 1.4
@@ -199,11 +198,7 @@ def _leaf_directions(
     mean = z.sum(axis=1)
     mean_angle = np.angle(mean) / degree
     angle = mean_angle[:, None] + np.angle(z * mean.conj()[:, None]) / degree
-    harmonics = [
-        (number, at_leaves(values, rotation_order((kind, number), degree)))
-        for (kind, number), values in corner_field.channels.items()
-        if kind == "deviation"
-    ]
+    harmonics = [(j, at_leaves(values, -j)) for j, values in deviations(corner_field.channels)]
     deviation = _deviations(harmonics, angle, degree) if symmetry.harmonic_orders else None
     leaf_offset = np.einsum("lcr,lr->lc", weights, offset.take(tree.leaf_root, axis=0))
     root_area = (offset[:, 1].conj() * offset[:, 2]).imag
@@ -248,9 +243,8 @@ def _deviations(
     spaced.
     """
     members = np.exp(1j * (angle[..., None] + 2 * np.pi * np.arange(degree) / degree))
-    result = np.ones_like(members)
+    result = np.empty_like(members)
     for direction in range(degree):
         ratio = evaluate_harmonics(harmonics, members[..., direction])
-        modulus = np.abs(ratio)
-        np.divide(ratio, modulus, out=result[..., direction], where=modulus > 0)
+        result[..., direction] = unit_complex(ratio, otherwise=1)
     return result

@@ -35,19 +35,6 @@ def normalize_components(vectors: VectorComponents) -> list[np.ndarray]:
     return [component / length for component in vectors]
 
 
-def tangent_frame_components(normal: VectorComponents) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Return two unit tangents x, y for each unit normal, with x cross y = normal.
-
-    They are the same as in `field.frames.tangent_frame`.
-    """
-    nx, ny, nz = normal
-    sign = np.copysign(nz.dtype.type(1), nz)
-    a = -1 / (sign + nz)
-    b = nx * ny * a
-    x = [1 + sign * nx * nx * a, sign * b, -sign * nx]
-    return x, [b, sign + ny * ny * a, -ny]
-
-
 def cofactor_matrix(linear: np.ndarray) -> np.ndarray:
     """Return the (3, 3) cofactor matrix of a linear map L: det(L) times its inverse transpose.
 
@@ -76,10 +63,8 @@ def relative_to_first(
         Components of the vectors from corner 0 to the corners 1, 2 and so on.
     """
     origin = [component.take(corner_vertex[0]) for component in points]
-    return [
-        [component.take(vertex) - base for component, base in zip(points, origin, strict=True)]
-        for vertex in corner_vertex[1:]
-    ]
+    corners = ([component.take(vertex) for component in points] for vertex in corner_vertex[1:])
+    return [subtract_components(corner, origin) for corner in corners]
 
 
 def polygon_normals(points: Sequence[VectorComponents]) -> list[np.ndarray]:
@@ -90,10 +75,8 @@ def polygon_normals(points: Sequence[VectorComponents]) -> list[np.ndarray]:
     """
     area_vector = cross_components(points[0], points[1])
     for first, second in pairwise(points[1:]):
-        area_vector = [
-            total + component
-            for total, component in zip(area_vector, cross_components(first, second), strict=True)
-        ]
+        for total, component in zip(area_vector, cross_components(first, second), strict=True):
+            total += component
     return normalize_components(area_vector)
 
 

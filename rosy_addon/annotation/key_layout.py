@@ -206,12 +206,9 @@ class _Arrangement:
             self._caption()
         if parts.scale is not None:
             self._scale_bar(*parts.scale)
-        lowest = 0.0
-        if parts.indices:
-            lowest = self._legend() + PLATE_GAP * self.size
-        if parts.color_scale is not None and not self._color_bar(parts.color_scale, lowest):
-            return None
-        return self.result if self._fits() else None
+        lowest = self._legend() + PLATE_GAP * self.size if parts.indices else 0.0
+        has_room = parts.color_scale is None or self._color_bar(parts.color_scale, lowest)
+        return self.result if has_room and self._fits() else None
 
     def _fits(self) -> bool:
         """Return whether all background rectangles are inside the frame and no two of them overlap."""

@@ -350,8 +350,6 @@ def _mark_strength(
     (n,) float32 ndarray
         For each of these pixels, the fraction for its mark, 0 to 1.
     """
-    if not len(pixel):
-        return np.zeros(0, dtype=np.float32)
     row, column = np.divmod(pixel.astype(np.int64), width)
     stride = width // block_side + 2
     block = row // block_side * stride + column // block_side

@@ -20,9 +20,9 @@ PROCESS_BYTES = 120_000_000
 #: Memory in bytes of each pixel of the finished picture: four float32 numbers.
 PIXEL_BYTES = 16
 
-#: Memory in bytes of each sample of the surface: 22 numbers of 4 bytes in the G-buffer (see
+#: Memory in bytes of each sample of the surface: 21 numbers of 4 bytes in the G-buffer (see
 #: `projection.gbuffer.GBuffer`), and 6 in the field in the picture (see `compositor.pixel_field.PixelField`).
-SAMPLE_BYTES = 28 * 4
+SAMPLE_BYTES = 27 * 4
 
 #: Memory in bytes for each sample, line direction of the field and stored LIC image: 6 numbers of 4 bytes.
 #: They are the next sample on the streamline, the noise, two running sums, their count and the image.

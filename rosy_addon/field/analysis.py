@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ..core.errors import RosyError
 from ..core.progress import progress, report
 from .blocks import row_blocks
-from .directional_field import field_directions
-from .frames import coordinates, dot, normalize
+from .directional_field import direction_coordinates
+from .frames import dot, normalize
 from .representation import face_representation, matching_angles, unit_complex
 from .rosy_field import RosyField
 from .singularities import find_singularities, first_pairs
@@ -189,8 +189,7 @@ def _matched_direction_angles(surface: Surface, field: RosyField, other: RosyFie
 
     On each face, the best of the N matchings that keep the order around the normal is used.
     """
-    frames = surface.face_frames
-    z, other_z = (coordinates(field_directions(surface, f), *frames) for f in (field, other))
+    z, other_z = (direction_coordinates(surface, f) for f in (field, other))
     best = np.full(surface.face_count, np.inf)
     for shift in range(field.degree):
         angles = np.abs(np.angle(z * np.roll(other_z, shift, axis=1).conj()))

@@ -113,8 +113,6 @@ def synchronize(graph: PhaseGraph, depth: int = 0) -> np.ndarray:
     else:
         z = synchronize(_coarse_graph(graph, clustering), depth + 1)[clustering.cluster]
         z = clustering.p * z + clustering.q * z.conj()
-    if not len(graph.row):
-        return z
     inertia = np.zeros(graph.node_count)
     rows = graph.row[graph.row_start]
     inertia[rows] = INERTIA * np.add.reduceat(graph.strength, graph.row_start)
@@ -175,8 +173,6 @@ def _clustering(graph: PhaseGraph) -> _Clustering:
     entry = np.arange(len(graph.row))
     for _ in range(MATCHING_ROUNDS):
         entry = entry[(partner[graph.row[entry]] < 0) & (partner[graph.column[entry]] < 0)]
-        if not len(entry):
-            break
         chosen = _strongest_of_row(graph.row, strength, entry)
         chooser, choice = graph.row[chosen], np.full(count, -1, dtype=np.int64)
         choice[chooser] = graph.column[chosen]

@@ -222,7 +222,6 @@ def find_creases(surface: Surface, crease_angle: float) -> np.ndarray:
         The two vertices of each edge that is a crease, the smaller index first. Border edges and edges with more
         than two faces are not creases.
     """
-    none = np.empty((0, 2), np.int32)
     report(0.0, "finding creases")
     edges = surface.edges
     sides = surface.corner_face[edges.halfedges].T
@@ -230,7 +229,7 @@ def find_creases(surface: Surface, crease_angle: float) -> np.ndarray:
     crease_angle = max(crease_angle, MIN_CREASE_ANGLE)
     angle = _large_angles(surface.face_normal, sides, WEAK_SHARE / MIN_RATIO * crease_angle)
     if angle.max(initial=0.0) < crease_angle:
-        return none
+        return np.empty((0, 2), np.int32)
     region = _faces_near(surface, edges.ends[edges.interior[angle >= crease_angle]])
     normals, noise_angle = filtered_normals(surface, region)
     ends = edges.ends[edges.interior]
@@ -246,8 +245,6 @@ def find_creases(surface: Surface, crease_angle: float) -> np.ndarray:
     if not is_candidate.all():
         is_candidate |= angle[bent] >= MIN_RATIO * _largest_of_others(surface, angle)[bent]
     bent = bent[is_candidate]
-    if not len(bent):
-        return none
     ends, length, is_strong = ends[bent], length[bent], angle[bent] >= crease_angle
     chain = connected_components(len(surface.vertices), ends)[ends[:, 0]]
     total = np.bincount(chain, length)[chain]

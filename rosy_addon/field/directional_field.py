@@ -204,6 +204,11 @@ def field_directions(surface: Surface, field: RosyField) -> np.ndarray:
     return factor.real * field.vectors[:, None] + factor.imag * perpendicular[:, None]
 
 
+def direction_coordinates(surface: Surface, field: RosyField) -> np.ndarray:
+    """Return (F, N) complex128: all directions of a field in the tangent frames of `surface.face_frames`."""
+    return coordinates(field_directions(surface, field), *surface.face_frames)
+
+
 def stored_directions(surface: Surface, field: RosyField) -> np.ndarray:
     """Return the (F, N, 3) directions to store for a field: those from which it was made, if it has them."""
     rows = field.source_directions

@@ -167,26 +167,25 @@ def load_field(
     notes = [note]
     with progress(0.5, 0.6):
         source_surface = _source_surface(path, raw, surface, mesh)
+    is_transferred = source_surface is not None
+    source_surface = source_surface or surface
     if raw.values.shape[2] == 2:
-        target = surface if source_surface is None else source_surface
-        vectors, domain, frame_note = in_space(target, raw.values[:, 0], str(path))
+        vectors, domain, frame_note = in_space(source_surface, raw.values[:, 0], str(path))
         raw = replace(raw, values=vectors[:, None], domain=domain)
         notes.append(f"{path.name}: {frame_note}")
-    if source_surface is None:
-        if raw.domain is None and len(raw.values) == surface.face_count == len(surface.vertices):
-            notes.append(f"{path.name}: {AMBIGUOUS_ROWS_NOTE}")
-        with progress(0.6, 1.0):
-            field = field_from_raw(raw, surface, degree, str(path), policy)
-        return LoadedField(field, "; ".join(filter(None, notes)))
-    with progress(0.6, 0.7):
+    is_ambiguous = len(raw.values) == surface.face_count == len(surface.vertices)
+    if is_ambiguous and raw.domain is None and not is_transferred:
+        notes.append(f"{path.name}: {AMBIGUOUS_ROWS_NOTE}")
+    with progress(0.6, 0.7 if is_transferred else 1.0):
         field = field_from_raw(raw, source_surface, degree, str(path), policy)
-    with progress(0.7, 1.0):
-        field = transfer_field(source_surface, field, surface, str(path))
-    notes.append(
-        f"{path.name}: the field has {counted(source_surface.face_count, 'face')}, but the mesh has "
-        f"{surface.face_count:,}; the field was transferred by position from "
-        f"{Path(source_surface.name).name}"
-    )
+    if is_transferred:
+        with progress(0.7, 1.0):
+            field = transfer_field(source_surface, field, surface, str(path))
+        notes.append(
+            f"{path.name}: the field has {counted(source_surface.face_count, 'face')}, but the mesh has "
+            f"{surface.face_count:,}; the field was transferred by position from "
+            f"{Path(source_surface.name).name}"
+        )
     return LoadedField(field, "; ".join(filter(None, notes)))
 
 

@@ -1,4 +1,4 @@
-"""Tangent frames, and the transport of tangent vectors by minimal rotations."""
+"""Vectors and their transforms, tangent frames, and the transport of tangent vectors by minimal rotations."""
 
 from __future__ import annotations
 
@@ -16,6 +16,11 @@ def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def coordinates(vectors: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Return the (F, N) complex coordinates v.x + i v.y of (F, N, 3) vectors v in (F, 3) frames x, y."""
     return dot(vectors, x[:, None]) + 1j * dot(vectors, y[:, None])
+
+
+def transformed(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """Return (..., k) products of a (k, 4) matrix and (..., 3) points (x, y, z), as vectors (x, y, z, 1)."""
+    return points @ matrix[:, :3].T + matrix[:, 3]
 
 
 def normalize(vectors: np.ndarray) -> np.ndarray:

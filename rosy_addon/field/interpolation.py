@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.errors import RosyError
-from .directional_field import closest_rosy, field_directions
-from .frames import coordinates
+from .directional_field import closest_rosy, direction_coordinates
 from .representation import face_representation, from_representation
 from .rosy_field import RosyField
 from .surface import Surface
@@ -66,9 +65,7 @@ def interpolate_fields(
         z = _between(*(face_representation(*pair) for pair in (first, second)), share)
         return RosyField(degree, from_representation(z, x, y, degree))
     family_count = min(field.family_count for _, field in (first, second))
-    start, stop = (
-        coordinates(field_directions(*pair), *pair[0].face_frames) for pair in (first, second)
-    )
+    start, stop = (direction_coordinates(*pair) for pair in (first, second))
     angle, rho, ratios = closest_rosy(_between(start, _matched(start, stop, family_count), share))
     vectors = rho[:, None] * (np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y)
     return RosyField(degree, vectors, ratios, family_count)

@@ -60,13 +60,13 @@ def find_crossings(strokes: Strokes) -> Crossings:
     arc, stroke = strokes.arc, strokes.stroke
     segment_end = np.flatnonzero(np.diff(stroke, prepend=-1) == 0)
     segment_end = segment_end[np.argsort(strokes.triangle[segment_end], kind="stable")]
+    if not len(segment_end):
+        return Crossings(np.empty((0, 2), dtype=np.int64), np.empty((0, 2)))
     batches = []
     for first, second in _close_pairs(strokes, segment_end):
         report(min(0.1 * len(batches), 0.9), "finding crossings")
         first, second = segment_end[first], segment_end[second]
         batches.append(_intersect_segments(strokes.points, stroke, first, second))
-    if not batches:
-        return Crossings(np.empty((0, 2), dtype=np.int64), np.empty((0, 2)))
     first, second, *fractions = (np.concatenate(column) for column in zip(*batches, strict=True))
     order = np.lexsort((second, first, strokes.triangle[first]))
     pairs, fraction = (np.stack(both, axis=1)[order] for both in ((first, second), fractions))
@@ -118,8 +118,6 @@ def _close_pairs(
     first, second : (k,) int64 ndarray
         The two segments of each pair, as indices into `segment_end`; first < second.
     """
-    if not len(segment_end):
-        return
     key, window = _strip_keys(strokes, segment_end)
     order = np.argsort(key, kind="stable")
     key, window = key[order], window[order]

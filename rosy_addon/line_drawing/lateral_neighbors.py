@@ -36,6 +36,9 @@ MIN_NORMAL_COSINE, MAX_SLOPE = 0.1, 0.6
 #: Number of pairs of samples that are compared at once. It bounds memory where surfaces lie on each other.
 PAIR_BLOCK = 1 << 20
 
+#: The columns of a table.
+_Table = tuple[np.ndarray, ...]
+
 
 @dataclass(frozen=True)
 class SeparationRules:
@@ -169,11 +172,7 @@ def find_lateral_neighbors(
 
 
 def _judge(
-    step: np.ndarray,
-    previous: np.ndarray,
-    near: tuple[np.ndarray, np.ndarray],
-    beside: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
-    max_gap: float,
+    step: np.ndarray, previous: np.ndarray, near: _Table, beside: _Table, max_gap: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Decide which samples are rejected. Return `gap`, `yielded` and `rejected` of `LateralNeighbors`.
 
@@ -215,13 +214,13 @@ def _judge(
     return gap, yielded, ~exists[:-1]
 
 
-def _sorted_by_first(columns: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
+def _sorted_by_first(columns: _Table) -> _Table:
     """Return the columns of a table with its rows sorted by the first column."""
     order = np.argsort(columns[0], kind="stable")
     return tuple(column[order] for column in columns)
 
 
-def _rows_of(columns: tuple[np.ndarray, ...], first: int, end: int) -> tuple[np.ndarray, ...]:
+def _rows_of(columns: _Table, first: int, end: int) -> _Table:
     """Return the rows of a table whose values in the first column are from `first` to `end` - 1.
 
     The first column must be sorted.

@@ -16,6 +16,7 @@ from ..core.cache import Cache
 from ..core.errors import RosyError
 from ..core.memory import check_memory
 from ..core.progress import progress, report
+from ..field.frames import transformed
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.pixel_blocks import part_of
@@ -49,7 +50,6 @@ from .visibility import (
     project_to_pixels,
     rasterize_depth,
     smooth,
-    to_clip,
 )
 
 #: Width of a tapered stroke at its end, as a fraction of the full width.
@@ -354,7 +354,7 @@ def _corner_spacing(mesh: TangentMesh, view: _View) -> CornerSpacing:
     """
     camera, style = view.camera, view.style
     if style.unit == "world":
-        return CornerSpacing(np.full(mesh.triangle_vertex.shape, style.distance))
+        return CornerSpacing(np.full(mesh.z.shape, style.distance))
     spacing = spacing_in_picture(mesh, camera, style.spacing)
     if view.clips or not camera.is_perspective:
         return spacing
@@ -375,7 +375,7 @@ def _is_in_view(points: np.ndarray, camera: Camera) -> bool:
     It is not in view if all vertices are outside of the same plane of the view frustum. The far plane is not
     tested.
     """
-    clip = to_clip(points, camera)
+    clip = transformed(points, camera.projection @ camera.view)
     w = clip[:, 3:]
     is_outside = np.concatenate([clip[:, :2] > w, clip[:, :3] < -w], axis=1)
     return not is_outside.all(axis=0).any()

@@ -13,6 +13,7 @@ from ..core.errors import RosyError
 from ..core.progress import progress, report
 from ..field.blocks import row_blocks
 from ..field.formats.polygons import offsets_from_sizes
+from ..field.frames import transformed
 from ..field.up_axis import UP_AXIS_MATRIX
 from ..projection.camera import Camera
 from .stroke_set import Strokes
@@ -68,7 +69,7 @@ def polyline_file(suffix: str, strokes: Strokes, camera: Camera, pen: Pen, up: s
     strokes = strokes.select(np.argsort(strokes.family, kind="stable"))
     width = pen.width * pixel_size(strokes.points, camera) * strokes.width
     matrix = UP_AXIS_MATRIX[up].T
-    points = strokes.points @ matrix[:3, :3].T + matrix[:3, 3]
+    points = transformed(strokes.points, matrix[:3])
     normals = strokes.normal @ matrix[:3, :3].T
     contents = {".csv": _csv, ".obj": _obj, ".ply": _ply}[suffix]
     with progress(0.4, 1.0, "writing strokes"):

@@ -284,10 +284,8 @@ def longest_open_runs(
     arc, key = samples.arc[sample], 2 * samples.stroke[sample].astype(np.int64) + side
     order = np.lexsort((arc, key))
     sample, side, arc, key = sample[order], side[order], arc[order], key[order]
-    starts_run = np.ones(len(key), dtype=bool)
     is_gap = np.diff(arc) > MAX_RUN_STEP * SAMPLE_STEP * samples.spacing[sample[1:]]
-    starts_run[1:] = (key[1:] != key[:-1]) | is_gap
-    first = np.flatnonzero(starts_run)
+    first = np.concatenate([[0], np.flatnonzero((key[1:] != key[:-1]) | is_gap) + 1])
     length = np.diff(np.append(first, len(key)))
     by_length = np.lexsort((-length, key[first]))
     run = by_length[np.unique(key[first][by_length], return_index=True)[1]]

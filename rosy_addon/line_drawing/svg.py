@@ -110,10 +110,8 @@ class Pen:
     def family_colors(self, names: Sequence[str]) -> list[str]:
         """Return the color of each family, given the names of the families (`Strokes.names`)."""
         return [
-            self.colors[index % len(self.colors)]
-            if self.outline is None or name not in OUTLINE_KINDS
-            else self.outline
-            for index, name in enumerate(names)
+            self.outline if self.outline is not None and name in OUTLINE_KINDS else color
+            for name, color in zip(names, itertools.cycle(self.colors), strict=False)
         ]
 
 

@@ -85,8 +85,6 @@ class TangentMesh:
         Unit factors that transport tangents from the frame of the triangle to the frame of the neighbor.
     area : (T,) float64 ndarray
         Areas in world space; 0 for degenerate triangles.
-    triangle_vertex : (T, 3) int32 ndarray
-        Indices of the corners into the vertices of the surface.
     """
 
     degree: int
@@ -106,7 +104,6 @@ class TangentMesh:
     neighbor_edge: np.ndarray
     edge_transport: np.ndarray
     area: np.ndarray
-    triangle_vertex: np.ndarray
 
     @property
     def is_directed(self) -> bool:
@@ -334,7 +331,6 @@ def build_tangent_mesh(
         neighbor_edge=np.zeros((len(points), 3), dtype=np.int8),
         edge_transport=np.ones((len(points), 3), dtype=np.complex128),
         area=area,
-        triangle_vertex=surface.triangle_vertex,
     )
     with progress(0.6, 1.0, "connecting triangles"):
         _connect(mesh, surface, crease_angle)

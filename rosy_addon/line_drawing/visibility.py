@@ -12,7 +12,7 @@ import numpy as np
 from ..core.progress import progress, report
 from ..field.blocks import mask, row_blocks
 from ..field.formats.polygons import offsets_from_sizes
-from ..field.frames import dot, normalize
+from ..field.frames import dot, normalize, transformed
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.rasterizer import rasterize
@@ -76,7 +76,7 @@ def project_to_pixels(points: np.ndarray, camera: Camera) -> tuple[np.ndarray, n
     depth : (n,) float64 ndarray
         Depth along the axis of the camera.
     """
-    clip = to_clip(points, camera)
+    clip = transformed(points, camera.projection @ camera.view)
     with np.errstate(divide="ignore", invalid="ignore"):
         ndc = clip[:, :2] / clip[:, 3:]
     pixels = (ndc + 1) * (np.array([camera.width, camera.height]) / 2)
@@ -254,7 +254,7 @@ def rasterize_depth(instances: Sequence[MeshInstance], camera: Camera) -> DepthB
     label = "finding the nearest surface"
     corners = np.concatenate([_camera_triangles(instance, camera) for instance in instances])
     flat_corners = corners.reshape(-1, 3)
-    clip = flat_corners @ camera.projection[:, :3].T + camera.projection[:, 3]
+    clip = transformed(flat_corners, camera.projection)
     indices = np.arange(len(flat_corners), dtype=np.int32).reshape(-1, 3)
     with progress(0.2, 0.8, label):
         fragments = rasterize(clip, indices, camera.width, camera.height)
@@ -268,12 +268,6 @@ def rasterize_depth(instances: Sequence[MeshInstance], camera: Camera) -> DepthB
     normal = normalize(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
     start = tuple(offsets_from_sizes([len(i.surface.triangles) for i in instances]).tolist())
     return DepthBuffer(camera, start, triangle, depth, normal, dot(normal, corners[:, 0]))
-
-
-def to_clip(points: np.ndarray, camera: Camera) -> np.ndarray:
-    """Return (n, 4) clip coordinates of (n, 3) points in world space."""
-    matrix = camera.projection @ camera.view
-    return points @ matrix[:, :3].T + matrix[:, 3]
 
 
 def _is_hidden(
@@ -293,7 +287,7 @@ def _is_hidden(
     depth_buffer : DepthBuffer
     """
     camera, points = depth_buffer.camera, strokes.points[point]
-    eye = _to_eye(_to_camera_space(points, camera), camera)
+    eye = _to_eye(transformed(points, camera.view[:3]), camera)
     normals = strokes.normal[point] @ camera.view[:3, :3].T
     # Outlines have no member of the field. They count as facing neither toward the camera nor away from it.
     facing = np.sign(dot(normals, eye)) * strokes.member[point].any(axis=1)
@@ -343,7 +337,7 @@ def planes_around(
     depth_buffer : DepthBuffer
     """
     camera = depth_buffer.camera
-    footprint, points = pixel_size(points, camera), _to_camera_space(points, camera)
+    footprint, points = pixel_size(points, camera), transformed(points, camera.view[:3])
     eye = _to_eye(points, camera)
     length = np.sqrt(dot(eye, eye))
     low_pixel = np.floor(pixels - 0.5).astype(np.int64)
@@ -365,11 +359,6 @@ def planes_around(
             yield PlanesAround(triangle, facing, distance, hides)
 
 
-def _to_camera_space(points: np.ndarray, camera: Camera) -> np.ndarray:
-    """Convert (n, 3) points from world space to camera space."""
-    return points @ camera.view[:3, :3].T + camera.view[:3, 3]
-
-
 def _to_eye(points: np.ndarray, camera: Camera) -> np.ndarray:
     """Return (n, 3) vectors from points to the camera, in camera space.
 
@@ -381,8 +370,7 @@ def _to_eye(points: np.ndarray, camera: Camera) -> np.ndarray:
 def _camera_triangles(instance: MeshInstance, camera: Camera) -> np.ndarray:
     """Return the (T, 3, 3) corners of triangles in camera space."""
     matrix = camera.view @ np.asarray(instance.matrix, dtype=np.float64)
-    vertices = instance.surface.vertices @ matrix[:3, :3].T + matrix[:3, 3]
-    return vertices[instance.surface.triangle_vertex]
+    return transformed(instance.surface.vertices, matrix[:3])[instance.surface.triangle_vertex]
 
 
 def clean_runs(

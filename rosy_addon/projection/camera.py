@@ -74,10 +74,9 @@ class Camera:
 
     def __post_init__(self) -> None:
         width, height = check_size(self.width, self.height)
-        object.__setattr__(self, "width", width)
-        object.__setattr__(self, "height", height)
-        object.__setattr__(self, "view", _validated_view(self.view, self.name))
-        object.__setattr__(self, "projection", _validated_projection(self.projection, self.name))
+        view = _validated_view(self.view, self.name)
+        projection = _validated_projection(self.projection, self.name)
+        vars(self).update(width=width, height=height, view=view, projection=projection)
 
     @property
     def key(self) -> Hashable:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..core.progress import report
 from ..field.blocks import blocks_by_count, concatenated_ranges
+from ..field.frames import transformed
 from .camera import Camera
 from .gbuffer import GBuffer
 from .pixel_neighbors import PixelTable, depth_slopes
@@ -69,8 +70,7 @@ def _on_screen(points: np.ndarray, camera: Camera) -> np.ndarray:
     (n, 2, 3) ends in world space. Under perspective, edges are clipped in front of the eye, and edges behind
     it are left out.
     """
-    view, projection = camera.view, camera.projection
-    ends = points @ view[:3, :3].T + view[:3, 3]
+    ends = transformed(points, camera.view[:3])
     if camera.is_perspective:
         depth = -ends[..., 2]
         least = MIN_RELATIVE_DEPTH * depth.max(axis=1)
@@ -80,7 +80,7 @@ def _on_screen(points: np.ndarray, camera: Camera) -> np.ndarray:
         near, far = depth[row, low], depth[row, 1 - low]
         share = np.clip((least - near) / np.maximum(far - near, 1e-300), 0.0, 1.0)[:, None]
         ends[row, low] += share * (ends[row, 1 - low] - ends[row, low])
-    clip = ends @ projection[:, :3].T + projection[:, 3]
+    clip = transformed(ends, camera.projection)
     screen = np.empty_like(ends)
     screen[..., :2] = 0.5 * (clip[..., :2] / clip[..., 3:] + 1) * camera.size
     screen[..., 2] = -1 / ends[..., 2] if camera.is_perspective else ends[..., 2]

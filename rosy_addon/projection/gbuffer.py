@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..field.formats.polygons import offsets_from_sizes
+from ..field.frames import transformed
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from .camera import Camera
@@ -44,8 +45,7 @@ class MeshInstance:
 
     def to_world(self, points: np.ndarray) -> np.ndarray:
         """Transform (..., 3) points from object space to world space."""
-        matrix = np.asarray(self.matrix, dtype=np.float64)
-        return points @ matrix[:3, :3].T + matrix[:3, 3]
+        return transformed(points, np.asarray(self.matrix, dtype=np.float64)[:3])
 
     def world_points(self) -> np.ndarray:
         """Return the (V, 3) float64 vertices in world space."""
@@ -179,8 +179,6 @@ class GBuffer:
         Flat index into the frame, row by row from the lower left.
     instance_id : (P,) int32 ndarray
         Index of the visible mesh instance.
-    face : (P,) int32 ndarray
-        Index of the visible face (polygon) of the instance's surface.
     triangle : (P,) int32 ndarray
         Index of the visible triangle of the instance's surface.
     barycentric : (P, 3) float32 ndarray
@@ -215,7 +213,6 @@ class GBuffer:
     instances: tuple[MeshInstance, ...]
     pixel: np.ndarray
     instance_id: np.ndarray
-    face: np.ndarray
     triangle: np.ndarray
     barycentric: np.ndarray
     position: np.ndarray
@@ -238,12 +235,15 @@ class GBuffer:
         """Return the G-buffer of some of the pixels, without a copy and without their samples."""
         return replace(part_of(self, extent), coverage=None, samples=None)
 
-    def instance_blocks(self) -> list[tuple[int, list[slice | np.ndarray], tuple[float, float]]]:
+    def instance_blocks(
+        self,
+    ) -> list[tuple[int, MeshInstance, list[slice | np.ndarray], tuple[float, float]]]:
         """Return a tuple for each visible mesh instance, in the order of instances: its pixels, in blocks.
 
         Returns
         -------
         instance_id : int
+        instance : MeshInstance
         blocks : list of slice or of (n,) intp ndarray
             Its pixels, as indices into this G-buffer, in blocks of limited size.
         progress : (float, float)
@@ -258,5 +258,6 @@ class GBuffer:
             if counts[instance_id] < len(self.pixel):
                 pixels = np.flatnonzero(self.instance_id == instance_id)
                 blocks = [pixels[block] for block in blocks]
-            instances.append((instance_id, blocks, (ends[instance_id], ends[instance_id + 1])))
+            extent = ends[instance_id], ends[instance_id + 1]
+            instances.append((instance_id, self.instances[instance_id], blocks, extent))
         return instances

@@ -375,11 +375,8 @@ def _new_gbuffer(instances: MeshInstances, camera: Camera, fragments: Fragments)
     """Return a G-buffer of rasterized pixels. Its normals and representation are not yet initialized."""
     count = len(fragments.pixel)
     instance_id, triangle = _split_triangles(instances, fragments.triangle)
-    face = np.empty(count, dtype=np.int32)
-    face_of_triangle = np.concatenate([instance.surface.triangle_face for instance in instances])
     position, view_direction = _empty_vectors(count), _empty_vectors(count)
     for block in reported_blocks(count, LABEL):
-        face[block] = face_of_triangle.take(fragments.triangle[block])
         x, y = pixel_rays(camera, fragments.pixel[block])
         z = z_at_depth(camera, x, y, fragments.depth[block]).astype(np.float32)
         if camera.is_perspective:
@@ -394,7 +391,6 @@ def _new_gbuffer(instances: MeshInstances, camera: Camera, fragments: Fragments)
         instances=tuple(instances),
         pixel=fragments.pixel,
         instance_id=instance_id,
-        face=face,
         triangle=triangle,
         barycentric=fragments.barycentric,
         position=position,
@@ -424,8 +420,8 @@ def _fill_instances(gbuffer: GBuffer, display: str, cache: Cache | None) -> dict
         Normals of the triangles of each visible instance, in camera space.
     """
     geometric_normals = {}
-    for instance_id, blocks, (start, stop) in gbuffer.instance_blocks():
-        instance, middle = gbuffer.instances[instance_id], (start + stop) / 2
+    for instance_id, instance, blocks, (start, stop) in gbuffer.instance_blocks():
+        middle = (start + stop) / 2
         with progress(start, middle):
             corner_field = cached_corner_field(instance, display, cache)
         corner_field = corner_field.rotated(gbuffer.camera.view[:3, :3])

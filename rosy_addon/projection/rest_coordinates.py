@@ -82,8 +82,7 @@ def rest_coordinates(gbuffer: GBuffer) -> RestCoordinates:
     count = len(gbuffer.pixel)
     shapes = (3, count), (3, count), (3, count), (3, 3, count), count
     coordinates = RestCoordinates(*(np.empty(shape, dtype=np.float32) for shape in shapes))
-    for instance_id, blocks, (start, stop) in gbuffer.instance_blocks():
-        instance = gbuffer.instances[instance_id]
+    for _, instance, blocks, (start, stop) in gbuffer.instance_blocks():
         rest = rest_positions(instance.surface)
         screen = _screen_vertices(gbuffer.camera, instance)
         for number, block in enumerate(blocks):

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..core.progress import progress
-from ..field.frames import normalize
+from ..field.frames import normalize, transformed
 from .camera import Camera, look_at, orthographic_camera, perspective_camera, z_at_depth
 from .gbuffer import GBuffer, MeshInstances, with_field
 from .pixel_blocks import reported_blocks
@@ -180,7 +180,7 @@ def visibility_from(
     bias_distance = np.abs(position[:, 2:]) if camera.is_perspective else 1.0
     normals = normals @ rotation.T
     position = position + NORMAL_BIAS_PIXELS / camera.pixels_per_unit * bias_distance * normals
-    clip = position @ camera.projection[:3, :3].T + camera.projection[:3, 3]
+    clip = transformed(position, camera.projection[:3])
     # Positive in front of the camera. Points behind it stay visible.
     axial_depth = -position[:, 2]
     divisor = np.where(axial_depth > 0, axial_depth, 1.0) if camera.is_perspective else 1.0

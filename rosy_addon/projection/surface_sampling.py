@@ -30,8 +30,7 @@ def surface_tones(gbuffer: GBuffer) -> np.ndarray:
         Linear tones, from 0 (dark) to 1 (light). NaN where the mesh instance has no tone.
     """
     tones = np.full(len(gbuffer.pixel), np.nan, dtype=np.float32)
-    for instance_id, blocks, _ in gbuffer.instance_blocks():
-        instance = gbuffer.instances[instance_id]
+    for _, instance, blocks, _ in gbuffer.instance_blocks():
         tone = instance.tone
         if tone is None:
             continue
@@ -59,8 +58,7 @@ def surface_values(gbuffer: GBuffer) -> np.ndarray:
         The values. NaN where the surface has none.
     """
     values = np.full(len(gbuffer.pixel), np.nan, dtype=np.float32)
-    for instance_id, blocks, _ in gbuffer.instance_blocks():
-        instance = gbuffer.instances[instance_id]
+    for _, instance, blocks, _ in gbuffer.instance_blocks():
         if instance.color_values is not None:
             for block in blocks:
                 place = gbuffer.triangle[block], gbuffer.barycentric[block]
@@ -111,11 +109,10 @@ def feature_curvatures(gbuffer: GBuffer, cache: Cache) -> np.ndarray:
         1 / Blender units, object space.
     """
     curvature = np.zeros(len(gbuffer.pixel), dtype=np.float32)
-    for instance_id, blocks, (start, stop) in gbuffer.instance_blocks():
-        surface = gbuffer.instances[instance_id].surface
+    for _, instance, blocks, (start, stop) in gbuffer.instance_blocks():
+        create, key = partial(feature_curvature, instance.surface), instance.surface.rest_shape_key
         with progress(start, stop):
-            create = partial(feature_curvature, surface)
-            corners = cached(cache, create, "feature curvature", surface.rest_shape_key)
+            corners = cached(cache, create, "feature curvature", key)
         for block in blocks:
             report(stop, "measuring features")
             values = corners.take(gbuffer.triangle[block], axis=0)

@@ -17,6 +17,7 @@ import numpy as np
 from ..core.progress import report
 from ..field.blocks import blocks_by_count, concatenated_ranges, mask
 from ..field.formats.polygons import offsets_from_sizes
+from ..field.frames import transformed
 from .camera import Camera
 from .gbuffer import MeshInstances, SurfacePoints
 from .project import all_triangles, first_triangles
@@ -320,4 +321,4 @@ def is_cut_away(points: np.ndarray, clip_planes: np.ndarray | None) -> np.ndarra
     """
     if clip_planes is None:
         return np.zeros(len(points), dtype=bool)
-    return ((points @ clip_planes[:, :3].T + clip_planes[:, 3]) < 0).any(axis=1)
+    return (transformed(points, clip_planes) < 0).any(axis=1)

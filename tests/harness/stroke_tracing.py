@@ -33,10 +33,8 @@ def trace_strokes(
     `spacing` is one value in world space, or (V,) values at vertices or (T, 3) at corners of triangles.
     """
     mesh = build_tangent_mesh(instance, crease_angle=None if cross_creases else CREASE_ANGLE)
-    values = np.asarray(spacing, dtype=np.float64)
-    if values.ndim == 1:
-        values = values[mesh.triangle_vertex]
-    values = np.broadcast_to(values, mesh.triangle_vertex.shape)
+    corners, values = instance.surface.triangle_vertex, np.asarray(spacing, dtype=np.float64)
+    values = np.broadcast_to(values[corners] if values.ndim == 1 else values, corners.shape)
     strokes = trace_on_mesh(mesh, CornerSpacing(values), rules, instance.surface.name)
     return label_families(strokes, mesh)
 

@@ -88,7 +88,9 @@ def test_numbers_of_faces_are_constant_on_them():
     """Exactly: no rounding shows, even of large numbers that differ little."""
     numbers = 1e6 + np.arange(GRID.face_count)
     gbuffer = project([numbered(GRID, numbers[GRID.corner_face])], camera())
-    np.testing.assert_array_equal(surface_values(gbuffer), numbers[gbuffer.face])
+    np.testing.assert_array_equal(
+        surface_values(gbuffer), numbers[GRID.triangle_face[gbuffer.triangle]]
+    )
 
 
 def test_the_range_is_that_of_all_instances_with_a_field():

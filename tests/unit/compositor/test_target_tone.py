@@ -60,7 +60,9 @@ def test_corner_values_may_differ_between_faces():
     instance = make_instance(surface, tone=SurfaceTone(values))
     gbuffer = project([instance], make_camera(position=(0, -0.5, 5)))
     tones = surface_tones(gbuffer)
-    np.testing.assert_allclose(tones, np.where(gbuffer.face == 0, 0.2, 0.9), atol=1e-6)
+    np.testing.assert_allclose(
+        tones, np.where(surface.triangle_face[gbuffer.triangle] == 0, 0.2, 0.9), atol=1e-6
+    )
 
 
 def test_instances_without_a_tone_use_the_light():

@@ -80,8 +80,8 @@ def test_the_sides_of_a_crease_have_their_shares(view):
     camera = CAMERAS[view]
     gbuffer = project([instance(CUBE)], camera, samples=4)
     fine = project([instance(CUBE)], camera.scaled(4))
-    actual = np.array(shares(gbuffer, gbuffer.face))
-    expected = np.array(sampled_shares(fine, fine.face, camera, 4))
+    actual = np.array(shares(gbuffer, CUBE.triangle_face[gbuffer.triangle]))
+    expected = np.array(sampled_shares(fine, CUBE.triangle_face[fine.triangle], camera, 4))
     mixed = (expected > 0).sum(axis=0) > 1
     assert mixed.sum() > 30 and np.abs(actual - expected)[:, mixed].mean() < 0.02
     alone = np.bincount(gbuffer.pixel, minlength=actual.shape[1])[mixed]

@@ -116,7 +116,7 @@ def test_parallel_sheets_are_separate(perspective, tilt, same_instance):
     gap = np.array([0, 0, 2 * 4.0 / 200])
     if same_instance:
         gbuffer = project_surfaces([joined(low, rebuilt(high, high.vertices + gap))], camera)
-        upper = gbuffer.face >= low.face_count
+        upper = gbuffer.triangle >= len(low.triangles)
     else:
         gbuffer = project_surfaces([low, high], camera, [np.zeros(3), gap])
         upper = gbuffer.instance_id == 1
@@ -146,7 +146,8 @@ def test_creases_separate_pixels_unless_crossed(perspective):
     camera = camera_above(200, 4, perspective, eye=(2, -4, 3.5), up=(0, 0, 1))
     gbuffer = project_surfaces([box], camera)
     pairs, linked = neighbor_pairs(gbuffer, neighbor_masks(gbuffer, 0.7))
-    across = gbuffer.face[pairs[:, 0]] != gbuffer.face[pairs[:, 1]]
+    face = box.triangle_face[gbuffer.triangle]
+    across = face[pairs[:, 0]] != face[pairs[:, 1]]
     assert across.sum() > 300 and not linked[across].any()
     assert linked[~across].all() and unlinked_fraction(gbuffer) == 0
     assert unlinked_fraction(gbuffer, 1.6) == 0

@@ -347,8 +347,7 @@ def _draw_layer(stages: ComposeStages, canvas: _Canvas, layer: _Layer, strip: St
             canvas.color[entries] = colorize(part, part_lines.images, streaks[block], look)
             canvas.color[entries] *= canvas.tone_rgb[entries]
         elif canvas.draws_thresholds:
-            samples = canvas.look.supersampling
-            pixels = picture_thresholds(part, part_lines, samples)
+            pixels = picture_thresholds(part, part_lines, canvas.look.supersampling)
             canvas.color[entries], canvas.spread[entries] = pixels[:, :3], pixels[:, 3:]
         else:
             color, alpha = render_hatching(part, part_lines, tone[block])
@@ -388,8 +387,7 @@ def streak_tone(field: PixelField, look: PixelLook, images: LicImages) -> np.nda
     """
     supersampled_gain = np.float32(supersampling_gain(look) if look.supersampling > 1 else 1)
     blended_gain = blend_gain(field.line_count, images.effective_samples, look)
-    gain = look.gain * blended_gain * supersampled_gain
-    return scale_contrast(images.blend, gain[:, None])
+    return scale_contrast(images.blend, (look.gain * blended_gain * supersampled_gain)[:, None])
 
 
 def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: PixelLook) -> np.ndarray:
@@ -402,8 +400,7 @@ def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: Pixel
     """
     hue, position = None, None
     if colors_magnitude(look):
-        ends = magnitude_ends(look, field)
-        hue = map_colors(relative_magnitude(field, ends), look.color_map)
+        hue = map_colors(relative_magnitude(field, magnitude_ends(look, field)), look.color_map)
     elif field.map_position is not None:
         position = field.map_position
         hue = map_colors(np.nan_to_num(position), look.color_map)

@@ -164,8 +164,7 @@ class Covering:
         backward : int
             Offset in the table: the opposite of the sheet at element i is at element i + backward.
         """
-        one_turn = np.arange(self.sheets_per_turn) * self.cell_count
-        forward = np.tile(one_turn, 2 * max_winding)
+        forward = np.tile(np.arange(self.sheets_per_turn) * self.cell_count, 2 * max_winding)
         if self.sheets_per_turn == 2 * self.line_count:
             return forward, self.line_count
         return np.concatenate([forward, forward + self.line_count * self.cell_count]), len(forward)

@@ -475,8 +475,7 @@ class _InstanceLines:
         pixels in the G-buffer.
         """
         gbuffer = self._gbuffer
-        triangle = gbuffer.triangle[entries]
-        first, second = self._sides.take(triangle, axis=2)
+        first, second = self._sides.take(gbuffer.triangle[entries], axis=2)
         tangent = heading[0] * first + heading[1] * second
         normal, view = gbuffer.geometric_normal[entries].T, gbuffer.view_direction[entries].T
         return view_plane_rotation(tangent, normal, view)

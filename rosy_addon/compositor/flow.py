@@ -110,8 +110,7 @@ def _channel_positions(phase: float) -> np.ndarray:
 
 def channel_weights(phase: float) -> np.ndarray:
     """Return the (3,) float64 weights of the channels at a `Drift.phase`. The sum of their squares is 1."""
-    position = _channel_positions(phase)
-    return math.sqrt(8 / 9) * np.sin(np.pi * position) ** 2
+    return math.sqrt(8 / 9) * np.sin(np.pi * _channel_positions(phase)) ** 2
 
 
 def channel_shifts(phase: float, distance: float) -> np.ndarray:

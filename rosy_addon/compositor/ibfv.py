@@ -375,8 +375,7 @@ def _doubled(
         around = sheets.surroundings(origins.at(state))
         for total, results in zip(sums, doubled, strict=True):
             for place, (values, target) in enumerate(zip(total.values, results, strict=True)):
-                arriving = around.interpolate(values)
-                target[state] += total.weighted(place, arriving, steps, block)
+                target[state] += total.weighted(place, around.interpolate(values), steps, block)
         if not is_last:
             result.put(state, sheets.interpolated(origins, around))
     for total, results in zip(sums, doubled, strict=True):

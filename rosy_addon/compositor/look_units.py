@@ -203,8 +203,7 @@ def surface_pixel_look(look: Look, step: float, pixel: float, drift: Drift = NO_
     """
     unit_size = look.unit_size or pixel
     look = replace(look, method="sheets", anchor="surface", guiding_angle=0.0, supersampling=1)
-    on_surface = _scaled_pixel_look(look, unit_size / step, unit_size, drift)
-    return replace(on_surface, is_on_surface=True)
+    return replace(_scaled_pixel_look(look, unit_size / step, unit_size, drift), is_on_surface=True)
 
 
 def _scaled_pixel_look(look: Look, scale: float, unit_size: float, drift: Drift) -> PixelLook:
@@ -242,8 +241,7 @@ def _possible_scale(look: Look, scale: float) -> float:
     """
     lengths = pixel_lengths(Look)
     max_scale = min(item.high / max(getattr(look, item.name), 1e-9) for item in lengths)
-    min_scale = 1.0 / look.line_width
-    return float(np.clip(scale, min(min_scale, 1.0), max(max_scale, 1.0)))
+    return float(np.clip(scale, min(1.0 / look.line_width, 1.0), max(max_scale, 1.0)))
 
 
 def _scaled_length(look: Look, setting: Number, scale: float) -> Any:

@@ -272,8 +272,7 @@ def convolve_members(
             mean = (noise[block] + forward_sum + backward_sum) / weights.total[:, None]
             members[member, block] = normalize_variance(mean, weights.effective_samples, look)
             effective_samples[block] += weights.effective_samples
-            fraction = (member + block.stop / count) / len(tracers)
-            report(fraction, "tracing streamlines")
+            report((member + block.stop / count) / len(tracers), "tracing streamlines")
     effective_samples /= len(tracers)
     return lic_images(members, effective_samples)
 

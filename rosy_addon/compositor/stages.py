@@ -53,8 +53,7 @@ class ComposeStages:
 
     def pixel_field(self, degree: int, look: PixelLook) -> PixelField:
         """Return the `PixelField` of one degree, with its directions rotated by the wobble of the look."""
-        crease_angle = crease_angle_of(look)
-        args = self._gbuffer, degree, crease_angle
+        args = self._gbuffer, degree, crease_angle_of(look)
         create = partial(surface_pixel_field, *args)
         field = self._cache.get_or_create(("pixel field", *args), create)
         if not has_wobble(look):
@@ -166,8 +165,7 @@ class ComposeStages:
             curvature = feature_curvatures(self._gbuffer, self._mesh_cache) if detail else None
             return surface_noise(*args, curvature)
 
-        key = "surface noise", *args
-        return self._cache.get_or_create(key, compute)[field.gbuffer_index]
+        return self._cache.get_or_create(("surface noise", *args), compute)[field.gbuffer_index]
 
     def _wobble_angle(self, look: PixelLook) -> np.ndarray:
         """Return the (Q,) float32 angle between drawn lines and the field at all Q pixels of the G-buffer.

@@ -211,8 +211,7 @@ def _noise_sample(shape: tuple[int, int], settings: NoiseSettings, anchored: boo
     noise = np.zeros(shape, dtype=np.float32)
     for octave_offset, weight in zip(octave_offsets, weights, strict=True):
         octave = settings._replace(cell=settings.cell * 2.0**octave_offset, seed=1, channels=1)
-        cells = image_noise(pixel, shape[1], octave)
-        noise += np.float32(weight) * cells.reshape(shape)
+        noise += np.float32(weight) * image_noise(pixel, shape[1], octave).reshape(shape)
     return noise
 
 

@@ -221,8 +221,7 @@ class TracedLanes:
         if len(remaining) >= 0.9 * len(self._cell):
             return
         self._all_counts[self.index] = self._counts
-        is_first = isinstance(self.index, slice)
-        self.index = remaining if is_first else self.index[remaining]
+        self.index = remaining if isinstance(self.index, slice) else self.index[remaining]
         for name in self._LANE_ARRAYS:
             setattr(self, name, getattr(self, name)[remaining])
         self._loops.keep(remaining)

@@ -92,8 +92,7 @@ def wobble_angle(gbuffer: GBuffer, look: PixelLook) -> np.ndarray:
         else:
             block_rest = part_of(rest, (..., block))
             min_scale = look.supersampling / look.line_width
-            instance_id = gbuffer.instance_id[block]
-            scale = cell_scale(units, instance_id, block_rest.pixel_size, min_scale)
+            scale = cell_scale(units, gbuffer.instance_id[block], block_rest.pixel_size, min_scale)
             position, size = block_rest.at_offset(0, 0), block_rest.pixel_size * scale
         angle[block] = solid_wobble_angle(position, np.maximum(size, 1e-30) * line_width)
     return angle
@@ -148,7 +147,6 @@ def rotate_pixel_field(field: PixelField, angle: np.ndarray) -> PixelField:
         if kind == "deviation":
             # A harmonic is a function of the angle of the member. The rotation of its phase gives rotated
             # members the value of the members before.
-            phase = unit_phasor(-order * angle)
-            channels[kind, order] = product(channels[kind, order], phase)
+            channels[kind, order] = product(channels[kind, order], unit_phasor(-order * angle))
     representation = product(field.representation, unit_phasor(field.degree * angle))
     return replace(field, representation=representation, channels=channels)

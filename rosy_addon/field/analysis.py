@@ -268,8 +268,7 @@ def match_on_surface(
         squared = np.zeros((len(index[block]), len(other_index)))
         for coordinate in range(3):
             squared += (points[block, None, coordinate] - other_points[None, :, coordinate]) ** 2
-        near = (squared <= reach**2) & (index[block, None] == other_index)
-        first, second = np.nonzero(near)
+        first, second = np.nonzero((squared <= reach**2) & (index[block, None] == other_index))
         found.append((first + block.start, second, np.sqrt(squared[first, second])))
     first, second, distance = (np.concatenate(parts) for parts in zip(*found, strict=True))
     order = np.lexsort((second, first, distance))

@@ -180,8 +180,7 @@ def start_combing(
     guides = system.to_representation(guide_vectors)
     guides /= np.maximum(np.abs(guides), 1)
     edges = max(reach / surface.mean_edge_length, MIN_REACH_EDGES)
-    weak_guides = unit_z / (1 + edges**2)
-    guides = np.where(guides == 0, weak_guides, guides)
+    guides = np.where(guides == 0, unit_z / (1 + edges**2), guides)
     averages = system.averages
     start = averages.node_sums(unit_z, system.degree) / averages.connection.positive_mass
     return Combing(system, guides, start, np.where(magnitude > 0, magnitude, 1.0))

@@ -133,8 +133,7 @@ def comb_members(surface: Surface, field: RosyField, period: int) -> np.ndarray:
     defined = field.vectors.any(axis=1)[faces].all(axis=1)
     # Member k of the first face of an edge matches member k + matching of the second face.
     tree = spanning_forest(surface.face_count, *faces[defined].T)
-    member_index = tree.sums_from_root(matching[defined]) % period
-    angle = 2 * np.pi * member_index / field.degree
+    angle = 2 * np.pi * (tree.sums_from_root(matching[defined]) % period) / field.degree
     return rotate_field(surface, field, angle).vectors
 
 

@@ -199,8 +199,7 @@ def feature_curvature(surface: Surface) -> np.ndarray:
     laplacians, area = {degree: averages.laplacian(degree) for degree in (0, 2)}, SCALE**2
 
     def smooth(values: np.ndarray, degree: int) -> np.ndarray:
-        sums = averages.node_sums(values, degree)
-        return np.abs(averages.smooth(laplacians[degree], area, sums))
+        return np.abs(averages.smooth(laplacians[degree], area, averages.node_sums(values, degree)))
 
     curvature = smooth(measured.mean, 0) + smooth(measured.deviator, 2)
     noise = smooth(measured.mean_noise, 0) + smooth(measured.deviator_noise, 2)

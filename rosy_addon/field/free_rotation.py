@@ -70,8 +70,7 @@ def freely_rotated(surface: Surface, z: np.ndarray, degree: int) -> np.ndarray:
         return np.where(decides, total, 0)
 
     for wanted in _criteria(surface, degree, component, area):
-        found = unit_complex(sums(wanted, z))
-        rotation = np.where(rotation == 0, found, rotation)
+        rotation = np.where(rotation == 0, unit_complex(sums(wanted, z)), rotation)
         if rotation.all():
             return z * rotation[component]
     away = np.angle(complex_bincount(component, wanted * z.conj(), len(area)))

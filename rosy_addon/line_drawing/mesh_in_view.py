@@ -15,11 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core.progress import report
-from ..field.blocks import row_blocks
 from ..field.frames import dot, normalize
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
-from ..projection.pixel_blocks import part_of
+from ..projection.pixel_blocks import part_of, reported_blocks
 from .stroke_set import Strokes
 from .tangent_mesh import TangentMesh, take_triangles, with_corners
 from .visibility import BLOCK_POINTS, DepthBuffer, in_frame, planes_around, project_to_pixels
@@ -296,8 +295,7 @@ def seen_triangles(instance: MeshInstance, index: int, depth_buffer: DepthBuffer
     points = instance.world_points()
     hidden = np.zeros(len(points), dtype=bool)
     pending = np.unique(triangle_vertex[~seen])
-    for part in row_blocks(len(pending), BLOCK_POINTS):
-        report(part.start / max(len(pending), 1), "finding the part in view")
+    for part in reported_blocks(len(pending), "finding the part in view", size=BLOCK_POINTS):
         hidden[pending[part]] = _is_hidden(points[pending[part]], depth_buffer)
     return seen | ~hidden[triangle_vertex].all(axis=1)
 

@@ -116,8 +116,7 @@ def outline_strokes(instance: MeshInstance, camera: Camera) -> Strokes:
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     with progress(0.3, 0.7, "finding outlines"):
         is_crease = are_pairs(edges.ends[edges.interior], find_creases(surface, CREASE_ANGLE))
-    is_border = ~mask(len(edges.face_count), edges.interior)
-    borders = np.flatnonzero(is_border[edges.corner_edge])
+    borders = np.flatnonzero(~mask(len(edges.face_count), edges.interior)[edges.corner_edge])
     starts = a[is_crease]
     creases = _edge_segments(corners, starts)
     is_blunt = is_sharp_edge(surface, a, b) & ~is_crease

@@ -301,8 +301,7 @@ def _outline(instance: MeshInstance, index: int, view: _View) -> Strokes:
     """
     if not view.clips:
         return outline_strokes(instance, view.camera)
-    lines = visible_outline(instance, index, view.camera, view.depth_buffer)
-    return smooth(lines, view.camera)
+    return smooth(visible_outline(instance, index, view.camera, view.depth_buffer), view.camera)
 
 
 def _overshoot(strokes: Strokes, view: _View) -> Strokes:

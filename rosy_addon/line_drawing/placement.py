@@ -356,8 +356,7 @@ class StreamlinePlacer:
             # The sides of other strokes that they covered stay covered until `rescan`. Otherwise the same
             # strokes would be seeded again.
             strokes.alive[dropped] = False
-            first = int(strokes.seed_sample[dropped].min())
-            self.samples.remove_strokes(strokes.alive, first)
+            self.samples.remove_strokes(strokes.alive, int(strokes.seed_sample[dropped].min()))
 
     def resume_yielded(self, rules: SeparationRules) -> None:
         """Change the rules, and let strokes that have yielded grow again."""

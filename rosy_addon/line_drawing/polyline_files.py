@@ -10,18 +10,21 @@ from pathlib import Path
 import numpy as np
 
 from ..core.errors import RosyError
-from ..core.progress import progress, report
-from ..field.blocks import row_blocks
+from ..core.progress import progress
 from ..field.formats.polygons import offsets_from_sizes
 from ..field.frames import transformed
 from ..field.up_axis import UP_AXIS_MATRIX
 from ..projection.camera import Camera
+from ..projection.pixel_blocks import reported_blocks
 from .stroke_set import Strokes
 from .svg import Pen, simplify_mask
 from .visibility import pixel_size
 
 #: Extensions of files with strokes: .svg for a picture, the others for 3D polylines.
 DRAWING_SUFFIXES = (".svg", ".ply", ".obj", ".csv")
+
+#: Text that the user sees while a file is written.
+LABEL = "writing strokes"
 
 #: Number of points that are formatted at once.
 POINTS_PER_BLOCK = 20_000
@@ -64,7 +67,7 @@ def polyline_file(suffix: str, strokes: Strokes, camera: Camera, pen: Pen, up: s
     -------
     bytes
     """
-    with progress(0.0, 0.4, "writing strokes"):
+    with progress(0.0, 0.4, LABEL):
         strokes = simplify_strokes(strokes, camera)
     strokes = strokes.select(np.argsort(strokes.family, kind="stable"))
     width = pen.width * pixel_size(strokes.points, camera) * strokes.width
@@ -72,7 +75,7 @@ def polyline_file(suffix: str, strokes: Strokes, camera: Camera, pen: Pen, up: s
     points = transformed(strokes.points, matrix[:3])
     normals = strokes.normal @ matrix[:3, :3].T
     contents = {".csv": _csv, ".obj": _obj, ".ply": _ply}[suffix]
-    with progress(0.4, 1.0, "writing strokes"):
+    with progress(0.4, 1.0, LABEL):
         return contents(strokes, points, normals, width)
 
 
@@ -118,8 +121,7 @@ def _csv(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.nd
     blocks = [b"stroke,family,x,y,z,nx,ny,nz,width\n"]
     form = "%d,%s" + 3 * ",%.9g" + 4 * ",%.6g" + "\n"
     stroke = strokes.stroke
-    for rows in row_blocks(len(points), POINTS_PER_BLOCK):
-        report(rows.start / max(len(points), 1), "writing strokes")
+    for rows in reported_blocks(len(points), LABEL, size=POINTS_PER_BLOCK):
         names = [strokes.names[family] for family in strokes.family[stroke[rows]]]
         values = np.column_stack([points[rows], normals[rows], width[rows]]).tolist()
         lines = (
@@ -145,8 +147,8 @@ def _obj(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.nd
     columns = ("v", points), ("vn", normals), ("vt", width[:, None])
     for index, (keyword, values) in enumerate(columns):
         form = keyword + values.shape[1] * (" %.9g" if keyword == "v" else " %.6g") + "\n"
-        for block in row_blocks(len(rows), POINTS_PER_BLOCK):
-            report((index + block.start / max(len(rows), 1)) / 4, "writing strokes")
+        extent = index / 4, (index + 1) / 4
+        for block in reported_blocks(len(rows), LABEL, *extent, POINTS_PER_BLOCK):
             lines = (form % tuple(row) for row in values[rows[block]].tolist())
             blocks.append("".join(lines).encode())
     number += 1

@@ -16,9 +16,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.progress import progress, report
-from ..field.blocks import concatenated_ranges, mask, row_blocks
+from ..core.progress import progress
+from ..field.blocks import concatenated_ranges, mask
 from ..field.frames import dot, normalize, transport
+from ..projection.pixel_blocks import reported_blocks
 from .lateral_neighbors import MAX_SLOPE, MIN_NORMAL_COSINE, MIN_SELF_ARC
 from .point_grid import PointGrid
 from .stroke_set import Strokes
@@ -103,8 +104,7 @@ def _suspect_points(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
     """Return (n,) bool: whether strokes may be closer than the minimum separation near a point."""
     surface_turn = np.empty(len(strokes.points))
     suspect = _stroke_turn_per_spacing(strokes) > MAX_TURN
-    for block in row_blocks(len(suspect), BLOCK_POINTS):
-        report(block.start / max(len(suspect), 1), "separating strokes")
+    for block in reported_blocks(len(suspect), "separating strokes", size=BLOCK_POINTS):
         surface_turn[block], field_turn = _turns_per_spacing(mesh, strokes, block)
         suspect[block] |= field_turn > MAX_TURN
     suspect |= surface_turn > FOLD_ANGLE
@@ -211,8 +211,7 @@ def _too_close(
     end_distance = np.minimum(arc, length[stroke] - arc)
     queries = np.flatnonzero(suspect)
     rejected = np.zeros(len(stroke), dtype=bool)
-    for block in row_blocks(len(queries), BLOCK_POINTS):
-        report(block.start / max(len(queries), 1), "separating strokes")
+    for block in reported_blocks(len(queries), "separating strokes", size=BLOCK_POINTS):
         query = queries[block]
         point, other = grid.pairs_within(refined.points[query], MIN_SEPARATION * spacing[query])
         point = query[point]

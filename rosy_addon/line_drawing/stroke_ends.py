@@ -11,10 +11,11 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.progress import report
-from ..field.blocks import concatenated_ranges, row_blocks
+from ..field.blocks import concatenated_ranges
 from ..field.formats.polygons import offsets_from_sizes
 from ..field.frames import dot, normalize
 from ..projection.camera import Camera
+from ..projection.pixel_blocks import reported_blocks
 from .point_grid import PointGrid
 from .stroke_set import Strokes, arc_lengths
 from .tangent_mesh import TangentMesh
@@ -320,8 +321,7 @@ def head_on_ends(strokes: Strokes) -> np.ndarray:
     grid = PointGrid(MAX_FORWARD * float(np.median(spacing)), len(ends))
     grid.add(position, MAX_FORWARD * spacing)
     radius = float(np.hypot(MAX_FORWARD, MAX_LATERAL)) * spacing
-    for block in row_blocks(len(ends), BLOCK_ENDS):
-        report(block.start / len(ends), "shaping ends")
+    for block in reported_blocks(len(ends), "shaping ends", size=BLOCK_ENDS):
         query, other = grid.pairs_within(position[block], radius[block])
         query = query + block.start
         delta = position[other] - position[query]

@@ -419,8 +419,7 @@ def _rotations_to_planes(
     for k in range(3):
         corner_axis = axis if k == 0 else transport(axis, corner_normal[:, 0], corner_normal[:, k])
         corner_axis = transport(corner_axis, corner_normal[:, k], normal)
-        rotation = dot(corner_axis, x) + 1j * dot(corner_axis, y)
-        rotations[:, k] = unit_complex(rotation)
+        rotations[:, k] = unit_complex(dot(corner_axis, x) + 1j * dot(corner_axis, y))
     return rotations
 
 

@@ -305,8 +305,7 @@ def close_loops(mesh: TangentMesh, strokes: Strokes, spacing: CornerSpacing) -> 
     triangle = np.concatenate([start.triangle, path.triangle[keep]])[order]
     weights = np.concatenate([start.weights, path.end_weights[keep]])[order]
     direction = np.concatenate([start.member, path.direction[keep]])[order]
-    points = triangle, weights, direction
-    loops = _strokes_on_mesh(mesh, spacing, particle[order], points)
+    loops = _strokes_on_mesh(mesh, spacing, particle[order], (triangle, weights, direction))
     loops = replace(loops, closed=np.ones(len(loops), dtype=bool))
     return Strokes.join([strokes.select(is_open), loops])
 

@@ -100,8 +100,7 @@ class Camera:
         A perspective camera has this scale at depth 1, an orthographic camera at any depth. If pixels are
         not square, it is the geometric mean of the horizontal and the vertical scale.
         """
-        scale = _xy_determinant(self.projection) * self.width * self.height / 4
-        return float(np.sqrt(scale))
+        return float(np.sqrt(_xy_determinant(self.projection) * self.width * self.height / 4))
 
     @property
     def eye(self) -> np.ndarray:

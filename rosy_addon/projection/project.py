@@ -200,8 +200,7 @@ def surface_points(
     a, b, c = np.moveaxis(corners[..., (0, 1, 3)], 1, 0)
     front_facing = (a * np.cross(b, c)).sum(axis=1) > 0
     z, w = (points.barycentric[:, :, None] * corners[..., 2:]).sum(axis=1).T
-    size = np.array(camera.size)
-    column, row = np.clip(position.astype(np.int64), 0, size - 1).T
+    column, row = np.clip(position.astype(np.int64), 0, np.array(camera.size) - 1).T
     pixel, triangle = (row * camera.width + column).astype(np.int32), triangle.astype(np.int32)
     barycentric = points.barycentric.astype(np.float32)
     fragments = Fragments(pixel, triangle, barycentric, front_facing, z / w)

@@ -187,8 +187,7 @@ def visibility_from(
     x, y = clip[:, 0] / divisor, clip[:, 1] / divisor
     in_frustum = np.flatnonzero((np.abs(x) <= 1) & (np.abs(y) <= 1) & (axial_depth > 0))
     visibility = np.ones(len(points), dtype=np.float32)
-    size = np.array(camera.size)
-    pixel = (np.stack([x[in_frustum], y[in_frustum]], axis=1) * 0.5 + 0.5) * size
+    pixel = (np.stack([x[in_frustum], y[in_frustum]], axis=1) * 0.5 + 0.5) * camera.size
     visibility[in_frustum] = _pcf_visibility(depth_map, pixel, axial_depth[in_frustum])
     return visibility
 

@@ -178,8 +178,7 @@ def _project(
             point = left[chosen]
             others = np.flatnonzero(~touches(triangle, point))
             triangle, point = triangle[others], point[others]
-            hidden = scene.hides(triangle, ndc[point], distance[point])
-            is_visible[point[hidden]] = False
+            is_visible[point[scene.hides(triangle, ndc[point], distance[point])]] = False
     return ProjectedPoints(world, position, distance, is_in_view, is_visible)
 
 

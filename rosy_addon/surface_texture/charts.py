@@ -19,6 +19,7 @@ import numpy as np
 
 from ..core.errors import RosyError
 from ..core.progress import progress, report
+from ..field.blocks import bincount_rows
 from ..field.connectivity import connected_components
 from ..field.frames import dot, transport
 from ..field.representation import unit_complex
@@ -188,8 +189,7 @@ def uv_tangents(surface: Surface, mesh: TangentMesh, charts: UvCharts) -> np.nda
     """
     triangle = np.arange(len(charts.linear))
     direction = unit_complex(charts.to_surface(triangle, np.ones(len(triangle))))
-    edges = _chart_edges(mesh, charts.uv)
-    return _averaged_at_corners(surface, mesh, direction, edges)
+    return _averaged_at_corners(surface, mesh, direction, _chart_edges(mesh, charts.uv))
 
 
 def _averaged_at_corners(
@@ -218,8 +218,7 @@ def _averaged_at_corners(
         group = connected_components(len(fan), pairs)
     report(0.6, LABEL)
     vector = mesh.to_world(np.arange(len(direction)), direction) * mesh.area[:, None]
-    sums = [np.bincount(group, np.repeat(component, 3)) for component in vector.T]
-    total = np.stack(sums, axis=1)
+    total = bincount_rows(group, np.repeat(vector, 3, axis=0))
     frame = np.empty((len(direction), 3), dtype=np.complex128)
     for corner in range(3):
         report(0.7 + 0.1 * corner, LABEL)

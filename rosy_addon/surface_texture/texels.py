@@ -21,6 +21,7 @@ from ..compositor.pixel_field import NEIGHBOR_OFFSETS, PixelField
 from ..core.cache import Cache
 from ..core.errors import RosyError
 from ..core.progress import progress, report
+from ..field.blocks import bincount_rows
 from ..line_drawing.tangent_mesh import TangentMesh
 from ..projection.gbuffer import MeshInstance
 from ..projection.rasterizer import rasterize
@@ -168,8 +169,7 @@ def texture_frame(charts: UvCharts, size: int, name: str, is_udim: bool = False)
     RosyError
         If there are more than `MAX_TILES` tiles or, for UDIM, tiles outside of its numbering.
     """
-    used = charts.gradient.any(axis=1)
-    uv = charts.uv[used]
+    uv = charts.uv[charts.gradient.any(axis=1)]
     # Corners on the border between two tiles belong to the tile that contains the triangle.
     low_u, low_v = (np.floor(part.min(axis=1) + 1e-9).astype(int) for part in (uv.real, uv.imag))
     high_u, high_v = (
@@ -328,8 +328,7 @@ def _beyond_seams(
     kept, outer = kept[empty], outer[empty]
     values = _color_at(field, color, steps.target[kept], steps.offset[kept])
     outer, place, count = np.unique(outer, return_inverse=True, return_counts=True)
-    mean = np.stack([np.bincount(place, channel) for channel in values.T], axis=1)
-    return outer, (mean / count[:, None]).astype(np.float32)
+    return outer, (bincount_rows(place, values) / count[:, None]).astype(np.float32)
 
 
 def _color_at(

@@ -25,8 +25,7 @@ def read_dmat(path: Path) -> RawField:
     RosyError
         If the file cannot be read or is malformed, or if its rows are no vectors.
     """
-    data = read_bytes(path)
-    header, _, rest = data.partition(b"\n")
+    header, _, rest = read_bytes(path).partition(b"\n")
     is_binary = header.split() == [b"0", b"0"]
     if is_binary:
         header, _, rest = rest.partition(b"\n")
@@ -42,5 +41,4 @@ def read_dmat(path: Path) -> RawField:
         raise RosyError(f"{path}: declares {columns * count} numbers, but contains {len(values)}")
     if not count:
         raise RosyError(f"{path}: contains no numbers")
-    matrix = as_float64(values.reshape(columns, count).T)
-    return raw_field(matrix, str(path), flags=True)
+    return raw_field(as_float64(values.reshape(columns, count).T), str(path), flags=True)

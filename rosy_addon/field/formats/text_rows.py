@@ -97,8 +97,7 @@ class TextRows:
 
     def row_of_word(self, word: int) -> int:
         """Return the index of the row that contains a word. Words are counted from 0 over all rows."""
-        ends = list(accumulate(map(len, self.words)))
-        return int(np.searchsorted(ends, word, side="right"))
+        return int(np.searchsorted(list(accumulate(map(len, self.words))), word, side="right"))
 
     def _parse(self, convert: Callable, dtype: type, expected: str) -> np.ndarray:
         """Convert all words of all rows, or raise an error about the first word that cannot be converted.

@@ -335,9 +335,8 @@ class _Arrangement:
         right, top = left + round(BAR_WIDTH * size), bar_bottom + length
         self.result.color_bar = (left, bar_bottom, right, top)
         # The colors are drawn over this rectangle, so that only its margin is seen.
-        self.result.strokes.append(
-            (left - stroke, bar_bottom - stroke, right + stroke, top + stroke)
-        )
+        frame = left - stroke, bar_bottom - stroke, right + stroke, top + stroke
+        self.result.strokes.append(frame)
         for fraction, label in ticks:
             y = bar_bottom + fraction * (length - stroke)
             end = right + round(TICK_LENGTH * size)

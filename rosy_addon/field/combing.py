@@ -142,9 +142,8 @@ class Combing:
         """
         guides = self.guides[face]
         _, is_exact = firmness_weights(np.abs(guides), self.system.surface.mean_edge_length)
-        self.representations[1][face] = np.where(
-            is_exact, unit_complex(guides), unit_representations(z)
-        )
+        z = np.where(is_exact, unit_complex(guides), unit_representations(z))
+        self.representations[1][face] = z
 
 
 def start_combing(

@@ -373,10 +373,9 @@ def triangle_graph(faces: FaceGraph) -> TriangleGraph:
     sides = np.flatnonzero(head == next_corners(surface.face_start)[tail])
     side = np.empty(len(surface.corner_vertex), dtype=np.intp)
     side[tail[sides]] = sides
-    triangles = [side[start] // 3 for start in faces.halfedges.T]
-    weights = [
-        cotangent[side[start] // 3, (side[start] + 2) % 3] / 2 for start in faces.halfedges.T
-    ]
+    sides = [side[start] for start in faces.halfedges.T]
+    triangles = [each // 3 for each in sides]
+    weights = [cotangent[each // 3, (each + 2) % 3] / 2 for each in sides]
     # Edges within faces, between each triangle and the next one.
     inner = np.flatnonzero(rank > 0)
     triangles = [np.concatenate(pair) for pair in zip(triangles, (inner - 1, inner), strict=True)]

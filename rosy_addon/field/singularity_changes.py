@@ -129,11 +129,10 @@ def cancel_pairs(surface: Surface, field: RosyField, max_distance: float) -> Ros
     start = 0.4
     while (group >= 0).any():
         chosen = np.flatnonzero(group >= 0)
+        change = vertex[chosen], -index[chosen]
         try:
             with progress(start, 1.0):
-                return change_singularities(
-                    surface, field, vertex[chosen], -index[chosen], max_distance
-                )
+                return change_singularities(surface, field, *change, max_distance)
         except TurningError as error:
             is_near = _are_near(surface, vertex[chosen], error.vertices)
             group[np.isin(group, group[chosen[is_near]])] = -1

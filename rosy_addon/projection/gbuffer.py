@@ -101,9 +101,8 @@ class SurfacePoints(NamedTuple):
     @staticmethod
     def of(instance_id: int, triangle: np.ndarray, barycentric: np.ndarray) -> SurfacePoints:
         """Return points on one instance, given their (P,) triangles and (P, 3) barycentric coordinates."""
-        return SurfacePoints(
-            np.full(len(triangle), instance_id, dtype=np.int32), triangle, barycentric
-        )
+        instance_ids = np.full(len(triangle), instance_id, dtype=np.int32)
+        return SurfacePoints(instance_ids, triangle, barycentric)
 
     @staticmethod
     def concatenate(parts: list[SurfacePoints]) -> SurfacePoints:

@@ -48,9 +48,8 @@ def fill_pixels(
     if not length.all():
         degenerate = length == 0
         normal[:, degenerate] = geometric_normal[:, degenerate]
-    tangent = transport_components(
-        corner_field.reference_tangent.take(triangle, axis=1), corners[0], normal
-    )
+    tangent = corner_field.reference_tangent.take(triangle, axis=1)
+    tangent = transport_components(tangent, corners[0], normal)
     if not front_facing.all():
         np.negative(normal, out=normal, where=~front_facing)
         np.negative(geometric_normal, out=geometric_normal, where=~front_facing)

@@ -342,9 +342,8 @@ def all_triangles(instances: MeshInstances, camera: Camera) -> tuple[np.ndarray,
 def clip_vertices(instance: MeshInstance, camera: Camera) -> np.ndarray:
     """Return the (4, V) float64 vertices of an instance in clip space."""
     matrix = camera.projection @ camera.view @ np.asarray(instance.matrix, dtype=np.float64)
-    return transform_components(
-        np.ascontiguousarray(instance.surface.vertices.T), matrix[:, :3], matrix[:, 3]
-    )
+    vertices = np.ascontiguousarray(instance.surface.vertices.T)
+    return transform_components(vertices, matrix[:, :3], matrix[:, 3])
 
 
 def raise_nothing_in_view(instances: MeshInstances, camera: Camera) -> None:

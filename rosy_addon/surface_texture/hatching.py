@@ -134,10 +134,9 @@ def lit_ink(
             light.irradiance(position, normal) * float(light.color @ LUMINANCE_WEIGHTS)
             for light in lights
         )
-        tone = apply_tone_curve(1 - look.shading + look.shading * irradiance, look)
-        color, coverage = ink_of_thresholds(
-            pixels[block], np.minimum(tone, 1), look, on.mesh.family_count
-        )
+        light = 1 - look.shading + look.shading * irradiance
+        tone = np.minimum(apply_tone_curve(light, look), 1)
+        color, coverage = ink_of_thresholds(pixels[block], tone, look, on.mesh.family_count)
         if inks.paper_alpha < 1:
             color, colors[block, 3] = inks.on_paper(color, coverage)
         colors[block, :3] = color

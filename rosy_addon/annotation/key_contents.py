@@ -85,11 +85,9 @@ class PictureKey:
         try:
             values = json.loads(text)
             scale = values["color_scale"]
-            return cls(
-                None if scale is None else ColorScale(**scale),
-                tuple(IndexCount(**entry) for entry in values["indices"]),
-                values["dot_size"],
-            )
+            scale = None if scale is None else ColorScale(**scale)
+            indices = tuple(IndexCount(**entry) for entry in values["indices"])
+            return cls(scale, indices, values["dot_size"])
         except (ValueError, KeyError, TypeError):
             return cls()
 
@@ -107,8 +105,6 @@ def sorted_indices(kinds: np.ndarray, *, has_counts: bool) -> tuple[IndexCount, 
     the results have the number of singularities with each index.
     """
     distinct, counts = np.unique(kinds.reshape(-1, 2), axis=0, return_counts=True)
-    entries = [
-        IndexCount(index, degree, count if has_counts else None)
-        for (index, degree), count in zip(distinct.tolist(), counts.tolist(), strict=True)
-    ]
+    rows = zip(distinct.tolist(), counts.tolist(), strict=True)
+    entries = [IndexCount(*kind, count if has_counts else None) for kind, count in rows]
     return tuple(sorted(entries, key=lambda entry: (-entry.index / entry.degree, entry.degree)))

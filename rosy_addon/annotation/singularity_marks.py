@@ -151,16 +151,10 @@ def singularity_marks(
     with progress(0.5, 1.0):
         projected = project_vertices(instances, camera, vertices, clip_planes)
     kept = projected.is_in_view if shows_hidden_singularities(settings) else projected.is_visible
-    return SingularityMarks(
-        projected.position,
-        np.concatenate(indices),
-        np.concatenate(degrees),
-        projected.depth,
-        projected.is_visible,
-        (camera.width, camera.height),
-        settings.singularity_size,
-        shows_indices(settings),
-    ).part(kept)
+    index, degree = np.concatenate(indices), np.concatenate(degrees)
+    position, depth, is_visible = projected.position, projected.depth, projected.is_visible
+    style = camera.size, settings.singularity_size, shows_indices(settings)
+    return SingularityMarks(position, index, degree, depth, is_visible, *style).part(kept)
 
 
 def shown_singularities(

@@ -140,10 +140,11 @@ def _even_line_thresholds(
     if break_streak is None and lines.paper_grain is None:
         return position
     grain = None if lines.paper_grain is None else lines.paper_grain[line]
-    return _bisect(
-        lambda coverage: uneven_width(coverage, lines.look, break_streak, grain) - position,
-        len(position),
-    )
+
+    def excess(coverage: np.ndarray) -> np.ndarray:
+        return uneven_width(coverage, lines.look, break_streak, grain) - position
+
+    return _bisect(excess, len(position))
 
 
 def _coverage_from(streak: np.ndarray, table: np.ndarray) -> np.ndarray:

@@ -217,15 +217,10 @@ def error_statistics(surface: Surface, error: np.ndarray) -> Difference:
     values, weight = error[defined], area[defined] / max(float(area[defined].sum()), 1e-300)
     order = np.argsort(values, kind="stable")
     rank = np.searchsorted(np.cumsum(weight[order]), PERCENTILE)
-    return Difference(
-        error,
-        float(weight @ values),
-        float(np.sqrt(weight @ values**2)),
-        float(values[order[min(rank, len(order) - 1)]]),
-        float(values.max()),
-        int(defined[np.argmax(values)]),
-        len(defined) / len(error),
-    )
+    p95 = values[order[min(rank, len(order) - 1)]]
+    statistics = weight @ values, np.sqrt(weight @ values**2), p95, values.max()
+    worst, compared = int(defined[np.argmax(values)]), len(defined) / len(error)
+    return Difference(error, *map(float, statistics), worst, compared)
 
 
 def format_degrees(degrees: float) -> str:

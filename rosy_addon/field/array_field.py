@@ -244,11 +244,8 @@ def array_field(
     raw = _raw_field(found, source)
     degree = check_degree(raw.degree or VECTOR_DEGREE if degree is None else degree)
     if found.columns == 6:
-        warnings.warn(
-            f"{array}: its components have no names; they are read in VTK's order XX, YY, ZZ, XY, YZ, XZ",
-            RosyWarning,
-            stacklevel=3,
-        )
+        text = f"{array}: its components have no names; they are read in VTK's order XX, YY, ZZ, XY, YZ, XZ"
+        warnings.warn(text, RosyWarning, stacklevel=3)
     report(0.0, _LABEL)
     if raw.tensors and raw.domain == "vertex":
         apply_nonfinite_policy(raw.values, source, "vertex", policy.nonfinite)

@@ -75,13 +75,9 @@ def coherent_edge_guides(surface: Surface, ends: np.ndarray, degree: int) -> np.
     diagonal = mass + stiffness + np.finfo(float).eps
     transport = power(edge_unfolding(surface, a, b), degree)
     matrix = from_edges(target, source, -weight * transport, diagonal)
+    scale, label = partial(np.multiply, 1 / diagonal), "averaging sharp edges"
     average = conjugate_gradient(
-        matrix,
-        mass * z[touches],
-        TOLERANCE,
-        partial(np.multiply, 1 / diagonal),
-        "averaging sharp edges",
-        max_iterations=MAX_ITERATIONS,
+        matrix, mass * z[touches], TOLERANCE, scale, label, max_iterations=MAX_ITERATIONS
     )
     is_kept = surface.face_area >= JAG_LENGTH**2
     modulus = np.abs(average)

@@ -179,15 +179,9 @@ def _agreement(
     system = GuidedSystem(averages.surface, degree, averages, matrix)
     at_edge = system.to_representation(edge_guides)
     nodes = system.node_guides(at_edge, np.zeros(len(at_edge)), at_edge != 0)
-    z = conjugate_gradient(
-        matrix,
-        nodes.rhs,
-        AVERAGE_TOLERANCE,
-        partial(np.multiply, 1 / matrix.diagonal),
-        "continuing salient edges",
-        nodes.fixed,
-        nodes.is_fixed,
-    )
+    scale, label = partial(np.multiply, 1 / matrix.diagonal), "continuing salient edges"
+    fixed = nodes.fixed, nodes.is_fixed
+    z = conjugate_gradient(matrix, nodes.rhs, AVERAGE_TOLERANCE, scale, label, *fixed)
     edge = averages.face_means(z, degree)
     cosine = (system.to_representation(guides) * edge.conj()).real
     return np.clip(1 - np.abs(edge) + cosine, 0, 1)

@@ -181,11 +181,9 @@ def generate(surface: Surface, settings: GeneratorSettings | str, degree: int) -
         needs more memory than the computer has.
     """
     settings = GeneratorSettings(settings) if isinstance(settings, str) else settings
-    check_memory(
-        BYTES_PER_TRIANGLE.get(settings.kind, 0) * len(surface.triangles),
-        f"{surface.name}: a field on {surface.face_count:,} faces",
-        "choose a smaller mesh, or another kind of field",
-    )
+    needed = BYTES_PER_TRIANGLE.get(settings.kind, 0) * len(surface.triangles)
+    subject = f"{surface.name}: a field on {surface.face_count:,} faces"
+    check_memory(needed, subject, "choose a smaller mesh, or another kind of field")
     report(0.0, "generating the field")
     surface = with_delaunay_triangles(surface)
     match settings.kind:

@@ -183,15 +183,9 @@ class GuidedSystem:
         z[nodes] = 0
         rows = self.laplacian.rows(nodes)
         matrix = rows.columns(nodes).plus_diagonal(guides.penalty[nodes])
-        return conjugate_gradient(
-            matrix,
-            guides.rhs[nodes] - rows @ z,
-            NEAR_TOLERANCE,
-            partial(np.multiply, 1 / matrix.diagonal),
-            start=start,
-            is_fixed=guides.is_fixed[nodes],
-            max_iterations=max_iterations,
-        )
+        rhs, scale = guides.rhs[nodes] - rows @ z, partial(np.multiply, 1 / matrix.diagonal)
+        limits = {"is_fixed": guides.is_fixed[nodes], "max_iterations": max_iterations}
+        return conjugate_gradient(matrix, rhs, NEAR_TOLERANCE, scale, start=start, **limits)
 
     def face_representations_at(self, z: np.ndarray, face: np.ndarray) -> np.ndarray:
         """Return (m,) complex128 sums of the values z at the corners of the given faces, weighted by area.

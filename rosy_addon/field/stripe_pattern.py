@@ -354,10 +354,6 @@ def _covering_graph(
     flips = tail_flipped != head_flipped
     a, b = np.where(flips, 0, value).reshape(-1), np.where(flips, value, 0).reshape(-1)
     tail_node, head_node = covering.node[tail].reshape(-1), covering.node[head].reshape(-1)
-    return phase_graph(
-        covering.node_count,
-        np.concatenate([head_node, tail_node]),
-        np.concatenate([tail_node, head_node]),
-        np.concatenate([a, a.conj()]),
-        np.concatenate([b, b]),
-    )
+    row, column = np.concatenate([head_node, tail_node]), np.concatenate([tail_node, head_node])
+    a, b = np.concatenate([a, a.conj()]), np.concatenate([b, b])
+    return phase_graph(covering.node_count, row, column, a, b)

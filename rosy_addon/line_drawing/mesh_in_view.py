@@ -77,11 +77,8 @@ class MeshInView(Parts):
 
     def on_whole_mesh(self, strokes: Strokes) -> Strokes:
         """Return strokes that were traced on this part, with triangles and weights of the whole mesh."""
-        return replace(
-            strokes,
-            triangle=self.triangle[strokes.triangle],
-            weights=np.einsum("nk,nkj->nj", strokes.weights, self.weights[strokes.triangle]),
-        )
+        weights = np.einsum("nk,nkj->nj", strokes.weights, self.weights[strokes.triangle])
+        return replace(strokes, triangle=self.triangle[strokes.triangle], weights=weights)
 
 
 def mesh_in_view(mesh: TangentMesh, camera: Camera) -> MeshInView:

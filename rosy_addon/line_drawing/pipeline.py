@@ -233,11 +233,9 @@ def _instance_strokes(
         return None
     part, spacing = seen
     name = instance.surface.name
-    check_memory(
-        stroke_memory(part.mesh, spacing.values),
-        f"{name}: a drawing of strokes with this spacing",
-        "increase the spacing, or choose a smaller size",
-    )
+    needed = stroke_memory(part.mesh, spacing.values)
+    subject = f"{name}: a drawing of strokes with this spacing"
+    check_memory(needed, subject, "increase the spacing, or choose a smaller size")
     with progress(0.1, 0.9):
         strokes = part.on_whole_mesh(trace_on_mesh(part.mesh, spacing, surface_name=name))
     strokes = mark_free_boundary_ends(strokes, mesh)

@@ -179,10 +179,8 @@ def _fan_values(
     TangentValues
         The field on the fans, in the same space.
     """
-    normal = np.array(
-        normalize_components(transform_components(surface.fan_normal.T, cofactor_matrix(linear))),
-        dtype=np.float32,
-    )
+    normal = transform_components(surface.fan_normal.T, cofactor_matrix(linear))
+    normal = np.array(normalize_components(normal), dtype=np.float32)
     frames = tangent_frame_components(normal)
     count, fan_count = len(surface.corner_vertex), normal.shape[1]
     weight, length = np.empty(count), np.empty(count)

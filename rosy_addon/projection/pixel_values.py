@@ -163,10 +163,8 @@ def _scale_to_magnitude(
     (P,), is the representation interpolated there. Its modulus is smaller where directions differ, as around
     singularities.
     """
-    magnitude = sum(
-        weight * corner.take(triangle)
-        for weight, corner in zip(weights, corner_field.magnitude, strict=True)
-    )
+    corners = zip(weights, corner_field.magnitude, strict=True)
+    magnitude = sum(weight * corner.take(triangle) for weight, corner in corners)
     modulus = np.abs(z)
     return np.divide(magnitude, modulus, out=np.zeros_like(modulus), where=modulus > 0)
 

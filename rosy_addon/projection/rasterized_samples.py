@@ -145,10 +145,6 @@ def _group_samples(
         sample += pixel_column[entry] * np.int32(samples) + np.int32(column)
         sample_depth = depth[:, row, :, column].ravel()[pixel[entry]]
         others.append((entry.astype(np.int32), sample, sample_triangle[entry], sample_depth))
-    return SampledTriangles(
-        pixel_row * np.int32(width) + pixel_column,
-        own_triangle,
-        own_depth,
-        own_samples,
-        *(np.concatenate(values) for values in zip(*others, strict=True)),
-    )
+    own = pixel_row * np.int32(width) + pixel_column, own_triangle, own_depth, own_samples
+    other = (np.concatenate(values) for values in zip(*others, strict=True))
+    return SampledTriangles(*own, *other)

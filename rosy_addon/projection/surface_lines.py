@@ -146,11 +146,9 @@ def surface_lines(
     report(0.1, label)
     tree = bisect(points, rest.triangle_vertex, MAX_EDGE * spacing, max_triangles)
     count = len(tree.leaf_root)
-    check_memory(
-        count * (TRIANGLE_BYTES + FAMILY_BYTES * field_symmetry(field).line_count),
-        f"{surface.name}: the spacing of lines on {count} triangles",
-        "choose wider lines or streaks instead of even lines",
-    )
+    needed = count * (TRIANGLE_BYTES + FAMILY_BYTES * field_symmetry(field).line_count)
+    subject = f"{surface.name}: the spacing of lines on {count} triangles"
+    check_memory(needed, subject, "choose wider lines or streaks instead of even lines")
     report(0.2, label)
     corners = points.take(rest.triangle_vertex, axis=0)
     directions, heading = _leaf_directions(tree, corners, corner_field, field)

@@ -259,13 +259,9 @@ class _Scene:
         count = np.searchsorted(key, 4.0 * row + high[box, 0], side="right") - first
         box, first, count = (array[count > 0] for array in (box, first, count))
         triangle = triangle[kept]
-        return (
-            (
-                triangle[np.repeat(box[part], count[part])],
-                order[concatenated_ranges(first[part], count[part])],
-            )
-            for part in blocks_by_count(count, PAIRS_PER_BLOCK)
-        )
+        for part in blocks_by_count(count, PAIRS_PER_BLOCK):
+            point = order[concatenated_ranges(first[part], count[part])]
+            yield triangle[np.repeat(box[part], count[part])], point
 
     def hides(self, triangle: np.ndarray, ndc: np.ndarray, distance: np.ndarray) -> np.ndarray:
         """Return (n,) bool: whether each triangle hides its point. The point must not be on the triangle.

@@ -64,10 +64,8 @@ class MovingKernel:
             share = level / (levels - 1) if levels > 1 else 1.0
             length = float(round(share * self.length))
             self.full_samples[level] = kernel_weights(*[length] * 3, self.kind).effective_samples
-            shifted = [
-                _shifted_weights(position, share * shift, length, self.kind)
-                for shift in self.shifts
-            ]
+            shifts = (share * shift for shift in self.shifts)
+            shifted = [_shifted_weights(position, shift, length, self.kind) for shift in shifts]
             rows = self.weights[:, None] * np.stack(shifted)
             mirrored = rows[:, ::-1]
             products = np.stack([rows**2, mirrored**2, rows * mirrored]).sum(axis=1)

@@ -144,13 +144,12 @@ def _line_averages(
         covering = build_covering(field, looks[0], noise)
     report(0.1, STEP_LABEL)
     cells = covering.cell_of_pixel[drawn.start - extent.start : drawn.stop - extent.start]
-    tables = [_LineAverages(covering, cells, channels) for _ in looks]
     undefined = field.representation == 0
     own_noise = noise[undefined]
     if has_flow(looks[0]):
         own_noise = blend_channels(own_noise, looks[0].flow_phase)
-    for table in tables:
-        table.init_undefined(covering.cell_of_pixel[undefined], own_noise)
+    undefined_cells = covering.cell_of_pixel[undefined]
+    tables = [_LineAverages(covering, cells, undefined_cells, own_noise) for _ in looks]
     line_limits = [_line_limits(limit, extent, covering) for limit in step_limits]
     with progress(0.1, 0.9):
         _cover_all_lines(covering, tables, looks, line_limits)
@@ -221,22 +220,23 @@ class _LineAverages:
     covering : Covering
     cells : (n,) int32 ndarray
         Cells whose lines need averages.
-    channels : int
-        K, the number of noise channels.
+    undefined : (m,) int32 ndarray
+        Cells where the field is undefined. Their averages are their own noise.
+    noise : (m, K) float32 ndarray
+        The K channels of noise at the undefined cells.
     """
 
-    def __init__(self, covering: Covering, cells: np.ndarray, channels: int) -> None:
-        shape = (covering.line_count, covering.cell_count, channels + 1)
+    def __init__(
+        self, covering: Covering, cells: np.ndarray, undefined: np.ndarray, noise: np.ndarray
+    ) -> None:
+        shape = (covering.line_count, covering.cell_count, noise.shape[1] + 1)
         state = np.full(covering.cell_count, -1, dtype=np.float32)
         state[cells] = 0
+        state[undefined] = 1
         self._values = np.empty(shape, dtype=np.float32)
         self._values[:, :, -1] = state
+        self._values[:, undefined, :-1] = noise
         self._flat = self._values.reshape(-1, shape[-1])
-
-    def init_undefined(self, cell: np.ndarray, noise: np.ndarray) -> None:
-        """Set the averages of n cells where the field is undefined to the (n, K) noise of these cells."""
-        self._values[:, cell, :-1] = noise
-        self._values[:, cell, -1] = 1
 
     def write(self, line: np.ndarray, values: np.ndarray) -> None:
         """Store (n, K + 1) averages at the lines with the (n,) indices `line`.
@@ -281,7 +281,7 @@ class _LineAverages:
                 own = self._flat.take(entry, axis=0)
                 total = np.float32(2) * own
                 for neighbor in covering.neighbor_lines(entry, ((1, 0), (-1, 0))):
-                    total += self._or_own(self._flat.take(neighbor, axis=0), own)
+                    total += self._known_values(neighbor, own)
                 np.multiply(total, np.float32(0.25), out=out[block])
         for line, rows in enumerate(smooth):
             scatter_rows(self._values[line], cells, rows)
@@ -297,22 +297,19 @@ class _LineAverages:
             for block in pixel_blocks(len(cells)):
                 entry = first_entry + cells[block].astype(np.intp)
                 own = self._flat.take(entry, axis=0)
-                left, right = (
-                    self._or_own(self._flat.take(neighbor, axis=0), own)
-                    for neighbor in covering.neighbor_lines(entry, ((0, 1), (0, -1)))
-                )
+                neighbors = covering.neighbor_lines(entry, ((0, 1), (0, -1)))
+                left, right = (self._known_values(neighbor, own) for neighbor in neighbors)
                 difference = left[:, :-1] / left[:, -1:] - right[:, :-1] / right[:, -1:]
                 np.multiply(difference.mean(axis=1), np.float32(0.5), out=out[block])
         return slopes
 
-    @staticmethod
-    def _or_own(values: np.ndarray, own: np.ndarray) -> np.ndarray:
-        """Replace the rows of `values` that have no average by the same rows of `own`. Return `values`.
+    def _known_values(self, line: np.ndarray, own: np.ndarray) -> np.ndarray:
+        """Return the (n, K + 1) values of lines with the (n,) indices `line`.
 
-        Both are (n, K + 1).
-
-        A row has no average if its effective samples, in the last column, are not above 0.
+        Where a line has no average, because its effective samples, in the last column, are not above 0, they
+        are the values of the same row of `own`, (n, K + 1).
         """
+        values = self._flat.take(line, axis=0)
         unknown = np.flatnonzero(values[:, -1] <= 0)
         values[unknown] = own[unknown]
         return values

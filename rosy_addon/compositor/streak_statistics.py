@@ -111,9 +111,8 @@ def _measured(look: PixelLook) -> StreakStatistics:
     scale = min(MAX_SAMPLE_WIDTH / look.line_width, 1.0)
     line_width, kernel = scale * look.line_width, look.kernel
     side = max(int(SAMPLE_WIDTHS * line_width), MIN_SAMPLE_PIXELS)
-    length_pixels, break_pixels = (
-        max(round(scale * (2 * steps + 1)), 1) for steps in (look.length, break_steps(look))
-    )
+    lengths = look.length, break_steps(look)
+    length_pixels, break_pixels = (max(round(scale * (2 * steps + 1)), 1) for steps in lengths)
     width = side + length_pixels
     anchored = look.anchor == "surface"
     settings = NoiseSettings(line_width, 1, density=look.density, high_pass=scale * look.high_pass)

@@ -249,9 +249,8 @@ class StreamlineBatch:
             if step <= self._half_window:
                 passages = [(self._states, state), (self._lateral_offset, lateral)]
                 if self._axial_offset is not None:
-                    axial = axial_steps(
-                        lanes.position, direction, self._step_scale / np.float32(1.5)
-                    )
+                    scale = self._step_scale / np.float32(1.5)
+                    axial = axial_steps(lanes.position, direction, scale)
                     passages.append((self._axial_offset, axial))
                 for buffer, values in passages:
                     buffer[step, : lanes.count] = SINK_CELL  # it is 0, which also means no offset

@@ -210,11 +210,8 @@ def replacing(*paths: str | os.PathLike[str], follow_links: bool = False) -> Ite
     for path in paths:
         check_writable(path, follow_links=follow_links)
     targets = [_target(path, follow_links) for path in paths]
-    token = _machine_token()
-    temporaries = [
-        target.with_name(f".rosy-{token}-{secrets.token_hex(8)}{target.suffix}")
-        for target in targets
-    ]
+    names = (f"{_own_prefix()}{secrets.token_hex(8)}{target.suffix}" for target in targets)
+    temporaries = [target.with_name(name) for target, name in zip(targets, names, strict=True)]
     with ExitStack() as locks:
         for folder in {target.parent for target in targets}:
             remove_leftovers(folder)
@@ -278,7 +275,7 @@ def remove_leftovers(folder: str | os.PathLike[str]) -> None:
         names = [name for name in os.listdir(folder) if TEMPORARY_NAME.match(name)]
     if not names:
         return
-    own_prefix = f".rosy-{_machine_token()}-"
+    own_prefix = _own_prefix()
     with _folder_lock(folder, exclusive=True) as is_unused:
         for name in names:
             path = os.path.join(folder, name)
@@ -288,16 +285,16 @@ def remove_leftovers(folder: str | os.PathLike[str]) -> None:
                     os.unlink(path)
 
 
-def _machine_token() -> str:
-    """Return 8 hexadecimal digits that identify this machine since its start.
+def _own_prefix() -> str:
+    """Return the start of the names of temporary files that are made on this machine since its start.
 
-    They are a hash of the ID that Linux has made at its start, which is the same in all containers, or else
-    of the name of the machine.
+    It has a hash of the ID that Linux has made at its start, which is the same in all containers, or else of
+    the name of the machine.
     """
     identity = platform.node()
     with suppress(OSError):
         identity = Path("/proc/sys/kernel/random/boot_id").read_text()
-    return f"{zlib.crc32(identity.encode()):08x}"
+    return f".rosy-{zlib.crc32(identity.encode()):08x}-"
 
 
 def check_writable(path: str | os.PathLike[str], *, follow_links: bool = False) -> None:

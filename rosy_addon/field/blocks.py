@@ -124,9 +124,8 @@ def concatenated_ranges(first: np.ndarray, count: np.ndarray) -> np.ndarray:
     stop = np.cumsum(count)
     if len(stop) and stop[-1] > MANY_ELEMENTS:
         advice = "divide faces with thousands of corners, and vertices with thousands of faces"
-        check_memory(
-            BYTES_PER_ELEMENT * float(stop[-1]), f"a matrix with {stop[-1]:,} terms", advice
-        )
+        subject = f"a matrix with {stop[-1]:,} terms"
+        check_memory(BYTES_PER_ELEMENT * float(stop[-1]), subject, advice)
     shift = first + count
     shift -= stop
     result = np.repeat(shift, count)

@@ -407,15 +407,14 @@ def build_surface(
     vertices = np.ascontiguousarray(vertices, dtype=np.float64).reshape(-1, 3)
     corner_vertex = np.ascontiguousarray(corner_vertex, dtype=np.int32).ravel()
     face_start = np.ascontiguousarray(face_start, dtype=np.int32).ravel()
-    _check_polygons(name, vertices, corner_vertex, face_start)
+    polygons = vertices, corner_vertex, face_start
+    _check_polygons(name, *polygons)
     if triangles is None:
-        triangles, triangle_face = triangulate(vertices, corner_vertex, face_start)
+        triangles, triangle_face = triangulate(*polygons)
     if corner_fan is None:
-        corner_fan = smooth_fans(
-            vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
-        )
+        corner_fan = smooth_fans(*polygons, sharp_edges, sharp_angle, flat_faces)
     if corner_normal is None:
-        corner_normal = fan_normals(vertices, corner_vertex, face_start, corner_fan)
+        corner_normal = fan_normals(*polygons, corner_fan)
     if rest_vertices is not None:
         rest_vertices = np.ascontiguousarray(rest_vertices, dtype=np.float64)
     return _surface_of_parts(

@@ -309,10 +309,8 @@ def _ear_clip(points: np.ndarray) -> np.ndarray:
         following[before], previous[after] = after, before
         for released in waiting.pop(corner, ()):
             heapq.heappush(candidates, released)
-        ends = np.array([before, after])
-        quality = _smallest_sine(
-            points[[previous[before], before]], points[ends], points[[after, following[after]]]
-        )
+        left, right = [previous[before], before], [after, following[after]]
+        quality = _smallest_sine(points[left], points[[before, after]], points[right])
         for end, value in zip((before, after), quality.tolist(), strict=True):
             version[end] += 1
             heapq.heappush(candidates, (-value, end, version[end]))

@@ -122,10 +122,8 @@ def _close_pairs(
     order = np.argsort(key, kind="stable")
     key, window = key[order], window[order]
     own_strip = np.arange(1, len(key) + 1), np.searchsorted(key, key + window, side="right")
-    next_strip = (
-        np.searchsorted(key, key + (STRIP_STRIDE - window)),
-        np.searchsorted(key, key + (STRIP_STRIDE + window), side="right"),
-    )
+    nearest, farthest = key + (STRIP_STRIDE - window), key + (STRIP_STRIDE + window)
+    next_strip = np.searchsorted(key, nearest), np.searchsorted(key, farthest, side="right")
     for low, high in (own_strip, next_strip):
         count = np.maximum(high - low, 0)
         for part in blocks_by_count(count, PAIR_BATCH_SIZE):

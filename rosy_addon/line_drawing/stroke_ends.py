@@ -280,8 +280,8 @@ def _drop_onto_surfaces(
     extended = np.flatnonzero(distance > 0)
     points = strokes.points[extended]
     pixels, depth = project_to_pixels(points, camera)
-    frame_size = np.array([camera.width, camera.height])
-    column, row = np.clip(np.nan_to_num(pixels), 0, frame_size - 1).astype(np.int64).T
+    last_pixel = np.array(camera.size) - 1
+    column, row = np.clip(np.nan_to_num(pixels), 0, last_pixel).astype(np.int64).T
     target_depth = depth_buffer.depth[row, column]
     reach = MAX_BIAS_STEEPNESS * (distance[extended] + BACKTRACK_PX)
     moves = target_depth < depth + reach * pixel_size(points, camera)

@@ -79,7 +79,7 @@ def project_to_pixels(points: np.ndarray, camera: Camera) -> tuple[np.ndarray, n
     clip = transformed(points, camera.projection @ camera.view)
     with np.errstate(divide="ignore", invalid="ignore"):
         ndc = clip[:, :2] / clip[:, 3:]
-    pixels = (ndc + 1) * (np.array([camera.width, camera.height]) / 2)
+    pixels = (ndc + 1) * (np.array(camera.size) / 2)
     pixels[(clip[:, 3] <= 0) | (clip[:, 2] < -clip[:, 3])] = np.nan
     return pixels, camera.depths(points)
 

@@ -63,12 +63,11 @@ def ambient_occlusion(
         with progress(start, stop, "sampling directions of light"):
             depth_map = render_depth_map(instances, camera)
         total_weight[facing_light] += cosine[facing_light]
-        visible_weight[facing_light] += cosine[facing_light] * visibility_from(
-            camera, depth_map, points[facing_light], normals[facing_light]
-        )
-    visible_fraction = np.divide(
-        visible_weight, total_weight, out=np.ones_like(visible_weight), where=total_weight > 0
-    )
+        receivers = points[facing_light], normals[facing_light]
+        visibility = visibility_from(camera, depth_map, *receivers)
+        visible_weight[facing_light] += cosine[facing_light] * visibility
+    faces_light, visible_fraction = total_weight > 0, np.ones(len(points))
+    np.divide(visible_weight, total_weight, out=visible_fraction, where=faces_light)
     return visible_fraction[instance.surface.corner_fan].astype(np.float32)
 
 

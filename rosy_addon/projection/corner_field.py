@@ -182,11 +182,11 @@ def _fan_values(
     normal = transform_components(surface.fan_normal.T, cofactor_matrix(linear))
     normal = np.array(normalize_components(normal), dtype=np.float32)
     frames = tangent_frame_components(normal)
-    count, fan_count = len(surface.corner_vertex), normal.shape[1]
-    weight, length = np.empty(count), np.empty(count)
+    corner_fan, fan_count, count = surface.corner_fan, normal.shape[1], len(surface.corner_fan)
+    weight, length = np.empty((2, count))
     weighted = {channel: np.empty((2, count)) for channel in faces.channels}
     for block in pixel_blocks(count):
-        face, fan = surface.corner_face[block], surface.corner_fan[block].astype(np.intp)
+        face, fan = surface.corner_face[block], corner_fan[block].astype(np.intp)
         x, y = ([component.take(fan) for component in axis] for axis in frames)
         phase = transport_phase(faces.normal.take(face, axis=1), normal.take(fan, axis=1), x, y)
         is_defined = faces.channels[REPRESENTATION].take(face) != 0
@@ -197,15 +197,13 @@ def _fan_values(
             z *= signed_power(phase, rotation_order(channel, degree))
             z *= weight[block]
             parts[:, block] = z.real, z.imag
-    total = np.bincount(surface.corner_fan, weight, fan_count)
+    total = np.bincount(corner_fan, weight, fan_count)
     total[total == 0] = np.inf
     averages = {}
     for channel, parts in weighted.items():
         averages[channel] = z = np.empty(fan_count, dtype=np.complex64)
-        z.real, z.imag = (
-            np.bincount(surface.corner_fan, part, fan_count) / total for part in parts
-        )
-    magnitude = np.bincount(surface.corner_fan, length, fan_count) / total
+        z.real, z.imag = (np.bincount(corner_fan, part, fan_count) / total for part in parts)
+    magnitude = np.bincount(corner_fan, length, fan_count) / total
     return TangentValues(normal, averages, magnitude.astype(np.float32))
 
 

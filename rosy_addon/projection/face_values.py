@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..field.directional_field import field_harmonics
-from ..field.frames import dot_components, tangent_frame_components, transform_components
+from ..field.frames import tangent_frame_components, transform_components
 from ..field.representation import signed_power
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
@@ -16,6 +16,7 @@ from .field_channel import REPRESENTATION, FieldChannel, rotation_order
 from .pixel_blocks import BLOCK_PIXELS, pixel_blocks
 from .vector_components import (
     VectorComponents,
+    frame_coordinates,
     plane_coordinates,
     polygon_angles,
     polygon_normals,
@@ -81,20 +82,19 @@ def face_values(
     rest = None if scale else np.ascontiguousarray(surface.in_rest_shape().vertices.T)
     for corner_count, block in _faces_by_size(surface.face_start):
         first_corner = surface.face_start[:-1][block]
-        corner_vertex = [
-            surface.corner_vertex.take(first_corner + corner) for corner in range(corner_count)
-        ]
+        corners = (first_corner + corner for corner in range(corner_count))
+        corner_vertex = [surface.corner_vertex.take(corner) for corner in corners]
         points = relative_to_first(deformed, corner_vertex)
         normal = polygon_normals(points)
         faces.normal[:, block] = normal
-        x, y = tangent_frame_components(faces.normal[:, block].astype(np.float64))
+        frame = tangent_frame_components(faces.normal[:, block].astype(np.float64))
         vectors = [np.ascontiguousarray(component) for component in field.vectors[block].T]
         if rest is None:
             vectors = transform_components(vectors, linear * (1 / scale))
-            member = dot_components(vectors, x) + 1j * dot_components(vectors, y)
+            member = frame_coordinates(vectors, frame)
         else:
             rest_points = relative_to_first(rest, corner_vertex)
-            member = _transport_member(rest_points, points, vectors, x, y)
+            member = _transport_member(rest_points, points, vectors, frame)
         rho = np.abs(member)
         member /= np.maximum(rho, np.finfo(np.float64).tiny)
         has_area = np.logical_or.reduce(normal)
@@ -111,9 +111,8 @@ def face_values(
 
 def relative_channels(field: RosyField) -> dict[FieldChannel, np.ndarray]:
     """Return the channels of a field besides z: (F,) values relative to the stored members."""
-    channels: dict[FieldChannel, np.ndarray] = {
-        ("deviation", j): values for j, values in field_harmonics(field).items()
-    }
+    harmonics = field_harmonics(field).items()
+    channels: dict[FieldChannel, np.ndarray] = {("deviation", j): values for j, values in harmonics}
     if field.family_count > 1:
         channels["family", field.family_count] = np.ones(len(field.vectors))
     return channels
@@ -150,8 +149,7 @@ def _transport_member(
     rest: Sequence[VectorComponents],
     deformed: Sequence[VectorComponents],
     vectors: VectorComponents,
-    x: VectorComponents,
-    y: VectorComponents,
+    frame: Sequence[VectorComponents],
 ) -> np.ndarray:
     """Transport vectors from rest faces to deformed faces; return them as complex numbers.
 
@@ -161,13 +159,13 @@ def _transport_member(
         Corners of the faces in both shapes, as returned by `relative_to_first`.
     vectors : 3 (n,) ndarrays
         Vectors on the rest faces.
-    x, y : 3 (n,) ndarrays
+    frame : (x, y), each 3 (n,) ndarrays
         Tangent frames of the deformed faces.
 
     Returns
     -------
     (n,) complex128 ndarray
-        In the frames x, y. Zero for a rest face without area.
+        In these frames. Zero for a rest face without area.
 
     Notes
     -----
@@ -178,8 +176,8 @@ def _transport_member(
     the corners, so mirrored faces need no special case.
     """
     rest_normal = polygon_normals(rest)
-    rest_x, rest_y = tangent_frame_components(rest_normal)
-    w, u = plane_coordinates(rest, rest_x, rest_y), plane_coordinates(deformed, x, y)
+    rest_frame = tangent_frame_components(rest_normal)
+    w, u = plane_coordinates(rest, rest_frame), plane_coordinates(deformed, frame)
     ww = uw = squared_norm = 0
     for w_k, u_k in zip(w, u, strict=True):
         ww, uw = ww + w_k * w_k, uw + u_k * w_k
@@ -188,4 +186,4 @@ def _transport_member(
     rotation -= np.conj(ww) * uw
     rotation *= np.logical_or.reduce(rest_normal)
     rotation /= np.maximum(np.abs(rotation), np.finfo(np.float64).tiny)
-    return rotation * (dot_components(vectors, rest_x) + 1j * dot_components(vectors, rest_y))
+    return rotation * frame_coordinates(vectors, rest_frame)

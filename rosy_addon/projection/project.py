@@ -288,9 +288,8 @@ def _visible_samples(
 
 def _triangles_with_field(instances: MeshInstances) -> np.ndarray:
     """Return (T,) bool: which triangles of all instances have a field."""
-    return np.concatenate(
-        [np.full(len(part.surface.triangles), part.field is not None) for part in instances]
-    )
+    counts = [len(instance.surface.triangles) for instance in instances]
+    return np.repeat([instance.field is not None for instance in instances], counts)
 
 
 def first_triangles(instances: MeshInstances) -> np.ndarray:

@@ -88,9 +88,8 @@ def rasterize_samples(
             half = (row_stop - row_start) / (2 * height)
             start = row_start / height + index * half
             with progress(start, start + half):
-                triangle, depth = rasterize_rows(
-                    screen, clipped, width * scale, row_start * scale, row_stop * scale
-                )
+                scaled = width * scale, row_start * scale, row_stop * scale
+                triangle, depth = rasterize_rows(screen, clipped, *scaled)
             if not is_drawn.all():
                 triangle[~is_drawn.take(triangle, mode="clip")] = -1
             buffers += [values.reshape(-1, scale, width, scale) for values in (triangle, depth)]

@@ -17,7 +17,7 @@ from ..core.progress import progress, report
 from ..field.bisection import BisectionTree, bisect
 from ..field.curvature import with_smooth_normals
 from ..field.directional_field import evaluate_harmonics, field_symmetry
-from ..field.frames import dot_components, tangent_frame_components, transform_components
+from ..field.frames import tangent_frame_components, transform_components
 from ..field.representation import signed_power, unit_complex
 from ..field.rosy_field import RosyField
 from ..field.stripe_pattern import CornerDirections, StripePattern, stripe_pattern
@@ -27,6 +27,7 @@ from .face_values import SIMILARITY_EPS, similarity_scale
 from .field_channel import deviations
 from .gbuffer import MeshInstance
 from .rest_coordinates import matrix_scale
+from .vector_components import frame_coordinates
 
 #: Longest edge of the triangles on which the phase is computed, in distances between lines.
 MAX_EDGE = 1.4
@@ -173,11 +174,9 @@ def _leaf_directions(
         A member of the field in each leaf, as multiples of two sides of the surface's triangle; see
         `SurfaceLines`.
     """
-    x, y = tangent_frame_components(corner_field.geometric_normal)
+    frame = tangent_frame_components(corner_field.geometric_normal)
     sides = (corners - corners[:, :1]).transpose(1, 2, 0)
-    offset = np.stack(
-        [dot_components(side, x) + 1j * dot_components(side, y) for side in sides], axis=1
-    )
+    offset = np.stack([frame_coordinates(side, frame) for side in sides], axis=1)
     to_plane = _rotations_to_planes(corner_field)
     weights = tree.leaf_weights.astype(np.float64)
 

@@ -80,15 +80,21 @@ def polygon_normals(points: Sequence[VectorComponents]) -> list[np.ndarray]:
     return normalize_components(area_vector)
 
 
+def frame_coordinates(vectors: VectorComponents, frame: Sequence[VectorComponents]) -> np.ndarray:
+    """Return the (n,) complex coordinates v.x + i v.y of vectors v in a frame of unit tangents, x and y."""
+    x, y = frame
+    return dot_components(vectors, x) + 1j * dot_components(vectors, y)
+
+
 def plane_coordinates(
-    points: Sequence[VectorComponents], x: VectorComponents, y: VectorComponents
+    points: Sequence[VectorComponents], frame: Sequence[VectorComponents]
 ) -> list[np.ndarray]:
-    """Return the corners of polygons as complex numbers in the frame x, y, relative to their mean.
+    """Return the corners of polygons as `frame_coordinates`, relative to their mean.
 
     `points` are the corners as returned by `relative_to_first`, without the first corner of each polygon.
     The result includes the first corner.
     """
-    coordinates = [dot_components(point, x) + 1j * dot_components(point, y) for point in points]
+    coordinates = [frame_coordinates(point, frame) for point in points]
     mean = sum(coordinates) / (len(coordinates) + 1)
     return [-mean, *(point - mean for point in coordinates)]
 

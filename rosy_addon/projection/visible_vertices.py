@@ -88,9 +88,8 @@ def project_vertices(
     report(0.0, LABEL)
     scene = _Scene.of(instances, camera, clip_planes)
     first = offsets_from_sizes([len(instance.surface.vertices) for instance in instances])[:-1]
-    vertex = np.concatenate(
-        [start + np.asarray(part, np.intp) for start, part in zip(first, vertices, strict=True)]
-    )
+    pairs = zip(first, vertices, strict=True)
+    vertex = np.concatenate([start + np.asarray(part, np.intp) for start, part in pairs])
 
     def touches(triangle: np.ndarray, point: np.ndarray) -> np.ndarray:
         return (scene.triangles[triangle] == vertex[point][:, None]).any(axis=1)

@@ -104,7 +104,7 @@ def prescribed_field(
     graph = face_graph(surface)
     check_index_ranges(graph, degree, vertex, index)
     node_index = index_at_nodes(graph, vertex, index)
-    angle, direction = _turning(graph, degree, node_index, graph.defect)
+    angle, direction = _turning(graph, degree, node_index)
     z = np.exp(1j * degree * direction) * x.any(axis=1)
     points, face = surface.vertices[surface.corner_vertex], surface.corner_face
     edge_z = to_representation(points[surface.next_corner] - points, x[face], y[face], degree)
@@ -157,7 +157,7 @@ def change_singularities(
     graph = face_graph(surface, is_defined)
     present = graph.turning(z, degree)
     node_change = index_at_nodes(graph, vertex, change)
-    added, direction = _turning(graph, degree, node_change, 0 * graph.defect, present)
+    added, direction = _turning(graph, degree, node_change, present)
     turned = np.exp(1j * degree * direction) * is_defined
     turned *= _rotation_to(z, turned, graph.component)
     with progress(0.9, 1.0):
@@ -167,19 +167,15 @@ def change_singularities(
 
 
 def _turning(
-    graph: FaceGraph,
-    degree: int,
-    node_index: np.ndarray,
-    defect: np.ndarray,
-    present: np.ndarray | float = 0.0,
+    graph: FaceGraph, degree: int, node_index: np.ndarray, present: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return (I,) turning angles and (F,) directions, in radians, of a field with given singularity indices.
 
-    For a new field, `node_index` holds the (n,) singularity indices of the vertex nodes, and `defect` their
-    angle defects. If an existing field is changed, `node_index` holds the changes of its indices, `defect` is
-    0, and `present` holds its (I,) turning angles. The first result is then the change of these angles.
-    Directions are angles in the frames of the faces.
+    For a new field, `node_index` holds the (n,) singularity indices of the vertex nodes. If an existing field
+    is changed, it holds the changes of its indices, and `present` holds the (I,) turning angles of the field.
+    The first result is then the change of these angles. Directions are angles in the frames of the faces.
     """
+    defect, present = (graph.defect, 0.0) if present is None else (0 * graph.defect, present)
     _check_sums(graph, defect * (degree / (2 * np.pi)), node_index, degree)
     required = 2 * np.pi / degree * node_index - defect
     with progress(0.2, 0.85):

@@ -290,9 +290,8 @@ def _fill_triangles(
             np.multiply(z, defined, out=out[corner, block])
     corner_field.reference_tangent[:, block] = x
     corner_field.geometric_normal[:, block] = geometric_normal
-    for out, (first, second) in zip(
-        corner_field.normal_dots, ((0, 1), (0, 2), (1, 2)), strict=True
-    ):
+    pairs = (0, 1), (0, 2), (1, 2)
+    for out, (first, second) in zip(corner_field.normal_dots, pairs, strict=True):
         out[block] = dot_components(normals[first], normals[second])
     cross_products = cross_components(normals[1], normals[2])
     corner_field.normal_triple_product[block] = dot_components(normals[0], cross_products)

@@ -92,7 +92,8 @@ def rasterize_samples(
                 triangle, depth = rasterize_rows(screen, clipped, *scaled)
             if not is_drawn.all():
                 triangle[~is_drawn.take(triangle, mode="clip")] = -1
-            buffers += [values.reshape(-1, scale, width, scale) for values in (triangle, depth)]
+            shape = -1, scale, width, scale
+            buffers.append((triangle.reshape(shape), depth.reshape(shape)))
         band = _group_samples(*buffers, row_start)
         bands.append(band._replace(other_entry=band.other_entry + np.int32(entry_count)))
         entry_count += len(band.pixel)
@@ -100,30 +101,25 @@ def rasterize_samples(
 
 
 def _group_samples(
-    center_triangle: np.ndarray,
-    center_depth: np.ndarray,
-    triangle: np.ndarray,
-    depth: np.ndarray,
-    first_row: int,
+    centers: tuple[np.ndarray, ...], buffers: tuple[np.ndarray, ...], first_row: int
 ) -> SampledTriangles:
     """Group the samples of h rows of pixels, w pixels wide, by pixels.
 
     Parameters
     ----------
-    center_triangle : (h, 1, w, 1) int32 ndarray
-        Triangle at the center of each pixel, -1 where there is none.
-    triangle : (h, S, w, S) int32 ndarray
-        Triangle at each sample, -1 where there is none.
-    center_depth, depth : (h, 1, w, 1) and (h, S, w, S) float64 ndarray
-        Depths z / w of these triangles.
+    centers : (h, 1, w, 1) int32 and float64 ndarrays
+        Triangle at the center of each pixel, -1 where there is none, and its depth z / w.
+    buffers : (h, S, w, S) int32 and float64 ndarrays
+        Triangle at each sample, -1 where there is none, and its depth z / w.
     first_row : int
         The first of the h rows, as a row of the frame.
     """
+    triangle, depth = buffers
     samples, width = triangle.shape[1:3]
     offset = np.arange(samples) - (samples - 1) / 2
     order = np.argsort((offset[:, None] ** 2 + offset**2).ravel(), kind="stable").tolist()
     sample_places = [divmod(sample, samples) for sample in order]
-    own_triangle, own_depth = center_triangle[:, 0, :, 0].copy(), center_depth[:, 0, :, 0].copy()
+    own_triangle, own_depth = (values[:, 0, :, 0].copy() for values in centers)
     for row, column in sample_places:
         empty = np.nonzero(own_triangle < 0)
         own_triangle[empty] = triangle[:, row, :, column][empty]

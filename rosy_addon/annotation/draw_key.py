@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.color import from_hex, to_linear
-from ..field.blocks import concatenated_ranges
+from ..field.blocks import numbered_ranges
 from .draw_marks import draw_dot, draw_over, window
 from .key_contents import ColorScale
 from .key_layout import Box, KeyLayout
@@ -161,8 +161,7 @@ def triangle_coverage(triangles: np.ndarray, width: int, height: int) -> np.ndar
     first = np.clip(np.ceil(y[:, 0] - 0.5), 0, SCAN_LINES * height).astype(np.int64)
     stop = np.clip(np.ceil(y[:, 2] - 0.5), 0, SCAN_LINES * height).astype(np.int64)
     count = np.maximum(stop - first, 0)
-    owner = np.repeat(np.arange(len(corners)), count)
-    line = concatenated_ranges(first, count)
+    owner, line = numbered_ranges(first, count)
     x, y, level = x[owner], y[owner], line + 0.5
     start = np.where(level < y[:, 1], 0, 1)
     sides = _crossing(x, y, start, start + 1, level), _crossing(x, y, 0 * start, 2, level)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core.color import from_hex, to_linear
 from ..core.progress import report
-from ..field.blocks import blocks_by_count, concatenated_ranges
+from ..field.blocks import blocks_by_count, concatenated_ranges, numbered_ranges
 from . import arrow_marks, singularity_marks
 from .arrow_marks import NOTCH, WIDTH, ArrowMarks
 from .index_labels import HALO, HALO_COLOR, LABEL_COLOR, Label, placed_labels, stroke_width
@@ -140,8 +140,7 @@ def draw_arrows(rgba: np.ndarray, marks: ArrowMarks) -> np.ndarray:
     high = np.clip(np.ceil(marks.position + reach), 0, (width, height)).astype(np.intp)
     # The rows of pixels of each arrowhead.
     row_count = high[:, 1] - low[:, 1]
-    head = np.repeat(np.arange(len(marks)), row_count)
-    row = concatenated_ranges(low[:, 1], row_count)
+    head, row = numbered_ranges(low[:, 1], row_count)
     length = (high - low)[head, 0]
     for part in blocks_by_count(length, PIXELS_PER_BLOCK):
         report(part.start / len(head), "drawing arrowheads")

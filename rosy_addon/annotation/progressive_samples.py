@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..field.blocks import concatenated_ranges
+from ..field.blocks import numbered_ranges
 from ..field.copied_faces import SPLIT_MIX_GAMMA, split_mix
 from ..field.surface import Surface
 from ..projection.camera import Camera
@@ -136,8 +136,7 @@ def progressive_samples(
         step = 4**whole.depth
         count = np.ceil((total - offset[whole.triangle] - whole.first) / step)
         count = np.clip(count, 0, (4**DIGITS - 1 - whole.first) // step).astype(np.int64)
-        chosen = np.repeat(np.arange(len(count)), count)
-        rank_in_piece = concatenated_ranges(np.zeros(len(count), dtype=np.intp), count)
+        chosen, rank_in_piece = numbered_ranges(np.zeros_like(count), count)
         numbers.append(whole.first[chosen] + rank_in_piece * step)
         of_pieces.append(whole.triangle[chosen])
         todo = part_of(todo, is_divided).divided(shuffle)
@@ -250,8 +249,8 @@ def surface_samples(surface: Surface, density: float) -> tuple[np.ndarray, np.nd
     area = rest_areas(surface)
     shuffle = _random_bits(len(area))
     count = np.maximum(np.ceil(area * density - _random_offsets(shuffle)), 0).astype(np.int64)
-    number = concatenated_ranges(np.zeros(len(area), dtype=np.intp), count)
-    return _points(number, np.repeat(np.arange(len(area)), count), shuffle, area)
+    triangle, number = numbered_ranges(np.zeros_like(count), count)
+    return _points(number, triangle, shuffle, area)
 
 
 def _points(

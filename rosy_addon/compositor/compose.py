@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core.cache import Cache
 from ..core.color import map_colors, to_linear
-from ..core.progress import progress, report
+from ..core.progress import progress
 from ..projection.gbuffer import GBuffer
 from ..projection.pixel_blocks import BLOCK_PIXELS, reported_blocks
 from .color_values import map_positions, value_ends, value_ranges
@@ -233,10 +233,9 @@ class _Canvas:
         height, is_averaged = (rows[1] - rows[0]) // s, s > 1 or coverage is not None
         rgba = np.zeros((height, width // s, 4), dtype=np.float32)
         band_rows = max(BLOCK_PIXELS // (width * s), 1)
-        for start in range(0, height, band_rows):
-            report(start / height, "drawing the ink")
-            band = rgba[start : start + band_rows]
-            band_of_frame = rows[0] + start * s, rows[0] + (start + len(band)) * s
+        for lines in reported_blocks(height, "drawing the ink", size=band_rows):
+            band = rgba[lines]
+            band_of_frame = rows[0] + lines.start * s, rows[0] + lines.stop * s
             first_pixel = band_of_frame[0] * width
             block = entries_of_rows(pixel, width, band_of_frame)
             if block.start == block.stop:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..core.cache import Cache
 from ..core.progress import progress, report
+from ..field.blocks import row_blocks
 from .filter_kernel import Kernel
 
 #: Mean and standard deviation of binary noise.
@@ -224,8 +225,7 @@ def _noise_tiles(
     row = np.arange(bottom - margin, top + margin, dtype=np.float64)[:, None]
     taps = (np.arange(TAPS_PER_SIDE) + 0.5) / TAPS_PER_SIDE
     total = np.zeros((len(row), len(column)), dtype=np.float32)
-    for start in range(0, len(row), BLOCK_ROWS):
-        block = slice(start, start + BLOCK_ROWS)
+    for block in row_blocks(len(row), BLOCK_ROWS):
         for y in taps:
             for x in taps:
                 px, py = column + x, row[block] + y
@@ -273,9 +273,8 @@ def gaussian_blur(
     for index in range(6):
         # Blur along the columns, and transpose.
         blurred = np.empty(image.shape[::-1], dtype=np.float32)
-        for start in range(0, image.shape[1], BLUR_LINES):
-            report((index + start / image.shape[1]) / 6, STEP_LABEL)
-            lines = slice(start, start + BLUR_LINES)
+        for lines in row_blocks(image.shape[1], BLUR_LINES):
+            report((index + lines.start / image.shape[1]) / 6, STEP_LABEL)
             blurred[lines] = _box_filter(image[:, lines], radius, outside).T
         image = blurred
     return image

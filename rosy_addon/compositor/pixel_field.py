@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.progress import progress, report
+from ..core.progress import progress
 from ..field.directional_field import evaluate_harmonics
 from ..field.symmetry import FieldSymmetry
 from ..projection.field_channel import FieldChannel, deviations
@@ -302,15 +302,14 @@ def without_undefined_neighbors(field: PixelField) -> PixelField:
     is_defined[row + 1, column + 1] = field.representation != 0
     result = np.empty_like(mask)
     band_rows = max(BLOCK_PIXELS // width, 1)
-    for start in range(0, field.height, band_rows):
-        report(start / field.height, "finding neighbors")
-        padded = is_defined[start : start + band_rows + 2].astype(np.uint16)
+    for rows in reported_blocks(field.height, "finding neighbors", size=band_rows):
+        padded = is_defined[rows.start : rows.stop + 2].astype(np.uint16)
         # Three neighbors of a row are three bits, in the order of `NEIGHBOR_OFFSETS`.
         row_bits = padded[:, :-2] | padded[:, 1:-1] << 1 | padded[:, 2:] << 2
         open_bits = row_bits[:-2] | row_bits[1:-1] << 3 | row_bits[2:] << 6
         open_bits *= padded[1:-1, 1:-1]
-        band = entries_of_rows(pixel, width, (start, start + band_rows))
-        result[band] = mask[band] & open_bits[row[band] - start, column[band]]
+        band = entries_of_rows(pixel, width, (rows.start, rows.stop))
+        result[band] = mask[band] & open_bits[row[band] - rows.start, column[band]]
     return replace(field, neighbor_mask=result)
 
 

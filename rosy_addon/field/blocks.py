@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -131,6 +131,26 @@ def concatenated_ranges(first: np.ndarray, count: np.ndarray) -> np.ndarray:
     result = np.repeat(shift, count)
     result += np.arange(len(result))
     return result
+
+
+def numbered_ranges(first: np.ndarray, count: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return two (m,) intp arrays: the index i of the range of each element, and `concatenated_ranges`.
+
+    Examples
+    --------
+    >>> [array.tolist() for array in numbered_ranges(np.array([5, 10]), np.array([3, 2]))]
+    [[0, 0, 0, 1, 1], [5, 6, 7, 10, 11]]
+    """
+    return np.repeat(np.arange(len(count)), count), concatenated_ranges(first, count)
+
+
+def blocks_of_ranges(
+    first: np.ndarray, count: np.ndarray, limit: int
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Yield the `numbered_ranges` in blocks of whole ranges, from `blocks_by_count`."""
+    for part in blocks_by_count(count, limit):
+        number = np.repeat(np.arange(part.start, part.stop), count[part])
+        yield number, concatenated_ranges(first[part], count[part])
 
 
 def as_float64(values: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ import heapq
 
 import numpy as np
 
-from .blocks import mask
+from .blocks import mask, row_blocks
 from .connectivity import build_edges
 from .frames import dot
 
@@ -217,9 +217,8 @@ def _fan_apexes(
     needs_ears = np.zeros(len(faces), dtype=bool)
     for count in np.unique(size):
         same_size = np.flatnonzero(size == count)
-        block_size = max(FACES_PER_BLOCK * 4 // int(count), 1)
-        for start in range(0, len(same_size), block_size):
-            group = same_size[start : start + block_size]
+        for block in row_blocks(len(same_size), max(FACES_PER_BLOCK * 4 // int(count), 1)):
+            group = same_size[block]
             corners = face_start[faces[group]][:, None] + np.arange(count)
             sine = _corner_sines(vertices[corner_vertex[corners]])
             sharpest = np.argmin(sine, axis=1)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.progress import progress, report
-from ..field.blocks import blocks_by_count, concatenated_ranges
+from ..field.blocks import blocks_of_ranges, concatenated_ranges
 from ..field.formats.polygons import offsets_from_sizes
 from ..field.frames import dot, normalize
 from .stroke_set import POINT_COLUMNS, Strokes
@@ -125,10 +125,8 @@ def _close_pairs(
     nearest, farthest = key + (STRIP_STRIDE - window), key + (STRIP_STRIDE + window)
     next_strip = np.searchsorted(key, nearest), np.searchsorted(key, farthest, side="right")
     for low, high in (own_strip, next_strip):
-        count = np.maximum(high - low, 0)
-        for part in blocks_by_count(count, PAIR_BATCH_SIZE):
-            segment = order[np.repeat(np.arange(part.start, part.stop), count[part])]
-            other = order[concatenated_ranges(low[part], count[part])]
+        for pair in blocks_of_ranges(low, np.maximum(high - low, 0), PAIR_BATCH_SIZE):
+            segment, other = (order[place] for place in pair)
             yield np.minimum(segment, other), np.maximum(segment, other)
 
 

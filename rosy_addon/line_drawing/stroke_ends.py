@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.progress import report
-from ..field.blocks import concatenated_ranges
+from ..field.blocks import numbered_ranges
 from ..field.formats.polygons import offsets_from_sizes
 from ..field.frames import dot, normalize
 from ..projection.camera import Camera
@@ -251,8 +251,7 @@ def _append_extensions(
     kept = np.arange(len(strokes.points))
     kept = kept[(kept >= low[strokes.stroke]) & (kept <= high[strokes.stroke])]
     count = np.ceil(length / SAMPLE_STEP_PX).astype(np.int64)
-    line = np.repeat(np.arange(len(count)), count)
-    number = concatenated_ranges(np.ones_like(count), count)
+    line, number = numbered_ranges(np.ones_like(count), count)
     sort_key = start_point[line] + np.where(at_start[line], -number, number)
     sort_key = np.concatenate([kept, sort_key])
     point = np.concatenate([kept, start_point[line]])

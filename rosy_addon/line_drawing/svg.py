@@ -15,7 +15,7 @@ from ..annotation.index_labels import HALO, HALO_COLOR, LABEL_COLOR, placed_labe
 from ..annotation.singularity_marks import SingularityMarks
 from ..core.errors import RosyError
 from ..core.progress import progress, report
-from ..field.blocks import concatenated_ranges
+from ..field.blocks import numbered_ranges
 from ..field.formats.polygons import offsets_from_sizes
 from ..field.frames import dot
 from ..projection.camera import Camera
@@ -361,8 +361,7 @@ def simplify_mask(points: np.ndarray, start: np.ndarray, tolerance: float) -> np
         report(1 - float((last - first).sum()) / len(points), "simplifying strokes")
         count = last - first - 1
         begin = offsets_from_sizes(count)[:-1]
-        segment = np.repeat(np.arange(len(first)), count)
-        point = concatenated_ranges(first + 1, count)
+        segment, point = numbered_ranges(first + 1, count)
         origin = points[first][segment]
         chord = points[last][segment] - origin
         delta = points[point] - origin

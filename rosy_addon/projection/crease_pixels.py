@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..core.progress import report
-from ..field.blocks import blocks_by_count, concatenated_ranges
+from ..field.blocks import blocks_of_ranges
 from ..field.frames import transformed
 from .camera import Camera
 from .gbuffer import GBuffer
+from .pixel_blocks import reported_blocks
 from .pixel_neighbors import PixelTable, depth_slopes
 
 #: Smallest depth at which a segment is drawn, as a fraction of the depth of its farther end.
@@ -47,9 +47,8 @@ def crease_pixels(
         Whether each pixel of the G-buffer is next to a visible edge.
     """
     marks = np.zeros(len(gbuffer.pixel), dtype=bool)
-    for start in range(0, len(points), BLOCK_EDGES):
-        report(start / len(points), "drawing outlines")
-        lines = _on_screen(points[start : start + BLOCK_EDGES], gbuffer.camera)
+    for block in reported_blocks(len(points), "drawing outlines", size=BLOCK_EDGES):
+        lines = _on_screen(points[block], gbuffer.camera)
         for axis in (0, 1):
             for row, column, offset, depth in _crossings(lines, axis, gbuffer.camera):
                 entry = table.at(row, column)
@@ -112,9 +111,7 @@ def _crossings(
     stop = np.clip(np.ceil(high[:, across] - 0.5), 0, size[across]).astype(np.int64)
     count = np.maximum(stop - first, 0)
     slope = (high - low) / np.maximum(high[:, across] - low[:, across], 1e-300)[:, None]
-    for part in blocks_by_count(count, BLOCK_CROSSINGS):
-        line = np.repeat(np.arange(part.start, part.stop), count[part])
-        index = concatenated_ranges(first[part], count[part])
+    for line, index in blocks_of_ranges(first, count, BLOCK_CROSSINGS):
         point = low[line] + slope[line] * (index + 0.5 - low[line, across])[:, None]
         inside = (point[:, along] > -0.5) & (point[:, along] < size[along] + 0.5)
         index, position, depth = index[inside], point[inside, along], point[inside, 2]

@@ -128,8 +128,8 @@ def _faces_by_size(face_start: np.ndarray) -> list[tuple[int, slice | np.ndarray
         same_count = np.flatnonzero(corner_counts == corner_count)
         # Fewer faces per block if they have many corners, so that blocks need equal memory.
         block_faces = max(4 * BLOCK_PIXELS // max(corner_count, 4), 1)
-        for start in range(0, len(same_count), block_faces):
-            blocks.append((corner_count, same_count[start : start + block_faces]))
+        parts = pixel_blocks(len(same_count), block_faces)
+        blocks += [(corner_count, same_count[part]) for part in parts]
     return blocks
 
 

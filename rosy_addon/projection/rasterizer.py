@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.progress import progress, report
-from ..field.blocks import blocks_by_count, concatenated_ranges
+from ..field.blocks import blocks_by_count, blocks_of_ranges, numbered_ranges, row_blocks
 from .barycentrics import LABEL, barycentrics
 from .near_clipping import ClippedTriangles, clip_near
 
@@ -180,13 +180,12 @@ def rasterize_rows(
     # Just beyond the far plane.
     depth_buffer = np.full((row_stop - row_start) * width, np.nextafter(1.0, 2.0))
     triangle_buffer = np.full((row_stop - row_start) * width, -1, dtype=np.int32)
-    for start in range(0, len(clipped.triangle), BLOCK_SIZE):
-        block = slice(start, start + BLOCK_SIZE)
+    for block in row_blocks(len(clipped.triangle), BLOCK_SIZE):
         corners = tuple(corner[block] for corner in clipped.corners)
         for spans in _scan_convert(screen, corners, clipped.triangle[block], width):
             spans.start[:] -= row_start * width
             for span_block in blocks_by_count(spans.count, BLOCK_SIZE):
-                report(start / len(clipped.triangle), LABEL)
+                report(block.start / len(clipped.triangle), LABEL)
                 part = _Spans(*(values[span_block] for values in spans))
                 _depth_test(part, depth_buffer, triangle_buffer)
     return triangle_buffer, depth_buffer
@@ -216,10 +215,7 @@ def _scan_convert(
     long_edge = _edge_line(low, high)
     edge_pairs = zip(_edge_line(low, mid), _edge_line(mid, high), strict=True)
     short_edges = tuple(np.concatenate(pair) for pair in edge_pairs)
-    for block in blocks_by_count(top - bottom, BLOCK_SIZE):
-        first, rows = bottom[block], (top - bottom)[block]
-        local_triangle = np.repeat(np.arange(block.start, block.stop), rows)
-        row = concatenated_ranges(first, rows)
+    for local_triangle, row in blocks_of_ranges(bottom, top - bottom, BLOCK_SIZE):
         short_edge = local_triangle + len(middle) * (row >= middle.take(local_triangle))
         center_y = row + 0.5
         long_x = _edge_x_at_row(long_edge, local_triangle, center_y)
@@ -310,8 +306,7 @@ def _depth_test(spans: _Spans, depth_buffer: np.ndarray, triangle_buffer: np.nda
     fragments that are nearer than the kept one write again, until there are none. Few rounds are
     needed, because each round removes all fragments that are not in front of the kept one.
     """
-    span = np.repeat(np.arange(len(spans.count)), spans.count)
-    pixel = concatenated_ranges(spans.start, spans.count)
+    span, pixel = numbered_ranges(spans.start, spans.count)
     depth = pixel - spans.start.take(span)
     depth = depth * spans.depth_step.take(span)
     depth += spans.depth.take(span)

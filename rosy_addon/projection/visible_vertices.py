@@ -15,11 +15,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.progress import report
-from ..field.blocks import blocks_by_count, concatenated_ranges, mask
+from ..field.blocks import blocks_of_ranges, mask, numbered_ranges
 from ..field.formats.polygons import offsets_from_sizes
 from ..field.frames import transformed
 from .camera import Camera
 from .gbuffer import MeshInstances, SurfacePoints
+from .pixel_blocks import reported_blocks
 from .project import all_triangles, first_triangles
 
 #: Surfaces that are nearer to a point than this fraction of the size of the scene do not hide it.
@@ -169,11 +170,9 @@ def _project(
     for is_outside in (scene.clip[:, 2] < -scene.clip[:, 3], scene.clip[:, 2] > scene.clip[:, 3]):
         if is_outside.any():
             number = number[~is_outside[scene.triangles[number]].all(axis=1)]
-    for start in range(0, len(number), TRIANGLES_PER_BLOCK):
-        report(start / len(number), label)
+    for block in reported_blocks(len(number), label, size=TRIANGLES_PER_BLOCK):
         left = np.flatnonzero(is_visible)
-        block = number[start : start + TRIANGLES_PER_BLOCK]
-        for triangle, chosen in scene.pairs(block, ndc[left]):
+        for triangle, chosen in scene.pairs(number[block], ndc[left]):
             point = left[chosen]
             others = np.flatnonzero(~touches(triangle, point))
             triangle, point = triangle[others], point[others]
@@ -252,15 +251,13 @@ class _Scene:
         low, high = np.maximum(low[kept], -1.0), np.minimum(high[kept], 1.0)
         first_row, last_row = (_grid_rows(edge[:, 1], row_count) for edge in (low, high))
         height = last_row - first_row + 1
-        box = np.repeat(np.arange(len(kept)), height)
-        row = concatenated_ranges(first_row, height)
+        box, row = numbered_ranges(first_row, height)
         first = np.searchsorted(key, 4.0 * row + low[box, 0])
         count = np.searchsorted(key, 4.0 * row + high[box, 0], side="right") - first
         box, first, count = (array[count > 0] for array in (box, first, count))
-        triangle = triangle[kept]
-        for part in blocks_by_count(count, PAIRS_PER_BLOCK):
-            point = order[concatenated_ranges(first[part], count[part])]
-            yield triangle[np.repeat(box[part], count[part])], point
+        triangle = triangle[kept[box]]
+        for number, place in blocks_of_ranges(first, count, PAIRS_PER_BLOCK):
+            yield triangle[number], order[place]
 
     def hides(self, triangle: np.ndarray, ndc: np.ndarray, distance: np.ndarray) -> np.ndarray:
         """Return (n,) bool: whether each triangle hides its point. The point must not be on the triangle.

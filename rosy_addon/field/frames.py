@@ -23,10 +23,18 @@ def transformed(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
     return points @ matrix[:, :3].T + matrix[:, 3]
 
 
+def quotient(numerator: np.ndarray | float, denominator: np.ndarray) -> np.ndarray:
+    """Return numerator / denominator, and 0 where the denominator is not above 0.
+
+    The result has the shape and dtype of the numerator or, if the numerator is a number, of the denominator.
+    """
+    zeros = np.zeros_like(denominator if isinstance(numerator, (int, float)) else numerator)
+    return np.divide(numerator, denominator, out=zeros, where=denominator > 0)
+
+
 def normalize(vectors: np.ndarray) -> np.ndarray:
     """Return (..., 3) vectors scaled to length 1; zero vectors stay zero."""
-    length = np.sqrt(dot(vectors, vectors))[..., None]
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+    return quotient(vectors, np.sqrt(dot(vectors, vectors))[..., None])
 
 
 def unit_direction(vector: ArrayLike) -> np.ndarray | None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from .blocks import by_rows
-from .frames import dot
+from .frames import dot, quotient
 from .rosy_field import RosyField
 from .surface import Surface
 
@@ -80,8 +80,7 @@ def to_representation(vectors: np.ndarray, x: np.ndarray, y: np.ndarray, degree:
     """
     member = dot(vectors, x) + 1j * dot(vectors, y)
     rho = np.abs(member)
-    phase = np.divide(member, rho, out=np.zeros_like(member), where=rho > 0)
-    return rho * power(phase, degree)
+    return rho * power(quotient(member, rho), degree)
 
 
 def from_representation(z: np.ndarray, x: np.ndarray, y: np.ndarray, degree: int) -> np.ndarray:

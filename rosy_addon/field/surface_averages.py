@@ -9,7 +9,7 @@ import numpy as np
 
 from .blocks import row_blocks
 from .connection import BLOCK_TRIANGLES, Connection, laplacian
-from .frames import dot
+from .frames import dot, quotient
 from .representation import complex_bincount
 from .sparse_multigrid import CSRMatrix
 from .surface import Surface
@@ -129,7 +129,7 @@ class SurfaceAverages:
         """
         total, surface = self.face_sums(values, degree), self.surface
         area = np.bincount(surface.triangle_face, 3 * self.connection.area, surface.face_count)
-        return np.divide(total, area, out=np.zeros_like(total), where=area > 0)
+        return quotient(total, area)
 
     def laplacian(self, degree: int) -> CSRMatrix:
         """Return the matrix of `connection.laplacian`, as complex64 (as float32 if the degree is 0)."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from .blocks import mask, row_blocks
 from .connectivity import build_edges
-from .frames import dot
+from .frames import dot, quotient
 
 #: Largest sine of the turning angle at a flat corner. Reflex corners have negative sines.
 COLLINEAR_SINE = 1e-6
@@ -240,8 +240,7 @@ def _corner_sines(points: np.ndarray) -> np.ndarray:
     normal = np.cross(relative, np.roll(relative, -1, axis=1)).sum(axis=1)
     length = np.linalg.norm(edge, axis=2)
     scale = np.roll(length, 1, axis=1) * length * np.linalg.norm(normal, axis=1)[:, None]
-    sine = np.einsum("fki,fi->fk", np.cross(previous_edge, edge), normal)
-    return np.divide(sine, scale, out=np.zeros_like(sine), where=scale > 0)
+    return quotient(np.einsum("fki,fi->fk", np.cross(previous_edge, edge), normal), scale)
 
 
 def _project_to_plane(points: np.ndarray) -> np.ndarray:
@@ -378,7 +377,6 @@ def _smallest_sine(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
 
     The sine is negative for clockwise triangles.
     """
-    area = _cross(b - a, c - a)
     ab, bc, ca = (np.linalg.norm(side, axis=1) for side in (b - a, c - b, a - c))
     scale = ab * bc * ca / np.maximum(np.minimum(np.minimum(ab, bc), ca), 1e-300)
-    return np.divide(area, scale, out=np.zeros_like(area), where=scale > 0)
+    return quotient(_cross(b - a, c - a), scale)

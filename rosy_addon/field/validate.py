@@ -19,7 +19,7 @@ from .directional_field import (
     ratio_harmonics,
     ratios_from_harmonics,
 )
-from .frames import coordinates, dot, normalize, tangent_frame
+from .frames import coordinates, dot, normalize, quotient, tangent_frame
 from .polygon_arrays import mean_per_face
 from .representation import from_representation, signed_power, to_representation
 from .rosy_field import RosyField, check_degree
@@ -338,7 +338,7 @@ def _project(vectors: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.nd
     """
     length = np.sqrt(dot(vectors, vectors))
     component = dot(vectors, normal)
-    sine = np.divide(np.abs(component), length, out=np.zeros_like(component), where=length > 0)
+    sine = quotient(np.abs(component), length)
     angle = np.degrees(np.arcsin(np.minimum(sine, 1.0)))
     # If a vector is parallel to the normal, its projection is only a rounding error.
     tangent = np.where((sine < 1 - 1e-12)[:, None], vectors - component[:, None] * normal, 0.0)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..field.formats.polygons import offsets_from_sizes
-from ..field.frames import dot, normalize
+from ..field.frames import dot, normalize, quotient
 from .stroke_set import Strokes
 
 #: Length of the barbs of an arrowhead in spacings, and their angle to the stroke in radians.
@@ -52,8 +52,7 @@ def arrowheads(strokes: Strokes, distance: float, has_direction: np.ndarray) -> 
     first, last = strokes.start[stroke], strokes.start[stroke + 1] - 1
     after = np.clip(np.searchsorted(key, place), first + 1, last)
     before = after - 1
-    step = key[after] - key[before]
-    share = np.divide(place - key[before], step, out=np.zeros_like(step), where=step > 0)
+    share = quotient(place - key[before], key[after] - key[before])
     center = strokes.between(after, share)
     normal = normalize(center.normal)
     along = strokes.points[after] - strokes.points[before]

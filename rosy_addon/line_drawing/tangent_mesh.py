@@ -18,7 +18,7 @@ from ..core.errors import RosyError, counted
 from ..core.progress import progress, report
 from ..field.connectivity import build_edges
 from ..field.directional_field import evaluate_harmonics, field_symmetry
-from ..field.frames import dot, normalize, transport
+from ..field.frames import dot, normalize, quotient, transport
 from ..field.representation import power, signed_power, unit_complex
 from ..field.surface import Surface
 from ..projection.corner_field import cached_corner_field
@@ -391,8 +391,7 @@ def _barycentric_gradients(
     planar = dot(delta, x[:, None]) + 1j * dot(delta, y[:, None])
     # The edge opposite to corner k, rotated inward by 90 degrees, over twice the area.
     edge = planar[:, [2, 0, 1]] - planar[:, [1, 2, 0]]
-    double_area = 2 * area[:, None]
-    return np.divide(1j * edge, double_area, out=np.zeros_like(edge), where=double_area > 0)
+    return quotient(1j * edge, 2 * area[:, None])
 
 
 def _rotations_to_planes(

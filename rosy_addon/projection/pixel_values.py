@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..field.frames import dot_components, transport_components
+from ..field.frames import dot_components, quotient, transport_components
 from ..field.representation import signed_power
 from .corner_field import CornerField
 from .field_channel import REPRESENTATION, FieldChannel, rotation_order
@@ -165,8 +165,7 @@ def _scale_to_magnitude(
     """
     corners = zip(weights, corner_field.magnitude, strict=True)
     magnitude = sum(weight * corner.take(triangle) for weight, corner in corners)
-    modulus = np.abs(z)
-    return np.divide(magnitude, modulus, out=np.zeros_like(modulus), where=modulus > 0)
+    return quotient(magnitude, np.abs(z))
 
 
 def _squared_phase(half: np.ndarray) -> np.ndarray:

@@ -18,7 +18,7 @@ from ..compositor.pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps
 from ..compositor.surface_noise import instance_hashes, solid_noise
 from ..core.progress import progress, report
 from ..field.blocks import row_blocks
-from ..field.frames import dot
+from ..field.frames import dot, quotient
 from ..field.representation import signed_power, unit_complex
 from ..line_drawing.surface_particles import SurfaceParticles, trace_geodesics
 from ..projection.field_channel import REPRESENTATION, FieldChannel, rotation_order
@@ -153,8 +153,7 @@ def _neighbor_masks(
     mesh, charts, texels = on.mesh, on.charts, on.texels
     masks = defined.astype(np.uint16) << np.uint16(NEIGHBOR_OFFSETS.index((0, 0)))
     # Squared limit for the distance of neighbors on the surface, for each triangle.
-    stretch = charts.stretch()[1] * texels.frame.size
-    reach = np.divide(MAX_STRETCHED_STEP, stretch, out=np.zeros(len(stretch)), where=stretch > 0)
+    reach = quotient(MAX_STRETCHED_STEP, charts.stretch()[1] * texels.frame.size)
     reach_squared = (reach * reach).astype(np.float32)
     corners, normals = mesh.points.astype(np.float32), mesh.corner_normal.astype(np.float32)
     min_cosine = -2.0 if crease_angle is None else np.cos(crease_angle)
@@ -312,8 +311,7 @@ def texel_noise(on: TexelSurface, settings: NoiseSettings) -> np.ndarray:
     scale = matrix_scale(on.instance.matrix)
     rest = rest_positions(surface).astype(np.float32)
     gradient = (charts.gradient / texels.frame.size).astype(np.complex64)
-    stretch = charts.stretch()[1] * (texels.frame.size * scale)
-    coarse = np.divide(MIN_CELL_TEXELS, stretch, out=np.zeros(len(stretch)), where=stretch > 0)
+    coarse = quotient(MIN_CELL_TEXELS, charts.stretch()[1] * (texels.frame.size * scale))
     cell_size = np.maximum(cell * step / scale, coarse).astype(np.float32)
     instance_hash = instance_hashes([surface.name])
     total = np.empty((channels, len(texels)), dtype=np.float32)
@@ -355,8 +353,7 @@ def _subtract_local_means(
     side = max(GRID_CELL_SIGMAS * sigma, extent / (MAX_GRID_SIDE - 2))
     shape = (np.ptp(used, axis=0) / side).astype(np.intp) + 2
     stride = np.array([shape[1] * shape[2], shape[2], 1])
-    area = np.abs(on.charts.density)
-    area = np.divide(1, area, out=np.zeros(len(area)), where=area > 0)
+    area = quotient(1, np.abs(on.charts.density))
 
     def cells(block: slice) -> tuple[np.ndarray, np.ndarray]:
         """Return the grid cells of texels and the positions in them.

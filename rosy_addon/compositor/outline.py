@@ -13,6 +13,7 @@ import numpy as np
 
 from ..core.cache import Cache
 from ..core.progress import progress
+from ..field.blocks import mask
 from ..field.connectivity import connected_components
 from ..field.frames import dot
 from ..projection.crease_pixels import crease_pixels
@@ -156,8 +157,7 @@ def _sample_outline(
 def _dilated(gbuffer: GBuffer, is_marked: np.ndarray, radius: int) -> np.ndarray:
     """Return a (P,) bool mask of the pixels within `radius` columns and rows of a marked pixel."""
     cell, shape = pixel_window(gbuffer.pixel, gbuffer.camera.width, radius)
-    padded = np.zeros(shape, dtype=bool)
-    padded.reshape(-1)[cell[is_marked]] = True
+    padded = mask(shape[0] * shape[1], cell[is_marked]).reshape(shape)
     for axis in (0, 1):
         windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * radius + 1, axis=axis)
         padded = windows.any(axis=-1)
@@ -362,8 +362,7 @@ def _mark_strength(
         pairs.append(np.stack([source, target[source]], axis=1))
     mark = connected_components(len(block), np.concatenate(pairs))
     sides = [_extent_per_label(values, mark) for values in (block // stride, block % stride)]
-    is_part_border = np.zeros(len(block), dtype=bool)
-    is_part_border[block_of_pixel[border & PART_BORDER != 0]] = True
+    is_part_border = mask(len(block), block_of_pixel[border & PART_BORDER != 0])
     borders = np.bincount(mark[is_part_border], minlength=len(sides[0]))
     has_full_width = (borders >= sides[0] + sides[1]) & (np.minimum(*sides) > 1)
     has_full_width[mark[block_of_pixel[border & EMPTY_BORDER != 0]]] = True

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..field.blocks import row_blocks
+from ..field.blocks import mask, row_blocks
 from ..field.frames import dot
 from .samples import SAMPLE_STEP, SEARCH_RADIUS, CoveringPairs, StrokeSamples
 
@@ -206,8 +206,7 @@ def _judge(
         is_near = exists[near_neighbor]
         is_beside = (neighbor < end) & exists[neighbor]
         np.minimum.at(gap, (query[is_beside], side[is_beside]), lateral_gap[is_beside])
-        is_accepted = np.ones(end - first, dtype=bool)
-        is_accepted[near_query[is_near] - first] = False
+        is_accepted = ~mask(end - first, near_query[is_near] - first)
         is_wide = (gap[rows] > max_gap) & (gap[rows] < MAX_COVERED_GAP)
         yielded[rows] = exists[rows] & is_accepted & is_wide.any(axis=1)
         exists[rows] &= is_accepted & ~yielded[rows]

@@ -15,7 +15,7 @@ from ..annotation.index_labels import HALO, HALO_COLOR, LABEL_COLOR, placed_labe
 from ..annotation.singularity_marks import SingularityMarks
 from ..core.errors import RosyError
 from ..core.progress import progress, report
-from ..field.blocks import numbered_ranges
+from ..field.blocks import mask, numbered_ranges
 from ..field.formats.polygons import offsets_from_sizes
 from ..field.frames import dot
 from ..projection.camera import Camera
@@ -353,9 +353,8 @@ def simplify_mask(points: np.ndarray, start: np.ndarray, tolerance: float) -> np
     (n,) bool ndarray
         Whether each point is kept.
     """
-    kept = np.zeros(len(points), dtype=bool)
     first, last = start[:-1].astype(np.int64), start[1:].astype(np.int64) - 1
-    kept[first], kept[last] = True, True
+    kept = mask(len(points), np.concatenate([first, last]))
     first, last = first[last - first > 1], last[last - first > 1]
     while len(first):
         report(1 - float((last - first).sum()) / len(points), "simplifying strokes")

@@ -21,7 +21,7 @@ from ..compositor.pixel_field import NEIGHBOR_OFFSETS, PixelField
 from ..core.cache import Cache
 from ..core.errors import RosyError
 from ..core.progress import progress, report
-from ..field.blocks import bincount_rows
+from ..field.blocks import bincount_rows, mask
 from ..line_drawing.tangent_mesh import TangentMesh
 from ..projection.gbuffer import MeshInstance
 from ..projection.rasterizer import rasterize
@@ -282,8 +282,7 @@ def fill_margin(
     image = np.full((height, width, channels), mean, dtype=np.float32)
     flat = image.reshape(-1, channels)
     flat[field.pixel] = color
-    filled = np.zeros(height * width, dtype=bool)
-    filled[field.pixel] = True
+    filled = mask(height * width, field.pixel)
     if not margin:
         return image
     ring = field.pixel[field.neighbor_mask != ALL_NEIGHBORS]
@@ -342,7 +341,7 @@ def _color_at(
     """
     column, row = np.sign(offset.real).astype(np.intp), np.sign(offset.imag).astype(np.intp)
     x, y = np.minimum(np.abs(offset.real), 1), np.minimum(np.abs(offset.imag), 1)
-    mask = field.neighbor_mask.take(texel)
+    links = field.neighbor_mask.take(texel)
     total = np.zeros((len(texel), color.shape[1]), dtype=np.float32)
     weights = np.zeros(len(texel), dtype=np.float32)
     neighbor = field.pixel.take(texel) + row * field.width
@@ -353,7 +352,7 @@ def _color_at(
         (0 * column, row, np.searchsorted(field.pixel, neighbor), (1 - x) * y),
         (column, row, np.searchsorted(field.pixel, neighbor + column), x * y),
     ):
-        linked = mask >> (dx + 3 * dy + 4).astype(np.uint16) & 1
+        linked = links >> (dx + 3 * dy + 4).astype(np.uint16) & 1
         weight = (weight + 1e-6) * linked
         total += weight[:, None] * color.take(place, axis=0, mode="clip")
         weights += weight

@@ -79,7 +79,7 @@ def run_bake(options: Options) -> None:
         if options.frames is None:
             location = bpy.path.abspath(result.image.filepath) if options.out else result.image.name
         else:
-            location = result.sequence.path
+            location = result.path
             if result.skipped:
                 print_line(f"{counted(len(result.skipped), 'frame')} of {result.camera} up to date")
         print_line(f"{result.camera}: {location}")

@@ -42,8 +42,8 @@ from ..scene.evaluated_field import temp_attributes
 from ..scene.files import picture_stem
 from ..scene.keys import update_camera_planes
 from ..scene.look_inputs import nonfinite_policy
-from ..scene.look_properties import drift_in_scene, read_look
-from ..scene.picture_state import PictureState, read_picture_states
+from ..scene.look_properties import read_look
+from ..scene.picture_state import PictureState, SceneState
 from ..scene.read_view import read_views, scene_depsgraph
 from ..scene.scene_reader import SceneData
 from ..scene.visible_objects import field_objects
@@ -66,7 +66,8 @@ class SequenceResult:
         Name of the camera. If the camera may change from frame to frame, the name of the scene.
     rendered, skipped : tuple of int
         Frames that were drawn, and frames that were up to date and kept.
-    sequence : ImageSequence
+    path : Path
+        File of the first frame.
     warnings : tuple of str
         Messages for the user.
     """
@@ -74,7 +75,7 @@ class SequenceResult:
     camera: str
     rendered: tuple[int, ...]
     skipped: tuple[int, ...]
-    sequence: pictures.ImageSequence
+    path: Path
     warnings: tuple[str, ...] = ()
 
 
@@ -164,20 +165,15 @@ def bake_animation(
             rendered_count += not all(one.up_to_date for one in drawn)
             if not rendered_count:
                 start_time = time.monotonic()
-        results = [
-            _sequence_result(drawn, settings, cameras, tuple(warnings))
-            for drawn in sequences.values()
-        ]
+        results = [_sequence_result(drawn, tuple(warnings)) for drawn in sequences.values()]
         if show and scene_data is not None:
             last_look = read_look(scene.rosy) if look is None else look
             key = yield Call(sequence_key, (scene_data.instances, last_look), 1.0)
             sources = [None] * len(results) if cameras is None else cameras
             for result, drawn, source in zip(results, sequences.values(), sources, strict=True):
                 states = {one.frame: one.state for one in drawn}
-                camera, sequence = drawn[-1].camera, result.sequence
-                pictures.apply_sequence(
-                    scene, scene_data, sequence, camera, settings, source, states, last_look, key
-                )
+                inputs = result.path, drawn[-1].camera, settings, source, states, last_look, key
+                pictures.apply_sequence(scene, scene_data, result.camera, *inputs)
             update_camera_planes(scene)
         return results
 
@@ -219,6 +215,8 @@ class _Frame:
     name : str
         Name of the sequence.
     frame : int
+    path : Path
+        The file.
     camera : Camera
     up_to_date : bool
         Whether the picture was up to date, so that it was not drawn.
@@ -228,26 +226,19 @@ class _Frame:
 
     name: str
     frame: int
+    path: Path
     camera: Camera
     up_to_date: bool
     state: PictureState
 
 
-def _sequence_result(
-    drawn: Sequence[_Frame],
-    settings: pictures.OutputSettings,
-    cameras: Sequence[CameraSource] | None,
-    warnings: tuple[str, ...],
-) -> SequenceResult:
-    """Return the result of an image sequence, given its frames and the arguments of `bake_animation`."""
-    first, last = drawn[0], drawn[-1]
-    path = _path_of_frame(settings, first.name, cameras, first.frame)
-    sequence = pictures.ImageSequence(first.name, path, first.frame, last.frame)
+def _sequence_result(drawn: Sequence[_Frame], warnings: tuple[str, ...]) -> SequenceResult:
+    """Return the result of an image sequence, given its frames."""
     rendered, skipped = (
         tuple(one.frame for one in drawn if one.up_to_date == up_to_date)
         for up_to_date in (False, True)
     )
-    return SequenceResult(first.name, rendered, skipped, sequence, warnings)
+    return SequenceResult(drawn[0].name, rendered, skipped, drawn[0].path, warnings)
 
 
 def _frame_steps(
@@ -283,12 +274,12 @@ def _frame_steps(
         cache=cache,
     )
     cache.evict_unused()
-    states = read_picture_states(scene, depsgraph, sources, scene_data.mesh_states, is_frame=True)
+    scene_state = SceneState(scene, depsgraph, scene_data.mesh_states)
+    states = [scene_state.picture_state(scene, depsgraph, source, True) for source in sources]
     drawn = []
     for (view, state), start, stop in shares(zip(views, states, strict=True)):
-        view = replace(view, drift=drift_in_scene(scene, look, frame))
-        name = scene.name if cameras is None else view.camera.name
-        path = _path_of_frame(settings, name, cameras, frame)
+        name, kind = (scene.name, "scene") if cameras is None else (view.camera.name, "camera")
+        path = frame_path(settings.folder / picture_stem(name, kind), frame, settings.as_float)
         sidecar = path.with_name(path.name + SIDECAR_SUFFIX)
         input_hash = _input_hash(view, device, settings)
         up_to_date = (
@@ -309,16 +300,8 @@ def _frame_steps(
             write_images({path: image_data})
             write_bytes(sidecar, _sidecar_text(input_hash, path))
         state = replace(state, device=device)
-        drawn.append(_Frame(name, frame, view.camera, up_to_date, state))
+        drawn.append(_Frame(name, frame, path, view.camera, up_to_date, state))
     return scene_data, drawn
-
-
-def _path_of_frame(
-    settings: pictures.OutputSettings, name: str, cameras: Sequence[CameraSource] | None, frame: int
-) -> Path:
-    """Return the path of a frame. `name` is the name of the camera, or of the scene if `cameras` is None."""
-    stem = settings.folder / picture_stem(name, "scene" if cameras is None else "camera")
-    return frame_path(stem, frame, settings.as_float)
 
 
 def _sidecar_text(input_hash: bytes, path: Path) -> bytes:

@@ -26,7 +26,7 @@ from ..core.memory import check_memory
 from ..field.blocks import ROWS_PER_BLOCK, row_blocks
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
-from .cameras import camera_of_object, render_camera
+from .cameras import camera_of_object
 from .datablocks import has_rosy_properties
 from .face_values import COLOR_TYPES, corner_scalars, filled_attribute
 from .meshes import read_uvs
@@ -300,34 +300,26 @@ def input_files() -> list[str]:
 
 
 def load_reference(
-    scene: Scene,
-    depsgraph: Depsgraph,
-    camera: Object | None,
-    look: Look,
-    picture_luminance: np.ndarray | None = None,
-) -> ReferenceRender | None:
-    """Return the reference render from which a look takes its tone; None if the look does not use one.
+    scene: Scene, depsgraph: Depsgraph, camera: Object, picture_luminance: np.ndarray | None = None
+) -> ReferenceRender:
+    """Return the reference render from which looks with the tone "picture" take their tone.
 
     Parameters
     ----------
     scene : bpy.types.Scene
         The scene, at the frame of the reference render.
     depsgraph : bpy.types.Depsgraph
-    camera : bpy.types.Object or None
-        The camera that the reference render was rendered from. None: the active camera of the scene.
-    look : Look
+    camera : bpy.types.Object
+        The camera that the reference render was rendered from.
     picture_luminance : (H, W) ndarray, optional
         The luminance of the reference render. By default it is read from the file.
 
     Raises
     ------
     RosyError
-        If the scene has no active camera, no file is chosen, the file cannot be read, or the picture does not
+        If no file is chosen, the file cannot be read, or the picture does not
         have the aspect ratio of renders.
     """
-    if look.tone != "picture":
-        return None
-    camera = camera or render_camera(scene)
     path = reference_path(scene)
     reference_camera = camera_of_object(scene, depsgraph, camera)
     if picture_luminance is None:

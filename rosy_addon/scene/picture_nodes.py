@@ -171,19 +171,18 @@ def _clip_position(build: NodeBuilder, view_projection: np.ndarray) -> Node:
     return build("ShaderNodeSeparateXYZ", {0: clip})
 
 
-def new_group(name: str, material: Material, matrix: np.ndarray | None) -> NodeTree:
+def new_group(material: Material, matrix: np.ndarray | None) -> NodeTree:
     """Create a geometry node group that sets a material and the attribute `CLIP_ATTRIBUTE`.
 
-    It is the node group of RoSy's modifier. The mesh, its material slots and other modifiers stay unchanged.
+    It is the node group of RoSy's modifier (`set_picture_modifier`, which names it). The mesh, its material slots and other modifiers stay unchanged.
 
     Parameters
     ----------
-    name : str
     material : bpy.types.Material
     matrix : (4, 4) ndarray or None
         Transforms object space to clip space. None for objects with several instances; they get no attribute.
     """
-    group, build, geometry = new_modifier_group(name)
+    group, build, geometry = new_modifier_group(MODIFIER_NAME)
     material_index = build("GeometryNodeInputMaterialIndex").outputs[0]
     geometry = build.stored_attribute(geometry, MATERIAL_ATTRIBUTE, "INT", "FACE", material_index)
     inputs = {"Geometry": geometry, "Material": material}

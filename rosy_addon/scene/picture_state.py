@@ -73,9 +73,9 @@ class PictureState:
     output: dict
     device: str
     objects: dict[str, list[str]]
-    occluders: dict[str, list[str]]
-    lights: dict[str, list[str]]
-    reference: str
+    occluders: dict[str, list[str]] = field(default_factory=dict)
+    lights: dict[str, list[str]] = field(default_factory=dict)
+    reference: str = ""
 
     def to_json(self) -> str:
         """Return the state as JSON text."""
@@ -237,24 +237,6 @@ def _light_digests(depsgraph: Depsgraph) -> dict[str, list[str]]:
     return {name: sorted(digests) for name, digests in lights.items()}
 
 
-def read_picture_states(
-    scene: Scene,
-    depsgraph: Depsgraph,
-    sources: Iterable[CameraSource],
-    mesh_states: MeshStates,
-    is_frame: bool = False,
-) -> list[PictureState]:
-    """Return the state of a picture from each camera.
-
-    `is_frame` says whether the pictures are frames of an animation.
-
-    `mesh_states` are the states of meshes from reading the scene (`SceneData.mesh_states`), so that meshes
-    are not read again.
-    """
-    scene_state = SceneState(scene, depsgraph, mesh_states)
-    return [scene_state.picture_state(scene, depsgraph, source, is_frame) for source in sources]
-
-
 def bakes_light(settings: PropertyGroup, look: Look) -> bool:
     """Return whether textures show hatching that was drawn in the light of the scene.
 
@@ -301,9 +283,7 @@ def read_texture_state(scene: Scene, depsgraph: Depsgraph, obj: Object) -> Pictu
         output=_used_output(settings, TEXTURE_OUTPUT),
         device="cpu",
         objects={obj.name_full: [place, digest(*shape)]},
-        occluders={},
         lights=lights,
-        reference="",
     )
 
 

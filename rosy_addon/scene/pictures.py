@@ -29,6 +29,7 @@ from ..core.file_io import check_folder, check_writable
 from ..image_io.image_data import ImageData, image_size
 from ..projection.camera import Camera
 from ..rendering.view_input import ViewInput
+from ..surface_texture.draw import TextureImages, TextureSettings
 from . import datablocks, picture_nodes, texture_nodes
 from .bake_records import (
     NAME_PREFIX,
@@ -73,26 +74,6 @@ class BakeResult:
     objects: tuple[Object, ...]
     picture: Picture
     warnings: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class ImageSequence:
-    """An image sequence on disk.
-
-    Attributes
-    ----------
-    name : str
-        Name of the camera, or of the scene if the camera changes between frames.
-    path : Path
-        File of the first frame.
-    first, last : int
-        Frame numbers, both included.
-    """
-
-    name: str
-    path: Path
-    first: int
-    last: int
 
 
 def read_output_settings(scene: Scene, folder: Path | None = None) -> OutputSettings:
@@ -225,7 +206,8 @@ def apply_picture(
 def apply_sequence(
     scene: Scene,
     scene_data: SceneData,
-    sequence: ImageSequence,
+    name: str,
+    path: Path,
     camera: Camera,
     settings: OutputSettings,
     source: CameraSource | None,
@@ -243,10 +225,13 @@ def apply_sequence(
     scene : bpy.types.Scene
     scene_data : SceneData
         Its objects get the pictures.
-    settings : OutputSettings
-    sequence : ImageSequence
+    name : str
+        Name of the camera, or of the scene if the camera changes between frames.
+    path : Path
+        File of the first frame.
     camera : Camera
         The camera of the last frame.
+    settings : OutputSettings
     source : bpy.types.Object, Camera or None
         The camera of all frames. None: each frame was drawn from the camera that renders it.
     states : mapping of int to PictureState
@@ -257,23 +242,15 @@ def apply_sequence(
         Contents of the key (legend) of the pictures.
     """
     settings = replace(settings, window_coordinates=True)
+    first, last = min(states), max(states)
     with datablocks.rollback_on_error() as track:
-        image = track(load_sequence(sequence.path, settings.as_float))
-        image.name = f"{NAME_PREFIX}{sequence.name}"
+        image = track(load_sequence(path, settings.as_float))
+        image.name = f"{NAME_PREFIX}{name}"
         material = picture_nodes.new_material(image, camera, track, settings, look)
-        picture_nodes.set_sequence_frames(material, sequence.first, sequence.last)
+        picture_nodes.set_sequence_frames(material, first, last)
         node_groups = _new_groups(material, dict.fromkeys(scene_data.objects), track)
-    store_record(
-        scene,
-        sequence.name,
-        image,
-        material,
-        source,
-        states,
-        size=(camera.width, camera.height),
-        key=key,
-        frame_range=f"{sequence.first} to {sequence.last}",
-    )
+    details = {"size": camera.size, "key": key, "frame_range": f"{first} to {last}"}
+    store_record(scene, name, image, material, source, states, **details)
     _show_on_objects(node_groups)
 
 
@@ -281,14 +258,11 @@ def apply_texture(
     scene: Scene,
     obj: Object,
     uv_map: str,
-    tiles: Mapping[int, ImageData],
-    settings: OutputSettings,
+    texture: TextureImages,
     state: PictureState,
-    content: str,
     look: Look,
-    hatching: texture_nodes.Hatching | None,
-    *,
-    is_udim: bool,
+    texture_settings: TextureSettings,
+    settings: OutputSettings,
 ) -> Image:
     """Show a texture on its object, and return its image. It replaces an earlier texture of the object.
 
@@ -300,37 +274,34 @@ def apply_texture(
     obj : bpy.types.Object
     uv_map : str
         Name of the UV map.
-    tiles : mapping of int to ImageData
-        The UDIM tiles by their numbers. If `is_udim` is False, only the first item is used.
-    settings : OutputSettings
+    texture : TextureImages
+        Without UDIM, only the first tile is used.
     state : PictureState
         The state of the scene that the texture was drawn from.
-    content : str
-        What the image shows; see `surface_texture.draw.CONTENTS`.
     look : Look
         The look of the texture.
-    hatching : Hatching or None
-        How the material draws hatching, if the image has thresholds of ink. None if it does not.
-    is_udim : bool
-        Whether the image has UDIM tiles.
+    texture_settings : TextureSettings
+        The settings with which the texture was drawn.
+    settings : OutputSettings
 
     Raises
     ------
     RosyError
         If the file cannot be written.
     """
-    name = f"{NAME_PREFIX}{obj.name}"
+    name, content = f"{NAME_PREFIX}{obj.name}", texture_settings.content
     stem = _image_stem(settings, obj.name, texture_kind(content))
-    first = next(iter(tiles.values()))
-    is_color = content == "look" and hatching is None
-    create, image_data = (new_tiled_image, tiles) if is_udim else (new_image, first)
+    first = next(iter(texture.tiles.values()))
+    is_udim = texture_settings.is_udim
+    create, image_data = (new_tiled_image, texture.tiles) if is_udim else (new_image, first)
     with datablocks.rollback_on_error() as track:
-        image = track(create(name, image_data, is_color=is_color, stem=stem))
+        image = track(create(name, image_data, is_color=not texture.is_data, stem=stem))
         is_clear = content == "look" and has_clear_paper(look)
         add_shader = partial(texture_nodes.color_shader, is_clear=is_clear)
         if content == "anisotropy":
             add_shader = partial(texture_nodes.brushed_metal_shader, uv_map=uv_map)
-        elif hatching is not None:
+        elif content == "look" and texture.is_data:
+            hatching = texture_nodes.Hatching(look, texture.line_count)
             add_shader = partial(texture_nodes.hatching_shader, hatching=hatching, track=track)
         material = track(texture_nodes.new_texture_material(name, image, uv_map, add_shader))
         node_groups = _new_groups(material, {obj: None}, track)
@@ -363,10 +334,7 @@ def _new_groups(
     `matrices` holds each object's (4, 4) matrix from object space to clip space, or None. `track` is called
     with each new group.
     """
-    return {
-        obj: track(new_group(f"RoSy {obj.name}", material, matrix))
-        for obj, matrix in matrices.items()
-    }
+    return {obj: track(new_group(material, matrix)) for obj, matrix in matrices.items()}
 
 
 def _show_on_objects(node_groups: Mapping[Object, NodeTree], *, keep_textures: bool = True) -> None:
@@ -407,7 +375,7 @@ def show_bake(scene: Scene, camera: str) -> None:
             projections |= picture_nodes.projections_of_group(modifier.node_group)
         if record.material in projections and datablocks.is_editable(obj):
             matrix = projections[record.material]
-            node_group = new_group(f"RoSy {obj.name}", record.material, matrix)
+            node_group = new_group(record.material, matrix)
             node_group[datablocks.OWNED_TAG] = True
             picture_nodes.set_picture_modifier(obj, node_group, materials)
     update_keys(scene)

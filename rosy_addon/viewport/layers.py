@@ -220,7 +220,7 @@ class ReferenceImages:
             raise RosyError(image)
         if image is None:
             return None
-        reference = look_inputs.load_reference(scene, depsgraph, render_camera(scene), look, image)
+        reference = look_inputs.load_reference(scene, depsgraph, render_camera(scene), image)
         key = file_key, reference.camera.key
         if scene.name not in self._current or self._current[scene.name][0] != key:
             self._current[scene.name] = key, reference

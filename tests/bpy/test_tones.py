@@ -160,7 +160,7 @@ def test_pictures_from_files(scene, wall, tmp_path):
     save_picture(tmp_path / "shot.png", values)
     scene.rosy.tone_picture = str(tmp_path / "shot.png")
     images = set(bpy.data.images)
-    reference = load_reference(scene, depsgraph(), scene.camera, PICTURE)
+    reference = load_reference(scene, depsgraph(), scene.camera)
     np.testing.assert_allclose(
         reference.luminance, to_linear(np.rint(values * 255) / 255), atol=2e-3
     )

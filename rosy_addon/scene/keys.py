@@ -93,7 +93,7 @@ def _add_key(scene: Scene, camera: Object, record: PropertyGroup, triangles: Tex
     with rollback_on_error() as track:
         image = track(new_image(name, image_data))
         material = track(_new_material(name, image, scene.rosy.emission or 1.0))
-        obj = add_camera_plane(scene, camera, name, KEY_TAG, corners, material, track)
+        obj = add_camera_plane(scene, camera, KEY_TAG, corners, material, track)
     # With Solid shading, 3D views would draw the plane opaque, so only its bounds are drawn.
     obj.display_type = "BOUNDS"
     for probe in ("hide_probe_volume", "hide_probe_sphere", "hide_probe_plane"):

@@ -226,15 +226,11 @@ def write_preset(
         If the name or the description of the preset is not allowed, or if the file cannot be written.
     """
     _validated(preset)
-    data = preset._asdict() | {"look": changed_settings(preset.look)}
+    settings = {name: getattr(preset.look, name) for name in settings_of(Look)}
+    changed = {name: value for name, value in settings.items() if value != getattr(Look, name)}
+    data = preset._asdict() | {"look": changed}
     text = json.dumps(data, indent=2, ensure_ascii=False) + "\n"
     write_bytes(path, text.encode("utf-8"), follow_links=follow_links)
-
-
-def changed_settings(look: Look) -> dict[str, Any]:
-    """Return the settings in which a look differs from the default look, in the order of `Look`."""
-    values = {name: getattr(look, name) for name in settings_of(Look)}
-    return {name: value for name, value in values.items() if value != getattr(Look, name)}
 
 
 def preview_path(path: Path) -> Path:

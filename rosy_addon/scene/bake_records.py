@@ -203,11 +203,6 @@ def _replace_datablocks(record: PropertyGroup, image: Image, material: Material)
             new_datablock.name = f"{NAME_PREFIX}{record.name}"
 
 
-def find_record(scene: Scene, name: str) -> PropertyGroup | None:
-    """Return the record with a name, as `camera_name` returns it; None if there is none."""
-    return next((record for record in scene.rosy.bakes if camera_name(record) == name), None)
-
-
 def camera_name(record: PropertyGroup) -> str:
     """Return the present name of the camera of a record.
 

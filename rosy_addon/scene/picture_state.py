@@ -25,7 +25,7 @@ from ..projection.camera import Camera
 from ..surface_texture.draw import DIRECTION_SETTINGS, TEXTURE_SETTINGS, texture_colors_values
 from .cameras import CameraSource, camera_of_object, render_camera, resolve_camera
 from .field_attributes import attribute_name, field_degree
-from .look_inputs import ReadRequest, color_values_digest, read_request, reference_path
+from .look_inputs import color_values_digest, read_request, reference_path
 from .look_properties import read_look
 from .mesh_states import MeshStates, digest, field_parts, mesh_state_key, read_mesh_state
 from .meshes import evaluated_mesh, polygon_arrays, read_uvs, shape_digest
@@ -134,13 +134,8 @@ class SceneState:
         self._occluders: dict[str, _Instances] = {}
         self._texture_states: dict[tuple, PictureState] = {}
         look = read_look(scene.rosy)
-        self._read_meshes(depsgraph, read_request(scene, look), mesh_states)
+        request, targets = read_request(scene, look), field_objects(depsgraph.view_layer)
         self._lights = _light_digests(depsgraph) if _uses_lights(look) else {}
-
-    def _read_meshes(
-        self, depsgraph: Depsgraph, request: ReadRequest, mesh_states: MeshStates
-    ) -> None:
-        targets = field_objects(depsgraph.view_layer)
         for instance, draws_field in rendered_instances(depsgraph, targets):
             obj, owner = instance.object, instance.object.original
             mesh_request = request if draws_field else None

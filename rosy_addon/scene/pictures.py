@@ -35,7 +35,6 @@ from .bake_records import (
     NAME_PREFIX,
     baked_objects,
     camera_name,
-    find_record,
     recorded_materials,
     store_record,
 )
@@ -364,7 +363,7 @@ def show_bake(scene: Scene, camera: str) -> None:
     RosyError
         If no picture was baked from this camera.
     """
-    record = find_record(scene, camera)
+    record = next((each for each in scene.rosy.bakes if camera_name(each) == camera), None)
     if record is None:
         names = ", ".join(f"'{camera_name(other)}'" for other in scene.rosy.bakes) or "none"
         raise RosyError(f"no picture was baked from camera '{camera}', only from {names}")

@@ -231,8 +231,7 @@ class SceneReader:
         topology_changed : bool
             Whether faces or fields may have changed. False: only positions of vertices have changed.
         """
-        for key in [key for key in self._meshes if key[0] in names]:
-            del self._meshes[key]
+        self._meshes = {key: data for key, data in self._meshes.items() if key[0] not in names}
         for key in [key for key in self._topologies if key[0] in names]:
             if topology_changed or isinstance(self._topologies[key], Exception):
                 del self._topologies[key]

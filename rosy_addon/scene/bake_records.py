@@ -99,11 +99,8 @@ def store_record(
     material: Material,
     source: CameraSource | None,
     states: Mapping[int | None, PictureState],
-    *,
     size: tuple[int, int],
     key: PictureKey = NO_KEY,
-    frame_range: str = "",
-    is_texture: bool = False,
 ) -> None:
     """Store the record of a picture, sequence or texture. It replaces an earlier record of the same source.
 
@@ -116,7 +113,7 @@ def store_record(
     image : bpy.types.Image
     material : bpy.types.Material
     source : bpy.types.Object, Camera or None
-        The camera; None for a sequence from the cameras that render the frames. For a texture, the object.
+        The camera; None for a sequence from the cameras that render the frames. For a texture, the mesh object.
     states : mapping of int or None to PictureState
         The state of the scene from which each frame was drawn, by frame number. A single picture has one
         state, with the key None. `PictureState.device` is the device that drew the picture.
@@ -124,14 +121,10 @@ def store_record(
         Width and height in pixels.
     key : PictureKey
         Contents of the key (the legend) of the picture.
-    frame_range : str
-        First and last frame of a sequence. Empty for a single picture.
-    is_texture : bool
-        Whether the picture is the texture of an object.
     """
-    record = _find_or_add_record(scene, name, source, is_texture)
+    record = _find_or_add_record(scene, name, source)
     _replace_datablocks(record, image, material)
-    record.frames = frame_range
+    record.frames = "" if None in states else f"{min(states)} to {max(states)}"
     record.width, record.height = size
     record.key = key.to_json()
     record.state = ""
@@ -144,13 +137,11 @@ def store_record(
             entry.name, entry.state = str(frame), state.to_json()
 
 
-def _find_or_add_record(
-    scene: Scene, name: str, source: CameraSource | None, is_texture: bool
-) -> PropertyGroup:
+def _find_or_add_record(scene: Scene, name: str, source: CameraSource | None) -> PropertyGroup:
     """Return the record of a camera, scene or textured object, and create it if missing. Update its name."""
     records = scene.rosy.bakes
     camera, view, record = None, "", None
-    if is_texture:
+    if isinstance(source, Object) and source.type == "MESH":
         view, record = TEXTURE_VIEW, _find_texture_record(scene, source) or records.add()
     elif source is None:
         view = FRAME_CAMERAS

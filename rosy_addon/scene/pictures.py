@@ -196,7 +196,7 @@ def apply_picture(
         matrices = _object_to_clip_matrices(scene_data, camera)
         node_groups = _new_groups(material, matrices, track)
     size, key = image_size(image_data), picture_key(view.look, picture)
-    store_record(scene, camera.name, image, material, source, {None: state}, size=size, key=key)
+    store_record(scene, camera.name, image, material, source, {None: state}, size, key)
     _show_on_objects(node_groups)
     warnings = (*scene_data.warnings, *_display_warnings(scene))
     return BakeResult(camera.name, image, material, tuple(matrices), picture, warnings)
@@ -241,15 +241,13 @@ def apply_sequence(
         Contents of the key (legend) of the pictures.
     """
     settings = replace(settings, window_coordinates=True)
-    first, last = min(states), max(states)
     with datablocks.rollback_on_error() as track:
         image = track(load_sequence(path, settings.as_float))
         image.name = f"{NAME_PREFIX}{name}"
         material = picture_nodes.new_material(image, camera, track, settings, look)
-        picture_nodes.set_sequence_frames(material, first, last)
+        picture_nodes.set_sequence_frames(material, min(states), max(states))
         node_groups = _new_groups(material, dict.fromkeys(scene_data.objects), track)
-    details = {"size": camera.size, "key": key, "frame_range": f"{first} to {last}"}
-    store_record(scene, name, image, material, source, states, **details)
+    store_record(scene, name, image, material, source, states, camera.size, key)
     _show_on_objects(node_groups)
 
 
@@ -304,8 +302,7 @@ def apply_texture(
             add_shader = partial(texture_nodes.hatching_shader, hatching=hatching, track=track)
         material = track(texture_nodes.new_texture_material(name, image, uv_map, add_shader))
         node_groups = _new_groups(material, {obj: None}, track)
-    size = image_size(first)
-    store_record(scene, obj.name, image, material, obj, {None: state}, size=size, is_texture=True)
+    store_record(scene, obj.name, image, material, obj, {None: state}, image_size(first))
     # The object can still show its pictures, but no longer an earlier texture.
     _show_on_objects(node_groups, keep_textures=False)
     return image

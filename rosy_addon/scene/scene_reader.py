@@ -369,9 +369,8 @@ class SceneReader:
                 try:
                     rest = read_attribute(mesh, REST_ATTRIBUTE, np.float32, 3)
                     surface = self._with_rest(mesh_surface(mesh, label, cache=self.cache), rest)
-                    field = read_evaluated_field(
-                        mesh, layout, surface, self._request.nonfinite, label, self.cache
-                    )
+                    nonfinite = self._request.nonfinite
+                    field = read_evaluated_field(mesh, layout, surface, nonfinite, self.cache)
                     self._topologies[key] = rest, field
                 except RosyError as error:
                     problems[owner.name_full] = error
@@ -421,15 +420,14 @@ class SceneReader:
         tone = look_inputs.read_tone(mesh, owner, request.tone, cache)
         values = look_inputs.read_color_values(mesh, request.color_attribute, label, cache)
         if original.is_editmode:
-            return surface, self._edit_mode_field(mesh, owner, surface, label), tone, values
+            return surface, self._edit_mode_field(mesh, owner, surface), tone, values
         modifiers, undeformed = user_modifiers(owner), surface
         if modifiers or original.shape_keys:
             undeformed = mesh_surface(original, label, cache=cache)
         keeps_field = all(modifier.type != "NODES" for modifier in modifiers)
         if keeps_field and have_same_polygons(surface, undeformed):
-            field = read_mesh_field(
-                original, surface=undeformed, nonfinite=request.nonfinite, label=label, cache=cache
-            )
+            inputs = {"surface": undeformed, "nonfinite": request.nonfinite, "cache": cache}
+            field = read_mesh_field(original, **inputs)
             return self._with_rest(surface, undeformed.vertices), field, tone, values
         key = owner.name_full, topology_hash(mesh, original)
         topology = self._topologies.get(key)
@@ -443,9 +441,7 @@ class SceneReader:
         rest, field = topology
         return self._with_rest(surface, rest), field, tone, values
 
-    def _edit_mode_field(
-        self, mesh: Mesh, owner: Object, surface: Surface, label: str
-    ) -> RosyField:
+    def _edit_mode_field(self, mesh: Mesh, owner: Object, surface: Surface) -> RosyField:
         """Return the field of an object in edit mode. Only its evaluated mesh has attributes then."""
         original = owner.data
         name = attribute_name(original)
@@ -453,10 +449,10 @@ class SceneReader:
             raise lost_field_error(owner, name)
         if name not in mesh.attributes or not is_face_vector_field(mesh, name):
             raise RosyError(
-                f"{label}: in edit mode, only fields stored as vectors on faces can be read: leave edit mode (Tab)"
+                f"{surface.name}: in edit mode, only fields stored as vectors on faces can be read: leave edit mode (Tab)"
             )
         layout = FieldLayout(name, field_degree(original))
-        return read_evaluated_field(mesh, layout, surface, self._request.nonfinite, label)
+        return read_evaluated_field(mesh, layout, surface, self._request.nonfinite)
 
     def _with_rest(self, surface: Surface, rest: np.ndarray | None) -> Surface:
         """Return a surface with rest positions.

@@ -59,9 +59,7 @@ def main(handle: str, package: str) -> None:
                 BAKE_CACHE.clear()
                 POOL.close()
                 channel.connection.poll(None)
-            function, arguments = channel.receive()
-            answer = _answer(function, arguments, reporter)
-            del function, arguments
+            answer = _answer(reporter, *channel.receive())
             try:
                 channel.send(answer)
             except (pickle.PicklingError, TypeError, AttributeError) as error:
@@ -72,7 +70,7 @@ def main(handle: str, package: str) -> None:
 
 
 def _answer(
-    function: Callable[..., Any], arguments: tuple[Any, ...], reporter: _Reporter
+    reporter: _Reporter, function: Callable[..., Any], arguments: tuple[Any, ...]
 ) -> tuple[Any, ...]:
     """Call a function, and return a message for the parent with its result or its error.
 

@@ -22,15 +22,9 @@ import numpy as np
 from bpy.types import Object, Scene
 
 from ..compositor.look import Look, has_flow
+from ..core import file_io
 from ..core.cache import Cache, content_hash
 from ..core.errors import RosyError
-from ..core.file_io import (
-    check_folder,
-    check_writable,
-    remove_leftovers,
-    system_errors,
-    write_bytes,
-)
 from ..gpu.select import image_steps, select_device
 from ..projection.camera import Camera
 from ..rendering.marks import sequence_key
@@ -152,9 +146,7 @@ def bake_animation(
             yield Step(start, label)
             scene.frame_set(frame)
             try:
-                steps = _frame_steps(
-                    scene, frame, cameras, objects, look, size, settings, cache, workers
-                )
+                steps = _frame_steps(scene, cameras, objects, look, size, settings, cache, workers)
                 scene_data, drawn = yield from part(steps, start, stop, label)
             except RosyError as error:
                 raise RosyError(f"frame {frame}: {error}") from None
@@ -188,8 +180,8 @@ def _folder_settings(
     settings = pictures.read_output_settings(scene) if settings is None else settings
     if settings.folder is None:
         raise RosyError("frames need a folder: choose Output > Store > In a Folder")
-    check_folder(settings.folder)
-    remove_leftovers(settings.folder)
+    file_io.check_folder(settings.folder)
+    file_io.remove_leftovers(settings.folder)
     return settings
 
 
@@ -243,7 +235,6 @@ def _sequence_result(drawn: Sequence[_Frame], warnings: tuple[str, ...]) -> Sequ
 
 def _frame_steps(
     scene: Scene,
-    frame: int,
     cameras: Sequence[CameraSource] | None,
     objects: Sequence[Object] | None,
     look: Look | None,
@@ -254,24 +245,16 @@ def _frame_steps(
 ) -> Steps[tuple[SceneData, list[_Frame]]]:
     """Draw one frame from all cameras as part of a job.
 
-    Return what was read, and the frame of each camera. The frame `frame` is already the current frame of the
-    scene. If `cameras` is None, it is drawn from the camera that renders it. `cache` has the meshes and
+    Return what was read, and the frame of each camera. It is the current frame of the scene. If `cameras` is None, it is drawn from the camera that renders it. `cache` has the meshes and
     fields of earlier frames. The other parameters are as in `bake_animation`.
     """
-    look = read_look(scene.rosy) if look is None else look
+    frame, look = scene.frame_current, read_look(scene.rosy) if look is None else look
     # The look may be animated, and not every device can draw every method, so the device is chosen per frame.
     device = select_device(settings.device, look)
     sources = [frame_camera(scene, frame)] if cameras is None else list(cameras)
     depsgraph = scene_depsgraph(scene)
     views, scene_data = read_views(
-        scene,
-        depsgraph,
-        sources,
-        look,
-        objects=objects,
-        size=size,
-        reference_camera=frame_camera(scene, frame) if look.tone == "picture" else None,
-        cache=cache,
+        scene, depsgraph, sources, look, objects=objects, size=size, cache=cache
     )
     cache.evict_unused()
     scene_state = SceneState(scene, depsgraph, scene_data.mesh_states)
@@ -290,7 +273,7 @@ def _frame_steps(
         if not up_to_date:
             for output in (path, sidecar):
                 if os.path.lexists(output):
-                    check_writable(output)
+                    file_io.check_writable(output)
             # The G-buffer is kept if streaks drift, as it may be the same in the next frame.
             steps = image_steps(
                 view, device, settings.as_float, keep_gbuffers=has_flow(look), workers=workers
@@ -298,7 +281,7 @@ def _frame_steps(
             _, image_data = yield from part(steps, start, stop)
             sidecar.unlink(missing_ok=True)
             write_images({path: image_data})
-            write_bytes(sidecar, _sidecar_text(input_hash, path))
+            file_io.write_bytes(sidecar, _sidecar_text(input_hash, path))
         state = replace(state, device=device)
         drawn.append(_Frame(name, frame, path, view.camera, up_to_date, state))
     return scene_data, drawn
@@ -312,7 +295,7 @@ def _sidecar_text(input_hash: bytes, path: Path) -> bytes:
 
 def _own_bytes(path: Path) -> bytes:
     """Return the contents of a picture or a sidecar file. It is no input (`read_bytes`): it may be replaced."""
-    with system_errors(path, "cannot be read"):
+    with file_io.system_errors(path, "cannot be read"):
         return path.read_bytes()
 
 

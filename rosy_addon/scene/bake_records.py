@@ -253,13 +253,12 @@ def list_bakes(
     """
     recorded = [record for record in scene.rosy.bakes if record.image is not None]
     shown = {material for obj in baked_objects(scene) for material in shown_materials(obj)}
-    state = None
-    if recorded and for_panel:
-        state = SCENE_STATES.get(scene, scene_depsgraph(scene))
-    elif recorded:
+    if for_panel:
+        state = (
+            SCENE_STATES.get(scene, scene_depsgraph(scene)) if recorded else SCENE_STATES.clear()
+        )
+    else:
         state = SceneState(scene, scene_depsgraph(scene), {})
-    elif for_panel:
-        SCENE_STATES.clear()
     infos = [
         BakeInfo(
             camera_name(record),

@@ -195,15 +195,16 @@ def _field_from_corners(
     return RosyField(degree, np.where(normalize(normal).any(axis=1)[:, None], mean, 0.0))
 
 
+def vector_names(mesh: Mesh) -> list[str]:
+    """Return the names of the vector attributes of a mesh that users see, without positions."""
+    names = [each.name for each in mesh.attributes if each.data_type == VECTOR_TYPE]
+    positions = ("position", "rest_position")
+    return [name for name in names if name not in positions and not name.startswith(".")]
+
+
 def _attribute_hint(mesh: Mesh) -> str:
     """Return advice for a message: which vector attribute to choose, or to make a field if there are none."""
-    names = [
-        f"'{other.name}'"
-        for other in mesh.attributes
-        if other.data_type == VECTOR_TYPE
-        and other.name not in ("position", "rest_position")
-        and not other.name.startswith(".")
-    ]
+    names = [f"'{name}'" for name in vector_names(mesh)]
     return f": choose {' or '.join(names)}" if names else ": make or import a field"
 
 

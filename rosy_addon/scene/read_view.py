@@ -29,7 +29,6 @@ def read_views(
     *,
     objects: Sequence[Object] | None = None,
     size: tuple[int, int] | None = None,
-    reference_camera: Object | None = None,
     cache: Cache | None = None,
 ) -> tuple[tuple[ViewInput, ...], SceneData]:
     """Read a scene as the input of a renderer, for one or more cameras. Each mesh is read only once.
@@ -48,8 +47,6 @@ def read_views(
         hide what is behind them.
     size : (int, int), optional
         Width and height in pixels; see `resolve_camera`.
-    reference_camera : bpy.types.Object, optional
-        The camera of the reference render. By default the active camera of the scene.
     cache : Cache, optional
         Keeps meshes, fields and tones that have not changed since an earlier reading.
 
@@ -77,7 +74,7 @@ def read_views(
     scene_data = read_scene(depsgraph, objects, read_request(scene, look), cache)
     reference = None
     if look.tone == "picture":
-        reference = load_reference(scene, depsgraph, reference_camera or render_camera(scene))
+        reference = load_reference(scene, depsgraph, render_camera(scene))
     instances = tuple(scene_data.instances)
     drift = drift_in_scene(scene, look, scene.frame_current_final)
     views = []

@@ -335,7 +335,7 @@ class SceneReader:
         nonfinite = self._request.nonfinite
         try:
             with temp_attributes(depsgraph, objects, nonfinite, self.cache, errors) as layouts:
-                self._read_topologies(depsgraph, layouts, problems)
+                self._read_topologies(depsgraph, layouts, errors)
         except MemoryError as error:
             problems = dict.fromkeys(problems, error)
         problems |= {obj.name_full: error for obj, error in errors.items()}
@@ -345,14 +345,11 @@ class SceneReader:
                 self._topologies.setdefault(key, problems[key[0]])
 
     def _read_topologies(
-        self,
-        depsgraph: Depsgraph,
-        layouts: Mapping[Object, FieldLayout],
-        problems: dict[str, Exception],
+        self, depsgraph: Depsgraph, layouts: Mapping[Object, FieldLayout], errors: Errors
     ) -> None:
-        """Add rest positions and fields of evaluated meshes to `_topologies`, or errors to `problems`.
+        """Add rest positions and fields of evaluated meshes to `_topologies`, or errors to `errors`.
 
-        `layouts` holds the field's attributes by original object, `problems` errors by full name.
+        `layouts` holds the field's attributes by original object.
         """
         for instance in depsgraph.object_instances:
             obj, owner = instance.object, instance.object.original
@@ -373,7 +370,7 @@ class SceneReader:
                     field = read_evaluated_field(mesh, layout, surface, nonfinite, self.cache)
                     self._topologies[key] = rest, field
                 except RosyError as error:
-                    problems[owner.name_full] = error
+                    errors[owner] = error
 
     def _mesh_data(self, obj: Object, owner: Object, draws_field: bool) -> _MeshData | None:
         """Return the data of the mesh of the evaluated object `obj`, whose original object is `owner`.
@@ -381,7 +378,7 @@ class SceneReader:
         Return None if it has no faces, has an error, or is left for a later call.
         """
         pointer, request = obj.data.as_pointer(), self._request
-        key = owner.name_full, pointer, look_inputs.tone_image_key(owner, request.tone), draws_field
+        key = owner.name_full, pointer, look_inputs.tone_image_key(owner, request), draws_field
         if key in self._meshes:
             return self._meshes[key]
         if draws_field and owner.name_full in self.errors:
@@ -417,7 +414,7 @@ class SceneReader:
         request, cache, label = self._request, self.cache, f"object '{owner.name}'"
         original = owner.data
         surface = mesh_surface(mesh, label, cache=cache)
-        tone = look_inputs.read_tone(mesh, owner, request.tone, cache)
+        tone = look_inputs.read_tone(mesh, owner, request, cache)
         values = look_inputs.read_color_values(mesh, request.color_attribute, label, cache)
         if original.is_editmode:
             return surface, self._edit_mode_field(mesh, owner, surface), tone, values

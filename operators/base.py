@@ -158,9 +158,7 @@ class RosyOperator:
                 self.report({"WARNING"}, as_sentence(message))
         self._reported |= {*messages}
 
-    def store_fields(
-        self, context: Context, fields: dict[Mesh, RosyField], name: str | None = None
-    ) -> None:
+    def store_fields(self, context: Context, fields: dict[Mesh, RosyField], name: str = "") -> None:
         """Store fields on meshes with `assign_fields`, and apply the preferences to the scene.
 
         Shown singularities are updated. With the first field of a scene, the 3D view is made live if the

@@ -127,7 +127,7 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
         for mesh in self.meshes:
             surface = mesh_surface(mesh)
             try:
-                settings = self._generator_settings(context, mesh, surface)
+                settings = self._settings_for(context, mesh, surface)
             except NoFeaturesError as error:
                 errors.append(error)
                 continue
@@ -162,9 +162,7 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
         target = f"'{names[0]}'" if len(made) == 1 else counted(len(made), "mesh", "meshes")
         return f"Made a field of degree {self.degree} on {target}{notes and ': '}{notes}"
 
-    def _generator_settings(
-        self, context: Context, mesh: Mesh, surface: Surface
-    ) -> GeneratorSettings:
+    def _settings_for(self, context: Context, mesh: Mesh, surface: Surface) -> GeneratorSettings:
         """Return the settings of the generator for a mesh. They contain the guides, read from the scene."""
         owner = next(obj for obj in self.objects if obj.data == mesh)
         kind_guides = {"features": {"EDGES"}, "uv": {"UV"}, "guided": self.guides}

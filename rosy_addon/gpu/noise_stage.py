@@ -17,7 +17,7 @@ from ..compositor.wobble import has_wobble
 from . import lookup_tables
 from .frame import Frame
 from .passes import ComputePass
-from .uniforms import surface_cell_uniforms, surface_noise_uniforms, wobble_uniforms
+from .uniforms import noise_uniforms, surface_cell_uniforms, wobble_uniforms
 
 
 def feature_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
@@ -76,7 +76,7 @@ def _surface_noise(frame: Frame, settings: NoiseSettings, name: str, detail: flo
     """
     raw_noise = frame.image("raw_noise")
     frame.clear(raw_noise)
-    shared_uniforms = surface_noise_uniforms(settings, frame.look, detail)
+    shared_uniforms = noise_uniforms(settings, frame.look, detail)
     names = [item.instance.surface.name for item in frame.items]
     hashes = instance_hashes(names).view(np.int32)
     for instance_id, item in frame.fields_in_view():

@@ -89,16 +89,14 @@ def _coverage(frame: Frame, prepared: dict[Hashable, Any]) -> Any:
     return textures["outline_coverage"]
 
 
-def _mark_creases(
-    frame: Frame, instance_id: int, found: OutlineTextures, crease_marks: Any
-) -> None:
+def _mark_creases(frame: Frame, instance_id: int, found: OutlineTextures, marks: Any) -> None:
     """Mark the pixels next to the visible creases of an instance in the image `crease_marks`.
 
     `found` has the creases of the instance.
     """
     columns = min(found.crease_count, CREASES_PER_ROW)
     box = 0, 0, columns, -(-found.crease_count // columns)
-    textures = {"crease_points": found.crease_points, "crease_marks": crease_marks}
+    textures = {"crease_points": found.crease_points, "crease_marks": marks}
     uniforms = {
         **clip_uniforms(frame.items[instance_id], frame.camera, frame.view.clip_planes),
         **frame.instance_uniforms(instance_id),

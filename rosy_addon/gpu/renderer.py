@@ -201,7 +201,7 @@ class GpuRenderer(ViewportRenderer):
         return replace(frame, samples=samples)
 
     def composite(
-        self, texture: Any, items: Sequence[DrawItem], view: ViewInput, opacity: float = 1.0
+        self, texture: Any, items: list[DrawItem], view: ViewInput, opacity: float
     ) -> None:
         """Draw the surfaces into the current 3D view, with the picture on them."""
         batches = [

@@ -82,7 +82,9 @@ def look_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
     _, crossing = streak_moments(*streak_args(look), kind.line_count, kernel=kernel)
     inks = inks_of(look.look, ink_count(look.look, kind.line_count, kind.family_count))
     statistics = streak_statistics.look_streak_statistics(look) if is_hatched(look) else None
-    ends = magnitude_range(look)
+    ends, grain_depth = magnitude_range(look), 0.0
+    if statistics is not None and hatching.has_paper_grain(look):
+        grain_depth = PAPER_GRAIN_STRENGTH * look.paper_grain / statistics.paper_grain_std
     return {
         **covering_uniforms(kind),
         "kernel": defines.KERNELS[kernel],
@@ -111,7 +113,7 @@ def look_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
         "break_std": statistics.break_std if statistics else 1.0,
         "disc_std": statistics.disc_std if statistics else 1.0,
         "wobble_strength": look.wobble if has_wobble(look) else 0.0,
-        "paper_grain_depth": _paper_grain_depth(look, statistics),
+        "paper_grain_depth": grain_depth,
         "paper_grain_channels": PAPER_GRAIN_CHANNELS if look.anchor == "surface" else 0,
         "paper_grain_shift": line_offset(look.line_width),
         # These are not `#define`s: compilers reorder sums with constants, which would change the result.
@@ -138,14 +140,6 @@ def _flow_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
         "flow_shifts": (*channel_shifts(look.flow_phase, look.flow_distance), 0.0),
         "flow_weights": (*channel_weights(look.flow_phase), 0.0),
     }
-
-
-def _paper_grain_depth(
-    look: PixelLook, statistics: streak_statistics.StreakStatistics | None
-) -> float:
-    if statistics is None or not hatching.has_paper_grain(look):
-        return 0.0
-    return PAPER_GRAIN_STRENGTH * look.paper_grain / statistics.paper_grain_std
 
 
 def light_uniforms(look: Look, lights: Sequence[Light]) -> list[dict[str, Any]]:
@@ -256,9 +250,7 @@ def even_line_uniforms(look: PixelLook, item: DrawItem, camera: Camera) -> dict[
     }
 
 
-def surface_noise_uniforms(
-    settings: NoiseSettings, look: PixelLook, detail: float
-) -> dict[str, Any]:
+def noise_uniforms(settings: NoiseSettings, look: PixelLook, detail: float) -> dict[str, Any]:
     """Return the uniforms of surface noise that all surfaces share.
 
     Parameters

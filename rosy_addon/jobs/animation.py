@@ -126,7 +126,11 @@ def bake_animation(
         For the reasons of `bake` (the message then begins with the frame number), if there is no folder, or
         if a picture cannot be written.
     """
-    settings = _folder_settings(scene, settings)
+    settings = pictures.read_output_settings(scene) if settings is None else settings
+    if settings.folder is None:
+        raise RosyError("frames need a folder: choose Output > Store > In a Folder")
+    file_io.check_folder(settings.folder)
+    file_io.remove_leftovers(settings.folder)
     frames = list(frames)
     depsgraph = scene_depsgraph(scene)
     targets = field_objects(depsgraph.view_layer) if objects is None else list(objects)
@@ -168,21 +172,6 @@ def bake_animation(
                 pictures.apply_sequence(scene, scene_data, result.camera, *inputs)
             update_camera_planes(scene)
         return results
-
-
-def _folder_settings(
-    scene: Scene, settings: pictures.OutputSettings | None
-) -> pictures.OutputSettings:
-    """Return the output settings (by default the scene's) after a check that their folder can be written to.
-
-    Temporary files that an interrupted job has left in the folder are removed.
-    """
-    settings = pictures.read_output_settings(scene) if settings is None else settings
-    if settings.folder is None:
-        raise RosyError("frames need a folder: choose Output > Store > In a Folder")
-    file_io.check_folder(settings.folder)
-    file_io.remove_leftovers(settings.folder)
-    return settings
 
 
 @contextmanager

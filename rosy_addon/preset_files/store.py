@@ -213,9 +213,7 @@ def read_preset(path: str | os.PathLike[str]) -> Preset:
         raise RosyError(f"{path}: {reason}") from None
 
 
-def write_preset(
-    path: str | os.PathLike[str], preset: Preset, *, follow_links: bool = False
-) -> None:
+def write_preset(path: Path, preset: Preset, *, follow_links: bool = False) -> None:
     """Write a preset file with the settings that differ from the default look.
 
     `follow_links` says whether the target of a link is replaced, and not the link itself.

@@ -268,7 +268,7 @@ def list_bakes(
             record.material in shown,
             record.frames,
             is_texture=record.view == TEXTURE_VIEW,
-            **_present_reason(scene, record, state, automatic_device),
+            **_present_reason(record, state, automatic_device),
         )
         for record in recorded
     ]
@@ -282,20 +282,16 @@ def list_bakes(
 
 
 def _present_reason(
-    scene: Scene,
-    record: PropertyGroup,
-    state: SceneState,
-    automatic_device: Callable[[Look], str] | None,
+    record: PropertyGroup, state: SceneState, automatic_device: Callable[[Look], str] | None
 ) -> dict[str, str]:
     """Return why a picture is out of date, or why this is not known, as a keyword argument of `BakeInfo`.
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     record : bpy.types.PropertyGroup
         The record of the picture.
     state : SceneState
-        The present state of the scene.
+        The present state of its scene.
     automatic_device : callable or None
         Returns the device that draws a look if the scene's device is "auto". None: the device that drew the
         picture is assumed.
@@ -306,6 +302,7 @@ def _present_reason(
         One item, with the key ``stale_reason`` or ``unknown_reason``. An empty ``stale_reason`` says that the
         picture is up to date.
     """
+    scene = record.id_data
     text, frame = record.state, scene.frame_current
     if record.frames and record.frame_states:
         entry = record.frame_states.get(str(frame))

@@ -198,7 +198,7 @@ def temp_attributes(
         for obj in objects:
             mesh = obj.data
             try:
-                layouts[obj] = _prepare_field(obj, nonfinite, temp_meshes, cache)
+                layouts[obj] = _layout_of(obj, nonfinite, temp_meshes, cache)
             except RosyError as error:
                 errors[obj] = error
                 continue
@@ -228,9 +228,7 @@ def temp_attributes(
             depsgraph.update()
 
 
-def _prepare_field(
-    obj: Object, nonfinite: str, temp_meshes: list[Mesh], cache: Cache
-) -> FieldLayout:
+def _layout_of(obj: Object, nonfinite: str, temp_meshes: list[Mesh], cache: Cache) -> FieldLayout:
     """Return the layout of the field of an object as vectors on faces; add temporary attributes if needed.
 
     If attributes are added to the mesh of the object, the mesh is appended to `temp_meshes`. `nonfinite` is

@@ -28,10 +28,10 @@ from .field_attributes import (
     attribute_name,
     check_attribute_type,
     describe_type,
+    ensure_attribute,
     field_degree,
     field_values,
     follow_mesh,
-    get_or_create_attribute,
     is_face_vector_field,
     store_attribute,
     store_rest_shape,
@@ -219,9 +219,7 @@ STORAGE_FORMS = {
 }
 
 
-def assign_fields(
-    fields: dict[Mesh, RosyField], name: str | None = None, form: str = "VECTOR"
-) -> None:
+def assign_fields(fields: dict[Mesh, RosyField], name: str = "", form: str = "VECTOR") -> None:
     """Store fields on meshes: on all of them, or on none if one field cannot be stored.
 
     Parameters
@@ -349,7 +347,7 @@ def _check_storable(mesh: Mesh, field: RosyField, name: str, form: str) -> None:
         names = [f"dir{index}" for index in range(field.degree)]
     for new_name in names:
         is_new = new_name not in mesh.attributes
-        attribute = get_or_create_attribute(mesh, new_name, data_type)
+        attribute = ensure_attribute(mesh, new_name, data_type)
         if is_new:
             mesh.attributes.remove(attribute)
 

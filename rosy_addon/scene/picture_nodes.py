@@ -231,9 +231,7 @@ def image_node(material: Material) -> Node | None:
     return first_node(material.node_tree, "ShaderNodeTexImage")
 
 
-def set_picture_modifier(
-    obj: Object, node_group: NodeTree, pictures: Container[Material] = ()
-) -> None:
+def set_picture_modifier(obj: Object, group: NodeTree, pictures: Container[Material] = ()) -> None:
     """Set the node group of RoSy's modifier, and move the modifier to the end of the object's stack.
 
     The previous group may have projections of other pictures. A projection is copied to the new group if its
@@ -242,18 +240,18 @@ def set_picture_modifier(
     existing = rosy_modifiers(obj)
     modifier = existing[0] if existing else obj.modifiers.new(MODIFIER_NAME, "NODES")
     modifier.show_expanded = False
-    old_group, modifier.node_group = modifier.node_group, node_group
+    old_group, modifier.node_group = modifier.node_group, group
     for extra in existing[1:]:
         obj.modifiers.remove(extra)
     obj.modifiers.move(obj.modifiers.find(modifier.name), len(obj.modifiers) - 1)
-    if old_group is not None and old_group != node_group:
-        shown_material = material_of_group(node_group)
+    if old_group is not None and old_group != group:
+        shown_material = material_of_group(group)
         for material, matrix in projections_of_group(old_group).items():
             if material != shown_material and material in pictures:
-                _add_projection(node_group, material, matrix)
+                _add_projection(group, material, matrix)
         if not old_group.users:
             bpy.data.node_groups.remove(old_group)
-    node_group.name = f"RoSy {obj.name}"
+    group.name = f"RoSy {obj.name}"
 
 
 def applied_materials(data: ID | None) -> list[Material]:

@@ -172,7 +172,7 @@ class SceneState:
         output = _used_output(scene.rosy, OUTPUT_PROPERTIES) | {"relight": is_relit}
         if is_frame:
             del output["placement"]  # frames always fill the frame of the camera
-        occluders = self._relevant_occluders(camera, settings["shadows"])
+        occluders = self._used_occluders(camera, settings["shadows"])
         has_reference = settings["tone"] == "picture"
         return PictureState(
             look=settings,
@@ -199,9 +199,7 @@ class SceneState:
             self._texture_states[key] = read_texture_state(scene, depsgraph, obj)
         return self._texture_states[key]
 
-    def _relevant_occluders(
-        self, camera: Camera | None, casts_shadows: bool
-    ) -> dict[str, _Instances]:
+    def _used_occluders(self, camera: Camera | None, casts_shadows: bool) -> dict[str, _Instances]:
         """Return the objects without a field that may change the picture, by name.
 
         If shadows are drawn, or no picture can be drawn from the camera (None), all of them are returned.

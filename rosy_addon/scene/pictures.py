@@ -193,8 +193,8 @@ def apply_picture(
     with datablocks.rollback_on_error() as track:
         image = track(new_image(name, image_data, is_color=hatching is None, stem=stem))
         material = picture_nodes.new_material(image, camera, track, settings, view.look, hatching)
-        matrices = _object_to_clip_matrices(scene_data, camera)
-        node_groups = _new_groups(material, matrices, track)
+        matrices = _clip_matrices(scene_data, camera)
+        node_groups = {obj: track(new_group(material, matrix)) for obj, matrix in matrices.items()}
     size, key = image_size(image_data), picture_key(view.look, picture)
     store_record(scene, camera.name, image, material, source, {None: state}, size, key)
     _show_on_objects(node_groups)
@@ -246,7 +246,7 @@ def apply_sequence(
         image.name = f"{NAME_PREFIX}{name}"
         material = picture_nodes.new_material(image, camera, track, settings, look)
         picture_nodes.set_sequence_frames(material, min(states), max(states))
-        node_groups = _new_groups(material, dict.fromkeys(scene_data.objects), track)
+        node_groups = {obj: track(new_group(material, None)) for obj in scene_data.objects}
     store_record(scene, name, image, material, source, states, camera.size, key)
     _show_on_objects(node_groups)
 
@@ -301,7 +301,7 @@ def apply_texture(
             hatching = texture_nodes.Hatching(look, texture.line_count)
             add_shader = partial(texture_nodes.hatching_shader, hatching=hatching, track=track)
         material = track(texture_nodes.new_texture_material(name, image, uv_map, add_shader))
-        node_groups = _new_groups(material, {obj: None}, track)
+        node_groups = {obj: track(new_group(material, None))}
     store_record(scene, obj.name, image, material, obj, {None: state}, image_size(first))
     # The object can still show its pictures, but no longer an earlier texture.
     _show_on_objects(node_groups, keep_textures=False)
@@ -320,17 +320,6 @@ def _image_stem(settings: OutputSettings, name: str, kind: str = "camera") -> Pa
     kind is part of the name of the file (`picture_stem`).
     """
     return None if settings.folder is None else settings.folder / picture_stem(name, kind)
-
-
-def _new_groups(
-    material: Material, matrices: Mapping[Object, np.ndarray | None], track: datablocks.Track
-) -> dict[Object, NodeTree]:
-    """Create the node groups that show a picture on objects; see `new_group`.
-
-    `matrices` holds each object's (4, 4) matrix from object space to clip space, or None. `track` is called
-    with each new group.
-    """
-    return {obj: track(new_group(material, matrix)) for obj, matrix in matrices.items()}
 
 
 def _show_on_objects(node_groups: Mapping[Object, NodeTree], *, keep_textures: bool = True) -> None:
@@ -377,9 +366,7 @@ def show_bake(scene: Scene, camera: str) -> None:
     update_keys(scene)
 
 
-def _object_to_clip_matrices(
-    scene_data: SceneData, camera: Camera
-) -> dict[Object, np.ndarray | None]:
+def _clip_matrices(scene_data: SceneData, camera: Camera) -> dict[Object, np.ndarray | None]:
     """Return the (4, 4) object-to-clip matrix of each object; None for objects with several instances."""
     matrices: dict[Object, np.ndarray | None] = {}
     for instance, owner in zip(scene_data.instances, scene_data.objects, strict=False):

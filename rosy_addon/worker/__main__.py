@@ -69,9 +69,7 @@ def main(handle: str, package: str) -> None:
         os._exit(0)
 
 
-def _answer(
-    reporter: _Reporter, function: Callable[..., Any], arguments: tuple[Any, ...]
-) -> tuple[Any, ...]:
+def _answer(reporter: _Reporter, function: Callable[..., Any], arguments: Any) -> tuple[Any, ...]:
     """Call a function, and return a message for the parent with its result or its error.
 
     It is ("result", result) or ("error", exception, text of the traceback).

@@ -186,10 +186,8 @@ def _forwarded_args(options: Options) -> list[str]:
         # The processes that draw frames already use all cores.
         "workers": [options.workers or 1],
     }
-    arguments = [
-        f"--{name}={value}" for name in values for value in values[name] if value is not None
-    ]
-    return [*arguments, "--all-cameras"] if options.all_cameras else arguments
+    words = [f"--{name}={value}" for name in values for value in values[name] if value is not None]
+    return [*words, "--all-cameras"] if options.all_cameras else words
 
 
 def _forwarded_preset(path: Path) -> str:

@@ -102,13 +102,11 @@ def _high_passed(frame: Frame, raw_noise: Any, high_pass: float, name: str) -> A
     if high_pass:
         radius = box_radius(BLUR_FACTOR * high_pass)
         for index, axis in enumerate(((1, 0), (0, 1)) * 3):
-            textures = {
-                "source_image": blurred,
-                "blurred_image": frame.image(f"blurred {index % 2}"),
-            }
+            image = frame.image(f"blurred {index % 2}")
+            textures = {"source_image": blurred, "blurred_image": image}
             uniforms = {"blur_axis": axis, "radius": radius}
             frame.run(ComputePass("box_blur"), frame.box, textures, uniforms, pause=0.5)
-            blurred = textures["blurred_image"]
+            blurred = image
     noise = frame.image(name)
     textures = {"raw_noise": raw_noise, "blurred_noise": blurred, "noise": noise}
     uniforms = {"high_passed": int(high_pass > 0)}

@@ -91,8 +91,6 @@ def bake(
         picture, image_data = yield from part(steps, start, stop)
         drawings.append((view, picture, image_data, source, replace(state, device=device)))
     yield Step(0.97, "applying the pictures")
-    results = [
-        pictures.apply_picture(scene, scene_data, settings, *drawing) for drawing in drawings
-    ]
+    results = [pictures.apply_picture(scene, scene_data, settings, *one) for one in drawings]
     update_camera_planes(scene)
     return results

@@ -309,9 +309,7 @@ def rename_preset(key: str, name: str, description: str, user_folder: Path) -> s
     """
     path = _user_file(key, user_folder)
     preset = _validated(read_preset(path)._replace(name=name, description=description))
-    target = (
-        path if preset_key(name) == path.stem else _target_path(preset, user_folder, replace=False)
-    )
+    target = path if preset_key(name) == path.stem else _target_path(preset, user_folder, False)
     write_preset(target, preset)
     if target != path:
         if preview_path(path).is_file():

@@ -253,12 +253,11 @@ def list_bakes(
     """
     recorded = [record for record in scene.rosy.bakes if record.image is not None]
     shown = {material for obj in baked_objects(scene) for material in shown_materials(obj)}
+    depsgraph = scene_depsgraph(scene)
     if for_panel:
-        state = (
-            SCENE_STATES.get(scene, scene_depsgraph(scene)) if recorded else SCENE_STATES.clear()
-        )
+        state = SCENE_STATES.get(scene, depsgraph) if recorded else SCENE_STATES.clear()
     else:
-        state = SceneState(scene, scene_depsgraph(scene), {})
+        state = SceneState(scene, depsgraph, {})
     infos = [
         BakeInfo(
             camera_name(record),

@@ -100,11 +100,9 @@ def _check_tangents_storable(mesh: Mesh, name: str) -> None:
 
 def other_field_names(mesh: Mesh) -> list[str]:
     """Return the names of vector attributes of a mesh that may hold a field other than its own."""
-    no_fields, names = (
-        (attribute_name(mesh), GUIDE_ATTRIBUTE, TANGENT_ATTRIBUTE),
-        vector_names(mesh),
-    )
-    return [name for name in names if name not in no_fields and not re.fullmatch(r"dir\d+", name)]
+    no_fields = (attribute_name(mesh), GUIDE_ATTRIBUTE, TANGENT_ATTRIBUTE)
+    names = [name for name in vector_names(mesh) if not re.fullmatch(r"dir\d+", name)]
+    return [name for name in names if name not in no_fields]
 
 
 @job

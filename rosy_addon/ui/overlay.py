@@ -87,10 +87,8 @@ def _read_again(*_: Any) -> None:
 
 #: Handlers of Blender's events while something is shown, by the names of their lists in `bpy.app.handlers`.
 #: Objects of a file that is loaded may have the names of those before.
-_APP_HANDLERS = {
-    **dict.fromkeys(("undo_post", "redo_post"), _read_again),
-    "load_pre": lambda *_: hide(),
-}
+_APP_HANDLERS = dict.fromkeys(("undo_post", "redo_post"), _read_again)
+_APP_HANDLERS["load_pre"] = lambda *_: hide()
 
 
 def shown(object_name: str) -> Singularities | None:

@@ -323,9 +323,7 @@ def _grown_outline(outline: np.ndarray, grown: float) -> np.ndarray:
     """
     tip, barb, notch = outline
     # The sides run counter-clockwise from the tip, so their right sides are outside.
-    side, back = (
-        np.arctan2(-step[0], step[1]) % (2 * np.pi) for step in (barb - tip, notch - barb)
-    )
+    side, back = (np.arctan2(-way[0], way[1]) % (2 * np.pi) for way in (barb - tip, notch - barb))
     half = [tip + grown * _unit_vectors(0.0, side), barb + grown * _unit_vectors(side, back)]
     half = np.concatenate([*half, [notch + (grown / np.cos(back), 0.0)]])
     return np.concatenate([half, (half * (1, -1))[-2:0:-1]])

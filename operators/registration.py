@@ -2,22 +2,46 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from pkgutil import iter_modules
-
 import bpy
 
 from ..rosy_addon.ui.comb_brush import VIEW3D_TOOL_rosy_comb, VIEW3D_TOOL_rosy_comb_sculpt
 from ..rosy_addon.ui.singularity_handles import VIEW3D_TOOL_rosy_singularities
 from ..rosy_addon.viewport import brush_mouse, session
-from . import __path__ as folders
-from . import modal_job
+from . import (
+    bake,
+    bake_texture,
+    field_comb,
+    field_compare,
+    field_convert,
+    field_files,
+    field_generate,
+    modal_job,
+    presets,
+    singularities,
+    strokes,
+    turntable,
+    viewport,
+)
 
 #: Blender's base classes. Classes that derive from one of them are registered.
 REGISTRABLE = (bpy.types.Operator, bpy.types.PropertyGroup, bpy.types.FileHandler)
 
-#: All modules of this package.
-MODULES = [import_module(f".{info.name}", __package__) for info in iter_modules(folders)]
+#: Modules with operators, in the order of registration.
+MODULES = (
+    field_generate,
+    field_convert,
+    field_files,
+    singularities,
+    field_comb,
+    field_compare,
+    strokes,
+    bake,
+    bake_texture,
+    turntable,
+    viewport,
+    presets,
+)
+
 
 #: The classes of these modules to register, in the order of their definition. Mixins are not among them.
 CLASSES = tuple(

@@ -8,16 +8,35 @@ from __future__ import annotations
 import operator
 from collections.abc import Sequence
 from functools import cache
-from importlib import import_module
+from types import ModuleType
 
 import numpy as np
 
-from ..compositor import even_lines, image_noise, surface_noise, wobble
+from ..compositor import (
+    compose,
+    covering,
+    drifting_averages,
+    even_lines,
+    flow,
+    hatching,
+    image_noise,
+    outline,
+    streak_statistics,
+    surface_noise,
+    wobble,
+)
 from ..compositor.filter_kernel import Kernel
 from ..compositor.undirected import SAMPLE_COUNT as DISC_SAMPLE_COUNT
 from ..core.color import REC709_LUMINANCE
-from ..projection import pixel_coverage
+from ..projection import (
+    crease_pixels,
+    pixel_coverage,
+    pixel_neighbors,
+    shadow_maps,
+    surface_sampling,
+)
 from ..projection.rest_coordinates import BARYCENTRIC_RANGE
+from . import mesh_buffers, surface_records
 
 #: The numbers of the filter kernels (`filter_kernel`) in shaders.
 KERNELS: dict[Kernel, int] = {"box": 0, "taper": 1, "ramp": 2}
@@ -44,38 +63,32 @@ EDGE_BIT = 4
 REDUCE_BLOCK = 16
 
 #: Constants that have the same name in shaders as in their Python module, by module.
-SHARED_NAMES: dict[str, tuple[str, ...]] = {
-    "..compositor.compose": ("COLOR_CONTRAST",),
-    "..compositor.covering": ("ALL_NEIGHBORS",),
-    "..compositor.drifting_averages": ("MIN_EFFECTIVE_SAMPLES",),
-    "..compositor.even_lines": ("COARSE_RATIO", "MAX_BREAK_AMOUNT"),
-    "..compositor.flow": ("ONE_WAY_COSINE",),
-    "..compositor.hatching": ("MIN_COVERAGE", "PIXEL_SOFTNESS", "RANK_BLEND"),
-    "..compositor.image_noise": ("NOISE_MEAN",),
-    "..compositor.outline": (
+SHARED_NAMES: dict[ModuleType, tuple[str, ...]] = {
+    compose: ("COLOR_CONTRAST",),
+    covering: ("ALL_NEIGHBORS",),
+    drifting_averages: ("MIN_EFFECTIVE_SAMPLES",),
+    even_lines: ("COARSE_RATIO", "MAX_BREAK_AMOUNT"),
+    flow: ("ONE_WAY_COSINE",),
+    hatching: ("MIN_COVERAGE", "PIXEL_SOFTNESS", "RANK_BLEND"),
+    image_noise: ("NOISE_MEAN",),
+    outline: (
         *("DEPTH_JUMP", "MIN_STEP", "STEP_RATIO", "PART_BORDER", "EMPTY_BORDER"),
         *("MIN_MARK_LENGTH", "FULL_MARK_LENGTH"),
     ),
-    "..compositor.streak_statistics": ("NO_INK", "WOBBLE_BREAKS"),
-    "..compositor.surface_noise": ("OCTAVES", "OCTAVE_OFFSET"),
-    "..compositor.wobble": ("WAVE_COUNT",),
-    "..projection.crease_pixels": ("LINE_TOLERANCE", "MIN_RELATIVE_DEPTH"),
-    "..projection.pixel_neighbors": ("MAX_SLOPE", "DEPTH_TOLERANCE", "SLOPE_TOLERANCE"),
-    "..projection.shadow_maps": ("PCF_WIDTH",),
-    "..projection.surface_sampling": ("MIN_FACING_COSINE",),
-    ".mesh_buffers": (
-        *("ROW_BITS", "POSITION_TEXEL", "NORMAL_TEXEL", "MAGNITUDE_TEXEL", "VALUE_TEXEL"),
-    ),
-    ".surface_records": ("MAX_TREE_DEPTH",),
+    streak_statistics: ("NO_INK", "WOBBLE_BREAKS"),
+    surface_noise: ("OCTAVES", "OCTAVE_OFFSET"),
+    wobble: ("WAVE_COUNT",),
+    crease_pixels: ("LINE_TOLERANCE", "MIN_RELATIVE_DEPTH"),
+    pixel_neighbors: ("MAX_SLOPE", "DEPTH_TOLERANCE", "SLOPE_TOLERANCE"),
+    shadow_maps: ("PCF_WIDTH",),
+    surface_sampling: ("MIN_FACING_COSINE",),
+    mesh_buffers: ("ROW_BITS", "POSITION_TEXEL", "NORMAL_TEXEL", "MAGNITUDE_TEXEL", "VALUE_TEXEL"),
+    surface_records: ("MAX_TREE_DEPTH",),
 }
 
 #: Constants of shaders, by their names there: floats, integers and vectors.
 CONSTANTS: dict[str, float | int | Sequence[float]] = {
-    **{
-        name: getattr(import_module(module, __package__), name)
-        for module, names in SHARED_NAMES.items()
-        for name in names
-    },
+    **{name: getattr(module, name) for module, names in SHARED_NAMES.items() for name in names},
     "MIN_CONTRAST_SCALE": surface_noise.CONTRAST_SCALE_RANGE[0],
     "MAX_CONTRAST_SCALE": surface_noise.CONTRAST_SCALE_RANGE[1],
     "MIN_BARYCENTRIC": float(BARYCENTRIC_RANGE[0]),

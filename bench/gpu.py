@@ -10,7 +10,6 @@ Blender nor a display.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -28,7 +27,7 @@ from rosy_addon.rendering.view_input import ViewInput
 from rosy_addon.worker.job import run
 
 from . import cases
-from .timing import peer
+from .timing import peer, write_json
 
 SIZES = ("512x512", "1920x1080", "3840x2160")
 
@@ -77,17 +76,15 @@ def frame_times(
     """
     renderer = GpuRenderer(device)
     items = renderer.upload([cases.instance(TRIANGLES, degree)], "smooth")
-    number = 0
+    azimuths = iter(np.arange(10_000) * AZIMUTH_STEP)
 
     def draw() -> tuple[float, float]:
-        nonlocal number
-        camera = cases.camera(*size, azimuth=number * AZIMUTH_STEP)
+        camera = cases.camera(*size, azimuth=next(azimuths))
         timer = device.context.query(time=True)
         start = time.perf_counter()
         with timer:
             draw_texture(renderer, items, camera, look)
         device.finish()
-        number += 1
         return time.perf_counter() - start, timer.elapsed * 1e-9
 
     draw()
@@ -138,8 +135,7 @@ def main() -> None:
             print(f"{size:>10}  {name:44}", *(f"{n:8.2f}" for n in numbers), flush=True)
     if options.json:
         report = {"renderer": device.name, "triangles": TRIANGLES, "rows": rows}
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+        write_json(options.json, report)
 
 
 if __name__ == "__main__":

@@ -47,7 +47,8 @@ def _list(entries: list[dict]) -> list[list[str]]:
     """Return the rows of a table with one row per case, after the header."""
     rows = [["case", "ratio", "target", "amounts"]]
     for entry in entries:
-        ratio, amounts = f"{entry['ratio']:.2f}", (_short(amount) for amount in entry["amounts"])
+        ratio = f"{entry['ratio']:.2f}"
+        amounts = (f"{n:.0f}" if n >= 100 else f"{n:.3g}" for n in entry["amounts"])
         if entry["low"] < entry["high"]:
             ratio += f" ({entry['low']:.2f} to {entry['high']:.2f})"
         amount = f"{' / '.join(amounts)} {entry['unit']}".strip()
@@ -73,10 +74,6 @@ def _target(entry: dict) -> str:
     sign = 1 if entry["higher_is_better"] else -1
     missed = ": **missed**" if sign * entry["ratio"] < sign * entry["target"] else ""
     return f"{'≥' if sign > 0 else '≤'} {entry['target']:g}{missed}"
-
-
-def _short(amount: float) -> str:
-    return f"{amount:.0f}" if amount >= 100 else f"{amount:.3g}"
 
 
 if __name__ == "__main__":

@@ -13,6 +13,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from .timing import write_json
+
 ROOT = Path(__file__).resolve().parents[1]
 
 #: The scripts, in the order in which they run.
@@ -39,8 +41,7 @@ def main() -> None:
         print(f"--- {name}", flush=True)
         entries += _run(name, arguments)
     if options.json:
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(json.dumps(entries, indent=1) + "\n", encoding="utf-8")
+        write_json(options.json, entries)
 
 
 def _run(name: str, arguments: list[str]) -> list[dict[str, object]]:

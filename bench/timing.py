@@ -99,10 +99,11 @@ class Bench:
         self.cases.append(case | {"machine": machine()})
         return case
 
-    def write(self, path: Path) -> None:
-        """Write the cases to a JSON file."""
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(self.cases, indent=1) + "\n", encoding="utf-8")
+
+def write_json(path: Path, content: object) -> None:
+    """Write the results of a benchmark to a JSON file."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
 
 def _seconds(work: Callable[[], object]) -> float:
@@ -133,7 +134,7 @@ def main(about: str | None, measure: Callable[..., None], **options: dict[str, A
     print(machine(), flush=True)
     measure(bench, **values)
     if path:
-        bench.write(path)
+        write_json(path, bench.cases)
 
 
 def peer(module: str) -> Any:

@@ -139,7 +139,7 @@ class ROSY_OT_bake_animation(ModalJobMixin, bpy.types.Operator):
     def finish(self, context: bpy.types.Context, result: list[SequenceResult]) -> None:
         for sequence in result:
             self.report_done(
-                f"{counted(len(sequence.rendered), 'frame')} drawn, {len(sequence.skipped)} up to date: {sequence.sequence.path}"
+                f"{counted(len(sequence.rendered), 'frame')} drawn, {len(sequence.skipped)} up to date: {sequence.path}"
             )
         self.report_warnings(*(text for sequence in result for text in sequence.warnings))
 

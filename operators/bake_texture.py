@@ -75,9 +75,7 @@ class ROSY_OT_bake_texture(ModalJobMixin, Operator):
         self.report_warnings(*(text for texture in result for text in texture.warnings))
 
     def _without_uv_map(self) -> list[Object]:
-        return [
-            obj for obj in self.objects if not obj.data.uv_layers and not obj.rosy.texture_uv_map
-        ]
+        return [obj for obj in self.objects if not (obj.data.uv_layers or obj.rosy.texture_uv_map)]
 
 
 def _with_uv_maps(context: Context, objects: Sequence[Object], steps: Steps[Any]) -> Steps[Any]:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from bpy.types import Context, Mesh, Object, Operator
+from bpy.types import Context, Event, Mesh, Object, Operator
 
 from ..rosy_addon.core.errors import (
     REPORTED_ERRORS,
@@ -137,6 +137,16 @@ class RosyOperator:
             return {"CANCELLED"}
         return {"CANCELLED"} if result == {"CANCELLED"} else {"FINISHED"}
 
+    def ask_to_confirm(
+        self, context: Context, event: Event, question: str, message: str, verb: str
+    ) -> set[str]:
+        """Ask for a confirmation, and return the result of the operator until it is given.
+
+        `verb` is the label of the button that confirms.
+        """
+        texts = {"title": question, "message": message, "confirm_text": verb}
+        return context.window_manager.invoke_confirm(self, event, icon="WARNING", **texts)
+
     def report_done(self, message: str) -> None:
         """Report what the operator has done."""
         self.report({"INFO"}, message)
@@ -148,9 +158,7 @@ class RosyOperator:
                 self.report({"WARNING"}, as_sentence(message))
         self._reported |= {*messages}
 
-    def store_fields(
-        self, context: Context, fields: dict[Mesh, RosyField], name: str | None = None
-    ) -> None:
+    def store_fields(self, context: Context, fields: dict[Mesh, RosyField], name: str = "") -> None:
         """Store fields on meshes with `assign_fields`, and apply the preferences to the scene.
 
         Shown singularities are updated. With the first field of a scene, the 3D view is made live if the

@@ -31,9 +31,7 @@ class RosyStrokePoint(bpy.types.PropertyGroup):
         subtype="XYZ",
     )
     pressure: real("Pressure", "Pressure of the pen", min=0.0, max=1.0, default=1.0)
-    is_start: toggle(
-        "Start", "Whether another line begins here, as after the pen has left the mesh"
-    )
+    is_start: toggle("Start", "Whether another line begins here, as after the pen left the mesh")
 
 
 class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):

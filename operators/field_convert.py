@@ -53,9 +53,7 @@ def _search_values(_operator: Any, context: Context, _typed: str) -> list[str]:
     """Return the names of the vertex groups and the scalar attributes of the active mesh."""
     obj = selected_mesh_objects(context)[0]
     scalar_types = {"FLOAT", "INT", "INT8", "BOOLEAN", "FLOAT_COLOR", "BYTE_COLOR"}
-    names = [
-        attribute.name for attribute in obj.data.attributes if attribute.data_type in scalar_types
-    ]
+    names = [each.name for each in obj.data.attributes if each.data_type in scalar_types]
     return [*(group.name for group in obj.vertex_groups), *names]
 
 

@@ -118,7 +118,7 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
         return selected_mesh_objects(context)
 
     def begin(self, context: Context) -> Steps[str]:
-        """Read all selected meshes and their guides. Return the steps of the job that generates the fields.
+        """Read all selected meshes and their guides, generate fields, and store them.
 
         A mesh without features to follow, or on which the field is undefined everywhere, is left out and
         reported. If no other mesh is selected, an error is raised.
@@ -127,24 +127,12 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
         for mesh in self.meshes:
             surface = mesh_surface(mesh)
             try:
-                settings = self._generator_settings(context, mesh, surface)
+                settings = self._settings_for(context, mesh, surface)
             except NoFeaturesError as error:
                 errors.append(error)
                 continue
             inputs.append((mesh, surface, settings))
-        return self._generate(context, inputs, errors)
-
-    def _generate(
-        self,
-        context: Context,
-        inputs: list[tuple[Mesh, Surface, GeneratorSettings]],
-        errors: list[RosyError],
-    ) -> Steps[str]:
-        """Generate fields, then store them. The result is a message to the user.
-
-        `errors` has the errors of meshes that have been left out.
-        """
-        fields, fields_on_surfaces = {}, []
+        made = {}
         for (mesh, surface, settings), start, stop in shares(inputs, 0.9):
             try:
                 field = yield Call(generate, (surface, settings, self.degree), start, stop)
@@ -156,27 +144,25 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
                 reason = "gives no direction on any face: choose another kind, such as Form"
                 errors.append(RosyError(f"{surface.name}: {kind} {reason}"))
                 continue
-            fields[mesh] = field
-            fields_on_surfaces.append((surface, field))
+            made[mesh] = surface, field
             for warning in (orientation_warning, copies_warning):
                 if note := (yield Call(warning, (surface,), stop, stop, "checking the mesh")):
                     self.report_warnings(note)
-        if not fields:
+        if not made:
             raise errors[0]
         self.report_warnings(*map(str, errors))
         # To count singularities must not take longer than to generate the field.
-        face_count = sum(surface.face_count for surface, _ in fields_on_surfaces)
+        face_count = sum(surface.face_count for surface, _ in made.values())
         is_cheap = self.kind not in FAST_KINDS or face_count <= MAX_FAST_FACES
         describe = partial(description, count_singularities=is_cheap)
-        notes = yield Call(describe, (fields_on_surfaces,), 0.9)
+        notes = yield Call(describe, (list(made.values()),), 0.9)
+        fields = {mesh: field for mesh, (_, field) in made.items()}
         self.store_fields(context, fields, self.attribute)
-        names = [obj.name for obj in self.objects if obj.data in fields]
-        target = f"'{names[0]}'" if len(fields) == 1 else counted(len(fields), "mesh", "meshes")
+        names = [obj.name for obj in self.objects if obj.data in made]
+        target = f"'{names[0]}'" if len(made) == 1 else counted(len(made), "mesh", "meshes")
         return f"Made a field of degree {self.degree} on {target}{notes and ': '}{notes}"
 
-    def _generator_settings(
-        self, context: Context, mesh: Mesh, surface: Surface
-    ) -> GeneratorSettings:
+    def _settings_for(self, context: Context, mesh: Mesh, surface: Surface) -> GeneratorSettings:
         """Return the settings of the generator for a mesh. They contain the guides, read from the scene."""
         owner = next(obj for obj in self.objects if obj.data == mesh)
         kind_guides = {"features": {"EDGES"}, "uv": {"UV"}, "guided": self.guides}

@@ -151,14 +151,8 @@ class ROSY_OT_preset_remove(_PresetOperator, bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         name = preset_library.preset_name(_target_preset(self, context))
-        return context.window_manager.invoke_confirm(
-            self,
-            event,
-            title=f"Delete the preset '{name}'?",
-            message="This cannot be undone",
-            confirm_text="Delete",
-            icon="WARNING",
-        )
+        question, message = f"Delete the preset '{name}'?", "This cannot be undone"
+        return self.ask_to_confirm(context, event, question, message, "Delete")
 
     def act(self, context: bpy.types.Context) -> None:
         key = _target_preset(self, context)

@@ -60,14 +60,9 @@ class ROSY_OT_strokes(ModalJobMixin, bpy.types.Operator):
         obj = stroke_objects.edited_strokes(context.scene, self._kind(context), camera.name)
         if obj is None or self.replace:
             return None
-        return context.window_manager.invoke_confirm(
-            self,
-            event,
-            title=f"Replace the strokes of '{obj.name}'?",
-            message="They were edited. Duplicate the object to keep them",
-            confirm_text="Replace",
-            icon="WARNING",
-        )
+        question = f"Replace the strokes of '{obj.name}'?"
+        message = "They were edited. Duplicate the object to keep them"
+        return self.ask_to_confirm(context, event, question, message, "Replace")
 
     def take_answer(self, context: bpy.types.Context) -> None:
         if self._kind(context) == "FILE":

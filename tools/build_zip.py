@@ -25,19 +25,16 @@ DEFAULT_TIME = 1580601600
 PERMISSIONS = 0o100644
 
 
-def main() -> int:
+def main() -> None:
     """Write FOLDER/rosy-VERSION.zip and print its path."""
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
     target = folder / f"{manifest['id']}-{manifest['version']}.zip"
-    if status := _run("build", "--source-dir", str(ROOT), "--output-filepath", str(target)):
-        return status
+    _run("build", "--source-dir", str(ROOT), "--output-filepath", str(target))
     make_reproducible(target)
-    if status := _run("validate", str(target)):
-        return status
+    _run("validate", str(target))
     print(target)
-    return 0
 
 
 def make_reproducible(path: Path) -> None:
@@ -54,9 +51,11 @@ def make_reproducible(path: Path) -> None:
             zipped.writestr(entry, files[name], zipfile.ZIP_DEFLATED, compresslevel=9)
 
 
-def _run(*arguments: str) -> int:
-    """Run a command of Blender's builder, and return its exit status."""
-    return subprocess.run([sys.executable, _builder(), *arguments], check=False).returncode
+def _run(*arguments: str) -> None:
+    """Run a command of Blender's builder. If it fails, end with its exit status."""
+    command = [sys.executable, _builder(), *arguments]
+    if status := subprocess.run(command, check=False).returncode:
+        sys.exit(status)
 
 
 def _builder() -> str:
@@ -70,4 +69,4 @@ def _builder() -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

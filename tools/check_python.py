@@ -14,24 +14,22 @@ OLDEST_VERSION = (3, 11)
 BPY_VERSIONS = {(5, 1): (3, 13), (4, 2): (3, 11)}
 
 
-def main() -> int:
-    """Check this interpreter against a file of requirements."""
+def main() -> str:
+    """Check this interpreter against a file of requirements. Return the reason; empty if it can be used."""
     version = sys.version_info[:2]
     required = _version_for_bpy(Path(sys.argv[1]).read_text())
     if required is not None and version != required:
-        print(
+        return (
             f"PyPI has this bpy for Python {_text(required)} alone, not for {_text(version)}: "
             f"name one with make {'PYTHON' if required == OLDEST_VERSION else 'PYTHON313'}="
             f"/path/to/python{_text(required)}"
         )
-        return 1
     if version < OLDEST_VERSION:
-        print(
+        return (
             f"Python {_text(version)} is too old, {_text(OLDEST_VERSION)} is required: "
             f"make PYTHON=/path/to/python{_text(OLDEST_VERSION)}"
         )
-        return 1
-    return 0
+    return ""
 
 
 def _version_for_bpy(requirements: str) -> tuple[int, int] | None:
@@ -48,4 +46,4 @@ def _text(version: tuple[int, ...]) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main() or 0)

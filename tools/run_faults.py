@@ -18,8 +18,8 @@ import tempfile
 import time
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from working_tree import ROOT, copy_working_tree
 
@@ -39,31 +39,15 @@ TIME_LIMIT = 900
 TESTS_FAILED = 1
 
 
-@dataclass(frozen=True)
-class Fault:
-    """A deliberate fault: in `file`, the text `find` is replaced by `replace`. Then `tests` have to fail."""
-
-    name: str
-    room: str
-    what: str
-    file: str
-    find: str
-    replace: str
-    tests: list[str]
-    lane: str
-
-
-def read_faults() -> list[Fault]:
-    """Return the faults of tests/faults.toml, in the order of the file."""
-    tables = tomllib.loads((ROOT / "tests/faults.toml").read_text(encoding="utf-8"))["fault"]
-    return [Fault(**table) for table in tables]
+#: A deliberate fault: a table of tests/faults.toml, which describes the keys.
+Fault = dict[str, Any]
 
 
 def broken_text(fault: Fault, root: Path) -> str | None:
     """Return the text of the file with the fault; None if `find` does not occur in it exactly once."""
-    path = root / fault.file
+    path = root / fault["file"]
     text = path.read_text(encoding="utf-8") if path.is_file() else ""
-    return text.replace(fault.find, fault.replace) if text.count(fault.find) == 1 else None
+    return text.replace(fault["find"], fault["replace"]) if text.count(fault["find"]) == 1 else None
 
 
 def copy_tree(folder: Path) -> Path:
@@ -82,18 +66,18 @@ def copy_tree(folder: Path) -> Path:
 
 def run_tests(fault: Fault, copy: Path) -> tuple[int, str]:
     """Run the tests of a fault in a copy; return the exit status and the last line of output."""
-    python = str(copy / PYTHON[fault.lane] / "bin/python")
+    python = str(copy / PYTHON[fault["lane"]] / "bin/python")
     options = {"cwd": copy, "capture_output": True, "text": True, "timeout": TIME_LIMIT}
     options["env"] = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
     command = [python, "-m", "pytest", "-x", "-p", "no:cacheprovider"]
     try:
-        if fault.lane == "blender":
+        if fault["lane"] == "blender":
             shutil.rmtree(copy / "dist", ignore_errors=True)
             subprocess.run([python, "tools/build_zip.py", "dist"], check=True, **options)
             (zip_path,) = (copy / "dist").glob("*.zip")
             command = [sys.executable, "tests/blender/run.py", "stable", str(zip_path)]
             command += ["--windows", "none"]
-        completed = subprocess.run([*command, *fault.tests], check=False, **options)
+        completed = subprocess.run([*command, *fault["tests"]], check=False, **options)
     except subprocess.TimeoutExpired:
         return -1, f"stopped after {TIME_LIMIT} s"
     except subprocess.CalledProcessError as error:
@@ -105,8 +89,8 @@ def run_tests(fault: Fault, copy: Path) -> tuple[int, str]:
 def try_fault(fault: Fault, copies: queue.Queue[Path]) -> bool:
     """Run the tests of a fault, print a line, and return whether they have caught it."""
     copy, start, succeeded = copies.get(), time.monotonic(), False
-    path, broken = copy / fault.file, broken_text(fault, copy)
-    verdict, message = "does not apply", f"`find` is not in {fault.file} exactly once"
+    path, broken = copy / fault["file"], broken_text(fault, copy)
+    verdict, message = "does not apply", f"`find` is not in {fault['file']} exactly once"
     if broken is not None:
         original = path.read_bytes()
         try:
@@ -117,7 +101,9 @@ def try_fault(fault: Fault, copies: queue.Queue[Path]) -> bool:
         succeeded = status == TESTS_FAILED and "failed" in message
         verdict = "caught" if succeeded else "MISSED"
     copies.put(copy)
-    print(f"{verdict:14} {fault.name:36} {time.monotonic() - start:6.1f} s  {message}", flush=True)
+    print(
+        f"{verdict:14} {fault['name']:36} {time.monotonic() - start:6.1f} s  {message}", flush=True
+    )
     return succeeded
 
 
@@ -127,7 +113,8 @@ def main() -> int:
     parser.add_argument("names", nargs="*", metavar="NAME", help="all faults if not given")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="copies used side by side")
     options = parser.parse_args()
-    faults = {fault.name: fault for fault in read_faults()}
+    tables = tomllib.loads((ROOT / "tests/faults.toml").read_text(encoding="utf-8"))["fault"]
+    faults = {fault["name"]: fault for fault in tables}
     if unknown := set(options.names) - set(faults):
         parser.error(f"no fault is named {', '.join(sorted(unknown))}")
     chosen = [faults[name] for name in options.names or faults]

@@ -188,11 +188,10 @@ def figure(
     return page
 
 
-def _comparison_of(
-    fields: Field | Sequence[Field] | Mapping[str, Field] | Comparison,
-    parts: Sequence[str],
-    reach: float,
-) -> Comparison:
+_Fields = Field | Sequence[Field] | Mapping[str, Field] | Comparison
+
+
+def _comparison_of(fields: _Fields, parts: Sequence[str], reach: float) -> Comparison:
     """Return the comparison of fields. It has no differences if none of the `parts` of the figure shows any.
 
     `reach` is the largest distance of singularities that match, as a fraction of the size of the mesh.

@@ -79,7 +79,7 @@ def run_bake(options: Options) -> None:
         if options.frames is None:
             location = bpy.path.abspath(result.image.filepath) if options.out else result.image.name
         else:
-            location = result.sequence.path
+            location = result.path
             if result.skipped:
                 print_line(f"{counted(len(result.skipped), 'frame')} of {result.camera} up to date")
         print_line(f"{result.camera}: {location}")
@@ -186,10 +186,8 @@ def _forwarded_args(options: Options) -> list[str]:
         # The processes that draw frames already use all cores.
         "workers": [options.workers or 1],
     }
-    arguments = [
-        f"--{name}={value}" for name in values for value in values[name] if value is not None
-    ]
-    return [*arguments, "--all-cameras"] if options.all_cameras else arguments
+    words = [f"--{name}={value}" for name in values for value in values[name] if value is not None]
+    return [*words, "--all-cameras"] if options.all_cameras else words
 
 
 def _forwarded_preset(path: Path) -> str:

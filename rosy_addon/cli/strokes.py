@@ -124,13 +124,9 @@ def _draw_frame_strokes(options: Options, scene: Any, path: Path) -> None:
     import bpy
 
     from ..jobs.draw_strokes import draw_strokes
-    from ..scene.cameras import frame_camera
     from ..scene.stroke_objects import read_pen, read_stroke_style, target_objects
 
-    if options.camera is not None:
-        camera = find_camera(scene, options.camera)
-    else:
-        camera = None if options.frames is None else frame_camera(scene, scene.frame_current)
+    camera = None if options.camera is None else find_camera(scene, options.camera)
     settings, layer = scene.rosy.strokes, bpy.context.view_layer
     objects = requested_objects(options) or target_objects(scene, layer)
     style = read_stroke_style(settings).with_settings(options.requested_settings())

@@ -40,9 +40,9 @@ TEMPORARY_NAME = re.compile(r"\.rosy-(?P<machine>[0-9a-f]{8})-[0-9a-f]{16}(\.\w+
 #: Age in seconds above which a temporary file counts as abandoned.
 LEFTOVER_SECONDS = 24 * 3600
 
-#: Number of attempts to lock a folder, and seconds after each. Another process locks it exclusively only while
-#: it deletes leftovers, which takes milliseconds.
-LOCK_ATTEMPTS, LOCK_PAUSE = 10, 0.02
+#: Seconds before each attempt to lock a folder. Another process locks it exclusively only while it deletes
+#: leftovers, which takes milliseconds.
+LOCK_PAUSES = (0.0, *[0.02] * 9)
 
 #: Functions that return paths of further inputs: in Blender, the open file and what it links.
 INPUT_LISTERS: list[Callable[[], Iterable[str]]] = []
@@ -215,7 +215,7 @@ def replacing(*paths: str | os.PathLike[str], follow_links: bool = False) -> Ite
     with ExitStack() as locks:
         for folder in {target.parent for target in targets}:
             remove_leftovers(folder)
-            locks.enter_context(_folder_lock(folder))
+            locks.enter_context(folder_lock(folder))
         try:
             yield temporaries
             for temporary, target in zip(temporaries, targets, strict=True):
@@ -238,7 +238,7 @@ def _target(path: str | os.PathLike[str], follow_links: bool) -> Path:
 
 
 @contextmanager
-def _folder_lock(folder: str | os.PathLike[str], *, exclusive: bool = False) -> Iterator[bool]:
+def folder_lock(folder: str | os.PathLike[str], *, exclusive: bool = False) -> Iterator[bool]:
     """Context manager: lock a folder, and yield whether it is locked.
 
     Processes that write to the folder share the lock. A process that gets the lock exclusively knows that none
@@ -255,12 +255,12 @@ def _folder_lock(folder: str | os.PathLike[str], *, exclusive: bool = False) -> 
             descriptor = os.open(folder, os.O_RDONLY)
             stack.callback(os.close, descriptor)
             # It does not wait for long, as the lock may be of the program that has started this one.
-            for _ in range(1 if exclusive else LOCK_ATTEMPTS):
+            for pause in LOCK_PAUSES[: 1 if exclusive else None]:
+                time.sleep(pause)
                 with suppress(BlockingIOError):
                     fcntl.flock(descriptor, operation)
                     is_locked = True
                     break
-                time.sleep(LOCK_PAUSE)
         yield is_locked
 
 
@@ -276,7 +276,7 @@ def remove_leftovers(folder: str | os.PathLike[str]) -> None:
     if not names:
         return
     own_prefix = _own_prefix()
-    with _folder_lock(folder, exclusive=True) as is_unused:
+    with folder_lock(folder, exclusive=True) as is_unused:
         for name in names:
             path = os.path.join(folder, name)
             with suppress(OSError):

@@ -73,9 +73,7 @@ def _run_tasks(
     """
     from distributed import as_completed
 
-    commands = [
-        ["-m", PACKAGE, *arguments, f"--frames={format_frames(list(task))}"] for task in tasks
-    ]
+    commands = [["-m", PACKAGE, *arguments, f"--frames={format_frames(task)}"] for task in tasks]
     futures = client.map(_python_runner(), commands, retries=MAX_RETRIES, pure=False)
     task_of = dict(zip(futures, tasks, strict=True))
     failed = {}

@@ -59,9 +59,7 @@ class CpuViewportRenderer(ViewportRenderer):
             return None
         return self.device.texture(picture.rgba.shape[1::-1], "RGBA16F", data=picture.rgba)
 
-    def composite(
-        self, texture: Any, items: Sequence[MeshInstance], view: ViewInput, opacity: float = 1.0
-    ) -> None:
+    def composite(self, texture: Any, items: list[Any], view: ViewInput, opacity: float) -> None:
         """Fill the 3D view that is being drawn with a texture."""
         if texture is not None:
             draw_texture(self.device, texture, [self._fullscreen_batch], opacity)

@@ -103,21 +103,19 @@ def render_fields(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> None
     if not is_hatched(look):
         _trace(frame, box, "lic", textures, uniforms)
         return
-    textures["line_means"] = _streaks(frame, kind, box, textures, uniforms)
+    textures["line_means"] = _streaks(frame, box, textures, uniforms)
     textures |= _ink_textures(frame, kind)
     frame.run(ComputePass("ink"), box, textures, uniforms, pause=1.0)
 
 
-def _streaks(
-    frame: Frame, kind: FieldKind, box: Box, textures: dict[str, Any], uniforms: dict[str, Any]
-) -> Any:
+def _streaks(frame: Frame, box: Box, textures: dict[str, Any], uniforms: dict[str, Any]) -> Any:
     """Return means along each line through a pixel, for a look with ink: one layer per line direction.
 
     The channels are the means of the noise, of the noise that breaks lines, and of the tone. If the look
     needs none of them, return an arbitrary texture, which is not read. `textures` include the result of
     `_unfold`, and `uniforms` the result of `look_uniforms`.
     """
-    layers = kind.line_count
+    layers = uniforms["line_count"]
     has_streaks = not uniforms["even_lines"] or uniforms["break_steps"] > 0
     if not (has_streaks or uniforms["overshoot_steps"]):
         return textures["directions"]

@@ -248,7 +248,7 @@ def _write_records(
     normals, and z in the last texel. `corners` has the rows of `MeshBuffers.corners`, as (T, 3, 4).
     """
     surface, tone, color_values = instance.surface, instance.tone, instance.color_values
-    rest = rest_positions(surface)
+    rest, degree = rest_positions(surface), corner_field.degree
     channel_values = [corner_field.channels.get(channel) for channel in channels]
     for extent in row_blocks(len(records), RECORDS_PER_BLOCK):
         part = records[extent]
@@ -260,17 +260,13 @@ def _write_records(
         part[:, NORMAL_TEXEL:MAGNITUDE_TEXEL, 3] = rest_corners[..., 1]
         part[:, MAGNITUDE_TEXEL, :3] = corner_field.magnitude[:, extent].T
         part[:, -1, :3] = rest_corners[..., 2]
-        _write_values(
-            part, VALUE_TEXEL, corner_field.representation[:, extent], corner_field.degree, 0
-        )
+        _write_values(part, VALUE_TEXEL, corner_field.representation[:, extent], degree, 0)
         for layer, (channel, values) in enumerate(zip(channels, channel_values, strict=True)):
             # A RoSy has the constant harmonic 1.
             default = np.complex64(1 if channel == ("deviation", 0) else 0)
             part_values = (default,) * 3 if values is None else values[:, extent]
             texel = VALUE_TEXEL + 2 + 2 * layer
-            _write_values(
-                part, texel, part_values, rotation_order(channel, corner_field.degree), layer
-            )
+            _write_values(part, texel, part_values, rotation_order(channel, degree), layer)
         if color_values is not None:
             texel, numbers = _values_texel(channels), color_values[surface.triangles[extent]]
             known = np.isfinite(numbers).all(axis=1)

@@ -17,7 +17,7 @@ from ..compositor.wobble import has_wobble
 from . import lookup_tables
 from .frame import Frame
 from .passes import ComputePass
-from .uniforms import surface_cell_uniforms, surface_noise_uniforms, wobble_uniforms
+from .uniforms import noise_uniforms, surface_cell_uniforms, wobble_uniforms
 
 
 def feature_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
@@ -76,7 +76,7 @@ def _surface_noise(frame: Frame, settings: NoiseSettings, name: str, detail: flo
     """
     raw_noise = frame.image("raw_noise")
     frame.clear(raw_noise)
-    shared_uniforms = surface_noise_uniforms(settings, frame.look, detail)
+    shared_uniforms = noise_uniforms(settings, frame.look, detail)
     names = [item.instance.surface.name for item in frame.items]
     hashes = instance_hashes(names).view(np.int32)
     for instance_id, item in frame.fields_in_view():
@@ -102,13 +102,11 @@ def _high_passed(frame: Frame, raw_noise: Any, high_pass: float, name: str) -> A
     if high_pass:
         radius = box_radius(BLUR_FACTOR * high_pass)
         for index, axis in enumerate(((1, 0), (0, 1)) * 3):
-            textures = {
-                "source_image": blurred,
-                "blurred_image": frame.image(f"blurred {index % 2}"),
-            }
+            image = frame.image(f"blurred {index % 2}")
+            textures = {"source_image": blurred, "blurred_image": image}
             uniforms = {"blur_axis": axis, "radius": radius}
             frame.run(ComputePass("box_blur"), frame.box, textures, uniforms, pause=0.5)
-            blurred = textures["blurred_image"]
+            blurred = image
     noise = frame.image(name)
     textures = {"raw_noise": raw_noise, "blurred_noise": blurred, "noise": noise}
     uniforms = {"high_passed": int(high_pass > 0)}

@@ -11,7 +11,7 @@ from ..compositor.look import crease_angle_of
 from .defines import CREASE_SLICES, CREASES_PER_ROW
 from .frame import Frame
 from .passes import ComputePass
-from .resources import DrawItem, OutlineTextures
+from .resources import OutlineTextures
 from .uniforms import clip_uniforms, min_normal_cosine
 
 
@@ -60,10 +60,10 @@ def _coverage(frame: Frame, prepared: dict[Hashable, Any]) -> Any:
     edges = frame.image("outline_edges", "RG32F")
     frame.clear(crease_marks, "R32F")
     frame.clear(edges, "RG32F")
-    for instance_id, item in frame.fields_in_view():
+    for instance_id, _ in frame.fields_in_view():
         found = prepared["outline", instance_id]
         if found.crease_count:
-            _mark_creases(frame, instance_id, item, found, crease_marks)
+            _mark_creases(frame, instance_id, found, crease_marks)
         textures = {
             "outline_edges": edges,
             "crease_marks": crease_marks,
@@ -89,18 +89,16 @@ def _coverage(frame: Frame, prepared: dict[Hashable, Any]) -> Any:
     return textures["outline_coverage"]
 
 
-def _mark_creases(
-    frame: Frame, instance_id: int, item: DrawItem, found: OutlineTextures, crease_marks: Any
-) -> None:
+def _mark_creases(frame: Frame, instance_id: int, found: OutlineTextures, marks: Any) -> None:
     """Mark the pixels next to the visible creases of an instance in the image `crease_marks`.
 
     `found` has the creases of the instance.
     """
     columns = min(found.crease_count, CREASES_PER_ROW)
     box = 0, 0, columns, -(-found.crease_count // columns)
-    textures = {"crease_points": found.crease_points, "crease_marks": crease_marks}
+    textures = {"crease_points": found.crease_points, "crease_marks": marks}
     uniforms = {
-        **clip_uniforms(item, frame.camera, frame.view.clip_planes),
+        **clip_uniforms(frame.items[instance_id], frame.camera, frame.view.clip_planes),
         **frame.instance_uniforms(instance_id),
         "crease_count": found.crease_count,
     }

@@ -12,7 +12,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from ..compositor.color_values import check_color_values
+from ..compositor.color_values import ValueRange, check_color_values
 from ..compositor.look import Look, colors_magnitude, magnitude_range
 from ..compositor.look_units import pixel_look
 from ..compositor.picture import Picture, common_color_range
@@ -201,7 +201,7 @@ class GpuRenderer(ViewportRenderer):
         return replace(frame, samples=samples)
 
     def composite(
-        self, texture: Any, items: Sequence[DrawItem], view: ViewInput, opacity: float = 1.0
+        self, texture: Any, items: list[DrawItem], view: ViewInput, opacity: float
     ) -> None:
         """Draw the surfaces into the current 3D view, with the picture on them."""
         batches = [
@@ -219,9 +219,7 @@ class GpuRenderer(ViewportRenderer):
         """Free all meshes, images and textures."""
         self.resources.release()
 
-    def _color_range(
-        self, items: Sequence[DrawItem], view: ViewInput
-    ) -> tuple[float, float] | None:
+    def _color_range(self, items: Sequence[DrawItem], view: ViewInput) -> ValueRange:
         """Return the values of the first and the last color of the color map; see `Picture.color_range`.
 
         Magnitudes are read from the images of the last picture, so `view` must be its input. Return None if

@@ -181,8 +181,8 @@ class GpuResources:
             kind = None if instance.field is None else kinds[instance.field.degree]
             model_matrix = mesh.buffers.model_matrix(instance.matrix)
             items.append(DrawItem(instance, mesh, model_matrix, kind))
-        for key in [key for key, kept in self._kept.items() if kept[1] < self._upload_count]:
-            del self._kept[key]
+        kept = self._kept.items()
+        self._kept = {key: entry for key, entry in kept if entry[1] >= self._upload_count}
         return items
 
     def feature_curvature(self, surface: Surface) -> Any:

@@ -7,19 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from ..compositor import hatching, streak_statistics
 from ..compositor.contrast import expected_std, streak_args
 from ..compositor.even_lines import FADE_PIXELS, MAX_EDGE_WIDTH, WOBBLE_SHIFT, crowded_pixels
 from ..compositor.family_hues import SOFTMAX_SHARPNESS
 from ..compositor.filter_kernel import full_sample_count
 from ..compositor.flow import channel_shifts, channel_weights, noise_channel_count
-from ..compositor.hatching import (
-    ONSET_LEAD,
-    ONSET_RANGE,
-    has_breaks,
-    has_overshoot,
-    has_paper_grain,
-    overshoot_steps,
-)
 from ..compositor.image_noise import NOISE_STD, NoiseSettings, streak_moments
 from ..compositor.inks import ink_count, inks_of
 from ..compositor.lic_images import distinct_ends
@@ -37,12 +30,6 @@ from ..compositor.look import (
 from ..compositor.look_units import PixelLook, instance_line_spacing
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, PAPER_GRAIN_STRENGTH, line_offset
 from ..compositor.shading import Light, lights_of
-from ..compositor.streak_statistics import (
-    StreakStatistics,
-    break_steps,
-    look_streak_statistics,
-    softness,
-)
 from ..compositor.surface_noise import FEATURE_CELLS, LATTICE_SCALE, SUBPIXEL_OFFSETS, lattice_axes
 from ..compositor.target_tone import ReferenceRender, tone_curve
 from ..compositor.wobble import MEAN_WAVELENGTH_WIDTHS, WOBBLE_STD, has_wobble
@@ -91,11 +78,13 @@ def look_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
     Settings that shaders use unchanged are not included; `Frame.run` adds them.
     """
     look = look.for_symmetry(kind.symmetry)
-    kernel, break_length = look.kernel, break_steps(look)
+    kernel, break_length = look.kernel, streak_statistics.break_steps(look)
     _, crossing = streak_moments(*streak_args(look), kind.line_count, kernel=kernel)
     inks = inks_of(look.look, ink_count(look.look, kind.line_count, kind.family_count))
-    statistics = look_streak_statistics(look) if is_hatched(look) else None
-    ends = magnitude_range(look)
+    statistics = streak_statistics.look_streak_statistics(look) if is_hatched(look) else None
+    ends, grain_depth = magnitude_range(look), 0.0
+    if statistics is not None and hatching.has_paper_grain(look):
+        grain_depth = PAPER_GRAIN_STRENGTH * look.paper_grain / statistics.paper_grain_std
     return {
         **covering_uniforms(kind),
         "kernel": defines.KERNELS[kernel],
@@ -116,20 +105,20 @@ def look_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
         "ink_count": len(inks.dark),
         "min_transmittance": inks.min_transmittance,
         "is_light_ink": int(inks.is_light),
-        "softness": softness(look.crispness),
+        "softness": streak_statistics.softness(look.crispness),
         "streak_std": statistics.std if statistics else 1.0,
-        "break_steps": break_length if has_breaks(look) else 0,
-        "overshoot_steps": overshoot_steps(look) if has_overshoot(look) else 0,
+        "break_steps": break_length if hatching.has_breaks(look) else 0,
+        "overshoot_steps": hatching.overshoot_steps(look) if hatching.has_overshoot(look) else 0,
         "break_samples": full_sample_count(break_length, kernel),
         "break_std": statistics.break_std if statistics else 1.0,
         "disc_std": statistics.disc_std if statistics else 1.0,
         "wobble_strength": look.wobble if has_wobble(look) else 0.0,
-        "paper_grain_depth": _paper_grain_depth(look, statistics),
+        "paper_grain_depth": grain_depth,
         "paper_grain_channels": PAPER_GRAIN_CHANNELS if look.anchor == "surface" else 0,
         "paper_grain_shift": line_offset(look.line_width),
         # These are not `#define`s: compilers reorder sums with constants, which would change the result.
-        "onset_range": ONSET_RANGE,
-        "onset_lead": ONSET_LEAD,
+        "onset_range": hatching.ONSET_RANGE,
+        "onset_lead": hatching.ONSET_LEAD,
         "even_lines": int(is_even(look)),
         "min_edge_width": MAX_EDGE_WIDTH * (1 - look.crispness) ** 2,
         "fade_pixels": FADE_PIXELS,
@@ -151,12 +140,6 @@ def _flow_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
         "flow_shifts": (*channel_shifts(look.flow_phase, look.flow_distance), 0.0),
         "flow_weights": (*channel_weights(look.flow_phase), 0.0),
     }
-
-
-def _paper_grain_depth(look: PixelLook, statistics: StreakStatistics | None) -> float:
-    if statistics is None or not has_paper_grain(look):
-        return 0.0
-    return PAPER_GRAIN_STRENGTH * look.paper_grain / statistics.paper_grain_std
 
 
 def light_uniforms(look: Look, lights: Sequence[Light]) -> list[dict[str, Any]]:
@@ -267,9 +250,7 @@ def even_line_uniforms(look: PixelLook, item: DrawItem, camera: Camera) -> dict[
     }
 
 
-def surface_noise_uniforms(
-    settings: NoiseSettings, look: PixelLook, detail: float
-) -> dict[str, Any]:
+def noise_uniforms(settings: NoiseSettings, look: PixelLook, detail: float) -> dict[str, Any]:
     """Return the uniforms of surface noise that all surfaces share.
 
     Parameters

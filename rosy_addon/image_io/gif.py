@@ -13,9 +13,7 @@ from ..core.progress import report
 PALETTE_LEVELS = (6, 7, 6)
 
 #: (4, 4) thresholds of ordered dithering, between 0 and 1 (Bayer 1973).
-BAYER_MATRIX = (
-    np.array([[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]]) / 16 + 1 / 32
-)
+BAYER = np.array([[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]]) / 16 + 1 / 32
 
 #: Maximum number of bits of an LZW code in a GIF file.
 MAX_CODE_BITS = 12
@@ -114,7 +112,7 @@ def _palette() -> np.ndarray:
 def _dither(frame: np.ndarray) -> np.ndarray:
     """Return (H, W) uint8: the palette indices of an (H, W, 3) uint8 frame after ordered dithering."""
     height, width = frame.shape[:2]
-    threshold = np.tile(BAYER_MATRIX, (-(-height // 4), -(-width // 4)))[:height, :width]
+    threshold = np.tile(BAYER, (-(-height // 4), -(-width // 4)))[:height, :width]
     index = np.zeros((height, width), dtype=np.int64)
     for channel, count in enumerate(PALETTE_LEVELS):
         level = np.floor(frame[..., channel] / 255 * (count - 1) + threshold).astype(np.int64)

@@ -22,15 +22,9 @@ import numpy as np
 from bpy.types import Object, Scene
 
 from ..compositor.look import Look, has_flow
+from ..core import file_io
 from ..core.cache import Cache, content_hash
 from ..core.errors import RosyError
-from ..core.file_io import (
-    check_folder,
-    check_writable,
-    remove_leftovers,
-    system_errors,
-    write_bytes,
-)
 from ..gpu.select import image_steps, select_device
 from ..projection.camera import Camera
 from ..rendering.marks import sequence_key
@@ -42,8 +36,8 @@ from ..scene.evaluated_field import temp_attributes
 from ..scene.files import picture_stem
 from ..scene.keys import update_camera_planes
 from ..scene.look_inputs import nonfinite_policy
-from ..scene.look_properties import drift_in_scene, read_look
-from ..scene.picture_state import PictureState, read_picture_states
+from ..scene.look_properties import read_look
+from ..scene.picture_state import PictureState, SceneState
 from ..scene.read_view import read_views, scene_depsgraph
 from ..scene.scene_reader import SceneData
 from ..scene.visible_objects import field_objects
@@ -66,7 +60,8 @@ class SequenceResult:
         Name of the camera. If the camera may change from frame to frame, the name of the scene.
     rendered, skipped : tuple of int
         Frames that were drawn, and frames that were up to date and kept.
-    sequence : ImageSequence
+    path : Path
+        File of the first frame.
     warnings : tuple of str
         Messages for the user.
     """
@@ -74,7 +69,7 @@ class SequenceResult:
     camera: str
     rendered: tuple[int, ...]
     skipped: tuple[int, ...]
-    sequence: pictures.ImageSequence
+    path: Path
     warnings: tuple[str, ...] = ()
 
 
@@ -131,7 +126,11 @@ def bake_animation(
         For the reasons of `bake` (the message then begins with the frame number), if there is no folder, or
         if a picture cannot be written.
     """
-    settings = _folder_settings(scene, settings)
+    settings = pictures.read_output_settings(scene) if settings is None else settings
+    if settings.folder is None:
+        raise RosyError("frames need a folder: choose Output > Store > In a Folder")
+    file_io.check_folder(settings.folder)
+    file_io.remove_leftovers(settings.folder)
     frames = list(frames)
     depsgraph = scene_depsgraph(scene)
     targets = field_objects(depsgraph.view_layer) if objects is None else list(objects)
@@ -151,9 +150,7 @@ def bake_animation(
             yield Step(start, label)
             scene.frame_set(frame)
             try:
-                steps = _frame_steps(
-                    scene, frame, cameras, objects, look, size, settings, cache, workers
-                )
+                steps = _frame_steps(scene, cameras, objects, look, size, settings, cache, workers)
                 scene_data, drawn = yield from part(steps, start, stop, label)
             except RosyError as error:
                 raise RosyError(f"frame {frame}: {error}") from None
@@ -164,37 +161,17 @@ def bake_animation(
             rendered_count += not all(one.up_to_date for one in drawn)
             if not rendered_count:
                 start_time = time.monotonic()
-        results = [
-            _sequence_result(drawn, settings, cameras, tuple(warnings))
-            for drawn in sequences.values()
-        ]
+        results = [_sequence_result(drawn, tuple(warnings)) for drawn in sequences.values()]
         if show and scene_data is not None:
             last_look = read_look(scene.rosy) if look is None else look
             key = yield Call(sequence_key, (scene_data.instances, last_look), 1.0)
             sources = [None] * len(results) if cameras is None else cameras
             for result, drawn, source in zip(results, sequences.values(), sources, strict=True):
                 states = {one.frame: one.state for one in drawn}
-                camera, sequence = drawn[-1].camera, result.sequence
-                pictures.apply_sequence(
-                    scene, scene_data, sequence, camera, settings, source, states, last_look, key
-                )
+                inputs = result.path, drawn[-1].camera, settings, source, states, last_look, key
+                pictures.apply_sequence(scene, scene_data, result.camera, *inputs)
             update_camera_planes(scene)
         return results
-
-
-def _folder_settings(
-    scene: Scene, settings: pictures.OutputSettings | None
-) -> pictures.OutputSettings:
-    """Return the output settings (by default the scene's) after a check that their folder can be written to.
-
-    Temporary files that an interrupted job has left in the folder are removed.
-    """
-    settings = pictures.read_output_settings(scene) if settings is None else settings
-    if settings.folder is None:
-        raise RosyError("frames need a folder: choose Output > Store > In a Folder")
-    check_folder(settings.folder)
-    remove_leftovers(settings.folder)
-    return settings
 
 
 @contextmanager
@@ -219,6 +196,8 @@ class _Frame:
     name : str
         Name of the sequence.
     frame : int
+    path : Path
+        The file.
     camera : Camera
     up_to_date : bool
         Whether the picture was up to date, so that it was not drawn.
@@ -228,31 +207,23 @@ class _Frame:
 
     name: str
     frame: int
+    path: Path
     camera: Camera
     up_to_date: bool
     state: PictureState
 
 
-def _sequence_result(
-    drawn: Sequence[_Frame],
-    settings: pictures.OutputSettings,
-    cameras: Sequence[CameraSource] | None,
-    warnings: tuple[str, ...],
-) -> SequenceResult:
-    """Return the result of an image sequence, given its frames and the arguments of `bake_animation`."""
-    first, last = drawn[0], drawn[-1]
-    path = _path_of_frame(settings, first.name, cameras, first.frame)
-    sequence = pictures.ImageSequence(first.name, path, first.frame, last.frame)
+def _sequence_result(drawn: Sequence[_Frame], warnings: tuple[str, ...]) -> SequenceResult:
+    """Return the result of an image sequence, given its frames."""
     rendered, skipped = (
         tuple(one.frame for one in drawn if one.up_to_date == up_to_date)
         for up_to_date in (False, True)
     )
-    return SequenceResult(first.name, rendered, skipped, sequence, warnings)
+    return SequenceResult(drawn[0].name, rendered, skipped, drawn[0].path, warnings)
 
 
 def _frame_steps(
     scene: Scene,
-    frame: int,
     cameras: Sequence[CameraSource] | None,
     objects: Sequence[Object] | None,
     look: Look | None,
@@ -263,32 +234,24 @@ def _frame_steps(
 ) -> Steps[tuple[SceneData, list[_Frame]]]:
     """Draw one frame from all cameras as part of a job.
 
-    Return what was read, and the frame of each camera. The frame `frame` is already the current frame of the
-    scene. If `cameras` is None, it is drawn from the camera that renders it. `cache` has the meshes and
+    Return what was read, and the frame of each camera. It is the current frame of the scene. If `cameras` is None, it is drawn from the camera that renders it. `cache` has the meshes and
     fields of earlier frames. The other parameters are as in `bake_animation`.
     """
-    look = read_look(scene.rosy) if look is None else look
+    frame, look = scene.frame_current, read_look(scene.rosy) if look is None else look
     # The look may be animated, and not every device can draw every method, so the device is chosen per frame.
     device = select_device(settings.device, look)
     sources = [frame_camera(scene, frame)] if cameras is None else list(cameras)
     depsgraph = scene_depsgraph(scene)
     views, scene_data = read_views(
-        scene,
-        depsgraph,
-        sources,
-        look,
-        objects=objects,
-        size=size,
-        reference_camera=frame_camera(scene, frame) if look.tone == "picture" else None,
-        cache=cache,
+        scene, depsgraph, sources, look, objects=objects, size=size, cache=cache
     )
     cache.evict_unused()
-    states = read_picture_states(scene, depsgraph, sources, scene_data.mesh_states, is_frame=True)
+    scene_state = SceneState(scene, depsgraph, scene_data.mesh_states)
+    states = [scene_state.picture_state(scene, depsgraph, source, True) for source in sources]
     drawn = []
     for (view, state), start, stop in shares(zip(views, states, strict=True)):
-        view = replace(view, drift=drift_in_scene(scene, look, frame))
-        name = scene.name if cameras is None else view.camera.name
-        path = _path_of_frame(settings, name, cameras, frame)
+        name, kind = (scene.name, "scene") if cameras is None else (view.camera.name, "camera")
+        path = frame_path(settings.folder / picture_stem(name, kind), frame, settings.as_float)
         sidecar = path.with_name(path.name + SIDECAR_SUFFIX)
         input_hash = _input_hash(view, device, settings)
         up_to_date = (
@@ -299,7 +262,7 @@ def _frame_steps(
         if not up_to_date:
             for output in (path, sidecar):
                 if os.path.lexists(output):
-                    check_writable(output)
+                    file_io.check_writable(output)
             # The G-buffer is kept if streaks drift, as it may be the same in the next frame.
             steps = image_steps(
                 view, device, settings.as_float, keep_gbuffers=has_flow(look), workers=workers
@@ -307,18 +270,10 @@ def _frame_steps(
             _, image_data = yield from part(steps, start, stop)
             sidecar.unlink(missing_ok=True)
             write_images({path: image_data})
-            write_bytes(sidecar, _sidecar_text(input_hash, path))
+            file_io.write_bytes(sidecar, _sidecar_text(input_hash, path))
         state = replace(state, device=device)
-        drawn.append(_Frame(name, frame, view.camera, up_to_date, state))
+        drawn.append(_Frame(name, frame, path, view.camera, up_to_date, state))
     return scene_data, drawn
-
-
-def _path_of_frame(
-    settings: pictures.OutputSettings, name: str, cameras: Sequence[CameraSource] | None, frame: int
-) -> Path:
-    """Return the path of a frame. `name` is the name of the camera, or of the scene if `cameras` is None."""
-    stem = settings.folder / picture_stem(name, "scene" if cameras is None else "camera")
-    return frame_path(stem, frame, settings.as_float)
 
 
 def _sidecar_text(input_hash: bytes, path: Path) -> bytes:
@@ -329,7 +284,7 @@ def _sidecar_text(input_hash: bytes, path: Path) -> bytes:
 
 def _own_bytes(path: Path) -> bytes:
     """Return the contents of a picture or a sidecar file. It is no input (`read_bytes`): it may be replaced."""
-    with system_errors(path, "cannot be read"):
+    with file_io.system_errors(path, "cannot be read"):
         return path.read_bytes()
 
 

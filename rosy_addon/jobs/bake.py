@@ -14,8 +14,8 @@ from ..gpu.select import image_steps, select_device
 from ..scene import pictures
 from ..scene.cameras import CameraSource, render_camera
 from ..scene.keys import update_camera_planes
-from ..scene.look_properties import drift_in_scene, read_look
-from ..scene.picture_state import read_picture_states
+from ..scene.look_properties import read_look
+from ..scene.picture_state import SceneState
 from ..scene.read_view import read_views, scene_depsgraph
 from ..worker.job import Step, Steps, job, part, shares
 
@@ -67,7 +67,6 @@ def bake(
         `select_device`, `picture_steps` and `check_targets`.
     """
     look = read_look(scene.rosy) if look is None else look
-    drift = drift_in_scene(scene, look, scene.frame_current_final)
     settings = pictures.read_output_settings(scene) if settings is None else settings
     draws_thresholds = settings.relight and is_hatched(look)
     if draws_thresholds:
@@ -80,19 +79,18 @@ def bake(
     BAKE_CACHE.evict_over_limit()
     pictures.check_targets(scene_data.objects, settings)
     pictures.check_files(settings, [view.camera.name for view in views])
-    states = read_picture_states(scene, depsgraph, sources, scene_data.mesh_states)
+    scene_state = SceneState(scene, depsgraph, scene_data.mesh_states)
+    states = [scene_state.picture_state(scene, depsgraph, source) for source in sources]
     device = select_device(settings.device, look)
     drawings = []
     for (view, source, state), start, stop in shares(
         zip(views, sources, states, strict=True), 0.97
     ):
-        view = replace(view, draws_thresholds=draws_thresholds, drift=drift)
+        view = replace(view, draws_thresholds=draws_thresholds)
         steps = image_steps(view, device, settings.as_float, workers=workers)
         picture, image_data = yield from part(steps, start, stop)
         drawings.append((view, picture, image_data, source, replace(state, device=device)))
     yield Step(0.97, "applying the pictures")
-    results = [
-        pictures.apply_picture(scene, scene_data, settings, *drawing) for drawing in drawings
-    ]
+    results = [pictures.apply_picture(scene, scene_data, settings, *one) for one in drawings]
     update_camera_planes(scene)
     return results

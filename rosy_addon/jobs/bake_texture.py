@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from bpy.types import Image, Object, Scene
 
-from ..core.cache import BAKE_CACHE
 from ..core.errors import RosyError
 from ..scene.look_inputs import color_attribute_of
 from ..scene.look_properties import drift_in_scene, read_look
@@ -22,7 +21,6 @@ from ..scene.pictures import (
     texture_kind,
 )
 from ..scene.read_view import read_lights, read_texture_input, scene_depsgraph
-from ..scene.texture_nodes import Hatching
 from ..surface_texture.draw import TextureSettings, draw_texture_images, texture_colors_values
 from ..worker.job import Call, Step, Steps, job, shares
 
@@ -91,22 +89,14 @@ def bake_texture(scene: Scene, objects: Sequence[Object]) -> Steps[list[TextureR
     color_attribute = color_attribute_of(scene, look) if has_colors else None
     drawn = []
     for (obj, uv_map), start, stop in shares(uv_maps.items(), 0.98):
-        instance, uv = read_texture_input(
-            scene, depsgraph, obj, uv_map, BAKE_CACHE, color_attribute
-        )
-        BAKE_CACHE.evict_over_limit()
+        instance, uv = read_texture_input(scene, depsgraph, obj, uv_map, color_attribute)
         state = read_texture_state(scene, depsgraph, obj)
         inputs = instance, uv, look, texture_settings, lights, settings.as_float
         texture = yield Call(draw_texture_images, inputs, start, stop)
-        is_hatching = content == "look" and texture.is_data
-        hatching = Hatching(look, texture.line_count) if is_hatching else None
-        drawn.append((obj, uv_map, texture, state, hatching))
+        drawn.append((obj, uv_map, texture, state))
     yield Step(0.98, "applying the textures")
     results = []
-    for obj, uv_map, texture, state, hatching in drawn:
-        image = apply_texture(
-            *(scene, obj, uv_map, texture.tiles, settings, state, content, look, hatching),
-            is_udim=is_udim,
-        )
+    for obj, uv_map, texture, state in drawn:
+        image = apply_texture(scene, obj, uv_map, texture, state, look, texture_settings, settings)
         results.append(TextureResult(obj, image, (texture.note,) if texture.note else ()))
     return results

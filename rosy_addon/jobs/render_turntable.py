@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -81,22 +80,15 @@ def render_turntable(
         instance, look, count, size, view_angles, lights=lights, still=still
     )
     as_gif = turntable.is_gif(path)
-    draw = partial(_frame_steps, device=device, as_gif=as_gif, still=still, workers=workers)
+
+    def draw(view: ViewInput) -> Steps[Any]:
+        # If the camera stands still, the G-buffer is kept for the next view.
+        if device == "cpu":
+            return (yield Call(turntable.draw_frame, (view, as_gif, still, workers)))
+        picture = yield from picture_steps(view, device)
+        return (yield Call(turntable.video_frame, (picture.rgba, as_gif), 1.0))
+
     contents = yield from turntable.video_steps(draw, views, count, path, rate, encode_video.begin)
     yield Step(1.0, "writing the file")
     write_bytes(path, contents, follow_links=True)
     return path
-
-
-def _frame_steps(
-    view: ViewInput, device: str, as_gif: bool, still: bool, workers: int
-) -> Steps[Any]:
-    """Draw a view as part of a job, and return its `video_frame`, for a .gif or else for an .mp4.
-
-    `device` is "cpu" or "gpu". If the camera stands still (`still`), the G-buffer is kept for the next view.
-    `workers` is the number of processes that draw a large picture; 0 means one per processor core.
-    """
-    if device == "cpu":
-        return (yield Call(turntable.draw_frame, (view, as_gif, still, workers)))
-    picture = yield from picture_steps(view, device)
-    return (yield Call(turntable.video_frame, (picture.rgba, as_gif), 1.0))

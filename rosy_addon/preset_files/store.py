@@ -213,9 +213,7 @@ def read_preset(path: str | os.PathLike[str]) -> Preset:
         raise RosyError(f"{path}: {reason}") from None
 
 
-def write_preset(
-    path: str | os.PathLike[str], preset: Preset, *, follow_links: bool = False
-) -> None:
+def write_preset(path: Path, preset: Preset, *, follow_links: bool = False) -> None:
     """Write a preset file with the settings that differ from the default look.
 
     `follow_links` says whether the target of a link is replaced, and not the link itself.
@@ -226,15 +224,11 @@ def write_preset(
         If the name or the description of the preset is not allowed, or if the file cannot be written.
     """
     _validated(preset)
-    data = preset._asdict() | {"look": changed_settings(preset.look)}
+    settings = {name: getattr(preset.look, name) for name in settings_of(Look)}
+    changed = {name: value for name, value in settings.items() if value != getattr(Look, name)}
+    data = preset._asdict() | {"look": changed}
     text = json.dumps(data, indent=2, ensure_ascii=False) + "\n"
     write_bytes(path, text.encode("utf-8"), follow_links=follow_links)
-
-
-def changed_settings(look: Look) -> dict[str, Any]:
-    """Return the settings in which a look differs from the default look, in the order of `Look`."""
-    values = {name: getattr(look, name) for name in settings_of(Look)}
-    return {name: value for name, value in values.items() if value != getattr(Look, name)}
 
 
 def preview_path(path: Path) -> Path:
@@ -315,9 +309,7 @@ def rename_preset(key: str, name: str, description: str, user_folder: Path) -> s
     """
     path = _user_file(key, user_folder)
     preset = _validated(read_preset(path)._replace(name=name, description=description))
-    target = (
-        path if preset_key(name) == path.stem else _target_path(preset, user_folder, replace=False)
-    )
+    target = path if preset_key(name) == path.stem else _target_path(preset, user_folder, False)
     write_preset(target, preset)
     if target != path:
         if preview_path(path).is_file():

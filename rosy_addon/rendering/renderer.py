@@ -79,9 +79,7 @@ class ViewportRenderer:
         """
         raise NotImplementedError
 
-    def composite(
-        self, texture: Any, items: Sequence[Any], view: ViewInput, opacity: float = 1.0
-    ) -> None:
+    def composite(self, texture: Any, items: list[Any], view: ViewInput, opacity: float) -> None:
         """Draw a texture over the 3D view that is being drawn.
 
         Parameters

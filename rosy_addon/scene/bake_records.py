@@ -99,11 +99,8 @@ def store_record(
     material: Material,
     source: CameraSource | None,
     states: Mapping[int | None, PictureState],
-    *,
     size: tuple[int, int],
     key: PictureKey = NO_KEY,
-    frame_range: str = "",
-    is_texture: bool = False,
 ) -> None:
     """Store the record of a picture, sequence or texture. It replaces an earlier record of the same source.
 
@@ -116,7 +113,7 @@ def store_record(
     image : bpy.types.Image
     material : bpy.types.Material
     source : bpy.types.Object, Camera or None
-        The camera; None for a sequence from the cameras that render the frames. For a texture, the object.
+        The camera; None for a sequence from the cameras that render the frames. For a texture, the mesh object.
     states : mapping of int or None to PictureState
         The state of the scene from which each frame was drawn, by frame number. A single picture has one
         state, with the key None. `PictureState.device` is the device that drew the picture.
@@ -124,14 +121,10 @@ def store_record(
         Width and height in pixels.
     key : PictureKey
         Contents of the key (the legend) of the picture.
-    frame_range : str
-        First and last frame of a sequence. Empty for a single picture.
-    is_texture : bool
-        Whether the picture is the texture of an object.
     """
-    record = _find_or_add_record(scene, name, source, is_texture)
+    record = _find_or_add_record(scene, name, source)
     _replace_datablocks(record, image, material)
-    record.frames = frame_range
+    record.frames = "" if None in states else f"{min(states)} to {max(states)}"
     record.width, record.height = size
     record.key = key.to_json()
     record.state = ""
@@ -144,13 +137,11 @@ def store_record(
             entry.name, entry.state = str(frame), state.to_json()
 
 
-def _find_or_add_record(
-    scene: Scene, name: str, source: CameraSource | None, is_texture: bool
-) -> PropertyGroup:
+def _find_or_add_record(scene: Scene, name: str, source: CameraSource | None) -> PropertyGroup:
     """Return the record of a camera, scene or textured object, and create it if missing. Update its name."""
     records = scene.rosy.bakes
     camera, view, record = None, "", None
-    if is_texture:
+    if isinstance(source, Object) and source.type == "MESH":
         view, record = TEXTURE_VIEW, _find_texture_record(scene, source) or records.add()
     elif source is None:
         view = FRAME_CAMERAS
@@ -201,11 +192,6 @@ def _replace_datablocks(record: PropertyGroup, image: Image, material: Material)
             old_datablock.user_remap(new_datablock)
             delete_owned(old_datablock)
             new_datablock.name = f"{NAME_PREFIX}{record.name}"
-
-
-def find_record(scene: Scene, name: str) -> PropertyGroup | None:
-    """Return the record with a name, as `camera_name` returns it; None if there is none."""
-    return next((record for record in scene.rosy.bakes if camera_name(record) == name), None)
 
 
 def camera_name(record: PropertyGroup) -> str:
@@ -267,13 +253,11 @@ def list_bakes(
     """
     recorded = [record for record in scene.rosy.bakes if record.image is not None]
     shown = {material for obj in baked_objects(scene) for material in shown_materials(obj)}
-    state = None
-    if recorded and for_panel:
-        state = SCENE_STATES.get(scene, scene_depsgraph(scene))
-    elif recorded:
-        state = SceneState(scene, scene_depsgraph(scene), {})
-    elif for_panel:
-        SCENE_STATES.clear()
+    depsgraph = scene_depsgraph(scene)
+    if for_panel:
+        state = SCENE_STATES.get(scene, depsgraph) if recorded else SCENE_STATES.clear()
+    else:
+        state = SceneState(scene, depsgraph, {})
     infos = [
         BakeInfo(
             camera_name(record),
@@ -283,7 +267,7 @@ def list_bakes(
             record.material in shown,
             record.frames,
             is_texture=record.view == TEXTURE_VIEW,
-            **_present_reason(scene, record, state, automatic_device),
+            **_present_reason(record, state, automatic_device),
         )
         for record in recorded
     ]
@@ -297,20 +281,16 @@ def list_bakes(
 
 
 def _present_reason(
-    scene: Scene,
-    record: PropertyGroup,
-    state: SceneState,
-    automatic_device: Callable[[Look], str] | None,
+    record: PropertyGroup, state: SceneState, automatic_device: Callable[[Look], str] | None
 ) -> dict[str, str]:
     """Return why a picture is out of date, or why this is not known, as a keyword argument of `BakeInfo`.
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     record : bpy.types.PropertyGroup
         The record of the picture.
     state : SceneState
-        The present state of the scene.
+        The present state of its scene.
     automatic_device : callable or None
         Returns the device that draws a look if the scene's device is "auto". None: the device that drew the
         picture is assumed.
@@ -321,6 +301,7 @@ def _present_reason(
         One item, with the key ``stale_reason`` or ``unknown_reason``. An empty ``stale_reason`` says that the
         picture is up to date.
     """
+    scene = record.id_data
     text, frame = record.state, scene.frame_current
     if record.frames and record.frame_states:
         entry = record.frame_states.get(str(frame))

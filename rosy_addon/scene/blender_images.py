@@ -135,13 +135,11 @@ def frame_path(stem: Path, frame: int, as_float: bool) -> Path:
 
 
 def image_path(stem: Path, as_float: bool) -> Path:
-    """Return the path of an image file: stem, suffix. The stem may have dots."""
-    return stem.with_name(stem.name + _suffix(as_float))
+    """Return the path of an image file: stem, suffix. The stem may have dots.
 
-
-def _suffix(as_float: bool) -> str:
-    """Return the suffix of image files with linear values, or with 8 bits per channel."""
-    return ".exr" if as_float else ".png"
+    The suffix is .exr for linear values, or .png for 8 bits per channel.
+    """
+    return stem.with_name(stem.name + (".exr" if as_float else ".png"))
 
 
 def write_images(contents: Mapping[Path, ImageData]) -> None:

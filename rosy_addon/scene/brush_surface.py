@@ -195,8 +195,5 @@ def closest_faces(mesh: Mesh, surface: Surface, cache: Cache) -> FaceLocator:
 
 def _barycentric(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
     """Return the (3,) barycentric coordinates of a point in a triangle with (3, 3) corners."""
-    a, b = corners[1] - corners[0], corners[2] - corners[0]
-    matrix = np.array([[a @ a, a @ b], [a @ b, b @ b]])
-    right = np.array([a @ (point - corners[0]), b @ (point - corners[0])])
-    u, v = np.linalg.lstsq(matrix, right, rcond=None)[0]
+    u, v = np.linalg.lstsq((corners[1:] - corners[0]).T, point - corners[0], rcond=None)[0]
     return np.array([1 - u - v, u, v])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+from bpy.types import Material, Object, PropertyGroup, Scene
 from mathutils import Matrix
 
 from ..compositor.look import is_hatched
@@ -20,14 +21,14 @@ from .read_view import scene_depsgraph
 HIDDEN_FROM = ("diffuse", "glossy", "transmission", "volume_scatter", "shadow")
 
 
-def pictured_cameras(scene: bpy.types.Scene) -> dict[bpy.types.Object, bpy.types.PropertyGroup]:
+def pictured_cameras(scene: Scene) -> dict[Object, PropertyGroup]:
     """Return the cameras from which pictures were baked, each with the record of one of its pictures.
 
     If a camera has several pictures, one that objects show is preferred. An animation in which each frame is
     drawn from the camera that renders it counts as a picture of the active camera.
     """
     shown = {material for obj in scene.objects for material in shown_materials(obj)}
-    cameras: dict[bpy.types.Object, bpy.types.PropertyGroup] = {}
+    cameras: dict[Object, PropertyGroup] = {}
     for record in scene.rosy.bakes:
         camera = scene.camera if record.view == FRAME_CAMERAS else record.camera
         is_camera = camera is not None and camera.type == "CAMERA"
@@ -36,7 +37,7 @@ def pictured_cameras(scene: bpy.types.Scene) -> dict[bpy.types.Object, bpy.types
     return cameras
 
 
-def remove_camera_planes(scene: bpy.types.Scene, tag: str) -> None:
+def remove_camera_planes(scene: Scene, tag: str) -> None:
     """Delete the planes of a scene that have the custom property `tag`.
 
     Their meshes, materials and images are deleted as well if nothing else uses them.
@@ -58,32 +59,27 @@ def remove_camera_planes(scene: bpy.types.Scene, tag: str) -> None:
 
 
 def add_camera_plane(
-    scene: bpy.types.Scene,
-    camera: bpy.types.Object,
-    name: str,
-    tag: str,
-    corners: np.ndarray,
-    material: bpy.types.Material,
-    track: Track,
-) -> bpy.types.Object:
+    scene: Scene, camera: Object, tag: str, corners: np.ndarray, material: Material, track: Track
+) -> Object:
     """Add a plane, parented to a camera, and return its object.
 
     Parameters
     ----------
     scene : bpy.types.Scene
     camera : bpy.types.Object
-    name, tag : str
-        Name of the new object, and name of the custom property by which it is found again.
+    tag : str
+        Name of the custom property by which the new object is found again.
     corners : (4, 3) float ndarray
         Corners of the plane in camera space, counter-clockwise as seen from the camera.
     material : bpy.types.Material
+        The new object has its name.
     track : function
         Called with each new datablock, which it returns; see `datablocks.rollback_on_error`.
     """
-    mesh = track(bpy.data.meshes.new(name))
+    mesh = track(bpy.data.meshes.new(material.name))
     mesh.from_pydata(corners.tolist(), [], [(0, 1, 2, 3)])
     mesh.materials.append(material)
-    obj = track(bpy.data.objects.new(name, mesh))
+    obj = track(bpy.data.objects.new(material.name, mesh))
     obj[tag] = True
     scene.collection.objects.link(obj)
     obj.parent = camera
@@ -130,7 +126,7 @@ DISTANCE = 0.99
 OVERSIZE = 1.5
 
 
-def update_backdrops(scene: bpy.types.Scene) -> None:
+def update_backdrops(scene: Scene) -> None:
     """Replace the backdrops of a scene by the ones that its settings ask for.
 
     If backdrops are switched on and the look is hatching (lines of ink on paper), a backdrop in the color of
@@ -143,7 +139,7 @@ def update_backdrops(scene: bpy.types.Scene) -> None:
             _add_backdrop(scene, camera, look.paper_color)
 
 
-def _add_backdrop(scene: bpy.types.Scene, camera: bpy.types.Object, paper: str) -> None:
+def _add_backdrop(scene: Scene, camera: Object, paper: str) -> None:
     """Add a plane with the color of the paper, given as a hex color, parented to a camera."""
     name = f"RoSy Backdrop {camera.name}"
     view = camera_of_object(scene, scene_depsgraph(scene), camera)
@@ -153,4 +149,4 @@ def _add_backdrop(scene: bpy.types.Scene, camera: bpy.types.Object, paper: str) 
         material = track(new_emissive_material(name, color, scene.rosy.emission))
         material.diffuse_color = color  # in views with Solid shading
         material.use_backface_culling = True
-        add_camera_plane(scene, camera, name, BACKDROP_TAG, corners, material, track)
+        add_camera_plane(scene, camera, BACKDROP_TAG, corners, material, track)

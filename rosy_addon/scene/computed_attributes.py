@@ -23,7 +23,7 @@ from ..worker.job import Call, Steps, call_steps, job, shares
 from .field_attributes import VECTOR_TYPE, attribute_name, check_attribute_type, store_attribute
 from .guides import GUIDE_ATTRIBUTE
 from .look_inputs import ReadRequest
-from .mesh_fields import check_writable, read_mesh_field
+from .mesh_fields import check_writable, read_mesh_field, vector_names
 from .meshes import mesh_label, mesh_surface
 from .scene_reader import SceneData, read_scene
 
@@ -100,14 +100,9 @@ def _check_tangents_storable(mesh: Mesh, name: str) -> None:
 
 def other_field_names(mesh: Mesh) -> list[str]:
     """Return the names of vector attributes of a mesh that may hold a field other than its own."""
-    no_fields = (attribute_name(mesh), "position", GUIDE_ATTRIBUTE, TANGENT_ATTRIBUTE)
-    return [
-        attribute.name
-        for attribute in mesh.attributes
-        if attribute.data_type == VECTOR_TYPE
-        and attribute.name not in no_fields
-        and not re.fullmatch(r"\..*|dir\d+", attribute.name)
-    ]
+    no_fields = (attribute_name(mesh), GUIDE_ATTRIBUTE, TANGENT_ATTRIBUTE)
+    names = [name for name in vector_names(mesh) if not re.fullmatch(r"dir\d+", name)]
+    return [name for name in names if name not in no_fields]
 
 
 @job

@@ -79,12 +79,7 @@ class FieldLayout:
 
 
 def read_evaluated_field(
-    mesh: Mesh,
-    layout: FieldLayout,
-    surface: Surface,
-    nonfinite: str,
-    label: str,
-    cache: Cache | None = None,
+    mesh: Mesh, layout: FieldLayout, surface: Surface, nonfinite: str, cache: Cache | None = None
 ) -> RosyField:
     """Read the field of an evaluated mesh, whose faces may differ from those of the original mesh.
 
@@ -100,11 +95,9 @@ def read_evaluated_field(
         Evaluated mesh.
     layout : FieldLayout
     surface : Surface
-        Surface of the mesh.
+        Surface of the mesh. Messages have its name.
     nonfinite : {"error", "zero"}
         Raise an error if a vector is not finite, or treat it as undefined.
-    label : str
-        Name of the mesh in messages.
     cache : Cache, optional
         Keeps fields that have not changed since an earlier call.
 
@@ -113,7 +106,7 @@ def read_evaluated_field(
     RosyError
         If a value is not finite and `nonfinite` is "error".
     """
-    source = f"{label}, attribute '{layout.name}'"
+    source = f"{surface.name}, attribute '{layout.name}'"
     stored_values = field_values(mesh.attributes[layout.name], source, mesh)
     values = follow_mesh(mesh, layout.name, stored_values, surface)
     original_normals = read_attribute(mesh, FACE_NORMAL_ATTRIBUTE, np.float32, 3)
@@ -121,32 +114,28 @@ def read_evaluated_field(
     ratio_parts = [read_attribute(mesh, name, np.float32, 2) for name in names]
 
     def build() -> RosyField:
-        vectors = _transport(values, original_normals, surface, source, nonfinite)
+        vectors = as_float64(values)
+        apply_nonfinite_policy(vectors, source, "face", nonfinite)
+        vectors = _transport(vectors, original_normals, surface, source)
         columns = [parts.astype(np.float64) @ (1, 1j) for parts in ratio_parts]
         ratios = np.stack(columns, axis=1) if columns else None
         return RosyField(layout.degree, vectors, ratios, layout.family_count)
 
     shape: tuple[object, ...] = (surface,)
-    if (
-        surface.rest_vertices is not None
-    ):  # the field does not depend on the deformed shape of each frame
+    if surface.rest_vertices is not None:  # the field does not depend on the shape of each frame
         shape = surface.rest_vertices, surface.corner_vertex, surface.face_start
     inputs = values, original_normals, *ratio_parts, layout, source, nonfinite
     return cached(cache, build, "evaluated field", *shape, *inputs)
 
 
 def _transport(
-    values: np.ndarray,
-    source_normals: np.ndarray | None,
-    surface: Surface,
-    source: str,
-    nonfinite: str,
+    vectors: np.ndarray, source_normals: np.ndarray | None, surface: Surface, source: str
 ) -> np.ndarray:
     """Return vectors, (F, 3) float64, transported from the original to the evaluated faces.
 
     Parameters
     ----------
-    values : (F, 3) ndarray
+    vectors : (F, 3) float64 ndarray
         The vectors that modifiers copied to the evaluated faces.
     source_normals : (F, 3) ndarray or None
         The normal of the original face of each evaluated face. None: vectors are only projected.
@@ -154,12 +143,8 @@ def _transport(
         Surface of the evaluated mesh.
     source : str
         Name of the attribute in messages.
-    nonfinite : {"error", "zero"}
-        Raise an error if a vector is not finite, or treat it as undefined.
     """
     label = "reading the field"
-    vectors = as_float64(values)
-    apply_nonfinite_policy(vectors, source, "face", nonfinite)
     report(0.0, label)
     normals = tangent_normals(surface, "face")
     report(0.3, label)
@@ -213,7 +198,7 @@ def temp_attributes(
         for obj in objects:
             mesh = obj.data
             try:
-                layouts[obj] = _prepare_field(obj, nonfinite, temp_meshes, cache)
+                layouts[obj] = _layout_of(obj, nonfinite, temp_meshes, cache)
             except RosyError as error:
                 errors[obj] = error
                 continue
@@ -243,9 +228,7 @@ def temp_attributes(
             depsgraph.update()
 
 
-def _prepare_field(
-    obj: Object, nonfinite: str, temp_meshes: list[Mesh], cache: Cache
-) -> FieldLayout:
+def _layout_of(obj: Object, nonfinite: str, temp_meshes: list[Mesh], cache: Cache) -> FieldLayout:
     """Return the layout of the field of an object as vectors on faces; add temporary attributes if needed.
 
     If attributes are added to the mesh of the object, the mesh is appended to `temp_meshes`. `nonfinite` is

@@ -121,9 +121,7 @@ def check_attribute_type(mesh: Mesh, name: str, data_type: str, domain: str = "F
         )
 
 
-def get_or_create_attribute(
-    mesh: Mesh, name: str, data_type: str, domain: str = "FACE"
-) -> Attribute:
+def ensure_attribute(mesh: Mesh, name: str, data_type: str, domain: str = "FACE") -> Attribute:
     """Return the attribute with this name, type and domain, and create it if it is missing.
 
     Raises
@@ -150,7 +148,7 @@ def store_attribute(
     mesh: Mesh, name: str, data_type: str, values: np.ndarray, domain: str = "FACE"
 ) -> Attribute:
     """Create an attribute if it is missing, write its values, one row per element, and return it."""
-    attribute = get_or_create_attribute(mesh, name, data_type, domain)
+    attribute = ensure_attribute(mesh, name, data_type, domain)
     write_attribute(attribute, values)
     return attribute
 

@@ -29,9 +29,8 @@ def open_blend(path: Path) -> None:
         bpy.ops.wm.open_mainfile(filepath=name, load_ui=False, use_scripts=False)
     except RuntimeError as reason:
         raise RosyError(f"{path}: cannot be read: {_one_line(reason)}") from None
-    if (
-        not bpy.app.binary_path
-    ):  # the module bpy 4.2 crashes at its end if a driver was not allowed to run
+    # The module bpy 4.2 crashes at its end if a driver was not allowed to run.
+    if not bpy.app.binary_path:
         atexit.register(bpy.ops.wm.read_factory_settings, use_empty=True)
 
 

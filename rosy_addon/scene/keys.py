@@ -20,14 +20,8 @@ from ..core.color import LUMINANCE_WEIGHTS, from_hex, to_linear
 from ..core.errors import RosyError
 from ..projection.camera import Camera
 from ..rendering.picture_images import picture_image
+from . import camera_planes
 from .blender_images import new_image
-from .camera_planes import (
-    add_camera_plane,
-    frame_corners,
-    pictured_cameras,
-    remove_camera_planes,
-    update_backdrops,
-)
 from .cameras import camera_of_object
 from .datablocks import KEY_TAG, rollback_on_error
 from .look_properties import read_look
@@ -57,7 +51,7 @@ TextShapes = Callable[[str], np.ndarray]
 
 def update_camera_planes(scene: Scene) -> None:
     """Replace the backdrops and the keys of a scene by the ones that its settings ask for."""
-    update_backdrops(scene)
+    camera_planes.update_backdrops(scene)
     update_keys(scene)
 
 
@@ -67,11 +61,11 @@ def update_keys(scene: Scene) -> None:
     If keys are switched on, a key is added for each of `pictured_cameras`. It explains the picture as it was
     baked, whatever the settings are now.
     """
-    remove_camera_planes(scene, KEY_TAG)
+    camera_planes.remove_camera_planes(scene, KEY_TAG)
     if not scene.rosy.key:
         return
     triangles = cache(text_triangles)
-    for camera, record in pictured_cameras(scene).items():
+    for camera, record in camera_planes.pictured_cameras(scene).items():
         try:
             _add_key(scene, camera, record, triangles)
         except RosyError:
@@ -88,12 +82,12 @@ def _add_key(scene: Scene, camera: Object, record: PropertyGroup, triangles: Tex
     if picture is None:
         return
     name = f"RoSy Key {camera.name}"
-    corners = frame_corners(view, DISTANCE * camera.data.clip_start)
+    corners = camera_planes.frame_corners(view, DISTANCE * camera.data.clip_start)
     image_data = picture_image(picture, as_float=False)
     with rollback_on_error() as track:
         image = track(new_image(name, image_data))
         material = track(_new_material(name, image, scene.rosy.emission or 1.0))
-        obj = add_camera_plane(scene, camera, name, KEY_TAG, corners, material, track)
+        obj = camera_planes.add_camera_plane(scene, camera, KEY_TAG, corners, material, track)
     # With Solid shading, 3D views would draw the plane opaque, so only its bounds are drawn.
     obj.display_type = "BOUNDS"
     for probe in ("hide_probe_volume", "hide_probe_sphere", "hide_probe_plane"):

@@ -26,7 +26,7 @@ from ..core.memory import check_memory
 from ..field.blocks import ROWS_PER_BLOCK, row_blocks
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
-from .cameras import camera_of_object, render_camera
+from .cameras import camera_of_object
 from .datablocks import has_rosy_properties
 from .face_values import COLOR_TYPES, corner_scalars, filled_attribute
 from .meshes import read_uvs
@@ -37,22 +37,6 @@ LUMINANCE_BYTES = 4 * 4 + 2 * 4
 
 
 @dataclass(frozen=True)
-class ToneRequest:
-    """Where the tones of surfaces (how light or dark they are drawn) are read from.
-
-    Attributes
-    ----------
-    kind : {"attribute", "image"}
-        Read the tone from a mesh attribute, or from the image that is chosen on each object.
-    attribute : str
-        Name of the attribute. If it is empty, the active color attribute of each mesh is read.
-    """
-
-    kind: str
-    attribute: str = ""
-
-
-@dataclass(frozen=True)
 class ReadRequest:
     """What to read from the meshes of a scene besides their shapes and fields.
 
@@ -60,14 +44,18 @@ class ReadRequest:
     ----------
     nonfinite : {"error", "zero"}
         Raise an error if a vector is not finite, or treat it as undefined.
-    tone : ToneRequest or None
-        Where surface tones are read from. None: no tones are read.
+    tone : {"", "attribute", "image"}
+        Read the tones of surfaces (how light or dark they are drawn) from a mesh attribute, from the image
+        that is chosen on each object, or not at all.
+    tone_attribute : str
+        Name of the attribute. If it is empty, the active color attribute of each mesh is read.
     color_attribute : str or None
         Name of the attribute with the values for the color map. None: no values are read.
     """
 
     nonfinite: str = "error"
-    tone: ToneRequest | None = None
+    tone: str = ""
+    tone_attribute: str = ""
     color_attribute: str | None = None
 
 
@@ -77,12 +65,9 @@ FIELDS_ONLY = ReadRequest()
 
 def read_request(scene: Scene, look: Look) -> ReadRequest:
     """Return what to read from the meshes of a scene to draw a look, with the settings of the scene."""
-    tone = None
-    if look.tone == "attribute":
-        tone = ToneRequest("attribute", scene.rosy.tone_attribute)
-    elif look.tone == "image":
-        tone = ToneRequest("image")
-    return ReadRequest(nonfinite_policy(scene), tone, color_attribute_of(scene, look))
+    tone = look.tone if look.tone in ("attribute", "image") else ""
+    attribute = scene.rosy.tone_attribute if tone == "attribute" else ""
+    return ReadRequest(nonfinite_policy(scene), tone, attribute, color_attribute_of(scene, look))
 
 
 def nonfinite_policy(scene: Scene) -> str:
@@ -99,7 +84,7 @@ def color_attribute_of(scene: Scene, look: Look) -> str | None:
 
 
 def read_tone(
-    mesh: Mesh, owner: Object, tone_request: ToneRequest | None, cache: Cache | None = None
+    mesh: Mesh, owner: Object, request: ReadRequest, cache: Cache | None = None
 ) -> SurfaceTone | None:
     """Read the surface tone of a mesh.
 
@@ -109,7 +94,7 @@ def read_tone(
         Evaluated mesh.
     owner : bpy.types.Object
         The original object.
-    tone_request : ToneRequest or None
+    request : ReadRequest
     cache : Cache, optional
         Keeps tones that have not changed since an earlier call.
 
@@ -124,11 +109,11 @@ def read_tone(
         If the type of the attribute is not supported, a value is not finite, the image cannot be
         read, or there is no UV map.
     """
-    if tone_request is None:
+    if not request.tone:
         return None
     label, image = f"object '{owner.name}'", None
-    if tone_request.kind == "attribute":
-        name = tone_request.attribute or mesh.color_attributes.active_color_name
+    if request.tone == "attribute":
+        name = request.tone_attribute or mesh.color_attributes.active_color_name
         attribute = filled_attribute(mesh, name)
         if attribute is None:
             return None
@@ -146,21 +131,21 @@ def read_tone(
     return cached(cache, lambda: SurfaceTone(values, image), "tone", values, image)
 
 
-def tone_digest(mesh: Mesh, owner: Object, tone_request: ToneRequest | None) -> bytes:
+def tone_digest(mesh: Mesh, owner: Object, request: ReadRequest) -> bytes:
     """Return a digest of the result of `read_tone`; empty if the mesh has no tone.
 
     If the tone cannot be read, a digest of the error message is returned.
     """
     try:
-        tone = read_tone(mesh, owner, tone_request)
+        tone = read_tone(mesh, owner, request)
     except RosyError as error:
         return content_hash(str(error))
     return b"" if tone is None else content_hash(tone.values, tone.image)
 
 
-def tone_image_key(owner: Object, tone_request: ToneRequest | None) -> tuple[str, ...]:
+def tone_image_key(owner: Object, request: ReadRequest) -> tuple[str, ...]:
     """Return a cache key for the tone image and UV map of an object; empty if the tone is not an image."""
-    if tone_request is None or tone_request.kind != "image" or not has_rosy_properties():
+    if request.tone != "image" or not has_rosy_properties():
         return ()
     image = owner.rosy.tone_image
     return ("" if image is None else image.name_full, owner.rosy.tone_uv_map)
@@ -234,14 +219,15 @@ def check_sources(with_field: Sequence[tuple[MeshInstance, Object]], request: Re
     tone, numbers = request.tone, request.color_attribute
     owners = list(dict.fromkeys(owner for _, owner in with_field))
     names = ", ".join(f"'{owner.name}'" for owner in owners)
-    if tone is not None and all(instance.tone is None for instance, _ in with_field):
-        if tone.kind == "image":
+    if tone and all(instance.tone is None for instance, _ in with_field):
+        if tone == "image":
             problem = "choose an image for the tone, in the properties of the object"
-        elif not tone.attribute:
+        elif not request.tone_attribute:
             problem = "there is no color attribute: choose an attribute for the tone"
         else:
             listing = _attribute_listing(owners, ("FLOAT", *COLOR_TYPES))
-            problem = f"there is no attribute '{tone.attribute}' for the tone, only {listing}"
+            name = request.tone_attribute
+            problem = f"there is no attribute '{name}' for the tone, only {listing}"
         raise RosyError(f"{names}: {problem}")
     if numbers is not None and all(instance.color_values is None for instance, _ in with_field):
         # Boolean attributes are not listed, as most of them are Blender's own.
@@ -300,34 +286,26 @@ def input_files() -> list[str]:
 
 
 def load_reference(
-    scene: Scene,
-    depsgraph: Depsgraph,
-    camera: Object | None,
-    look: Look,
-    picture_luminance: np.ndarray | None = None,
-) -> ReferenceRender | None:
-    """Return the reference render from which a look takes its tone; None if the look does not use one.
+    scene: Scene, depsgraph: Depsgraph, camera: Object, picture_luminance: np.ndarray | None = None
+) -> ReferenceRender:
+    """Return the reference render from which looks with the tone "picture" take their tone.
 
     Parameters
     ----------
     scene : bpy.types.Scene
         The scene, at the frame of the reference render.
     depsgraph : bpy.types.Depsgraph
-    camera : bpy.types.Object or None
-        The camera that the reference render was rendered from. None: the active camera of the scene.
-    look : Look
+    camera : bpy.types.Object
+        The camera that the reference render was rendered from.
     picture_luminance : (H, W) ndarray, optional
         The luminance of the reference render. By default it is read from the file.
 
     Raises
     ------
     RosyError
-        If the scene has no active camera, no file is chosen, the file cannot be read, or the picture does not
+        If no file is chosen, the file cannot be read, or the picture does not
         have the aspect ratio of renders.
     """
-    if look.tone != "picture":
-        return None
-    camera = camera or render_camera(scene)
     path = reference_path(scene)
     reference_camera = camera_of_object(scene, depsgraph, camera)
     if picture_luminance is None:

@@ -28,15 +28,15 @@ from .field_attributes import (
     attribute_name,
     check_attribute_type,
     describe_type,
+    ensure_attribute,
     field_degree,
     field_values,
     follow_mesh,
-    get_or_create_attribute,
     is_face_vector_field,
     store_attribute,
     store_rest_shape,
 )
-from .meshes import flush_edit_mode, mesh_label, mesh_surface, read_attribute, write_attribute
+from .meshes import flush_edit_mode, mesh_surface, read_attribute, write_attribute
 
 #: Names of the elements of a mesh in `field.validate`, by the domain of an attribute.
 ELEMENTS = {"FACE": "face", "POINT": "vertex"}
@@ -63,11 +63,11 @@ def read_mesh_field(
     degree : int, optional
         By default ``mesh.rosy.degree``.
     surface : Surface, optional
-        The surface of the mesh, if it has been read already.
+        The surface of the mesh, if it has been read already. Messages have its name.
     nonfinite : {"error", "zero"}
         Raise an error if a value is not finite, or treat it as undefined.
     label : str, optional
-        Name of the mesh in messages. By default `mesh_label`.
+        Name of the mesh in messages, if there is no surface. By default `mesh_label`.
     cache : Cache, optional
         Keeps surfaces and fields that have not changed since an earlier call.
 
@@ -81,16 +81,16 @@ def read_mesh_field(
     --------
     write_mesh_field : The inverse.
     """
-    label = mesh_label(mesh) if label is None else label
     flush_edit_mode(mesh)
     if surface is None:
         with progress(0.0, 0.5):
             surface = mesh_surface(mesh, label, cache=cache)
+    label = surface.name
     field_name = name or attribute_name(mesh)
     degree = check_degree(field_degree(mesh) if degree is None else degree)
     if field_name not in mesh.attributes and "dir0" in mesh.attributes:
         with progress(0.5, 1.0):
-            return _field_from_directions(mesh, surface, degree, nonfinite, label, cache)
+            return _field_from_directions(mesh, surface, degree, nonfinite, cache)
     attribute = mesh.attributes.get(field_name)
     if attribute is None:
         raise RosyError(
@@ -116,15 +116,14 @@ def read_mesh_field(
 
 
 def _field_from_directions(
-    mesh: Mesh, surface: Surface, degree: int, nonfinite: str, label: str, cache: Cache | None
+    mesh: Mesh, surface: Surface, degree: int, nonfinite: str, cache: Cache | None
 ) -> RosyField:
     """Read a field from the attributes ``dir0`` ... ``dir{N-1}``. Their number N is the degree.
 
     Two attributes are the lines of a cross if their directions are nowhere opposite and `degree`, the
-    expected degree, is not 2. A `RosyWarning` says so. `label` is the name of the mesh in messages.
-    `nonfinite` is "error" or "zero": vectors that are not finite raise an error, or are undefined.
+    expected degree, is not 2. A `RosyWarning` says so. `nonfinite` is "error" or "zero": vectors that are not finite raise an error, or are undefined.
     """
-    count = 0
+    label, count = surface.name, 0
     while f"dir{count}" in mesh.attributes:
         count += 1
     if count > MAX_DEGREE:
@@ -196,15 +195,16 @@ def _field_from_corners(
     return RosyField(degree, np.where(normalize(normal).any(axis=1)[:, None], mean, 0.0))
 
 
+def vector_names(mesh: Mesh) -> list[str]:
+    """Return the names of the vector attributes of a mesh that users see, without positions."""
+    names = [each.name for each in mesh.attributes if each.data_type == VECTOR_TYPE]
+    positions = ("position", "rest_position")
+    return [name for name in names if name not in positions and not name.startswith(".")]
+
+
 def _attribute_hint(mesh: Mesh) -> str:
     """Return advice for a message: which vector attribute to choose, or to make a field if there are none."""
-    names = [
-        f"'{other.name}'"
-        for other in mesh.attributes
-        if other.data_type == VECTOR_TYPE
-        and other.name not in ("position", "rest_position")
-        and not other.name.startswith(".")
-    ]
+    names = [f"'{name}'" for name in vector_names(mesh)]
     return f": choose {' or '.join(names)}" if names else ": make or import a field"
 
 
@@ -219,9 +219,7 @@ STORAGE_FORMS = {
 }
 
 
-def assign_fields(
-    fields: dict[Mesh, RosyField], name: str | None = None, form: str = "VECTOR"
-) -> None:
+def assign_fields(fields: dict[Mesh, RosyField], name: str = "", form: str = "VECTOR") -> None:
     """Store fields on meshes: on all of them, or on none if one field cannot be stored.
 
     Parameters
@@ -349,7 +347,7 @@ def _check_storable(mesh: Mesh, field: RosyField, name: str, form: str) -> None:
         names = [f"dir{index}" for index in range(field.degree)]
     for new_name in names:
         is_new = new_name not in mesh.attributes
-        attribute = get_or_create_attribute(mesh, new_name, data_type)
+        attribute = ensure_attribute(mesh, new_name, data_type)
         if is_new:
             mesh.attributes.remove(attribute)
 

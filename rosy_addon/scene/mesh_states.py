@@ -78,7 +78,7 @@ def read_mesh_state(
     if request is None:
         return MeshState(digest(shape_digest(mesh, occluder_only=True)), bounds)
     original = owner.data
-    digest_of_tone = tone_digest(mesh, owner, request.tone)
+    digest_of_tone = tone_digest(mesh, owner, request)
     parts = [shape_digest(mesh), *field_parts(mesh, original), digest_of_tone]
     parts.append(color_values_digest(mesh, request.color_attribute))
     if user_modifiers(owner) or original.shape_keys:
@@ -86,7 +86,7 @@ def read_mesh_state(
         parts += [shape_digest(original), *field_parts(original, original)]
     if any(isinstance(part, np.ndarray) and not np.isfinite(part).all() for part in parts):
         parts.append(request.nonfinite)
-    lacks_tone = request.tone is not None and not digest_of_tone
+    lacks_tone = bool(request.tone) and not digest_of_tone
     return MeshState(digest(*parts), bounds, lacks_tone)
 
 

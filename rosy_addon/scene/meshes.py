@@ -188,7 +188,8 @@ def read_uvs(mesh: Mesh, name: str = "", label: str | None = None) -> np.ndarray
 def polygon_arrays(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     """Return `Surface.corner_vertex`, (C,) int32, and `Surface.face_start`, (F + 1,) int32."""
     loops, face_count = mesh.loops, len(mesh.polygons)
-    corner_vertex = _attribute_or_collection(mesh, ".corner_vert", loops, "vertex_index", np.int32)
+    key = "vertex_index"
+    corner_vertex = _attribute_or_collection(mesh, ".corner_vert", loops, key, np.int32, 1)
     if len(loops) == 3 * face_count:
         return corner_vertex, np.arange(0, len(loops) + 1, 3, dtype=np.int32)
     face_start = np.empty(face_count + 1, dtype=np.int32)
@@ -309,12 +310,7 @@ def _edge_flags(mesh: Mesh, property_name: str) -> np.ndarray:
 
 
 def _attribute_or_collection(
-    mesh: Mesh,
-    attribute: str,
-    collection: bpy_prop_collection,
-    key: str,
-    dtype: type,
-    columns: int = 1,
+    mesh: Mesh, attribute: str, collection: bpy_prop_collection, key: str, dtype: type, columns: int
 ) -> np.ndarray:
     """Return the values of a property of a collection, from an attribute with the same values if possible.
 

@@ -171,19 +171,18 @@ def _clip_position(build: NodeBuilder, view_projection: np.ndarray) -> Node:
     return build("ShaderNodeSeparateXYZ", {0: clip})
 
 
-def new_group(name: str, material: Material, matrix: np.ndarray | None) -> NodeTree:
+def new_group(material: Material, matrix: np.ndarray | None) -> NodeTree:
     """Create a geometry node group that sets a material and the attribute `CLIP_ATTRIBUTE`.
 
-    It is the node group of RoSy's modifier. The mesh, its material slots and other modifiers stay unchanged.
+    It is the node group of RoSy's modifier (`set_picture_modifier`, which names it). The mesh, its material slots and other modifiers stay unchanged.
 
     Parameters
     ----------
-    name : str
     material : bpy.types.Material
     matrix : (4, 4) ndarray or None
         Transforms object space to clip space. None for objects with several instances; they get no attribute.
     """
-    group, build, geometry = new_modifier_group(name)
+    group, build, geometry = new_modifier_group(MODIFIER_NAME)
     material_index = build("GeometryNodeInputMaterialIndex").outputs[0]
     geometry = build.stored_attribute(geometry, MATERIAL_ATTRIBUTE, "INT", "FACE", material_index)
     inputs = {"Geometry": geometry, "Material": material}
@@ -232,9 +231,7 @@ def image_node(material: Material) -> Node | None:
     return first_node(material.node_tree, "ShaderNodeTexImage")
 
 
-def set_picture_modifier(
-    obj: Object, node_group: NodeTree, pictures: Container[Material] = ()
-) -> None:
+def set_picture_modifier(obj: Object, group: NodeTree, pictures: Container[Material] = ()) -> None:
     """Set the node group of RoSy's modifier, and move the modifier to the end of the object's stack.
 
     The previous group may have projections of other pictures. A projection is copied to the new group if its
@@ -243,18 +240,18 @@ def set_picture_modifier(
     existing = rosy_modifiers(obj)
     modifier = existing[0] if existing else obj.modifiers.new(MODIFIER_NAME, "NODES")
     modifier.show_expanded = False
-    old_group, modifier.node_group = modifier.node_group, node_group
+    old_group, modifier.node_group = modifier.node_group, group
     for extra in existing[1:]:
         obj.modifiers.remove(extra)
     obj.modifiers.move(obj.modifiers.find(modifier.name), len(obj.modifiers) - 1)
-    if old_group is not None and old_group != node_group:
-        shown_material = material_of_group(node_group)
+    if old_group is not None and old_group != group:
+        shown_material = material_of_group(group)
         for material, matrix in projections_of_group(old_group).items():
             if material != shown_material and material in pictures:
-                _add_projection(node_group, material, matrix)
+                _add_projection(group, material, matrix)
         if not old_group.users:
             bpy.data.node_groups.remove(old_group)
-    node_group.name = f"RoSy {obj.name}"
+    group.name = f"RoSy {obj.name}"
 
 
 def applied_materials(data: ID | None) -> list[Material]:

@@ -25,7 +25,7 @@ from ..projection.camera import Camera
 from ..surface_texture.draw import DIRECTION_SETTINGS, TEXTURE_SETTINGS, texture_colors_values
 from .cameras import CameraSource, camera_of_object, render_camera, resolve_camera
 from .field_attributes import attribute_name, field_degree
-from .look_inputs import ReadRequest, color_values_digest, read_request, reference_path
+from .look_inputs import color_values_digest, read_request, reference_path
 from .look_properties import read_look
 from .mesh_states import MeshStates, digest, field_parts, mesh_state_key, read_mesh_state
 from .meshes import evaluated_mesh, polygon_arrays, read_uvs, shape_digest
@@ -73,9 +73,9 @@ class PictureState:
     output: dict
     device: str
     objects: dict[str, list[str]]
-    occluders: dict[str, list[str]]
-    lights: dict[str, list[str]]
-    reference: str
+    occluders: dict[str, list[str]] = field(default_factory=dict)
+    lights: dict[str, list[str]] = field(default_factory=dict)
+    reference: str = ""
 
     def to_json(self) -> str:
         """Return the state as JSON text."""
@@ -134,13 +134,8 @@ class SceneState:
         self._occluders: dict[str, _Instances] = {}
         self._texture_states: dict[tuple, PictureState] = {}
         look = read_look(scene.rosy)
-        self._read_meshes(depsgraph, read_request(scene, look), mesh_states)
+        request, targets = read_request(scene, look), field_objects(depsgraph.view_layer)
         self._lights = _light_digests(depsgraph) if _uses_lights(look) else {}
-
-    def _read_meshes(
-        self, depsgraph: Depsgraph, request: ReadRequest, mesh_states: MeshStates
-    ) -> None:
-        targets = field_objects(depsgraph.view_layer)
         for instance, draws_field in rendered_instances(depsgraph, targets):
             obj, owner = instance.object, instance.object.original
             mesh_request = request if draws_field else None
@@ -177,7 +172,7 @@ class SceneState:
         output = _used_output(scene.rosy, OUTPUT_PROPERTIES) | {"relight": is_relit}
         if is_frame:
             del output["placement"]  # frames always fill the frame of the camera
-        occluders = self._relevant_occluders(camera, settings["shadows"])
+        occluders = self._used_occluders(camera, settings["shadows"])
         has_reference = settings["tone"] == "picture"
         return PictureState(
             look=settings,
@@ -204,9 +199,7 @@ class SceneState:
             self._texture_states[key] = read_texture_state(scene, depsgraph, obj)
         return self._texture_states[key]
 
-    def _relevant_occluders(
-        self, camera: Camera | None, casts_shadows: bool
-    ) -> dict[str, _Instances]:
+    def _used_occluders(self, camera: Camera | None, casts_shadows: bool) -> dict[str, _Instances]:
         """Return the objects without a field that may change the picture, by name.
 
         If shadows are drawn, or no picture can be drawn from the camera (None), all of them are returned.
@@ -235,24 +228,6 @@ def _light_digests(depsgraph: Depsgraph) -> dict[str, list[str]]:
     for light, owner in rendered_lights(depsgraph, np.eye(4)):
         lights.setdefault(owner.name_full, []).append(digest(*vars(light).values()))
     return {name: sorted(digests) for name, digests in lights.items()}
-
-
-def read_picture_states(
-    scene: Scene,
-    depsgraph: Depsgraph,
-    sources: Iterable[CameraSource],
-    mesh_states: MeshStates,
-    is_frame: bool = False,
-) -> list[PictureState]:
-    """Return the state of a picture from each camera.
-
-    `is_frame` says whether the pictures are frames of an animation.
-
-    `mesh_states` are the states of meshes from reading the scene (`SceneData.mesh_states`), so that meshes
-    are not read again.
-    """
-    scene_state = SceneState(scene, depsgraph, mesh_states)
-    return [scene_state.picture_state(scene, depsgraph, source, is_frame) for source in sources]
 
 
 def bakes_light(settings: PropertyGroup, look: Look) -> bool:
@@ -301,9 +276,7 @@ def read_texture_state(scene: Scene, depsgraph: Depsgraph, obj: Object) -> Pictu
         output=_used_output(settings, TEXTURE_OUTPUT),
         device="cpu",
         objects={obj.name_full: [place, digest(*shape)]},
-        occluders={},
         lights=lights,
-        reference="",
     )
 
 

@@ -29,12 +29,12 @@ from ..core.file_io import check_folder, check_writable
 from ..image_io.image_data import ImageData, image_size
 from ..projection.camera import Camera
 from ..rendering.view_input import ViewInput
+from ..surface_texture.draw import TextureImages, TextureSettings
 from . import datablocks, picture_nodes, texture_nodes
 from .bake_records import (
     NAME_PREFIX,
     baked_objects,
     camera_name,
-    find_record,
     recorded_materials,
     store_record,
 )
@@ -73,26 +73,6 @@ class BakeResult:
     objects: tuple[Object, ...]
     picture: Picture
     warnings: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class ImageSequence:
-    """An image sequence on disk.
-
-    Attributes
-    ----------
-    name : str
-        Name of the camera, or of the scene if the camera changes between frames.
-    path : Path
-        File of the first frame.
-    first, last : int
-        Frame numbers, both included.
-    """
-
-    name: str
-    path: Path
-    first: int
-    last: int
 
 
 def read_output_settings(scene: Scene, folder: Path | None = None) -> OutputSettings:
@@ -213,10 +193,10 @@ def apply_picture(
     with datablocks.rollback_on_error() as track:
         image = track(new_image(name, image_data, is_color=hatching is None, stem=stem))
         material = picture_nodes.new_material(image, camera, track, settings, view.look, hatching)
-        matrices = _object_to_clip_matrices(scene_data, camera)
-        node_groups = _new_groups(material, matrices, track)
+        matrices = _clip_matrices(scene_data, camera)
+        node_groups = {obj: track(new_group(material, matrix)) for obj, matrix in matrices.items()}
     size, key = image_size(image_data), picture_key(view.look, picture)
-    store_record(scene, camera.name, image, material, source, {None: state}, size=size, key=key)
+    store_record(scene, camera.name, image, material, source, {None: state}, size, key)
     _show_on_objects(node_groups)
     warnings = (*scene_data.warnings, *_display_warnings(scene))
     return BakeResult(camera.name, image, material, tuple(matrices), picture, warnings)
@@ -225,7 +205,8 @@ def apply_picture(
 def apply_sequence(
     scene: Scene,
     scene_data: SceneData,
-    sequence: ImageSequence,
+    name: str,
+    path: Path,
     camera: Camera,
     settings: OutputSettings,
     source: CameraSource | None,
@@ -243,10 +224,13 @@ def apply_sequence(
     scene : bpy.types.Scene
     scene_data : SceneData
         Its objects get the pictures.
-    settings : OutputSettings
-    sequence : ImageSequence
+    name : str
+        Name of the camera, or of the scene if the camera changes between frames.
+    path : Path
+        File of the first frame.
     camera : Camera
         The camera of the last frame.
+    settings : OutputSettings
     source : bpy.types.Object, Camera or None
         The camera of all frames. None: each frame was drawn from the camera that renders it.
     states : mapping of int to PictureState
@@ -258,22 +242,12 @@ def apply_sequence(
     """
     settings = replace(settings, window_coordinates=True)
     with datablocks.rollback_on_error() as track:
-        image = track(load_sequence(sequence.path, settings.as_float))
-        image.name = f"{NAME_PREFIX}{sequence.name}"
+        image = track(load_sequence(path, settings.as_float))
+        image.name = f"{NAME_PREFIX}{name}"
         material = picture_nodes.new_material(image, camera, track, settings, look)
-        picture_nodes.set_sequence_frames(material, sequence.first, sequence.last)
-        node_groups = _new_groups(material, dict.fromkeys(scene_data.objects), track)
-    store_record(
-        scene,
-        sequence.name,
-        image,
-        material,
-        source,
-        states,
-        size=(camera.width, camera.height),
-        key=key,
-        frame_range=f"{sequence.first} to {sequence.last}",
-    )
+        picture_nodes.set_sequence_frames(material, min(states), max(states))
+        node_groups = {obj: track(new_group(material, None)) for obj in scene_data.objects}
+    store_record(scene, name, image, material, source, states, camera.size, key)
     _show_on_objects(node_groups)
 
 
@@ -281,14 +255,11 @@ def apply_texture(
     scene: Scene,
     obj: Object,
     uv_map: str,
-    tiles: Mapping[int, ImageData],
-    settings: OutputSettings,
+    texture: TextureImages,
     state: PictureState,
-    content: str,
     look: Look,
-    hatching: texture_nodes.Hatching | None,
-    *,
-    is_udim: bool,
+    texture_settings: TextureSettings,
+    settings: OutputSettings,
 ) -> Image:
     """Show a texture on its object, and return its image. It replaces an earlier texture of the object.
 
@@ -300,42 +271,38 @@ def apply_texture(
     obj : bpy.types.Object
     uv_map : str
         Name of the UV map.
-    tiles : mapping of int to ImageData
-        The UDIM tiles by their numbers. If `is_udim` is False, only the first item is used.
-    settings : OutputSettings
+    texture : TextureImages
+        Without UDIM, only the first tile is used.
     state : PictureState
         The state of the scene that the texture was drawn from.
-    content : str
-        What the image shows; see `surface_texture.draw.CONTENTS`.
     look : Look
         The look of the texture.
-    hatching : Hatching or None
-        How the material draws hatching, if the image has thresholds of ink. None if it does not.
-    is_udim : bool
-        Whether the image has UDIM tiles.
+    texture_settings : TextureSettings
+        The settings with which the texture was drawn.
+    settings : OutputSettings
 
     Raises
     ------
     RosyError
         If the file cannot be written.
     """
-    name = f"{NAME_PREFIX}{obj.name}"
+    name, content = f"{NAME_PREFIX}{obj.name}", texture_settings.content
     stem = _image_stem(settings, obj.name, texture_kind(content))
-    first = next(iter(tiles.values()))
-    is_color = content == "look" and hatching is None
-    create, image_data = (new_tiled_image, tiles) if is_udim else (new_image, first)
+    first = next(iter(texture.tiles.values()))
+    is_udim = texture_settings.is_udim
+    create, image_data = (new_tiled_image, texture.tiles) if is_udim else (new_image, first)
     with datablocks.rollback_on_error() as track:
-        image = track(create(name, image_data, is_color=is_color, stem=stem))
+        image = track(create(name, image_data, is_color=not texture.is_data, stem=stem))
         is_clear = content == "look" and has_clear_paper(look)
         add_shader = partial(texture_nodes.color_shader, is_clear=is_clear)
         if content == "anisotropy":
             add_shader = partial(texture_nodes.brushed_metal_shader, uv_map=uv_map)
-        elif hatching is not None:
+        elif content == "look" and texture.is_data:
+            hatching = texture_nodes.Hatching(look, texture.line_count)
             add_shader = partial(texture_nodes.hatching_shader, hatching=hatching, track=track)
         material = track(texture_nodes.new_texture_material(name, image, uv_map, add_shader))
-        node_groups = _new_groups(material, {obj: None}, track)
-    size = image_size(first)
-    store_record(scene, obj.name, image, material, obj, {None: state}, size=size, is_texture=True)
+        node_groups = {obj: track(new_group(material, None))}
+    store_record(scene, obj.name, image, material, obj, {None: state}, image_size(first))
     # The object can still show its pictures, but no longer an earlier texture.
     _show_on_objects(node_groups, keep_textures=False)
     return image
@@ -353,20 +320,6 @@ def _image_stem(settings: OutputSettings, name: str, kind: str = "camera") -> Pa
     kind is part of the name of the file (`picture_stem`).
     """
     return None if settings.folder is None else settings.folder / picture_stem(name, kind)
-
-
-def _new_groups(
-    material: Material, matrices: Mapping[Object, np.ndarray | None], track: datablocks.Track
-) -> dict[Object, NodeTree]:
-    """Create the node groups that show a picture on objects; see `new_group`.
-
-    `matrices` holds each object's (4, 4) matrix from object space to clip space, or None. `track` is called
-    with each new group.
-    """
-    return {
-        obj: track(new_group(f"RoSy {obj.name}", material, matrix))
-        for obj, matrix in matrices.items()
-    }
 
 
 def _show_on_objects(node_groups: Mapping[Object, NodeTree], *, keep_textures: bool = True) -> None:
@@ -396,7 +349,7 @@ def show_bake(scene: Scene, camera: str) -> None:
     RosyError
         If no picture was baked from this camera.
     """
-    record = find_record(scene, camera)
+    record = next((each for each in scene.rosy.bakes if camera_name(each) == camera), None)
     if record is None:
         names = ", ".join(f"'{camera_name(other)}'" for other in scene.rosy.bakes) or "none"
         raise RosyError(f"no picture was baked from camera '{camera}', only from {names}")
@@ -407,15 +360,13 @@ def show_bake(scene: Scene, camera: str) -> None:
             projections |= picture_nodes.projections_of_group(modifier.node_group)
         if record.material in projections and datablocks.is_editable(obj):
             matrix = projections[record.material]
-            node_group = new_group(f"RoSy {obj.name}", record.material, matrix)
+            node_group = new_group(record.material, matrix)
             node_group[datablocks.OWNED_TAG] = True
             picture_nodes.set_picture_modifier(obj, node_group, materials)
     update_keys(scene)
 
 
-def _object_to_clip_matrices(
-    scene_data: SceneData, camera: Camera
-) -> dict[Object, np.ndarray | None]:
+def _clip_matrices(scene_data: SceneData, camera: Camera) -> dict[Object, np.ndarray | None]:
     """Return the (4, 4) object-to-clip matrix of each object; None for objects with several instances."""
     matrices: dict[Object, np.ndarray | None] = {}
     for instance, owner in zip(scene_data.instances, scene_data.objects, strict=False):

@@ -10,12 +10,13 @@ from bpy.types import Depsgraph, Object, Scene
 
 from ..compositor.look import Look
 from ..compositor.shading import Light
-from ..core.cache import Cache
+from ..core.cache import BAKE_CACHE, Cache
 from ..core.errors import RosyError
 from ..projection.gbuffer import MeshInstance
 from ..rendering.view_input import ViewInput
-from .cameras import CameraSource, resolve_camera
+from .cameras import CameraSource, render_camera, resolve_camera
 from .look_inputs import ReadRequest, load_reference, nonfinite_policy, read_request
+from .look_properties import drift_in_scene
 from .meshes import evaluated_mesh, read_uvs
 from .scene_reader import SceneData, read_scene
 
@@ -28,7 +29,6 @@ def read_views(
     *,
     objects: Sequence[Object] | None = None,
     size: tuple[int, int] | None = None,
-    reference_camera: Object | None = None,
     cache: Cache | None = None,
 ) -> tuple[tuple[ViewInput, ...], SceneData]:
     """Read a scene as the input of a renderer, for one or more cameras. Each mesh is read only once.
@@ -47,8 +47,6 @@ def read_views(
         hide what is behind them.
     size : (int, int), optional
         Width and height in pixels; see `resolve_camera`.
-    reference_camera : bpy.types.Object, optional
-        The camera of the reference render. By default the active camera of the scene.
     cache : Cache, optional
         Keeps meshes, fields and tones that have not changed since an earlier reading.
 
@@ -74,12 +72,15 @@ def read_views(
             "rename them in their libraries, or draw from one"
         )
     scene_data = read_scene(depsgraph, objects, read_request(scene, look), cache)
-    reference = load_reference(scene, depsgraph, reference_camera, look)
+    reference = None
+    if look.tone == "picture":
+        reference = load_reference(scene, depsgraph, render_camera(scene))
     instances = tuple(scene_data.instances)
+    drift = drift_in_scene(scene, look, scene.frame_current_final)
     views = []
     for camera in resolved_cameras:
         lights = read_lights(depsgraph, camera.view) if look.light == "scene" else ()
-        views.append(ViewInput(instances, camera, look, tuple(lights), reference))
+        views.append(ViewInput(instances, camera, look, tuple(lights), reference, drift=drift))
     return tuple(views), scene_data
 
 
@@ -163,14 +164,9 @@ def _convert_light(data: bpy.types.Light, matrix: np.ndarray) -> Light:
 
 
 def read_texture_input(
-    scene: Scene,
-    depsgraph: Depsgraph,
-    obj: Object,
-    uv_map: str,
-    cache: Cache,
-    color_attribute: str | None,
+    scene: Scene, depsgraph: Depsgraph, obj: Object, uv_map: str, color_attribute: str | None
 ) -> tuple[MeshInstance, np.ndarray]:
-    """Read an evaluated object with its field, and the UV map of its texture.
+    """Read an evaluated object with its field, and the UV map of its texture. Uses the cache of bakes.
 
     `uv_map` is the name of the UV map; the active one if it is empty. `color_attribute` is the name of the
     attribute with the values for the color map; if it is None, no values are read.
@@ -189,7 +185,8 @@ def read_texture_input(
         removes it.
     """
     request = ReadRequest(nonfinite_policy(scene), color_attribute=color_attribute)
-    instance = read_scene(depsgraph, [obj], request, cache).instances[0]
+    instance = read_scene(depsgraph, [obj], request, BAKE_CACHE).instances[0]
+    BAKE_CACHE.evict_over_limit()
     with evaluated_mesh(obj.evaluated_get(depsgraph)) as mesh:
         uv = read_uvs(mesh, uv_map, f"object '{obj.name}'")
     return instance, uv

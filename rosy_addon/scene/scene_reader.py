@@ -231,8 +231,7 @@ class SceneReader:
         topology_changed : bool
             Whether faces or fields may have changed. False: only positions of vertices have changed.
         """
-        for key in [key for key in self._meshes if key[0] in names]:
-            del self._meshes[key]
+        self._meshes = {key: data for key, data in self._meshes.items() if key[0] not in names}
         for key in [key for key in self._topologies if key[0] in names]:
             if topology_changed or isinstance(self._topologies[key], Exception):
                 del self._topologies[key]
@@ -336,7 +335,7 @@ class SceneReader:
         nonfinite = self._request.nonfinite
         try:
             with temp_attributes(depsgraph, objects, nonfinite, self.cache, errors) as layouts:
-                self._read_topologies(depsgraph, layouts, problems)
+                self._read_topologies(depsgraph, layouts, errors)
         except MemoryError as error:
             problems = dict.fromkeys(problems, error)
         problems |= {obj.name_full: error for obj, error in errors.items()}
@@ -346,14 +345,11 @@ class SceneReader:
                 self._topologies.setdefault(key, problems[key[0]])
 
     def _read_topologies(
-        self,
-        depsgraph: Depsgraph,
-        layouts: Mapping[Object, FieldLayout],
-        problems: dict[str, Exception],
+        self, depsgraph: Depsgraph, layouts: Mapping[Object, FieldLayout], errors: Errors
     ) -> None:
-        """Add rest positions and fields of evaluated meshes to `_topologies`, or errors to `problems`.
+        """Add rest positions and fields of evaluated meshes to `_topologies`, or errors to `errors`.
 
-        `layouts` holds the field's attributes by original object, `problems` errors by full name.
+        `layouts` holds the field's attributes by original object.
         """
         for instance in depsgraph.object_instances:
             obj, owner = instance.object, instance.object.original
@@ -370,12 +366,11 @@ class SceneReader:
                 try:
                     rest = read_attribute(mesh, REST_ATTRIBUTE, np.float32, 3)
                     surface = self._with_rest(mesh_surface(mesh, label, cache=self.cache), rest)
-                    field = read_evaluated_field(
-                        mesh, layout, surface, self._request.nonfinite, label, self.cache
-                    )
+                    nonfinite = self._request.nonfinite
+                    field = read_evaluated_field(mesh, layout, surface, nonfinite, self.cache)
                     self._topologies[key] = rest, field
                 except RosyError as error:
-                    problems[owner.name_full] = error
+                    errors[owner] = error
 
     def _mesh_data(self, obj: Object, owner: Object, draws_field: bool) -> _MeshData | None:
         """Return the data of the mesh of the evaluated object `obj`, whose original object is `owner`.
@@ -383,7 +378,7 @@ class SceneReader:
         Return None if it has no faces, has an error, or is left for a later call.
         """
         pointer, request = obj.data.as_pointer(), self._request
-        key = owner.name_full, pointer, look_inputs.tone_image_key(owner, request.tone), draws_field
+        key = owner.name_full, pointer, look_inputs.tone_image_key(owner, request), draws_field
         if key in self._meshes:
             return self._meshes[key]
         if draws_field and owner.name_full in self.errors:
@@ -419,18 +414,17 @@ class SceneReader:
         request, cache, label = self._request, self.cache, f"object '{owner.name}'"
         original = owner.data
         surface = mesh_surface(mesh, label, cache=cache)
-        tone = look_inputs.read_tone(mesh, owner, request.tone, cache)
+        tone = look_inputs.read_tone(mesh, owner, request, cache)
         values = look_inputs.read_color_values(mesh, request.color_attribute, label, cache)
         if original.is_editmode:
-            return surface, self._edit_mode_field(mesh, owner, surface, label), tone, values
+            return surface, self._edit_mode_field(mesh, owner, surface), tone, values
         modifiers, undeformed = user_modifiers(owner), surface
         if modifiers or original.shape_keys:
             undeformed = mesh_surface(original, label, cache=cache)
         keeps_field = all(modifier.type != "NODES" for modifier in modifiers)
         if keeps_field and have_same_polygons(surface, undeformed):
-            field = read_mesh_field(
-                original, surface=undeformed, nonfinite=request.nonfinite, label=label, cache=cache
-            )
+            inputs = {"surface": undeformed, "nonfinite": request.nonfinite, "cache": cache}
+            field = read_mesh_field(original, **inputs)
             return self._with_rest(surface, undeformed.vertices), field, tone, values
         key = owner.name_full, topology_hash(mesh, original)
         topology = self._topologies.get(key)
@@ -444,9 +438,7 @@ class SceneReader:
         rest, field = topology
         return self._with_rest(surface, rest), field, tone, values
 
-    def _edit_mode_field(
-        self, mesh: Mesh, owner: Object, surface: Surface, label: str
-    ) -> RosyField:
+    def _edit_mode_field(self, mesh: Mesh, owner: Object, surface: Surface) -> RosyField:
         """Return the field of an object in edit mode. Only its evaluated mesh has attributes then."""
         original = owner.data
         name = attribute_name(original)
@@ -454,10 +446,10 @@ class SceneReader:
             raise lost_field_error(owner, name)
         if name not in mesh.attributes or not is_face_vector_field(mesh, name):
             raise RosyError(
-                f"{label}: in edit mode, only fields stored as vectors on faces can be read: leave edit mode (Tab)"
+                f"{surface.name}: in edit mode, only fields stored as vectors on faces can be read: leave edit mode (Tab)"
             )
         layout = FieldLayout(name, field_degree(original))
-        return read_evaluated_field(mesh, layout, surface, self._request.nonfinite, label)
+        return read_evaluated_field(mesh, layout, surface, self._request.nonfinite)
 
     def _with_rest(self, surface: Surface, rest: np.ndarray | None) -> Surface:
         """Return a surface with rest positions.

@@ -77,9 +77,8 @@ def read_singularities(obj: Object, depsgraph: Depsgraph) -> Singularities:
 
 def _own_field(obj: Object) -> tuple[Surface, RosyField]:
     """Return the surface and the field of an object's original mesh."""
-    label = f"object '{obj.name}'"
-    surface = meshes.mesh_surface(obj.data, label)
-    return surface, read_mesh_field(obj.data, surface=surface, nonfinite="zero", label=label)
+    surface = meshes.mesh_surface(obj.data, f"object '{obj.name}'")
+    return surface, read_mesh_field(obj.data, surface=surface, nonfinite="zero")
 
 
 def read_editable_singularities(obj: Object, depsgraph: Depsgraph) -> Singularities:

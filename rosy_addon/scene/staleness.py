@@ -6,6 +6,7 @@ import atexit
 import time
 
 import bpy
+from bpy.types import Depsgraph, Image, Scene
 
 from .app_handlers import add_handlers, remove_handlers
 from .picture_state import MeshStates, PictureState, SceneState, settings_key
@@ -47,7 +48,7 @@ class SceneStateCache:
         self._next_reading = 0.0
         self._handlers = dict.fromkeys(_WATCHED_EVENTS, self.note_changes)
 
-    def get(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> SceneState:
+    def get(self, scene: Scene, depsgraph: Depsgraph) -> SceneState:
         """Return the state of the view layer of a depsgraph.
 
         After a change, the scene is read again, but only after a pause of `TTL_READINGS` times the duration
@@ -74,16 +75,14 @@ class SceneStateCache:
         is_behind = self._is_watching() and self._is_outdated
         return max(self._next_reading - time.monotonic(), 0.01) if is_behind else 0.0
 
-    def note_changes(
-        self, _scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None
-    ) -> None:
+    def note_changes(self, _scene: Scene, depsgraph: Depsgraph | None = None) -> None:
         """Forget the states of meshes that have changed. If there is no depsgraph, all may have changed."""
         self._is_outdated = True
         if depsgraph is None:
             self._mesh_states.clear()
             return
         for update in depsgraph.updates:
-            if isinstance(update.id, bpy.types.Image):
+            if isinstance(update.id, Image):
                 self._mesh_states.clear()  # the image may be the tone of any mesh
             elif update.is_updated_geometry:
                 changed = update.id.original.session_uid

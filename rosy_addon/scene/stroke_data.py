@@ -23,7 +23,7 @@ from .meshes import write_attribute
 from .node_builder import NodeBuilder, enabled_output, new_emissive_material, new_modifier_group
 
 #: A function that is called with each new datablock and the name that it should have. It returns the datablock.
-RegisterDatablock = Callable[[Any, str], Any]
+Register = Callable[[Any, str], Any]
 
 #: Name of the attribute of curves with the color of their family of strokes, linear RGBA.
 INK_ATTRIBUTE = "ink"
@@ -32,7 +32,7 @@ INK_ATTRIBUTE = "ink"
 POLY_CURVE_TYPE = 1
 
 
-def new_curves(name: str, geometry: StrokeGeometry, frame: int, register: RegisterDatablock) -> ID:
+def new_curves(name: str, geometry: StrokeGeometry, frame: int, register: Register) -> ID:
     """Create Curves data from strokes: polylines with a radius, and a material with the ink colors.
 
     Parameters
@@ -95,9 +95,7 @@ def has_grease_pencil_drawings() -> bool:
     return hasattr(bpy.types, "GreasePencilDrawing")
 
 
-def new_grease_pencil(
-    name: str, geometry: StrokeGeometry, frame: int, register: RegisterDatablock
-) -> ID:
+def new_grease_pencil(name: str, geometry: StrokeGeometry, frame: int, register: Register) -> ID:
     """Create Grease Pencil data from strokes, with one layer and one material for each family.
 
     All kinds of outlines (silhouettes, creases, borders) share one layer.

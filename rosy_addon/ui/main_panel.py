@@ -125,7 +125,8 @@ def _draw_picture_section(layout: UILayout, context: Context) -> None:
 def _draw_bakes(layout: UILayout, context: Context) -> None:
     objects = field_objects(context.view_layer)
     bake_infos = list_bakes(context.scene, for_panel=True, automatic_device=automatic_device)
-    _redraw_later(SCENE_STATES.seconds_to_wait())
+    if (wait := SCENE_STATES.seconds_to_wait()) and not bpy.app.timers.is_registered(redraw):
+        bpy.app.timers.register(redraw, first_interval=wait)  # the panel may be outdated
     for bake in bake_infos:
         _draw_bake_info(layout, context, bake, several=len(bake_infos) > 1)
     if objects:
@@ -211,12 +212,6 @@ def _draw_bake_info(layout: UILayout, context: Context, bake: BakeInfo, several:
     else:
         text = "Up to date at this frame" if bake.frame_range else "Up to date"
         box.label(text=text, icon="CHECKMARK")
-
-
-def _redraw_later(seconds: float) -> None:
-    """Redraw the 3D views after some seconds, when the panel may be outdated. Do nothing for 0 seconds."""
-    if seconds and not bpy.app.timers.is_registered(redraw):
-        bpy.app.timers.register(redraw, first_interval=seconds)
 
 
 def unregister() -> None:

@@ -54,9 +54,8 @@ def draw_generator_settings(layout: UILayout, settings: Any) -> None:
     """Draw the settings of ``rosy.field_generate`` that apply to the chosen generator, guides and edges."""
     inputs = _INPUTS_BY_KIND.get(settings.kind, ())
     if settings.kind == "guided":
-        inputs = tuple(
-            name for name in inputs if _GUIDE_OF_INPUT.get(name, "") in {"", *settings.guides}
-        )
+        kept = {"", *settings.guides}
+        inputs = tuple(name for name in inputs if _GUIDE_OF_INPUT.get(name, "") in kept)
     options = options_of(settings.kind)
     # The angle is used only for edges that are found by their angle, also if these edges are guides.
     if "edges" in inputs and settings.edges == "FEATURES":

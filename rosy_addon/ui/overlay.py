@@ -7,7 +7,7 @@ mesh.
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Callable, Container
 from typing import Any
 
 import bpy
@@ -45,8 +45,8 @@ def show(object_name: str, singularities: Singularities) -> None:
     add_handlers(_APP_HANDLERS)
     if not DRAW_HANDLERS and not bpy.app.background:
         add = bpy.types.SpaceView3D.draw_handler_add
-        DRAW_HANDLERS.append(add(_draw_dots, (), "WINDOW", "POST_VIEW"))
-        DRAW_HANDLERS.append(add(_draw_labels, (), "WINDOW", "POST_PIXEL"))
+        DRAW_HANDLERS.append(add(_draw, (draw_dots, False), "WINDOW", "POST_VIEW"))
+        DRAW_HANDLERS.append(add(_draw, (draw_labels, True), "WINDOW", "POST_PIXEL"))
     redraw()
 
 
@@ -87,10 +87,8 @@ def _read_again(*_: Any) -> None:
 
 #: Handlers of Blender's events while something is shown, by the names of their lists in `bpy.app.handlers`.
 #: Objects of a file that is loaded may have the names of those before.
-_APP_HANDLERS = {
-    **dict.fromkeys(("undo_post", "redo_post"), _read_again),
-    "load_pre": lambda *_: hide(),
-}
+_APP_HANDLERS = dict.fromkeys(("undo_post", "redo_post"), _read_again)
+_APP_HANDLERS["load_pre"] = lambda *_: hide()
 
 
 def shown(object_name: str) -> Singularities | None:
@@ -108,16 +106,11 @@ def _all_dots() -> list[SingularityDots]:
     return dots
 
 
-def _draw_dots() -> None:
-    context = bpy.context
-    if context.space_data.overlay.show_overlays:
-        draw_dots(context, _all_dots(), DOT_DIAMETER * context.preferences.system.ui_scale)
-
-
-def _draw_labels() -> None:
-    context = bpy.context
-    if context.space_data.overlay.show_overlays and context.space_data.overlay.show_text:
-        draw_labels(context, _all_dots(), DOT_DIAMETER * context.preferences.system.ui_scale)
+def _draw(draw: Callable[..., None], is_text: bool) -> None:
+    """Draw the dots, or their labels, if the current 3D view shows overlays of this kind."""
+    context, settings = bpy.context, bpy.context.space_data.overlay
+    if settings.show_overlays and (settings.show_text or not is_text):
+        draw(context, _all_dots(), DOT_DIAMETER * context.preferences.system.ui_scale)
 
 
 def offset_points(obj: bpy.types.Object, singularities: Singularities) -> np.ndarray:

@@ -42,9 +42,9 @@ class VIEW3D_PT_rosy_strokes(SidebarPanel, Panel):
                 continue
             body = closed_panel(layout, f"strokes_{title.lower()}", title)
             if body is not None:
-                _draw_stroke_settings(body, settings, names)
+                _draw_properties(body, settings, names)
         if settings.kind == "FILE":
-            _draw_stroke_settings(layout, settings, ("page", "paper", "plotter"))
+            _draw_properties(layout, settings, ("page", "paper", "plotter"))
         if job_status.current is not None:
             draw_progress(layout)
             return
@@ -58,9 +58,7 @@ class VIEW3D_PT_rosy_strokes(SidebarPanel, Panel):
                 layout.label(text=obj.name, icon=f"OUTLINER_OB_{name}")
 
 
-def _draw_stroke_settings(
-    layout: UILayout, settings: PropertyGroup, names: tuple[str, ...]
-) -> None:
+def _draw_properties(layout: UILayout, settings: PropertyGroup, names: tuple[str, ...]) -> None:
     column = layout.column()
     descriptions = settings_of(StrokeStyle)
     active = {

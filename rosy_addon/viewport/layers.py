@@ -119,15 +119,13 @@ class LayerStates:
         updates = [update for update in updates if update.id.original.id_type in RELEVANT_ID_TYPES]
         changed_names, remeshed_names = set(), set()
         for update in updates:
-            datablock, objects = update.id.original, bpy.data.objects
-            if datablock.id_type == "IMAGE":
-                changed_names |= {
-                    obj.name_full for obj in objects if obj.rosy.tone_image == datablock
-                }
-            elif datablock.id_type == "MESH" and update.is_updated_geometry:
-                remeshed_names |= {obj.name_full for obj in objects if obj.data == datablock}
-            elif datablock.id_type == "OBJECT" and update.is_updated_geometry:
-                changed_names.add(datablock.name_full)
+            block, objects = update.id.original, bpy.data.objects
+            if block.id_type == "IMAGE":
+                changed_names |= {obj.name_full for obj in objects if obj.rosy.tone_image == block}
+            elif block.id_type == "MESH" and update.is_updated_geometry:
+                remeshed_names |= {obj.name_full for obj in objects if obj.data == block}
+            elif block.id_type == "OBJECT" and update.is_updated_geometry:
+                changed_names.add(block.name_full)
         for (scene_name, _), layer in self._layers.items():
             if scene_name == scene.name and (updates or depsgraph is None):
                 layer.reader.invalidate(changed_names, topology_changed=False)
@@ -220,7 +218,7 @@ class ReferenceImages:
             raise RosyError(image)
         if image is None:
             return None
-        reference = look_inputs.load_reference(scene, depsgraph, render_camera(scene), look, image)
+        reference = look_inputs.load_reference(scene, depsgraph, render_camera(scene), image)
         key = file_key, reference.camera.key
         if scene.name not in self._current or self._current[scene.name][0] != key:
             self._current[scene.name] = key, reference

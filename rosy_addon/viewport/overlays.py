@@ -294,7 +294,7 @@ def draw_view_arrowheads(
         overlay.arrowheads = key, view_arrows(view, cache, is_exact=is_exact)
     marks = overlay.arrowheads[1]
     parts = [
-        (_head_triangles(context, marks, grown, nearness * marks.size), code)
+        (_arrowheads(context, marks, grown, nearness * marks.size), code)
         for grown, code, nearness in (
             (marks.outline, arrow_marks.OUTLINE_COLOR, NEARNESS - OUTLINE_DISTANCE),
             (0.0, arrow_marks.FILL_COLOR, NEARNESS),
@@ -303,9 +303,7 @@ def draw_view_arrowheads(
     _draw_triangles(parts)
 
 
-def _head_triangles(
-    context: Context, marks: ArrowMarks, grown: float, nearness: float
-) -> np.ndarray:
+def _arrowheads(context: Context, marks: ArrowMarks, grown: float, nearness: float) -> np.ndarray:
     """Return the (n, 3) float32 corners, in world space, of triangles of arrowheads that face the camera.
 
     The outline of each arrowhead is moved outward by `grown` pixels, and the arrowhead is moved toward the
@@ -325,9 +323,7 @@ def _grown_outline(outline: np.ndarray, grown: float) -> np.ndarray:
     """
     tip, barb, notch = outline
     # The sides run counter-clockwise from the tip, so their right sides are outside.
-    side, back = (
-        np.arctan2(-step[0], step[1]) % (2 * np.pi) for step in (barb - tip, notch - barb)
-    )
+    side, back = (np.arctan2(-way[0], way[1]) % (2 * np.pi) for way in (barb - tip, notch - barb))
     half = [tip + grown * _unit_vectors(0.0, side), barb + grown * _unit_vectors(side, back)]
     half = np.concatenate([*half, [notch + (grown / np.cos(back), 0.0)]])
     return np.concatenate([half, (half * (1, -1))[-2:0:-1]])

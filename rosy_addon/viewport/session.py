@@ -11,7 +11,7 @@ from functools import partial
 from itertools import chain
 
 import bpy
-from bpy.types import Area, Context, Depsgraph, SpaceView3D
+from bpy.types import Area, Context, SpaceView3D
 
 from ..annotation.singularity_settings import shows_singularities
 from ..compositor.flow import NO_DRIFT
@@ -251,9 +251,8 @@ class ViewportSession:
 
     def _draw_view(self, context: Context, overlay: ViewOverlay) -> None:
         """Update the picture of a view, and composite the picture and its overlays over the view."""
-        depsgraph = context.evaluated_depsgraph_get()
         look = read_look(context.scene.rosy)
-        view_input = self._read_view(context, depsgraph, look, overlay)
+        view_input = self._read_view(context, look, overlay)
         if view_input is None:
             return
         shows_dots = shows_singularities(look)
@@ -267,7 +266,7 @@ class ViewportSession:
         view = self.progressive.update(_pointers(context), request)
         renderer = self.progressive.renderer
         if self.progressive.is_prepared:
-            background = view3d.view_background(context, depsgraph, view_input.camera, look)
+            background = view3d.view_background(context, view_input.camera, look)
             if background is not None:
                 draw_background(renderer.device, background)
         if view.texture is None:
@@ -284,9 +283,7 @@ class ViewportSession:
             overlays.draw_singularities(context, view_input, look, overlay, self._marks_cache)
         self._marks_cache.evict_over_limit()
 
-    def _read_view(
-        self, context: Context, depsgraph: Depsgraph, look: Look, overlay: ViewOverlay
-    ) -> ViewInput | None:
+    def _read_view(self, context: Context, look: Look, overlay: ViewOverlay) -> ViewInput | None:
         """Return the input of the picture of a view, or None if there is nothing to draw yet.
 
         Raises
@@ -295,6 +292,7 @@ class ViewportSession:
             If no field is visible and no other message says why, or if the tone or the colors have no source.
         """
         # Dots and arrowheads are drawn over the picture.
+        depsgraph = context.evaluated_depsgraph_get()
         look = replace(look, singularity_dots="none", arrows=0.0)
         look, overlay.problem = look_in_view(look, self.progressive.renderer)
         include_occluders = self.progressive.renderer.needs_occluders or look.shadows

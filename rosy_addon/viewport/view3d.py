@@ -94,9 +94,7 @@ def clip_planes(region_3d: RegionView3D) -> np.ndarray | None:
     return planes
 
 
-def view_background(
-    context: Context, depsgraph: Depsgraph, camera: Camera, look: Look
-) -> Background | None:
+def view_background(context: Context, camera: Camera, look: Look) -> Background | None:
     """Return the background of a view in the color of the paper.
 
     Return None if the backdrop is switched off in the scene, or the look has no paper. In a camera view, the
@@ -106,7 +104,6 @@ def view_background(
     ----------
     context : bpy.types.Context
         Context of the region that is drawn.
-    depsgraph : bpy.types.Depsgraph
     camera : Camera
         Camera of the view.
     look : Look
@@ -119,7 +116,7 @@ def view_background(
     space = context.space_data
     camera_object = space.camera if space.use_local_camera else context.scene.camera
     try:
-        frame = camera_of_object(context.scene, depsgraph, camera_object)
+        frame = camera_of_object(context.scene, context.evaluated_depsgraph_get(), camera_object)
     except RosyError:
         return Background(color)  # a light, for example, has no frame
     corners = np.concatenate([frame_corners(frame, 1.0), np.ones((4, 1))], axis=1)

@@ -59,9 +59,7 @@ def main(handle: str, package: str) -> None:
                 BAKE_CACHE.clear()
                 POOL.close()
                 channel.connection.poll(None)
-            function, arguments = channel.receive()
-            answer = _answer(function, arguments, reporter)
-            del function, arguments
+            answer = _answer(reporter, *channel.receive())
             try:
                 channel.send(answer)
             except (pickle.PicklingError, TypeError, AttributeError) as error:
@@ -71,9 +69,7 @@ def main(handle: str, package: str) -> None:
         os._exit(0)
 
 
-def _answer(
-    function: Callable[..., Any], arguments: tuple[Any, ...], reporter: _Reporter
-) -> tuple[Any, ...]:
+def _answer(reporter: _Reporter, function: Callable[..., Any], arguments: Any) -> tuple[Any, ...]:
     """Call a function, and return a message for the parent with its result or its error.
 
     It is ("result", result) or ("error", exception, text of the traceback).

@@ -107,9 +107,7 @@ def call_steps(function: Callable[..., Result], *arguments: Any) -> Steps[Result
     return (yield Call(function, arguments))
 
 
-def part(
-    steps: Steps[Result], start: float, stop: float, label: str | None = None
-) -> Steps[Result]:
+def part(steps: Steps[Result], start: float, stop: float, label: str = "") -> Steps[Result]:
     """Run a job as a part of another job (with ``yield from``), and return its result.
 
     Parameters

@@ -10,19 +10,16 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager, ExitStack, suppress
 from functools import cached_property
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 from ..core.errors import RosyError
-from ..core.file_io import os_error_text
+from ..core.file_io import folder_lock, os_error_text
 from .guard import kill_group, remove_folder
 from .start import start_module
-
-if sys.platform != "win32":
-    import fcntl
 
 #: Age in seconds from which a folder that is not locked counts as abandoned. It is locked right after it is created.
 ABANDONED_SECONDS = 60.0
@@ -51,7 +48,7 @@ class Lifeline(AbstractContextManager["Lifeline"]):
     def __init__(self) -> None:
         self._processes: list[subprocess.Popen[bytes]] = []
         self._folder: Path | None = None
-        self._lock: int | None = None
+        self._lock = ExitStack()
 
     @cached_property
     def _guard(self) -> tuple[subprocess.Popen[bytes], Connection]:
@@ -80,7 +77,7 @@ class Lifeline(AbstractContextManager["Lifeline"]):
             self._folder = parent / f"rosy-{secrets.token_hex(8)}"
             self._tell_guard(str(self._folder))
             self._folder.mkdir(mode=0o700)
-            self._lock = _lock(self._folder)
+            self._lock.enter_context(folder_lock(self._folder, exclusive=True))
         except OSError as error:
             reason = os_error_text(error)
             raise RosyError(
@@ -136,8 +133,7 @@ class Lifeline(AbstractContextManager["Lifeline"]):
         kill_group(self.group)
         if self._folder is not None:
             remove_folder(str(self._folder))
-        if self._lock is not None:
-            os.close(self._lock)
+        self._lock.close()
 
     def _tell_guard(self, item: int | str) -> None:
         """Let the guard process end a program or remove a folder, given its ID or path, with this process."""
@@ -146,31 +142,14 @@ class Lifeline(AbstractContextManager["Lifeline"]):
             connection.send(item)
 
 
-def _lock(folder: Path) -> int | None:
-    """Lock a folder until this process ends, and return the descriptor of the lock.
-
-    Return None if another process has locked it, and on Windows, which cannot lock folders.
-    """
-    if sys.platform == "win32":
-        return None
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        os.close(descriptor)
-        return None
-    return descriptor
-
-
 def _remove_abandoned_folders(parent: Path) -> None:
     """Remove the temporary folders of processes that were killed together with their guard processes."""
     for folder in parent.glob("rosy-" + 16 * "[0-9a-f]"):
         with suppress(OSError):  # another process may remove it, or it is of another user
             if time.time() - folder.stat().st_mtime > ABANDONED_SECONDS:
-                lock = _lock(folder)
-                if lock is not None:
-                    remove_folder(str(folder))
-                    os.close(lock)
+                with folder_lock(folder, exclusive=True) as is_abandoned:
+                    if is_abandoned:
+                        remove_folder(str(folder))
 
 
 #: The lifeline of the helper processes of this process, and the folder for as long as it runs.

@@ -17,7 +17,6 @@ from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.scene.computed_attributes import OCCLUSION_ATTRIBUTE, store_occlusion
 from rosy.rosy_addon.scene.look_inputs import (
     ReadRequest,
-    ToneRequest,
     image_luminance,
     load_reference,
 )
@@ -49,8 +48,8 @@ def save_picture(path, values):
     bpy.data.images.remove(image)
 
 
-def tone_of(tone_request, name="Plane"):
-    scene_data = read_scene(depsgraph(), None, ReadRequest(tone=tone_request))
+def tone_of(tone, attribute="", name="Plane"):
+    scene_data = read_scene(depsgraph(), None, ReadRequest("error", tone, attribute))
     return scene_data.instances[[owner.name for owner in scene_data.objects].index(name)].tone
 
 
@@ -71,7 +70,7 @@ def test_attributes_of_all_domains(wall, domain, kind):
     corner = np.array([loop.vertex_index for loop in mesh.loops])
     face = np.repeat(np.arange(4), 4)
     element = {"POINT": corner, "FACE": face, "CORNER": np.arange(len(corner))}[domain]
-    tone = tone_of(ToneRequest("attribute", "Ink")).values
+    tone = tone_of("attribute", "Ink").values
     tolerance = 0.01 if kind == "BYTE_COLOR" else 1e-6
     np.testing.assert_allclose(tone[:, 0], expected[element], atol=tolerance)
 
@@ -80,29 +79,28 @@ def test_the_default_is_the_active_color_attribute(wall):
     set_attribute(wall.data, np.full((9, 4), 0.2), "Some", "POINT", "FLOAT_COLOR")
     set_attribute(wall.data, np.full((9, 4), 0.7), "Paint", "POINT", "FLOAT_COLOR")
     wall.data.color_attributes.active_color_name = "Paint"
-    tone = tone_of(ToneRequest("attribute")).values
+    tone = tone_of("attribute").values
     np.testing.assert_allclose(tone, 0.7, atol=1e-6)
 
 
 def test_objects_without_the_attribute_have_no_tone(wall, monkey):
     set_attribute(wall.data, np.zeros(9), "Ink", "POINT", "FLOAT")
-    assert tone_of(ToneRequest("attribute", "Ink"), "Suzanne") is None
+    assert tone_of("attribute", "Ink", "Suzanne") is None
 
 
 def test_missing_attributes(wall, monkey):
     set_attribute(wall.data, np.zeros(9), "Paint", "POINT", "FLOAT")
     with pytest.raises(RosyError) as caught:
-        read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("attribute", "Pain")))
+        read_scene(depsgraph(), None, ReadRequest("error", "attribute", "Pain"))
     for name in ("'Pain'", "'Paint'", "'Plane'", "'Suzanne'"):
         assert name in str(caught.value)
-    expect_error("no color attribute", tone_of, ToneRequest("attribute"))
+    expect_error("no color attribute", tone_of, "attribute")
 
 
 def test_unsuitable_attributes(wall):
-    rosy, ink = (ToneRequest("attribute", name) for name in ("rosy", "Ink"))
-    expect_error("object 'Plane', attribute 'rosy': expected", tone_of, rosy)
+    expect_error("object 'Plane', attribute 'rosy': expected", tone_of, "attribute", "rosy")
     set_attribute(wall.data, np.full(9, np.nan), "Ink", "POINT", "FLOAT")
-    expect_error("attribute 'Ink': has values that are not finite", tone_of, ink)
+    expect_error("attribute 'Ink': has values that are not finite", tone_of, "attribute", "Ink")
 
 
 # --- images ---------------------------------------------------------------------------------------
@@ -136,18 +134,18 @@ def test_memory_of_a_large_image(monkeypatch):
 
 
 def test_missing_images_and_uv_maps(wall):
-    expect_error("'Plane': choose an image for the tone", tone_of, ToneRequest("image"))
+    expect_error("'Plane': choose an image for the tone", tone_of, "image")
     wall.rosy.tone_image = add_image()
     bpy.context.view_layer.update()
-    expect_error("object 'Plane' has no UV map: unwrap", tone_of, ToneRequest("image"))
+    expect_error("object 'Plane' has no UV map: unwrap", tone_of, "image")
     add_uv(wall.data)
-    tone = tone_of(ToneRequest("image"))
+    tone = tone_of("image")
     np.testing.assert_allclose(
         tone.image, to_linear(np.array([[0, 1], [128 / 255, 64 / 255]])), atol=1e-3
     )
     assert tone.values.min() == 0 and tone.values.max() == 1
     wall.rosy.tone_uv_map = "Other"
-    expect_error("no UV map 'Other'", tone_of, ToneRequest("image"))
+    expect_error("no UV map 'Other'", tone_of, "image")
 
 
 # --- pictures -------------------------------------------------------------------------------------
@@ -160,7 +158,7 @@ def test_pictures_from_files(scene, wall, tmp_path):
     save_picture(tmp_path / "shot.png", values)
     scene.rosy.tone_picture = str(tmp_path / "shot.png")
     images = set(bpy.data.images)
-    reference = load_reference(scene, depsgraph(), scene.camera, PICTURE)
+    reference = load_reference(scene, depsgraph(), scene.camera)
     np.testing.assert_allclose(
         reference.luminance, to_linear(np.rint(values * 255) / 255), atol=2e-3
     )
@@ -218,7 +216,7 @@ def test_animations_take_the_picture_of_each_frame(scene, wall, tmp_path):
 def test_a_live_view_reads_values_again_when_they_change(wall, kind):
     request_for_ink = ReadRequest(color_attribute="Ink")
     if kind == "tone":
-        request_for_ink = ReadRequest(tone=ToneRequest("attribute", "Ink"))
+        request_for_ink = ReadRequest("error", "attribute", "Ink")
 
     def values_of(mesh):
         return mesh.color_values if kind == "numbers" else mesh.tone and mesh.tone.values
@@ -250,7 +248,7 @@ def test_occlusion_is_stored_and_drawn(scene, wall):
     # At the edge with the floor, which is practically infinite, half of the sky is visible.
     assert values[height == -1].mean() == pytest.approx(0.5, abs=0.05)
     assert values[height == 1].mean() > values[height == 0].mean() > 0.55
-    assert tone_of(ToneRequest("attribute", OCCLUSION_ATTRIBUTE)) is not None
+    assert tone_of("attribute", OCCLUSION_ATTRIBUTE) is not None
     # Storing it again replaces it.
     store_occlusion(depsgraph(), [wall], direction_count=16)
     assert sum(a.name.startswith(OCCLUSION_ATTRIBUTE) for a in wall.data.attributes) == 1
@@ -261,7 +259,7 @@ def test_occlusion_of_meshes_with_new_faces(scene, wall):
     bpy.context.view_layer.update()
     store_occlusion(depsgraph(), [wall], direction_count=16)
     assert len(wall.data.attributes[OCCLUSION_ATTRIBUTE].data) == 16
-    assert len(tone_of(ToneRequest("attribute", OCCLUSION_ATTRIBUTE)).values) == 64
+    assert len(tone_of("attribute", OCCLUSION_ATTRIBUTE).values) == 64
 
 
 def test_occlusion_does_not_replace_other_attributes(scene, wall):

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from PIL import Image
 
-from rosy_addon.compositor.look import Look, colors_magnitude
+from rosy_addon.compositor.look import Look
 from rosy_addon.preset_files.preview import draw_preview
 from rosy_addon.preset_files.store import preset_files, preview_path, read_preset
 
 from .sheet import display
 
-#: Numbers of palette colors: for pictures in tones of one hue, with colors for the magnitude, and with noise
-#: of many hues. At the size of previews the palettes are not visible. They reduce the files to a quarter.
-TONES, MAGNITUDE_COLORS, NOISE_COLORS = 16, 32, 64
+#: Numbers of palette colors: for pictures in tones of one hue, and by the setting `hue` for others. At the size
+#: of previews the palettes are not visible. They reduce the files to a quarter.
+TONES, COLORS = 16, {"magnitude": 32, "noise": 64}
 
 
 def write() -> None:
@@ -23,9 +23,5 @@ def write() -> None:
 
 def _small(look: Look) -> Image.Image:
     shown = Image.fromarray(display(draw_preview(look)))
-    size = TONES
-    if colors_magnitude(look):
-        size = MAGNITUDE_COLORS
-    if look.hue == "noise":
-        size = NOISE_COLORS
+    size = COLORS.get(look.hue, TONES)
     return shown.quantize(size, Image.Quantize.MEDIANCUT, kmeans=4, dither=Image.Dither.NONE)

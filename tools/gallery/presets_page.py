@@ -17,9 +17,9 @@ from PIL import Image
 from rosy_addon.field.frames import normalize
 from rosy_addon.field.generate import generate
 from rosy_addon.field.surface import Surface, build_surface
-from rosy_addon.field.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
+from rosy_addon.field.up_axis import UP_AXIS_MATRIX
 from rosy_addon.preset_files.store import load_preset, preset_keys
-from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.rendering.mesh_view import mesh_instance
 
 from .page import IMAGES, ROOT
 from .shapes import grid_surface, suzanne
@@ -62,26 +62,21 @@ SIDE, FIRST_VIEW, FIRST_MARGIN, COLUMNS = 262, (-32.0, 24.0), 0.006, 3
 
 def write_pages(folder: Path) -> None:
     """Draw and write both pages, with the meshes of a folder."""
-    files = {title: _read(folder / "meshes" / name) for title, name in FILES.items()}
+    files = {title: Surface(folder / "meshes" / name) for title, name in FILES.items()}
     _write_presets(files)
     _write_first_pictures(files)
 
 
-def _read(path: Path) -> tuple[Surface, np.ndarray]:
-    """Return the surface of a mesh file, and the matrix that rotates it so that z points up."""
-    return Surface(path), UP_AXIS_MATRIX[UP_AXIS_BY_SUFFIX.get(path.suffix, "z")]
-
-
-def _write_presets(files: dict[str, tuple[Surface, np.ndarray]]) -> None:
+def _write_presets(files: dict[str, Surface]) -> None:
     """Draw each preset large on one model and small on two others."""
     models = {
-        "Suzanne": (suzanne(), np.eye(4)),
+        "Suzanne": suzanne(),
         "Spot": files["Spot"],
         "Bunny": files["Stanford bunny"],
     }
     instances = {
-        (name, kind): MeshInstance(surface, matrix, generate(surface, kind, 4))
-        for name, (surface, matrix) in models.items()
+        (name, kind): mesh_instance(surface, generate(surface, kind, 4))
+        for name, surface in models.items()
         for kind in ("form", "curvature")
     }
     sections = []
@@ -111,15 +106,13 @@ def _write_presets(files: dict[str, tuple[Surface, np.ndarray]]) -> None:
     _replace_sections(PRESETS_PAGE, sections)
 
 
-def _write_first_pictures(files: dict[str, tuple[Surface, np.ndarray]]) -> None:
+def _write_first_pictures(files: dict[str, Surface]) -> None:
     """Draw the default field of sixteen meshes with some presets, antialiased."""
     models = _made_models()
-    for title, (surface, matrix) in files.items():
-        points = surface.vertices @ matrix[:3, :3].T
+    for title, surface in files.items():
+        points = surface.vertices @ UP_AXIS_MATRIX[surface.up][:3, :3].T
         models.append((title, build_surface(points, surface.corner_vertex, surface.face_start)))
-    instances = [
-        MeshInstance(surface, np.eye(4), generate(surface, "form", 4)) for _, surface in models
-    ]
+    instances = [mesh_instance(surface, generate(surface, "form", 4)) for _, surface in models]
     sections = []
     for key in FIRST_PRESETS:
         preset = load_preset(key)

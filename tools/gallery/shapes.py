@@ -17,21 +17,6 @@ def plane(cells: int = 8) -> Surface:
     return grid_surface("plane", np.stack([x, y, 0 * x], axis=-1), closed=(False, False))
 
 
-def fine_plane() -> Surface:
-    """Return the square of `plane` with small faces."""
-    return plane(96)
-
-
-def fine_sphere() -> Surface:
-    """Return a sphere of many faces."""
-    return sphere(64)
-
-
-def coarse_sphere() -> Surface:
-    """Return a sphere of few faces."""
-    return sphere(5)
-
-
 def torus(radius: float = 1.0, tube: float = 0.45, around: int = 144, across: int = 72) -> Surface:
     """Return a torus around the z axis."""
     u = np.arange(around)[:, None] * (2 * np.pi / around)

@@ -121,8 +121,10 @@ def _instance(spec: dict[str, Any]) -> MeshInstance:
 
 
 @lru_cache
-def _surface(name: str) -> Surface:
-    return getattr(shapes, name)()
+def _surface(text: str) -> Surface:
+    """Return the mesh of a function of `shapes`: its name, and its arguments (whole numbers) if there are any."""
+    name, *arguments = text.split()
+    return getattr(shapes, name)(*map(int, arguments))
 
 
 def _field(surface: Surface, spec: dict[str, Any]) -> RosyField:

@@ -69,14 +69,9 @@ def smoothed(surface: Surface, field: RosyField, rounds: int) -> RosyField:
     return RosyField(field.degree, from_representation(z, x, y, field.degree))
 
 
-def smoothed_a_little(surface: Surface, field: RosyField) -> RosyField:
-    """Smooth a field a little, which removes the noise of small faces."""
-    return smoothed(surface, field, 6)
-
-
 def even_curvature(surface: Surface, degree: int) -> RosyField:
-    """Return the slightly smoothed curvature field of a surface."""
-    return smoothed_a_little(surface, curvature_field(surface, degree))
+    """Return the slightly smoothed curvature field of a surface, without the noise of small faces."""
+    return smoothed(surface, curvature_field(surface, degree), 6)
 
 
 def ring_curvature(rings: Surface, degree: int = 4) -> RosyField:

@@ -19,6 +19,7 @@ from shapes import (
     moved,
     plane,
     rebuilt,
+    roughened,
     sharp_cube,
     torus,
 )
@@ -31,7 +32,6 @@ from rosy_addon.compositor.outline import (
     _mark_strength,
     outline_coverage,
 )
-from rosy_addon.field.frames import normalize
 from rosy_addon.field.surface import Surface
 from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
 from rosy_addon.projection.outline_mesh import outline_mesh
@@ -57,11 +57,7 @@ def noisy(name: str, flat: bool) -> Surface:
     """A dense mesh whose vertices are moved along their normals."""
     surface = torus(160, 80) if name == "torus" else icosphere(5)
     edge = 0.025 if name == "torus" else 0.04
-    normal = np.zeros_like(surface.vertices)
-    np.add.at(normal, surface.corner_vertex, surface.corner_normal)
-    noise = np.random.default_rng(5).standard_normal((len(normal), 1))
-    points = surface.vertices + 0.25 * edge * noise * normalize(normal)
-    return rebuilt(surface, points, flat_faces=np.full(surface.face_count, flat))
+    return roughened(surface, 0.25 * edge, 5, flat_faces=np.full(surface.face_count, flat))
 
 
 def combined(*parts: tuple[np.ndarray, np.ndarray]) -> Surface:

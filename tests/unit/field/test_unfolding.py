@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from awkward import AWKWARD
 from field_helpers import awkward_surface, cross_errors, ellipsoid
-from shapes import cube, icosphere, plane, rebuilt, torus
+from shapes import cube, icosphere, plane, rebuilt, tetrahedron, torus
 
 from rosy_addon.field.frames import dot
 from rosy_addon.field.generate import generate
@@ -72,11 +72,6 @@ def test_reversed_faces_are_oriented(share):
     assert len(oriented.edges.interior) == len(surface.edges.interior)
     sign = dot(oriented.face_normal, surface.face_normal)
     np.testing.assert_allclose(sign, sign[0])
-
-
-def tetrahedron() -> Surface:
-    points = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]])
-    return Surface(points, [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
 
 
 def needle() -> Surface:

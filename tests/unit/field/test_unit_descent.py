@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import awkward
 import numpy as np
 import pytest
 from field_helpers import bumpy
 from scipy.optimize import minimize
-from shapes import cube, from_quads, from_triangles, icosphere, torus
+from shapes import cube, from_quads, from_triangles, icosphere, tetrahedron, torus, walls_of
 
 from rosy_addon.core.errors import RosyError
 from rosy_addon.field import smoothest
@@ -16,18 +17,8 @@ from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.smoothest import smoothest_field
 from rosy_addon.field.unit_descent import face_energy
 
-QUADS = cube().corner_vertex.reshape(6, 4)
-CUBE_OF_TRIANGLES = from_triangles(
-    cube().vertices, np.concatenate([QUADS[:, [0, 1, 2]], QUADS[:, [0, 2, 3]]])
-)
-OCTAHEDRON = from_triangles(
-    np.concatenate([np.eye(3), -np.eye(3)]),
-    [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]],
-)
-TETRAHEDRON = from_triangles(
-    [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]],
-    [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]],
-)
+CUBE_OF_TRIANGLES = from_triangles(cube().vertices, cube().triangle_vertex)
+OCTAHEDRON = from_triangles(*awkward.octahedron())
 
 
 @pytest.mark.parametrize(
@@ -37,7 +28,7 @@ TETRAHEDRON = from_triangles(
         (CUBE_OF_TRIANGLES, 4, [1] * 8),
         (OCTAHEDRON, 3, [1] * 6),
         (OCTAHEDRON, 6, [2] * 6),
-        (TETRAHEDRON, 4, [2] * 4),
+        (tetrahedron(), 4, [2] * 4),
     ],
 )
 def test_fields_that_turn_nowhere(surface, degree, index):
@@ -63,31 +54,14 @@ def test_no_random_start_has_less_energy(degree, subdivisions):
     assert dirichlet_energy(surface, smoothest_field(surface, degree)) <= 1.001 * least + 1e-6
 
 
-def _walls(cells):
-    """The quads between unit cells at integer positions and the space around them."""
-    corners = np.array([[0, 0, 0], [0, 1, 0], [0, 1, 1], [0, 0, 1]])
-    quads = []
-    for axis in range(3):
-        for side in (0, 1):
-            square = np.roll(corners, axis, axis=1) + side * np.eye(3, dtype=int)[axis]
-            square = square if side else square[::-1]
-            step = (2 * side - 1) * np.eye(3, dtype=int)[axis]
-            quads += [square + cell for cell in cells if tuple(step + cell) not in cells]
-    vertices, number = np.unique(np.reshape(quads, (-1, 3)), axis=0, return_inverse=True)
-    return from_quads(vertices, number.reshape(-1, 4))
-
-
-#: A frame with two holes, of 206 quads, with many minima.
-FRAME = _walls(
-    set(np.ndindex(9, 7, 2)) - {(x, y, z) for x in (2, 3, 5, 6) for y in (2, 3, 4) for z in (0, 1)}
-)
-
-
 @pytest.mark.parametrize(("degree", "least"), [(2, 60.0819), (4, 0.0)])
 def test_a_frame_of_few_quads(degree, least):
     """Genus 2. The least energy of 90 random starts; degree 4 turns nowhere, as angle defects are multiples of 90."""
-    assert len(FRAME.vertices) - 206 == -2
-    assert dirichlet_energy(FRAME, smoothest_field(FRAME, degree)) <= 1.001 * least + 1e-6
+    solid = np.ones((9, 7, 2), dtype=bool)
+    solid[[2, 3, 5, 6], 2:5] = False
+    frame = from_quads(*walls_of(solid))
+    assert frame.face_count == 206 and frame.euler_characteristic == -2
+    assert dirichlet_energy(frame, smoothest_field(frame, degree)) <= 1.001 * least + 1e-6
 
 
 def test_another_eigenvector_gives_less_energy():

@@ -131,14 +131,6 @@ def test_fields_from_directions_and_tensors(sphere, field):
     assert tensor_field.degree == 4 and tensor_field.difference(field).max < 1e-6
 
 
-def test_files_and_arrays_give_the_same_field(sphere, field, tmp_path):
-    for name in ("a.rosy", "a.npy", "a.rawfield"):
-        field.save(tmp_path / name)
-        again = rf.read_field(tmp_path / name, sphere, 4)
-        assert np.array_equal(again.directions, field.directions)
-    assert np.array_equal(rf.from_vectors(sphere, field.vectors, 4).vectors, field.vectors)
-
-
 def test_fields_from_arrays_of_a_surface(sphere, field, error_of):
     """Vectors of faces give the same field; the array is found by its name, or as the only one."""
     arrays = mesh_arrays.MeshArrays(
@@ -156,12 +148,11 @@ def test_fields_from_arrays_of_a_surface(sphere, field, error_of):
     assert "sphere: has no array of vectors" in error_of(rf.from_array, sphere)
 
 
-def test_guides_may_be_a_field(sphere, field):
+def test_guides_may_be_a_field(sphere, field, error_of):
     vectors = np.where(np.arange(sphere.face_count)[:, None] < 40, field.vectors, 0)
     guided = rf.guided(sphere, vectors=rf.from_vectors(sphere, vectors, 4))
     assert np.nanmax(guided.difference(field).angle[:40]) < 1e-3
-    with pytest.raises(rf.RosyError, match="to_degree"):
-        rf.guided(sphere, 2, vectors=field)
+    assert "to_degree" in error_of(rf.guided, sphere, 2, vectors=field)
 
 
 def test_lengths_of_guides_may_be_their_firmness(sphere, field):
@@ -208,15 +199,14 @@ def test_warnings_name_the_surface():
     assert told[0].filename == __file__
 
 
-def test_a_picture_is_an_array_and_a_png(sphere, field, tmp_path):
+def test_a_picture_is_an_array_and_a_png(sphere, field, tmp_path, error_of):
     picture = rf.render(sphere, field, view=(0, 0), size=(60, 40))
     array = np.asarray(picture)
     assert array.shape == (40, 60, 4) and array.dtype == np.uint8
     assert np.array_equal(array, np.asarray(Image.open(io.BytesIO(picture._repr_png_()))))
     picture.save(tmp_path / "a.png")
     assert (tmp_path / "a.png").read_bytes() == picture._repr_png_()
-    with pytest.raises(rf.RosyError, match=r"must end in \.png"):
-        picture.save(tmp_path / "a.jpg")
+    assert "must end in .png" in error_of(picture.save, tmp_path / "a.jpg")
 
 
 def test_the_command_draws_the_same_picture(tmp_path):
@@ -354,21 +344,12 @@ def test_lines_in_space_are_in_the_space_of_the_mesh(tmp_path, error_of):
     assert "must end in .svg, .ply, .obj or .csv" in error_of(drawing.save, tmp_path / "a.png")
 
 
-def test_a_turntable_counts_its_pictures(sphere, field, tmp_path):
+def test_a_turntable_counts_its_pictures(sphere, field, tmp_path, error_of):
     numbers = []
     options = {"pictures": 3, "size": (32, 32), "on_picture": numbers.append}
     path = rf.turntable(sphere, field, path=tmp_path / "a.gif", **options)
     assert numbers == [1, 2, 3] and Image.open(path).n_frames == 3
-    with pytest.raises(rf.RosyError, match="2 or more"):
-        rf.turntable(sphere, field, path=tmp_path / "b.gif", pictures=1)
-
-
-def test_outer_faces_see_the_sky_and_inner_ones_do_not():
-    vertices, faces = awkward.cube()
-    outside = rf.Surface(vertices, faces)
-    inside = rf.Surface(vertices, [face[::-1] for face in faces])
-    np.testing.assert_allclose(rf.ambient_occlusion(outside, 8), 1, atol=0.02)
-    np.testing.assert_allclose(rf.ambient_occlusion(inside, 8), 0, atol=0.02)
+    assert "2 or more" in error_of(rf.turntable, sphere, field, path=tmp_path / "b.gif", pictures=1)
 
 
 def test_indices_are_fractions_or_units(error_of):

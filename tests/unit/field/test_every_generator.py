@@ -11,7 +11,6 @@ from field_helpers import bumpy, read_field, write_off
 from shapes import torus
 
 from rosy_addon.cli.parser import main
-from rosy_addon.core.errors import RosyError
 from rosy_addon.field.generate import GENERATORS, GeneratorSettings, generate, options_of
 from rosy_addon.field.surface import Surface
 
@@ -84,8 +83,7 @@ def test_options_of_the_command_line(kind, words, options, tmp_path):
     assert list(options) == options_of(kind)
 
 
-def test_options_out_of_range_are_refused():
+def test_options_out_of_range_are_refused(error_of):
     for options in ({"reach": -0.1}, {"reach": np.nan}, {"sharp_angle": 4.0}, {"axis": (1.0, 2.0)}):
         (name,) = options
-        with pytest.raises(RosyError, match=f"setting '{name}' is"):
-            GeneratorSettings("curvature", **options)
+        assert f"setting '{name}' is" in error_of(GeneratorSettings, "curvature", **options)

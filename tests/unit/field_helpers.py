@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from awkward import AWKWARD
+from conftest import traced_peak
 from scipy import sparse
 from shapes import from_triangles, icosphere, rebuilt
 
@@ -80,6 +81,14 @@ def read_damaged(path, data, garbage, offset, read):
         read(path)
     except RosyError as error:
         assert "\n" not in str(error) and str(path) in str(error)
+
+
+def assert_damaged(path, data, expected, error_of_reading):
+    """Check that a damaged file is refused by its name, without memory for what its header claims."""
+    path.write_bytes(data)
+    messages = []
+    assert traced_peak(lambda: messages.append(error_of_reading(path))) < 10e6
+    assert expected in messages[0] and str(path) in messages[0]
 
 
 def cross_errors(surface, vectors, expected):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from command_helpers import write_obj
+from field_helpers import assert_damaged
 from shapes import plane
 
 import rosy_addon as rf
@@ -58,20 +59,19 @@ def test_the_command_line(tmp_path, capfd):
 
 
 DAMAGED = {
-    "a.sharp": ("", "expected the number of edges"),
-    "b.sharp": ("2\n0,0,0\n", "declares 2 edges, but contains 1"),
-    "c.sharp": ("1\n0,0\n", "c.sharp:2: a row has 2 numbers, expected 3"),
-    "d.sharp": ("1\n0,6,0\n", "d.sharp:2: the mesh has no edge 0 of face 6"),
-    "e.feature": ("1\n0,4\n", "has no edge 4 of face 0"),
-    "f.feature": ("1\n-1,0\n", "has no edge 0 of face -1"),
-    "g.feature": ("1\nx,0\n", "expected a whole number"),
-    "h.txt": ("1\n", "its name must end in .sharp or .feature"),
+    "a.sharp": (b"", "expected the number of edges"),
+    "b.sharp": (b"2\n0,0,0\n", "declares 2 edges, but contains 1"),
+    "c.sharp": (b"1\n0,0\n", "c.sharp:2: a row has 2 numbers, expected 3"),
+    "d.sharp": (b"1\n0,6,0\n", "d.sharp:2: plane has no edge 0 of face 6"),
+    "e.feature": (b"1\n0,4\n", "has no edge 4 of face 0"),
+    "f.feature": (b"1\n-1,0\n", "has no edge 0 of face -1"),
+    "g.feature": (b"1\nx,0\n", "expected a whole number"),
+    "h.txt": (b"1\n", "its name must end in .sharp or .feature"),
 }
 
 
 @pytest.mark.parametrize("name", DAMAGED)
 def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
-    text, expected = DAMAGED[name]
-    (tmp_path / name).write_text(text)
-    message = error_of(read_edges, tmp_path / name, SQUARES)
-    assert expected.replace("the mesh", SQUARES.name) in message and str(tmp_path / name) in message
+    assert_damaged(
+        tmp_path / name, *DAMAGED[name], lambda path: error_of(read_edges, path, SQUARES)
+    )

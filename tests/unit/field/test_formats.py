@@ -6,7 +6,7 @@ import io
 
 import numpy as np
 import pytest
-from field_helpers import read_damaged, read_field
+from field_helpers import assert_damaged, read_damaged, read_field
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from shapes import icosphere
@@ -150,10 +150,7 @@ DAMAGED = {
 
 @pytest.mark.parametrize("name", DAMAGED)
 def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
-    content, expected = DAMAGED[name]
-    (tmp_path / name).write_bytes(content)
-    message = error_of(read_field, tmp_path / name, BALL)
-    assert expected in message and str(tmp_path / name) in message and "\n" not in message
+    assert_damaged(tmp_path / name, *DAMAGED[name], lambda path: error_of(read_field, path, BALL))
 
 
 WRITTEN = ["a.rosy", "a.rawfield", "a.obj", "a.txt", "a.npy"]

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import tracemalloc
-
 import numpy as np
 import pytest
+from conftest import traced_peak
 
 import rosy_addon as rf
 from rosy_addon.field import triangulate
@@ -35,11 +34,7 @@ SOLVERS = {
 @pytest.mark.parametrize("name", SOLVERS)
 def test_memory(name):
     surface = cylinder(700)
-    tracemalloc.start()
-    SOLVERS[name](surface)
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert peak < 50e6
+    assert traced_peak(lambda: SOLVERS[name](surface)) < 50e6
 
 
 def test_a_strip_and_a_fan_give_the_same_field(monkeypatch):

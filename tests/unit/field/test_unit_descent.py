@@ -111,18 +111,9 @@ def test_parts_of_very_different_sizes_are_solved_alone():
 def test_slivers_do_not_hide_other_faces():
     """Half of the edges are those of slivers, whose height is a rounding error. The search ends."""
     x, y, z = 2.942049503326416, 2.4556283950805664, 2.0361483097076416
-    corners = [
-        [0, 0, 0],
-        [0, 0, z],
-        [0, y, z],
-        [0, y, 0],
-        [x, 0, 0],
-        [x, y, 0],
-        [x, y, z],
-        [x, 0, z],
-    ]
+    corners = cube().vertices * (x, y, z)
     line = np.outer(range(1, 5), np.float32([-0.0346824, 0.05744636, 0.0728727]))
     slivers = [[0, 8, 9], [0, 9, 10], [0, 10, 11]]
-    triangles = [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7], *slivers]
+    triangles = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], *slivers]
     surface = from_triangles(np.concatenate([corners, line]), triangles)
     assert generate(surface, "form", 4).vectors[:4].any(axis=1).all()

@@ -17,25 +17,29 @@ def rosy(*arguments) -> subprocess.CompletedProcess:
     return run_command(list(map(str, arguments)), ROOT)
 
 
+def finished(*arguments) -> subprocess.CompletedProcess:
+    """Run a command that succeeds."""
+    done = rosy(*arguments)
+    assert done.returncode == 0, done.stderr
+    return done
+
+
+def refusal(*arguments) -> str:
+    """Run a command that has status 2 and prints one line, and return this line."""
+    done = rosy(*arguments)
+    assert done.returncode == 2 and done.stdout == "", done.stderr
+    assert done.stderr.startswith("rosy: ") and done.stderr.count("\n") == 1
+    return done.stderr
+
+
 def facts_of(*arguments) -> dict:
     """Return what ``rosyfields info`` prints."""
-    done = rosy("info", *arguments, "--json")
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    return json.loads(finished("info", *arguments, "--json").stdout)
 
 
 def pixels_of(path) -> np.ndarray:
     """Return the (H, W, 4) uint8 pixels of a picture."""
     return np.asarray(Image.open(path))
-
-
-def assert_refused(completed: subprocess.CompletedProcess, *expected: str) -> None:
-    """Check that a command has status 2 and prints one line with the expected texts."""
-    assert completed.returncode == 2, completed.stderr
-    assert completed.stderr.startswith("rosy: ") and completed.stderr.count("\n") == 1
-    assert completed.stdout == ""
-    for text in expected:
-        assert text in completed.stderr
 
 
 def write_obj(path, points, faces):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import io
 import pickle
+from functools import partial
 
 import awkward
 import numpy as np
@@ -209,17 +210,27 @@ def test_a_picture_is_an_array_and_a_png(sphere, field, tmp_path, error_of):
     assert "must end in .png" in error_of(picture.save, tmp_path / "a.jpg")
 
 
-def test_the_command_draws_the_same_picture(tmp_path):
+@pytest.mark.parametrize(
+    ("words", "draw"),
+    [
+        (
+            "--generate smoothest --preset plaid --set seed=3 --set view_plane=off",
+            partial(rf.render, preset="plaid", seed=3, view_plane=False),
+        ),
+        (
+            "--generate smoothest --view -120,-30 --ortho --set display=flat",
+            partial(rf.render, view=(-120, -30), orthographic=True, display="flat"),
+        ),
+    ],
+)
+def test_the_command_draws_the_same_picture(words, draw, tmp_path, capsys):
     path = write_obj(tmp_path / "torus.obj", torus(24, 12).vertices, torus(24, 12).faces)
-    words = ["--size", "64x48", "--preset", "plaid", "--set", "seed=3", "--generate", "smoothest"]
     out = tmp_path / "command.png"
-    assert main(["render", str(path), "-o", str(out), *words]) == 0
+    assert main(["render", str(path), "-o", str(out), "--size", "64x48", *words.split()]) == 0
+    assert capsys.readouterr().err == ""
     surface = rf.Surface(path)
-    picture = rf.render(surface, rf.smoothest(surface), size=(64, 48), preset="plaid", seed=3)
-    assert out.read_bytes() == picture._repr_png_()
-    same = rf.Surface(surface.vertices, surface.faces, up="y")
-    again = rf.render(same, rf.smoothest(same), size=(64, 48), preset="plaid", seed=3)
-    assert again._repr_png_() == picture._repr_png_()
+    for same in (surface, rf.Surface(surface.vertices, surface.faces, up="y")):
+        assert draw(same, rf.smoothest(same), size=(64, 48))._repr_png_() == out.read_bytes()
 
 
 def test_numbers_as_colors(error_of):

@@ -4,34 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from command_helpers import assert_refused, pixels_of, rosy, write_cube
+from command_helpers import finished, pixels_of, refusal, write_cube
 from field_helpers import write_off
 from shapes import icosphere, torus
 
 import rosy_addon as rf
 from rosy_addon.extras.command_line import main
 from rosy_addon.image_io.png import write_png
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "words",
-    [
-        [],
-        ["--degree", "3", "--generate", "axis", "--axis", "-1,0.5,0"],
-        ["--preset", "plaid", "--set", "supersampling=2", "--set", "view_plane=off"],
-        ["--view", "-120,-30", "--ortho", "--set", "display=flat"],
-    ],
-    ids=["plain", "axis", "look", "view"],
-)
-def test_render_writes_a_picture(words, ring, tmp_path):
-    done = rosy("render", ring, "-o", tmp_path / "a.png", "--size", "96x64", *words)
-    assert done.returncode == 0, done.stderr
-    assert done.stderr == ""
-    pixels = pixels_of(tmp_path / "a.png")
-    assert pixels.shape == (64, 96, 4)
-    covered = pixels[..., 3] == 255
-    assert 0.1 < covered.mean() < 0.9 and ((pixels[..., 3] > 0) & ~covered).any()
 
 
 def test_y_is_up_in_off_files_by_default(tmp_path):
@@ -49,24 +28,11 @@ def test_y_is_up_in_off_files_by_default(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["vase-7", "cheburashka"])
-def test_render_fields_of_others(name, shared_data, tmp_path):
-    mesh = shared_data / "meshes" / f"{name.partition('-')[0]}.off"
-    field = shared_data / "fields" / f"{name}.rawfield"
-    done = rosy("render", mesh, field, "-o", tmp_path / "a.png", "--size", "128x128")
-    assert done.returncode == 0, done.stderr
-    ink = pixels_of(tmp_path / "a.png")
-    assert ink[ink[..., 3] == 255][:, :3].std() > 15
-
-
-@pytest.mark.slow
 def test_a_transferred_field_is_reported(sphere, tmp_path):
-    made = tmp_path / "sphere.rosy"
-    assert rosy("field", sphere, "-o", made).returncode == 0
-    cut = write_off(tmp_path / "cut.off", icosphere(4))
-    done = rosy("render", cut, made, "-o", tmp_path / "a.png", "--size", "64x64",
-                "--field-mesh", sphere)  # fmt: skip
-    assert done.returncode == 0 and "transferred by position from sphere.off" in done.stderr
+    made, cut = tmp_path / "sphere.rosy", write_off(tmp_path / "cut.off", icosphere(4))
+    finished("field", sphere, "-o", made)
+    done = finished("field", cut, made, "-o", tmp_path / "cut.rosy", "--field-mesh", sphere)
+    assert "transferred by position from sphere.off" in done.stderr
 
 
 @pytest.mark.slow
@@ -148,20 +114,15 @@ def test_sources_of_tones_and_colors(words, name, painted, tmp_path, monkeypatch
 @pytest.mark.slow
 def test_tones_that_are_not_there(painted, sphere, tmp_path):
     write_png(tmp_path / "wide.png", np.ones((16, 64, 4), dtype=np.float32))
-    out = ("-o", tmp_path / "a.png", "--size", "64x64")
     for mesh, words, expected in (
         (painted, ("--tone-attribute", "ink"), ("'ink'", "'cavity'", "ball.ply")),
         (painted, ("--color-values", "Cavity"), ("'Cavity'", "'cavity'", "ball.ply")),
+        (painted, ("--tone-attribute", "red", "--tone-image", "x.png"), ("choose one source",)),
         (sphere, ("--tone-attribute", "ink"), ("sphere.off", ".ply")),
         (sphere, ("--tone-image", "x.png"), ("sphere.off", "UV map")),
         (sphere, ("--tone-picture", tmp_path / "none.png"), ("none.png", "no such file")),
         (sphere, ("--tone-picture", tmp_path / "wide.png"), ("wide.png", "64 x 16")),
         (sphere, ("--set", "tone=picture"), ("picture", "none is given")),
-        (
-            painted,
-            ("--tone-attribute", "red", "--tone-image", "x.png"),
-            ("choose one source of the tone, attribute or image",),
-        ),
     ):
-        assert_refused(rosy("render", mesh, *out, *words), *expected)
-        assert not (tmp_path / "a.png").exists()
+        message = refusal("render", mesh, "-o", tmp_path / "a.png", "--size", "64x64", *words)
+        assert all(text in message for text in expected) and not (tmp_path / "a.png").exists()

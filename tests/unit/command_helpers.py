@@ -42,10 +42,12 @@ def pixels_of(path) -> np.ndarray:
     return np.asarray(Image.open(path))
 
 
-def write_obj(path, points, faces):
-    """Write a mesh as an .obj file, and return its path."""
-    rows = ["v " + " ".join(map(repr, point)) for point in np.asarray(points, float).tolist()]
-    rows += ["f " + " ".join(str(corner + 1) for corner in face) for face in faces]
+def write_obj(path, points, faces, uv=None):
+    """Write a mesh as an .obj file, with texture coordinates of its vertices, and return its path."""
+    rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in np.asarray(points, float).tolist()]
+    rows += [] if uv is None else [f"vt {u!r} {v!r}" for u, v in np.asarray(uv, float).tolist()]
+    corner = "{0}" if uv is None else "{0}/{0}"
+    rows += ["f " + " ".join(corner.format(vertex + 1) for vertex in face) for face in faces]
     path.write_text("\n".join([*rows, ""]))
     return path
 

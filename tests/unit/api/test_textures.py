@@ -6,6 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
+from command_helpers import write_obj
 from shapes import icosphere
 
 import rosy_addon.api as rf
@@ -28,9 +29,7 @@ UV = np.array(SQUARE[0])[:, :2] * 0.9 + 0.05
 )
 def test_the_command_draws_the_same_texture(tmp_path, words, options):
     """Also that of the preset, the light and the settings."""
-    lines = [f"v {x} {y} {z}" for x, y, z in SQUARE[0]] + [f"vt {u} {v}" for u, v in UV]
-    path = tmp_path / "square.obj"
-    path.write_text("\n".join([*lines, "f 1/1 2/2 3/3 4/4"]))
+    path = write_obj(tmp_path / "square.obj", *SQUARE, UV)
     out = tmp_path / "square.png"
     common = ["--generate", "uv", "--degree", "2", "--size", "64", "--margin", "3"]
     arguments = ["texture", str(path), "-o", str(out), *common, *words, "--set", "seed=3"]

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from command_helpers import facts_of, finished, refusal, write_obj
+from field_helpers import write_off
+from shapes import torus
 
 import rosy_addon as rf
-from rosy_addon.extras.command_line import main
 
 
 @pytest.mark.slow
@@ -26,28 +27,29 @@ def test_field_makes_converts_and_info_reads(sphere, tmp_path):
     assert "degree 6" in printed and "1,280 faces" in printed
 
 
-def test_the_default_generator_follows_the_form(ring, tmp_path):
+def test_the_default_generator_follows_the_form(tmp_path):
+    ring = write_off(tmp_path / "torus.off", torus(24, 12))
     default, chosen = tmp_path / "a.rosy", tmp_path / "b.rosy"
-    common = ["field", str(ring), "--degree", "4", "-o"]
-    assert main([*common, str(default)]) == 0
-    assert main([*common, str(chosen), "--generate", "form"]) == 0
+    finished("field", ring, "-o", default)
+    finished("field", ring, "-o", chosen, "--generate", "form")
     assert default.read_bytes() == chosen.read_bytes()
 
 
-def test_a_kind_without_directions_is_noted(tmp_path, capsys):
+def test_a_kind_without_directions_is_noted(tmp_path):
     """A flat mesh has no direction of curvature. Other fields have one everywhere."""
-    mesh = tmp_path / "flat.obj"
-    mesh.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n")
-    command = ["field", str(mesh), "-o", str(tmp_path / "a.rosy")]
-    assert main([*command, "--generate", "curvature"]) == 0
-    assert "curvature gives no direction on any face" in capsys.readouterr().err
-    assert main(command) == 0 and capsys.readouterr().err == ""
+    mesh = write_obj(
+        tmp_path / "flat.obj", [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [range(4)]
+    )
+    command = "field", mesh, "-o", tmp_path / "a.rosy"
+    note = finished(*command, "--generate", "curvature").stderr
+    assert "curvature gives no direction on any face" in note
+    assert finished(*command).stderr == ""
 
 
 @pytest.mark.slow
 def test_undefined_vectors_on_request(sphere, tmp_path):
     path = tmp_path / "a.rosy"
-    assert main(["field", str(sphere), "-o", str(path)]) == 0
+    finished("field", sphere, "-o", path)
     lines = path.read_text().splitlines()
     lines[2 + 7] = "nan nan nan"
     path.write_text("\n".join(lines))
@@ -61,7 +63,7 @@ def test_undefined_vectors_on_request(sphere, tmp_path):
 @pytest.mark.slow
 def test_vectors_off_the_surface_on_request(sphere, tmp_path):
     path = tmp_path / "a.npy"
-    assert main(["field", str(sphere), "-o", str(path), "--degree", "1"]) == 0
+    finished("field", sphere, "-o", path, "--degree", 1)
     vectors = np.load(path)
     vectors[::20] = rf.Surface(sphere).face_normal[::20] * 0.9 + vectors[::20] * 0.1
     np.save(path, vectors)
@@ -117,15 +119,13 @@ def test_strokes_and_guides(sphere, tmp_path):
     assert "has no UV map" in refusal(*to_file, "--generate", "uv")
 
 
-def test_info_says_that_borders_coincide(tmp_path, capsys):
+def test_info_says_that_borders_coincide(tmp_path):
     """A tube of quads whose first and last column are two rows of vertices at the same positions."""
     angle, height = np.meshgrid(np.linspace(0, 2 * np.pi, 9), [0.0, 1.0, 2.0], indexing="ij")
     points = np.stack([np.cos(angle), np.sin(angle), height], axis=-1).reshape(-1, 3)
     quads = [(k, k + 1, k + 4, k + 3) for k in range(24) if k % 3 < 2]
     tube = write_obj(tmp_path / "tube.obj", points, quads)
-    assert main(["info", str(tube), "--generate", "axis"]) == 0
-    printed = capsys.readouterr().out
+    printed = finished("info", tube, "--generate", "axis").stdout
     assert "Euler characteristic 1\n3 vertices on borders coincide" in printed
-    assert main(["info", str(tube), "--generate", "axis", "--join"]) == 0
-    printed = capsys.readouterr()
-    assert "Euler characteristic 0\nmagnitude" in printed.out and "were joined" in printed.err
+    joined = finished("info", tube, "--generate", "axis", "--join")
+    assert "Euler characteristic 0\nmagnitude" in joined.stdout and "were joined" in joined.stderr

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from command_helpers import finished, pixels_of, refusal, write_cube
+from command_helpers import finished, pixels_of, refusal, write_cube, write_obj
 from field_helpers import write_off
 from shapes import icosphere, torus
 
@@ -91,18 +91,17 @@ def test_sources_of_tones_and_colors(words, name, painted, tmp_path, monkeypatch
     write_png("shot.png", np.linspace(0.2, 0.9, 64 * 64 * 4, dtype=np.float32).reshape(64, 64, 4))
     mesh = painted
     if name == "tone_image":
-        mesh = tmp_path / "square.obj"
-        corners = "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
-        mesh.write_text(corners + "f 1/1 2/2 3/3 4/4\n")
+        points, uv = (
+            [(-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1)],
+            [(0, 0), (1, 0), (1, 1), (0, 1)],
+        )
+        mesh = write_obj(tmp_path / "square.obj", points, [range(4)], uv)
     view = "--generate smoothest --size 64x64 --view 0,0 --up z --ortho"
-    plain, out = [
-        [*["render", "-o", "a.png"], str(mesh), *view.split(), *options.split()]
-        for options in (words.rsplit(" ", 2)[0], words)
-    ]
-    assert main(plain) == 0
-    before = pixels_of(tmp_path / "a.png")
-    assert main(out) == 0
-    drawn = pixels_of(tmp_path / "a.png")
+    pictures = []
+    for options in (words.rsplit(" ", 2)[0], words):
+        assert main(["render", str(mesh), "-o", "a.png", *view.split(), *options.split()]) == 0
+        pictures.append(pixels_of("a.png"))
+    before, drawn = pictures
     _, look, _, source = words.split()
     keywords = {"preset": look} if "=" not in look else dict([look.split("=")])
     surface = rf.Surface(mesh, up="z")

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 from awkward import AWKWARD
+from command_helpers import write_obj
 from field_helpers import bumpy, read_field, write_off
 from shapes import torus
 
@@ -24,10 +25,8 @@ def meshes(tmp_path_factory):
     folder = tmp_path_factory.mktemp("awkward")
     for name, make in AWKWARD.items():
         points, faces = make()
-        rows = [f"v {x} {y} {z}" for x, y, z in points]
-        rows += [f"vt {x + 0.2 * z} {y - 0.3 * z}" for x, y, z in points]
-        rows += ["f " + " ".join(f"{v + 1}/{v + 1}" for v in face) for face in faces]
-        (folder / f"{name}.obj").write_text("\n".join(rows) + "\n")
+        uv = [(x + 0.2 * z, y - 0.3 * z) for x, y, z in points]
+        write_obj(folder / f"{name}.obj", points, faces, uv)
     return folder
 
 

@@ -85,16 +85,6 @@ def test_imports_run_one_way(path):
     assert outside <= allowed, "only relative imports inside the package, only numpy outside it"
 
 
-def test_imports_of_finds_all_kinds_of_imports(tmp_path, monkeypatch):
-    """All forms of imports, of RoSy and of others."""
-    monkeypatch.setitem(globals(), "PACKAGE", tmp_path)
-    (tmp_path / "field").mkdir()
-    path = tmp_path / "field" / "wrong.py"
-    imports = "import bpy\nfrom ..scene.apply import x\nfrom .. import ui\nfrom . import frames\n"
-    path.write_text(imports)
-    assert imports_of(path) == ({"scene.apply", "ui", "field.frames"}, {"bpy"})
-
-
 def imported_files(path: Path) -> Iterator[Path]:
     """Yield the files of all modules that a file imports relatively, in functions as well."""
     for node in ast.walk(ast.parse(path.read_text())):

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from harness.stroke_tracing import turned
 from hatched import camera_above, render
-from scipy.ndimage import gaussian_filter
 from shapes import plane
 
 from rosy_addon.compositor.even_lines import (
@@ -21,11 +20,9 @@ from rosy_addon.compositor.even_lines import (
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import instance_line_spacing, pixel_look
 from rosy_addon.compositor.pixel_field import all_members, surface_pixel_field
-from rosy_addon.core.color import from_hex, to_linear
 from rosy_addon.core.settings import Choice, Number, Numbers, Switch, settings_of
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.rosy_field import RosyField
-from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
@@ -198,17 +195,6 @@ def test_uneven_lines_have_the_mean_width(breaks, paper_grain):
         widths = uneven_width(np.full(streak.shape, width), look, streak, grain)
         assert widths.mean() == pytest.approx(width, abs=6e-3)
     assert (np.diff(look_width_table(look)) > 0).all()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("degree", "shading"), [(4, 0.1), (6, 0.5), (6, 0.95)])
-def test_flat_tones(shading, degree):
-    look = load_preset("engraving").look
-    look = replace(look, light="scene", shading=shading, paper_color="#ffffff")
-    rgba = render(wall_instance(degree, 0.4), camera_above(), look)
-    ink = to_linear(from_hex(look.ink_color))[0]
-    blurred = gaussian_filter((rgba[..., 0] - ink) / (1 - ink), 16)[40:-40, 40:-40]
-    assert np.abs(blurred - (1 - shading)).max() <= 0.04
 
 
 # --- perspective -------------------------------------------------------------------------------------

@@ -69,7 +69,8 @@ RAMPS = {
 
 
 @pytest.mark.parametrize(
-    "name", mainly(["cross-hatch", "families, light", "ramp, light", "all uneven"], RAMPS)
+    "name",
+    mainly(["cross-hatch", "engraving", "families, light", "ramp, light", "all uneven"], RAMPS),
 )
 def test_looks_reproduce_a_ramp(name):
     """A blur contains few lines, so that its tone has a random error, which is 0.03 in the mean."""

@@ -63,10 +63,12 @@ def test_rotation_at_points_and_cells(degree, sphere):
             assert field.magnitude[far_from_poles] == pytest.approx(radius, rel=0.02)
 
 
-@pytest.mark.parametrize("columns", [3, 6, 9, 12])
-@pytest.mark.parametrize("domain", ["points", "cells"])
+@pytest.mark.parametrize(
+    ("domain", "columns"),
+    [("points", 3), ("points", 12), ("cells", 3), ("cells", 6), ("cells", 9), ("cells", 12)],
+)
 def test_the_same_as_npy(columns, domain, sphere, tmp_path):
-    """Arrays give the fields of .npy files with the same rows, to the last bit."""
+    """Arrays give the fields of .npy files, which have no tensors at points, to the last bit."""
     at_points = domain == "points"
     rows = vectors = rotation(sphere.vertices if at_points else sphere.face_center)
     if columns == 12:
@@ -77,12 +79,6 @@ def test_the_same_as_npy(columns, domain, sphere, tmp_path):
         rows = tensors.reshape(-1, 9)
     array = rows[:, [0, 4, 8, 1, 5, 2]] if columns == 6 else rows
     field = array_field(arrays_of(sphere, **{domain: {"a": array}}))
-    if columns in (6, 9) and at_points:
-        # .npy files have no tensors at points.
-        away = np.abs(sphere.face_center[:, 2]) < 0.9
-        circles = rotation(sphere.face_center)
-        assert angle_between_lines(field.vectors, circles)[away].max() < 3
-        return
     np.save(tmp_path / "rows.npy", rows)
     expected = read_field(tmp_path / "rows.npy", sphere, 1 if columns == 3 else None)
     assert np.array_equal(field.vectors, expected.vectors)

@@ -40,11 +40,3 @@ def test_the_nearest_pairs_come_first():
         assert pairs == greedy_pairs(points, index, other_points, other_index, reach)
         distance = np.linalg.norm(points[found.first] - other_points[found.second], axis=1)
         np.testing.assert_allclose(found.distance, distance)
-
-
-def test_a_chain_of_neighbors_is_matched_from_its_closest_pair():
-    """On a line at 0, 10 and 19; the others at 9 and 20: 19 and 20 first, 9 and 10 next, 0 stays."""
-    first = np.array([[0.0, 0, 0], [10, 0, 0], [19.2, 0, 0]])
-    second = np.array([[9.0, 0, 0], [20.0, 0, 0]])
-    found = match(first, np.ones(3), second, np.ones(2), 12.0)
-    assert found.first.tolist() == [1, 2] and found.second.tolist() == [0, 1]

@@ -7,7 +7,17 @@ import numpy as np
 import pytest
 from field_helpers import bumpy
 from scipy.optimize import minimize
-from shapes import cube, from_quads, from_triangles, icosphere, tetrahedron, torus, walls_of
+from shapes import (
+    cube,
+    from_quads,
+    from_triangles,
+    icosphere,
+    joined,
+    rebuilt,
+    tetrahedron,
+    torus,
+    walls_of,
+)
 
 from rosy_addon.core.errors import RosyError
 from rosy_addon.field import smoothest
@@ -102,9 +112,7 @@ def test_parts_of_very_different_sizes_are_solved_alone():
     """Diffusion times are relative to the area of each component."""
     ball = bumpy(icosphere(3))
     alone = dirichlet_energy(ball, smoothest_field(ball, 4))
-    points = np.concatenate([ball.vertices, 1e-3 * ball.vertices + 9])
-    triangles = ball.corner_vertex.reshape(-1, 3)
-    both = from_triangles(points, np.concatenate([triangles, triangles + len(ball.vertices)]))
+    both = joined(ball, rebuilt(ball, 1e-3 * ball.vertices + 9))
     assert dirichlet_energy(both, smoothest_field(both, 4)) == pytest.approx(2 * alone, rel=0.04)
 
 

@@ -83,11 +83,11 @@ def read_damaged(path, data, garbage, offset, read):
         assert "\n" not in str(error) and str(path) in str(error)
 
 
-def assert_damaged(path, data, expected, error_of_reading):
+def assert_damaged(error_of, path, data, expected, read, *arguments):
     """Check that a damaged file is refused by its name, without memory for what its header claims."""
     path.write_bytes(data)
     messages = []
-    assert traced_peak(lambda: messages.append(error_of_reading(path))) < 10e6
+    assert traced_peak(lambda: messages.append(error_of(read, path, *arguments))) < 10e6
     assert expected in messages[0] and str(path) in messages[0]
 
 

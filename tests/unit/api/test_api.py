@@ -83,11 +83,7 @@ def test_texture_coordinates_of_vertices_and_corners():
         ((SQUARE, [[0, 1, 2]]), {"uv": [[0, np.nan]] * 4}, "not finite"),
         ((SQUARE,), {}, "expected vertices and faces"),
         ((object(),), {}, "not object"),
-        (
-            ("a.xyz",),
-            {},
-            "a.xyz: is not a mesh file: its name must end in .obj, .off, .ply, .stl, .om",
-        ),
+        (("a.xyz",), {}, "a.xyz: is not a mesh file: its name must end in .obj, .off, .ply, .stl"),
         (("a.obj",), {"step": 1}, "a.obj: step applies only to files of simulations"),
         ((SQUARE, [[0, 1, 2]]), {"step": 1}, "step applies only to files of simulations"),
         (("none.obj",), {}, "none.obj: cannot be read"),
@@ -162,13 +158,12 @@ def test_lengths_of_guides_may_be_their_firmness(sphere, field):
     turned = np.where(is_weak[:, None], field.rotated(np.pi / 4).vectors, field.vectors)
     vectors = turned / np.linalg.norm(turned, axis=1)[:, None]
     vectors[is_weak] *= 1e-3
-    angle = [
-        rf.guided(sphere, vectors=vectors, vectors_have_firmness=firmness)
-        .difference(field)
-        .angle[is_weak]
-        for firmness in (False, True)
-    ]
-    assert angle[0] == pytest.approx(np.pi / 4, abs=1e-3) and angle[1] < 0.3
+    exact, firm = (
+        rf.guided(sphere, vectors=vectors, vectors_have_firmness=is_firm)
+        for is_firm in (False, True)
+    )
+    assert exact.difference(field).angle[is_weak] == pytest.approx(np.pi / 4, abs=1e-3)
+    assert firm.difference(field).angle[is_weak] < 0.3
 
 
 def test_a_surface_is_its_content(sphere, field, error_of):
@@ -244,17 +239,13 @@ def test_numbers_as_colors(error_of):
         (tetrahedron, range(4), np.repeat(range(4), 3)),
     ):
         np.testing.assert_array_equal(corner_numbers(surface, numbers), expected)
-    keywords = {"view": (0, 90), "size": (16, 16), "orthographic": True, "gain": 0.0}
-    colors = {"color_values": [0, 1], "color_map": "gray", "shading": 0.0}
-    picture = np.asarray(rf.render(quad, **keywords, **colors))
-    assert set(np.unique(picture[picture[..., 3] == 255][:, :3])) >= {17, 255}
     for wrong, expected in (
         ({"color_values": [1, 2, 3]}, "surface: color_values must be 2 numbers"),
         ({"color_values": "angle"}, "surface: has no attributes of faces or vertices"),
         ({"color_values": ["a", "b"]}, "surface: color_values must be numbers"),
         ({"hue": "values"}, "hue 'values' needs numbers"),
     ):
-        assert expected in error_of(rf.render, quad, **keywords, **wrong)
+        assert expected in error_of(rf.render, quad, **wrong)
 
 
 def test_sources_of_the_tone(sphere, field, error_of):
@@ -275,14 +266,7 @@ def test_sources_of_the_tone(sphere, field, error_of):
     by_picture = rf.render(sphere, field, tone_picture=rf.Picture(rgba), **look)
     assert np.array_equal(np.asarray(by_array), np.asarray(by_picture))
     for keywords, expected in (
-        (
-            {"tone_values": values[1:]},
-            "sphere: tone_values must be 162 numbers, one for each vertex",
-        ),
-        (
-            {"tone_values": values[1:]},
-            ", or 960 numbers, one for each corner, not an array of shape",
-        ),
+        ({"tone_values": values[1:]}, "162 numbers, one for each vertex, or 960 numbers, one for"),
         ({"tone_values": values * np.nan}, "not finite"),
         ({"tone_values": "ink"}, "sphere: has no vertex attributes"),
         ({"tone_image": tone}, "sphere: has no UV map"),

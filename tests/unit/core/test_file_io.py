@@ -30,6 +30,17 @@ with replacing(sys.argv[1]) as (temporary,):
 """
 
 
+WHOLE_WRITER = (
+    "import sys; from rosy_addon.core.file_io import write_bytes; write_bytes(sys.argv[1], b'')"
+)
+
+
+def write_in_process(folder, *prefix):
+    """Write a file by another process, which is started by the program of the prefix."""
+    command = [*prefix, sys.executable, "-c", WHOLE_WRITER, folder / "b.png"]
+    return subprocess.run(command, capture_output=True, text=True, timeout=30)
+
+
 @pytest.fixture
 def writer(tmp_path):
     """A process in the midst of writing a file."""
@@ -59,20 +70,8 @@ def test_what_a_killed_process_leaves_is_deleted_by_the_next_one(writer, tmp_pat
 @pytest.mark.skipif(sys.platform != "linux", reason="Linux has PID namespaces")
 def test_processes_that_see_each_other_only_in_the_folder(writer, tmp_path):
     """In a container, whose processes have other numbers, a process that is writing has none."""
-    code = "import sys; from rosy_addon.core.file_io import write_bytes; write_bytes(sys.argv[1], b'b')"
-    command = [
-        "unshare",
-        "--user",
-        "--map-root-user",
-        "--pid",
-        "--fork",
-        sys.executable,
-        "-c",
-        code,
-    ]
-    done = subprocess.run(
-        [*command, tmp_path / "b.png"], capture_output=True, text=True, check=False
-    )
+    namespace = "unshare", "--user", "--map-root-user", "--pid", "--fork"
+    done = write_in_process(tmp_path, *namespace)
     if "unshare" in done.stderr:
         pytest.skip(done.stderr)
     assert done.returncode == 0, done.stderr
@@ -83,9 +82,7 @@ def test_processes_that_see_each_other_only_in_the_folder(writer, tmp_path):
 @pytest.mark.skipif(sys.platform != "linux", reason="Linux has the program flock")
 def test_a_program_that_has_locked_the_folder_may_start_rosy(tmp_path):
     """As ``flock FOLDER rosy ...`` does."""
-    code = "import sys; from rosy_addon.core.file_io import write_bytes; write_bytes(sys.argv[1], b'b')"
-    command = ["flock", tmp_path, sys.executable, "-c", code, tmp_path / "b.png"]
-    subprocess.run(command, check=True, timeout=30)
+    assert write_in_process(tmp_path, "flock", tmp_path).returncode == 0
     assert names(tmp_path) == ["b.png"]
 
 

@@ -72,6 +72,4 @@ DAMAGED = {
 
 @pytest.mark.parametrize("name", DAMAGED)
 def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
-    assert_damaged(
-        tmp_path / name, *DAMAGED[name], lambda path: error_of(read_edges, path, SQUARES)
-    )
+    assert_damaged(error_of, tmp_path / name, *DAMAGED[name], read_edges, SQUARES)

@@ -159,9 +159,7 @@ DAMAGED = {
 
 @pytest.mark.parametrize("name", DAMAGED)
 def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
-    assert_damaged(
-        tmp_path / name, *DAMAGED[name], lambda path: error_of(read_field, path, SQUARES)
-    )
+    assert_damaged(error_of, tmp_path / name, *DAMAGED[name], read_field, SQUARES)
 
 
 def test_missing_file_and_conflicting_degree(tmp_path, error_of):

@@ -224,7 +224,7 @@ DAMAGED = {
 
 @pytest.mark.parametrize("name", DAMAGED)
 def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
-    assert_damaged(tmp_path / name, *DAMAGED[name], lambda path: error_of(Surface, path))
+    assert_damaged(error_of, tmp_path / name, *DAMAGED[name], Surface)
 
 
 def test_missing_files_and_folders(tmp_path, error_of):

@@ -81,9 +81,7 @@ DAMAGED = {
 @pytest.mark.parametrize("name", DAMAGED)
 def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
     surface = rf.Surface(POINTS, [[0, 1, 2, 3], [1, 4, 2]])
-    assert_damaged(
-        tmp_path / "a.om", *DAMAGED[name], lambda path: error_of(read_field, path, surface)
-    )
+    assert_damaged(error_of, tmp_path / "a.om", *DAMAGED[name], read_field, surface)
 
 
 def test_every_changed_byte_is_an_error_or_a_mesh(tmp_path):

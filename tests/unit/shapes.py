@@ -120,6 +120,15 @@ def cylinder(
     return from_quads(np.stack(vertices, axis=1), quads, name="cylinder")
 
 
+def capped_cylinder(columns: int) -> Surface:
+    """A cylinder of quads with a polygon at each end, without vertices between them."""
+    tube = cylinder(columns, 1)
+    low = np.arange(0, 2 * columns, 2)
+    corners = np.concatenate([tube.corner_vertex, low[::-1], low + 1])
+    start = 4 * columns + columns * np.arange(3)
+    return build_surface(tube.vertices, corners, np.concatenate([tube.face_start, start[1:]]))
+
+
 def icosphere(subdivisions: int = 3, radius: float = 1.0) -> Surface:
     """A sphere of 20 * 4^n triangles."""
     golden = (1 + np.sqrt(5)) / 2

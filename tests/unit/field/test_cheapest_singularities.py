@@ -14,7 +14,7 @@ from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.prescribed import prescribed_field
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.smoothest import smoothest_field
-from rosy_addon.field.surface import build_surface
+from rosy_addon.field.surface import Surface
 
 
 def energy_of(surface, degree, vertex, index):
@@ -49,8 +49,7 @@ def test_given_ones_stay_and_the_sum_is_right():
 def test_given_ones_are_found_on_few_faces_or_refused(points, faces):
     """Where all neighbors of a given vertex are singular, what is added stayed at the given one."""
     random, made = np.random.default_rng(5), 0
-    start = np.cumsum([0, *map(len, faces)])
-    surface = build_surface(np.array(points, dtype=float), np.concatenate(faces), start)
+    surface = Surface(points, faces)
     for _ in range(40):
         given = random.permutation(len(points))[: random.integers(1, 4)]
         index, degree = random.integers(-1, 3, len(given)), int(random.choice([1, 2, 4, 6]))
@@ -79,8 +78,7 @@ def test_one_given_costs_no_more_than_the_smoothest_field():
 
 def test_a_field_with_a_border_needs_no_more():
     tube = cylinder(24, 12)
-    settings = GeneratorSettings(
-        "prescribed", singularities=(np.array([150]), np.array([1])), add_missing=True
-    )
+    given = np.array([150]), np.array([1])
+    settings = GeneratorSettings("prescribed", singularities=given, add_missing=True)
     vertex, index = find_singularities(tube, generate(tube, settings, 4))
     assert vertex.tolist() == [150] and index.tolist() == [1]

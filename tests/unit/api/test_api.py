@@ -130,14 +130,9 @@ def test_fields_from_directions_and_tensors(sphere, field):
 
 def test_fields_from_arrays_of_a_surface(sphere, field, error_of):
     """Vectors of faces give the same field; the array is found by its name, or as the only one."""
-    arrays = mesh_arrays.MeshArrays(
-        sphere.vertices,
-        sphere.corner_vertex,
-        sphere.face_start,
-        vertex_data={"p": sphere.vertices[:, 2]},
-        face_data={"U": field.vectors},
-    )
-    surface = rf.Surface(arrays, name="flow")
+    mesh = sphere.vertices, sphere.corner_vertex, sphere.face_start
+    data = {"vertex_data": {"p": sphere.vertices[:, 2]}, "face_data": {"U": field.vectors}}
+    surface = rf.Surface(mesh_arrays.MeshArrays(*mesh, **data), name="flow")
     for again in (rf.from_array(surface, degree=4), rf.from_array(surface, "cell:U", 4)):
         assert np.array_equal(again.vectors, field.vectors) and again.surface is surface
     assert rf.from_array(surface).degree == 1
@@ -281,12 +276,9 @@ def test_sources_of_the_tone(sphere, field, error_of):
 def test_colors_of_vertices_as_a_tone():
     """The tone "Color" is their linear luminance; sRGB as IEC 61966 defines it."""
     display = np.array([[60, 60, 60], [230, 230, 230], [255, 0, 0], [0, 0, 255]]) / 255
-    arrays = mesh_arrays.MeshArrays(
-        np.array(SQUARE, dtype=float),
-        np.arange(4),
-        np.array([0, 4]),
-        vertex_data=dict(zip(("red", "green", "blue"), display.T, strict=True)),
-    )
+    colors = dict(zip(("red", "green", "blue"), display.T, strict=True))
+    mesh = np.array(SQUARE, dtype=float), np.arange(4), np.array([0, 4])
+    arrays = mesh_arrays.MeshArrays(*mesh, vertex_data=colors)
     linear = ((display + 0.055) / 1.055) ** 2.4 * (display > 0)
     expected = linear @ (0.2126, 0.7152, 0.0722)
     assert np.allclose(named_tone(rf.Surface(arrays), "Color"), expected, atol=1e-3)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from command_helpers import finished, pixels_of, refusal, write_cube, write_obj
-from field_helpers import write_off
+from field_helpers import ply_header, write_off
 from shapes import icosphere, torus
 
 import rosy_addon as rf
@@ -60,18 +60,15 @@ def test_unused_vertices_change_nothing(tmp_path):
 def painted(tmp_path_factory):
     """A ball that is dark on the left and light on the right, in its colors and in a number."""
     ball = icosphere(4)
-    floats, colors = ("x", "y", "z", "cavity"), ("red", "green", "blue")
-    head = ["ply", "format ascii 1.0", f"element vertex {len(ball.vertices)}"]
-    head += [f"property float {name}" for name in floats]
-    head += [f"property uchar {name}" for name in colors]
-    head += [f"element face {ball.face_count}", "property list uchar int vertex_indices"]
+    properties = [f"float {name}" for name in ("x", "y", "z", "cavity")]
+    properties += [f"uchar {name}" for name in ("red", "green", "blue")]
+    face = "face", ball.face_count, "list uchar int vertex_indices"
     paint = [(0.8, 230, 230, 230) if x > 0 else (0.1, 60, 60, 60) for x in ball.vertices[:, 0]]
     rows = [(*point, *values) for point, values in zip(ball.vertices.tolist(), paint, strict=True)]
     rows += [(3, *corners) for corners in ball.corner_vertex.reshape(-1, 3).tolist()]
     path = tmp_path_factory.mktemp("painted") / "ball.ply"
-    path.write_text(
-        "\n".join([*head, "end_header", *(" ".join(map(str, row)) for row in rows), ""])
-    )
+    header = ply_header("ascii", ("vertex", len(ball.vertices), *properties), face)
+    path.write_text(header + "".join(" ".join(map(str, row)) + "\n" for row in rows))
     return path
 
 

@@ -21,7 +21,6 @@ from rosy_addon.field.generate import generate
 from rosy_addon.field.prescribed import prescribed_field
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
-from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.ambient_occlusion import ambient_occlusion
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.rendering.draw import draw_picture
@@ -147,12 +146,3 @@ def test_a_listener_ends_the_work(name):
         with listening(cancel_at(stop)), pytest.raises(CancelledError):
             function(*arguments)
     assert len(reported(function, *arguments)) <= count
-
-
-@pytest.mark.slow
-def test_listening_does_not_change_pixels():
-    view = ViewInput((INSTANCE,), CAMERA, load_preset("pen-and-ink").look, (SUN,))
-    alone = draw_picture(view).rgba
-    with listening(lambda fraction, label: None):
-        heard = draw_picture(view).rgba
-    assert heard.tobytes() == alone.tobytes()

@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sparse
 from field_helpers import angle_differences, as_scipy, bumpy
 from scipy.sparse.linalg import spsolve
-from shapes import cube, from_quads, icosphere, joined, plane, rebuilt, torus
+from shapes import cube, from_quads, grid_of_quads, icosphere, joined, plane, rebuilt, torus
 
 from rosy_addon.field.connection import build_connection, laplacian
 from rosy_addon.field.frames import dot, normalize
@@ -116,8 +116,7 @@ def test_curvature_spreads_into_flat_regions():
     z = np.concatenate([np.full(15, 1.0), np.cos(turns), -flap[::-1]])
     y = np.linspace(0, 6, count)
     points = np.stack(np.broadcast_arrays(x[:, None], y, z[:, None]), axis=-1).reshape(-1, 3)
-    first = np.arange(len(x) - 1)[:, None] * count + np.arange(count - 1)
-    quads = np.stack([first, first + 1, first + count + 1, first + count], axis=-1).reshape(-1, 4)
+    quads, _ = grid_of_quads(len(x) - 1, count - 1, False, False)
     surface = from_quads(points, quads)
     flat = surface.face_center[:, 0] < -1
     assert generate(surface, "curvature", 4).magnitude[flat].max() < 1e-3

@@ -9,11 +9,11 @@ import sys
 
 import numpy as np
 import pytest
+from command_helpers import finished, refusal
 from field_helpers import write_off
 from shapes import icosphere
 
 import rosy_addon as rf
-from rosy_addon.cli.parser import main
 
 
 @pytest.fixture(scope="module")
@@ -85,19 +85,19 @@ def test_nothing_to_compare(sphere, error_of):
     assert row["worst_face"] == -1 and row["worst_position"] is None and row["compared"] == 0
 
 
-def test_the_command(sphere, tmp_path, capfd):
+def test_the_command(sphere, tmp_path):
     mesh, field = write_off(tmp_path / "sphere.off", sphere), tmp_path / "turned.rosy"
     rf.smoothest(rf.Surface(mesh), degree=6).rotated(0.05).save(field)
-    assert main(["compare", str(mesh), "Ours=smoothest", str(field), "--format", "json"]) == 0
-    ours, turned = json.loads(capfd.readouterr().out)
+    done = finished("compare", mesh, "Ours=smoothest", field, "--format", "json")
+    ours, turned = json.loads(done.stdout)
     assert (ours["title"], turned["title"]) == ("Ours", "turned") and ours["degree"] == 6
     assert np.isclose(turned["mean"], np.degrees(0.05), atol=1e-3)
     for words, message in (
         (["form", "form"], "same title"),
-        (["form", "b=curvature", "-o", str(tmp_path / "a.gif")], ".pdf, .svg, .png"),
+        (["form", "b=curvature", "-o", tmp_path / "a.gif"], ".pdf, .svg, .png"),
         (["nothing.rosy"], "nothing.rosy"),
     ):
-        assert main(["compare", str(mesh), *words]) == 2 and message in capfd.readouterr().err
+        assert message in refusal("compare", mesh, *words)
 
 
 def test_figures_need_matplotlib():

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from command_helpers import write_obj
+from command_helpers import finished, refusal, write_obj
 from field_helpers import assert_damaged
 from shapes import plane
 
 import rosy_addon as rf
-from rosy_addon.extras.command_line import main
 from rosy_addon.field.formats.feature_edges import read_edges
 
 SQUARES = plane(3, 2)
@@ -46,16 +45,16 @@ def test_features_follow_the_file(tmp_path):
     assert degrees_of(field.vectors) % 180 == pytest.approx(45)
 
 
-def test_the_command_line(tmp_path, capfd):
+def test_the_command_line(tmp_path):
     surface, rows = diagonal()
     mesh = write_obj(tmp_path / "a.obj", surface.vertices, surface.faces)
     edges, out = tmp_path / "a.feature", tmp_path / "a.npy"
     edges.write_text(f"{len(rows)}\n" + "".join(f"{face},{edge}\n" for face, edge in rows))
-    words = ["field", str(mesh), "-o", str(out), "--edges", str(edges)]
-    assert main(words) == 0
+    words = "field", mesh, "-o", out, "--edges", edges
+    finished(*words)
     assert degrees_of(np.load(out)) % 90 == pytest.approx(45)
-    assert main([*words, "--generate", "form"]) == 2
-    assert "--edges applies only to --generate features, guided" in capfd.readouterr().err
+    message = refusal(*words, "--generate", "form")
+    assert "--edges applies only to --generate features, guided" in message
 
 
 DAMAGED = {

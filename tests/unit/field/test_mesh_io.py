@@ -7,11 +7,11 @@ import struct
 import numpy as np
 import pytest
 from field_helpers import assert_damaged, ply_header, read_damaged
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rosy_addon.field.formats.stl import weld
-from rosy_addon.field.surface import MIN_EXTENT, Surface
+from rosy_addon.field.surface import Surface
 
 # A square, and a triangle on its edge from vertex 1 to vertex 2.
 VERTICES = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (1, 0.5, 1e-3)])
@@ -238,13 +238,3 @@ def test_missing_files_and_folders(tmp_path, error_of):
 def test_random_damage_raises_only_rosy_errors(tmp_path_factory, garbage, name, offset):
     path = tmp_path_factory.getbasetemp() / f"damaged-{name}"
     read_damaged(path, FILES[name], garbage, offset, Surface)
-
-
-@pytest.mark.slow
-@given(st.lists(st.floats(-1e12, 1e12), min_size=9, max_size=9))
-def test_off_coordinates_are_read_exactly(tmp_path_factory, numbers):
-    assume(not 0 < np.ptp(np.reshape(numbers, (3, 3)), axis=0).max() < MIN_EXTENT)
-    path = tmp_path_factory.getbasetemp() / "exact.off"
-    rows = [" ".join(map(repr, numbers[k : k + 3])) for k in (0, 3, 6)]
-    path.write_text("\n".join(["OFF", "3 1 0", *rows, "3 0 1 2", ""]))
-    assert Surface(path).vertices.ravel().tolist() == numbers

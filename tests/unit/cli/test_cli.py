@@ -17,6 +17,8 @@ from rosy_addon.cli import bake, parser
 from rosy_addon.extras.command_line import main
 from rosy_addon.preset_files.store import preset_files
 
+COMMAND = [sys.executable, "-m", "rosy_addon"]
+
 #: Commands and their errors. {render} is `render`, a mesh and an output.
 REFUSED = {
     "no mesh": ("render none.off -o {out}", "none.off: cannot be read"),
@@ -97,11 +99,9 @@ def test_help_names_the_program_it_was_started_as(capsys):
 @pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is no signal there")
 def test_ctrl_c_is_status_130_without_a_traceback(sphere, tmp_path):
-    command = [sys.executable, "-m", "rosy_addon", "render", str(sphere), "-o"]
-    command += [str(tmp_path / "a.png")]
-    command += ["--size", "1500x1500", "--set", "length=2000", "--set", "method=brute"]
+    slow = ["--size", "1500x1500", "--set", "length=2000", "--set", "method=brute"]
     process = subprocess.Popen(
-        command,
+        [*COMMAND, "render", sphere, "-o", tmp_path / "a.png", *slow],
         cwd=ROOT,
         stderr=subprocess.PIPE,
         text=True,
@@ -154,7 +154,7 @@ def test_workers_get_the_options_as_they_are(tmp_path, monkeypatch):
     in_two_words = ["--object=-a", "--object", "b", "--object=--save", *words[:1], *words[4:]]
     for arguments in (words, in_two_words):
         assert main(["bake", str(scene), *arguments, "--frames", "1-2", "--jobs", "2"]) == 0
-    command = [sys.executable, "-m", "rosy_addon", "bake", str(scene), *words, "--workers=1"]
+    command = [*COMMAND, "bake", str(scene), *words, "--workers=1"]
     assert commands == [command, command] and main([*command[3:], "--frames=1-2", "--jobs=2"]) == 0
     assert commands[2] == command
 
@@ -237,9 +237,9 @@ def test_no_temporary_folder(sphere):
     """No file can be written, so Python finds no folder for temporary files."""
     import resource
 
-    words = ["turntable", str(sphere), "-o", "film.mp4", "--size", "16x16", "--pictures", "2"]
+    words = ["turntable", sphere, "-o", "film.mp4", "--size", "16x16", "--pictures", "2"]
     done = subprocess.run(
-        [sys.executable, "-m", "rosy_addon", *words],
+        [*COMMAND, *words],
         cwd=ROOT,
         capture_output=True,
         text=True,
@@ -252,7 +252,7 @@ def test_no_temporary_folder(sphere):
 
 @pytest.mark.slow
 def test_output_streams_that_fail(sphere):
-    command = [sys.executable, "-m", "rosy_addon", "info", str(sphere), "--generate", "axis"]
+    command = [*COMMAND, "info", sphere, "--generate", "axis"]
     process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     process.stdout.close()
     assert process.wait(60) == 141 and process.stderr.read() == b""
@@ -261,7 +261,7 @@ def test_output_streams_that_fail(sphere):
     assert done.returncode == 1
     assert done.stderr == b"rosy: standard output: no space left on device\n"
     environment = {**os.environ, "PYTHONIOENCODING": "ascii", "ROSY_PRESETS": "/caf\xe9"}
-    presets = subprocess.check_output([*command[:3], "presets"], cwd=ROOT, env=environment)
+    presets = subprocess.check_output([*COMMAND, "presets"], cwd=ROOT, env=environment)
     assert b"/caf\\xe9" in presets
 
 

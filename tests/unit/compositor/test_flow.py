@@ -61,14 +61,13 @@ def test_averages_are_those_of_kernels_moved_upstream(kernel, is_short):
     averages = DriftingAverages(moving, second.astype(np.complex64))
     sums, samples = averages.at(position, axial, length, forward, *ends)
 
-    share = 7 / 12 if is_short else 1.0
     kernel_length = 7.0 if is_short else 12.0
     offsets = np.arange(-steps, steps + 1) - position
     expected = np.zeros(count)
     for column in range(count):
         for direction, part in ((1, forward[column]), (-1, 1 - forward[column])):
             for channel in range(3):
-                center = axial[column] - direction * share * shifts[channel]
+                center = axial[column] - direction * kernel_length / 12 * shifts[channel]
                 whole = np.floor(center)
                 low, high = (
                     sample_weights(direction * (offsets - at), kernel_length, look.kernel)

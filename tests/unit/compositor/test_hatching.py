@@ -166,8 +166,7 @@ def test_required_coverage_has_the_target_luminance(kind):
 
 
 def test_inks_of_families_differ_visibly():
-    for code in ("#101010", "#8a2020", "#f4f0e8"):
-        paper = "#000000" if code == "#f4f0e8" else "#ffffff"
+    for code, paper in (("#101010", "#ffffff"), ("#8a2020", "#ffffff"), ("#f4f0e8", "#000000")):
         look = replace(INK, ink_color=code, paper_color=paper, hue="families")
         inks = inks_of(look, 6)
         np.testing.assert_array_equal(inks.dark[0], to_linear(from_hex(code)))

@@ -10,6 +10,7 @@ from scipy.sparse.linalg import spsolve
 from shapes import cube, from_quads, grid_of_quads, icosphere, joined, plane, rebuilt, torus
 
 from rosy_addon.field.connection import build_connection, laplacian
+from rosy_addon.field.edge_guides import coherent_edge_guides
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.guided_system import guided_field
@@ -98,6 +99,42 @@ def test_borders_are_features():
     guides = guides_from_edges(square, ends, 4)
     field = guided_field(square, 4, guides, 0.0, guides.any(axis=1))
     np.testing.assert_allclose(np.abs(field.vectors).max(axis=1), 1, atol=1e-6)
+
+
+#: Number of faces along a side of a square; a face is smaller than the distance over which edges are averaged.
+SIDE = 240
+
+
+def kept_share(ends: np.ndarray, degree: int) -> float:
+    """The share of the guides along edges of a square of size 1 that are kept."""
+    square = plane(SIDE, SIDE)
+    square = square.with_vertices(square.vertices / np.ptp(square.vertices[:, 0]))
+    expected = guides_from_edges(square, ends, degree)
+    guides = coherent_edge_guides(square, ends, degree)
+    is_kept = guides.any(axis=1)
+    assert (guides[is_kept] == expected[is_kept]).all()
+    return is_kept.sum() / expected.any(axis=1).sum()
+
+
+@pytest.mark.parametrize("degree", [2, 4])
+def test_a_straight_line_is_followed(degree):
+    x = np.arange(SIDE) + SIDE // 2 * (SIDE + 1)
+    assert kept_share(np.stack([x, x + 1], axis=1), degree) == 1
+
+
+@pytest.mark.parametrize("degree, low, high", [(2, 0, 0.1), (4, 1, 1)])
+def test_steps(degree, low, high):
+    """A cross follows both directions of steps of two edges, but a line would have to turn at each of them."""
+    corner = np.arange(0, SIDE, 2) * (SIDE + 2)
+    path = corner + np.array([[0, 1, 2, SIDE + 3, 2 * SIDE + 4]]).T
+    ends = np.stack([path[:-1].ravel(), path[1:].ravel()], axis=1)
+    assert low <= kept_share(ends, degree) <= high
+
+
+def test_all_edges_of_a_cube_are_followed():
+    box = cube()
+    ends = feature_edges(box, 1.0)
+    assert (coherent_edge_guides(box, ends, 4) == guides_from_edges(box, ends, 4)).all()
 
 
 def test_guides_lie_in_their_faces():

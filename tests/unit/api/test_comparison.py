@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
 import sys
 
 import numpy as np
@@ -100,18 +99,14 @@ def test_the_command(sphere, tmp_path):
         assert message in refusal("compare", mesh, *words)
 
 
-def test_figures_need_matplotlib():
-    """In another process, without the module as in the extension, and where it cannot be imported."""
-    code = (
-        "import sys, rosy_addon as rf\n"
-        "s = rf.Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])\n"
-        "for module in ('rosy_addon.external.matplotlib_figure', 'matplotlib'):\n"
-        "    sys.modules[module] = None\n"
-        "    try: rf.figure(rf.form(s))\n"
-        "    except rf.RosyError as error: print(error)\n"
-        "    del sys.modules[module]\n"
-    )
-    output = subprocess.check_output([sys.executable, "-c", code], text=True)
-    in_extension, alone = output.splitlines()
-    assert "the Python package rosyfields" in in_extension
-    assert "pip install rosyfields[figures]" in alone
+@pytest.mark.parametrize(
+    ("module", "expected"),
+    [
+        ("rosy_addon.external.matplotlib_figure", "the Python package rosyfields"),
+        ("matplotlib", "pip install rosyfields[figures]"),
+    ],
+)
+def test_figures_need_matplotlib(module, expected, sphere, monkeypatch, error_of):
+    """Without the module, as in the extension, and where it cannot be imported."""
+    monkeypatch.setitem(sys.modules, module, None)
+    assert expected in error_of(rf.figure, rf.form(sphere))

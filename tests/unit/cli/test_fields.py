@@ -35,17 +35,6 @@ def test_the_default_generator_follows_the_form(tmp_path):
     assert default.read_bytes() == chosen.read_bytes()
 
 
-def test_a_kind_without_directions_is_noted(tmp_path):
-    """A flat mesh has no direction of curvature. Other fields have one everywhere."""
-    mesh = write_obj(
-        tmp_path / "flat.obj", [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [range(4)]
-    )
-    command = "field", mesh, "-o", tmp_path / "a.rosy"
-    note = finished(*command, "--generate", "curvature").stderr
-    assert "curvature gives no direction on any face" in note
-    assert finished(*command).stderr == ""
-
-
 @pytest.mark.slow
 def test_undefined_vectors_on_request(sphere, tmp_path):
     path = tmp_path / "a.rosy"

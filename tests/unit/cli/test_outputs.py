@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-
 import numpy as np
 import pytest
 from command_helpers import finished, refusal, rosy, write_obj
@@ -68,13 +66,3 @@ def test_inputs_that_have_a_title(tmp_path):
     finished("field", mesh, "--generate", "axis", "-o", field)
     link.symlink_to(field)
     assert_is_input(["compare", mesh, f"Axis={field}", "smoothest"], link)
-
-
-def test_inputs_below_another_name(tmp_path):
-    mesh = write_obj(tmp_path / "mesh.obj", POINTS, SQUARES)
-    (tmp_path / "folder").symlink_to(tmp_path)
-    (tmp_path / "hard.obj").hardlink_to(mesh)
-    for output in (tmp_path / "folder" / "mesh.obj", tmp_path / "hard.obj"):
-        assert_is_input(["field", mesh, "--generate", "axis"], output)
-    shutil.copy(mesh, tmp_path / "copy.obj")
-    finished("field", mesh, "--generate", "axis", "-o", tmp_path / "copy.obj")

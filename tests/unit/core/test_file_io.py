@@ -102,10 +102,11 @@ def test_leftovers_of_other_machines_are_deleted_after_a_day(tmp_path):
 
 @pytest.fixture
 def linked(tmp_path):
-    """A file in another folder, and a link to it."""
+    """A file in another folder, and links to it."""
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "elsewhere" / "file").write_bytes(b"old")
     (tmp_path / "link.png").symlink_to(tmp_path / "elsewhere" / "file")
+    (tmp_path / "folder").symlink_to(tmp_path / "elsewhere")
     return tmp_path / "elsewhere" / "file", tmp_path / "link.png"
 
 
@@ -142,11 +143,15 @@ def test_several_files_are_all_replaced_or_none(fault, tmp_path):
     assert names(tmp_path) == ["a", "b", "c"][: 3 if fault == "check" else 2]
 
 
-@pytest.mark.parametrize("name", ["link.png", "elsewhere/file", "elsewhere/../elsewhere/file"])
+@pytest.mark.parametrize(
+    "name",
+    ["link.png", "hard.png", "elsewhere/file", "folder/file", "elsewhere/../elsewhere/file"],
+)
 def test_what_was_read_is_not_replaced(name, linked, tmp_path):
     target, link = linked
     with guarding_inputs():
         write_bytes(target, b"before it is read")
+        (tmp_path / "hard.png").hardlink_to(target)
         read_bytes(link)
         with pytest.raises(RosyError, match="is also an input: choose another output file"):
             write_bytes(tmp_path / name, b"new", follow_links=True)

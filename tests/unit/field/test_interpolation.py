@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from field_helpers import random_field
-from shapes import icosphere, plane, torus
+from shapes import plane, torus
 
 from rosy_addon.field.carry import vectors_on_rest_shape
 from rosy_addon.field.convert import rotate_field
@@ -15,7 +15,6 @@ from rosy_addon.field.directional_field import field_directions, tensor_field
 from rosy_addon.field.interpolation import interpolate_fields
 from rosy_addon.field.representation import face_representation, from_representation
 from rosy_addon.field.rosy_field import RosyField
-from rosy_addon.field.surface import have_same_polygons
 from rosy_addon.projection.face_values import face_values
 from rosy_addon.projection.field_channel import REPRESENTATION
 
@@ -81,13 +80,6 @@ def test_families_of_tensors_stay(surface):
     angle = np.arctan2((major * y).sum(axis=1), (major * x).sum(axis=1))
     assert np.degrees(angle) % 180 == pytest.approx(np.full(surface.face_count, 40.0))
     assert np.linalg.norm(major, axis=1) == pytest.approx(np.full(surface.face_count, 3.0))
-
-
-def test_degrees_must_agree(surface, error_of):
-    four, two = ((surface, random_field(surface, degree)) for degree in (4, 2))
-    message = error_of(interpolate_fields, four, two, 0.5, surface)
-    assert "has degree 2, but the one before it 4" in message
-    assert have_same_polygons(surface, torus()) and not have_same_polygons(surface, icosphere(1))
 
 
 def test_vectors_on_a_rest_shape_are_transported_back(surface):

@@ -256,8 +256,7 @@ def test_sources_of_the_tone(sphere, field, error_of):
     tone = np.zeros((64, 64, 3), dtype=np.uint8)
     tone[:, 32:] = 255
     by_array = rf.render(sphere, field, tone_picture=tone, **look)
-    rgba = np.ones((64, 64, 4), dtype=np.float32)
-    rgba[..., :3] = tone / 255
+    rgba = np.dstack([tone / 255, np.ones((64, 64))]).astype(np.float32)
     by_picture = rf.render(sphere, field, tone_picture=rf.Picture(rgba), **look)
     assert np.array_equal(np.asarray(by_array), np.asarray(by_picture))
     for keywords, expected in (

@@ -109,16 +109,8 @@ def test_fields_are_described():
 # --- singularities ---------------------------------------------------------------------------------------
 
 
-def match(points, index, other_points, other_index, reach):
-    """Match singularities at vertices at these points, on a mesh of extent 1."""
-    surface = SimpleNamespace(vertices=np.concatenate([points, other_points]), extent=1.0)
-    other_vertex = len(points) + np.arange(len(other_points))
-    singularities = np.arange(len(points)), index
-    return match_on_surface(surface, singularities, (other_vertex, other_index), reach)
-
-
 def greedy_pairs(points, index, other_points, other_index, reach):
-    """The same, one pair after another."""
+    """Match points, one pair after another."""
     distance = cdist(points, other_points)
     distance[index[:, None] != other_index] = np.inf
     pairs = []
@@ -134,7 +126,9 @@ def test_the_nearest_pairs_come_first():
     for count, other_count, reach in ((40, 55, 0.2), (200, 120, 0.5), (60, 60, 9.0), (5, 0, 1.0)):
         points, other_points = random.random((count, 3)), random.random((other_count, 3))
         index, other_index = random.choice([-1, 1], count), random.choice([-1, 1, 2], other_count)
-        found = match(points, index, other_points, other_index, reach)
+        surface = SimpleNamespace(vertices=np.concatenate([points, other_points]), extent=1.0)
+        others = count + np.arange(other_count), other_index
+        found = match_on_surface(surface, (np.arange(count), index), others, reach)
         pairs = list(zip(found.first.tolist(), found.second.tolist(), strict=True))
         assert pairs == greedy_pairs(points, index, other_points, other_index, reach)
         distance = np.linalg.norm(points[found.first] - other_points[found.second], axis=1)

@@ -23,15 +23,11 @@ from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.validate import validated_directions
 
 
-def rotate(vectors, normal, angle):
-    return np.cos(angle) * vectors + np.sin(angle) * np.cross(normal, vectors)
-
-
 def directions_at_angles(surface, angles, lengths):
     """(F, N, 3) directions with the same angles from the first edge on each face."""
-    x, _ = surface.face_frames
-    turned = [rotate(x, surface.face_normal, angle) for angle in angles]
-    return np.stack(turned, axis=1) * np.array(lengths, dtype=float)[:, None]
+    x, y = (axis[:, None] for axis in surface.face_frames)
+    w = (np.exp(1j * np.array(angles)) * lengths)[:, None]
+    return w.real * x + w.imag * y
 
 
 # --- the algebra ---------------------------------------------------------------------------------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from field_helpers import read_field
+from field_helpers import angle_differences, read_field
 from shapes import cube, icosphere, plane
 
 from rosy_addon.core.errors import RosyWarning
@@ -53,11 +53,8 @@ def test_rotation_at_points_and_cells(degree, sphere):
     for name, tolerance in (("p", 3.0), ("c", 1.0)):
         field = array_field(arrays, name, degree)
         assert field.degree == degree
-        members = [field.vectors]
-        if degree == 4:
-            members.append(np.cross(sphere.face_normal, field.vectors))
-        off = np.minimum.reduce([angle_between_lines(m, circles) for m in members])
-        assert off[far_from_poles].max() < tolerance
+        off = angle_differences(sphere, field.vectors, circles, max(degree, 2))
+        assert np.degrees(off)[far_from_poles].max() < tolerance
         if degree == 1:
             radius = np.linalg.norm(circles, axis=1)[far_from_poles]
             assert field.magnitude[far_from_poles] == pytest.approx(radius, rel=0.02)

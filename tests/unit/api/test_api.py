@@ -26,14 +26,8 @@ from rosy_addon.field.formats.polygons import offsets_from_sizes
 SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
 
 
-@pytest.fixture(scope="module")
-def sphere():
-    return icosphere(2).with_parts(name="sphere")
-
-
-@pytest.fixture(scope="module")
-def field(sphere):
-    return rf.smoothest(sphere)
+SPHERE = icosphere(2).with_parts(name="sphere")
+FIELD = rf.smoothest(SPHERE)
 
 
 @pytest.mark.parametrize("draw", [rf.render, rf.texture, rf.turntable])
@@ -100,87 +94,87 @@ def test_the_extension_reads_no_simulations(error_of, monkeypatch):
     assert error_of(rf.Surface, "a.vtu") == expected
 
 
-def test_angles_are_those_of_the_frames(sphere):
-    angle = np.linspace(-3.1, 3.1, sphere.face_count)
-    field = rf.from_angles(sphere, angle, degree=3)
+def test_angles_are_those_of_the_frames():
+    angle = np.linspace(-3.1, 3.1, SPHERE.face_count)
+    field = rf.from_angles(SPHERE, angle, degree=3)
     assert np.allclose(field.angles, angle)
-    x, _ = sphere.face_frames
-    first_edge = sphere.vertices[sphere.faces[:, 1]] - sphere.vertices[sphere.faces[:, 0]]
+    x, _ = SPHERE.face_frames
+    first_edge = SPHERE.vertices[SPHERE.faces[:, 1]] - SPHERE.vertices[SPHERE.faces[:, 0]]
     assert np.allclose(x, first_edge / np.linalg.norm(first_edge, axis=1, keepdims=True))
     assert field.degree == 3 and np.allclose(field.magnitude, 1)
-    assert np.allclose(rf.from_angles(sphere, angle, 4, magnitude=angle**2).magnitude, angle**2)
+    assert np.allclose(rf.from_angles(SPHERE, angle, 4, magnitude=angle**2).magnitude, angle**2)
 
 
-def test_the_representation_is_that_of_any_member(sphere, field):
-    again = rf.from_representation(sphere, field.representation, 4)
-    assert np.allclose(again.representation, field.representation)
-    other_member = rf.from_vectors(sphere, field.directions[:, 1], 4)
-    assert np.allclose(other_member.representation, field.representation)
+def test_the_representation_is_that_of_any_member():
+    again = rf.from_representation(SPHERE, FIELD.representation, 4)
+    assert np.allclose(again.representation, FIELD.representation)
+    other_member = rf.from_vectors(SPHERE, FIELD.directions[:, 1], 4)
+    assert np.allclose(other_member.representation, FIELD.representation)
 
 
-def test_fields_from_directions_and_tensors(sphere, field):
-    again = rf.from_directions(sphere, field.directions)
-    assert again.is_rosy and again.difference(field).max < 1e-6
+def test_fields_from_directions_and_tensors():
+    again = rf.from_directions(SPHERE, FIELD.directions)
+    assert again.is_rosy and again.difference(FIELD).max < 1e-6
     # The larger eigenvalue belongs to the member.
-    unit = field.vectors / field.magnitude[:, None]
+    unit = FIELD.vectors / FIELD.magnitude[:, None]
     tensors = 2 * unit[:, :, None] * unit[:, None] - 0.5 * np.eye(3)
-    tensor_field = rf.from_tensors(sphere, tensors)
-    assert tensor_field.degree == 4 and tensor_field.difference(field).max < 1e-6
+    tensor_field = rf.from_tensors(SPHERE, tensors)
+    assert tensor_field.degree == 4 and tensor_field.difference(FIELD).max < 1e-6
 
 
-def test_fields_from_arrays_of_a_surface(sphere, field, error_of):
+def test_fields_from_arrays_of_a_surface(error_of):
     """Vectors of faces give the same field; the array is found by its name, or as the only one."""
-    mesh = sphere.vertices, sphere.corner_vertex, sphere.face_start
-    data = {"vertex_data": {"p": sphere.vertices[:, 2]}, "face_data": {"U": field.vectors}}
+    mesh = SPHERE.vertices, SPHERE.corner_vertex, SPHERE.face_start
+    data = {"vertex_data": {"p": SPHERE.vertices[:, 2]}, "face_data": {"U": FIELD.vectors}}
     surface = rf.Surface(mesh_arrays.MeshArrays(*mesh, **data), name="flow")
     for again in (rf.from_array(surface, degree=4), rf.from_array(surface, "cell:U", 4)):
-        assert np.array_equal(again.vectors, field.vectors) and again.surface is surface
+        assert np.array_equal(again.vectors, FIELD.vectors) and again.surface is surface
     assert rf.from_array(surface).degree == 1
     assert "flow: array 'p' has scalars" in error_of(rf.from_array, surface, "p")
-    assert "sphere: has no array of vectors" in error_of(rf.from_array, sphere)
+    assert "sphere: has no array of vectors" in error_of(rf.from_array, SPHERE)
 
 
-def test_guides_may_be_a_field(sphere, field, error_of):
-    vectors = np.where(np.arange(sphere.face_count)[:, None] < 40, field.vectors, 0)
-    guided = rf.guided(sphere, vectors=rf.from_vectors(sphere, vectors, 4))
-    assert np.nanmax(guided.difference(field).angle[:40]) < 1e-3
-    assert "to_degree" in error_of(rf.guided, sphere, 2, vectors=field)
+def test_guides_may_be_a_field(error_of):
+    vectors = np.where(np.arange(SPHERE.face_count)[:, None] < 40, FIELD.vectors, 0)
+    guided = rf.guided(SPHERE, vectors=rf.from_vectors(SPHERE, vectors, 4))
+    assert np.nanmax(guided.difference(FIELD).angle[:40]) < 1e-3
+    assert "to_degree" in error_of(rf.guided, SPHERE, 2, vectors=FIELD)
 
 
-def test_lengths_of_guides_may_be_their_firmness(sphere, field):
+def test_lengths_of_guides_may_be_their_firmness():
     """A weak guide hardly turns the field away from firm ones that surround it."""
-    is_weak = np.arange(sphere.face_count) == 40
-    turned = np.where(is_weak[:, None], field.rotated(np.pi / 4).vectors, field.vectors)
+    is_weak = np.arange(SPHERE.face_count) == 40
+    turned = np.where(is_weak[:, None], FIELD.rotated(np.pi / 4).vectors, FIELD.vectors)
     vectors = turned / np.linalg.norm(turned, axis=1)[:, None]
     vectors[is_weak] *= 1e-3
     exact, firm = (
-        rf.guided(sphere, vectors=vectors, vectors_have_firmness=is_firm)
+        rf.guided(SPHERE, vectors=vectors, vectors_have_firmness=is_firm)
         for is_firm in (False, True)
     )
-    assert exact.difference(field).angle[is_weak] == pytest.approx(np.pi / 4, abs=1e-3)
-    assert firm.difference(field).angle[is_weak] < 0.3
+    assert exact.difference(FIELD).angle[is_weak] == pytest.approx(np.pi / 4, abs=1e-3)
+    assert firm.difference(FIELD).angle[is_weak] < 0.3
 
 
-def test_a_surface_is_its_content(sphere, field, error_of):
+def test_a_surface_is_its_content(error_of):
     """A mesh that is read twice, or sent to another process and back, is the same surface."""
-    again = rf.Surface(sphere.vertices.copy(), sphere.faces, name="again")
-    for other in (again, pickle.loads(pickle.dumps(sphere))):
-        copied = rf.from_vectors(other, field.vectors, field.degree)
-        mean = rf.compare([field, copied.rotated(0.2)]).rows[1]["mean"]
+    again = rf.Surface(SPHERE.vertices.copy(), SPHERE.faces, name="again")
+    for other in (again, pickle.loads(pickle.dumps(SPHERE))):
+        copied = rf.from_vectors(other, FIELD.vectors, FIELD.degree)
+        mean = rf.compare([FIELD, copied.rotated(0.2)]).rows[1]["mean"]
         assert mean == pytest.approx(np.degrees(0.2))
-        assert copied.difference(field).max < 1e-12
+        assert copied.difference(FIELD).max < 1e-12
         size = {"size": (32, 32)}
-        assert np.array_equal(rf.render(sphere, copied, **size), rf.render(sphere, field, **size))
-    moved = rf.form(again.with_vertices(sphere.vertices + (0, 0, 1e-9)))
-    assert "another surface" in error_of(field.difference, moved)
+        assert np.array_equal(rf.render(SPHERE, copied, **size), rf.render(SPHERE, FIELD, **size))
+    moved = rf.form(again.with_vertices(SPHERE.vertices + (0, 0, 1e-9)))
+    assert "another surface" in error_of(FIELD.difference, moved)
     with pytest.warns(rf.RosyWarning, match="field 2: is on other vertices or faces than field 1"):
-        assert not rf.compare([field, moved]).differences
+        assert not rf.compare([FIELD, moved]).differences
 
 
-def test_a_field_of_another_surface_is_refused(sphere, field, error_of):
+def test_a_field_of_another_surface_is_refused(error_of):
     other = icosphere(2, radius=2.0).with_parts(name="other")
     for function in (rf.render, rf.strokes):
-        assert error_of(function, other, field).startswith("other: the field is on another surface")
+        assert error_of(function, other, FIELD).startswith("other: the field is on another surface")
 
 
 def test_warnings_name_the_surface():
@@ -190,8 +184,8 @@ def test_warnings_name_the_surface():
     assert told[0].filename == __file__
 
 
-def test_a_picture_is_an_array_and_a_png(sphere, field, tmp_path, error_of):
-    picture = rf.render(sphere, field, view=(0, 0), size=(60, 40))
+def test_a_picture_is_an_array_and_a_png(tmp_path, error_of):
+    picture = rf.render(SPHERE, FIELD, view=(0, 0), size=(60, 40))
     array = np.asarray(picture)
     assert array.shape == (40, 60, 4) and array.dtype == np.uint8
     assert np.array_equal(array, np.asarray(Image.open(io.BytesIO(picture._repr_png_()))))
@@ -243,21 +237,21 @@ def test_numbers_as_colors(error_of):
         assert expected in error_of(rf.render, quad, **wrong)
 
 
-def test_sources_of_the_tone(sphere, field, error_of):
+def test_sources_of_the_tone(error_of):
     """Light on the right, unlike the lamp: from values of vertices and corners, a picture and an array."""
     look = {"view": (0, 0), "size": (64, 64), "orthographic": True, "preset": "pen-and-ink"}
-    values = (sphere.vertices[:, 0] > 0).astype(float)
+    values = (SPHERE.vertices[:, 0] > 0).astype(float)
     by_vertex, by_corner = (
-        np.asarray(rf.render(sphere, field, tone_values=each, **look))[..., :3]
-        for each in (values, values[sphere.corner_vertex])
+        np.asarray(rf.render(SPHERE, FIELD, tone_values=each, **look))[..., :3]
+        for each in (values, values[SPHERE.corner_vertex])
     )
     assert np.array_equal(by_vertex, by_corner)
     assert by_vertex[:, -24:].mean() > by_vertex[:, :24].mean() + 50
     tone = np.zeros((64, 64, 3), dtype=np.uint8)
     tone[:, 32:] = 255
-    by_array = rf.render(sphere, field, tone_picture=tone, **look)
+    by_array = rf.render(SPHERE, FIELD, tone_picture=tone, **look)
     rgba = np.dstack([tone / 255, np.ones((64, 64))]).astype(np.float32)
-    by_picture = rf.render(sphere, field, tone_picture=rf.Picture(rgba), **look)
+    by_picture = rf.render(SPHERE, FIELD, tone_picture=rf.Picture(rgba), **look)
     assert np.array_equal(np.asarray(by_array), np.asarray(by_picture))
     for keywords, expected in (
         ({"tone_values": values[1:]}, "162 numbers, one for each vertex, or 960 numbers, one for"),
@@ -269,7 +263,7 @@ def test_sources_of_the_tone(sphere, field, error_of):
         ({"lenght": 3}, "lenght"),
         ({"size": (0, 10)}, "size 0x10"),
     ):
-        assert expected in error_of(rf.render, sphere, field, **keywords)
+        assert expected in error_of(rf.render, SPHERE, FIELD, **keywords)
 
 
 def test_colors_of_vertices_as_a_tone():
@@ -294,16 +288,16 @@ def test_an_image_on_the_uv_map(error_of):
     assert gray[16:48, 8:24].mean() < gray[16:48, 40:56].mean() - 50
 
 
-def test_a_drawing_is_svg(sphere, field, tmp_path, error_of):
-    drawing = rf.strokes(sphere, field, view=(0, 0), size=(100, 100), spacing=12, colors=["navy"])
+def test_a_drawing_is_svg(tmp_path, error_of):
+    drawing = rf.strokes(SPHERE, FIELD, view=(0, 0), size=(100, 100), spacing=12, colors=["navy"])
     drawing.save(tmp_path / "a.svg")
     assert (tmp_path / "a.svg").read_text() == drawing.svg == drawing._repr_svg_()
     assert 'stroke="navy"' in drawing.svg
     assert len(drawing.polylines) == len(drawing) == len(drawing.family_names)
     assert np.allclose(np.linalg.norm(drawing.polylines[0], axis=1), 1, atol=0.05)
-    dense = rf.strokes(sphere, field, view=(0, 0), size=(100, 100), distance=0.1)
+    dense = rf.strokes(SPHERE, FIELD, view=(0, 0), size=(100, 100), distance=0.1)
     assert len(dense) > len(drawing)
-    assert "unknown setting 'spacng'" in error_of(rf.strokes, sphere, field, spacng=3)
+    assert "unknown setting 'spacng'" in error_of(rf.strokes, SPHERE, FIELD, spacng=3)
 
 
 def test_lines_in_space_are_in_the_space_of_the_mesh(tmp_path, error_of):
@@ -330,12 +324,12 @@ def test_lines_in_space_are_in_the_space_of_the_mesh(tmp_path, error_of):
     assert "must end in .svg, .ply, .obj or .csv" in error_of(drawing.save, tmp_path / "a.png")
 
 
-def test_a_turntable_counts_its_pictures(sphere, field, tmp_path, error_of):
+def test_a_turntable_counts_its_pictures(tmp_path, error_of):
     numbers = []
     options = {"pictures": 3, "size": (32, 32), "on_picture": numbers.append}
-    path = rf.turntable(sphere, field, path=tmp_path / "a.gif", **options)
+    path = rf.turntable(SPHERE, FIELD, path=tmp_path / "a.gif", **options)
     assert numbers == [1, 2, 3] and Image.open(path).n_frames == 3
-    assert "2 or more" in error_of(rf.turntable, sphere, field, path=tmp_path / "b.gif", pictures=1)
+    assert "2 or more" in error_of(rf.turntable, SPHERE, FIELD, path=tmp_path / "b.gif", pictures=1)
 
 
 def test_indices_are_fractions_or_units(error_of):

@@ -14,14 +14,11 @@ from shapes import icosphere
 
 import rosy_addon as rf
 
-
-@pytest.fixture(scope="module")
-def sphere():
-    return icosphere(2).with_parts(name="sphere")
+SPHERE = icosphere(2).with_parts(name="sphere")
 
 
-def test_rows_of_fields_that_are_turned(sphere):
-    one = rf.smoothest(sphere)
+def test_rows_of_fields_that_are_turned():
+    one = rf.smoothest(SPHERE)
     comparison = rf.compare({"One": one, "turned": one.rotated(0.1), "lines": one.to_degree(2)})
     first, turned, lines = comparison.rows
     assert [row["title"] for row in comparison.rows] == ["One", "turned", "lines"]
@@ -32,30 +29,30 @@ def test_rows_of_fields_that_are_turned(sphere):
     assert turned["matched"] == 8 and turned["matched_distance"] == 0 and turned["compared"] == 1
 
 
-def test_the_face_of_the_largest_angle(sphere):
-    one = rf.along_axis(sphere, (0, 0, 1), degree=1)
-    turn = np.where(np.arange(sphere.face_count) == 7, 0.4, 0.1)
-    row = rf.compare([one, rf.from_angles(sphere, one.angles + turn, degree=1)]).rows[1]
+def test_the_face_of_the_largest_angle():
+    one = rf.along_axis(SPHERE, (0, 0, 1), degree=1)
+    turn = np.where(np.arange(SPHERE.face_count) == 7, 0.4, 0.1)
+    row = rf.compare([one, rf.from_angles(SPHERE, one.angles + turn, degree=1)]).rows[1]
     assert row["worst_face"] == 7 and np.isclose(row["max"], np.degrees(0.4))
-    assert np.allclose(row["worst_position"], sphere.vertices[sphere.faces[7]].mean(axis=0))
+    assert np.allclose(row["worst_position"], SPHERE.vertices[SPHERE.faces[7]].mean(axis=0))
 
 
-def test_singularities_match_within_reach(sphere):
+def test_singularities_match_within_reach():
     """One of four moves along an edge; in another field, two of them are one of twice the index."""
-    start, end = sphere.faces[0][:2].tolist()
-    edge = np.linalg.norm(sphere.vertices[start] - sphere.vertices[end])
+    start, end = SPHERE.faces[0][:2].tolist()
+    edge = np.linalg.norm(SPHERE.vertices[start] - SPHERE.vertices[end])
     first, second, third = 3, 4, 8  # far from the first vertex, and from each other
-    one = rf.prescribed(sphere, {start: 1, first: 1, second: 1, third: 1}, 2)
-    moved = rf.prescribed(sphere, {end: 1, first: 1, second: 1, third: 1}, 2)
-    merged = rf.prescribed(sphere, {start: 2, second: 1, third: 1}, 2)
+    one = rf.prescribed(SPHERE, {start: 1, first: 1, second: 1, third: 1}, 2)
+    moved = rf.prescribed(SPHERE, {end: 1, first: 1, second: 1, third: 1}, 2)
+    merged = rf.prescribed(SPHERE, {start: 2, second: 1, third: 1}, 2)
     wide, narrow = (rf.compare([one, moved, merged], reach=reach).rows for reach in (0.2, 0.01))
     assert [row["matched"] for row in wide[1:]] == [4, 2]
     assert np.isclose(wide[1]["matched_distance"], edge / 4)
     assert [row["matched"] for row in narrow[1:]] == [3, 2]
 
 
-def test_a_title_is_one_line_of_a_table(sphere):
-    one = rf.form(sphere)
+def test_a_title_is_one_line_of_a_table():
+    one = rf.form(SPHERE)
     comparison = rf.compare({"two\nlines\x1b\udcff": one, "b": one})
     lines, latex = str(comparison).splitlines(), comparison.to_latex()
     assert lines[1].startswith(r"two\nlines\x1b\udcff  ") and len(lines) == 4
@@ -63,8 +60,8 @@ def test_a_title_is_one_line_of_a_table(sphere):
     assert comparison.rows[0]["title"] == "two\nlines\x1b\udcff"
 
 
-def test_tables(sphere):
-    one = rf.form(sphere)
+def test_tables():
+    one = rf.form(SPHERE)
     comparison = rf.compare({"50 % & more_1": one, "b": one.rotated(0.1)})
     text, latex = str(comparison), comparison.to_latex()
     lines = text.splitlines()
@@ -77,15 +74,15 @@ def test_tables(sphere):
     assert "matched" not in str(rf.compare([one]))
 
 
-def test_nothing_to_compare(sphere, error_of):
+def test_nothing_to_compare(error_of):
     assert "there is no field" in error_of(rf.compare, [])
-    undefined = rf.from_vectors(sphere, np.zeros((sphere.face_count, 3)), degree=4)
-    row = rf.compare([rf.form(sphere), undefined]).rows[1]
+    undefined = rf.from_vectors(SPHERE, np.zeros((SPHERE.face_count, 3)), degree=4)
+    row = rf.compare([rf.form(SPHERE), undefined]).rows[1]
     assert row["worst_face"] == -1 and row["worst_position"] is None and row["compared"] == 0
 
 
-def test_the_command(sphere, tmp_path):
-    mesh, field = write_off(tmp_path / "sphere.off", sphere), tmp_path / "turned.rosy"
+def test_the_command(tmp_path):
+    mesh, field = write_off(tmp_path / "sphere.off", SPHERE), tmp_path / "turned.rosy"
     rf.smoothest(rf.Surface(mesh), degree=6).rotated(0.05).save(field)
     done = finished("compare", mesh, "Ours=smoothest", field, "--format", "json")
     ours, turned = json.loads(done.stdout)
@@ -106,7 +103,7 @@ def test_the_command(sphere, tmp_path):
         ("matplotlib", "pip install rosyfields[figures]"),
     ],
 )
-def test_figures_need_matplotlib(module, expected, sphere, monkeypatch, error_of):
+def test_figures_need_matplotlib(module, expected, monkeypatch, error_of):
     """Without the module, as in the extension, and where it cannot be imported."""
     monkeypatch.setitem(sys.modules, module, None)
-    assert expected in error_of(rf.figure, rf.form(sphere))
+    assert expected in error_of(rf.figure, rf.form(SPHERE))

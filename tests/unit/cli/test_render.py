@@ -14,8 +14,7 @@ from rosy_addon.image_io.png import write_png
 
 
 def test_y_is_up_in_off_files_by_default(tmp_path):
-    tall = torus(24, 12)
-    path = write_off(tmp_path / "a.off", tall)  # around z
+    path = write_off(tmp_path / "a.off", torus(24, 12))  # around z
     covered = {}
     for up in ("y", "z"):
         picture = tmp_path / f"{up}.png"

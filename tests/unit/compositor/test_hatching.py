@@ -167,8 +167,7 @@ def test_required_coverage_has_the_target_luminance(kind):
 
 def test_inks_of_families_differ_visibly():
     for code, paper in (("#101010", "#ffffff"), ("#8a2020", "#ffffff"), ("#f4f0e8", "#000000")):
-        look = replace(INK, ink_color=code, paper_color=paper, hue="families")
-        inks = inks_of(look, 6)
+        inks = inks_of(replace(INK, ink_color=code, paper_color=paper, hue="families"), 6)
         np.testing.assert_array_equal(inks.dark[0], to_linear(from_hex(code)))
         display = to_display(inks.dark)
         difference = np.linalg.norm(display[:, None] - display, axis=2)

@@ -39,8 +39,7 @@ def test_undefined_faces_fade():
     between = interpolate_fields((SURFACE, field), (SURFACE, none), 0.75, SURFACE)
     z, whole = (face_representation(SURFACE, each) for each in (between, field))
     assert z == pytest.approx(0.25 * whole)
-    both = interpolate_fields((SURFACE, none), (SURFACE, none), 0.5, SURFACE)
-    assert not both.vectors.any()
+    assert not interpolate_fields((SURFACE, none), (SURFACE, none), 0.5, SURFACE).vectors.any()
 
 
 def test_moving_singularities_move():

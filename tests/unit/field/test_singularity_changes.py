@@ -55,8 +55,7 @@ def test_near_pairs_are_cancelled_and_nothing_else():
 
 def test_far_from_a_pair_nothing_turns():
     field, _ = pole_field(4, [((1, 0, 0), (1, 0.2, 0))])
-    clean = convert(BALL, field, Conversion(pair_distance=0.15))
-    turned = turned_by(BALL, field, clean)
+    turned = turned_by(BALL, field, convert(BALL, field, Conversion(pair_distance=0.15)))
     distance = np.linalg.norm(BALL.face_center - (1, 0.1, 0), axis=1)
     assert turned[distance > 1].max() < 0.5 and turned[distance < 0.1].max() > 20
     assert convert(BALL, field, Conversion(pair_distance=0.01)) is field

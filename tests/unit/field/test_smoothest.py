@@ -68,8 +68,7 @@ def test_a_constant_direction_in_the_plane_has_no_energy(degree):
 
 def test_each_umbrella_of_a_vertex_is_a_node():
     points = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0], [-1, -1, 0]]
-    bowtie = from_triangles(points, [[0, 1, 2], [0, 3, 4]])
-    assert build_connection(bowtie).node_count == 6
+    assert build_connection(from_triangles(points, [[0, 1, 2], [0, 3, 4]])).node_count == 6
 
 
 # --- fields ----------------------------------------------------------------------------------------

@@ -82,8 +82,7 @@ def needle() -> Surface:
 def groove() -> Surface:
     """A strip that runs back at 60 degrees between two planes, as the side of a dovetail."""
     profile = np.array([[-1, 0], [0, 0], [-0.1, -0.173], [1, -0.173]])
-    x = np.arange(4.0)
-    points = [[along, *point] for along in x for point in profile]
+    points = [[along, *point] for along in range(4) for point in profile]
     corner = np.array([[4 * i + j for j in range(3)] for i in range(3)]).ravel()[:, None]
     return Surface(points, np.concatenate([corner + (0, 4, 5), corner + (0, 5, 1)]))
 

@@ -11,7 +11,6 @@ from shapes import from_triangles, icosphere, rebuilt
 from rosy_addon.core.errors import RosyError
 from rosy_addon.field.convert import rotate_field
 from rosy_addon.field.field_io import load_field
-from rosy_addon.field.frames import dot
 from rosy_addon.field.representation import from_representation, to_representation
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
@@ -93,10 +92,7 @@ def assert_damaged(error_of, path, data, expected, read, *arguments):
 
 def cross_errors(surface, vectors, expected):
     """(F,) angles in degrees between the directions of crosses, projected on the faces."""
-    normal = surface.face_normal
-    vectors, expected = (a - dot(a, normal)[:, None] * normal for a in (vectors, expected))
-    turn = np.arctan2(dot(np.cross(expected, vectors), normal), dot(expected, vectors))
-    return np.abs((np.degrees(turn) + 45) % 90 - 45)
+    return np.degrees(angle_differences(surface, vectors, expected, 4))
 
 
 def ellipsoid(subdivisions, axes=(1.0, 0.8, 0.6)):

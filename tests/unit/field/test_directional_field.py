@@ -81,12 +81,11 @@ def test_the_representation_is_the_product_of_the_directions():
 def test_opposite_directions_are_detected():
     surface = plane()
     pairs = np.array([0.0, 0.6, np.pi, np.pi + 0.6])
-    even = field_from_directions(surface, directions_at_angles(surface, pairs, (1, 2, 1, 2)))
-    assert field_symmetry(even).has_opposites
-    uneven = field_from_directions(surface, directions_at_angles(surface, pairs, (1, 2, 1, 3)))
-    assert not field_symmetry(uneven).has_opposites
-    odd = field_from_directions(surface, directions_at_angles(surface, (0.0, 1.0, 3.0), (1, 1, 1)))
-    assert not field_symmetry(odd).has_opposites
+    even, uneven, odd = (
+        field_symmetry(field_from_directions(surface, directions_at_angles(surface, *each)))
+        for each in ((pairs, (1, 2, 1, 2)), (pairs, (1, 2, 1, 3)), ((0.0, 1.0, 3.0), (1, 1, 1)))
+    )
+    assert even.has_opposites and not uneven.has_opposites and not odd.has_opposites
 
 
 def test_directions_on_vertices_are_averaged_onto_faces():

@@ -17,16 +17,11 @@ from rosy_addon.field.representation import face_representation, to_representati
 BALL = icosphere(4)
 
 
-def great_circles(count, seed=2, tremble=0.0):
-    """Arcs of great circles on the unit sphere, with normally distributed jitter."""
-    random = np.random.default_rng(seed)
-    strokes = []
-    for _ in range(count):
-        a, b = np.linalg.qr(random.standard_normal((3, 2)))[0].T
-        angle = np.linspace(0, 0.8, 40)[:, None]
-        arc = np.cos(angle) * a + np.sin(angle) * b
-        strokes.append(arc + random.normal(0, tremble, arc.shape))
-    return strokes
+def great_circles(count):
+    """Arcs of great circles on the unit sphere."""
+    axes = np.linalg.qr(np.random.default_rng(4).standard_normal((count, 3, 2)))[0]
+    angle = np.linspace(0, 0.8, 40)
+    return list(np.einsum("at,sia->sti", [np.cos(angle), np.sin(angle)], axes))
 
 
 def stroke_error(surface, field, stroke):

@@ -1,7 +1,5 @@
 """The functions for scripts and notebooks: what they take, what they return, and what they refuse."""
 
-from __future__ import annotations
-
 import inspect
 import io
 import pickle

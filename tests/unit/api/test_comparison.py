@@ -1,7 +1,5 @@
 """`compare`: angles, matched singularities, and the table in text, JSON and LaTeX."""
 
-from __future__ import annotations
-
 import json
 import re
 import sys

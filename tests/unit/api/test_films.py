@@ -1,7 +1,5 @@
 """Films of fields that change with time."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from PIL import Image

@@ -1,7 +1,5 @@
 """Textures from scripts and from the command line."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the command line refuses, in this process and in its own processes, and how it ends."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal

@@ -1,7 +1,5 @@
 """Fields that the command line makes, converts, describes and compares."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from command_helpers import facts_of, finished, refusal, write_obj

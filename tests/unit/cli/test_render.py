@@ -1,7 +1,5 @@
 """Pictures of mesh files by the command line."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from command_helpers import finished, pixels_of, refusal, write_cube, write_obj

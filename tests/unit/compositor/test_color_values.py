@@ -1,7 +1,5 @@
 """Numbers on surfaces as colors: where they are in the color map, and their pictures."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

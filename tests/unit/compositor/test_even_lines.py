@@ -1,7 +1,5 @@
 """Evenly spaced lines: tone, distances in pictures, and where they are too close or too far apart."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

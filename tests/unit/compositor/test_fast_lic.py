@@ -1,7 +1,5 @@
 """Fast LIC on the covering surface, against brute force and closed forms."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

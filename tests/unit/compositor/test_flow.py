@@ -1,7 +1,5 @@
 """Drifting streaks, against plain convolutions, and by correlation between frames."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from harness.planar import compose_planar

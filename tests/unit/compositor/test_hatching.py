@@ -1,7 +1,5 @@
 """Hatching: its tone, lines along the field, inks, and lines that overshoot."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

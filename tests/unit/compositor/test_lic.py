@@ -1,7 +1,5 @@
 """LIC images against independent integrators, theory and invariances."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pictures of surfaces, composed from a G-buffer."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from field_helpers import with_random_members

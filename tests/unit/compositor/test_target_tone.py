@@ -1,7 +1,5 @@
 """Target tones from attributes, images, reference renders and shadows, and their hatching."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

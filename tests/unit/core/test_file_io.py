@@ -1,7 +1,5 @@
 """Writing whole files, and what processes leave behind that are killed meanwhile."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """The Dirichlet energy of fields, and angles and matched singularities between fields."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Fields from named arrays, against closed forms and against the same numbers in .npy files."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from field_helpers import angle_differences, read_field

@@ -1,7 +1,5 @@
 """Refinement of triangles by bisection."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from awkward import AWKWARD

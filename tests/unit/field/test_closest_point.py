@@ -1,7 +1,5 @@
 """The triangle closest to a point, against exhaustive search and dense samples."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """Conversion of fields: degree, rotation, diffusion and magnitude."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from field_helpers import with_random_members

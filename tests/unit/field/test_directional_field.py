@@ -1,7 +1,5 @@
 """Directions that are not a RoSy: harmonics, matching and families."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

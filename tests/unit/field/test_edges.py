@@ -1,7 +1,5 @@
 """Edges and connected parts of meshes, compared with scipy and numpy's own sorting."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.sparse import coo_array, csgraph

@@ -1,7 +1,5 @@
 """Every generator on every awkward mesh, through the command line."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from awkward import AWKWARD

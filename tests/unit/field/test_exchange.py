@@ -1,7 +1,5 @@
 """Fields in the formats of other programs: round trips, and transfer to another mesh."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from field_helpers import angle_differences, read_field, write_off

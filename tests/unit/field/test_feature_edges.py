@@ -1,7 +1,5 @@
 """Files of feature edges."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from command_helpers import finished, refusal, write_obj

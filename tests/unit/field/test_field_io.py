@@ -1,7 +1,5 @@
 """Reading and writing of fields, and the validation of vectors from outside."""
 
-from __future__ import annotations
-
 import io
 import os
 

@@ -1,7 +1,5 @@
 """Field files of other programs: matrices, archives, and crosses of two directions."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Transport, singularities and generators, against closed forms, invariances and Poincaré-Hopf."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from field_helpers import cross_errors, random_field, with_random_members

@@ -1,7 +1,5 @@
 """Guides from strokes, axes of empties, UV maps and vectors; and one-sided surfaces."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from field_helpers import awkward_surface

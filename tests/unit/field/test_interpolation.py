@@ -1,7 +1,5 @@
 """Fields between two others: they turn the shorter way, and keep families."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

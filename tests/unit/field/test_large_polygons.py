@@ -1,7 +1,5 @@
 """Faces with hundreds of corners: solvers need memory for each corner, not for each pair of corners."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from conftest import traced_peak

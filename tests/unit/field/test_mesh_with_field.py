@@ -1,7 +1,5 @@
 """Files of a mesh with its field: read again by RoSy, and by numpy."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

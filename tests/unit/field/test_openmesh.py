@@ -1,7 +1,5 @@
 """Files of OpenMesh, whose layout is that of its own writer, and one of FrameFieldTracing."""
 
-from __future__ import annotations
-
 import struct
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Ties: edges at which a field turns to either side alike."""
 
-from __future__ import annotations
-
 import numpy as np
 from command_helpers import facts_of, finished, write_obj
 from shapes import plane

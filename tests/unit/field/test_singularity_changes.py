@@ -1,7 +1,5 @@
 """Change singularities near them: cancel pairs, and bend fields to guides with the same singularities."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from field_helpers import angle_differences

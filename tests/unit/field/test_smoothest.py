@@ -1,7 +1,5 @@
 """Smoothest fields, against closed forms, random starts, mirror images and another library."""
 
-from __future__ import annotations
-
 import awkward
 import numpy as np
 import pytest

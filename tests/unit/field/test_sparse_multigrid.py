@@ -1,7 +1,5 @@
 """Parts of sparse matrices, and multigrid levels for matrices that differ by their diagonals."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The number of lines and of sheets of a field."""
 
-from __future__ import annotations
-
 import pytest
 
 from rosy_addon.field.symmetry import FieldSymmetry

@@ -1,7 +1,5 @@
 """Triangles of convex and concave polygons, which must cover each polygon exactly once."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from conftest import traced_peak

@@ -10,6 +10,7 @@ from hatched import (
     BALL,
     INK,
     SIZE,
+    camera_above,
     camera_before_wall,
     make_camera,
     make_instance,
@@ -30,7 +31,6 @@ from rosy_addon.compositor.look_units import pixel_look
 from rosy_addon.core.color import from_hex, to_display, to_linear
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.preset_files.store import load_preset, preset_keys
-from rosy_addon.projection.camera import look_at, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 from rosy_addon.projection.surface_tone import SurfaceTone
@@ -133,9 +133,8 @@ def test_lines_run_along_the_field():
 
 def test_lone_pixels_of_undefined_faces_have_ink_or_not():
     """A face of one pixel has no neighbors to average, whatever its tone."""
-    camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 41, 41, scale=41.0)
     instance = MeshInstance(plane(1, 1, 1.0), np.eye(4), RosyField(4, np.zeros((1, 3))))
-    gbuffer = project([instance], camera)
+    gbuffer = project([instance], camera_above(41.0, 41))
     assert len(gbuffer.pixel) == 1
     with np.errstate(all="raise"):
         rgba = compose(gbuffer, Look(ink="hatch", line_width=10.0, length=4)).rgba
@@ -233,10 +232,9 @@ def render_half_dark_wall(overshoot):
     image = np.repeat([[0.3, 1.0]], 2, axis=0).repeat(256, axis=1).astype(np.float32)
     uv = (points[:, [0, 2]] / (2 * HALF) + 0.5).astype(np.float32)
     instance = replace(wall, tone=SurfaceTone(uv, image))
-    camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), SIZE, SIZE, scale=2 * HALF)
     look = replace(INK, tone="image", overshoot=overshoot, seed=5, ink_color="#000000")
     # The image of tones repeats, so the last column is dark and is left out.
-    return render(instance, camera, look)[..., :-1, 0]
+    return render(instance, camera_before_wall(2 * HALF), look)[..., :-1, 0]
 
 
 def test_lines_overshoot_the_border_of_a_tone():

@@ -10,7 +10,7 @@ from shapes import icosphere, placed, plane
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import Light, diffuse
 from rosy_addon.compositor.target_tone import ReferenceRender, apply_tone_curve, target_tone
-from rosy_addon.field.frames import normalize
+from rosy_addon.field.frames import dot, normalize
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
@@ -172,8 +172,7 @@ def test_reference_renders_are_reprojected():
     rendered = ReferenceRender(luminance.reshape(256, 256), camera)
     other = project([make_instance(BALL)], make_camera(256, position=(1.5, -3.8, 0.6)))
     point = world_positions(other)
-    in_reference_camera = (camera.view[:3, :3] @ point.T + camera.view[:3, 3:]).T
-    facing = -np.einsum("pi,pi->p", in_reference_camera, point @ camera.view[:3, :3].T) > 0.8
+    facing = dot(camera.view_directions(point), point) > 0.25
     actual = rendered.sample(other)[facing]
     np.testing.assert_allclose(actual, point[facing, 2] * 0.5 + 0.5, atol=0.01)
 

@@ -17,7 +17,7 @@ BALL = icosphere(4)
 
 def great_circles(count):
     """Arcs of great circles on the unit sphere."""
-    axes = np.linalg.qr(np.random.default_rng(4).standard_normal((count, 3, 2)))[0]
+    axes = np.linalg.qr(np.random.default_rng(6).standard_normal((count, 3, 2)))[0]
     angle = np.linspace(0, 0.8, 40)
     return list(np.einsum("at,sia->sti", [np.cos(angle), np.sin(angle)], axes))
 

@@ -18,6 +18,7 @@ from rosy_addon.field.directional_field import (
 )
 from rosy_addon.field.frames import normalize
 from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.field.symmetry import FieldSymmetry
 from rosy_addon.field.validate import validated_directions
 
 
@@ -95,6 +96,24 @@ def test_directions_on_vertices_are_averaged_onto_faces():
     for actual in field_directions(surface, field):
         nearest = np.abs(actual[:, None] - directions).max(axis=2).min(axis=1)
         assert nearest.max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("degree", "orders", "has_opposites", "line_count", "sheets_per_turn"),
+    [
+        (1, (), False, 1, 2),
+        (2, (), True, 1, 2),
+        (3, (), False, 3, 6),
+        (4, (), True, 2, 4),
+        (4, (0, 2, -2), True, 2, 4),
+        (4, (0, 1), False, 4, 4),
+        (5, (0, 2), False, 5, 5),
+    ],
+)
+def test_numbers_of_lines_and_sheets(degree, orders, has_opposites, line_count, sheets_per_turn):
+    symmetry = FieldSymmetry(degree, orders)
+    assert symmetry.has_opposites == has_opposites and symmetry.line_count == line_count
+    assert symmetry.sheets_per_turn == sheets_per_turn
 
 
 # --- matching and families -----------------------------------------------------------------------

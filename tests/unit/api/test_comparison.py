@@ -5,7 +5,6 @@ import re
 import sys
 
 import numpy as np
-import pytest
 from command_helpers import finished, refusal
 from field_helpers import write_off
 from shapes import icosphere
@@ -94,14 +93,9 @@ def test_the_command(tmp_path):
         assert message in refusal("compare", mesh, *words)
 
 
-@pytest.mark.parametrize(
-    ("module", "expected"),
-    [
-        ("rosy_addon.external.matplotlib_figure", "the Python package rosyfields"),
-        ("matplotlib", "pip install rosyfields[figures]"),
-    ],
-)
-def test_figures_need_matplotlib(module, expected, monkeypatch, error_of):
-    """Without the module, as in the extension, and where it cannot be imported."""
-    monkeypatch.setitem(sys.modules, module, None)
-    assert expected in error_of(rf.figure, rf.form(SPHERE))
+def test_figures_need_matplotlib(monkeypatch, error_of):
+    """Where it cannot be imported, and without the module, as in the extension."""
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert "pip install rosyfields[figures]" in error_of(rf.figure, rf.form(SPHERE))
+    monkeypatch.setitem(sys.modules, "rosy_addon.external.matplotlib_figure", None)
+    assert "the Python package rosyfields" in error_of(rf.figure, rf.form(SPHERE))

@@ -7,7 +7,7 @@ import pytest
 from harness.planar import lic, planar_pixel_field
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from planar_fields import KERNELS, PLAIN, pair_angle, pixel_centers
+from planar_fields import KERNELS, PLAIN, pair_angle, pixel_centers, plain
 
 from rosy_addon.compositor import fast_lic
 from rosy_addon.compositor.covering import build_covering
@@ -85,9 +85,7 @@ def test_streamlines_end_where_brute_force_ends_them(kernel, degree):
 def test_magnitude_determines_the_samples_of_a_pixel(kernel):
     x, _ = pixel_centers(SIZE)
     field = planar_pixel_field(np.zeros((SIZE, SIZE)), 1, magnitude=x / SIZE)
-    look = replace(
-        PLAIN, magnitude_length=True, color_range=(0.0, 1.0), length=30, **KERNELS[kernel]
-    )
+    look = plain(magnitude_length=True, color_range=(0.0, 1.0), length=30, **KERNELS[kernel])
     samples = lic(field, look).effective_samples.reshape(SIZE, SIZE)[:, 40:-40]
     reach = np.rint(30 * x / SIZE)[:, 40:-40]
     expected = kernel_weights(reach, reach, reach, kernel).effective_samples

@@ -17,11 +17,24 @@ def rosy(*arguments) -> subprocess.CompletedProcess:
     return run_command(list(map(str, arguments)), ROOT)
 
 
+def finished(*arguments) -> subprocess.CompletedProcess:
+    """Run a command that succeeds."""
+    done = rosy(*arguments)
+    assert done.returncode == 0, done.stderr
+    return done
+
+
+def refusal(*arguments) -> str:
+    """Run a command that has status 2 and prints one line, and return this line."""
+    done = rosy(*arguments)
+    assert done.returncode == 2 and done.stdout == "", done.stderr
+    assert done.stderr.startswith("rosy: ") and done.stderr.count("\n") == 1
+    return done.stderr
+
+
 def facts_of(*arguments) -> dict:
     """Return what ``rosyfields info`` prints."""
-    done = rosy("info", *arguments, "--json")
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    return json.loads(finished("info", *arguments, "--json").stdout)
 
 
 def pixels_of(path) -> np.ndarray:
@@ -29,19 +42,12 @@ def pixels_of(path) -> np.ndarray:
     return np.asarray(Image.open(path))
 
 
-def assert_refused(completed: subprocess.CompletedProcess, *expected: str) -> None:
-    """Check that a command has status 2 and prints one line with the expected texts."""
-    assert completed.returncode == 2, completed.stderr
-    assert completed.stderr.startswith("rosy: ") and completed.stderr.count("\n") == 1
-    assert completed.stdout == ""
-    for text in expected:
-        assert text in completed.stderr
-
-
-def write_obj(path, points, faces):
-    """Write a mesh as an .obj file, and return its path."""
-    rows = ["v " + " ".join(map(repr, point)) for point in np.asarray(points, float).tolist()]
-    rows += ["f " + " ".join(str(corner + 1) for corner in face) for face in faces]
+def write_obj(path, points, faces, uv=None):
+    """Write a mesh as an .obj file, with texture coordinates of its vertices, and return its path."""
+    rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in np.asarray(points, float).tolist()]
+    rows += [] if uv is None else [f"vt {u!r} {v!r}" for u, v in np.asarray(uv, float).tolist()]
+    corner = "{0}" if uv is None else "{0}/{0}"
+    rows += ["f " + " ".join(corner.format(vertex + 1) for vertex in face) for face in faces]
     path.write_text("\n".join([*rows, ""]))
     return path
 

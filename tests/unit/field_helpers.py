@@ -1,16 +1,14 @@
 """Surfaces, matrices and measures for tests of fields."""
 
-from __future__ import annotations
-
 import numpy as np
 from awkward import AWKWARD
+from conftest import traced_peak
 from scipy import sparse
 from shapes import from_triangles, icosphere, rebuilt
 
 from rosy_addon.core.errors import RosyError
 from rosy_addon.field.convert import rotate_field
 from rosy_addon.field.field_io import load_field
-from rosy_addon.field.frames import dot
 from rosy_addon.field.representation import from_representation, to_representation
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
@@ -82,12 +80,17 @@ def read_damaged(path, data, garbage, offset, read):
         assert "\n" not in str(error) and str(path) in str(error)
 
 
+def assert_damaged(error_of, path, data, expected, read, *arguments):
+    """Check that a damaged file is refused by its name, without memory for what its header claims."""
+    path.write_bytes(data)
+    messages = []
+    assert traced_peak(lambda: messages.append(error_of(read, path, *arguments))) < 10e6
+    assert expected in messages[0] and str(path) in messages[0]
+
+
 def cross_errors(surface, vectors, expected):
     """(F,) angles in degrees between the directions of crosses, projected on the faces."""
-    normal = surface.face_normal
-    vectors, expected = (a - dot(a, normal)[:, None] * normal for a in (vectors, expected))
-    turn = np.arctan2(dot(np.cross(expected, vectors), normal), dot(expected, vectors))
-    return np.abs((np.degrees(turn) + 45) % 90 - 45)
+    return np.degrees(angle_differences(surface, vectors, expected, 4))
 
 
 def ellipsoid(subdivisions, axes=(1.0, 0.8, 0.6)):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import combinations
+from itertools import combinations, product
 
 import awkward
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.surface import Surface, build_surface
+from rosy_addon.field.validate import vertex_normals
 from rosy_addon.projection.gbuffer import MeshInstance
 
 
@@ -50,6 +51,27 @@ def joined(*surfaces: Surface, **settings) -> Surface:
         sizes.append(np.diff(surface.face_start))
     starts = np.cumsum(np.concatenate(sizes))
     return build_surface(np.concatenate(points), np.concatenate(corners), starts, **settings)
+
+
+def walls_of(solid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The vertices and the quads between the unit cells of a solid, (X, Y, Z) bool, and the space around it."""
+    solid = np.pad(solid, 1)
+    quads = []
+    for axis, side in product(range(3), (0, 1)):
+        cells = np.argwhere(solid & ~np.roll(solid, 1 - 2 * side, axis=axis))
+        steps = np.zeros((4, 3), dtype=int)
+        steps[:, axis] = side
+        steps[1:3, (axis + 1) % 3], steps[2:, (axis + 2) % 3] = 1, 1
+        quads.append(cells[:, None] + (steps if side else steps[::-1]))
+    vertices, quads = np.unique(np.concatenate(quads).reshape(-1, 3), axis=0, return_inverse=True)
+    return vertices.astype(float), quads.reshape(-1, 4)
+
+
+def roughened(surface: Surface, amplitude: float, seed: int = 3, **settings) -> Surface:
+    """The same polygons with random displacements along the vertex normals, of a standard deviation."""
+    noise = np.random.default_rng(seed).standard_normal((len(surface.vertices), 1))
+    displaced = surface.vertices + amplitude * noise * vertex_normals(surface)
+    return rebuilt(surface, displaced, **settings)
 
 
 def globe(rows: int = 24, columns: int = 48) -> Surface:
@@ -98,6 +120,15 @@ def cylinder(
     return from_quads(np.stack(vertices, axis=1), quads, name="cylinder")
 
 
+def capped_cylinder(columns: int) -> Surface:
+    """A cylinder of quads with a polygon at each end, without vertices between them."""
+    tube = cylinder(columns, 1)
+    low = np.arange(0, 2 * columns, 2)
+    corners = np.concatenate([tube.corner_vertex, low[::-1], low + 1])
+    start = 4 * columns + columns * np.arange(3)
+    return build_surface(tube.vertices, corners, np.concatenate([tube.face_start, start[1:]]))
+
+
 def icosphere(subdivisions: int = 3, radius: float = 1.0) -> Surface:
     """A sphere of 20 * 4^n triangles."""
     golden = (1 + np.sqrt(5)) / 2
@@ -138,6 +169,11 @@ def cube() -> Surface:
     """A unit cube of six quads."""
     points, faces = awkward.cube()
     return build_surface(points, np.concatenate(faces), range(0, 25, 4), name="cube")
+
+
+def tetrahedron() -> Surface:
+    points = [(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)]
+    return from_triangles(points, [(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)])
 
 
 def sharp_cube() -> Surface:

@@ -1,48 +1,21 @@
 """`compare`: angles, matched singularities, and the table in text, JSON and LaTeX."""
 
-from __future__ import annotations
-
 import json
 import re
-import subprocess
 import sys
 
 import numpy as np
-import pytest
+from command_helpers import finished, refusal
 from field_helpers import write_off
-from shapes import icosphere, torus
+from shapes import icosphere
 
 import rosy_addon as rf
-from rosy_addon.cli.parser import main
+
+SPHERE = icosphere(2).with_parts(name="sphere")
 
 
-@pytest.fixture(scope="module")
-def sphere():
-    return icosphere(2).with_parts(name="sphere")
-
-
-def members(surface, vectors, degree):
-    """The members of one face: a vector rotated about the normal."""
-    angles = 2 * np.pi * np.arange(degree) / degree
-    for vector, normal in zip(vectors, surface.face_normal, strict=True):
-        yield np.cos(angles)[:, None] * vector + np.sin(angles)[:, None] * np.cross(normal, vector)
-
-
-@pytest.mark.parametrize("degree", range(1, 8))
-def test_angles_are_those_of_the_nearest_members(degree):
-    """Every member of one field against every member of the other, face by face."""
-    surface = torus(16, 10)
-    one, other = rf.form(surface, degree), rf.along_axis(surface, (1, 2, 3), degree=degree)
-    difference = rf.compare([one, other]).differences["field 2"]
-    directions = (members(surface, field.vectors, degree) for field in (one, other))
-    for face, (a, b) in enumerate(zip(*directions, strict=True)):
-        a, b = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in (a, b))
-        nearest = np.arctan2(np.linalg.norm(np.cross(a[0], b), axis=1), b @ a[0]).min()
-        assert np.isclose(difference.angle[face], nearest, atol=1e-6)
-
-
-def test_rows_of_fields_that_are_turned(sphere):
-    one = rf.smoothest(sphere)
+def test_rows_of_fields_that_are_turned():
+    one = rf.smoothest(SPHERE)
     comparison = rf.compare({"One": one, "turned": one.rotated(0.1), "lines": one.to_degree(2)})
     first, turned, lines = comparison.rows
     assert [row["title"] for row in comparison.rows] == ["One", "turned", "lines"]
@@ -53,49 +26,39 @@ def test_rows_of_fields_that_are_turned(sphere):
     assert turned["matched"] == 8 and turned["matched_distance"] == 0 and turned["compared"] == 1
 
 
-def test_the_face_of_the_largest_angle(sphere):
-    one = rf.along_axis(sphere, (0, 0, 1), degree=1)
-    turn = np.zeros(sphere.face_count)
-    turn[:] = 0.1
-    turn[7] = 0.4
-    x, y = one.vectors, np.cross(sphere.face_normal, one.vectors)
-    other = rf.from_vectors(sphere, np.cos(turn)[:, None] * x + np.sin(turn)[:, None] * y, degree=1)
-    row = rf.compare([one, other]).rows[1]
+def test_the_face_of_the_largest_angle():
+    one = rf.along_axis(SPHERE, (0, 0, 1), degree=1)
+    turn = np.where(np.arange(SPHERE.face_count) == 7, 0.4, 0.1)
+    row = rf.compare([one, rf.from_angles(SPHERE, one.angles + turn, degree=1)]).rows[1]
     assert row["worst_face"] == 7 and np.isclose(row["max"], np.degrees(0.4))
-    assert np.allclose(row["worst_position"], sphere.vertices[sphere.faces[7]].mean(axis=0))
+    assert np.allclose(row["worst_position"], SPHERE.vertices[SPHERE.faces[7]].mean(axis=0))
 
 
-def test_singularities_match_within_reach(sphere):
+def test_singularities_match_within_reach():
     """One of four moves along an edge; in another field, two of them are one of twice the index."""
-    start, end = sphere.faces[0][:2].tolist()
-    edge = np.linalg.norm(sphere.vertices[start] - sphere.vertices[end])
-    others = [int(np.argmin(sphere.vertices @ sphere.vertices[start]))]
-    for _ in range(2):
-        nearest = np.max(sphere.vertices @ sphere.vertices[[start, *others]].T, axis=1)
-        others.append(int(np.argmin(nearest)))
-    first, second, third = others
-    one = rf.prescribed(sphere, {start: 1, first: 1, second: 1, third: 1}, 2)
-    moved = rf.prescribed(sphere, {end: 1, first: 1, second: 1, third: 1}, 2)
-    merged = rf.prescribed(sphere, {start: 2, second: 1, third: 1}, 2)
+    start, end = SPHERE.faces[0][:2].tolist()
+    edge = np.linalg.norm(SPHERE.vertices[start] - SPHERE.vertices[end])
+    first, second, third = 3, 4, 8  # far from the first vertex, and from each other
+    one = rf.prescribed(SPHERE, {start: 1, first: 1, second: 1, third: 1}, 2)
+    moved = rf.prescribed(SPHERE, {end: 1, first: 1, second: 1, third: 1}, 2)
+    merged = rf.prescribed(SPHERE, {start: 2, second: 1, third: 1}, 2)
     wide, narrow = (rf.compare([one, moved, merged], reach=reach).rows for reach in (0.2, 0.01))
     assert [row["matched"] for row in wide[1:]] == [4, 2]
     assert np.isclose(wide[1]["matched_distance"], edge / 4)
     assert [row["matched"] for row in narrow[1:]] == [3, 2]
 
 
-def test_a_title_is_one_line_of_a_table(sphere):
-    one = rf.form(sphere)
+def test_a_title_is_one_line_of_a_table():
+    one = rf.form(SPHERE)
     comparison = rf.compare({"two\nlines\x1b\udcff": one, "b": one})
-    text, latex = str(comparison), comparison.to_latex()
-    assert (
-        text.splitlines()[1].startswith(r"two\nlines\x1b\udcff  ") and len(text.splitlines()) == 4
-    )
+    lines, latex = str(comparison).splitlines(), comparison.to_latex()
+    assert lines[1].startswith(r"two\nlines\x1b\udcff  ") and len(lines) == 4
     assert r"two\textbackslash{}nlines\textbackslash{}x1b\textbackslash{}udcff & 4" in latex
     assert comparison.rows[0]["title"] == "two\nlines\x1b\udcff"
 
 
-def test_tables(sphere):
-    one = rf.form(sphere)
+def test_tables():
+    one = rf.form(SPHERE)
     comparison = rf.compare({"50 % & more_1": one, "b": one.rotated(0.1)})
     text, latex = str(comparison), comparison.to_latex()
     lines = text.splitlines()
@@ -108,41 +71,31 @@ def test_tables(sphere):
     assert "matched" not in str(rf.compare([one]))
 
 
-def test_nothing_to_compare(sphere):
-    with pytest.raises(rf.RosyError, match="there is no field"):
-        rf.compare([])
-    undefined = rf.from_vectors(sphere, np.zeros((sphere.face_count, 3)), degree=4)
-    row = rf.compare([rf.form(sphere), undefined]).rows[1]
+def test_nothing_to_compare(error_of):
+    assert "there is no field" in error_of(rf.compare, [])
+    undefined = rf.from_vectors(SPHERE, np.zeros((SPHERE.face_count, 3)), degree=4)
+    row = rf.compare([rf.form(SPHERE), undefined]).rows[1]
     assert row["worst_face"] == -1 and row["worst_position"] is None and row["compared"] == 0
 
 
-def test_the_command(sphere, tmp_path, capfd):
-    mesh, field = write_off(tmp_path / "sphere.off", sphere), tmp_path / "turned.rosy"
+def test_the_command(tmp_path):
+    mesh, field = write_off(tmp_path / "sphere.off", SPHERE), tmp_path / "turned.rosy"
     rf.smoothest(rf.Surface(mesh), degree=6).rotated(0.05).save(field)
-    assert main(["compare", str(mesh), "Ours=smoothest", str(field), "--format", "json"]) == 0
-    ours, turned = json.loads(capfd.readouterr().out)
+    done = finished("compare", mesh, "Ours=smoothest", field, "--format", "json")
+    ours, turned = json.loads(done.stdout)
     assert (ours["title"], turned["title"]) == ("Ours", "turned") and ours["degree"] == 6
     assert np.isclose(turned["mean"], np.degrees(0.05), atol=1e-3)
     for words, message in (
         (["form", "form"], "same title"),
-        (["form", "b=curvature", "-o", str(tmp_path / "a.gif")], ".pdf, .svg, .png"),
+        (["form", "b=curvature", "-o", tmp_path / "a.gif"], ".pdf, .svg, .png"),
         (["nothing.rosy"], "nothing.rosy"),
     ):
-        assert main(["compare", str(mesh), *words]) == 2 and message in capfd.readouterr().err
+        assert message in refusal("compare", mesh, *words)
 
 
-def test_figures_need_matplotlib():
-    """In another process, without the module as in the extension, and where it cannot be imported."""
-    code = (
-        "import sys, rosy_addon as rf\n"
-        "s = rf.Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])\n"
-        "for module in ('rosy_addon.external.matplotlib_figure', 'matplotlib'):\n"
-        "    sys.modules[module] = None\n"
-        "    try: rf.figure(rf.form(s))\n"
-        "    except rf.RosyError as error: print(error)\n"
-        "    del sys.modules[module]\n"
-    )
-    output = subprocess.check_output([sys.executable, "-c", code], text=True)
-    in_extension, alone = output.splitlines()
-    assert "the Python package rosyfields" in in_extension
-    assert "pip install rosyfields[figures]" in alone
+def test_figures_need_matplotlib(monkeypatch, error_of):
+    """Where it cannot be imported, and without the module, as in the extension."""
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert "pip install rosyfields[figures]" in error_of(rf.figure, rf.form(SPHERE))
+    monkeypatch.setitem(sys.modules, "rosy_addon.external.matplotlib_figure", None)
+    assert "the Python package rosyfields" in error_of(rf.figure, rf.form(SPHERE))

@@ -1,11 +1,10 @@
 """Textures from scripts and from the command line."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np
 import pytest
+from command_helpers import write_obj
 from shapes import icosphere
 
 import rosy_addon.api as rf
@@ -16,27 +15,16 @@ SQUARE = ([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]])
 UV = np.array(SQUARE[0])[:, :2] * 0.9 + 0.05
 
 
-@pytest.mark.parametrize(
-    "words, options",
-    [
-        (["--preset", "plaid"], {"preset": "plaid"}),
-        (
-            ["--preset", "engraving", "--light-direction", "-1,0.5,2"],
-            {"preset": "engraving", "light_direction": (-1, 0.5, 2)},
-        ),
-    ],
-)
-def test_the_command_draws_the_same_texture(tmp_path, words, options):
+def test_the_command_draws_the_same_texture(tmp_path):
     """Also that of the preset, the light and the settings."""
-    lines = [f"v {x} {y} {z}" for x, y, z in SQUARE[0]] + [f"vt {u} {v}" for u, v in UV]
-    path = tmp_path / "square.obj"
-    path.write_text("\n".join([*lines, "f 1/1 2/2 3/3 4/4"]))
+    path = write_obj(tmp_path / "square.obj", *SQUARE, UV)
     out = tmp_path / "square.png"
     common = ["--generate", "uv", "--degree", "2", "--size", "64", "--margin", "3"]
-    arguments = ["texture", str(path), "-o", str(out), *common, *words, "--set", "seed=3"]
-    assert main(arguments) == 0
+    words = ["--preset", "engraving", "--set", "seed=3", "--light-direction", "-1,0.5,2"]
+    assert main(["texture", str(path), "-o", str(out), *common, *words]) == 0
     surface = rf.Surface(path)
-    texture = rf.texture(surface, rf.along_uv(surface, 2), size=64, margin=3, seed=3, **options)
+    options = {"preset": "engraving", "light_direction": (-1, 0.5, 2), "seed": 3}
+    texture = rf.texture(surface, rf.along_uv(surface, 2), size=64, margin=3, **options)
     assert list(texture.tiles) == [1001] and texture.overlap == 0
     (picture,) = texture.tiles.values()
     picture.save(tmp_path / "same.png")
@@ -82,6 +70,7 @@ def test_a_texture_without_tiles_is_tile_1001():
     assert list(rf.texture(square, rf.along_uv(square, 2), size=32).tiles) == [1001]
 
 
+@pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("draw", [rf.render, rf.texture])
 def test_a_constant_magnitude_has_one_color(draw):
     """Also around singularities, where directions cancel."""
@@ -92,9 +81,7 @@ def test_a_constant_magnitude_has_one_color(draw):
     field = rf.smoothest(ball)
     assert len(field.singularities.index) == 8
     flat = {"hue": "magnitude", "gain": 0.0, "shading": 0.0}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", rf.RosyWarning)
-        drawn = draw(ball, field, size=(160, 160) if draw is rf.render else 64, **flat)
+    drawn = draw(ball, field, size=(160, 160) if draw is rf.render else 64, **flat)
     picture = np.asarray(drawn if draw is rf.render else drawn.tiles[1001])
     color = picture[picture[..., 3] == 255][:, :3]
     assert len(color) > 1000 and np.ptp(color.astype(int), axis=0).max() <= 1

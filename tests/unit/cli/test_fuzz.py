@@ -1,7 +1,5 @@
 """A few random hostile cases of each category, always the same ones; `make fuzz` runs others."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -10,7 +10,9 @@ import sys
 
 import numpy as np
 import pytest
+from command_helpers import refusal, write_obj
 from conftest import ROOT
+from shapes import grid_of_quads
 
 from rosy_addon.extras.command_line import main
 
@@ -44,11 +46,9 @@ for line in sys.argv[1:]:
 
 def write_grid(path) -> None:
     """Write a grid of 14 x 14 quads with a UV map."""
+    quads, _ = grid_of_quads(14, 14, False, False)
     u, v = np.divmod(np.arange(225), 15)
-    lines = [f"v {a} {b} {0.1 * a * b}\nvt {a / 14} {b / 14}" for a, b in zip(u, v, strict=True)]
-    corners = [(15 * a + b + 1) for a in range(14) for b in range(14)]
-    lines += [f"f {c}/{c} {c + 15}/{c + 15} {c + 16}/{c + 16} {c + 1}/{c + 1}" for c in corners]
-    path.write_text("\n".join(lines) + "\n")
+    write_obj(path, np.stack([u, v, 0.1 * u * v], axis=1), quads, np.stack([u, v], axis=1) / 14)
 
 
 def command_lines(folder):
@@ -105,7 +105,7 @@ class Hostile:
 
 
 @pytest.mark.parametrize("suffix", [".npy", ".npz"])
-def test_arrays_are_read_without_pickles(suffix, sphere, tmp_path, capsys):
+def test_arrays_are_read_without_pickles(suffix, sphere, tmp_path):
     rows, data = np.empty(1, dtype=object), io.BytesIO()
     rows[0] = Hostile(tmp_path / "ran")
     if suffix == ".npy":
@@ -114,11 +114,9 @@ def test_arrays_are_read_without_pickles(suffix, sphere, tmp_path, capsys):
         np.savez(data, Q=rows)
     path = tmp_path / f"field{suffix}"
     path.write_bytes(data.getvalue())
-    assert main(["info", str(sphere), str(path)]) == 2
-    error = capsys.readouterr().err
-    assert error.startswith(f"rosy: {path}") and error.count("\n") == 1
+    assert refusal("info", sphere, path).startswith(f"rosy: {path}")
     path.write_bytes(pickle.dumps(rows[0]))
-    assert main(["info", str(sphere), str(path)]) == 2
+    refusal("info", sphere, path)
     assert not (tmp_path / "ran").exists()
     np.load(io.BytesIO(data.getvalue()), allow_pickle=True)["Q" if suffix == ".npz" else ...]
     assert (tmp_path / "ran").exists()

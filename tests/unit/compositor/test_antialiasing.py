@@ -1,7 +1,5 @@
 """Pictures that are shaded once per pixel, against pictures that are shaded at many samples."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

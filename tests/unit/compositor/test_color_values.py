@@ -1,18 +1,16 @@
 """Numbers on surfaces as colors: where they are in the color map, and their pictures."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from hatched import camera_above
 from shapes import icosphere, placed, plane
 
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
 from rosy_addon.core.color import map_colors, to_linear
 from rosy_addon.field.generate import axis_field
-from rosy_addon.projection.camera import look_at, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 from rosy_addon.projection.surface_sampling import surface_values
@@ -21,6 +19,7 @@ from rosy_addon.rendering.view_input import ViewInput
 
 #: Pixels along each side. The pictures show a square from -1.2 to 1.2.
 SIZE, SIDE = 96, 2.4
+CAMERA = camera_above(SIDE, SIZE, (0, 0, 4))
 PIXEL_CENTERS = ((np.arange(SIZE) + 0.5) / SIZE - 0.5) * SIDE
 BALL, GRID = icosphere(4), plane(4, 4)
 
@@ -28,11 +27,6 @@ BALL, GRID = icosphere(4), plane(4, 4)
 FLAT = Look(hue="values", gain=0.0, shading=0.0, length=3)
 #: The ink alone, which covers everything.
 INK = replace(FLAT, ink="hatch", tone_levels=(2.0, 3.0, 1.0), paper_color="#ffffff00")
-
-
-def camera(width=SIZE, height=SIZE):
-    view = look_at((0.0, 0.0, 4.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
-    return orthographic_camera(view, width, height, scale=SIDE)
 
 
 def numbered(surface, values, shift=(0, 0, 0)):
@@ -46,7 +40,7 @@ def of_vertices(surface, values, shift=(0, 0, 0)):
 
 def drawn(instances, look):
     """The linear colors of a picture, and the x of its pixels."""
-    rgba = draw_picture(ViewInput(tuple(instances), camera(), look)).rgba
+    rgba = draw_picture(ViewInput(tuple(instances), CAMERA, look)).rgba
     row, column = np.nonzero(rgba[..., 3])
     return rgba[row, column, :3], PIXEL_CENTERS[column]
 
@@ -87,7 +81,7 @@ def test_the_range_of_the_look(low, high, position):
 def test_numbers_of_faces_are_constant_on_them():
     """Exactly: no rounding shows, even of large numbers that differ little."""
     numbers = 1e6 + np.arange(GRID.face_count)
-    gbuffer = project([numbered(GRID, numbers[GRID.corner_face])], camera())
+    gbuffer = project([numbered(GRID, numbers[GRID.corner_face])], CAMERA)
     np.testing.assert_array_equal(
         surface_values(gbuffer), numbers[GRID.triangle_face[gbuffer.triangle]]
     )
@@ -113,7 +107,7 @@ def test_pixels_without_a_number(look):
     """They are as with one hue, and do not count for the range."""
     values = BALL.vertices[:, 0].copy()
     values[BALL.vertices[:, 1] > 0.2] = np.nan
-    gbuffer = project([of_vertices(BALL, values)], camera())
+    gbuffer = project([of_vertices(BALL, values)], CAMERA)
     missing = np.isnan(surface_values(gbuffer))
     assert 0.2 < missing.mean() < 0.6
     of_values, of_one = (
@@ -131,7 +125,7 @@ def test_processes_draw_the_same_bytes():
     # Fields with many lines need many strips.
     instance = replace(instance, field=axis_field(BALL, 11, (0, 0, 1)))
     look = replace(FLAT, gain=1.0, length=10)
-    view = ViewInput((instance,), camera(320, 1216), look)
+    view = ViewInput((instance,), CAMERA.resized(320, 1216), look)
     alone = draw_picture(view).rgba
     assert len(picture_groups(view, 2)) == 2
     assert draw_picture(view, workers=2).rgba.tobytes() == alone.tobytes()

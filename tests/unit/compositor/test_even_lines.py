@@ -1,14 +1,11 @@
 """Evenly spaced lines: tone, distances in pictures, and where they are too close or too far apart."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from harness.stroke_tracing import turned
 from hatched import camera_above, render
-from scipy.ndimage import gaussian_filter
 from shapes import plane
 
 from rosy_addon.compositor.even_lines import (
@@ -21,14 +18,13 @@ from rosy_addon.compositor.even_lines import (
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import instance_line_spacing, pixel_look
 from rosy_addon.compositor.pixel_field import all_members, surface_pixel_field
-from rosy_addon.core.color import from_hex, to_linear
-from rosy_addon.core.settings import Choice, Number, Numbers, Switch, settings_of
+from rosy_addon.core.settings import settings_of
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.rosy_field import RosyField
-from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
+from tests.fuzz.options import setting_value
 
 SIZE = 256
 LOOK = Look(
@@ -141,32 +137,19 @@ def test_settings_that_do_not_apply_do_not_change_the_picture(breaks):
     instance, camera = partly_undefined(4), camera_above(20.0, size=96)
     look = replace(LOOK, crispness=0.8, layers=2, breaks=breaks)
     expected = render(instance, camera, look)
-    others = {"length": 7, "fade": "ends"}
+    others, random = {"length": 7, "fade": "ends"}, np.random.default_rng(0)
     applied = {name for name in others if settings_of(Look)[name].applies(look)}
     assert applied == (set(others) if breaks else set())
     for name, setting in settings_of(Look).items():
         if setting.applies(look):
             continue
-        other = others.get(name, _other_value(setting))
-        actual = render(instance, camera, replace(look, **{name: other}))
+        while (other := others.get(name, setting_value(random, setting))) == setting.default:
+            pass
+        actual = render(instance, camera, look.with_settings({name: other}))
         np.testing.assert_array_equal(actual, expected, err_msg=name)
     for name in applied:
         actual = render(instance, camera, replace(look, **{name: others[name]}))
         assert np.abs(actual - expected).max() > 0.1, name
-
-
-def _other_value(setting):
-    """A valid value of a setting that is not its default."""
-    if isinstance(setting, Choice):
-        return next(option for option in setting.options if option != setting.default)
-    if isinstance(setting, Switch):
-        return not setting.default
-    if isinstance(setting, Number):
-        middle = setting.low + 0.3 * min(setting.high - setting.low, 8.0)
-        return round(middle) if setting.is_integer else middle
-    if isinstance(setting, Numbers):
-        return tuple(low + 0.3 * min(high - low, 8.0) for low, high in setting.parts.values())
-    return "#3366aa"
 
 
 # --- tone ------------------------------------------------------------------------------------------
@@ -198,17 +181,6 @@ def test_uneven_lines_have_the_mean_width(breaks, paper_grain):
         widths = uneven_width(np.full(streak.shape, width), look, streak, grain)
         assert widths.mean() == pytest.approx(width, abs=6e-3)
     assert (np.diff(look_width_table(look)) > 0).all()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("degree", "shading"), [(4, 0.1), (6, 0.5), (6, 0.95)])
-def test_flat_tones(shading, degree):
-    look = load_preset("engraving").look
-    look = replace(look, light="scene", shading=shading, paper_color="#ffffff")
-    rgba = render(wall_instance(degree, 0.4), camera_above(), look)
-    ink = to_linear(from_hex(look.ink_color))[0]
-    blurred = gaussian_filter((rgba[..., 0] - ink) / (1 - ink), 16)[40:-40, 40:-40]
-    assert np.abs(blurred - (1 - shading)).max() <= 0.04
 
 
 # --- perspective -------------------------------------------------------------------------------------

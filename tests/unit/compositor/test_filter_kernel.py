@@ -1,7 +1,5 @@
 """Sums of the weights of samples along streamlines, against explicit sums."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Hatching: its tone, lines along the field, inks, and lines that overshoot."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +10,7 @@ from hatched import (
     BALL,
     INK,
     SIZE,
+    camera_above,
     camera_before_wall,
     make_camera,
     make_instance,
@@ -32,7 +31,6 @@ from rosy_addon.compositor.look_units import pixel_look
 from rosy_addon.core.color import from_hex, to_display, to_linear
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.preset_files.store import load_preset, preset_keys
-from rosy_addon.projection.camera import look_at, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 from rosy_addon.projection.surface_tone import SurfaceTone
@@ -69,7 +67,8 @@ RAMPS = {
 
 
 @pytest.mark.parametrize(
-    "name", mainly(["cross-hatch", "families, light", "ramp, light", "all uneven"], RAMPS)
+    "name",
+    mainly(["cross-hatch", "engraving", "families, light", "ramp, light", "all uneven"], RAMPS),
 )
 def test_looks_reproduce_a_ramp(name):
     """A blur contains few lines, so that its tone has a random error, which is 0.03 in the mean."""
@@ -134,9 +133,8 @@ def test_lines_run_along_the_field():
 
 def test_lone_pixels_of_undefined_faces_have_ink_or_not():
     """A face of one pixel has no neighbors to average, whatever its tone."""
-    camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 41, 41, scale=41.0)
     instance = MeshInstance(plane(1, 1, 1.0), np.eye(4), RosyField(4, np.zeros((1, 3))))
-    gbuffer = project([instance], camera)
+    gbuffer = project([instance], camera_above(41.0, 41))
     assert len(gbuffer.pixel) == 1
     with np.errstate(all="raise"):
         rgba = compose(gbuffer, Look(ink="hatch", line_width=10.0, length=4)).rgba
@@ -165,10 +163,8 @@ def test_required_coverage_has_the_target_luminance(kind):
 
 
 def test_inks_of_families_differ_visibly():
-    for code in ("#101010", "#8a2020", "#f4f0e8"):
-        paper = "#000000" if code == "#f4f0e8" else "#ffffff"
-        look = replace(INK, ink_color=code, paper_color=paper, hue="families")
-        inks = inks_of(look, 6)
+    for code, paper in (("#101010", "#ffffff"), ("#8a2020", "#ffffff"), ("#f4f0e8", "#000000")):
+        inks = inks_of(replace(INK, ink_color=code, paper_color=paper, hue="families"), 6)
         np.testing.assert_array_equal(inks.dark[0], to_linear(from_hex(code)))
         display = to_display(inks.dark)
         difference = np.linalg.norm(display[:, None] - display, axis=2)
@@ -236,10 +232,9 @@ def render_half_dark_wall(overshoot):
     image = np.repeat([[0.3, 1.0]], 2, axis=0).repeat(256, axis=1).astype(np.float32)
     uv = (points[:, [0, 2]] / (2 * HALF) + 0.5).astype(np.float32)
     instance = replace(wall, tone=SurfaceTone(uv, image))
-    camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), SIZE, SIZE, scale=2 * HALF)
     look = replace(INK, tone="image", overshoot=overshoot, seed=5, ink_color="#000000")
     # The image of tones repeats, so the last column is dark and is left out.
-    return render(instance, camera, look)[..., :-1, 0]
+    return render(instance, camera_before_wall(2 * HALF), look)[..., :-1, 0]
 
 
 def test_lines_overshoot_the_border_of_a_tone():

@@ -1,7 +1,5 @@
 """Looks in pixels of a frame: lengths, Blender units and samples."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """Pictures of surfaces, composed from a G-buffer."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from field_helpers import with_random_members
@@ -11,8 +9,10 @@ from planar_fields import PLAIN, plain
 from shapes import icosphere, moved, plane, torus
 
 from rosy_addon.compositor.compose import compose
+from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import Light, diffuse
 from rosy_addon.core.color import map_colors, to_display, to_linear
+from rosy_addon.field.directional_field import field_from_directions, tensor_field
 from rosy_addon.field.frames import normalize
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.rosy_field import RosyField
@@ -160,3 +160,48 @@ def test_display_curve_is_its_own_inverse():
     values = np.linspace(0, 1, 1001, dtype=np.float32)
     assert np.allclose(to_display(to_linear(values)), values, atol=1e-5)
     assert to_linear(np.array([0.5]))[0] == pytest.approx(0.21404, abs=1e-5)
+
+
+# --- free directions ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", ["sheets", "members", "brute", "ibfv"])
+@pytest.mark.parametrize(
+    "angles",
+    [(20, 70, 200, 250), (10, 55, 130), (0, 40, 100, 150), (15, 195)],
+    ids=["paired", "three", "four", "line"],
+)
+def test_streaks_run_along_free_directions(method, angles):
+    surface = plane(7, 7, 2.2)
+    radians = np.radians(angles)
+    directions = np.stack([np.cos(radians), np.sin(radians), 0 * radians], axis=1)
+    orders = [np.roll(directions, row, axis=0) for row in range(surface.face_count)]
+    field = field_from_directions(surface, np.stack(orders))
+    gbuffer = project_surface(surface, field, scale=2.0)
+    (layer,) = degree_layers(gbuffer, plain(method=method, length=30))
+    tone = layer.tone.reshape(256, 256)[32:-32, 32:-32]
+    # From -5 to 175 degrees: no direction is near the ends.
+    actual = np.sort((np.array(peaks(orientation_spectrum(tone))) + 5) % 180 - 5)
+    expected = np.unique(np.mod(angles, 180))
+    assert len(actual) == len(expected) and np.abs(actual - expected).max() < 2
+
+
+def test_hues_of_families_tell_their_directions():
+    """The major direction runs along x: its streaks are orange, and those along y blue."""
+    surface = plane(7, 7, 2.2)
+    field = tensor_field(surface, np.tile(np.diag([3.0, -1.0, 0.0]), (surface.face_count, 1, 1)))
+    gbuffer = project_surface(surface, field, scale=2.0)
+    colored = compose(gbuffer, Look(shading=0.0, length=30, hue="families")).rgba
+    orange_minus_blue = (colored[..., 0] - colored[..., 2]).astype(float)
+    for sign, expected in ((1, 0), (-1, 90)):
+        image = np.clip(sign * orange_minus_blue, 0, None)
+        actual = np.array(peaks(orientation_spectrum(image - image.mean()), 4.0))
+        assert np.abs((actual - expected + 90) % 180 - 90).max() < 3
+
+
+def test_a_single_family_is_gray():
+    surface = plane(7, 7, 2.2)
+    field = RosyField(4, np.tile((1.0, 0, 0), (surface.face_count, 1)))
+    gbuffer = project_surface(surface, field, 64, scale=2.0)
+    colored = compose(gbuffer, plain(hue="families")).rgba
+    assert np.array_equal(colored, compose(gbuffer, PLAIN).rgba)

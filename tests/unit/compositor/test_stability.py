@@ -1,7 +1,5 @@
 """Streaks that stay on a surface which moves, and the noise that is fixed to it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

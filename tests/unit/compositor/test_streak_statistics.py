@@ -1,7 +1,5 @@
 """Statistics of streaks in a sample of noise."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """Target tones from attributes, images, reference renders and shadows, and their hatching."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +10,7 @@ from shapes import icosphere, placed, plane
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import Light, diffuse
 from rosy_addon.compositor.target_tone import ReferenceRender, apply_tone_curve, target_tone
+from rosy_addon.field.frames import dot, normalize
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
@@ -175,8 +174,7 @@ def test_reference_renders_are_reprojected():
     rendered = ReferenceRender(luminance.reshape(256, 256), camera)
     other = project([make_instance(BALL)], make_camera(256, position=(1.5, -3.8, 0.6)))
     point = world_positions(other)
-    in_reference_camera = (camera.view[:3, :3] @ point.T + camera.view[:3, 3:]).T
-    facing = -np.einsum("pi,pi->p", in_reference_camera, point @ camera.view[:3, :3].T) > 0.8
+    facing = dot(camera.view_directions(point), point) > 0.25
     actual = rendered.sample(other)[facing]
     np.testing.assert_allclose(actual, point[facing, 2] * 0.5 + 0.5, atol=0.01)
 
@@ -193,7 +191,7 @@ def test_reference_renders_of_another_aspect_ratio_are_refused(error_of):
 def light_at(camera, kind, where):
     """A point light at a position in world space, or a sun in a direction, in the space of a camera."""
     if kind == "sun":
-        vector = camera.view[:3, :3] @ np.divide(where, np.linalg.norm(where))
+        vector = camera.view[:3, :3] @ normalize(np.array(where))
     else:
         vector = camera.view[:3, :3] @ where + camera.view[:3, 3]
     return Light(kind, vector, np.ones(3), 1.0)
@@ -232,13 +230,9 @@ def test_the_shadow_of_a_ball_on_a_plane(name):
     visibility = visibility_of(gbuffer, light)
     on_ground = gbuffer.instance_id == 0
     point = world_positions(gbuffer)[on_ground].astype(float)
-    if kind == "sun":
-        toward = np.broadcast_to(np.divide(where, np.linalg.norm(where)), point.shape)
-        light_distance = np.inf
-    else:
-        to_light = where - point
-        light_distance = np.linalg.norm(to_light, axis=1)
-        toward = to_light / light_distance[:, None]
+    to_light = np.multiply(where, 1e9 if kind == "sun" else 1.0) - point
+    light_distance = np.linalg.norm(to_light, axis=1)
+    toward = to_light / light_distance[:, None]
     clearance = clearance_from_ball(point, toward, np.array([0, 0, 1.0]), 0.8, light_distance)
     certain = np.abs(clearance) > 0.04
     assert certain.mean() > 0.9 and (clearance < 0).mean() > 0.02
@@ -255,8 +249,7 @@ def test_surfaces_that_face_the_light_do_not_shadow_themselves(name):
         gbuffer = project([make_instance(surface)], camera)
         light = light_at(camera, kind, where)
         visibility = visibility_of(gbuffer, light)
-        to_light = light.vector - gbuffer.position if kind == "point" else light.vector
-        to_light = to_light / np.linalg.norm(to_light, axis=-1, keepdims=True)
+        to_light = normalize(light.vector - (kind == "point") * gbuffer.position)
         # Normals of triangles, because smooth normals may face the light where triangles do not.
         facing = (gbuffer.geometric_normal * to_light).sum(axis=1)
         assert (visibility[facing > 0.05] == 1).mean() > 0.999

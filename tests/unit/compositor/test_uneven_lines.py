@@ -1,7 +1,5 @@
 """Uneven lines of hatching: breaks, wobble and the grain of paper."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The cache: what it keeps, and by which keys."""
 
-from __future__ import annotations
-
 import weakref
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The polynomials of `deterministic_trig`, against numpy's functions in double precision."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st

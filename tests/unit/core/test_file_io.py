@@ -1,7 +1,5 @@
 """Writing whole files, and what processes leave behind that are killed meanwhile."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -28,6 +26,17 @@ with replacing(sys.argv[1]) as (temporary,):
     print("writing", flush=True)
     time.sleep(60)
 """
+
+
+WHOLE_WRITER = (
+    "import sys; from rosy_addon.core.file_io import write_bytes; write_bytes(sys.argv[1], b'')"
+)
+
+
+def write_in_process(folder, *prefix):
+    """Write a file by another process, which is started by the program of the prefix."""
+    command = [*prefix, sys.executable, "-c", WHOLE_WRITER, folder / "b.png"]
+    return subprocess.run(command, capture_output=True, text=True, timeout=30)
 
 
 @pytest.fixture
@@ -59,20 +68,8 @@ def test_what_a_killed_process_leaves_is_deleted_by_the_next_one(writer, tmp_pat
 @pytest.mark.skipif(sys.platform != "linux", reason="Linux has PID namespaces")
 def test_processes_that_see_each_other_only_in_the_folder(writer, tmp_path):
     """In a container, whose processes have other numbers, a process that is writing has none."""
-    code = "import sys; from rosy_addon.core.file_io import write_bytes; write_bytes(sys.argv[1], b'b')"
-    command = [
-        "unshare",
-        "--user",
-        "--map-root-user",
-        "--pid",
-        "--fork",
-        sys.executable,
-        "-c",
-        code,
-    ]
-    done = subprocess.run(
-        [*command, tmp_path / "b.png"], capture_output=True, text=True, check=False
-    )
+    namespace = "unshare", "--user", "--map-root-user", "--pid", "--fork"
+    done = write_in_process(tmp_path, *namespace)
     if "unshare" in done.stderr:
         pytest.skip(done.stderr)
     assert done.returncode == 0, done.stderr
@@ -83,9 +80,7 @@ def test_processes_that_see_each_other_only_in_the_folder(writer, tmp_path):
 @pytest.mark.skipif(sys.platform != "linux", reason="Linux has the program flock")
 def test_a_program_that_has_locked_the_folder_may_start_rosy(tmp_path):
     """As ``flock FOLDER rosy ...`` does."""
-    code = "import sys; from rosy_addon.core.file_io import write_bytes; write_bytes(sys.argv[1], b'b')"
-    command = ["flock", tmp_path, sys.executable, "-c", code, tmp_path / "b.png"]
-    subprocess.run(command, check=True, timeout=30)
+    assert write_in_process(tmp_path, "flock", tmp_path).returncode == 0
     assert names(tmp_path) == ["b.png"]
 
 
@@ -105,10 +100,11 @@ def test_leftovers_of_other_machines_are_deleted_after_a_day(tmp_path):
 
 @pytest.fixture
 def linked(tmp_path):
-    """A file in another folder, and a link to it."""
+    """A file in another folder, and links to it."""
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "elsewhere" / "file").write_bytes(b"old")
     (tmp_path / "link.png").symlink_to(tmp_path / "elsewhere" / "file")
+    (tmp_path / "folder").symlink_to(tmp_path / "elsewhere")
     return tmp_path / "elsewhere" / "file", tmp_path / "link.png"
 
 
@@ -145,11 +141,15 @@ def test_several_files_are_all_replaced_or_none(fault, tmp_path):
     assert names(tmp_path) == ["a", "b", "c"][: 3 if fault == "check" else 2]
 
 
-@pytest.mark.parametrize("name", ["link.png", "elsewhere/file", "elsewhere/../elsewhere/file"])
+@pytest.mark.parametrize(
+    "name",
+    ["link.png", "hard.png", "elsewhere/file", "folder/file", "elsewhere/../elsewhere/file"],
+)
 def test_what_was_read_is_not_replaced(name, linked, tmp_path):
     target, link = linked
     with guarding_inputs():
         write_bytes(target, b"before it is read")
+        (tmp_path / "hard.png").hardlink_to(target)
         read_bytes(link)
         with pytest.raises(RosyError, match="is also an input: choose another output file"):
             write_bytes(tmp_path / name, b"new", follow_links=True)

@@ -7,12 +7,12 @@ import sys
 
 import numpy as np
 import pytest
+from command_helpers import refusal
 from conftest import ROOT, traced_peak
 from field_helpers import write_off
 from shapes import plane
 
 from bench import cases
-from rosy_addon.cli.parser import main
 from rosy_addon.compositor.look import Look
 from rosy_addon.core import memory
 from rosy_addon.core.cache import Cache
@@ -157,7 +157,7 @@ def test_strokes_are_refused_by_their_spacing(monkeypatch, error_of):
     draw_instances([ball], camera, StrokeStyle(spacing=60.0))
 
 
-def test_lack_of_memory_is_one_line(monkeypatch, capsys, tmp_path):
+def test_lack_of_memory_is_one_line(monkeypatch, tmp_path):
     """If the system says so only when the memory is taken."""
 
     def fail(*_, **__):
@@ -165,6 +165,5 @@ def test_lack_of_memory_is_one_line(monkeypatch, capsys, tmp_path):
 
     monkeypatch.setattr("rosy_addon.field.generate.smoothest_field", fail)
     mesh, output = write_off(tmp_path / "quad.off", plane(1, 1)), tmp_path / "out.rosy"
-    assert main(["field", str(mesh), "-o", str(output), "--generate", "smoothest"]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "there is not enough memory: choose a smaller size" in line and not output.exists()
+    message = refusal("field", mesh, "-o", output, "--generate", "smoothest")
+    assert "there is not enough memory: choose a smaller size" in message and not output.exists()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextvars
 import itertools
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,7 +20,6 @@ from rosy_addon.field.generate import generate
 from rosy_addon.field.prescribed import prescribed_field
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
-from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.ambient_occlusion import ambient_occlusion
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.rendering.draw import draw_picture
@@ -101,30 +99,25 @@ def test_each_context_has_its_own_listener():
 # --- long functions -------------------------------------------------------------------------------
 
 
-def picture(look: Look) -> None:
-    draw_picture(ViewInput((INSTANCE,), CAMERA, look, (SUN,)))
-
-
-def texture(look: Look) -> None:
-    draw_texture(INSTANCE, torus_uv(48, 24), look, 128)
-
-
-CONVERSION = Conversion(2, rotation=0.1, smoothing_length=0.05, pair_distance=0.2)
+CONVERSION = Conversion(
+    2, rotation=0.1, smoothing_length=0.05, pair_distance=0.2, magnitude="curvature"
+)
+VIEW = ViewInput((INSTANCE,), CAMERA, Look(), (SUN,))
 
 #: Long functions, their arguments, and the least part of the work at which the last report comes.
 LONG = {
     "smoothest": (generate, (SURFACE, "smoothest", 4), 0.9),
     "form": (generate, (SURFACE, "form", 4), 0.8),
     "prescribed": (prescribed_field, (SURFACE, 4, np.array([5, 200]), np.array([1, -1])), 0.8),
-    "convert": (convert, (SURFACE, FIELD, replace(CONVERSION, magnitude="curvature")), 0.9),
+    "convert": (convert, (SURFACE, FIELD, CONVERSION), 0.9),
     "occlusion": (ambient_occlusion, ([INSTANCE], 0, 16), 0.9),
-    "picture": (picture, (Look(),), 0.9),
+    "picture": (draw_picture, (VIEW,), 0.9),
     "strokes": (
         draw_instances,
         ([INSTANCE], CAMERA, StrokeStyle(spacing=40.0, arrows=30.0, overshoot=4.0, outline=True)),
         0.9,
     ),
-    "texture": (texture, (Look(length=20),), 0.9),
+    "texture": (draw_texture, (INSTANCE, torus_uv(48, 24), Look(length=20), 128), 0.9),
 }
 
 
@@ -147,12 +140,3 @@ def test_a_listener_ends_the_work(name):
         with listening(cancel_at(stop)), pytest.raises(CancelledError):
             function(*arguments)
     assert len(reported(function, *arguments)) <= count
-
-
-@pytest.mark.slow
-def test_listening_does_not_change_pixels():
-    view = ViewInput((INSTANCE,), CAMERA, load_preset("pen-and-ink").look, (SUN,))
-    alone = draw_picture(view).rgba
-    with listening(lambda fraction, label: None):
-        heard = draw_picture(view).rgba
-    assert heard.tobytes() == alone.tobytes()

@@ -44,8 +44,7 @@ def test_values_that_are_not_allowed(settings, expected):
 
 def test_numbers_from_files_and_from_the_command_line():
     """Lists and texts become tuples, so that they can be compared and hashed."""
-    levels = settings_of(Look)["tone_levels"].parse("0.1, 1,-2e-1")
-    assert levels == (0.1, 1.0, -0.2)
+    assert settings_of(Look)["tone_levels"].parse("0.1, 1,-2e-1") == (0.1, 1.0, -0.2)
     look = Look().with_settings({"tone_levels": [0, 1, 2], "paper_color": "#ABCDEF80"})
     assert look.tone_levels == (0, 1, 2) and hash(look)
     assert alpha_from_hex(look.paper_color) == 128 / 255

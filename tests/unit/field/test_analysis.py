@@ -1,12 +1,19 @@
-"""The Dirichlet energy of fields, and angle errors between fields."""
+"""The Dirichlet energy of fields, and angles and matched singularities between fields."""
 
-from __future__ import annotations
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from shapes import from_triangles, icosphere, plane, torus
+from field_helpers import with_random_members
+from scipy.spatial.distance import cdist
+from shapes import from_triangles, icosphere, plane, rebuilt, torus
 
-from rosy_addon.field.analysis import angle_errors, dirichlet_energy, error_statistics
+from rosy_addon.field.analysis import (
+    angle_errors,
+    dirichlet_energy,
+    error_statistics,
+    match_on_surface,
+)
 from rosy_addon.field.convert import rotate_field
 from rosy_addon.field.directional_field import field_from_directions
 from rosy_addon.field.frames import normalize
@@ -35,22 +42,10 @@ def test_energy_does_not_depend_on_size_member_or_length():
     surface = torus(48, 24)
     field = axis_field(surface, 4, (0.2, 0.3, 1.0))
     energy = dirichlet_energy(surface, field)
-    large = from_triangles(7 * surface.vertices, surface.triangle_vertex)
-    small = from_triangles(surface.vertices, surface.triangle_vertex)
-    same = [dirichlet_energy(mesh, axis_field(mesh, 4, (0.2, 0.3, 1.0))) for mesh in (large, small)]
-    assert np.isclose(*same)
-    index = np.random.default_rng(0).integers(0, 4, surface.face_count)
-    other = rotate_field(surface, RosyField(4, 3 * field.vectors), index * np.pi / 2)
+    large = rebuilt(surface, 7 * surface.vertices)
+    assert np.isclose(dirichlet_energy(large, axis_field(large, 4, (0.2, 0.3, 1.0))), energy)
+    other = with_random_members(surface, RosyField(4, 3 * field.vectors))
     assert np.isclose(dirichlet_energy(surface, other), energy)
-
-
-def test_the_smoothest_field_has_less_energy_than_others():
-    ball = icosphere(3)
-    smoothest = dirichlet_energy(ball, generate(ball, "smoothest", 4))
-    assert smoothest < dirichlet_energy(ball, generate(ball, "curvature", 4))
-    assert smoothest < dirichlet_energy(ball, axis_field(ball, 4))
-    # 4 pi N, plus the energy of singularities of index 1/4 on such a coarse mesh.
-    assert 4 * np.pi * 4 < smoothest < 3 * 4 * np.pi * 4
 
 
 @pytest.mark.parametrize("degree", [1, 3, 6])
@@ -58,16 +53,11 @@ def test_errors_are_angles_to_the_nearest_member(degree, error_of):
     ball = icosphere(2)
     field = RosyField(degree, normalize(axis_field(ball, degree).vectors))
     index = np.arange(ball.face_count) % degree
-    angle = 0.4 / degree
+    angle = np.linspace(-3, 3, ball.face_count) / degree
     other = rotate_field(ball, field, angle + 2 * np.pi * index / degree)
-    error = angle_errors(ball, field, other)
-    np.testing.assert_allclose(error, angle, atol=1e-9)
-    statistics = error_statistics(ball, error)
-    errors = [statistics.mean, statistics.rms, statistics.p95, statistics.max]
-    np.testing.assert_allclose(errors, angle)
-    vectors = field.vectors.copy()
-    vectors[:10] = 0
-    partial = angle_errors(ball, RosyField(degree, vectors), other)
+    np.testing.assert_allclose(angle_errors(ball, field, other), np.abs(angle), atol=1e-9)
+    is_defined = np.arange(ball.face_count)[:, None] >= 10
+    partial = angle_errors(ball, RosyField(degree, field.vectors * is_defined), other)
     assert np.isnan(partial[:10]).all() and np.isfinite(partial[10:]).all()
     assert np.isclose(error_statistics(ball, partial).compared, 1 - 10 / ball.face_count)
     assert "cannot be compared" in error_of(angle_errors, ball, field, axis_field(ball, 12))
@@ -91,18 +81,15 @@ def test_percentiles_of_errors_are_weighted_by_area():
 def test_fields_that_are_no_rosys_are_compared_by_their_best_matching():
     """Three directions at free angles, once with the first and once with the second one stored."""
     ball = icosphere(2)
-    x, y = ball.face_frames
-    angles = np.array([0.1, 1.0, 4.0])
+    x, y = (axis[:, None] for axis in ball.face_frames)
 
-    def field_at(offsets, first):
-        turned = np.roll(angles + offsets, -first)[:, None, None]
-        members = np.cos(turned) * x + np.sin(turned) * y
-        return field_from_directions(ball, np.moveaxis(members, 0, 1))
+    def field_at(*angles):
+        turned = np.array(angles)[:, None]
+        return field_from_directions(ball, np.cos(turned) * x + np.sin(turned) * y)
 
-    same = angle_errors(ball, field_at(0, 0), field_at(0, 1))
-    np.testing.assert_allclose(same, 0, atol=1e-7)
-    error = angle_errors(ball, field_at(0, 0), field_at(np.array([0.3, 0.0, -0.3]), 2))
-    np.testing.assert_allclose(error, 0.2, atol=1e-7)
+    field = field_at(0.1, 1.0, 4.0)
+    for other, error in ((field_at(1.0, 4.0, 0.1), 0), (field_at(3.7, 0.4, 1.0), 0.2)):
+        np.testing.assert_allclose(angle_errors(ball, field, other), error, atol=1e-7)
 
 
 def test_fields_are_described():
@@ -115,3 +102,32 @@ def test_fields_are_described():
     vectors[[3, 70]] = 0
     fields = [(sphere, field), (sphere, RosyField(4, vectors))]
     assert description(fields, count_singularities=False) == "2 faces without a direction"
+
+
+# --- singularities ---------------------------------------------------------------------------------------
+
+
+def greedy_pairs(points, index, other_points, other_index, reach):
+    """Match points, one pair after another."""
+    distance = cdist(points, other_points)
+    distance[index[:, None] != other_index] = np.inf
+    pairs = []
+    while distance.size and distance.min() <= reach:
+        row, column = np.unravel_index(np.argmin(distance), distance.shape)
+        pairs.append((row, column))
+        distance[row], distance[:, column] = np.inf, np.inf
+    return sorted(pairs)
+
+
+def test_the_nearest_pairs_come_first():
+    random = np.random.default_rng(3)
+    for count, other_count, reach in ((40, 55, 0.2), (200, 120, 0.5), (60, 60, 9.0), (5, 0, 1.0)):
+        points, other_points = random.random((count, 3)), random.random((other_count, 3))
+        index, other_index = random.choice([-1, 1], count), random.choice([-1, 1, 2], other_count)
+        surface = SimpleNamespace(vertices=np.concatenate([points, other_points]), extent=1.0)
+        others = count + np.arange(other_count), other_index
+        found = match_on_surface(surface, (np.arange(count), index), others, reach)
+        pairs = list(zip(found.first.tolist(), found.second.tolist(), strict=True))
+        assert pairs == greedy_pairs(points, index, other_points, other_index, reach)
+        distance = np.linalg.norm(points[found.first] - other_points[found.second], axis=1)
+        np.testing.assert_allclose(found.distance, distance)

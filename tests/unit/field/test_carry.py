@@ -1,7 +1,5 @@
 """Vectors of faces that are carried along when their mesh moves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

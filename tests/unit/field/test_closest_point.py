@@ -1,7 +1,5 @@
 """The triangle closest to a point, against exhaustive search and dense samples."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -26,9 +24,7 @@ def test_the_result_matches_an_exhaustive_search(surface, far):
     triangle, distance = closest_triangles(surface, points)
     distances = distances_to_all_triangles(surface, points)
     assert np.allclose(distance, distances.min(axis=1))
-    assert np.array_equal(triangle, np.argmin(distances, axis=1)) or np.allclose(
-        distances[np.arange(200), triangle], distance
-    )
+    assert np.allclose(distances[np.arange(200), triangle], distance)
 
 
 @pytest.mark.slow
@@ -59,12 +55,9 @@ def test_large_triangles_among_small_ones():
 @given(st.lists(st.floats(-3, 3), min_size=12, max_size=12))
 def test_distances_match_dense_samples_of_the_triangle(numbers):
     point, corners = np.array(numbers[:3]), np.array(numbers[3:]).reshape(3, 3)
-    u, v = np.meshgrid(np.linspace(0, 1, 41), np.linspace(0, 1, 41))
-    u, v = u[u + v <= 1], v[u + v <= 1]
-    net = (
-        corners[0] + u[:, None] * (corners[1] - corners[0]) + v[:, None] * (corners[2] - corners[0])
-    )
-    nearest = np.linalg.norm(net - point, axis=1).min()
+    steps = np.argwhere(np.ones((41, 41)))
+    weights = np.column_stack([steps, 40 - steps.sum(axis=1)])[steps.sum(axis=1) <= 40] / 40
+    nearest = np.linalg.norm(weights @ corners - point, axis=1).min()
     actual = point_triangle_distances(point[None], corners[None])[0]
     size = np.abs(corners - corners[0]).max()
     assert actual <= nearest + 1e-9 and actual >= nearest - size / 10

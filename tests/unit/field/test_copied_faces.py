@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from command_helpers import write_obj
 from shapes import from_triangles, icosphere, plane
 
 import rosy_addon as rf
 from rosy_addon.field.copied_faces import copied_faces
-from rosy_addon.field.mesh_checks import copies_warning
 
 SHEET = plane(4, 3)
 
@@ -31,23 +31,9 @@ def test_a_two_sided_sheet_becomes_one_sheet(apart, turn):
     assert not len(rf.smoothest(joined).singularities.index)
 
 
-def test_two_sided_squares_have_false_singularities():
-    """Two triangles and their backs: their Euler characteristic is 3, as if they were closed."""
-    points = [[0, 0, 0], [3, 0, 0], [3, 2, 0], [0, 2, 0]]
-    faces = [[0, 1, 2], [0, 2, 3], [2, 1, 0], [3, 2, 0]]
-    with pytest.warns(rf.RosyWarning):
-        closed, sheet = (rf.Surface(points, faces, join=join) for join in (None, True))
-    assert (closed.euler_characteristic, sheet.euler_characteristic) == (3, 1)
-    assert len(rf.form(closed).singularities.index) and not len(rf.form(sheet).singularities.index)
-    assert "2 faces of 4 lie on others" in copies_warning(closed) and not copies_warning(sheet)
-
-
 def test_texture_coordinates_of_a_file_stay_with_their_faces(tmp_path):
-    path = tmp_path / "sheet.obj"
-    path.write_text(
-        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
-        "f 1/1 2/2 3/3\nf 3/3 2/2 1/1\nf 1/1 3/3 4/4\n"
-    )
+    points, uv = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 0), (1, 0), (1, 1), (0, 1)]
+    path = write_obj(tmp_path / "sheet.obj", points, [(0, 1, 2), (2, 1, 0), (0, 2, 3)], uv)
     with pytest.warns(rf.RosyWarning, match="1 face with"):
         surface = rf.Surface(path, join=True)
     assert surface.uv.tolist() == [[0, 0], [1, 0], [1, 1], [0, 0], [1, 1], [0, 1]]

@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from shapes import cube, cylinder, from_triangles, icosphere, plane, rebuilt
+from shapes import capped_cylinder, cube, from_triangles, icosphere, plane, rebuilt
 
 from rosy_addon.field.connectivity import connected_components
 from rosy_addon.field.creases import find_creases
-from rosy_addon.field.surface import build_surface
 
 
 def creases(surface, angle=0.7, **settings):
@@ -39,11 +38,7 @@ def test_smooth_surfaces_have_no_creases(flat):
 
 
 def test_the_rims_of_a_cylinder_are_two_chains():
-    tube = cylinder(24, 1)
-    rims = [np.arange(1, 48, 2), np.arange(0, 48, 2)[::-1]]
-    corners = np.concatenate([tube.corner_vertex, *rims])
-    start = np.append(tube.face_start, [tube.face_start[-1] + 24, len(corners)])
-    assert creases(build_surface(tube.vertices, corners, start))[1] == [24, 24]
+    assert creases(capped_cylinder(24))[1] == [24, 24]
 
 
 @pytest.mark.parametrize("noise", [0.25, 0.35])

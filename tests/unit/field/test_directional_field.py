@@ -1,17 +1,11 @@
-"""Directions that are not a RoSy: harmonics, matching, families, and streaks along them."""
-
-from __future__ import annotations
+"""Directions that are not a RoSy: harmonics, matching and families."""
 
 import numpy as np
 import pytest
-from harness.planar import degree_layers
-from harness.streaks import orientation_spectrum, peaks
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapes import icosphere, plane
 
-from rosy_addon.compositor.compose import compose
-from rosy_addon.compositor.look import Look
 from rosy_addon.field.directional_field import (
     closest_rosy,
     field_directions,
@@ -24,28 +18,15 @@ from rosy_addon.field.directional_field import (
 )
 from rosy_addon.field.frames import normalize
 from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.field.symmetry import FieldSymmetry
 from rosy_addon.field.validate import validated_directions
-from rosy_addon.projection.camera import orthographic_camera
-from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.projection.project import project
-
-WEAVE = Look(shading=0.0, line_width=1.5, length=30)
-
-
-def rotate(vectors, normal, angle):
-    return np.cos(angle) * vectors + np.sin(angle) * np.cross(normal, vectors)
 
 
 def directions_at_angles(surface, angles, lengths):
     """(F, N, 3) directions with the same angles from the first edge on each face."""
-    x, _ = surface.face_frames
-    turned = [rotate(x, surface.face_normal, angle) for angle in angles]
-    return np.stack(turned, axis=1) * np.array(lengths, dtype=float)[:, None]
-
-
-def in_changing_order(directions, count):
-    """(count, N, 3): the same N directions in each row, in another order than in the row before."""
-    return np.stack([np.roll(directions, row, axis=0) for row in range(count)])
+    x, y = (axis[:, None] for axis in surface.face_frames)
+    w = (np.exp(1j * np.array(angles)) * lengths)[:, None]
+    return w.real * x + w.imag * y
 
 
 # --- the algebra ---------------------------------------------------------------------------------
@@ -99,23 +80,40 @@ def test_the_representation_is_the_product_of_the_directions():
 def test_opposite_directions_are_detected():
     surface = plane()
     pairs = np.array([0.0, 0.6, np.pi, np.pi + 0.6])
-    even = field_from_directions(surface, directions_at_angles(surface, pairs, (1, 2, 1, 2)))
-    assert field_symmetry(even).has_opposites
-    uneven = field_from_directions(surface, directions_at_angles(surface, pairs, (1, 2, 1, 3)))
-    assert not field_symmetry(uneven).has_opposites
-    odd = field_from_directions(surface, directions_at_angles(surface, (0.0, 1.0, 3.0), (1, 1, 1)))
-    assert not field_symmetry(odd).has_opposites
+    even, uneven, odd = (
+        field_symmetry(field_from_directions(surface, directions_at_angles(surface, *each)))
+        for each in ((pairs, (1, 2, 1, 2)), (pairs, (1, 2, 1, 3)), ((0.0, 1.0, 3.0), (1, 1, 1)))
+    )
+    assert even.has_opposites and not uneven.has_opposites and not odd.has_opposites
 
 
 def test_directions_on_vertices_are_averaged_onto_faces():
     surface = plane(6, 6)
     angles = (0.1, 0.9, 0.1 + np.pi, 0.9 + np.pi)
     directions = np.array([(2 * np.cos(a), 2 * np.sin(a), 0) for a in angles])
-    rows = in_changing_order(directions, len(surface.vertices))
+    rows = np.stack([np.roll(directions, row, axis=0) for row in range(len(surface.vertices))])
     field = validated_directions(surface, rows, "test", domain="vertex")
     for actual in field_directions(surface, field):
         nearest = np.abs(actual[:, None] - directions).max(axis=2).min(axis=1)
         assert nearest.max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("degree", "orders", "has_opposites", "line_count", "sheets_per_turn"),
+    [
+        (1, (), False, 1, 2),
+        (2, (), True, 1, 2),
+        (3, (), False, 3, 6),
+        (4, (), True, 2, 4),
+        (4, (0, 2, -2), True, 2, 4),
+        (4, (0, 1), False, 4, 4),
+        (5, (0, 2), False, 5, 5),
+    ],
+)
+def test_numbers_of_lines_and_sheets(degree, orders, has_opposites, line_count, sheets_per_turn):
+    symmetry = FieldSymmetry(degree, orders)
+    assert symmetry.has_opposites == has_opposites and symmetry.line_count == line_count
+    assert symmetry.sheets_per_turn == sheets_per_turn
 
 
 # --- matching and families -----------------------------------------------------------------------
@@ -153,53 +151,3 @@ def test_families_need_a_consistent_order_of_directions():
     assert field_from_directions(surface, directions).family_count == 2
     directions[::2] = np.roll(directions[::2], 1, axis=1)
     assert field_from_directions(surface, directions).family_count == 1
-
-
-# --- drawing -------------------------------------------------------------------------------------
-
-
-def project_from_above(surface, field, size):
-    camera = orthographic_camera(np.eye(4), size, size, scale=2.0, clip=(-10, 10))
-    return project([MeshInstance(surface, np.eye(4), field)], camera)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("method", ["sheets", "members", "brute", "ibfv"])
-@pytest.mark.parametrize(
-    "angles",
-    [(20, 70, 200, 250), (10, 55, 130), (0, 40, 100, 150), (15, 195)],
-    ids=["paired", "three", "four", "line"],
-)
-def test_streaks_run_along_free_directions(method, angles):
-    surface = plane(7, 7, 2.2)
-    radians = np.radians(angles)
-    directions = np.stack([np.cos(radians), np.sin(radians), 0 * radians], axis=1)
-    field = field_from_directions(surface, in_changing_order(directions, surface.face_count))
-    gbuffer = project_from_above(surface, field, 256)
-    (layer,) = degree_layers(gbuffer, WEAVE.with_settings({"method": method}))
-    tone = layer.tone.reshape(256, 256)[32:-32, 32:-32]
-    # From -5 to 175 degrees: no direction is near the ends.
-    actual = np.sort((np.array(peaks(orientation_spectrum(tone))) + 5) % 180 - 5)
-    expected = np.unique(np.mod(angles, 180))
-    assert len(actual) == len(expected) and np.abs(actual - expected).max() < 2
-
-
-def test_hues_of_families_tell_their_directions():
-    """The major direction runs along x: its streaks are orange, and those along y blue."""
-    surface = plane(7, 7, 2.2)
-    field = tensor_field(surface, np.tile(np.diag([3.0, -1.0, 0.0]), (surface.face_count, 1, 1)))
-    gbuffer = project_from_above(surface, field, 256)
-    colored = compose(gbuffer, WEAVE.with_settings({"hue": "families"})).rgba
-    orange_minus_blue = (colored[..., 0] - colored[..., 2]).astype(float)
-    for sign, expected in ((1, 0), (-1, 90)):
-        image = np.clip(sign * orange_minus_blue, 0, None)
-        actual = np.array(peaks(orientation_spectrum(image - image.mean()), 4.0))
-        assert np.abs((actual - expected + 90) % 180 - 90).max() < 3
-
-
-def test_a_single_family_is_gray():
-    surface = plane(7, 7, 2.2)
-    field = RosyField(4, np.tile((1.0, 0, 0), (surface.face_count, 1)))
-    gbuffer = project_from_above(surface, field, 64)
-    colored = compose(gbuffer, WEAVE.with_settings({"hue": "families"})).rgba
-    assert np.array_equal(colored, compose(gbuffer, WEAVE).rgba)

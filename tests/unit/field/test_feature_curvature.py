@@ -1,7 +1,5 @@
 """Curvature of features: closed forms, scales, noise, sharp edges and awkward meshes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from awkward import AWKWARD

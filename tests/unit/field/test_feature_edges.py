@@ -1,14 +1,12 @@
 """Files of feature edges."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
-from command_helpers import write_obj
+from command_helpers import finished, refusal, write_obj
+from field_helpers import assert_damaged
 from shapes import plane
 
 import rosy_addon as rf
-from rosy_addon.extras.command_line import main
 from rosy_addon.field.formats.feature_edges import read_edges
 
 SQUARES = plane(3, 2)
@@ -45,33 +43,30 @@ def test_features_follow_the_file(tmp_path):
     assert degrees_of(field.vectors) % 180 == pytest.approx(45)
 
 
-def test_the_command_line(tmp_path, capfd):
+def test_the_command_line(tmp_path):
     surface, rows = diagonal()
     mesh = write_obj(tmp_path / "a.obj", surface.vertices, surface.faces)
     edges, out = tmp_path / "a.feature", tmp_path / "a.npy"
     edges.write_text(f"{len(rows)}\n" + "".join(f"{face},{edge}\n" for face, edge in rows))
-    words = ["field", str(mesh), "-o", str(out), "--edges", str(edges)]
-    assert main(words) == 0
+    words = "field", mesh, "-o", out, "--edges", edges
+    finished(*words)
     assert degrees_of(np.load(out)) % 90 == pytest.approx(45)
-    assert main([*words, "--generate", "form"]) == 2
-    assert "--edges applies only to --generate features, guided" in capfd.readouterr().err
+    message = refusal(*words, "--generate", "form")
+    assert "--edges applies only to --generate features, guided" in message
 
 
 DAMAGED = {
-    "a.sharp": ("", "expected the number of edges"),
-    "b.sharp": ("2\n0,0,0\n", "declares 2 edges, but contains 1"),
-    "c.sharp": ("1\n0,0\n", "c.sharp:2: a row has 2 numbers, expected 3"),
-    "d.sharp": ("1\n0,6,0\n", "d.sharp:2: the mesh has no edge 0 of face 6"),
-    "e.feature": ("1\n0,4\n", "has no edge 4 of face 0"),
-    "f.feature": ("1\n-1,0\n", "has no edge 0 of face -1"),
-    "g.feature": ("1\nx,0\n", "expected a whole number"),
-    "h.txt": ("1\n", "its name must end in .sharp or .feature"),
+    "a.sharp": (b"", "expected the number of edges"),
+    "b.sharp": (b"2\n0,0,0\n", "declares 2 edges, but contains 1"),
+    "c.sharp": (b"1\n0,0\n", "c.sharp:2: a row has 2 numbers, expected 3"),
+    "d.sharp": (b"1\n0,6,0\n", "d.sharp:2: plane has no edge 0 of face 6"),
+    "e.feature": (b"1\n0,4\n", "has no edge 4 of face 0"),
+    "f.feature": (b"1\n-1,0\n", "has no edge 0 of face -1"),
+    "g.feature": (b"1\nx,0\n", "expected a whole number"),
+    "h.txt": (b"1\n", "its name must end in .sharp or .feature"),
 }
 
 
 @pytest.mark.parametrize("name", DAMAGED)
 def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
-    text, expected = DAMAGED[name]
-    (tmp_path / name).write_text(text)
-    message = error_of(read_edges, tmp_path / name, SQUARES)
-    assert expected.replace("the mesh", SQUARES.name) in message and str(tmp_path / name) in message
+    assert_damaged(error_of, tmp_path / name, *DAMAGED[name], read_edges, SQUARES)

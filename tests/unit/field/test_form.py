@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from field_helpers import cross_errors, ellipsoid
-from shapes import cube, cylinder, icosphere, plane, rebuilt, torus
+from shapes import cube, cylinder, icosphere, plane, rebuilt, roughened, torus
 
 from rosy_addon.field.analysis import dirichlet_energy
 from rosy_addon.field.connection import build_connection
@@ -31,11 +31,7 @@ SHARP_EDGE = np.radians(30)
 
 def with_noise(surface: Surface, share: float) -> Surface:
     """Displace the vertices along their normals by a share of the diagonal of the bounding box."""
-    normal = np.zeros_like(surface.vertices)
-    np.add.at(normal, surface.corner_vertex, surface.corner_normal)
-    amplitude = share * np.linalg.norm(np.ptp(surface.vertices, axis=0))
-    noise = np.random.default_rng(3).standard_normal((len(normal), 1))
-    return rebuilt(surface, surface.vertices + amplitude * noise * normalize(normal))
+    return roughened(surface, share * np.linalg.norm(np.ptp(surface.vertices, axis=0)))
 
 
 def direction_on_torus(center: np.ndarray) -> np.ndarray:

@@ -1,17 +1,14 @@
 """Field files of other programs: matrices, archives, and crosses of two directions."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np
 import pytest
-from field_helpers import read_damaged, read_field
+from field_helpers import assert_damaged, read_damaged, read_field
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from shapes import icosphere
 
-from rosy_addon.core.errors import RosyError
 from rosy_addon.field.directional_field import field_directions
 from rosy_addon.field.field_io import field_file, load_field
 from rosy_addon.field.frames import normalize
@@ -80,15 +77,14 @@ def test_frames_need_not_be_orthogonal(tmp_path):
     assert np.abs(field.source_directions[:, :2].reshape(-1, 6) - skewed).max() < 1e-12
 
 
-def test_frames_on_vertices(tmp_path):
+def test_frames_on_vertices(tmp_path, error_of):
     axis = np.cross(BALL.vertices, (0.0, 0.0, 1.0))
     rows = np.concatenate([axis, np.cross(BALL.vertices, axis)], axis=1)
     (tmp_path / "a.vfield").write_bytes(frames_bytes(rows))
     field = read_field(tmp_path / "a.vfield", BALL)
     assert field.degree == 4 and field.vectors.any(axis=1).all()
     (tmp_path / "b.vfield").write_bytes(FILES["a.ffield"])
-    with pytest.raises(RosyError, match="contains 320 rows, but"):
-        read_field(tmp_path / "b.vfield", BALL)
+    assert "contains 320 rows, but" in error_of(read_field, tmp_path / "b.vfield", BALL)
 
 
 ARCHIVES = {
@@ -140,10 +136,7 @@ DAMAGED = {
     "f.txt": (b"1 2\n", "contains 1 row, but sphere has"),
     "f.npy": (b"hello", "is not a valid .npy file"),
     "a.npz": (b"hello", "is not a valid .npz file"),
-    "b.npz": (
-        archive_bytes(a=CROSS, b=CROSS),
-        "several arrays can be the field; call it 'directions'",
-    ),
+    "b.npz": (archive_bytes(a=CROSS, b=CROSS), "several arrays can be the field; call it 'dir"),
     "c.npz": (archive_bytes(a=np.arange(3)), "no array can be the field"),
     "d.npz": (archive_bytes(), "no array can be the field"),
     "e.npz": (archive_bytes(Q=CROSS.astype(object)), "is not a valid .npy file"),
@@ -152,10 +145,7 @@ DAMAGED = {
 
 @pytest.mark.parametrize("name", DAMAGED)
 def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
-    content, expected = DAMAGED[name]
-    (tmp_path / name).write_bytes(content)
-    message = error_of(read_field, tmp_path / name, BALL)
-    assert expected in message and str(tmp_path / name) in message and "\n" not in message
+    assert_damaged(error_of, tmp_path / name, *DAMAGED[name], read_field, BALL)
 
 
 WRITTEN = ["a.rosy", "a.rawfield", "a.obj", "a.txt", "a.npy"]

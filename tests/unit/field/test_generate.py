@@ -1,15 +1,13 @@
 """Transport, singularities and generators, against closed forms, invariances and Poincaré-Hopf."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
-from field_helpers import random_field, with_random_members
+from field_helpers import cross_errors, random_field, with_random_members
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 from shapes import cube, from_triangles, icosphere, plane, rebuilt, sharp_cube, torus
 
-from rosy_addon.core.errors import RosyError
 from rosy_addon.field.convert import Conversion, convert
 from rosy_addon.field.corner_fans import average_over_fans, corner_rotations
 from rosy_addon.field.curvature import curvature_field
@@ -35,11 +33,10 @@ def test_transport_is_the_minimal_rotation(a, b, angle):
         return
     x, y = tangent_frame(s)
     v = np.cos(3 * angle) * x + np.sin(3 * angle) * y
+    axis = np.cross(s, t)
+    turn = Rotation.from_rotvec(normalize(axis) * np.arctan2(np.linalg.norm(axis), s @ t))
     moved = transport(v, s, t)
-    assert abs(moved @ t) < 1e-12 and np.linalg.norm(moved) == pytest.approx(1)
-    assert np.allclose(transport(moved, t, s), v)
-    axis = np.cross(s, t)  # invariant under the rotation that takes s to t
-    assert moved @ axis == pytest.approx(v @ axis, abs=1e-9)
+    assert np.allclose(moved, turn.apply(v)) and np.allclose(transport(moved, t, s), v)
 
 
 @given(vector)
@@ -141,10 +138,7 @@ def test_principal_directions_of_a_torus():
     k1, k2 = 1 / 0.4, (ring - 1) / 0.4 / ring
     expected = np.abs(k1 - k2) / (np.abs(k1) + np.abs(k2))
     assert np.abs(degree_2.magnitude - expected).max() < 0.03
-    degree_4 = curvature_field(surface, 4)
-    x, y = along, across
-    z = to_representation(degree_4.vectors, x, y, 4)
-    assert np.degrees(np.abs(np.angle(z)).max() / 4) < 0.5
+    assert cross_errors(surface, curvature_field(surface, 4).vectors, along).max() < 0.5
 
 
 def test_an_axis_is_projected():
@@ -183,16 +177,12 @@ def test_faces_perpendicular_to_an_axis_are_undefined():
 
 
 @pytest.mark.parametrize("axis", [(0, 0, 0), (np.nan, 0, 1), (1, 2)])
-def test_an_axis_without_a_direction_is_refused(axis):
-    with pytest.raises(RosyError, match="axis"):
-        axis_field(plane(), 4, axis)
+def test_an_axis_without_a_direction_is_refused(axis, error_of):
+    assert "axis" in error_of(axis_field, plane(), 4, axis)
 
 
-def test_unknown_generators_and_odd_degrees_are_refused():
-    with pytest.raises(RosyError, match="even degree, not 3"):
-        generate(plane(), "curvature", 3)
-    with pytest.raises(RosyError, match="magic"):
-        generate(plane(), "magic", 4)
+def test_unknown_generators_are_refused(error_of):
+    assert "magic" in error_of(generate, plane(), "magic", 4)
 
 
 def test_faces_with_two_equal_corners():
@@ -206,20 +196,16 @@ def test_faces_with_two_equal_corners():
 
 
 @pytest.mark.parametrize("degree", [0, -1, 1000, 1.5])
-def test_impossible_degrees(degree):
-    with pytest.raises(RosyError, match="degree"):
-        RosyField(degree, np.zeros((1, 3)))
+def test_impossible_degrees(degree, error_of):
+    assert "degree" in error_of(RosyField, degree, np.zeros((1, 3)))
 
 
-def test_impossible_meshes():
-    with pytest.raises(RosyError, match="no faces"):
-        build_surface(np.zeros((3, 3)), [], [0])
-    with pytest.raises(RosyError, match="corners"):
-        build_surface(np.zeros((3, 3)), [0, 1], [0, 2])
-    with pytest.raises(RosyError, match="not exist"):
-        build_surface(np.zeros((3, 3)), [0, 1, 3], [0, 3])
-    with pytest.raises(RosyError, match="vertex 1"):
-        build_surface([[0, 0, 0], [0, np.nan, 0], [1, 0, 0]], [0, 1, 2], [0, 3])
+def test_impossible_meshes(error_of):
+    points = [[0, 0, 0], [0, np.nan, 0], [1, 0, 0]]
+    assert "no faces" in error_of(build_surface, points, [], [0])
+    assert "corners" in error_of(build_surface, points, [0, 1], [0, 2])
+    assert "not exist" in error_of(build_surface, points, [0, 1, 3], [0, 3])
+    assert "vertex 1" in error_of(build_surface, points, [0, 1, 2], [0, 3])
 
 
 def test_curvatures_next_to_nothing():

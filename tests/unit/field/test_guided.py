@@ -7,10 +7,10 @@ import pytest
 import scipy.sparse as sparse
 from field_helpers import angle_differences, as_scipy, bumpy
 from scipy.sparse.linalg import spsolve
-from shapes import cube, from_quads, icosphere, joined, plane, rebuilt, torus
+from shapes import cube, from_quads, grid_of_quads, icosphere, joined, plane, rebuilt, torus
 
-from rosy_addon.core.errors import RosyError
 from rosy_addon.field.connection import build_connection, laplacian
+from rosy_addon.field.edge_guides import coherent_edge_guides
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.guided_system import guided_field
@@ -75,9 +75,8 @@ def test_a_component_without_guides_has_the_smoothest_field():
     assert np.array_equal(field.vectors[unguided], smoothest_field(both, 4).vectors[unguided])
 
 
-def test_no_guide_at_all_is_an_error():
-    with pytest.raises(RosyError, match="guides are zero"):
-        guided_field(plane(), 4, np.zeros((16, 3)), 1.0)
+def test_no_guide_at_all_is_an_error(error_of):
+    assert "guides are zero" in error_of(guided_field, plane(), 4, np.zeros((16, 3)), 1.0)
 
 
 # --- edges -----------------------------------------------------------------------------------------
@@ -102,6 +101,42 @@ def test_borders_are_features():
     np.testing.assert_allclose(np.abs(field.vectors).max(axis=1), 1, atol=1e-6)
 
 
+#: Number of faces along a side of a square; a face is smaller than the distance over which edges are averaged.
+SIDE = 240
+
+
+def kept_share(ends: np.ndarray, degree: int) -> float:
+    """The share of the guides along edges of a square of size 1 that are kept."""
+    square = plane(SIDE, SIDE)
+    square = square.with_vertices(square.vertices / np.ptp(square.vertices[:, 0]))
+    expected = guides_from_edges(square, ends, degree)
+    guides = coherent_edge_guides(square, ends, degree)
+    is_kept = guides.any(axis=1)
+    assert (guides[is_kept] == expected[is_kept]).all()
+    return is_kept.sum() / expected.any(axis=1).sum()
+
+
+@pytest.mark.parametrize("degree", [2, 4])
+def test_a_straight_line_is_followed(degree):
+    x = np.arange(SIDE) + SIDE // 2 * (SIDE + 1)
+    assert kept_share(np.stack([x, x + 1], axis=1), degree) == 1
+
+
+@pytest.mark.parametrize("degree, low, high", [(2, 0, 0.1), (4, 1, 1)])
+def test_steps(degree, low, high):
+    """A cross follows both directions of steps of two edges, but a line would have to turn at each of them."""
+    corner = np.arange(0, SIDE, 2) * (SIDE + 2)
+    path = corner + np.array([[0, 1, 2, SIDE + 3, 2 * SIDE + 4]]).T
+    ends = np.stack([path[:-1].ravel(), path[1:].ravel()], axis=1)
+    assert low <= kept_share(ends, degree) <= high
+
+
+def test_all_edges_of_a_cube_are_followed():
+    box = cube()
+    ends = feature_edges(box, 1.0)
+    assert (coherent_edge_guides(box, ends, 4) == guides_from_edges(box, ends, 4)).all()
+
+
 def test_guides_lie_in_their_faces():
     points = np.array([[0, 0, 0], [1, 0, 0.2], [1, 1, 0], [0, 1, 0.3]], dtype=float)
     bent = from_quads(points, np.array([[0, 1, 2, 3]]))
@@ -118,8 +153,7 @@ def test_curvature_spreads_into_flat_regions():
     z = np.concatenate([np.full(15, 1.0), np.cos(turns), -flap[::-1]])
     y = np.linspace(0, 6, count)
     points = np.stack(np.broadcast_arrays(x[:, None], y, z[:, None]), axis=-1).reshape(-1, 3)
-    first = np.arange(len(x) - 1)[:, None] * count + np.arange(count - 1)
-    quads = np.stack([first, first + 1, first + count + 1, first + count], axis=-1).reshape(-1, 4)
+    quads, _ = grid_of_quads(len(x) - 1, count - 1, False, False)
     surface = from_quads(points, quads)
     flat = surface.face_center[:, 0] < -1
     assert generate(surface, "curvature", 4).magnitude[flat].max() < 1e-3
@@ -129,11 +163,10 @@ def test_curvature_spreads_into_flat_regions():
 
 
 @pytest.mark.parametrize("degree", [1, 4, 6])
-def test_features_of_a_cube(degree):
+def test_features_of_a_cube(degree, error_of):
     box = icosphere(3)
     cubic = rebuilt(box, box.vertices / np.abs(box.vertices).max(axis=1)[:, None])
     field = generate(cubic, GeneratorSettings("features", sharp_angle=0.9), degree)
     # The corners are triangles, on which the field is singular by symmetry.
     assert (field.magnitude < 0.5).sum() in (0, 8)
-    with pytest.raises(RosyError, match="no border or sharp edge"):
-        generate(icosphere(3), "features", degree)
+    assert "no border or sharp edge" in error_of(generate, icosphere(3), "features", degree)

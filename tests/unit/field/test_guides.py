@@ -1,7 +1,5 @@
 """Guides from strokes, axes of empties, UV maps and vectors; and one-sided surfaces."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from field_helpers import awkward_surface
@@ -17,16 +15,11 @@ from rosy_addon.field.representation import face_representation, to_representati
 BALL = icosphere(4)
 
 
-def great_circles(count, seed=2, tremble=0.0):
-    """Arcs of great circles on the unit sphere, with normally distributed jitter."""
-    random = np.random.default_rng(seed)
-    strokes = []
-    for _ in range(count):
-        a, b = np.linalg.qr(random.standard_normal((3, 2)))[0].T
-        angle = np.linspace(0, 0.8, 40)[:, None]
-        arc = np.cos(angle) * a + np.sin(angle) * b
-        strokes.append(arc + random.normal(0, tremble, arc.shape))
-    return strokes
+def great_circles(count):
+    """Arcs of great circles on the unit sphere."""
+    axes = np.linalg.qr(np.random.default_rng(6).standard_normal((count, 3, 2)))[0]
+    angle = np.linspace(0, 0.8, 40)
+    return list(np.einsum("at,sia->sti", [np.cos(angle), np.sin(angle)], axes))
 
 
 def stroke_error(surface, field, stroke):
@@ -80,8 +73,7 @@ def test_axes_guide_the_faces_around_them():
     assert guides[near].any(axis=1).all() and guides.any(axis=1).sum() == near.sum() + 1
     assert (np.abs(guides[near, 0]) > 0.9).all()
     axis_guides = list(zip(position, axis, (0.3, 0.0), strict=True))
-    generator_settings = GeneratorSettings("guided", axis_guides=axis_guides)
-    field = generate(BALL, generator_settings, 2)
+    field = generate(BALL, GeneratorSettings("guided", axis_guides=axis_guides), 2)
     np.testing.assert_allclose(np.abs(dot(field.vectors, guides))[near], 1, atol=1e-9)
 
 
@@ -143,8 +135,8 @@ def test_guides_of_several_kinds_are_combined(error_of):
     vectors = np.zeros((surface.face_count, 3))
     vectors[5] = 3 * surface.face_frames[0][5]
     edges = np.stack([surface.corner_vertex, surface.corner_vertex[surface.next_corner]], axis=1)
-    generator_settings = GeneratorSettings("guided", vectors=vectors, edges=edges[800:801])
-    field = generate(surface, generator_settings, 4)
+    settings = GeneratorSettings("guided", vectors=vectors, edges=edges[800:801])
+    field = generate(surface, settings, 4)
     assert np.isclose(abs(dot(normalize(vectors[5]), field.vectors[5])), 1)
     assert (field.magnitude > 0.99).all()
     assert "no guides are given" in error_of(generate, surface, "guided", 4)

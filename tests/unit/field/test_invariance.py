@@ -1,7 +1,5 @@
 """Fields do not depend on the position, the scale, the side, the numbering and the first corners of faces."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from field_helpers import angle_differences, bumpy, symmetric_head

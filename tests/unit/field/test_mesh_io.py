@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import struct
-import tracemalloc
 
 import numpy as np
 import pytest
-from field_helpers import ply_header, read_damaged
-from hypothesis import assume, given
+from field_helpers import assert_damaged, ply_header, read_damaged
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rosy_addon.field.formats.stl import weld
-from rosy_addon.field.surface import MIN_EXTENT, Surface
+from rosy_addon.field.surface import Surface
 
 # A square, and a triangle on its edge from vertex 1 to vertex 2.
 VERTICES = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (1, 0.5, 1e-3)])
@@ -225,14 +224,7 @@ DAMAGED = {
 
 @pytest.mark.parametrize("name", DAMAGED)
 def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
-    data, expected = DAMAGED[name]
-    (tmp_path / name).write_bytes(data)
-    tracemalloc.start()
-    message = error_of(Surface, tmp_path / name)
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert expected in message and str(tmp_path / name) in message
-    assert peak < 10e6, "a claim in a header must not be believed"
+    assert_damaged(error_of, tmp_path / name, *DAMAGED[name], Surface)
 
 
 def test_missing_files_and_folders(tmp_path, error_of):
@@ -246,13 +238,3 @@ def test_missing_files_and_folders(tmp_path, error_of):
 def test_random_damage_raises_only_rosy_errors(tmp_path_factory, garbage, name, offset):
     path = tmp_path_factory.getbasetemp() / f"damaged-{name}"
     read_damaged(path, FILES[name], garbage, offset, Surface)
-
-
-@pytest.mark.slow
-@given(st.lists(st.floats(-1e12, 1e12), min_size=9, max_size=9))
-def test_off_coordinates_are_read_exactly(tmp_path_factory, numbers):
-    assume(not 0 < np.ptp(np.reshape(numbers, (3, 3)), axis=0).max() < MIN_EXTENT)
-    path = tmp_path_factory.getbasetemp() / "exact.off"
-    rows = [" ".join(map(repr, numbers[k : k + 3])) for k in (0, 3, 6)]
-    path.write_text("\n".join(["OFF", "3 1 0", *rows, "3 0 1 2", ""]))
-    assert Surface(path).vertices.ravel().tolist() == numbers

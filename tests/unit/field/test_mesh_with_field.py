@@ -1,12 +1,10 @@
 """Files of a mesh with its field: read again by RoSy, and by numpy."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np
 import pytest
-from field_helpers import angle_differences, ply_header, read_field
+from field_helpers import angle_differences, ply_header, random_field, read_field
 from shapes import from_triangles, icosphere
 
 import rosy_addon as rf
@@ -15,7 +13,6 @@ from rosy_addon.extras.command_line import main
 from rosy_addon.field.directional_field import field_directions
 from rosy_addon.field.field_io import write_field
 from rosy_addon.field.generate import axis_field
-from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
 
 BALL = icosphere(2)
@@ -78,14 +75,11 @@ def test_vectors_of_a_ply_file(tmp_path, capfd):
 
 def test_what_an_obj_file_loses_is_said(tmp_path):
     """With random directions a lot, and on a plane with a constant field nothing."""
-    surface = BALL
-    angle = np.random.default_rng(0).uniform(-np.pi, np.pi, surface.face_count)[:, None]
-    x, y = surface.face_frames
-    field = RosyField(1, np.cos(angle) * x + np.sin(angle) * y)
+    field = random_field(BALL, 1)
     with pytest.warns(RosyWarning, match="off by up to [0-9]+ degrees") as caught:
-        write_field(tmp_path / "a.obj", field, surface)
-    again = read_field(tmp_path / "a.obj", surface)
-    lost = angle_differences(surface, field.vectors, again.vectors, 1)
+        write_field(tmp_path / "a.obj", field, BALL)
+    again = read_field(tmp_path / "a.obj", BALL)
+    lost = angle_differences(BALL, field.vectors, again.vectors, 1)
     assert f"up to {np.degrees(lost.max()):.0f} degrees" in str(caught[0].message)
     flat = from_triangles([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], [[0, 1, 2], [1, 3, 2]])
     with warnings.catch_warnings():

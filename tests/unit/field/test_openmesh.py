@@ -1,12 +1,10 @@
 """Files of OpenMesh, whose layout is that of its own writer, and one of FrameFieldTracing."""
 
-from __future__ import annotations
-
 import struct
 
 import numpy as np
 import pytest
-from field_helpers import read_damaged, read_field
+from field_helpers import assert_damaged, read_damaged, read_field
 
 import rosy_addon as rf
 from rosy_addon.field.formats.openmesh import read_om_mesh
@@ -80,10 +78,8 @@ DAMAGED = {
 
 @pytest.mark.parametrize("name", DAMAGED)
 def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
-    content, expected = DAMAGED[name]
-    path = tmp_path / "a.om"
-    path.write_bytes(content)
-    assert expected in error_of(read_field, path, rf.Surface(POINTS, [[0, 1, 2, 3], [1, 4, 2]]))
+    surface = rf.Surface(POINTS, [[0, 1, 2, 3], [1, 4, 2]])
+    assert_damaged(error_of, tmp_path / "a.om", *DAMAGED[name], read_field, surface)
 
 
 def test_every_changed_byte_is_an_error_or_a_mesh(tmp_path):

@@ -1,14 +1,9 @@
 """Ties: edges at which a field turns to either side alike."""
 
-from __future__ import annotations
-
-import json
-
 import numpy as np
-from command_helpers import write_obj
+from command_helpers import facts_of, finished, write_obj
 from shapes import plane
 
-from rosy_addon.cli.parser import main
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import count_ties, find_singularities
 
@@ -29,8 +24,7 @@ def test_rounding_errors_change_no_singularity():
     """Nine of 36 faces are turned, with four edges each; five of them are at the border, where six edges end."""
     expected = [part.tolist() for part in find_singularities(SURFACE, turned_field(0))]
     ties = count_ties(SURFACE, turned_field(0))
-    inside = SURFACE.edges.halfedges
-    faces = SURFACE.corner_face[inside]
+    faces = SURFACE.corner_face[SURFACE.edges.halfedges]
     is_turned = (faces // 6 % 2) * (faces % 6 % 2) == 1
     assert ties == np.count_nonzero(is_turned.any(axis=1)) == 30
     for seed in range(5):
@@ -43,10 +37,9 @@ def test_a_smaller_turn_is_no_tie():
     assert count_ties(SURFACE, turned_field(1e-2)) == 0
 
 
-def test_info_counts_ties(tmp_path, capsys):
+def test_info_counts_ties(tmp_path):
     mesh, out = write_obj(tmp_path / "a.obj", SURFACE.vertices, SURFACE.faces), tmp_path / "a.txt"
     np.savetxt(out, turned_field(0).vectors)
-    assert main(["info", str(mesh), str(out), "--degree", "4"]) == 0
-    assert "30 edges where the field turns by 45 degrees" in capsys.readouterr().out
-    assert main(["info", str(mesh), str(out), "--degree", "4", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["ties"] == 30
+    printed = finished("info", mesh, out, "--degree", 4).stdout
+    assert "30 edges where the field turns by 45 degrees" in printed
+    assert facts_of(mesh, out, "--degree", 4)["ties"] == 30

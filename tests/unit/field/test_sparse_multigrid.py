@@ -1,7 +1,5 @@
 """Parts of sparse matrices, and multigrid levels for matrices that differ by their diagonals."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np
@@ -22,11 +20,8 @@ from rosy_addon.field.sparse_multigrid import (
     w_cycle,
 )
 
-
-@pytest.fixture(scope="module")
-def laplacian():
-    matrix = field_laplacian(build_connection(torus(60, 30)), 4)
-    return matrix.plus_diagonal(1e-3 * matrix.diagonal)
+TORUS_LAPLACIAN = field_laplacian(build_connection(torus(60, 30)), 4)
+LAPLACIAN = TORUS_LAPLACIAN.plus_diagonal(1e-3 * TORUS_LAPLACIAN.diagonal)
 
 
 def random_matrix(rows, columns, seed):
@@ -47,10 +42,10 @@ def test_products_and_adjoints():
     np.testing.assert_array_equal(as_scipy(a.adjoint).toarray(), as_scipy(a).toarray().conj().T)
 
 
-def test_rows_and_columns(laplacian):
-    chosen = np.random.default_rng(0).permutation(len(laplacian))[:200]
-    expected = as_scipy(laplacian)[chosen]
-    rows = laplacian.rows(chosen)
+def test_rows_and_columns():
+    chosen = np.random.default_rng(0).permutation(len(LAPLACIAN))[:200]
+    expected = as_scipy(LAPLACIAN)[chosen]
+    rows = LAPLACIAN.rows(chosen)
     assert abs(as_scipy(rows) - expected).max() == 0
     assert abs(as_scipy(rows.columns(chosen)) - expected[:, chosen]).max() == 0
 
@@ -62,27 +57,27 @@ def test_diagonal_with_several_entries_in_a_row():
     assert np.array_equal(as_scipy(matrix.plus_diagonal([10, 20])).toarray(), expected)
 
 
-def test_levels_with_another_diagonal(laplacian):
-    levels = hierarchy(laplacian)
+def test_levels_with_another_diagonal():
+    levels = hierarchy(LAPLACIAN)
     random = np.random.default_rng(1)
-    diagonal = np.where(random.random(len(laplacian)) < 0.2, 10.0, 0.0)
-    rhs = random.standard_normal(len(laplacian)) + 0j
+    diagonal = np.where(random.random(len(LAPLACIAN)) < 0.2, 10.0, 0.0)
+    rhs = random.standard_normal(len(LAPLACIAN)) + 0j
     new_levels = add_diagonal(levels, diagonal)
     # 15 iterations would not be enough without a suitable preconditioner.
     cycle = partial(w_cycle, new_levels)
     solution = conjugate_gradient(new_levels[0].matrix, rhs, 1e-12, cycle, max_iterations=20)
-    expected = spsolve(as_scipy(laplacian) + sparse.diags(diagonal), rhs)
+    expected = spsolve(as_scipy(LAPLACIAN) + sparse.diags(diagonal), rhs)
     assert np.abs(solution - expected).max() < 1e-6 * np.abs(expected).max()
 
 
-def test_fixed_unknowns_keep_their_values(laplacian):
+def test_fixed_unknowns_keep_their_values():
     random = np.random.default_rng(2)
-    is_fixed = random.random(len(laplacian)) < 0.1
-    start = random.standard_normal(len(laplacian)) + 1j * random.standard_normal(len(laplacian))
-    rhs = random.standard_normal(len(laplacian)) + 0j
-    solution = conjugate_gradient(laplacian, rhs, 1e-11, start=start, is_fixed=is_fixed)
+    is_fixed = random.random(len(LAPLACIAN)) < 0.1
+    start = random.standard_normal(len(LAPLACIAN)) + 1j * random.standard_normal(len(LAPLACIAN))
+    rhs = random.standard_normal(len(LAPLACIAN)) + 0j
+    solution = conjugate_gradient(LAPLACIAN, rhs, 1e-11, start=start, is_fixed=is_fixed)
     assert np.array_equal(solution[is_fixed], start[is_fixed])
-    matrix, free = as_scipy(laplacian), ~is_fixed
+    matrix, free = as_scipy(LAPLACIAN), ~is_fixed
     known = rhs - matrix[:, is_fixed] @ start[is_fixed]
     expected = spsolve(matrix[free][:, free].tocsc(), known[free])
     assert np.abs(solution[free] - expected).max() < 1e-6
@@ -90,13 +85,13 @@ def test_fixed_unknowns_keep_their_values(laplacian):
 
 @pytest.mark.parametrize("scale", [0.0, 5e-324, 1e-161, 1e-120])
 @pytest.mark.parametrize("start_scale", [1.0, 1e-163])
-def test_tiny_right_hand_sides(laplacian, scale, start_scale):
+def test_tiny_right_hand_sides(scale, start_scale):
     random = np.random.default_rng(3)
-    rhs = scale * random.standard_normal(len(laplacian)) + 0j
-    start = start_scale * random.standard_normal(len(laplacian)) + 0j
-    jacobi = partial(np.multiply, 1 / laplacian.diagonal)
+    rhs = scale * random.standard_normal(len(LAPLACIAN)) + 0j
+    start = start_scale * random.standard_normal(len(LAPLACIAN)) + 0j
+    jacobi = partial(np.multiply, 1 / LAPLACIAN.diagonal)
     for precondition in jacobi, None:
-        solution = conjugate_gradient(laplacian, rhs, 1e-4, precondition, start=start)
+        solution = conjugate_gradient(LAPLACIAN, rhs, 1e-4, precondition, start=start)
         assert np.abs(solution).max() <= 1e-12 * start_scale + 1e3 * scale + 1e-160
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from awkward import AWKWARD
 from field_helpers import awkward_surface, cross_errors, ellipsoid
-from shapes import cube, icosphere, plane, rebuilt, torus
+from shapes import cube, icosphere, plane, rebuilt, tetrahedron, torus
 
 from rosy_addon.field.frames import dot
 from rosy_addon.field.generate import generate
@@ -74,11 +74,6 @@ def test_reversed_faces_are_oriented(share):
     np.testing.assert_allclose(sign, sign[0])
 
 
-def tetrahedron() -> Surface:
-    points = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]])
-    return Surface(points, [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
-
-
 def needle() -> Surface:
     """A tip much narrower than 90 degrees."""
     return rebuilt(tetrahedron(), tetrahedron().vertices @ np.diag([0.05, 0.05, 1.0]))
@@ -87,8 +82,7 @@ def needle() -> Surface:
 def groove() -> Surface:
     """A strip that runs back at 60 degrees between two planes, as the side of a dovetail."""
     profile = np.array([[-1, 0], [0, 0], [-0.1, -0.173], [1, -0.173]])
-    x = np.arange(4.0)
-    points = [[along, *point] for along in x for point in profile]
+    points = [[along, *point] for along in range(4) for point in profile]
     corner = np.array([[4 * i + j for j in range(3)] for i in range(3)]).ravel()[:, None]
     return Surface(points, np.concatenate([corner + (0, 4, 5), corner + (0, 5, 1)]))
 

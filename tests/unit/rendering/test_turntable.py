@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
-import sys
 import tempfile
 
 import numpy as np
@@ -32,7 +30,6 @@ from rosy_addon.rendering.turntable import (
     turntable,
     turntable_views,
 )
-from rosy_addon.worker.program import run_program
 
 QUICK = Look(length=8)
 BALL = MeshInstance(icosphere(2), np.eye(4), axis_field(icosphere(2), 2))
@@ -124,26 +121,6 @@ def test_lights_stay_fixed_while_the_camera_orbits():
         for view in turntable_views(BALL, look, 2, (64, 64), (0.0, 0.0), lights=[sun])
     )
     assert dark < 0.05 < 0.2 < lit
-
-
-def test_the_encoder_is_killed_when_the_video_is_cancelled(tmp_path):
-    """An .mp4 is encoded by another program."""
-    views = turntable_views(BALL, QUICK, 2, (32, 32), (0.0, 0.0))
-    pid_file = tmp_path / "pid"
-
-    def encode(*_):
-        code = f"import os, time; open({str(pid_file)!r}, 'w').write(str(os.getpid()))"
-        run_program([sys.executable, "-c", code + "; time.sleep(60)"], "encoding")
-
-    def cancel(fraction, label):
-        if label == "encoding the video" and pid_file.exists() and pid_file.read_text():
-            raise CancelledError
-
-    with listening(cancel), pytest.raises(CancelledError):
-        turntable(draw_picture, views, 2, tmp_path / "film.mp4", 12, encode)
-    with pytest.raises(ProcessLookupError):
-        os.kill(int(pid_file.read_text()), 0)
-    assert not (tmp_path / "film.mp4").exists()
 
 
 def test_a_cancelled_video_leaves_no_file(tmp_path):

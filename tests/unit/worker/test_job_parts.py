@@ -9,6 +9,7 @@ import time
 
 import pytest
 from harness.steps import finished
+from listeners import CancelledError, cancel_at
 
 from rosy_addon.core.errors import RosyError
 from rosy_addon.core.progress import listening
@@ -95,12 +96,18 @@ def test_programs():
     assert (status, output.strip()) == (3, "out") and set(labels) == {"working"}
 
 
-def test_a_cancelled_job_kills_its_program(tmp_path):
+@pytest.mark.parametrize("by_listener", [False, True])
+def test_a_cancelled_job_kills_its_program(tmp_path, by_listener):
     path = tmp_path / "late"
     code = f"import time; time.sleep(0.5); open({str(path)!r}, 'w')"
-    steps = run_program.begin([sys.executable, "-c", code], "working")
-    next(steps)
-    steps.close()
+    command = [sys.executable, "-c", code]
+    if by_listener:
+        with listening(cancel_at(1)), pytest.raises(CancelledError):
+            run_program(command, "working")
+    else:
+        steps = run_program.begin(command, "working")
+        next(steps)
+        steps.close()
     time.sleep(0.7)
     assert not path.exists()
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
-from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -48,21 +47,27 @@ def room_of(path: Path) -> str:
     return path.relative_to(PACKAGE).with_suffix("").parts[0]
 
 
-def imports_of(path: Path) -> tuple[set[str], set[str]]:
-    """Imported modules: dotted paths of those in RoSy, and top-level names of all others."""
-    package_parts = path.relative_to(PACKAGE).parent.parts
+def imports_of(path: Path) -> tuple[set[Path], set[str]]:
+    """Imported modules, in functions as well: files of RoSy, and top-level names of all others."""
     inside, outside = set(), set()
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
             outside |= {alias.name.split(".")[0] for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+        elif isinstance(node, ast.ImportFrom) and not node.level:
             outside.add(node.module.split(".")[0])
         elif isinstance(node, ast.ImportFrom):
-            assert node.level <= len(package_parts) + 1, f"{path} reaches out of the package"
-            base = package_parts[: len(package_parts) - node.level + 1]
-            names = [node.module] if node.module else [alias.name for alias in node.names]
-            inside |= {".".join((*base, name)) for name in names}
+            source = path.parents[node.level - 1].joinpath(*(node.module or "").split("."))
+            inside |= {file_of(source, alias.name) for alias in node.names}
     return inside, outside
+
+
+def file_of(source: Path, name: str) -> Path:
+    """The file of a module, or of a name in it."""
+    for module in (source / name, source):
+        for file in (module.with_suffix(".py"), module / "__init__.py"):
+            if file.is_file():
+                return file
+    raise AssertionError(f"{source} has no {name}")
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
@@ -71,7 +76,7 @@ def test_imports_run_one_way(path):
     room = room_of(path)
     (layer,) = (number for number, rooms in enumerate(LAYERS) if room in rooms)
     above = {each for rooms in LAYERS[:layer] for each in rooms}
-    rooms = {name.split(".")[0] for name in inside} - {room}
+    rooms = {room_of(file) for file in inside} - {room}
     assert rooms <= above
     allowed = set(sys.stdlib_module_names) | {"numpy"}
     if room in BLENDER_ROOMS:
@@ -85,36 +90,9 @@ def test_imports_run_one_way(path):
     assert outside <= allowed, "only relative imports inside the package, only numpy outside it"
 
 
-def test_imports_of_finds_all_kinds_of_imports(tmp_path, monkeypatch):
-    """All forms of imports, of RoSy and of others."""
-    monkeypatch.setitem(globals(), "PACKAGE", tmp_path)
-    (tmp_path / "field").mkdir()
-    path = tmp_path / "field" / "wrong.py"
-    imports = "import bpy\nfrom ..scene.apply import x\nfrom .. import ui\nfrom . import frames\n"
-    path.write_text(imports)
-    assert imports_of(path) == ({"scene.apply", "ui", "field.frames"}, {"bpy"})
-
-
-def imported_files(path: Path) -> Iterator[Path]:
-    """Yield the files of all modules that a file imports relatively, in functions as well."""
-    for node in ast.walk(ast.parse(path.read_text())):
-        if not isinstance(node, ast.ImportFrom) or not node.level:
-            continue
-        source = path.parents[node.level - 1].joinpath(*(node.module or "").split("."))
-        for alias in node.names:
-            candidates = [
-                file
-                for module in (source / alias.name, source)
-                for file in (module.with_suffix(".py"), module / "__init__.py")
-                if file.is_file()
-            ]
-            assert candidates, f"{path} imports {alias.name}, which does not exist"
-            yield candidates[0]
-
-
 def import_cycle(folder: Path) -> list[str]:
     """Files of a folder that import each other in a cycle, or an empty list."""
-    graph = {path: set(imported_files(path)) for path in sorted(folder.rglob("*.py"))}
+    graph = {path: imports_of(path)[0] for path in sorted(folder.rglob("*.py"))}
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
@@ -143,7 +121,7 @@ def test_import_cycle_finds_cycles(tmp_path, back):
     (tmp_path / "first.py").write_text("from . import second\n")
     (tmp_path / "second.py").write_text("import os\n")
     (tmp_path / "inner" / "third.py").write_text("from ..first import x\n")
-    assert import_cycle(tmp_path) == []
+    assert import_cycle(tmp_path) == [] and imports_of(tmp_path / "second.py")[1] == {"os"}
     (tmp_path / "second.py").write_text(back + "\n")
     assert {"first.py", "second.py"} <= set(import_cycle(tmp_path))
 

@@ -49,18 +49,6 @@ def rays_reach_the_eye(instances, camera, planes=None):
 
 
 @pytest.mark.parametrize("camera", CAMERAS, ids=["perspective", "orthographic"])
-def test_a_vertex_of_a_convex_solid_is_visible_if_one_of_its_faces_is(camera):
-    surface = icosphere(3)
-    projected = project([moved(surface)], camera)
-    center = surface.vertices[surface.corner_vertex].reshape(-1, 3, 3).mean(axis=1)
-    is_front = (surface.face_normal * camera.view_directions(center)).sum(axis=1) > 0
-    expected = np.zeros(len(surface.vertices), dtype=bool)
-    expected[surface.corner_vertex[is_front[surface.corner_face]]] = True
-    np.testing.assert_array_equal(projected.is_visible, expected)
-    assert projected.is_in_view.all()
-
-
-@pytest.mark.parametrize("camera", CAMERAS, ids=["perspective", "orthographic"])
 @pytest.mark.parametrize("pairs", [1 << 20, 50])
 def test_vertices_are_visible_if_rays_reach_the_eye(camera, pairs, monkeypatch):
     """Of solids that hide each other, and one that reaches behind the eye."""

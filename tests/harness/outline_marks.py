@@ -8,7 +8,7 @@ import numpy as np
 from scipy import ndimage
 
 from rosy_addon.field.connectivity import build_edges
-from rosy_addon.projection.rasterizer import rasterize
+from rosy_addon.line_drawing.visibility import project_to_pixels, rasterize_depth
 
 #: Coverage from which on a pixel belongs to a mark, or a silhouette is covered.
 MARK_COVERAGE, LINE_COVERAGE = 0.25, 0.3
@@ -61,17 +61,9 @@ def visible_silhouettes(
         The length in pixels that each point stands for.
     """
     points, triangles = instance.world_points(), instance.surface.triangle_vertex
-    homogeneous = np.concatenate([points, np.ones((len(points), 1))], axis=1)
-    clip = homogeneous @ (camera.projection @ camera.view).T
-    depth = -(homogeneous @ camera.view[2])
-    screen = (clip[:, :2] / clip[:, 3:] * 0.5 + 0.5) * (camera.width, camera.height)
+    screen, depth = project_to_pixels(points, camera)
     ends = _contour_edges(screen, triangles)
-    size = camera.width * FINE, camera.height * FINE
-    fragments = rasterize(clip, triangles.astype(np.int32), *size)
-    fine_depth = np.full(size[0] * size[1], np.inf)
-    at_corners = depth[triangles[fragments.triangle]]
-    fine_depth[fragments.pixel] = (at_corners * fragments.barycentric).sum(axis=1)
-    fine_depth = fine_depth.reshape(size[1], size[0])
+    fine_depth = rasterize_depth([instance], camera.scaled(FINE)).depth
     p, q = screen[ends[:, 0]], screen[ends[:, 1]]
     length = np.hypot(*(q - p).T)
     count = np.maximum(np.ceil(length * FINE).astype(int), 1)
@@ -83,10 +75,11 @@ def visible_silhouettes(
     if camera.is_perspective:
         z = 1 / ((1 - share) / near + share / far)
     column, row = (place * FINE).astype(int).T
-    inside = (column > 2) & (row > 2) & (column < size[0] - 3) & (row < size[1] - 3)
+    height, width = fine_depth.shape
+    inside = (column > 2) & (row > 2) & (column < width - 3) & (row < height - 3)
     place, z, column, row = place[inside], z[inside], column[inside], row[inside]
     weight = (length / count)[edge][inside]
-    pixel_size = (z if camera.is_perspective else 1.0) / camera.pixels_per_unit
+    pixel_size = camera.pixel_sizes(z)
     around = [fine_depth[row + dy, column + dx] for dy in range(-2, 3) for dx in range(-2, 3)]
     is_near = np.abs(np.stack(around) - z).min(axis=0) < 15 * pixel_size
     is_visible = is_near & (np.max(around, axis=0) > z + min_jump * pixel_size)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from harness.stroke_tracing import pixel_lengths
 from scipy.spatial import cKDTree
 from shapes import cylinder, icosphere, plane, rebuilt, torus
 
@@ -29,14 +30,6 @@ def outlines_of(surface, camera):
     strokes = draw_instances([instance], camera, StrokeStyle(spacing=40, outline=True)).strokes
     kinds = [strokes.names.index(kind) for kind in OUTLINE_KINDS]
     return strokes.select(np.isin(strokes.family, kinds))
-
-
-def pixel_lengths(lines, camera):
-    """Return (S,): the lengths of strokes in pixels."""
-    pixels, _ = project_to_pixels(lines.points, camera)
-    step = np.linalg.norm(np.diff(pixels, axis=0), axis=1)
-    step[lines.start[1:-1] - 1] = 0
-    return np.add.reduceat(step, lines.start[:-1])
 
 
 def coverage(lines, surface, camera, tolerance):

@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from harness.stroke_tracing import latitudes, turned
+from harness.stroke_tracing import latitudes, pixel_lengths, turned
 from shapes import icosphere, instance_of, moved, placed, plane, sharp_cube
 
 from rosy_addon.field.frames import dot, normalize
@@ -48,13 +48,7 @@ def ends_of(strokes):
 
 def pixel_growth(plain, extended, camera):
     """Return the (S,) pixels by which strokes are extended."""
-    lengths = []
-    for strokes in (plain, extended):
-        pixels, _ = project_to_pixels(strokes.points, camera)
-        segment_length = np.hypot(*np.diff(pixels, axis=0).T)
-        same = np.diff(strokes.stroke) == 0
-        lengths.append(np.bincount(strokes.stroke[1:][same], segment_length[same]))
-    return lengths[1] - lengths[0]
+    return pixel_lengths(extended, camera) - pixel_lengths(plain, camera)
 
 
 @pytest.mark.slow

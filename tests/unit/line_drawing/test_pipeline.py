@@ -173,13 +173,6 @@ def test_errors(error_of):
         (SPHERE, {"unit": "world", "distance": 0.4 * pixel}, "strokes would be 0.4 pixels"),
     ):
         assert message in error_of(draw_instances, [instance], CAMERA, StrokeStyle(**settings))
-    for settings, message in (
-        ({"spacing": 0}, "setting 'spacing' is 0, expected a number from 0.5"),
-        ({"curvature": np.nan}, "setting 'curvature' is nan"),
-        ({"overshoot": -1}, "setting 'overshoot' is -1, expected a number from 0"),
-        ({"light": "sun"}, "'sun', expected one of none, headlight, lamp, scene"),
-    ):
-        assert message in error_of(StrokeStyle, **settings)
     assert "pen" in error_of(Pen, width=0.0)
     style = StrokeStyle(hidden=True, spacing=1)
     unseen = draw_instances([behind], CAMERA, style, clip_to_frame=False)

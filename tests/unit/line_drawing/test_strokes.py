@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 from field_helpers import bumpy
 from harness.stroke_spacing import lateral_gaps
-from harness.stroke_tracing import latitudes, planar_strokes, trace_strokes, turned, visible_strokes
+from harness.stroke_tracing import (
+    latitudes,
+    pixel_lengths,
+    planar_strokes,
+    trace_strokes,
+    turned,
+    visible_strokes,
+)
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapes import (
@@ -320,9 +327,7 @@ def test_slanted_surfaces_are_as_dense_in_the_picture():
         instance = turned(floor, 4, angle)
         spacing = spacing_in_picture(build_tangent_mesh(instance), camera, 6.0).values
         strokes = trace_strokes(instance, spacing)
-        pixels, _ = project_to_pixels(strokes.points, camera)
-        segment_length = np.linalg.norm(np.diff(pixels, axis=0), axis=1)
-        lengths.append(segment_length[np.diff(strokes.stroke) == 0].sum())
+        lengths.append(pixel_lengths(strokes, camera).sum())
     area = 400 * 400 * np.cos(slant)
     # There are two families, six pixels apart.
     assert np.mean(lengths) / area == pytest.approx(2 / 6, rel=0.12)

@@ -21,12 +21,11 @@ from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 from rosy_addon.worker.job import run
 
-from .gpu_parity import draw_pair, rooms
+from .gpu_parity import draw_pair
 
 AXIS = (0.3, 0.2, 1.0)
 SHEAR = np.array([[1.0, 0.4, 0.0], [0.0, 0.8, 0.3], [0.0, 0.0, 1.2]])
 MIRROR = np.diag([-1.0, 1.0, 1.0])
-ROSY = rooms()
 SIZE = 160, 144
 LOOK = Look(shading=0.0, length=30)
 EVEN_LINES = replace(LOOK, ink="even", shading=0.9, line_width=3.0, line_distance=6.0)
@@ -169,7 +168,7 @@ def assert_parity(
 ):
     """Compare the picture of the card with the picture of numpy, and return both."""
     camera = view(supersampling=look.supersampling) if camera is None else camera
-    pair = draw_pair(ROSY, card, instances, camera, look, lights, reference, drift)
+    pair = draw_pair(card, instances, camera, look, lights, reference, drift)
     assert np.isfinite(pair.card).all()
     both = (pair.card[..., 3] == 1) & (pair.numpy[..., 3] == 1)
     assert both.sum() > 500 and pair.agreement >= agreement and pair.likeness >= likeness

@@ -14,7 +14,6 @@ from harness.gpu_scenes import (
     BALL,
     FREE,
     LOOK,
-    ROSY,
     assert_parity,
     ball,
     card_rgba,
@@ -187,7 +186,7 @@ def test_samples_show_what_numpy_draws(card, preset):
 @pytest.mark.parametrize("hue", ["one", "families"])
 def test_ink_on_paper_that_is_not_opaque(card, hue, paper):
     look = replace(LOOK, ink="hatch", shading=1.0, paper_color=paper, hue=hue, line_width=3.0)
-    pair = draw_pair(ROSY, card, [ball()], view(), look)
+    pair = draw_pair(card, [ball()], view(), look)
     card_alpha, numpy_alpha = (picture[..., 3] for picture in (pair.card, pair.numpy))
     assert 0.2 < numpy_alpha[numpy_alpha > 0].mean() < 0.8
     assert np.corrcoef(card_alpha.ravel(), numpy_alpha.ravel())[0, 1] > 0.98

@@ -14,7 +14,6 @@ from harness.gpu_scenes import (
     FREE,
     LOOK,
     MIRROR,
-    ROSY,
     SHEAR,
     SIZE,
     assert_parity,
@@ -22,6 +21,7 @@ from harness.gpu_scenes import (
     boxes,
     card_rgba,
     conjugate_field,
+    draw,
     face_centers,
     field_of,
     perturbed_field,
@@ -37,6 +37,7 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.projection.camera import Camera, look_at, perspective_camera
+from rosy_addon.rendering.view_input import ViewInput
 
 FAMILIES = replace(LOOK, hue="families")
 
@@ -346,6 +347,6 @@ def test_the_picture_is_empty_if_there_is_nothing_to_draw(card, instances):
 @pytest.mark.parametrize("size", [(1, 1), (3, 200), (200, 3), (257, 129)])
 def test_odd_sizes(card, size):
     rgba = card_rgba(card, [ball()], camera=view(size))
-    expected = ROSY.compose(ROSY.project([ball()], view(size)), replace(LOOK, method="brute")).rgba
+    expected = draw(None, ViewInput((ball(),), view(size), LOOK)).rgba
     assert rgba.shape == expected.shape
     assert ((rgba[..., 3] > 0) != (expected[..., 3] > 0)).mean() < 0.01

@@ -38,20 +38,14 @@ def test_every_triangle_that_is_not_hidden_is_seen(camera):
     occluders = [other.world_points()[other.surface.triangle_vertex] for other in instances]
     weights = np.random.default_rng(3).dirichlet(np.ones(3), size=len(corners))
     points = np.einsum("tk,tki->ti", weights, corners)
-    is_seen = ~meets_another(points, camera.view_directions(points), np.concatenate(occluders))
+    barycentric, distance = ray_intersections(
+        points, camera.view_directions(points), np.concatenate(occluders)
+    )
+    is_seen = ~((barycentric >= 0).all(axis=2) & (distance > 1e-6)).any(axis=1)
     assert is_seen.sum() > 50 and found[is_seen].mean() > 0.98
     pixels, _ = project_to_pixels(corners.reshape(-1, 3), camera)
     inside = in_frame(pixels, camera).reshape(-1, 3).all(axis=1)
     assert found[inside & ~is_seen].mean() < 0.6
-
-
-def meets_another(points, direction, triangles):
-    """Whether rays from points toward the camera meet a triangle."""
-    result = np.zeros(len(points), dtype=bool)
-    for index, (point, ray) in enumerate(zip(points, direction, strict=True)):
-        barycentric, distance = ray_intersections(point, ray, triangles)
-        result[index] = ((barycentric >= 0).all(axis=1) & (distance > 1e-6)).any()
-    return result
 
 
 def test_the_margin_is_a_distance_on_the_surface():

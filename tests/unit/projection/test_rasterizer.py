@@ -42,28 +42,22 @@ def cast_rays(points, triangles, camera):
 
     Also return whether a margin is below 1e-9, so that the result depends on rounding.
     """
-    shape = camera.width * camera.height
-    owner, depth = np.full(shape, -1), np.full(shape, np.inf)
-    weights, doubtful = np.zeros((shape, 3)), np.zeros(shape, dtype=bool)
+    row, column = np.divmod(np.arange(camera.width * camera.height), camera.width)
+    x = (2 * (column + 0.5) / camera.width - 1) / camera.projection[0, 0]
+    y = (2 * (row + 0.5) / camera.height - 1) / camera.projection[1, 1]
+    on_plane, away = np.stack([x, y, 0 * x], axis=1), np.array([0.0, 0.0, -1.0])
+    if camera.is_perspective:
+        origin, direction = 0 * on_plane, on_plane + away
+    else:
+        origin, direction = on_plane, 0 * on_plane + away
+    barycentric, distance = ray_intersections(origin, direction, points[triangles])
     near, far = CLIP
-    for pixel in range(shape):
-        row, column = divmod(pixel, camera.width)
-        x = (2 * (column + 0.5) / camera.width - 1) / camera.projection[0, 0]
-        y = (2 * (row + 0.5) / camera.height - 1) / camera.projection[1, 1]
-        if camera.is_perspective:
-            origin, direction = np.zeros(3), np.array([x, y, -1.0])
-        else:
-            origin, direction = np.array([x, y, 0.0]), np.array([0.0, 0.0, -1.0])
-        barycentric, distance = ray_intersections(origin, direction, points[triangles])
-        smallest = barycentric.min(axis=1)
-        hits = (smallest > -1e-9) & (distance > near - 1e-9) & (distance < far + 1e-9)
-        for index in np.flatnonzero(hits):
-            d = distance[index]
-            margin = min(smallest[index], d - near, far - d, abs(d - depth[pixel]))
-            doubtful[pixel] |= margin < 1e-9
-            if d < depth[pixel]:
-                owner[pixel], depth[pixel], weights[pixel] = index, d, barycentric[index]
-    return owner, weights, depth, doubtful
+    margin = np.min([barycentric.min(axis=2), distance - near, far - distance], axis=0)
+    depths = np.where(margin > -1e-9, distance, np.inf)
+    owner, first_two = depths.argmin(axis=1), np.sort(depths, axis=1)[:, :2]
+    doubtful = (np.abs(margin) < 1e-9).any(axis=1) | (first_two[:, 1] < first_two[:, 0] + 1e-9)
+    weights = barycentric[np.arange(len(owner)), owner]
+    return np.where(np.isfinite(first_two[:, 0]), owner, -1), weights, first_two[:, 0], doubtful
 
 
 @pytest.mark.slow

@@ -34,7 +34,7 @@ def view_from(eye, **look) -> ViewInput:
     return ViewInput((instance,), camera, Look(length=10, **look))
 
 
-VIEW = view_from((0.0, -1.5, 5.0), supersampling=2)
+VIEW = view_from((0.0, -1.5, 5.0), supersampling=2, arrows=40.0)
 
 
 def drawn(view: ViewInput, workers: int = 1) -> bytes:

@@ -1,7 +1,5 @@
 """The sources of shaders and their declarations, as far as they can be checked without a graphics card."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
@@ -38,11 +36,8 @@ def test_uniforms_are_aligned_as_in_std140(shader):
 def code_of(shader):
     """Return the source of a pass without comments, and without the file that is common to all."""
     kinds = ("comp",) if isinstance(shader, passes.ComputePass) else ("vert", "frag")
-    return code_of_files(*(f"{shader.name}.{kind}.glsl" for kind in kinds))
-
-
-def code_of_files(*files):
-    return re.sub(r"//[^\n]*|/\*.*?\*/", "", passes.read_source(*files).code, flags=re.S)
+    source = passes.read_source(*(f"{shader.name}.{kind}.glsl" for kind in kinds))
+    return re.sub(r"//[^\n]*|/\*.*?\*/", "", source.code, flags=re.S)
 
 
 def names_in(code):
@@ -50,35 +45,16 @@ def names_in(code):
     return set(re.findall(r"(?<![.\w])[A-Za-z_]\w*", code))
 
 
-def names_of(shader):
-    """Return the uniforms of a pass, and its textures and images with the mark of arrays."""
-    images = shader.images if isinstance(shader, passes.ComputePass) else ()
-    textures = {*shader.declared.textures, *(name for name, _ in images)}
-    return {name for name, _ in shader.uniforms}, textures
-
-
-def listed_names(shader):
-    uniforms, textures = names_of(shader)
-    return uniforms | {name.removesuffix("[]") for name in textures}
-
-
 @each_pass
-def test_sources_use_all_names_of_their_pass_and_no_others(shader):
-    """A pass that uses a uniform, texture or image of another pass has to declare it, too."""
-    code, listed = code_of(shader), listed_names(shader)
-    own = {"vertex_data"}  # the attribute of vertices
+def test_sources_use_all_names_of_their_pass(shader):
+    """Names that are not declared are found by the compiler."""
+    listed = {name for name, _ in shader.uniforms} | set(shader.declared.textures)
     if isinstance(shader, passes.RasterPass):
-        results = {name for name, _ in shader.vertex.outputs + shader.fragment.outputs}
-        assert results <= names_in(code)
-        own |= results
-    assert listed <= names_in(code), f"not used: {sorted(listed - names_in(code))}"
-    # Parameters and variables that are declared in the source may have any name.
-    kinds = r"(?:float|int|uint|bool|[iu]?vec[234])"
-    declared = set(re.findall(rf"\b{kinds}\s+([A-Za-z_]\w*)", code))
-    declared |= names_in(" ".join(re.findall(rf"\b{kinds}\s+[^;()]*;", code)))
-    known = set().union(*map(listed_names, PASSES))
-    used = names_in(code) & known - declared - listed - own
-    assert not used, f"not declared: {sorted(used)}"
+        listed |= {name for name, _ in shader.vertex.outputs + shader.fragment.outputs}
+    else:
+        listed |= {name for name, _ in shader.images}
+    unused = {name.removesuffix("[]") for name in listed} - names_in(code_of(shader))
+    assert not unused, f"not used: {sorted(unused)}"
 
 
 @each_pass
@@ -87,16 +63,6 @@ def test_declarations_and_members(shader):
     code = code_of(shader)
     assert not re.findall(r"^\s*(?:uniform|in|out|layout|#include|#pragma)\b.*", code, flags=re.M)
     assert not re.search(r"\.length\b", code)
-    for name in names_of(shader)[1]:
-        access = rf"(?:texelFetch|imageStore)\({name.removesuffix('[]')},\s*(ivec[23])\("
-        assert set(re.findall(access, code)) <= {"ivec3" if name.endswith("[]") else "ivec2"}
-
-
-def test_common_code_uses_no_uniforms():
-    """The common code is part of every pass: it gets uniforms only as parameters of functions."""
-    known = {name for shader in PASSES for name, _ in shader.uniforms}
-    known |= {name.removesuffix("[]") for shader in PASSES for name in shader.declared.textures}
-    assert not names_in(code_of_files("common.glsl")) & known
 
 
 @each_pass

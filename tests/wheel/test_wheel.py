@@ -123,28 +123,17 @@ def test_nothing_imports_the_name_of_the_tree():
             assert not roots & {"rosy_addon", "operators"}, f"{path}, line {node.lineno}"
 
 
-@pytest.mark.parametrize(
-    ("arguments", "status", "stream", "text"),
-    [
-        (["render", "--help"], 0, "stdout", "--preset"),
-        (["render", "no.obj", "-o", "no.png"], 2, "stderr", "no.obj"),
-    ],
-)
-def test_statuses(arguments, status, stream, text, tmp_path):
-    by_module = run(sys.executable, "-m", "rosyfields", *arguments, folder=tmp_path)
-    assert by_module.returncode == status
-    assert text in getattr(by_module, stream)
-    assert "Traceback" not in by_module.stderr
-
-
 def test_command_draws_the_same_bytes_as_the_tree(tmp_path):
     write_torus(tmp_path / "torus.obj")
     options = ["--size", "200x160", "--preset", "engraving", "--generate", "smoothest"]
     arguments = ["render", "torus.obj", *options, "-o"]
-    installed = run("rosyfields", *arguments, "wheel.png", folder=tmp_path)
+    python = sys.executable, "-m"
+    installed = run(*python, "rosyfields", *arguments, "wheel.png", folder=tmp_path)
     assert installed.returncode == 0, installed.stderr
+    refused = run("rosyfields", "render", "no.obj", "-o", "no.png", folder=tmp_path)
+    assert refused.returncode == 2 and refused.stderr.startswith("rosy: no.obj: ")
     in_tree = ENVIRONMENT | {"PYTHONPATH": str(TREE)}
-    module = [sys.executable, "-m", "rosy_addon"]
-    assert run(*module, *arguments, "tree.png", folder=tmp_path, env=in_tree).returncode == 0
+    words = *python, "rosy_addon", *arguments, "tree.png"
+    assert run(*words, folder=tmp_path, env=in_tree).returncode == 0
     picture = (tmp_path / "wheel.png").read_bytes()
     assert picture.startswith(b"\x89PNG") and picture == (tmp_path / "tree.png").read_bytes()

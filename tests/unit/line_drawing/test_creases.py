@@ -1,7 +1,5 @@
 """Strokes at creases and silhouettes: even spacing, with the tone and width of their own side."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from shapes import instance_of, sharp_cube
@@ -13,6 +11,8 @@ from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.projection.camera import look_at, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 
+pytestmark = pytest.mark.slow
+
 CAMERA = orthographic_camera(look_at((3, -5, 4), (0, 0, 0)), 300, 300, scale=2.0)
 
 #: Different tones on the three faces of the cube that the camera sees.
@@ -22,7 +22,6 @@ SIDE_LIGHT = Light("sun", np.array([-0.8, 0.3, 0.52]), np.ones(3), 0.9)
 CUBE = MeshInstance(sharp_cube(), np.eye(4), axis_field(sharp_cube(), 4, (0.2, 1.0, 0.1)))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("light", ["none", "scene"])
 def test_spacing_and_width_are_even_up_to_creases(light):
     """A flat face under a sun has one tone and, without perspective, one spacing."""
@@ -37,7 +36,6 @@ def test_spacing_and_width_are_even_up_to_creases(light):
     assert len(spacings) == 3
 
 
-@pytest.mark.slow
 def test_strokes_reach_creases_at_full_width():
     """Only ends inside faces are tapered: at creases, tapered ends leave a pale margin."""
     instance = instance_of(sharp_cube(), 4)

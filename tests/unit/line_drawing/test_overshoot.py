@@ -1,7 +1,5 @@
 """Overshoot: which ends are extended, by which length, and in which direction."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np
@@ -18,6 +16,8 @@ from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.visibility import project_to_pixels, rasterize_depth
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
+
+pytestmark = pytest.mark.slow
 
 IDENTITY = np.eye(4)
 MAX_PIXELS = 12.0
@@ -51,7 +51,6 @@ def pixel_growth(plain, extended, camera):
     return pixel_lengths(extended, camera) - pixel_lengths(plain, camera)
 
 
-@pytest.mark.slow
 def test_extensions_at_borders_are_straight_and_of_different_lengths():
     plain, extended = draw_both([SQUARE], TOP_CAMERA, spacing=3.0)
     assert len(plain) == len(extended) > 50
@@ -69,7 +68,6 @@ def test_extensions_at_borders_are_straight_and_of_different_lengths():
     assert (np.diff(extended.points[:, 0])[np.diff(extended.stroke) == 0] != 0).all()
 
 
-@pytest.mark.slow
 def test_extensions_cross_the_silhouette():
     plain, extended = draw_both([SPHERE], FRONT_CAMERA, spacing=9.0)
     assert len(plain) == len(extended)
@@ -93,7 +91,6 @@ def test_extensions_cross_the_silhouette():
     assert np.abs(np.diff(pixels, 2, axis=0)[inner]).max() < 1e-6
 
 
-@pytest.mark.slow
 def test_extensions_lie_on_occluders_in_front():
     occluder = MeshInstance(plane(), moved(x=1.2, z=0.7))
     plain, extended = draw_both([SQUARE, occluder], TOP_CAMERA, spacing=6.0)
@@ -108,7 +105,6 @@ def test_extensions_lie_on_occluders_in_front():
     assert np.allclose(extended.points[on_square, 2], 0, atol=1e-6)
 
 
-@pytest.mark.slow
 def test_extensions_into_the_light_follow_the_surface():
     plain, extended = draw_both([SPHERE], FRONT_CAMERA, spacing=9.0, light="lamp")
     # Where the sphere is visible, points are on it, within about half a pixel.
@@ -121,7 +117,6 @@ def test_extensions_into_the_light_follow_the_surface():
     assert np.abs(height).max() < 0.02 and pixel_growth(plain, extended, FRONT_CAMERA).mean() > 1
 
 
-@pytest.mark.slow
 def test_ends_at_gaps_and_at_neighbors_are_not_extended():
     plain, extended = draw_both([turned(SQUARE.surface, 4)], TOP_CAMERA, spacing=20.0, gaps=0.3)
     is_inner = np.abs(ends_of(plain)[:, :, :2]).max(axis=(1, 2)) < 1 - 1e-9
@@ -136,7 +131,6 @@ def test_ends_at_gaps_and_at_neighbors_are_not_extended():
     assert facing.sum() > 10 and np.allclose(ends_of(plain)[facing], ends_of(extended)[facing])
 
 
-@pytest.mark.slow
 def test_closed_strokes_and_outlines_are_not_extended():
     circles, occluder = latitudes(icosphere(3)), MeshInstance(plane(), moved(x=1.8, z=1.7))
     plain, extended = draw_both([circles, occluder], TOP_CAMERA, spacing=15.0, outline=True)
@@ -150,7 +144,6 @@ def test_closed_strokes_and_outlines_are_not_extended():
     assert (~extended.closed).any()
 
 
-@pytest.mark.slow
 def test_ends_at_creases_are_extended():
     surface = sharp_cube()
     instance = MeshInstance(surface, IDENTITY, axis_field(surface, 2, (0.2, 1.0, 0.1)))
@@ -161,7 +154,6 @@ def test_ends_at_creases_are_extended():
     assert (pixel_growth(plain, extended, camera) > 1).mean() > 0.5
 
 
-@pytest.mark.slow
 def test_extensions_are_clipped_to_the_frame():
     camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 206, 206, scale=2.06)
     for options in ({}, {"hidden": True}):
@@ -172,7 +164,6 @@ def test_extensions_are_clipped_to_the_frame():
         assert np.abs(ends_of(strokes)[:, :, 0]).min() > 1.015
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("taper", [0.0, 1.0])
 def test_extensions_are_tapered(taper):
     style = StrokeStyle(spacing=6, taper=taper, overshoot=MAX_PIXELS)
@@ -183,7 +174,6 @@ def test_extensions_are_tapered(taper):
     assert np.allclose(strokes.width[from_tip >= taper * 0.06 + 1e-9], 1.0)
 
 
-@pytest.mark.slow
 def test_with_hidden_strokes_extensions_are_straight_in_space():
     """On a slanted plane, extensions are in the plane. Their length is along the plane."""
     slope = np.array([[0.6, 0, -0.8], [0, 1, 0], [0.8, 0, 0.6]])
@@ -196,7 +186,6 @@ def test_with_hidden_strokes_extensions_are_straight_in_space():
     assert growth.max() <= 0.01 * MAX_PIXELS + 1e-6
 
 
-@pytest.mark.slow
 def test_extensions_double_short_strokes():
     """Each end is extended by at most half the length."""
     traced = strokes_of((SQUARE,), TOP_CAMERA, StrokeStyle(spacing=6, taper=0))

@@ -1,7 +1,5 @@
 """Fields, meshes and views on which the pictures of the graphics card are compared with those of numpy."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 

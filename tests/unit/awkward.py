@@ -1,7 +1,5 @@
 """Meshes that are unusual or not closed manifolds, as points and faces; also for Blender."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -1,7 +1,5 @@
 """Surfaces, matrices and measures for tests of fields."""
 
-from __future__ import annotations
-
 import numpy as np
 from awkward import AWKWARD
 from scipy import sparse

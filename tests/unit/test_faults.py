@@ -1,7 +1,5 @@
 """The deliberate faults of faults.toml can still be applied; `tools/run_faults.py` runs them."""
 
-from __future__ import annotations
-
 import tomllib
 
 from conftest import ROOT

@@ -1,7 +1,5 @@
 """The job type for Flamenco, in a JavaScript engine with the manager's documented functions."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """Keys: coverage of triangles, round numbers, layouts without overlaps, and the colors of the bar."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 

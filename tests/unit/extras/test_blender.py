@@ -1,7 +1,5 @@
 """Finding a Blender, with small programs in its place. tests/blender runs commands in a real one."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

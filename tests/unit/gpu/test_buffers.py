@@ -1,7 +1,5 @@
 """The input of the graphics card: buffers of meshes, kinds of fields, and boxes on screen."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from harness.gpu_scenes import (

@@ -1,7 +1,5 @@
 """What the renderer on the graphics card keeps, refuses, prepares and draws besides single pictures."""
 
-from __future__ import annotations
-
 import pickle
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Constants that shaders share with numpy are written once: a check without a graphics card."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -3,8 +3,6 @@
 These tests are skipped without moderngl or without a context (EGL; software OpenGL is enough).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Meshes, fields, matrices and cameras: pictures of the card and of numpy, of the same pixels."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

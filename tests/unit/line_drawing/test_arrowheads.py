@@ -1,7 +1,5 @@
 """Arrowheads point along the members of fields of odd degree, evenly spaced along strokes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The part of a mesh in view: exactly what is in the frame, and the same surface where it is cut."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from shapes import icosphere, instance_of, plane

@@ -1,7 +1,5 @@
 """Outlines in pictures: silhouettes without gaps, creases without specks."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from harness.stroke_tracing import pixel_lengths

@@ -1,7 +1,5 @@
 """Drawings of several instances: families, density, light, and the geometry of the strokes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

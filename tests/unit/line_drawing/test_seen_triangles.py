@@ -1,7 +1,5 @@
 """Strokes are traced only where they can be seen: all that is seen, and as if there were more."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from rays import ray_intersections

@@ -1,7 +1,5 @@
 """Strokes: directions, spacing, families and visibility."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """SVG files of strokes: layers, paths, outlines of lines, and the order of a plotter."""
 
-from __future__ import annotations
-
 import re
 import sys
 import xml.etree.ElementTree as ElementTree

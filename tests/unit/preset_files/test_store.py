@@ -1,7 +1,5 @@
 """Presets of the user: saved, renamed, shared, and read from untrusted files."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Ambient occlusion against closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from shapes import from_quads, grid_of_quads, icosphere, moved, placed, plane

@@ -1,7 +1,5 @@
 """Cameras: lenses as in Blender, framing, and errors."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Links between pixels: smooth surfaces are continuous, silhouettes and creases separate pixels."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from harness.planar import planar_pixel_field

@@ -1,7 +1,5 @@
 """The G-buffer against explicit transport, closed forms and invariances."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

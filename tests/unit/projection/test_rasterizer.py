@@ -1,7 +1,5 @@
 """The rasterizer against a ray caster; no cracks, no overlaps, any order of triangles."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

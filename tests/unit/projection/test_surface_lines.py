@@ -1,7 +1,5 @@
 """Evenly spaced lines on surfaces: distances, directions, and meshes that are not simple."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from awkward import AWKWARD

@@ -1,7 +1,5 @@
 """Turntable videos, and GIF files against Pillow's decoder."""
 
-from __future__ import annotations
-
 import io
 import tempfile
 

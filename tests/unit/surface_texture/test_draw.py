@@ -1,7 +1,5 @@
 """Textures show the field of the surface, whatever the charts of their UV map."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from harness.streaks import correlation

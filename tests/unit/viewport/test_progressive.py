@@ -1,7 +1,5 @@
 """Previews and final pictures of views, with a renderer that only notes what it does."""
 
-from __future__ import annotations
-
 import os
 import time
 from itertools import count, pairwise

@@ -1,7 +1,5 @@
 """Messages between two processes, here between two ends of a pipe in one."""
 
-from __future__ import annotations
-
 from multiprocessing import Pipe
 
 import numpy as np

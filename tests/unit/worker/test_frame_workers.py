@@ -1,7 +1,5 @@
 """Processes for frames: all that they print arrives, while they run, and none is left."""
 
-from __future__ import annotations
-
 import os
 import sys
 import time

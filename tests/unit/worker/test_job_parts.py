@@ -1,7 +1,5 @@
 """Jobs as parts of others, programs as parts of jobs, and calls that helpers make."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

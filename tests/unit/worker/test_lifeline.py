@@ -1,7 +1,5 @@
 """All processes and temporary folders end with the process that started them, however it ends."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

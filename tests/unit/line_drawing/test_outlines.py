@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from harness.outline_marks import visible_silhouettes
 from harness.stroke_tracing import pixel_lengths
 from scipy.spatial import cKDTree
 from shapes import cylinder, icosphere, plane, rebuilt, torus
@@ -12,7 +13,7 @@ from rosy_addon.field.surface import build_surface
 from rosy_addon.line_drawing.outline import OUTLINE_KINDS
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
-from rosy_addon.line_drawing.visibility import project_to_pixels, rasterize_depth
+from rosy_addon.line_drawing.visibility import project_to_pixels
 from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 
@@ -31,18 +32,8 @@ def outlines_of(surface, camera):
 
 
 def coverage(lines, surface, camera, tolerance):
-    """Return the share of the border of a surface in a picture that is near an outline.
-
-    The border is where pixels of the surface meet those of the background, at four times the
-    resolution.
-    """
-    fine = camera.scaled(4)
-    shown = rasterize_depth([MeshInstance(surface, IDENTITY)], fine).triangle >= 0
-    borders = []
-    for axis, offset in ((0, (0.5, 1.0)), (1, (1.0, 0.5))):
-        row, column = np.nonzero(np.diff(shown, axis=axis))
-        borders.append((np.stack([column, row], axis=1) + offset) / 4)
-    border = np.concatenate(borders)[::3]
+    """Return the share of the visible silhouettes of a surface that is near an outline."""
+    border, _ = visible_silhouettes(MeshInstance(surface, IDENTITY), camera)
     pixels, _ = project_to_pixels(lines.points, camera)
     is_first = np.zeros(len(pixels), dtype=bool)
     is_first[lines.start[:-1]] = True

@@ -207,17 +207,6 @@ class HelpedRenderer(NotingRenderer):
         return view.instances, view.camera.width
 
 
-def test_what_the_helper_does_is_named(helper, view_input):
-    progressive, shown = progressive_of(HelpedRenderer(), helper), []
-
-    def is_done(view):
-        shown.append(view.progress.label if view.progress else "")
-        return has_picture(view)
-
-    view = updated(progressive, "key", view_input, is_done)
-    assert view.texture == ((), 32) and view.progress is None and "drawing" in shown
-
-
 @pytest.mark.slow
 def test_previews_are_finished_and_final_pictures_abandoned(helper, view_input, monkeypatch):
     monkeypatch.setattr(progressive_module, "FRAME_BUDGET_SECONDS", 0.0)

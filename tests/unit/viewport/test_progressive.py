@@ -1,6 +1,5 @@
 """Previews and final pictures of views, with a renderer that only notes what it does."""
 
-import os
 import time
 from itertools import count, pairwise
 from types import SimpleNamespace
@@ -14,7 +13,7 @@ from rosy_addon.projection.camera import orthographic_camera
 from rosy_addon.rendering.view_input import ViewInput
 from rosy_addon.viewport import progressive as progressive_module
 from rosy_addon.viewport.progressive import ProgressiveRenderer, Request
-from rosy_addon.worker.helper import Helper, HelperLostError
+from rosy_addon.worker.helper import Helper
 from rosy_addon.worker.job import Call, Step
 
 POINTERS = 1, 2
@@ -258,20 +257,3 @@ def test_two_views_share_the_helper(helper, view_input):
     assert all(view.texture == ((), 32) for view in views)
     progressive.remove_space(POINTERS[0])
     assert not progressive.views and progressive.poll()
-
-
-def test_without_a_helper_pictures_are_drawn_in_place(monkeypatch, view_input, helper):
-    def fail(self):
-        raise HelperLostError("no helper process can be started", False)
-
-    monkeypatch.setattr(Helper, "start", fail)
-    view = updated(progressive_of(HelpedRenderer(len, ("abc",)), helper), "key", view_input)
-    assert view.texture == ((), 32)
-
-
-def test_a_helper_that_ends_is_an_error(helper, view_input):
-    progressive = progressive_of(HelpedRenderer(os._exit, (3,)), helper)
-    with pytest.raises(RosyError, match="has ended"):
-        updated(progressive, "key", view_input)
-    progressive.renderer.picture, progressive.renderer.arguments = len, ("abc",)
-    assert updated(progressive, "another", view_input).texture == ((), 32)

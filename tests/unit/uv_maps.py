@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import map_coordinates
 
 
 def torus_uv(columns: int = 96, rows: int = 48, width: float = 0.9) -> np.ndarray:
@@ -45,11 +46,5 @@ def colors_at(image: np.ndarray, surface, uv: np.ndarray, points) -> np.ndarray:
     triangle, weights = points
     place = np.einsum("nk,nki->ni", weights, uv[surface.triangles[triangle]])
     height, width = image.shape[:2]
-    x, y = place[:, 0] * width - 0.5, place[:, 1] * height - 0.5
-    column, row = np.floor(x).astype(int), np.floor(y).astype(int)
-    x, y = x - column, y - row
-
-    def at(dx, dy):
-        return image[(row + dy) % height, (column + dx) % width, 0]
-
-    return (at(0, 0) * (1 - x) + at(1, 0) * x) * (1 - y) + (at(0, 1) * (1 - x) + at(1, 1) * x) * y
+    row_column = place[:, 1] * height - 0.5, place[:, 0] * width - 0.5
+    return map_coordinates(image[..., 0], row_column, order=1, mode="grid-wrap")

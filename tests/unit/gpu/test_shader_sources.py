@@ -5,11 +5,20 @@ import re
 import numpy as np
 import pytest
 
-from rosy_addon.gpu import passes
+from rosy_addon.gpu import defines, passes
 from rosy_addon.gpu.device import UNIFORM_WORDS, _pack_uniforms, _std140_order
 
 PASSES = passes.all_passes()
 each_pass = pytest.mark.parametrize("shader", PASSES, ids=lambda shader: shader.name)
+
+#: Files without comments, and the constants that they share with numpy.
+SOURCES = {
+    path.name: re.sub(r"//[^\n]*", "", path.read_text(encoding="utf-8"))
+    for path in sorted(passes.SHADER_FOLDER.glob("*.glsl"))
+}
+DEFINED = dict(
+    line.removeprefix("#define ").split(" ", 1) for line in defines.shader_defines().splitlines()
+)
 
 
 @each_pass
@@ -74,3 +83,24 @@ def test_no_variable_has_the_name_of_a_uniform(shader):
     declared |= set(re.findall(rf"\b(?:{kinds})\s[^;(]*?,\s*(\w+)\s*[=;,]", code))
     declared |= set(re.findall(r"(?<=[A-Za-z_\])])\.([A-Za-z_]\w*)", code))
     assert not declared & {name for name, _ in shader.uniforms}
+
+
+def test_every_constant_is_defined_and_used():
+    code = "".join(SOURCES.values())
+    used = set(re.findall(r"\b[A-Z][A-Z0-9_]+\b", code))  # names in capitals
+    local = set(re.findall(r"#define\s+(\w+)", code))
+    assert set(DEFINED) <= used <= local | set(DEFINED)
+
+
+def test_shaders_read_records_by_named_texels():
+    for name, code in SOURCES.items():
+        assert not re.search(r"\brecord_texel\(\w+,\s*\d", code), name
+
+
+@pytest.mark.parametrize(
+    "name", [name for name, value in defines.CONSTANTS.items() if isinstance(value, float)]
+)
+def test_literals_round_to_the_same_number(name):
+    text = DEFINED[name].strip("()")
+    assert "." in text or "e" in text, "GLSL would read an integer"
+    assert np.float32(text) == np.float32(defines.CONSTANTS[name])

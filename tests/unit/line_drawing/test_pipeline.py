@@ -7,11 +7,12 @@ import pytest
 from harness.stroke_tracing import trace_strokes, turned
 from listeners import cancel_at
 from scipy.spatial import cKDTree
-from shapes import from_triangles, icosphere, instance_of, moved, plane, rebuilt
+from shapes import from_triangles, icosphere, instance_of, moved, plane, rebuilt, sharp_cube
 
 from rosy_addon.compositor.shading import Light
 from rosy_addon.core.progress import listening
 from rosy_addon.field.frames import dot, normalize
+from rosy_addon.field.generate import GeneratorSettings
 from rosy_addon.line_drawing import lateral_neighbors, seeding, separation, visibility
 from rosy_addon.line_drawing.drawing_outputs import offset_toward_camera, stroke_geometry
 from rosy_addon.line_drawing.outline import OUTLINE_KINDS
@@ -192,3 +193,37 @@ def test_swelling_strokes_are_evenly_spaced():
     to_eye = CAMERA.view_directions(swelling.points)
     darkness = 1 - np.clip(dot(normalize(swelling.points), to_eye), 0, 1)
     np.testing.assert_allclose(swelling.width[first], darkness[first], atol=0.05)
+
+
+# --- creases -------------------------------------------------------------------------------------
+
+CUBE_CAMERA = orthographic_camera(look_at((3, -5, 4), (0, 0, 0)), 300, 300, scale=2.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("light", ["none", "scene"])
+def test_spacing_and_width_are_even_up_to_creases(light):
+    """A flat face under a sun has one tone and, without perspective, one spacing."""
+    style = StrokeStyle(spacing=7.0, light=light, layering=0.0, taper=0.0)
+    # Different tones on the three faces of the cube that the camera sees.
+    lights = [Light("sun", np.array([-0.8, 0.3, 0.52]), np.ones(3), 0.9)]
+    cube = instance_of(sharp_cube(), 4, GeneratorSettings("axis", (0.2, 1.0, 0.1)))
+    strokes = draw_instances([cube], CUBE_CAMERA, style, lights=lights).strokes
+    assert len(np.unique(strokes.face)) == 3
+    spacings = set()
+    for face in np.unique(strokes.face):
+        spacing, width = strokes.spacing[strokes.face == face], strokes.width[strokes.face == face]
+        assert np.ptp(spacing) < 1e-6 * spacing.max() and np.ptp(width) < 1e-6
+        spacings.add(round(float(spacing[0]), 6))
+    assert len(spacings) == 3
+
+
+@pytest.mark.slow
+def test_strokes_reach_creases_at_full_width():
+    """Only ends inside faces are tapered: at creases, tapered ends leave a pale margin."""
+    instance = instance_of(sharp_cube(), 4)
+    strokes = draw_instances([instance], CUBE_CAMERA, StrokeStyle(spacing=7.0, taper=0.8)).strokes
+    ends = np.concatenate([strokes.start[:-1], strokes.start[1:] - 1])
+    at_crease = (np.abs(np.abs(strokes.points[ends] - 0.5) - 0.5) < 1e-6).sum(axis=1) >= 2
+    assert at_crease.sum() > 60 and strokes.width[ends][at_crease].min() == 1
+    assert strokes.width[ends][~at_crease].min() < 0.5

@@ -13,6 +13,7 @@ from shapes import cube, from_quads, from_triangles, icosphere, placed, plane, r
 
 from rosy_addon.core.errors import RosyError
 from rosy_addon.field.frames import dot, normalize, tangent_frame, transport, view_frame
+from rosy_addon.field.representation import from_representation, to_representation
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
 from rosy_addon.projection.camera import perspective_camera as lens
@@ -38,25 +39,10 @@ def tangent_field(surface, degree, seed=0):
 
 
 def members_in_space(gbuffer, degree):
-    """(P, 3) members in camera space, from the representation."""
-    angle = np.angle(gbuffer.representation.astype(complex)) / degree
-    toward_eye = gbuffer.view_direction.astype(float)
-    x, y = view_frame(toward_eye)
-    member_in_view = np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y
-    return transport(member_in_view, toward_eye, gbuffer.normal.astype(float))
-
-
-def representation(vectors, normal, degree):
-    """z in `tangent_frame(normal)`, by trigonometry."""
-    x, y = tangent_frame(normal)
-    angle = np.arctan2(dot(vectors, y), dot(vectors, x))
-    return np.linalg.norm(vectors, axis=-1) * np.exp(1j * degree * angle)
-
-
-def member(z, normal, degree):
-    x, y = tangent_frame(normal)
-    angle = np.angle(z) / degree
-    return np.abs(z) * (np.cos(angle) * x + np.sin(angle) * y)
+    """(P, 3) unit members in camera space, from the representation."""
+    toward_eye, z = gbuffer.view_direction.astype(float), gbuffer.representation.astype(complex)
+    in_view = from_representation(z / np.abs(z), *view_frame(toward_eye), degree)
+    return transport(in_view, toward_eye, gbuffer.normal.astype(float))
 
 
 def screen_directions(gbuffer, degree):
@@ -80,38 +66,33 @@ def moved_on_screen(gbuffer, vectors, h=1e-6):
 
 
 def explicit_values(surface, field, gbuffer, chosen, linear):
-    """z at some pixels in the view frame, by transporting one vector at a time in space."""
-    degree = field.degree
+    """z at some pixels in the view frame, by transporting vectors in space."""
+    degree, corner_normal = field.degree, surface.corner_normal @ linear.T
     vectors, faces = field.vectors @ linear.T, surface.face_normal @ linear.T
-    corner_normal = surface.corner_normal @ linear.T
     points = surface.vertices[surface.corner_vertex]
     previous_corner = np.argsort(surface.next_corner)
     to_next = normalize(points[surface.next_corner] - points)
     angle = np.arccos(dot(to_next, normalize(points[previous_corner] - points)))
     at_corner, length = np.zeros((len(angle), 3)), np.zeros(len(angle))
-    for corner in range(len(angle)):
+    for corner, normal in enumerate(corner_normal):
         fan = np.flatnonzero(surface.corner_fan == surface.corner_fan[corner])
-        faces_of_fan, normal = surface.corner_face[fan], corner_normal[corner]
-        transported = [transport(vectors[f], faces[f], normal) for f in faces_of_fan]
-        z = np.array([representation(vector, normal, degree) for vector in transported])
+        face, share = surface.corner_face[fan], angle[fan] / angle[fan].sum()
+        frame = tangent_frame(normal)
+        z = to_representation(transport(vectors[face], faces[face], normal), *frame, degree)
         # Lengths have means of their own: directions that differ do not shorten them.
-        length[corner] = (field.magnitude[faces_of_fan] * angle[fan]).sum() / angle[fan].sum()
-        at_corner[corner] = member((z * angle[fan]).sum() / angle[fan].sum(), normal, degree)
-    values = []
-    for pixel in chosen:
-        corners = surface.triangles[gbuffer.triangle[pixel]]
-        weights = gbuffer.barycentric[pixel].astype(float)
-        normal = normalize(weights @ corner_normal[corners])
-        transported = [transport(at_corner[c], corner_normal[c], normal) for c in corners]
-        z = weights @ [representation(vector, normal, degree) for vector in transported]
-        direction = member(z, normal, degree)
-        eye = gbuffer.view_direction[pixel].astype(float)
-        side = np.sign(dot(gbuffer.normal[pixel].astype(float), normal))
-        member_in_view = transport(direction, side * normal, eye)
-        x, y = view_frame(eye)
-        angle_in_view = np.arctan2(dot(member_in_view, y), dot(member_in_view, x))
-        values.append(weights @ length[corners] * np.exp(1j * degree * angle_in_view))
-    return np.array(values)
+        length[corner] = share @ field.magnitude[face]
+        at_corner[corner] = from_representation(share @ z, *frame, degree)
+    corners = surface.triangles[gbuffer.triangle[chosen]]
+    weights = gbuffer.barycentric[chosen].astype(float)
+    normal = normalize(np.einsum("pk,pki->pi", weights, corner_normal[corners]))
+    x, y = tangent_frame(normal)
+    members = transport(at_corner[corners], corner_normal[corners], normal[:, None])
+    z = to_representation(members, x[:, None], y[:, None], degree)
+    direction = from_representation((weights * z).sum(axis=1), x, y, degree)
+    eye = gbuffer.view_direction[chosen].astype(float)
+    side = np.sign(dot(gbuffer.normal[chosen].astype(float), normal))[:, None]
+    z = to_representation(transport(direction, side * normal, eye), *view_frame(eye), degree)
+    return (weights * length[corners]).sum(axis=1) * z / np.abs(z)
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3, 4, 6])
@@ -219,9 +200,9 @@ def test_flat_faces_show_their_own_member(display):
     modulus = np.abs(gbuffer.representation)
     np.testing.assert_allclose(modulus, field.magnitude[gbuffer.face], rtol=1e-5)
     own = field.vectors[gbuffer.face] @ camera.view[:3, :3].T
-    normal = gbuffer.normal.astype(float)
-    turn = representation(members_in_space(gbuffer, 3), normal, 3)
-    z = representation(own, normal, 3)
+    frame = tangent_frame(gbuffer.normal.astype(float))
+    turn = to_representation(members_in_space(gbuffer, 3), *frame, 3)
+    z = to_representation(own, *frame, 3)
     np.testing.assert_allclose(turn, z / np.abs(z), atol=1e-4)
 
 

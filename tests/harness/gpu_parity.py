@@ -139,8 +139,7 @@ def draw_pair(
             numpy_picture = compose(gbuffer, look, lights, reference, drift=drift).rgba
     else:
         numpy_picture = compose(gbuffer, replace(look, method="brute"), lights, reference).rgba
-    named = {name: np.array(image) for name, image in images.items()}
-    return Pair(gbuffer, named, card_picture, numpy_picture, is_center)
+    return Pair(gbuffer, images, card_picture, numpy_picture, is_center)
 
 
 def read_gbuffer(card: Any, width: int, height: int) -> dict[str, np.ndarray]:

@@ -19,7 +19,7 @@ from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 from rosy_addon.worker.job import run
 
-from .gpu_parity import draw_pair
+from .gpu_parity import draw_on_card, draw_pair
 
 AXIS = (0.3, 0.2, 1.0)
 SHEAR = np.array([[1.0, 0.4, 0.0], [0.0, 0.8, 0.3], [0.0, 0.0, 1.2]])
@@ -147,10 +147,7 @@ def draw(renderer, view_input):
 
 def card_rgba(card, instances, look=LOOK, camera=None, **others):
     """Draw a picture on the card; it may be empty, and larger than what is in view."""
-    camera = view() if camera is None else camera
-    items = card.upload(instances, look.display)
-    texture = run(card.texture_steps(items, ViewInput((), camera, look, **others)))
-    return card.device.read(texture).copy()
+    return draw_on_card(card, ViewInput(tuple(instances), camera or view(), look, **others))
 
 
 def assert_parity(

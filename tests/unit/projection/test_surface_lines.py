@@ -114,17 +114,19 @@ def test_phases_are_continuous_where_lines_end():
     vertex = lines.tree.leaf_vertex
     assert np.abs(lines.pattern.index).max() == 1
     # The middles of all edges, evaluated in both triangles.
-    values = {}
-    for corner in range(3):
+    edges, values = [], []
+    for corner, following in ((0, 1), (1, 2), (2, 0)):
         weights = np.zeros((3, len(vertex)), dtype=np.float32)
-        weights[corner] = weights[(corner + 1) % 3] = 0.5
+        weights[[corner, following]] = 0.5
         triangles = np.arange(len(vertex))
         phase = lines.pattern.evaluate(triangles, weights, np.zeros(len(vertex), dtype=int))
-        ends = np.sort(np.stack([vertex[:, corner], vertex[:, (corner + 1) % 3]]), axis=0)
-        for a, b, value in zip(*ends.tolist(), phase.tolist(), strict=True):
-            values.setdefault((a, b), []).append(abs(value - round(value)))
-    pairs = np.array([pair for pair in values.values() if len(pair) == 2])
-    assert len(pairs) == 1.5 * len(vertex)
+        values.append(np.abs(phase - np.rint(phase)))
+        edges.append(np.sort(vertex[:, [corner, following]], axis=1))
+    _, edge, count = np.unique(
+        np.concatenate(edges), axis=0, return_inverse=True, return_counts=True
+    )
+    assert (count == 2).all()
+    pairs = np.concatenate(values)[np.argsort(edge)].reshape(-1, 2)
     # Around the singular vertices, triangles have phases of their own.
     assert np.mean(np.abs(pairs[:, 0] - pairs[:, 1]) > 1e-3) < 0.005
 

@@ -5,7 +5,6 @@ import pytest
 from rays import ray_intersections
 from shapes import icosphere, instance_of, moved, plane, torus
 
-from rosy_addon.field.generate import GeneratorSettings
 from rosy_addon.line_drawing.mesh_in_view import (
     HIDDEN_MARGIN,
     MARGIN_PIXELS,
@@ -35,8 +34,8 @@ SCENES = {
 
 def mesh_and_part(name):
     surface, camera = SCENES[name]
-    settings = GeneratorSettings("axis", (1, 0.3, 0)) if name == "ground" else "form"
-    mesh = build_tangent_mesh(instance_of(surface, 4, settings))
+    kind = (1, 0.3, 0) if name == "ground" else "form"
+    mesh = build_tangent_mesh(instance_of(surface, 4, kind))
     return mesh, mesh_in_view(mesh, camera), camera
 
 

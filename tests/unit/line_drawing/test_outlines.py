@@ -5,10 +5,9 @@ import pytest
 from harness.outline_marks import visible_silhouettes
 from harness.stroke_tracing import pixel_lengths
 from scipy.spatial import cKDTree
-from shapes import cylinder, icosphere, plane, rebuilt, torus
+from shapes import cylinder, icosphere, instance_of, plane, rebuilt, torus
 
 import rosy_addon.api as rf
-from rosy_addon.field.generate import axis_field
 from rosy_addon.field.surface import build_surface
 from rosy_addon.line_drawing.outline import OUTLINE_KINDS
 from rosy_addon.line_drawing.pipeline import draw_instances
@@ -25,7 +24,7 @@ MIN_MARK_PX = 6.0
 
 def outlines_of(surface, camera):
     """Return the outlines of a drawing."""
-    instance = MeshInstance(surface, IDENTITY, axis_field(surface, 4, (0.1, 0.2, 1)))
+    instance = instance_of(surface, 4, (0.1, 0.2, 1))
     strokes = draw_instances([instance], camera, StrokeStyle(spacing=40, outline=True)).strokes
     kinds = [strokes.names.index(kind) for kind in OUTLINE_KINDS]
     return strokes.select(np.isin(strokes.family, kinds))

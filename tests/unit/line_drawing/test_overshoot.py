@@ -8,7 +8,6 @@ from harness.stroke_tracing import latitudes, pixel_lengths, turned
 from shapes import icosphere, instance_of, moved, placed, plane, sharp_cube
 
 from rosy_addon.field.frames import dot, normalize
-from rosy_addon.field.generate import axis_field
 from rosy_addon.line_drawing.outline import OUTLINE_KINDS
 from rosy_addon.line_drawing.pipeline import TIP_WIDTH, draw_instances
 from rosy_addon.line_drawing.stroke_ends import MIN_EXTENSION_RATIO, extend_free_ends
@@ -145,8 +144,7 @@ def test_closed_strokes_and_outlines_are_not_extended():
 
 
 def test_ends_at_creases_are_extended():
-    surface = sharp_cube()
-    instance = MeshInstance(surface, IDENTITY, axis_field(surface, 2, (0.2, 1.0, 0.1)))
+    instance = instance_of(sharp_cube(), 2, (0.2, 1.0, 0.1))
     camera = orthographic_camera(look_at((3, -5, 4), (0, 0, 0)), 300, 300, scale=3.0)
     plain, extended = draw_both([instance], camera, spacing=8.0)
     assert (pixel_growth(plain, extended, camera) > 1).mean() > 0.9

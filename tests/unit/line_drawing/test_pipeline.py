@@ -12,7 +12,6 @@ from shapes import from_triangles, icosphere, instance_of, moved, plane, rebuilt
 from rosy_addon.compositor.shading import Light
 from rosy_addon.core.progress import listening
 from rosy_addon.field.frames import dot, normalize
-from rosy_addon.field.generate import GeneratorSettings
 from rosy_addon.line_drawing import lateral_neighbors, seeding, separation, visibility
 from rosy_addon.line_drawing.drawing_outputs import offset_toward_camera, stroke_geometry
 from rosy_addon.line_drawing.outline import OUTLINE_KINDS
@@ -207,7 +206,7 @@ def test_spacing_and_width_are_even_up_to_creases(light):
     style = StrokeStyle(spacing=7.0, light=light, layering=0.0, taper=0.0)
     # Different tones on the three faces of the cube that the camera sees.
     lights = [Light("sun", np.array([-0.8, 0.3, 0.52]), np.ones(3), 0.9)]
-    cube = instance_of(sharp_cube(), 4, GeneratorSettings("axis", (0.2, 1.0, 0.1)))
+    cube = instance_of(sharp_cube(), 4, (0.2, 1.0, 0.1))
     strokes = draw_instances([cube], CUBE_CAMERA, style, lights=lights).strokes
     assert len(np.unique(strokes.face)) == 3
     spacings = set()

@@ -31,7 +31,6 @@ from shapes import (
 )
 
 from rosy_addon.field.frames import dot, normalize
-from rosy_addon.field.generate import axis_field
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.line_drawing.families import global_labels
 from rosy_addon.line_drawing.outline import outline_strokes
@@ -121,7 +120,7 @@ def test_strokes_look_like_the_render():
 @pytest.mark.slow
 def test_strokes_stop_at_creases_unless_asked():
     surface = sharp_cube()
-    instance = MeshInstance(surface, IDENTITY, axis_field(surface, 4, (1, 0.3, 0.2)))
+    instance = instance_of(surface, 4, (1, 0.3, 0.2))
 
     def face_counts(strokes):
         return [len(np.unique(strokes.face[a:b])) for a, b in pairwise(strokes.start)]
@@ -253,7 +252,7 @@ def test_thin_sheets_do_not_interfere():
     upper = plane()
     lower = from_quads(upper.vertices - (0, 0, 0.001), upper.corner_vertex.reshape(-1, 4)[:, ::-1])
     surface = joined(upper, lower)
-    instance = MeshInstance(surface, IDENTITY, axis_field(surface, 2, (1, 0, 0)))
+    instance = instance_of(surface, 2, (1, 0, 0))
     strokes = trace_strokes(instance, 0.1)
     is_upper = strokes.normal[strokes.start[:-1], 2] > 0
     assert 18 <= is_upper.sum() <= 22 and 18 <= (~is_upper).sum() <= 22
@@ -268,7 +267,7 @@ def test_ink_coverage_follows_a_ramp_of_tone():
     surface = plane(40, 40)
     width = 0.025
     spacing = width * spacing_by_tone(0.85 * (surface.vertices[:, 0] + 1) / 2, max_ratio=1 / 0.15)
-    instance = MeshInstance(surface, IDENTITY, axis_field(surface, 2, (0, 1, 0)))
+    instance = instance_of(surface, 2, (0, 1, 0))
     start, end, _ = segments_of(trace_strokes(instance, spacing))
     length = np.linalg.norm(end - start, axis=1)
     bins = np.linspace(-1, 1, 6)
@@ -285,7 +284,7 @@ def test_strokes_are_denser_where_the_surface_is_more_curved():
     surface = rebuilt(sphere, sphere.vertices * (1, 1, 3))
     spacing = 0.06 * spacing_by_curvature(surface, 1.0)
     assert np.ptp(spacing) > 0.01
-    instance = MeshInstance(surface, IDENTITY, axis_field(surface, 2, (0, 0, 1)))
+    instance = instance_of(surface, 2, (0, 0, 1))
     mesh = build_tangent_mesh(instance)
     triangle_spacing = spacing[surface.triangle_vertex].mean(axis=1)
     start, end, triangle = segments_of(trace_strokes(instance, spacing))

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from listeners import CancelledError
 from PIL import Image, ImageSequence
-from shapes import icosphere, placed, torus
+from shapes import icosphere, instance_of, placed, torus
 
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import Light
@@ -17,9 +17,7 @@ from rosy_addon.core.cache import Cache
 from rosy_addon.core.errors import RosyError
 from rosy_addon.core.progress import listening
 from rosy_addon.external.ffmpeg import find_encoder
-from rosy_addon.field.generate import axis_field
 from rosy_addon.image_io.gif import gif_bytes, lzw_compress
-from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.turntable import (
     check_still,
@@ -30,7 +28,7 @@ from rosy_addon.rendering.turntable import (
 )
 
 QUICK = Look(length=8)
-BALL = MeshInstance(icosphere(2), np.eye(4), axis_field(icosphere(2), 2))
+BALL = instance_of(icosphere(2), 2, "axis")
 
 
 def decode_frames(data):
@@ -74,7 +72,7 @@ def test_rate_and_repetition():
 def test_the_object_stays_in_the_frame_in_all_views():
     surface = torus(48, 24)
     matrix = placed(np.diag((1.0, 2.0, 1.5)), (5.0, -2.0, 1.0))
-    instance = MeshInstance(surface, matrix, axis_field(surface, 2))
+    instance = instance_of(surface, 2, "axis", matrix)
     covered = []
     for view in turntable_views(instance, QUICK, 5, (80, 60), (10.0, 25.0)):
         rgba = draw_picture(view).rgba
@@ -97,7 +95,7 @@ def test_a_video_has_all_frames(tmp_path):
 
 
 def test_streaks_drift_before_a_still_camera_in_whole_cycles():
-    instance = MeshInstance(BALL.surface, np.eye(4), axis_field(BALL.surface, 1))
+    instance = instance_of(BALL.surface, 1, "axis")
     look = Look(length=8, flow=1.5)
     cache = Cache()
     views = turntable_views(instance, look, 12, (64, 64), (0.0, 0.0), still=True)

@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from shapes import icosphere, plane
 
 from rosy_addon.cli.parser import main
-from rosy_addon.core.errors import RosyError
 from rosy_addon.line_drawing.svg import Pen, plotter_order, simplify_mask, svg_text
 from rosy_addon.line_drawing.visibility import project_to_pixels
 from rosy_addon.projection.camera import look_at, orthographic_camera
@@ -36,9 +35,8 @@ def path_points(data):
 
 
 @pytest.mark.parametrize("color", ["", "\x1b[31m", "blakc", "#12", "#gggggg", 'red" x="', "#00f\n"])
-def test_color_must_be_one_of_svg(color):
-    with pytest.raises(RosyError, match="is not a color"):
-        Pen(colors=("Navy", "#00F", color))
+def test_color_must_be_one_of_svg(color, error_of):
+    assert "is not a color" in error_of(Pen, colors=("Navy", "#00F", color))
 
 
 def test_svg_has_one_layer_per_family_and_one_path_per_stroke():

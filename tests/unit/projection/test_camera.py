@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from lenses import shifted
 from shapes import icosphere
 
-from rosy_addon.core.errors import RosyError
 from rosy_addon.projection.camera import (
     Camera,
     look_at,
@@ -136,7 +135,7 @@ def make_camera(view=GOOD.view, projection=GOOD.projection, size=(10, 10)):
         ({"view": np.diag([-1.0, 1, 1, 1])}, "'Cam' is mirrored"),
         ({"view": np.diag([2.0, 2, 2, 1])}, "'Cam': its view matrix must be a rotation"),
         ({"view": np.full((4, 4), np.nan)}, "'Cam': its view matrix is not finite"),
-        ({"view": np.eye(3)}, r"'Cam': its view matrix must have the shape \(4, 4\)"),
+        ({"view": np.eye(3)}, "'Cam': its view matrix must have the shape (4, 4)"),
         ({"projection": np.full((4, 4), np.inf)}, "'Cam': its projection matrix is not finite"),
         ({"projection": np.diag([1.0, 1, 1, 0])}, "'Cam' is neither perspective nor orthographic"),
         ({"projection": np.diag([-1.0, 1, 1, 1])}, "'Cam': its projection is mirrored or flat"),
@@ -144,9 +143,8 @@ def make_camera(view=GOOD.view, projection=GOOD.projection, size=(10, 10)):
         ({"size": (10.5, 10)}, "size 10.5x10"),
     ],
 )
-def test_impossible_cameras_are_refused(settings, message):
-    with pytest.raises(RosyError, match=message):
-        make_camera(**settings)
+def test_impossible_cameras_are_refused(settings, message, error_of):
+    assert message in error_of(make_camera, **settings)
 
 
 @pytest.mark.parametrize(
@@ -163,6 +161,5 @@ def test_impossible_cameras_are_refused(settings, message):
         lambda: look_at((1, 1, 9), (1, 1, 1)),
     ],
 )
-def test_impossible_views_are_refused(make):
-    with pytest.raises(RosyError):
-        make()
+def test_impossible_views_are_refused(make, error_of):
+    error_of(make)

@@ -11,7 +11,6 @@ from lenses import shifted
 from scipy.spatial.transform import Rotation
 from shapes import cube, from_quads, from_triangles, icosphere, placed, plane, rebuilt, torus
 
-from rosy_addon.core.errors import RosyError
 from rosy_addon.field.frames import dot, normalize, tangent_frame, transport, view_frame
 from rosy_addon.field.representation import from_representation, to_representation
 from rosy_addon.field.rosy_field import RosyField
@@ -382,10 +381,9 @@ DAMAGED = np.where(np.arange(80)[:, None] == 7, np.nan, FIELD.vectors)
         ([replace(SHOWN, matrix=np.full((4, 4), np.inf))], "sphere: its matrix must be"),
     ],
 )
-def test_errors_of_projection(instances, message):
+def test_errors_of_projection(instances, message, error_of):
     camera = lens(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 50, 50, name="Camera.001")
-    with pytest.raises(RosyError, match=message):
-        project(instances, camera)
+    assert message in error_of(project, instances, camera)
 
 
 def test_unknown_displays_are_refused(error_of):

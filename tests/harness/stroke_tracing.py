@@ -16,11 +16,7 @@ from rosy_addon.line_drawing.stroke_set import Strokes
 from rosy_addon.line_drawing.svg import svg_text
 from rosy_addon.line_drawing.tangent_mesh import CREASE_ANGLE, build_tangent_mesh
 from rosy_addon.line_drawing.trace import trace_on_mesh
-from rosy_addon.line_drawing.visibility import (
-    clip_to_visible,
-    project_to_pixels,
-    rasterize_depth,
-)
+from rosy_addon.line_drawing.visibility import clip_to_visible, project_to_pixels, rasterize_depth
 from rosy_addon.projection.camera import Camera
 from rosy_addon.projection.gbuffer import MeshInstance
 

@@ -165,21 +165,6 @@ def instance_with_singularity(degree, sign, center, phase):
     return MeshInstance(surface, IDENTITY, RosyField(degree, direction))
 
 
-def closest_approaches(strokes, center):
-    """Return (k, 2): how close strokes pass a point in spacings, and at which polar angle, sorted.
-
-    Strokes whose closest point is one of their ends are left out.
-    """
-    fine, found = strokes.subdivided(np.full(len(strokes.points), 16)), []
-    for first, last in pairwise(fine.start):
-        offset = fine.points[first:last, :2] - center
-        radius = np.linalg.norm(offset, axis=1) / fine.spacing[first:last]
-        closest = int(np.argmin(radius))
-        if 0 < closest < len(radius) - 1:
-            found.append((radius[closest], np.arctan2(offset[closest, 1], offset[closest, 0])))
-    return np.array(sorted(found)).reshape(-1, 2)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("degree", "sign", "phase"), [(2, -1, 1.1), (4, 1, 0.3)])
 def test_around_singularities_strokes_are_alike_on_all_sides(degree, sign, phase):
@@ -191,15 +176,14 @@ def test_around_singularities_strokes_are_alike_on_all_sides(degree, sign, phase
     assert np.allclose(index, sign / degree) and len(index) == 1
     found_center = mesh.points_at(triangle, weights)[0, :2]
     assert np.linalg.norm(found_center - center) < 0.02
-    sectors = degree - sign
-    radius, polar_angle = closest_approaches(strokes, found_center)[:sectors].T
-    assert len(radius) == sectors
+    fine = strokes.subdivided(np.full(len(strokes.points), 16))
+    offset = (fine.points[:, :2] - found_center) @ [1, 1j]
+    sectors, nearest = degree - sign, offset[np.abs(offset).argmin()]
+    sector = np.rint(np.angle(offset / nearest) * sectors / (2 * np.pi)).astype(int) % sectors
+    radius = np.full(sectors, np.inf)
+    np.minimum.at(radius, sector, np.abs(offset))
     np.testing.assert_allclose(radius, radius.mean(), rtol=0.03)
-    polar_angle = np.sort(polar_angle)
-    sector_angle = np.diff(polar_angle, append=polar_angle[0] + 2 * np.pi)
-    assert np.abs(np.degrees(sector_angle) - 360 / sectors).max() < 8
-    gaps = lateral_gaps(mesh, strokes)
-    assert gaps.nearest >= 0.5
+    assert lateral_gaps(mesh, strokes).nearest >= 0.5
 
 
 @pytest.mark.slow

@@ -1,6 +1,6 @@
 """Which looks the graphics card refuses, before it is asked for, and what 3D views draw of them."""
 
-from __future__ import annotations
+from types import SimpleNamespace
 
 import pytest
 
@@ -10,25 +10,23 @@ from rosy_addon.gpu.cpu_viewport import CpuViewportRenderer
 from rosy_addon.gpu.renderer import GpuRenderer
 from rosy_addon.rendering.draw import bake_picture
 from rosy_addon.rendering.view_input import ViewInput
-from rosy_addon.worker.job import Call, run
+from rosy_addon.worker.job import Call, call_steps, run
 
 REFUSED = {"members": "brute", "ibfv": "sheets"}
 
 
-@pytest.fixture
-def unused_card(monkeypatch):
+@pytest.fixture(autouse=True)
+def _unused_card(monkeypatch):
     """A graphics card that is never drawn with."""
     monkeypatch.setattr(select, "blender_device", lambda: None)
 
 
-@pytest.mark.usefixtures("unused_card")
 @pytest.mark.parametrize("device", ["gpu", "auto"])
 @pytest.mark.parametrize("method", ["sheets", "brute"])
 def test_methods_that_the_card_draws(method, device):
     assert select.select_device(device, Look(method=method)) == "gpu"
 
 
-@pytest.mark.usefixtures("unused_card")
 @pytest.mark.parametrize("method", REFUSED)
 def test_methods_that_the_processor_draws_instead(method, error_of):
     look = Look(method=method)
@@ -44,15 +42,8 @@ def test_pictures_are_a_part_of_a_job(monkeypatch):
     view = ViewInput((), None, Look())
     assert list(select.picture_steps(view, "cpu")) == [Call(bake_picture, (view,))]
 
-    class Card:
-        def __init__(self, device):
-            pass
-
-        def picture_steps(self, view):
-            return (yield Call(len, ([1, 2],)))
-
-    monkeypatch.setattr(select, "blender_device", lambda: None)
-    monkeypatch.setattr(select, "GpuRenderer", Card)
+    card = SimpleNamespace(picture_steps=lambda view: call_steps(len, [1, 2]))
+    monkeypatch.setattr(select, "GpuRenderer", lambda device: card)
     assert run(select.picture_steps(view, "gpu")) == 2
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from listeners import CancelledError
+from listeners import CancelledError, cancel_at
 from PIL import Image, ImageSequence
 from shapes import icosphere, instance_of, placed, torus
 
@@ -114,11 +114,7 @@ def test_lights_stay_fixed_while_the_camera_orbits():
 def test_a_cancelled_video_leaves_no_file(tmp_path):
     views = turntable_views(BALL, QUICK, 3, (32, 32), (0.0, 0.0))
 
-    def cancel(fraction, label):
-        if label == "picture 3 of 3":
-            raise CancelledError
-
-    with listening(cancel), pytest.raises(CancelledError):
+    with listening(cancel_at(10)), pytest.raises(CancelledError):
         turntable(draw_picture, views, 3, tmp_path / "film.gif", 12)
     assert not list(tmp_path.iterdir())
 

@@ -8,15 +8,10 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
-
-if __name__ == "__main__":  # without pytest's search path
-    sys.path[:0] = [str(folder) for folder in Path(__file__).resolve().parents[1:3]]
-else:
-    import pytest
-
+import pytest
+from conftest import ROOT
 from harness.planar import compose_planar
 from planar_fields import pair_angle, pixel_centers
 from shapes import icosphere, instance_of, torus
@@ -74,7 +69,9 @@ def other_arrays(tmp_path_factory):
     if not other:
         pytest.skip("ROSY_OTHER_PYTHON names no other interpreter")
     file = tmp_path_factory.mktemp("numpy") / "arrays.npz"
-    subprocess.run([other, __file__, file], check=True)
+    folders = ROOT, ROOT / "tests", ROOT / "tests" / "unit"
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, folders))}
+    subprocess.run([other, __file__, file], env=environment, check=True)
     code = "import numpy; print(numpy.__version__, end='')"
     assert subprocess.check_output([other, "-c", code], text=True) != np.__version__
     return np.load(file)

@@ -195,9 +195,6 @@ def test_awkward_meshes(name, degree):
     field = generate(surface, "smoothest", degree)
     lines = lines_of(surface, field, 0.11)
     assert np.isfinite(lines.pattern.phase).all() and np.isfinite(lines.heading).all()
-    again = lines_of(surface, field, 0.11)
-    assert lines.pattern.phase.tobytes() == again.pattern.phase.tobytes()
-    assert lines.pattern.index.tobytes() == again.pattern.index.tobytes()
 
 
 @pytest.mark.slow

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from rosy_addon.field.connectivity import build_edges
 from rosy_addon.line_drawing.visibility import project_to_pixels, rasterize_depth
 
 #: Coverage from which on a pixel belongs to a mark, or a silhouette is covered.
@@ -97,12 +96,10 @@ def _contour_edges(screen: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     a, b, c = (screen[triangles[:, corner]] for corner in range(3))
     u, v = b - a, c - a
     is_front = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] > 0
-    start = np.arange(0, triangles.size + 1, 3, dtype=np.int32)
-    edges = build_edges(triangles.ravel().astype(np.int32), start)
-    is_contour = np.ones(len(edges.ends), dtype=bool)
-    first, second = edges.halfedges.T // 3
-    is_contour[edges.interior] = is_front[first] != is_front[second]
-    return edges.ends[is_contour]
+    sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
+    ends, edge, count = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
+    front_count = np.bincount(edge, np.repeat(is_front, 3))
+    return ends[(count != 2) | (front_count == 1)]
 
 
 def covered_share(coverage: np.ndarray, points: np.ndarray, lengths: np.ndarray) -> float:

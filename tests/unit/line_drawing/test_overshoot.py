@@ -74,16 +74,13 @@ def test_extensions_cross_the_silhouette():
     assert growth.max() <= 2 * MAX_PIXELS + 0.5
     assert growth[growth > 1].mean() > MIN_EXTENSION_RATIO * MAX_PIXELS
     pixels, depth = project_to_pixels(extended.points, FRONT_CAMERA)
-    column, row = np.clip(pixels.astype(int), 0, (399, 359)).T
-    outside = rasterize_depth([SPHERE], FRONT_CAMERA).triangle[row, column] < 0
     plain_pixels = project_to_pixels(plain.points, FRONT_CAMERA)[0]
     center = project_to_pixels(np.zeros((1, 3)), FRONT_CAMERA)[0]
     max_radius = np.hypot(*(plain_pixels - center).T).max()
     radius = np.hypot(*(pixels - center).T)
-    assert outside.sum() > 200 and radius.max() < max_radius + MAX_PIXELS + 1
-    assert radius.max() > max_radius + 0.5 * MAX_PIXELS
+    assert 0.5 * MAX_PIXELS < radius.max() - max_radius < MAX_PIXELS + 1
     # Extensions are at a constant depth, and straight.
-    is_beyond = outside & (radius > max_radius + 1)
+    is_beyond = radius > max_radius + 1
     inner = is_beyond[:-2] & is_beyond[1:-1] & is_beyond[2:]
     inner &= (np.diff(extended.stroke)[1:] == 0) & (np.diff(extended.stroke)[:-1] == 0)
     assert inner.sum() > 50 and np.abs(np.diff(depth)[1:][inner]).max() < 1e-9
@@ -120,9 +117,8 @@ def test_ends_at_gaps_and_at_neighbors_are_not_extended():
     plain, extended = draw_both([turned(SQUARE.surface, 4)], TOP_CAMERA, spacing=20.0, gaps=0.3)
     is_inner = np.abs(ends_of(plain)[:, :, :2]).max(axis=(1, 2)) < 1 - 1e-9
     assert is_inner.sum() > 50 and not is_inner.all()
-    for number in np.flatnonzero(is_inner):
-        a, b = (strokes.select([number]) for strokes in (plain, extended))
-        assert np.array_equal(a.points, b.points) and np.allclose(a.width, b.width)
+    a, b = (strokes.select(is_inner) for strokes in (plain, extended))
+    assert np.array_equal(a.points, b.points) and np.allclose(a.width, b.width)
     assert (pixel_growth(plain, extended, TOP_CAMERA)[~is_inner] > 1).all()
     # On the sphere, strokes end where they come too near to others.
     plain, extended = draw_both([SPHERE], FRONT_CAMERA, spacing=9.0)
@@ -135,8 +131,7 @@ def test_closed_strokes_and_outlines_are_not_extended():
     plain, extended = draw_both([circles, occluder], TOP_CAMERA, spacing=15.0, outline=True)
     closed = plain.closed & extended.closed
     assert closed.sum() >= 4
-    for number in np.flatnonzero(closed):
-        assert np.array_equal(plain.select([number]).points, extended.select([number]).points)
+    assert np.array_equal(plain.select(closed).points, extended.select(closed).points)
     for kind in OUTLINE_KINDS:
         a, b = (s.select(s.family == s.names.index(kind)) for s in (plain, extended))
         assert np.array_equal(a.points, b.points) and np.allclose(a.width, b.width)

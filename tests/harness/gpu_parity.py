@@ -18,7 +18,7 @@ MAX_DISTANCE_PX = 0.1
 #: Largest difference of unit normals, and of representations relative to the larger modulus.
 MAX_DIFFERENCE = 1e-3
 
-Drift, has_flow = rosy("compositor.flow").Drift, rosy("compositor.look").has_flow
+NO_DRIFT, has_flow = rosy("compositor.flow").NO_DRIFT, rosy("compositor.look").has_flow
 ViewInput, run = rosy("rendering.view_input").ViewInput, rosy("worker.job").run
 compose, project = rosy("compositor.compose").compose, rosy("projection.project").project
 
@@ -104,7 +104,7 @@ def draw_pair(
     look: Any,
     lights: Sequence[Any] = (),
     reference: Any = None,
-    drift: Any = (0.0, 1.0),
+    drift: Any = NO_DRIFT,
 ) -> Pair:
     """Draw a picture on the card and with numpy.
 
@@ -121,7 +121,6 @@ def draw_pair(
     reference : ReferenceRender, optional
     drift : Drift
     """
-    drift = Drift(*drift)
     supersampling = look.supersampling
     width, height = camera.width // supersampling, camera.height // supersampling
     view = ViewInput(

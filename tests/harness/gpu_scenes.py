@@ -48,11 +48,6 @@ def boxes():
 # --- fields --------------------------------------------------------------------------------------
 
 
-def face_centers(surface):
-    """Return the first corner of each face, as a place in it."""
-    return surface.vertices[surface.corner_vertex[surface.face_start[:-1]]]
-
-
 def smooth_field(surface, degree, families=1):
     """Return a field with singularities of index 1 / N and a magnitude that varies.
 
@@ -65,7 +60,7 @@ def smooth_field(surface, degree, families=1):
     vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
     if degree > 1:
         vectors = generate(surface, "smoothest", degree).vectors
-    magnitude = 0.8 + 0.4 * np.sin(3 * face_centers(surface) @ np.array(AXIS) + 1)
+    magnitude = 0.8 + 0.4 * np.sin(3 * surface.face_center @ np.array(AXIS) + 1)
     return RosyField(degree, vectors * magnitude[:, None], family_count=families)
 
 
@@ -94,7 +89,7 @@ def conjugate_field(surface):
 
 def sign_changing_tensors(surface):
     """Return the field of symmetric tensors whose eigenvalues change sign."""
-    x, y, z = face_centers(surface).T
+    x, y, z = surface.face_center.T
     tensor = np.zeros((surface.face_count, 3, 3))
     tensor[:, 0, 0], tensor[:, 1, 1], tensor[:, 2, 2] = 1 + x, 0.3 - y, 2 * z
     tensor[:, 0, 2] = tensor[:, 2, 0] = 0.5

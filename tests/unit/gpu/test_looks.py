@@ -16,7 +16,6 @@ from harness.gpu_scenes import (
     ball,
     card_rgba,
     draw,
-    face_centers,
     field_of,
     shown,
     smooth_field,
@@ -141,7 +140,7 @@ UNDEFINED_LOOKS = {
 @pytest.mark.parametrize("name", UNDEFINED_LOOKS)
 def test_where_the_field_is_undefined(card, name):
     look, _, drift = look_of(UNDEFINED_LOOKS[name])
-    center = face_centers(BALL)
+    center = BALL.face_center
     is_undefined = (center[:, :1] > 0.2) | (center[:, 2:] > 0.6)
     vectors = np.where(is_undefined, 0.0, smooth_field(BALL, 3).vectors)
     field = RosyField(3, vectors, family_count=3)

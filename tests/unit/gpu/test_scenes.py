@@ -20,7 +20,6 @@ from harness.gpu_scenes import (
     card_rgba,
     conjugate_field,
     draw,
-    face_centers,
     field_of,
     perturbed_field,
     rotation,
@@ -296,7 +295,7 @@ def test_fields_of_two_kinds_are_independent(card, name):
 
 
 def partly_undefined():
-    vectors = np.where(face_centers(BALL)[:, :1] > 0.2, 0.0, field_of(BALL, 4).vectors)
+    vectors = np.where(BALL.face_center[:, :1] > 0.2, 0.0, field_of(BALL, 4).vectors)
     return shown(BALL, RosyField(4, vectors))
 
 

@@ -33,8 +33,6 @@ LAYERS = (
 #: Rooms that may use Blender everywhere. Of the others, only the commands of `extras` import them.
 BLENDER_ROOMS = {"scene", "ui", "jobs", "viewport", "cli"}
 
-#: Files of the room `gpu` that draw with Blender, and may import its modules.
-BLENDER_GPU_FILES = ("device.py",)
 
 #: What the Python package can use where it is installed.
 EXTRA_LIBRARIES = {
@@ -83,7 +81,7 @@ def test_imports_run_one_way(path):
         allowed |= {"bpy", "bmesh", "bpy_extras", "mathutils", "gpu", "gpu_extras", "blf"}
     elif room != "extras":
         assert not rooms & BLENDER_ROOMS
-    if path.name in BLENDER_GPU_FILES and room == "gpu":
+    if path == PACKAGE / "gpu" / "device.py":  # draws with Blender
         allowed |= {"gpu", "gpu_extras", "mathutils"}
     if room in ("external", "extras"):
         allowed |= EXTRA_LIBRARIES

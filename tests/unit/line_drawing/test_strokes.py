@@ -155,23 +155,14 @@ def test_strokes_are_even_and_not_too_close(surface):
     assert gaps.nearest >= 0.5 and gaps.evenness >= 0.9
 
 
-def instance_with_singularity(degree, sign, center, phase):
-    """Return a plane whose field has one singularity of index sign / degree."""
-    surface = plane(50, 50)
-    offset = surface.face_center[:, :2] - center
-    polar_angle = np.arctan2(offset[:, 1], offset[:, 0])
-    angle = sign * polar_angle / degree + phase
-    direction = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    return MeshInstance(surface, IDENTITY, RosyField(degree, direction))
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("degree", "sign", "phase"), [(2, -1, 1.1), (4, 1, 0.3)])
 def test_around_singularities_strokes_are_alike_on_all_sides(degree, sign, phase):
     """There are N - 1 or N + 1 equal sectors. The closest stroke has the same distance in each."""
-    center, spacing = (0.013, -0.007), 0.08
-    instance = instance_with_singularity(degree, sign, center, phase)
-    mesh, strokes = build_tangent_mesh(instance), trace_strokes(instance, spacing)
+    center, surface = (0.013, -0.007), plane(50, 50)
+    x, y = (surface.face_center[:, :2] - center).T
+    instance = turned(surface, degree, (sign * np.arctan2(y, x) / degree + phase)[:, None])
+    mesh, strokes = build_tangent_mesh(instance), trace_strokes(instance, 0.08)
     triangle, weights, index = singularities(mesh)
     assert np.allclose(index, sign / degree) and len(index) == 1
     found_center = mesh.points_at(triangle, weights)[0, :2]

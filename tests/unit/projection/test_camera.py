@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from lenses import shifted
 from shapes import icosphere
 
+from rosy_addon.line_drawing.visibility import to_clip
 from rosy_addon.projection.camera import (
     Camera,
     look_at,
@@ -23,8 +24,7 @@ angles = st.floats(-400, 400)
 
 def device_coordinates(camera, points):
     """(V, 3) normalized device coordinates."""
-    view = points @ camera.view[:3, :3].T + camera.view[:3, 3]
-    clip = view @ camera.projection[:, :3].T + camera.projection[:, 3]
+    clip = to_clip(points, camera)
     assert (clip[:, 3] > 0).all()
     return clip[:, :3] / clip[:, 3:]
 
@@ -60,8 +60,7 @@ def test_everything_is_framed_and_touches_the_margin(seed, azimuth, elevation, p
     # then be among the points.
     low, high = ndc[:, :2].min(axis=0), ndc[:, :2].max(axis=0)
     touched = (np.isclose(low, -0.9, atol=1e-6) & np.isclose(high, 0.9, atol=1e-6)).any()
-    depth = -(points @ camera.view[:3, :3].T + camera.view[:3, 3])[:, 2]
-    assert touched or depth.min() < 2e-3 * np.ptp(points, axis=0).max()
+    assert touched or camera.depths(points).min() < 2e-3 * np.ptp(points, axis=0).max()
 
 
 def test_framing_ignores_loose_vertices():

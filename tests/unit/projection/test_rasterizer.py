@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from rays import ray_intersections
 from shapes import plane
 
+from rosy_addon.line_drawing.visibility import to_clip
 from rosy_addon.projection import near_clipping, rasterizer
 from rosy_addon.projection.camera import orthographic_camera, perspective_camera
 from rosy_addon.projection.rasterizer import rasterize
@@ -16,11 +17,6 @@ pytestmark = pytest.mark.filterwarnings("error")
 WIDTH, HEIGHT = 37, 29
 CLIP = (0.3, 9.0)
 seeds = st.integers(0, 2**32 - 1)
-
-
-def to_clip(points, camera):
-    points = np.concatenate([points, np.ones((len(points), 1))], axis=1)
-    return points @ (camera.projection @ camera.view).T
 
 
 def flat_clip(x, y, z=0.0, width=WIDTH, height=HEIGHT):

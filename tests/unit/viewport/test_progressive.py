@@ -243,13 +243,11 @@ def test_meshes_that_change_faster_than_they_are_prepared_are_shown(helper, view
 
 def test_two_views_share_the_helper(helper, view_input):
     progressive = progressive_of(HelpedRenderer(), helper)
-    for _ in range(500):
-        request = Request("key", "key", view_input)
-        views = [progressive.update(pointers, request) for pointers in (POINTERS, (1, 3))]
-        if all(view.texture == ((), 32) for view in views):
-            break
-        progressive.poll()
-        time.sleep(0.005)
-    assert all(view.texture == ((), 32) for view in views)
+
+    def both_are_shown(view):
+        other = progressive.update((1, 3), Request("key", "key", view_input))
+        return view.texture == other.texture == ((), 32)
+
+    updated(progressive, "key", view_input, both_are_shown)
     progressive.remove_space(POINTERS[0])
     assert not progressive.views and progressive.poll()

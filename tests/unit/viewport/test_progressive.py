@@ -125,9 +125,7 @@ def test_a_picture_that_fails_is_not_tried_again(progressive, view_input, failin
 class SlowRenderer(NotingRenderer):
     """A renderer whose pictures have many steps and names of their own."""
 
-    def __init__(self):
-        super().__init__()
-        self.pictures = 0
+    pictures = 0
 
     def texture_steps(self, items, view, target_key=None):
         self.pictures += 1

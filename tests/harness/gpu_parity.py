@@ -18,8 +18,8 @@ MAX_DISTANCE_PX = 0.1
 #: Largest difference of unit normals, and of representations relative to the larger modulus.
 MAX_DIFFERENCE = 1e-3
 
-NO_DRIFT, has_flow = rosy("compositor.flow").NO_DRIFT, rosy("compositor.look").has_flow
 ViewInput, run = rosy("rendering.view_input").ViewInput, rosy("worker.job").run
+has_flow = rosy("compositor.look").has_flow
 compose, project = rosy("compositor.compose").compose, rosy("projection.project").project
 
 
@@ -97,15 +97,7 @@ def draw_on_card(card: Any, view: Any) -> np.ndarray:
     return card.device.read(texture)
 
 
-def draw_pair(
-    card: Any,
-    instances: Sequence[Any],
-    camera: Any,
-    look: Any,
-    lights: Sequence[Any] = (),
-    reference: Any = None,
-    drift: Any = NO_DRIFT,
-) -> Pair:
+def draw_pair(card: Any, instances: Sequence[Any], camera: Any, look: Any, **scene: Any) -> Pair:
     """Draw a picture on the card and with numpy.
 
     Numpy uses brute force, which averages each streamline separately.
@@ -117,15 +109,12 @@ def draw_pair(
     camera : Camera
         With `look.supersampling` times the width and height of the picture.
     look : Look
-    lights : sequence of Light
-    reference : ReferenceRender, optional
-    drift : Drift
+    **scene
+        The other attributes of the `ViewInput`.
     """
     supersampling = look.supersampling
     width, height = camera.width // supersampling, camera.height // supersampling
-    view = ViewInput(
-        tuple(instances), camera.resized(width, height), look, tuple(lights), reference, drift=drift
-    )
+    view = ViewInput(tuple(instances), camera.resized(width, height), look, **scene)
     card_picture = draw_on_card(card, view)
     images = read_gbuffer(card, width, height)
     gbuffer = project(instances, view.camera, look.display, samples=supersampling)
@@ -133,11 +122,12 @@ def draw_pair(
     if supersampling > 1:
         centers = project(instances, view.camera, look.display)
         is_center = np.isin(gbuffer.pixel, centers.pixel)
+    light = view.lights, view.reference
     if has_flow(look) or supersampling > 1:
         with one_streamline_per_pixel():
-            numpy_picture = compose(gbuffer, look, lights, reference, drift=drift).rgba
+            numpy_picture = compose(gbuffer, look, *light, drift=view.drift).rgba
     else:
-        numpy_picture = compose(gbuffer, replace(look, method="brute"), lights, reference).rgba
+        numpy_picture = compose(gbuffer, replace(look, method="brute"), *light).rgba
     return Pair(gbuffer, images, card_picture, numpy_picture, is_center)
 
 

@@ -8,7 +8,6 @@ from lenses import shifted
 from scipy.spatial.transform import Rotation
 from shapes import cube, icosphere, joined, placed, rebuilt
 
-from rosy_addon.compositor.flow import NO_DRIFT
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.directional_field import field_from_directions, tensor_field
 from rosy_addon.field.generate import axis_field, generate
@@ -135,8 +134,9 @@ def view(size=SIZE, azimuth=0.4, perspective=True, distance=4.0, supersampling=1
     return shifted(orthographic_camera(view_matrix, *size, scale=2.6), (0.06, -0.04))
 
 
-def draw(renderer, view_input):
+def draw(renderer, instances, look=LOOK, camera=None):
     """Draw a picture on a card, or with numpy if it is None."""
+    view_input = ViewInput(tuple(instances), camera or view(), look)
     return draw_picture(view_input) if renderer is None else run(renderer.picture_steps(view_input))
 
 
@@ -145,20 +145,10 @@ def card_rgba(card, instances, look=LOOK, camera=None, **others):
     return draw_on_card(card, ViewInput(tuple(instances), camera or view(), look, **others))
 
 
-def assert_parity(
-    card,
-    instances,
-    camera=None,
-    look=LOOK,
-    lights=(),
-    agreement=0.998,
-    likeness=0.98,
-    reference=None,
-    drift=NO_DRIFT,
-):
+def assert_parity(card, instances, camera=None, look=LOOK, agreement=0.998, likeness=0.98, **scene):
     """Compare the picture of the card with the picture of numpy, and return both."""
     camera = view(supersampling=look.supersampling) if camera is None else camera
-    pair = draw_pair(card, instances, camera, look, lights, reference, drift)
+    pair = draw_pair(card, instances, camera, look, **scene)
     assert np.isfinite(pair.card).all()
     both = (pair.card[..., 3] == 1) & (pair.numpy[..., 3] == 1)
     assert both.sum() > 500 and pair.agreement >= agreement and pair.likeness >= likeness

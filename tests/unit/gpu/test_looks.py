@@ -30,7 +30,6 @@ from rosy_addon.field.frames import normalize
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.surface_tone import SurfaceTone
-from rosy_addon.rendering.view_input import ViewInput
 
 
 @pytest.mark.parametrize("perspective", [True, False])
@@ -169,8 +168,7 @@ def test_subpixels(card):
 def test_samples_show_what_numpy_draws(card, preset):
     """Tone and contrast of the default method, whose streaks are smooth in another way."""
     look = replace(load_preset(preset).look, supersampling=2)
-    view_input = ViewInput((ball(),), view((240, 216)), look)
-    drawn = [draw(renderer, view_input).rgba for renderer in (card, None)]
+    drawn = [draw(each, [ball()], look, view((240, 216))).rgba for each in (card, None)]
     inside = np.logical_and(*(rgba[..., 3] == 1 for rgba in drawn))
     of_card, of_numpy = (rgba[inside][:, :3] for rgba in drawn)
     assert inside.sum() > 10_000
@@ -202,7 +200,7 @@ POINT = Light("point", np.array([-1.0, 0.5, -2.0]), np.array([0.2, 0.5, 1.0]), 3
 @pytest.mark.parametrize("perspective", [True, False])
 def test_lights_of_the_scene(card, lights, perspective):
     look = replace(LOOK, shading=0.8, light="scene")
-    assert_parity(card, [ball()], view(perspective=perspective), look, lights)
+    assert_parity(card, [ball()], view(perspective=perspective), look, lights=lights)
 
 
 def test_a_headlight_ignores_lights(card):

@@ -34,7 +34,6 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.projection.camera import Camera, look_at, perspective_camera
-from rosy_addon.rendering.view_input import ViewInput
 
 FAMILIES = replace(LOOK, hue="families")
 
@@ -344,6 +343,6 @@ def test_the_picture_is_empty_if_there_is_nothing_to_draw(card, instances):
 @pytest.mark.parametrize("size", [(1, 1), (3, 200), (200, 3), (257, 129)])
 def test_odd_sizes(card, size):
     rgba = card_rgba(card, [ball()], camera=view(size))
-    expected = draw(None, ViewInput((ball(),), view(size), LOOK)).rgba
+    expected = draw(None, [ball()], camera=view(size)).rgba
     assert rgba.shape == expected.shape
     assert ((rgba[..., 3] > 0) != (expected[..., 3] > 0)).mean() < 0.01

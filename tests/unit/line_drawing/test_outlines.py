@@ -16,8 +16,6 @@ from rosy_addon.line_drawing.visibility import project_to_pixels
 from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 
-IDENTITY = np.eye(4)
-
 #: Outlines shorter than this in pixels are specks.
 MIN_MARK_PX = 6.0
 
@@ -32,7 +30,7 @@ def outlines_of(surface, camera):
 
 def coverage(lines, surface, camera, tolerance):
     """Return the share of the visible silhouettes of a surface that is near an outline."""
-    border, _ = visible_silhouettes(MeshInstance(surface, IDENTITY), camera)
+    border, _ = visible_silhouettes(MeshInstance(surface, np.eye(4)), camera)
     pixels, _ = project_to_pixels(lines.points, camera)
     is_first = np.zeros(len(pixels), dtype=bool)
     is_first[lines.start[:-1]] = True

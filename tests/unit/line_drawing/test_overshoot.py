@@ -18,7 +18,6 @@ from rosy_addon.projection.gbuffer import MeshInstance
 
 pytestmark = pytest.mark.slow
 
-IDENTITY = np.eye(4)
 MAX_PIXELS = 12.0
 
 SQUARE = turned(plane(8, 8), 2)

@@ -45,8 +45,6 @@ from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.pixel_neighbors import screen_jacobians
 from rosy_addon.projection.project import project
 
-IDENTITY = np.eye(4)
-
 
 def segments_of(strokes):
     """Return the starts and ends of all segments, and their triangles."""
@@ -334,15 +332,15 @@ def test_strokes_are_clipped_by_occluders_and_by_the_frame():
 
 
 def test_outlines_of_simple_shapes():
-    sphere = MeshInstance(icosphere(4), IDENTITY)
+    sphere = MeshInstance(icosphere(4), np.eye(4))
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), 400, 400, scale=2.5)
     lines = outline_strokes(sphere, camera)
     assert len(lines) == 1 and lines.closed[0] and lines.names[lines.family[0]] == "silhouettes"
     assert np.abs(lines.points[:, 1]).max() < 0.01
     assert np.isclose(lines.length[0], 2 * np.pi, rtol=0.01)
-    box = outline_strokes(MeshInstance(sharp_cube(), IDENTITY), camera)
+    box = outline_strokes(MeshInstance(sharp_cube(), np.eye(4)), camera)
     assert np.isclose(box.length.sum(), 12) and set(box.family.tolist()) == {1}
-    edge = outline_strokes(MeshInstance(plane(), IDENTITY), camera)
+    edge = outline_strokes(MeshInstance(plane(), np.eye(4)), camera)
     assert np.isclose(edge.length.sum(), 8) and set(edge.family.tolist()) == {2}
 
 

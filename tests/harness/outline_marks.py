@@ -15,6 +15,9 @@ MARK_COVERAGE, LINE_COVERAGE = 0.25, 0.3
 #: Largest distance in pixels from a silhouette to a line that covers it.
 LINE_DISTANCE = 1.5
 
+#: Least jump of the depth behind a visible silhouette, and its least length, in pixels.
+MIN_JUMP, MIN_LENGTH = 6.0, 10
+
 #: Pixels of the depth buffer of the reference along the side of a pixel.
 FINE = 4
 
@@ -34,9 +37,7 @@ def mark_lengths(coverage: np.ndarray) -> np.ndarray:
     return np.array([max(side.stop - side.start for side in box) for box in boxes], dtype=int)
 
 
-def visible_silhouettes(
-    instance: Any, camera: Any, min_jump: float = 6.0, min_length: int = 10
-) -> tuple[np.ndarray, np.ndarray]:
+def visible_silhouettes(instance: Any, camera: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return points on the visible silhouettes and borders of a mesh, by brute force.
 
     They are on all edges between front and back faces. A point is visible if the depth buffer of a
@@ -47,10 +48,6 @@ def visible_silhouettes(
     instance : MeshInstance
         The only one in the scene.
     camera : Camera
-    min_jump : float
-        Pixels.
-    min_length : int
-        Silhouettes that are visible over a shorter length in pixels are left out.
 
     Returns
     -------
@@ -81,13 +78,13 @@ def visible_silhouettes(
     pixel_size = camera.pixel_sizes(z)
     around = [fine_depth[row + dy, column + dx] for dy in range(-2, 3) for dx in range(-2, 3)]
     is_near = np.abs(np.stack(around) - z).min(axis=0) < 15 * pixel_size
-    is_visible = is_near & (np.max(around, axis=0) > z + min_jump * pixel_size)
+    is_visible = is_near & (np.max(around, axis=0) > z + MIN_JUMP * pixel_size)
     place, weight = place[is_visible], weight[is_visible]
     picture = np.zeros((camera.height, camera.width), dtype=bool)
     column, row = place.astype(int).T
     picture[row, column] = True
     labels, _ = ndimage.label(picture, np.ones((3, 3)))
-    is_long = mark_lengths(picture)[labels[row, column] - 1] >= min_length
+    is_long = mark_lengths(picture)[labels[row, column] - 1] >= MIN_LENGTH
     return place[is_long], weight[is_long]
 
 

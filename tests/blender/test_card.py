@@ -115,8 +115,7 @@ def test_parity_of_a_scene(card, scene, suzanne, kind):
     depsgraph = bpy.context.evaluated_depsgraph_get()
     instances = rosy("scene.scene_reader").read_scene(depsgraph).instances
     assert [instance.field is None for instance in instances] == [False, False, True]
-    cameras = rosy("scene.cameras")
-    view = cameras.camera_of_object(scene, depsgraph, camera, (512, 512))
+    view = rosy("scene.cameras").camera_of_object(scene, depsgraph, camera, (512, 512))
     look = Look(shading=0.0)
     pair = draw_pair(card, instances, view, look)
     assert set(np.unique(pair.gbuffer.instance_id)) == {0, 1}
@@ -128,8 +127,6 @@ def test_parity_of_a_scene(card, scene, suzanne, kind):
 
 
 def test_the_state_of_blender_is_restored(card, surface_of):
-    import gpu
-
     state = gpu.state
     state.depth_test_set("GREATER")
     state.depth_mask_set(False)

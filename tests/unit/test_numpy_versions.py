@@ -25,6 +25,8 @@ from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.project import project
 
+pytestmark = pytest.mark.slow
+
 #: Largest angles between the directions of generated fields, in degrees.
 MAX_DEGREES = {"form": 1e-3, "smoothest": 1e-5, "curvature": 1e-5, "features": 1e-5}
 
@@ -77,7 +79,6 @@ def other_arrays(tmp_path_factory):
     return np.load(file)
 
 
-@pytest.mark.slow
 def test_generated_fields_hardly_differ(other_arrays):
     for kind, vectors in fields().items():
         sine = np.linalg.norm(np.cross(vectors, other_arrays[kind]), axis=1)
@@ -86,7 +87,6 @@ def test_generated_fields_hardly_differ(other_arrays):
         assert ((vectors == 0) == (other_arrays[kind] == 0)).all(), kind
 
 
-@pytest.mark.slow
 def test_another_numpy_version_draws_the_same(other_arrays):
     for name, picture in draw().items():
         difference = np.abs(picture.astype(int) - other_arrays[name]).max(axis=2)

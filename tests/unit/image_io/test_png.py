@@ -76,10 +76,10 @@ def write_filtered(path, values: np.ndarray, kind: int, extra_chunks=b"", interl
 def test_files_of_all_kinds_are_read(tmp_path, kind, channels, dtype, shape):
     """With every filter, on values whose sums overflow."""
     generator = np.random.default_rng(kind)
-    values = generator.integers(0, np.iinfo(dtype).max, (*shape, channels), endpoint=True)
-    values = values.astype(dtype)
+    top = np.iinfo(dtype).max
+    values = generator.integers(0, top, (*shape, channels), dtype, endpoint=True)
     rgba = read_png(write_filtered(tmp_path / "a.png", values, kind))
-    expected = values[::-1] / np.iinfo(dtype).max
+    expected = values[::-1] / top
     colors = expected[..., :3] if channels > 2 else np.repeat(expected[..., :1], 3, axis=2)
     np.testing.assert_allclose(rgba[..., :3], to_linear(colors), atol=1e-6)
     alpha = expected[..., -1] if channels % 2 == 0 else 1

@@ -41,8 +41,7 @@ def decode_frames(data):
 def test_gray_frames_are_stored_exactly(count, width, height, seed):
     random = np.random.default_rng(seed)
     top = random.integers(1, 257)
-    sides = height, width, 1
-    gray = [random.integers(0, top, sides, dtype=np.uint8) for _ in range(count)]
+    gray = [random.integers(0, top, (height, width, 1), dtype=np.uint8) for _ in range(count)]
     frames = [np.repeat(frame, 3, axis=2) for frame in gray]
     _, actual = decode_frames(gif_bytes(frames, 25))
     assert len(actual) == count or all((a == frames[0]).all() for a in frames)

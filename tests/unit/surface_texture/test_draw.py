@@ -34,7 +34,6 @@ POINTS = surface_points(TORUS, 20_000)
 
 LAMP = Light("sun", np.array([0.5, -0.6, 0.6]) / np.sqrt(0.97), np.ones(3), 1.0)
 UNEVEN = {"ink": "hatch", "wobble": 0.5, "breaks": 0.5, "paper_grain": 0.3}
-MAGNITUDE = {"hue": "magnitude", "magnitude_length": True}
 
 
 @pytest.mark.slow
@@ -44,7 +43,7 @@ MAGNITUDE = {"hue": "magnitude", "magnitude_length": True}
         (1, {}, None, 0.95),
         (4, {}, None, 0.95),
         (4, {"hue": "noise"}, None, 0.93),
-        (4, MAGNITUDE, None, 0.93),
+        (4, {"hue": "magnitude", "magnitude_length": True}, None, 0.93),
         (4, {"method": "ibfv"}, None, 0.93),
         (4, {"ink": "even"}, None, 0.85),
         (4, UNEVEN, [LAMP], 0.85),

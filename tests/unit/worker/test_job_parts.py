@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 import time
+from unittest.mock import Mock
 
 import pytest
 from harness.steps import finished
@@ -144,12 +145,9 @@ def test_a_call_is_made_again_if_its_helper_is_killed(helper, error_of):
 
 
 def test_calls_are_made_here_if_no_process_can_be_started(helper, monkeypatch):
+    refuse = Mock(side_effect=OSError("too many processes"))
     monkeypatch.setattr("rosy_addon.worker.helper.start_module", refuse)
     runner = StepRunner(called(sum, [1, 2]), helper)
     runner.advance()
     assert runner.poll() and runner.is_in_place and not helper.is_usable
     assert finished(runner, helper) == 3
-
-
-def refuse(*_, **__):
-    raise OSError("too many processes")

@@ -35,8 +35,8 @@ def measure(bench: Bench) -> None:
     strokes = trace_strokes(instance, SPACING, rules=rules)
     gaps = lateral_gaps(build_tangent_mesh(instance), strokes)
     print(
-        f"{len(strokes)} strokes, {100 * gaps.evenness():.1f} % of gaps within 25 %, "
-        f"none nearer than {gaps.nearest_distance.min():.2f} spacings"
+        f"{len(strokes)} strokes, {100 * gaps.evenness:.1f} % of gaps within 25 %, "
+        f"none nearer than {gaps.nearest:.2f} spacings"
     )
     case = bench.compare(
         f"{len(strokes)} strokes / smoothest field, 200K triangles, N = {DEGREE}",

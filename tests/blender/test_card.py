@@ -16,43 +16,60 @@ import bpy
 import gpu
 import numpy as np
 import pytest
-from conftest import EXTENSION
+from conftest import add_suzanne
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from harness.gpu_parity import (
-    camera_of_shape,
-    draw_on_card,
-    draw_pair,
-    likeness,
-    module_of,
-    rooms,
-    surface_of_shape,
-)
+from harness.gpu_parity import ViewInput, compose, draw_on_card, draw_pair, likeness
+from harness.rosy_modules import rosy
 
-PACKAGE = f"{EXTENSION}.rosy_addon"
+generate = rosy("field.generate").generate
+Look = rosy("compositor.look").Look
+MeshInstance = rosy("projection.gbuffer").MeshInstance
+
 #: Half of the table's size, and half of the default length: the same share of the picture.
 SIZE, LENGTH = 256, 20
 
-
-@pytest.fixture(scope="module")
-def rosy():
-    return rooms(PACKAGE)
+#: Azimuth and elevation in degrees, and whether the view is in perspective.
+VIEWS = {"torus": (20.0, 40.0, False), "Suzanne": (25.0, 10.0, True)}
 
 
 @pytest.fixture(scope="module")
-def card(rosy):
-    errors = module_of(PACKAGE, "core.errors")
+def card():
     try:
-        device = module_of(PACKAGE, "gpu.device").Device()
-    except errors.RosyError as error:
+        device = rosy("gpu.device").Device()
+    except rosy("core.errors").RosyError as error:
         pytest.skip(str(error))
-    return rosy.GpuRenderer(device)
+    return rosy("gpu.renderer").GpuRenderer(device)
 
 
 @pytest.fixture(scope="module")
-def surface_of(rosy):
+def surface_of():
+    """A function that returns a primitive of Blender as a surface."""
     bpy.ops.wm.read_homefile(use_empty=True)
-    return lru_cache(lambda name: surface_of_shape(rosy, name))
+    return lru_cache(blender_surface)
+
+
+def blender_surface(name):
+    if name == "torus":
+        bpy.ops.mesh.primitive_torus_add(
+            major_segments=128, minor_segments=48, major_radius=1.0, minor_radius=0.4
+        )
+    else:
+        add_suzanne(2)
+    bpy.ops.object.shade_smooth()
+    evaluated = bpy.context.object.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    try:
+        return rosy("scene.meshes").mesh_surface(evaluated.to_mesh(), name)
+    finally:
+        evaluated.to_mesh_clear()
+        bpy.ops.object.delete()
+
+
+def camera_of(name, surface, size):
+    """Return the camera for a shape, with a square frame."""
+    azimuth, elevation, perspective = VIEWS[name]
+    orbit_camera = rosy("projection.camera").orbit_camera
+    return orbit_camera(surface.vertices, azimuth, elevation, size, size, perspective=perspective)
 
 
 def test_the_requested_backend_is_used(card):
@@ -60,30 +77,30 @@ def test_the_requested_backend_is_used(card):
 
 
 @pytest.mark.parametrize(("name", "degree"), [("Suzanne", 4), ("torus", 3)])
-def test_parity(rosy, card, surface_of, name, degree):
+def test_parity(card, surface_of, name, degree):
     """Without shading, which is the same in both and would raise the correlation."""
     surface = surface_of(name)
-    camera = camera_of_shape(rosy, name, surface, SIZE)
-    instance = rosy.MeshInstance(surface, np.eye(4), rosy.generate(surface, "smoothest", degree))
-    pair = draw_pair(rosy, card, [instance], camera, rosy.Look(shading=0.0, length=LENGTH))
+    camera = camera_of(name, surface, SIZE)
+    instance = MeshInstance(surface, np.eye(4), generate(surface, "smoothest", degree))
+    pair = draw_pair(card, [instance], camera, Look(shading=0.0, length=LENGTH))
     assert len(pair.gbuffer.pixel) > 0.25 * SIZE * SIZE
     assert pair.agreement >= 0.999
     assert pair.likeness >= 0.98
 
 
-def test_parity_of_uneven_lines(rosy, card, surface_of):
+def test_parity_of_uneven_lines(card, surface_of):
     """All settings that make lines uneven, an ink for each family, and an outline."""
     surface = surface_of("torus")
-    camera = camera_of_shape(rosy, "torus", surface, 2 * SIZE)
-    instance = rosy.MeshInstance(surface, np.eye(4), rosy.generate(surface, "smoothest", 4))
+    camera = camera_of("torus", surface, 2 * SIZE)
+    instance = MeshInstance(surface, np.eye(4), generate(surface, "smoothest", 4))
     uneven = {"breaks": 0.6, "wobble": 0.6, "paper_grain": 0.4, "outline": 1.5}
     lines = {"anchor": "surface", "shading": 0.9, "line_width": 2.5, "length": LENGTH, **uneven}
-    look = rosy.Look(ink="hatch", hue="families", supersampling=2, **lines)
-    assert draw_pair(rosy, card, [instance], camera, look).likeness >= 0.98
+    look = Look(ink="hatch", hue="families", supersampling=2, **lines)
+    assert draw_pair(card, [instance], camera, look).likeness >= 0.98
 
 
 @pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
-def test_parity_of_a_scene(rosy, card, scene, suzanne, kind):
+def test_parity_of_a_scene(card, scene, suzanne, kind):
     """The input of a bake: a field on faces, a modifier, instances, and a shifted lens."""
     bpy.ops.rosy.field_generate(kind="curvature", degree=4)
     camera = scene.camera
@@ -96,32 +113,29 @@ def test_parity_of_a_scene(rosy, card, scene, suzanne, kind):
     for obj in (mirrored, occluder):
         scene.collection.objects.link(obj)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    instances = module_of(PACKAGE, "scene.scene_reader").read_scene(depsgraph).instances
+    instances = rosy("scene.scene_reader").read_scene(depsgraph).instances
     assert [instance.field is None for instance in instances] == [False, False, True]
-    cameras = module_of(PACKAGE, "scene.cameras")
-    view = cameras.camera_of_object(scene, depsgraph, camera, (512, 512))
-    look = rosy.Look(shading=0.0)
-    pair = draw_pair(rosy, card, instances, view, look)
+    view = rosy("scene.cameras").camera_of_object(scene, depsgraph, camera, (512, 512))
+    look = Look(shading=0.0)
+    pair = draw_pair(card, instances, view, look)
     assert set(np.unique(pair.gbuffer.instance_id)) == {0, 1}
     assert pair.agreement >= 0.999
     assert pair.likeness >= 0.98
     # The fast method of numpy shares averages between pixels: it differs from both pictures alike.
-    fast = rosy.compose(pair.gbuffer, replace(look, method="sheets")).rgba
+    fast = compose(pair.gbuffer, replace(look, method="sheets")).rgba
     assert likeness(pair.card, fast) >= likeness(pair.numpy, fast) - 0.02
 
 
-def test_the_state_of_blender_is_restored(rosy, card, surface_of):
-    import gpu
-
+def test_the_state_of_blender_is_restored(card, surface_of):
     state = gpu.state
     state.depth_test_set("GREATER")
     state.depth_mask_set(False)
     state.blend_set("ADDITIVE")
     try:
-        surface = surface_of("sphere")
-        instance = rosy.MeshInstance(surface, np.eye(4), rosy.generate(surface, "axis", 2))
-        camera = camera_of_shape(rosy, "sphere", surface, 64)
-        draw_on_card(rosy, card, rosy.ViewInput((instance,), camera, rosy.Look()))
+        surface = surface_of("torus")
+        instance = MeshInstance(surface, np.eye(4), generate(surface, "axis", 2))
+        camera = camera_of("torus", surface, 64)
+        draw_on_card(card, ViewInput((instance,), camera, Look()))
         current = state.depth_test_get(), state.depth_mask_get(), state.blend_get()
         assert current == ("GREATER", False, "ADDITIVE")
     finally:

@@ -1,7 +1,5 @@
 """What a Blender file holds, and the values of images and fields, in any Blender."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 

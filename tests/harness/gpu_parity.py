@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from .one_streamline import one_streamline_per_pixel
+from .rosy_modules import rosy
 
 #: Largest distance between two points that count as equal, in pixels. OpenGL rounds the vertices of
 #: triangles to 1/256 of a pixel, and on steep parts the depth changes by many pixels per pixel.
@@ -20,46 +18,9 @@ MAX_DISTANCE_PX = 0.1
 #: Largest difference of unit normals, and of representations relative to the larger modulus.
 MAX_DIFFERENCE = 1e-3
 
-DEGREES = (1, 2, 3, 4, 5, 6)
-
-#: Mesh files in the data folder, by the name of the shape.
-FILES = {"bunny": "stanford-bunny.obj", "vase": "vase.off"}
-
-#: Azimuth and elevation in degrees, and whether the view is in perspective.
-VIEWS = {
-    "sphere": (30.0, 20.0, True),
-    "torus": (20.0, 40.0, False),
-    "Suzanne": (25.0, 10.0, True),
-    "bunny": (0.0, 85.0, True),
-    "vase": (10.0, 15.0, False),
-}
-
-
-def module_of(package: str, module: str) -> Any:
-    """Import a module of RoSy from the repository or from an installed extension."""
-    return importlib.import_module(f"{package}.{module}")
-
-
-def rooms(package: str = "rosy_addon") -> SimpleNamespace:
-    """Return the parts of RoSy that are used here."""
-
-    def of(module: str) -> Any:
-        return module_of(package, module)
-
-    return SimpleNamespace(
-        package=package,
-        MeshInstance=of("projection.gbuffer").MeshInstance,
-        Camera=of("projection.camera").Camera,
-        GpuRenderer=of("gpu.renderer").GpuRenderer,
-        Look=of("compositor.look").Look,
-        ViewInput=of("rendering.view_input").ViewInput,
-        compose=of("compositor.compose").compose,
-        generate=of("field.generate").generate,
-        orbit_camera=of("projection.camera").orbit_camera,
-        project=of("projection.project").project,
-        run=of("worker.job").run,
-        Surface=of("field.surface").Surface,
-    )
+ViewInput, run = rosy("rendering.view_input").ViewInput, rosy("worker.job").run
+has_flow = rosy("compositor.look").has_flow
+compose, project = rosy("compositor.compose").compose, rosy("projection.project").project
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,60 +91,44 @@ class Pair:
         return likeness(self.card, self.numpy)
 
 
-def draw_on_card(rosy: SimpleNamespace, card: Any, view: Any) -> np.ndarray:
+def draw_on_card(card: Any, view: Any) -> np.ndarray:
     """Draw the picture of a view on a card: (H, W, 4), without marks over it."""
-    texture = rosy.run(card.texture_steps(card.upload(view.instances, view.look.display), view))
+    texture = run(card.texture_steps(card.upload(view.instances, view.look.display), view))
     return card.device.read(texture)
 
 
-def draw_pair(
-    rosy: SimpleNamespace,
-    card: Any,
-    instances: Sequence[Any],
-    camera: Any,
-    look: Any,
-    lights: Sequence[Any] = (),
-    reference: Any = None,
-    drift: Any = (0.0, 1.0),
-) -> Pair:
+def draw_pair(card: Any, instances: Sequence[Any], camera: Any, look: Any, **scene: Any) -> Pair:
     """Draw a picture on the card and with numpy.
 
     Numpy uses brute force, which averages each streamline separately.
 
     Parameters
     ----------
-    rosy : SimpleNamespace
-        The result of `rooms`.
     card : GpuRenderer
     instances : sequence of MeshInstance
     camera : Camera
         With `look.supersampling` times the width and height of the picture.
     look : Look
-    lights : sequence of Light
-    reference : ReferenceRender, optional
-    drift : Drift
+    **scene
+        The other attributes of the `ViewInput`.
     """
-    drift = module_of(rosy.package, "compositor.flow").Drift(*drift)
     supersampling = look.supersampling
     width, height = camera.width // supersampling, camera.height // supersampling
-    view = rosy.ViewInput(
-        tuple(instances), camera.resized(width, height), look, tuple(lights), reference, drift=drift
-    )
-    card_picture = draw_on_card(rosy, card, view)
+    view = ViewInput(tuple(instances), camera.resized(width, height), look, **scene)
+    card_picture = draw_on_card(card, view)
     images = read_gbuffer(card, width, height)
-    gbuffer = rosy.project(instances, view.camera, look.display, samples=supersampling)
+    gbuffer = project(instances, view.camera, look.display, samples=supersampling)
     is_center = None
     if supersampling > 1:
-        centers = rosy.project(instances, view.camera, look.display)
+        centers = project(instances, view.camera, look.display)
         is_center = np.isin(gbuffer.pixel, centers.pixel)
-    has_flow = module_of(rosy.package, "compositor.look").has_flow
+    light = view.lights, view.reference
     if has_flow(look) or supersampling > 1:
-        with one_streamline_per_pixel(rosy.package):
-            numpy_picture = rosy.compose(gbuffer, look, lights, reference, drift=drift).rgba
+        with one_streamline_per_pixel():
+            numpy_picture = compose(gbuffer, look, *light, drift=view.drift).rgba
     else:
-        numpy_picture = rosy.compose(gbuffer, replace(look, method="brute"), lights, reference).rgba
-    named = {name: np.array(image) for name, image in images.items()}
-    return Pair(gbuffer, named, card_picture, numpy_picture, is_center)
+        numpy_picture = compose(gbuffer, replace(look, method="brute"), *light).rgba
+    return Pair(gbuffer, images, card_picture, numpy_picture, is_center)
 
 
 def read_gbuffer(card: Any, width: int, height: int) -> dict[str, np.ndarray]:
@@ -200,43 +145,3 @@ def likeness(one: np.ndarray, other: np.ndarray) -> float:
     both = (one[..., 3] == 1) & (other[..., 3] == 1)
     one, other = one[both].astype(np.float64), other[both].astype(np.float64)
     return min(float(np.corrcoef(one[:, c], other[:, c])[0, 1]) for c in range(3))
-
-
-def blender_surface(rosy: SimpleNamespace, name: str) -> Any:
-    """Return a primitive of Blender as a surface: sphere, torus or Suzanne."""
-    import bpy
-
-    if name == "sphere":
-        bpy.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48)
-    elif name == "torus":
-        bpy.ops.mesh.primitive_torus_add(
-            major_segments=128, minor_segments=48, major_radius=1.0, minor_radius=0.4
-        )
-    else:
-        bpy.ops.mesh.primitive_monkey_add()
-        modifier = bpy.context.object.modifiers.new("Subdivision", "SUBSURF")
-        modifier.levels = 2
-    bpy.ops.object.shade_smooth()
-    evaluated = bpy.context.object.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    meshes = module_of(rosy.package, "scene.meshes")
-    try:
-        return meshes.mesh_surface(evaluated.to_mesh(), name)
-    finally:
-        evaluated.to_mesh_clear()
-        bpy.ops.object.delete()
-
-
-def surface_of_shape(rosy: SimpleNamespace, name: str, data: Path | None = None) -> Any:
-    """Return the surface of a shape in `VIEWS`; None if its file is not in the data folder."""
-    if name not in FILES:
-        return blender_surface(rosy, name)
-    path = None if data is None else data / "meshes" / FILES[name]
-    return rosy.Surface(path) if path is not None and path.is_file() else None
-
-
-def camera_of_shape(rosy: SimpleNamespace, name: str, surface: Any, size: int) -> Any:
-    """Return the camera for a shape in `VIEWS`, with a square frame."""
-    azimuth, elevation, perspective = VIEWS[name]
-    return rosy.orbit_camera(
-        surface.vertices, azimuth, elevation, size, size, perspective=perspective
-    )

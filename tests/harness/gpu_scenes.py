@@ -1,7 +1,5 @@
 """Fields, meshes and views on which the pictures of the graphics card are compared with those of numpy."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 
@@ -10,7 +8,6 @@ from lenses import shifted
 from scipy.spatial.transform import Rotation
 from shapes import cube, icosphere, joined, placed, rebuilt
 
-from rosy_addon.compositor.flow import NO_DRIFT
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.directional_field import field_from_directions, tensor_field
 from rosy_addon.field.generate import axis_field, generate
@@ -21,12 +18,11 @@ from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 from rosy_addon.worker.job import run
 
-from .gpu_parity import draw_pair, rooms
+from .gpu_parity import draw_on_card, draw_pair
 
 AXIS = (0.3, 0.2, 1.0)
 SHEAR = np.array([[1.0, 0.4, 0.0], [0.0, 0.8, 0.3], [0.0, 0.0, 1.2]])
 MIRROR = np.diag([-1.0, 1.0, 1.0])
-ROSY = rooms()
 SIZE = 160, 144
 LOOK = Look(shading=0.0, length=30)
 EVEN_LINES = replace(LOOK, ink="even", shading=0.9, line_width=3.0, line_distance=6.0)
@@ -51,11 +47,6 @@ def boxes():
 # --- fields --------------------------------------------------------------------------------------
 
 
-def face_centers(surface):
-    """Return the first corner of each face, as a place in it."""
-    return surface.vertices[surface.corner_vertex[surface.face_start[:-1]]]
-
-
 def smooth_field(surface, degree, families=1):
     """Return a field with singularities of index 1 / N and a magnitude that varies.
 
@@ -68,7 +59,7 @@ def smooth_field(surface, degree, families=1):
     vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
     if degree > 1:
         vectors = generate(surface, "smoothest", degree).vectors
-    magnitude = 0.8 + 0.4 * np.sin(3 * face_centers(surface) @ np.array(AXIS) + 1)
+    magnitude = 0.8 + 0.4 * np.sin(3 * surface.face_center @ np.array(AXIS) + 1)
     return RosyField(degree, vectors * magnitude[:, None], family_count=families)
 
 
@@ -97,7 +88,7 @@ def conjugate_field(surface):
 
 def sign_changing_tensors(surface):
     """Return the field of symmetric tensors whose eigenvalues change sign."""
-    x, y, z = face_centers(surface).T
+    x, y, z = surface.face_center.T
     tensor = np.zeros((surface.face_count, 3, 3))
     tensor[:, 0, 0], tensor[:, 1, 1], tensor[:, 2, 2] = 1 + x, 0.3 - y, 2 * z
     tensor[:, 0, 2] = tensor[:, 2, 0] = 0.5
@@ -143,33 +134,21 @@ def view(size=SIZE, azimuth=0.4, perspective=True, distance=4.0, supersampling=1
     return shifted(orthographic_camera(view_matrix, *size, scale=2.6), (0.06, -0.04))
 
 
-def draw(renderer, view_input):
+def draw(renderer, instances, look=LOOK, camera=None):
     """Draw a picture on a card, or with numpy if it is None."""
+    view_input = ViewInput(tuple(instances), camera or view(), look)
     return draw_picture(view_input) if renderer is None else run(renderer.picture_steps(view_input))
 
 
 def card_rgba(card, instances, look=LOOK, camera=None, **others):
     """Draw a picture on the card; it may be empty, and larger than what is in view."""
-    camera = view() if camera is None else camera
-    items = card.upload(instances, look.display)
-    texture = run(card.texture_steps(items, ViewInput((), camera, look, **others)))
-    return card.device.read(texture).copy()
+    return draw_on_card(card, ViewInput(tuple(instances), camera or view(), look, **others))
 
 
-def assert_parity(
-    card,
-    instances,
-    camera=None,
-    look=LOOK,
-    lights=(),
-    agreement=0.998,
-    likeness=0.98,
-    reference=None,
-    drift=NO_DRIFT,
-):
+def assert_parity(card, instances, camera=None, look=LOOK, agreement=0.998, likeness=0.98, **scene):
     """Compare the picture of the card with the picture of numpy, and return both."""
     camera = view(supersampling=look.supersampling) if camera is None else camera
-    pair = draw_pair(ROSY, card, instances, camera, look, lights, reference, drift)
+    pair = draw_pair(card, instances, camera, look, **scene)
     assert np.isfinite(pair.card).all()
     both = (pair.card[..., 3] == 1) & (pair.numpy[..., 3] == 1)
     assert both.sum() > 500 and pair.agreement >= agreement and pair.likeness >= likeness

@@ -7,21 +7,24 @@ and those of pixels with several samples by that of `lic_trace.glsl`, with inter
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 from unittest import mock
 
 import numpy as np
 
-#: The modules of `compositor` that are used here.
-MODULES = (
-    *("per_pixel_lic", "lic", "covering", "flow", "contrast", "filter_kernel", "hatching"),
-    *("lic_images", "image_noise", "pixel_field"),
-)
+from .rosy_modules import rosy
+
+lic, per_pixel_lic = rosy("compositor.lic"), rosy("compositor.per_pixel_lic")
+covering_module, lic_images = rosy("compositor.covering"), rosy("compositor.lic_images")
+filter_kernel, flow = rosy("compositor.filter_kernel"), rosy("compositor.flow")
+normalize_variance = rosy("compositor.contrast").normalize_variance
+all_members = rosy("compositor.pixel_field").all_members
+is_hatched = rosy("compositor.hatching").is_hatched
+NOISE_MEAN = rosy("compositor.image_noise").NOISE_MEAN
+INTERPOLATED_CONTRAST = rosy("gpu.lic_stage").INTERPOLATED_CONTRAST
 
 #: Weights of the channels at positions of a streamline: from a position and the share of the kernel that drifts
 #: forward to (P, K).
@@ -29,39 +32,36 @@ Weights = Callable[[int, np.ndarray], np.ndarray]
 
 
 @contextmanager
-def one_streamline_per_pixel(package: str = "rosy_addon") -> Iterator[None]:
+def one_streamline_per_pixel() -> Iterator[None]:
     """Let the method "sheets" follow the best of the N directions from each pixel, as "brute" does."""
-    modules = {name: importlib.import_module(f"{package}.compositor.{name}") for name in MODULES}
-    lic_stage = importlib.import_module(f"{package}.gpu.lic_stage")
-    rosy = SimpleNamespace(**modules, interpolated_contrast=lic_stage.INTERPOLATED_CONTRAST)
 
     def draw_lengths(field, looks, noise, _strip):
         results = []
         for look in looks:
-            images = rosy.per_pixel_lic.brute_force(field, look, noise)
-            if look.is_antialiased and rosy.hatching.is_hatched(look):
-                covering = rosy.covering.build_covering(field, look, noise)
-                images = _smoothed(rosy, covering, field, images)
+            images = per_pixel_lic.brute_force(field, look, noise)
+            if look.is_antialiased and is_hatched(look):
+                covering = covering_module.build_covering(field, look, noise)
+                images = _smoothed(covering, field, images)
             results.append(images)
         return results
 
-    convolve_still = rosy.per_pixel_lic.convolve_members
+    convolve_still = per_pixel_lic.convolve_members
 
     def convolve(field, look, *arguments):
         if look.flow or look.is_antialiased:
-            return _members(rosy, field, look, *arguments)
+            return _members(field, look, *arguments)
         return convolve_still(field, look, *arguments)
 
     with (
-        mock.patch.object(rosy.lic, "fast_lic", draw_lengths),
-        mock.patch.object(rosy.per_pixel_lic, "convolve_members", convolve),
+        mock.patch.object(lic, "fast_lic", draw_lengths),
+        mock.patch.object(per_pixel_lic, "convolve_members", convolve),
     ):
         yield
 
 
-def _smoothed(rosy: SimpleNamespace, covering: Any, field: Any, images: Any) -> Any:
+def _smoothed(covering: Any, field: Any, images: Any) -> Any:
     """Return images that are averaged with those before and behind, with their slopes."""
-    lines = rosy.covering.member_lines(field)
+    lines = covering_module.member_lines(field)
     member_of_line = np.argsort(lines)
     pixel_of_cell = np.full(covering.cell_count, -1)
     pixel_of_cell[covering.cell_of_pixel] = np.arange(images.members.shape[1])
@@ -83,32 +83,25 @@ def _smoothed(rosy: SimpleNamespace, covering: Any, field: Any, images: Any) -> 
     return replace(images, members=smooth, slopes=slopes)
 
 
-def _members(
-    rosy: SimpleNamespace,
-    field: Any,
-    look: Any,
-    noise: np.ndarray,
-    neighbors: np.ndarray,
-    tracers: Any,
-) -> Any:
+def _members(field: Any, look: Any, noise: np.ndarray, neighbors: np.ndarray, tracers: Any) -> Any:
     """Do the same as `per_pixel_lic.convolve_members`, by kernels that move or with interpolated noise."""
     count = len(field.pixel)
-    limit = rosy.lic_images.magnitude_step_limits(field, look)
+    limit = lic_images.magnitude_step_limits(field, look)
     length = np.full(count, look.length) if limit is None else limit
     reach = look.streamline_reach()
-    centered = noise.astype(np.float64) - rosy.image_noise.NOISE_MEAN
+    centered = noise.astype(np.float64) - NOISE_MEAN
     sample = _sampler(centered, neighbors, look.is_antialiased)
-    weights = _weights(rosy, look, length)
-    whole = rosy.filter_kernel.kernel_weights(*[length.astype(float)] * 3, look.kernel)
+    weights = _weights(look, length)
+    whole = filter_kernel.kernel_weights(*[length.astype(float)] * 3, look.kernel)
     channels = 1 if look.flow else noise.shape[1]
     members = np.empty((len(tracers), count, channels), dtype=np.float32)
     samples = np.empty((len(tracers), count))
-    directions = rosy.pixel_field.all_members(field, look.guiding_angle)
+    directions = all_members(field, look.guiding_angle)
     for member, tracer in enumerate(tracers):
         forward = np.ones(count)
         if field.symmetry.has_opposites:
             cosine = (directions[member] * np.exp(-1j * look.guiding_angle)).real
-            forward = rosy.flow.forward_share(cosine).astype(np.float64)
+            forward = flow.forward_share(cosine).astype(np.float64)
         start = weights(0, forward)
         total, weight_sum = start * centered, start.sum(axis=1)
         available, full = (start**2).sum(axis=1), (start**2).sum(axis=1)
@@ -128,12 +121,12 @@ def _members(
         else:
             samples[member] = weight_sum**2 / available
             mean = total / weight_sum[:, None]
-        if look.is_antialiased and not rosy.hatching.is_hatched(look):
-            mean *= rosy.interpolated_contrast
-        mean = (rosy.image_noise.NOISE_MEAN + mean).astype(np.float32)
+        if look.is_antialiased and not is_hatched(look):
+            mean *= INTERPOLATED_CONTRAST
+        mean = (NOISE_MEAN + mean).astype(np.float32)
         number = samples[member].astype(np.float32)
-        members[member] = rosy.contrast.normalize_variance(mean, number, look)
-    return rosy.lic_images.lic_images(members, samples.mean(axis=0).astype(np.float32))
+        members[member] = normalize_variance(mean, number, look)
+    return lic_images.lic_images(members, samples.mean(axis=0).astype(np.float32))
 
 
 def _sampler(
@@ -157,16 +150,16 @@ def _sampler(
     )
 
 
-def _weights(rosy: SimpleNamespace, look: Any, length: np.ndarray) -> Weights:
+def _weights(look: Any, length: np.ndarray) -> Weights:
     """Return the weights of a kernel that moves, or is at rest without flow."""
     kind, share = look.kernel, length / look.length
-    sample_weights = rosy.filter_kernel.sample_weights
+    sample_weights = filter_kernel.sample_weights
     if not look.flow:
         return lambda position, _: sample_weights(np.full(len(length), position), length, kind)[
             :, None
         ]
-    shifts = rosy.flow.channel_shifts(look.flow_phase, look.flow_distance)
-    channel_weights = rosy.flow.channel_weights(look.flow_phase)
+    shifts = flow.channel_shifts(look.flow_phase, look.flow_distance)
+    channel_weights = flow.channel_weights(look.flow_phase)
 
     def weights(position: int, forward: np.ndarray) -> np.ndarray:
         result = np.zeros((len(length), len(shifts)))

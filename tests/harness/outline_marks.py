@@ -7,14 +7,16 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from rosy_addon.field.connectivity import build_edges
-from rosy_addon.projection.rasterizer import rasterize
+from rosy_addon.line_drawing.visibility import project_to_pixels, rasterize_depth
 
 #: Coverage from which on a pixel belongs to a mark, or a silhouette is covered.
 MARK_COVERAGE, LINE_COVERAGE = 0.25, 0.3
 
 #: Largest distance in pixels from a silhouette to a line that covers it.
 LINE_DISTANCE = 1.5
+
+#: Least jump of the depth behind a visible silhouette, and its least length, in pixels.
+MIN_JUMP, MIN_LENGTH = 6.0, 10
 
 #: Pixels of the depth buffer of the reference along the side of a pixel.
 FINE = 4
@@ -35,9 +37,7 @@ def mark_lengths(coverage: np.ndarray) -> np.ndarray:
     return np.array([max(side.stop - side.start for side in box) for box in boxes], dtype=int)
 
 
-def visible_silhouettes(
-    instance: Any, camera: Any, min_jump: float = 6.0, min_length: int = 10
-) -> tuple[np.ndarray, np.ndarray]:
+def visible_silhouettes(instance: Any, camera: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return points on the visible silhouettes and borders of a mesh, by brute force.
 
     They are on all edges between front and back faces. A point is visible if the depth buffer of a
@@ -48,10 +48,6 @@ def visible_silhouettes(
     instance : MeshInstance
         The only one in the scene.
     camera : Camera
-    min_jump : float
-        Pixels.
-    min_length : int
-        Silhouettes that are visible over a shorter length in pixels are left out.
 
     Returns
     -------
@@ -61,17 +57,9 @@ def visible_silhouettes(
         The length in pixels that each point stands for.
     """
     points, triangles = instance.world_points(), instance.surface.triangle_vertex
-    homogeneous = np.concatenate([points, np.ones((len(points), 1))], axis=1)
-    clip = homogeneous @ (camera.projection @ camera.view).T
-    depth = -(homogeneous @ camera.view[2])
-    screen = (clip[:, :2] / clip[:, 3:] * 0.5 + 0.5) * (camera.width, camera.height)
+    screen, depth = project_to_pixels(points, camera)
     ends = _contour_edges(screen, triangles)
-    size = camera.width * FINE, camera.height * FINE
-    fragments = rasterize(clip, triangles.astype(np.int32), *size)
-    fine_depth = np.full(size[0] * size[1], np.inf)
-    at_corners = depth[triangles[fragments.triangle]]
-    fine_depth[fragments.pixel] = (at_corners * fragments.barycentric).sum(axis=1)
-    fine_depth = fine_depth.reshape(size[1], size[0])
+    fine_depth = rasterize_depth([instance], camera.scaled(FINE)).depth
     p, q = screen[ends[:, 0]], screen[ends[:, 1]]
     length = np.hypot(*(q - p).T)
     count = np.maximum(np.ceil(length * FINE).astype(int), 1)
@@ -83,19 +71,20 @@ def visible_silhouettes(
     if camera.is_perspective:
         z = 1 / ((1 - share) / near + share / far)
     column, row = (place * FINE).astype(int).T
-    inside = (column > 2) & (row > 2) & (column < size[0] - 3) & (row < size[1] - 3)
+    height, width = fine_depth.shape
+    inside = (column > 2) & (row > 2) & (column < width - 3) & (row < height - 3)
     place, z, column, row = place[inside], z[inside], column[inside], row[inside]
     weight = (length / count)[edge][inside]
-    pixel_size = (z if camera.is_perspective else 1.0) / camera.pixels_per_unit
+    pixel_size = camera.pixel_sizes(z)
     around = [fine_depth[row + dy, column + dx] for dy in range(-2, 3) for dx in range(-2, 3)]
     is_near = np.abs(np.stack(around) - z).min(axis=0) < 15 * pixel_size
-    is_visible = is_near & (np.max(around, axis=0) > z + min_jump * pixel_size)
+    is_visible = is_near & (np.max(around, axis=0) > z + MIN_JUMP * pixel_size)
     place, weight = place[is_visible], weight[is_visible]
     picture = np.zeros((camera.height, camera.width), dtype=bool)
     column, row = place.astype(int).T
     picture[row, column] = True
     labels, _ = ndimage.label(picture, np.ones((3, 3)))
-    is_long = mark_lengths(picture)[labels[row, column] - 1] >= min_length
+    is_long = mark_lengths(picture)[labels[row, column] - 1] >= MIN_LENGTH
     return place[is_long], weight[is_long]
 
 
@@ -104,12 +93,10 @@ def _contour_edges(screen: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     a, b, c = (screen[triangles[:, corner]] for corner in range(3))
     u, v = b - a, c - a
     is_front = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] > 0
-    start = np.arange(0, triangles.size + 1, 3, dtype=np.int32)
-    edges = build_edges(triangles.ravel().astype(np.int32), start)
-    is_contour = np.ones(len(edges.ends), dtype=bool)
-    first, second = edges.halfedges.T // 3
-    is_contour[edges.interior] = is_front[first] != is_front[second]
-    return edges.ends[is_contour]
+    sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
+    ends, edge, count = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
+    front_count = np.bincount(edge, np.repeat(is_front, 3))
+    return ends[(count != 2) | (front_count == 1)]
 
 
 def covered_share(coverage: np.ndarray, points: np.ndarray, lengths: np.ndarray) -> float:

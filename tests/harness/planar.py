@@ -20,7 +20,6 @@ from rosy_addon.compositor.pixel_field import PixelField, without_undefined_neig
 from rosy_addon.compositor.streak_statistics import break_steps
 from rosy_addon.compositor.strips import Strip
 from rosy_addon.compositor.undirected import undirected_texture
-from rosy_addon.core.cache import Cache
 from rosy_addon.core.deterministic_trig import unit_phasor
 from rosy_addon.projection.gbuffer import GBuffer
 
@@ -52,7 +51,7 @@ class PlanarPicture(NamedTuple):
     layer: DegreeLayer
 
 
-def degree_layers(gbuffer: GBuffer, look: Look, cache: Cache | None = None) -> list[DegreeLayer]:
+def degree_layers(gbuffer: GBuffer, look: Look) -> list[DegreeLayer]:
     """Return the layers of a picture without ink, one per visible degree, in ascending order."""
     layers = []
 
@@ -63,7 +62,7 @@ def degree_layers(gbuffer: GBuffer, look: Look, cache: Cache | None = None) -> l
 
     height = gbuffer.camera.height
     with mock.patch.object(compose_module, "streak_tone", recorded):
-        compose(gbuffer, look, cache=cache, strips=[Strip(0, height, height)])
+        compose(gbuffer, look, strips=[Strip(0, height, height)])
     return layers
 
 

@@ -1,7 +1,5 @@
 """Run the steps of jobs beside a helper process."""
 
-from __future__ import annotations
-
 
 def finished(runner, helper):
     """Run the steps of a `StepRunner` to their end, and return their result."""

@@ -20,39 +20,31 @@ from rosy_addon.line_drawing.tangent_mesh import TangentMesh
 #: Distance between the points that are compared, and search radius, in spacings.
 SAMPLE_STEP, SEARCH_RADIUS = 0.1, 2.0
 
+#: Allowed difference of gaps from the spacing, and number of points at which they are measured.
+TOLERANCE, MAX_POINTS = 0.25, 4000
+
 #: Points of one stroke are compared only if they are farther apart along it than this, in spacings.
 MIN_SELF_ARC = 2.5
 
 
 class LateralGaps(NamedTuple):
-    """The gaps at n points of strokes, on the left (0) and the right (1) side.
+    """The gaps of strokes on both sides.
 
     Attributes
     ----------
-    point : (n,) int64 ndarray
-        Numbers of the points in the strokes.
-    gap : (n, 2) float64 ndarray
-        Distance to the next stroke in spacings; infinite if there is none within `SEARCH_RADIUS`.
-    has_room : (n, 2) bool ndarray
-        Whether the surface continues on that side for 1.25 spacings. If it does not, or if a crease
-        stops strokes, no stroke is expected there.
-    nearest_distance : (n,) float64 ndarray
-        Distance to the nearest point of a stroke of the family in any direction, in spacings.
+    evenness : float
+        The fraction of gaps that differ from the required spacing by at most `TOLERANCE`. Sides on which the
+        surface ends, or a crease, within 1.25 spacings do not count: no stroke is expected there.
+    nearest : float
+        Least distance to a point of another stroke of the family in any direction, in spacings.
     """
 
-    point: np.ndarray
-    gap: np.ndarray
-    has_room: np.ndarray
-    nearest_distance: np.ndarray
-
-    def evenness(self, tolerance: float = 0.25) -> float:
-        """Return the fraction of gaps on sides with room that differ from 1 by at most `tolerance`."""
-        gap = self.gap[self.has_room]
-        return float(np.mean(np.abs(gap - 1) <= tolerance)) if len(gap) else 1.0
+    evenness: float
+    nearest: float
 
 
-def lateral_gaps(mesh: TangentMesh, strokes: Strokes, max_points: int = 20_000) -> LateralGaps:
-    """Measure the gaps of strokes.
+def lateral_gaps(mesh: TangentMesh, strokes: Strokes) -> LateralGaps:
+    """Measure the gaps of strokes at about `MAX_POINTS` points, evenly distributed.
 
     Parameters
     ----------
@@ -60,25 +52,17 @@ def lateral_gaps(mesh: TangentMesh, strokes: Strokes, max_points: int = 20_000) 
         The mesh on which the strokes were traced.
     strokes : Strokes
         All strokes, before any are clipped or cut.
-    max_points : int
-        About the number of points at which gaps are measured, evenly distributed.
     """
     step = np.diff(strokes.arc, prepend=0)
     step[strokes.start[:-1]] = 0
     samples = strokes.subdivided(np.ceil(step / (SAMPLE_STEP * strokes.spacing)).clip(1, 1000))
     tangent = _tangents(samples)
-    grid = PointGrid(SEARCH_RADIUS * float(np.median(samples.spacing)), len(samples.points))
-    grid.add(samples.points, SEARCH_RADIUS * samples.spacing)
     sample = np.flatnonzero(np.isfinite(samples.weights[:, 0]))
-    point = np.flatnonzero(np.isfinite(strokes.weights[:, 0]))
-    stride = max(len(sample) // max_points, 1)
-    sample, point = sample[::stride], point[::stride]
-    gap, nearest_distance = np.full((len(sample), 2), np.inf), np.full(len(sample), np.inf)
-    for start in range(0, len(sample), 1 << 12):
-        batch = slice(start, start + (1 << 12))
-        gap[batch], nearest_distance[batch] = _measure(mesh, samples, tangent, grid, sample[batch])
-    has_room = _sides_with_room(mesh, samples, tangent, sample)
-    return LateralGaps(point, gap, has_room, nearest_distance)
+    sample = sample[:: max(len(sample) // MAX_POINTS, 1)]
+    gap, nearest = _measure(mesh, samples, tangent, sample)
+    gap = gap[_sides_with_room(mesh, samples, tangent, sample)]
+    evenness = np.mean(np.abs(gap - 1) <= TOLERANCE) if len(gap) else 1.0
+    return LateralGaps(float(evenness), nearest)
 
 
 def _arc_distance(strokes: Strokes, point_a: np.ndarray, point_b: np.ndarray) -> np.ndarray:
@@ -94,44 +78,42 @@ def _arc_distance(strokes: Strokes, point_a: np.ndarray, point_b: np.ndarray) ->
 
 
 def _measure(
-    mesh: TangentMesh, samples: Strokes, tangent: np.ndarray, grid: PointGrid, batch: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return `LateralGaps.gap` and `nearest_distance` for the samples of a batch."""
-    stroke = samples.stroke
-    query, other = grid.pairs_within(samples.points[batch], SEARCH_RADIUS * samples.spacing[batch])
-    sample = batch[query]
-    distinct = stroke[sample] != stroke[other]
-    distinct |= _arc_distance(samples, sample, other) > MIN_SELF_ARC * samples.spacing[sample]
-    distinct &= dot(samples.normal[sample], samples.normal[other]) > 0.3
-    query, other, sample = query[distinct], other[distinct], sample[distinct]
-    normal = normalize(samples.normal[sample] + samples.normal[other])
-    delta = samples.points[other] - samples.points[sample]
-    height = dot(delta, normal)
-    same_family = np.abs(height) < 0.5 * np.sqrt(dot(delta, delta))
-    sample_a, sample_b = sample[same_family], other[same_family]
+    mesh: TangentMesh, samples: Strokes, tangent: np.ndarray, sample: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Return the (n, 2) gaps at samples, infinite beyond the search radius, and `LateralGaps.nearest`."""
+    grid = PointGrid(SEARCH_RADIUS * float(np.median(samples.spacing)), len(samples.points))
+    grid.add(samples.points, SEARCH_RADIUS * samples.spacing)
+    radius = SEARCH_RADIUS * samples.spacing[sample]
+    query, other = grid.pairs_within(samples.points[sample], radius)
+    own = sample[query]
+    distinct = samples.stroke[own] != samples.stroke[other]
+    distinct |= _arc_distance(samples, own, other) > MIN_SELF_ARC * samples.spacing[own]
+    distinct &= dot(samples.normal[own], samples.normal[other]) > 0.3
+    query, own, other = query[distinct], own[distinct], other[distinct]
 
     def member_at(at: np.ndarray) -> np.ndarray:
         return transport(samples.member[at], mesh.normal[samples.triangle[at]], samples.normal[at])
 
-    same_family[same_family] = mesh.is_same_family(
-        member_at(sample_a), samples.normal[sample_a], member_at(sample_b), samples.normal[sample_b]
+    delta = samples.points[other] - samples.points[own]
+    height = dot(delta, normalize(samples.normal[own] + samples.normal[other]))
+    compared = np.abs(height) < 0.5 * np.sqrt(dot(delta, delta))
+    compared &= mesh.is_same_family(
+        member_at(own), samples.normal[own], member_at(other), samples.normal[other]
     )
-    query, other, sample, normal, delta, height = (
-        values[same_family] for values in (query, other, sample, normal, delta, height)
+    query, own, other, delta, height = (
+        values[compared] for values in (query, own, other, delta, height)
     )
+    normal = normalize(samples.normal[own] + samples.normal[other])
     tangential = delta - height[:, None] * normal
-    half_angle = np.arccos(np.clip(dot(samples.normal[sample], samples.normal[other]), -1, 1)) / 2
-    arc_ratio = np.where(half_angle > 1e-6, half_angle / np.sin(np.maximum(half_angle, 1e-6)), 1)
-    distance = np.sqrt(dot(tangential, tangential)) * arc_ratio
-    spacing = samples.spacing[sample]
-    nearest_distance = np.full(len(batch), np.inf)
-    np.minimum.at(nearest_distance, query, distance / spacing)
-    forward = dot(tangential, tangent[sample])
-    alongside = np.abs(forward) <= 0.6 * SAMPLE_STEP * spacing + 0.05 * distance
-    side = (dot(tangential, np.cross(samples.normal[sample], tangent[sample])) < 0).astype(np.intp)
-    gap = np.full((len(batch), 2), np.inf)
-    np.minimum.at(gap, (query[alongside], side[alongside]), (distance / spacing)[alongside])
-    return gap, nearest_distance
+    half_angle = np.arccos(np.clip(dot(samples.normal[own], samples.normal[other]), -1, 1)) / 2
+    distance = np.sqrt(dot(tangential, tangential)) / np.sinc(half_angle / np.pi)
+    forward = dot(tangential, tangent[own])
+    alongside = np.abs(forward) <= 0.6 * SAMPLE_STEP * samples.spacing[own] + 0.05 * distance
+    side = (dot(tangential, np.cross(samples.normal[own], tangent[own])) < 0).astype(np.intp)
+    distance /= samples.spacing[own]
+    gap = np.full((len(sample), 2), np.inf)
+    np.minimum.at(gap, (query[alongside], side[alongside]), distance[alongside])
+    return gap, float(distance.min(initial=np.inf))
 
 
 def _tangents(samples: Strokes) -> np.ndarray:
@@ -146,7 +128,7 @@ def _tangents(samples: Strokes) -> np.ndarray:
 def _sides_with_room(
     mesh: TangentMesh, samples: Strokes, tangent: np.ndarray, sample: np.ndarray
 ) -> np.ndarray:
-    """Return `LateralGaps.has_room` for samples."""
+    """Return (n, 2) bool: whether the surface continues on the sides of samples."""
     triangle, weights = samples.triangle[sample], samples.weights[sample]
     direction = dot(tangent[sample], mesh.x[triangle]) + 1j * dot(tangent[sample], mesh.y[triangle])
     direction /= np.maximum(np.abs(direction), 1e-300)

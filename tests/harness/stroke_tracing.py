@@ -16,7 +16,7 @@ from rosy_addon.line_drawing.stroke_set import Strokes
 from rosy_addon.line_drawing.svg import svg_text
 from rosy_addon.line_drawing.tangent_mesh import CREASE_ANGLE, build_tangent_mesh
 from rosy_addon.line_drawing.trace import trace_on_mesh
-from rosy_addon.line_drawing.visibility import clip_to_visible, rasterize_depth
+from rosy_addon.line_drawing.visibility import clip_to_visible, project_to_pixels, rasterize_depth
 from rosy_addon.projection.camera import Camera
 from rosy_addon.projection.gbuffer import MeshInstance
 
@@ -42,6 +42,14 @@ def trace_strokes(
 def visible_strokes(strokes: Strokes, instances: Sequence[MeshInstance], camera: Camera) -> Strokes:
     """Return the parts of strokes that are in the frame and not hidden by mesh instances."""
     return clip_to_visible(strokes, camera, rasterize_depth(instances, camera))
+
+
+def pixel_lengths(strokes: Strokes, camera: Camera) -> np.ndarray:
+    """Return the (S,) lengths of strokes in pixels."""
+    pixels, _ = project_to_pixels(strokes.points, camera)
+    segment_length = np.hypot(*np.diff(pixels, axis=0).T)
+    same = np.diff(strokes.stroke) == 0
+    return np.bincount(strokes.stroke[1:][same], segment_length[same])
 
 
 def write_svg(path: Path, *drawing: object) -> None:

@@ -1,4 +1,4 @@
-"""Intersections of rays with triangles, one ray at a time."""
+"""Intersections of all rays with all triangles."""
 
 from __future__ import annotations
 
@@ -8,24 +8,26 @@ import numpy as np
 def ray_intersections(
     origin: np.ndarray, direction: np.ndarray, triangles: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where a line meets the planes of triangles (Möller and Trumbore).
+    """Where lines meet the planes of triangles (Möller and Trumbore).
 
     Parameters
     ----------
-    origin, direction : (3,) ndarray
+    origin, direction : (R, 3) ndarray
     triangles : (T, 3, 3) ndarray
         Their corners.
 
     Returns
     -------
-    barycentric : (T, 3) ndarray
+    barycentric : (R, T, 3) ndarray
         All are at least 0 on the triangle. Not finite if the line is parallel to the plane.
-    distance : (T,) ndarray
+    distance : (R, T) ndarray
         In lengths of the direction, negative behind the origin.
     """
     a, u, v = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    origin, direction = origin[:, None], direction[:, None]
     p, q = np.cross(direction, v), np.cross(origin - a, u)
     with np.errstate(divide="ignore", invalid="ignore"):
-        inverse = 1 / (u * p).sum(axis=1)
-        s, t = ((origin - a) * p).sum(axis=1) * inverse, q @ direction * inverse
-        return np.stack([1 - s - t, s, t], axis=1), (v * q).sum(axis=1) * inverse
+        inverse = 1 / (u * p).sum(axis=2)
+        s = ((origin - a) * p).sum(axis=2) * inverse
+        t = (q * direction).sum(axis=2) * inverse
+        return np.stack([1 - s - t, s, t], axis=2), (v * q).sum(axis=2) * inverse

@@ -184,9 +184,10 @@ def sharp_cube() -> Surface:
 def instance_of(
     surface: Surface,
     degree: int,
-    kind: GeneratorSettings | str = "smoothest",
+    kind: GeneratorSettings | str | tuple[float, float, float] = "smoothest",
     matrix: np.ndarray | None = None,
 ) -> MeshInstance:
-    """A surface with a generated field, at its place or moved."""
+    """A surface with a generated field, or with one along an axis, at its place or moved."""
+    kind = GeneratorSettings("axis", kind) if isinstance(kind, tuple) else kind
     matrix = np.eye(4) if matrix is None else matrix
     return MeshInstance(surface, matrix, generate(surface, kind, degree))

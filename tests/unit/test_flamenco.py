@@ -24,17 +24,12 @@ function compiled(settings) {
 DEFAULTS = {"folder": "/out", "blendfile": "/a b/scene.blend", "preset": "", "cameras": ""}
 
 
-def result_of(expression):
-    """Evaluate JavaScript after the manager's functions and the job type."""
+def arguments_of(**settings):
+    """Return the arguments of Blender in each task of a job."""
     engine = quickjs.Context()
     script = (ROOT / "farm" / "flamenco" / "rosy_bake.js").read_text()
     engine.eval(MANAGER + script.replace("const JOB_TYPE", "var JOB_TYPE"))
-    return json.loads(engine.eval(expression))
-
-
-def arguments_of(**settings):
-    """Return the arguments of Blender in each task of a job."""
-    tasks = result_of(f"compiled({json.dumps({**DEFAULTS, **settings})})")
+    tasks = json.loads(engine.eval(f"compiled({json.dumps({**DEFAULTS, **settings})})"))
     assert all(task["type"] == "blender" for task in tasks)
     commands = [command for task in tasks for command in task["commands"]]
     programs = {(each["name"], each["parameters"]["exe"]) for each in commands}

@@ -8,15 +8,10 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
-
-if __name__ == "__main__":  # without pytest's search path
-    sys.path[:0] = [str(folder) for folder in Path(__file__).resolve().parents[1:3]]
-else:
-    import pytest
-
+import pytest
+from conftest import ROOT
 from harness.planar import compose_planar
 from planar_fields import pair_angle, pixel_centers
 from shapes import icosphere, instance_of, torus
@@ -29,6 +24,8 @@ from rosy_addon.image_io.png import to_srgb_uint8
 from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.project import project
+
+pytestmark = pytest.mark.slow
 
 #: Largest angles between the directions of generated fields, in degrees.
 MAX_DEGREES = {"form": 1e-3, "smoothest": 1e-5, "curvature": 1e-5, "features": 1e-5}
@@ -74,13 +71,14 @@ def other_arrays(tmp_path_factory):
     if not other:
         pytest.skip("ROSY_OTHER_PYTHON names no other interpreter")
     file = tmp_path_factory.mktemp("numpy") / "arrays.npz"
-    subprocess.run([other, __file__, file], check=True)
+    folders = ROOT, ROOT / "tests", ROOT / "tests" / "unit"
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, folders))}
+    subprocess.run([other, __file__, file], env=environment, check=True)
     code = "import numpy; print(numpy.__version__, end='')"
     assert subprocess.check_output([other, "-c", code], text=True) != np.__version__
     return np.load(file)
 
 
-@pytest.mark.slow
 def test_generated_fields_hardly_differ(other_arrays):
     for kind, vectors in fields().items():
         sine = np.linalg.norm(np.cross(vectors, other_arrays[kind]), axis=1)
@@ -89,7 +87,6 @@ def test_generated_fields_hardly_differ(other_arrays):
         assert ((vectors == 0) == (other_arrays[kind] == 0)).all(), kind
 
 
-@pytest.mark.slow
 def test_another_numpy_version_draws_the_same(other_arrays):
     for name, picture in draw().items():
         difference = np.abs(picture.astype(int) - other_arrays[name]).max(axis=2)

@@ -2,13 +2,11 @@
 
 import re
 import tomllib
-from pathlib import Path
 
 import pytest
+from conftest import ROOT
 
 from tools.check_tag import fault_of
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_citation_has_the_version_of_the_manifest():

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
-from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -34,8 +33,6 @@ LAYERS = (
 #: Rooms that may use Blender everywhere. Of the others, only the commands of `extras` import them.
 BLENDER_ROOMS = {"scene", "ui", "jobs", "viewport", "cli"}
 
-#: Files of the room `gpu` that draw with Blender, and may import its modules.
-BLENDER_GPU_FILES = ("device.py",)
 
 #: What the Python package can use where it is installed.
 EXTRA_LIBRARIES = {
@@ -48,21 +45,27 @@ def room_of(path: Path) -> str:
     return path.relative_to(PACKAGE).with_suffix("").parts[0]
 
 
-def imports_of(path: Path) -> tuple[set[str], set[str]]:
-    """Imported modules: dotted paths of those in RoSy, and top-level names of all others."""
-    package_parts = path.relative_to(PACKAGE).parent.parts
+def imports_of(path: Path) -> tuple[set[Path], set[str]]:
+    """Imported modules, in functions as well: files of RoSy, and top-level names of all others."""
     inside, outside = set(), set()
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
             outside |= {alias.name.split(".")[0] for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+        elif isinstance(node, ast.ImportFrom) and not node.level:
             outside.add(node.module.split(".")[0])
         elif isinstance(node, ast.ImportFrom):
-            assert node.level <= len(package_parts) + 1, f"{path} reaches out of the package"
-            base = package_parts[: len(package_parts) - node.level + 1]
-            names = [node.module] if node.module else [alias.name for alias in node.names]
-            inside |= {".".join((*base, name)) for name in names}
+            source = path.parents[node.level - 1].joinpath(*(node.module or "").split("."))
+            inside |= {file_of(source, alias.name) for alias in node.names}
     return inside, outside
+
+
+def file_of(source: Path, name: str) -> Path:
+    """The file of a module, or of a name in it."""
+    for module in (source / name, source):
+        for file in (module.with_suffix(".py"), module / "__init__.py"):
+            if file.is_file():
+                return file
+    raise AssertionError(f"{source} has no {name}")
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
@@ -71,35 +74,18 @@ def test_imports_run_one_way(path):
     room = room_of(path)
     (layer,) = (number for number, rooms in enumerate(LAYERS) if room in rooms)
     above = {each for rooms in LAYERS[:layer] for each in rooms}
-    rooms = {name.split(".")[0] for name in inside} - {room}
+    rooms = {room_of(file) for file in inside} - {room}
     assert rooms <= above
     allowed = set(sys.stdlib_module_names) | {"numpy"}
     if room in BLENDER_ROOMS:
         allowed |= {"bpy", "bmesh", "bpy_extras", "mathutils", "gpu", "gpu_extras", "blf"}
     elif room != "extras":
         assert not rooms & BLENDER_ROOMS
-    if path.name in BLENDER_GPU_FILES and room == "gpu":
+    if path == PACKAGE / "gpu" / "device.py":  # draws with Blender
         allowed |= {"gpu", "gpu_extras", "mathutils"}
     if room in ("external", "extras"):
         allowed |= EXTRA_LIBRARIES
     assert outside <= allowed, "only relative imports inside the package, only numpy outside it"
-
-
-def imported_files(path: Path) -> Iterator[Path]:
-    """Yield the files of all modules that a file imports relatively, in functions as well."""
-    for node in ast.walk(ast.parse(path.read_text())):
-        if not isinstance(node, ast.ImportFrom) or not node.level:
-            continue
-        source = path.parents[node.level - 1].joinpath(*(node.module or "").split("."))
-        for alias in node.names:
-            candidates = [
-                file
-                for module in (source / alias.name, source)
-                for file in (module.with_suffix(".py"), module / "__init__.py")
-                if file.is_file()
-            ]
-            assert candidates, f"{path} imports {alias.name}, which does not exist"
-            yield candidates[0]
 
 
 @pytest.mark.slow
@@ -107,7 +93,7 @@ def imported_files(path: Path) -> Iterator[Path]:
 def test_there_are_no_import_cycles(folder):
     """Neither between rooms nor inside a room, nor by an import in a function."""
     files = sorted((ROOT / folder).rglob("*.py"))
-    TopologicalSorter({path: set(imported_files(path)) for path in files}).prepare()
+    TopologicalSorter({path: imports_of(path)[0] for path in files}).prepare()
 
 
 @pytest.mark.slow

@@ -1,7 +1,5 @@
 """The pages for readers who need no Blender: their programs and commands run as they are written."""
 
-from __future__ import annotations
-
 import subprocess
 
 import pytest

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.distance import pdist
 from shapes import from_quads, globe, icosphere, instance_of, plane, rebuilt, torus
 
 from rosy_addon.annotation.arrow_marks import (
@@ -51,18 +52,11 @@ def on_screen(camera, points):
     return project_to_pixels(points, camera)[0]
 
 
-def screen_angles(marks):
-    return np.angle(marks.direction @ [1, 1j])
-
-
-def gap(positions):
-    """The least distance between two of (n, 2) positions."""
-    apart = np.hypot(*(positions[:, None] - positions).transpose(2, 0, 1))
-    return apart[~np.eye(len(positions), dtype=bool)].min()
-
-
-def places(marks):
-    return np.unique(marks.place, axis=0)
+def angle_errors(marks, directions, camera=CAMERA, step=1e-4):
+    """(D, n) angles on screen between arrowheads and directions in space, radians."""
+    ends = [on_screen(camera, marks.anchor + step * direction) for direction in directions]
+    expected = (np.array(ends) - marks.place) @ [1, 1j]
+    return np.abs(np.angle(marks.direction @ [1, 1j] / expected))
 
 
 @pytest.mark.parametrize("normal_up", [True, False])
@@ -80,18 +74,15 @@ def test_arrowheads_point_along_the_directions_of_a_field(case, normal_up):
     camera = perspective_camera(look_at((1.5, -2.5, 2.5), (0, 0, 0)), 480, 320, fov=0.9)
     marks = arrows([MeshInstance(surface, np.eye(4), field)], camera, spacing=50.0)
     np.testing.assert_allclose(on_screen(camera, marks.anchor), marks.place, atol=1e-6)
-    step = 1e-4
-    ends = [on_screen(camera, marks.anchor + step * direction) for direction in directions]
-    angles = np.angle([(end - marks.place) @ [1, 1j] for end in ends])
-    error = np.abs(np.angle(np.exp(1j * (screen_angles(marks) - angles))))
+    error = angle_errors(marks, directions, camera)
     assert len(marks) > 15 and np.degrees(error.min(axis=0)).max() < 0.5
     # All directions of a place are there.
     assert (np.unique(error.argmin(axis=0), return_counts=True)[1] > len(marks) / 8).all()
-    assert len(marks) > 0.9 * len(directions) * len(places(marks))
+    assert len(marks) > 0.9 * len(directions) * len(np.unique(marks.place, axis=0))
     if len(directions) > 1:
         ahead = ((marks.position - marks.place) * marks.direction).sum(axis=1)
         np.testing.assert_allclose(np.hypot(*(marks.position - marks.place).T), ahead, atol=1e-9)
-        assert case.startswith("two") or gap(marks.position) > 0.8 * WIDTH * marks.size
+        assert case.startswith("two") or pdist(marks.position).min() > 0.8 * WIDTH * marks.size
     else:
         np.testing.assert_array_equal(marks.position, marks.place)
 
@@ -102,9 +93,7 @@ def test_arrowheads_follow_the_smooth_field_of_curved_surfaces():
     normal = surface.face_normal
     field = RosyField(1, east - (east * normal).sum(axis=1)[:, None] * normal)
     marks = arrows([MeshInstance(surface, np.eye(4), field)])
-    east = np.cross([0.0, 0.0, 1.0], marks.anchor)
-    angles = np.angle((on_screen(CAMERA, marks.anchor + 1e-4 * east) - marks.place) @ [1, 1j])
-    error = np.abs(np.angle(np.exp(1j * (screen_angles(marks) - angles))))
+    error = angle_errors(marks, [np.cross([0.0, 0.0, 1.0], marks.anchor)])
     assert len(marks) > 60 and np.degrees(error).max() < 1.0
 
 
@@ -114,7 +103,7 @@ def test_places_are_even_and_on_the_side_that_the_camera_sees(subdivisions, is_e
     surface = icosphere(subdivisions)
     camera = orthographic_camera(look_at((0, -3, 0.0), (0, 0, 0)), 400, 400, scale=2.2)
     marks = arrows([instance_of(surface, 1)], camera, spacing=25.0, is_exact=is_exact)
-    assert gap(marks.position) >= 25.0 and (marks.anchor[:, 1] < 0).all()
+    assert pdist(marks.position).min() >= 25.0 and (marks.anchor[:, 1] < 0).all()
     radius = 400 / 2.2
     y, x = np.mgrid[:400:2, :400:2] + 0.5
     inside = np.hypot(x - 200, y - 200) < 0.95 * radius
@@ -196,7 +185,7 @@ def test_a_large_floor_around_the_camera_is_covered_evenly():
     floor, field = plane(1, 1, 1000.0), RosyField(1, np.array([[0.2, 1.0, 0.0]]))
     camera = perspective_camera(look_at((0, 0, 1.7), (10, 0, -2)), 480, 320, fov=1.0)
     marks = arrows([MeshInstance(floor, np.eye(4), field)], camera, spacing=24.0)
-    assert gap(marks.position) >= 24.0
+    assert pdist(marks.position).min() >= 24.0
     lower = np.mgrid[10:470:8, 10:120:8].reshape(2, -1).T
     nearest = np.min([np.hypot(*(lower - place).T) for place in marks.place], axis=0)
     assert nearest.max() < 1.5 * 24.0
@@ -236,28 +225,10 @@ def test_an_arrowhead_has_its_shape_and_its_outline():
     np.testing.assert_array_equal(draw_arrows(rgba, beside), rgba)
 
 
-def rendered(view):
-    return draw_picture(view).rgba
-
-
-def changed_by_arrows(view):
-    plain = replace(view, look=replace(view.look, arrows=0.0))
-    return (rendered(view) != rendered(plain)).any(axis=2)
-
-
-@pytest.mark.slow
-def test_supersampling_draws_the_same_arrowheads():
-    looks = [Look(length=8, arrows=40.0, supersampling=samples) for samples in (1, 2)]
-    views = [ViewInput((instance_of(globe(48, 96), 3),), CAMERA, look) for look in looks]
-    changed = [changed_by_arrows(view) for view in views]
-    assert changed[0].sum() > 2000
-    np.testing.assert_array_equal(*changed)
-
-
 @pytest.mark.parametrize("distance", [65536.0, 1.0, 50.0])
 def test_any_distance_and_any_unit_can_be_drawn(distance):
     instance = instance_of(icosphere(2), 3)
     for unit_size in (0.0, 0.01):
         look = Look(length=4, unit_size=unit_size, arrows=distance)
-        picture = rendered(ViewInput((instance,), CAMERA.resized(60, 50), look))
-        assert np.isfinite(picture).all()
+        picture = draw_picture(ViewInput((instance,), CAMERA.resized(60, 50), look))
+        assert np.isfinite(picture.rgba).all()

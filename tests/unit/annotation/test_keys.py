@@ -1,7 +1,5 @@
 """Keys: coverage of triangles, round numbers, layouts without overlaps, and the colors of the bar."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 
@@ -241,17 +239,13 @@ def view(look, instances=None, camera=None):
     return ViewInput(instances or (instance,), camera, look)
 
 
-def largest_visible(view_input):
-    gbuffer = project(view_input.instances, view_input.sample_camera, view_input.look.display)
-    return float(np.abs(gbuffer.representation).max())
-
-
 def test_the_range_is_the_largest_visible_magnitude():
     look = Look(hue="magnitude", supersampling=1)
     view_input = view(look)
     picture = draw_picture(view_input)
+    gbuffer = project(view_input.instances, view_input.camera)
     low, high = picture.color_range
-    assert low == 0 and high == pytest.approx(largest_visible(view_input), rel=1e-6)
+    assert low == 0 and high == pytest.approx(np.abs(gbuffer.representation).max(), rel=1e-6)
     # A look with this range gives the same picture.
     again = draw_picture(view(replace(look, color_range=(0.0, high))))
     np.testing.assert_array_equal(again.rgba, picture.rgba)

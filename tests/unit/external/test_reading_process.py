@@ -1,7 +1,5 @@
 """Files of simulations that never end, or take too much time or memory; no library reads them here."""
 
-from __future__ import annotations
-
 import os
 import sys
 import time

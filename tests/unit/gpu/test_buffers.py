@@ -1,14 +1,11 @@
 """The input of the graphics card: buffers of meshes, kinds of fields, and boxes on screen."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from harness.gpu_scenes import (
     AXIS,
     FREE,
     MIRROR,
-    ROSY,
     SHEAR,
     perturbed_field,
     rotation,
@@ -28,6 +25,7 @@ from rosy_addon.gpu.mesh_buffers import mesh_buffers as build_mesh_buffers
 from rosy_addon.gpu.resources import DrawItem, GpuMesh
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.face_values import relative_channels
+from rosy_addon.projection.project import project
 
 ANGLES = st.floats(-3.2, 3.2)
 DISTORTIONS = [None, SHEAR, MIRROR, np.diag([1.0, 1.0, 2.0]), np.diag([1.0, 1.0, 0])]
@@ -147,7 +145,7 @@ def test_kinds_agree_with_the_pixel_field_of_numpy(name):
     surface = icosphere(2)
     field = FIELDS[name](surface)
     camera = perspective_camera(look_at((0, -4, 1), (0, 0, 0)), 40, 40)
-    gbuffer = ROSY.project([shown(surface, field)], camera)
+    gbuffer = project([shown(surface, field)], camera)
     pixel_field = surface_pixel_field(gbuffer, field.degree, 0.7)
     (kind,) = field_kinds([field]).values()
     assert kind.line_count == pixel_field.line_count
@@ -184,7 +182,7 @@ def test_boxes_contain_all_pixels_of_a_mesh(make_camera):
     field = axis_field(surface, 2)
     for shift in ((0, 0, 0), (1.5, 0, -0.5), (0, -4.5, 0.2), (0.3, -5, 0)):
         left, bottom, right, top = box_of(surface, shift, camera)
-        pixel = ROSY.project([shown(surface, field, shift=shift)], camera).pixel
+        pixel = project([shown(surface, field, shift=shift)], camera).pixel
         row, column = np.divmod(pixel, camera.width)
         assert left <= column.min() and column.max() < right <= camera.width
         assert bottom <= row.min() and row.max() < top <= camera.height

@@ -3,8 +3,6 @@
 These tests are skipped without moderngl or without a context (EGL; software OpenGL is enough).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -14,12 +12,10 @@ from harness.gpu_scenes import (
     BALL,
     FREE,
     LOOK,
-    ROSY,
     assert_parity,
     ball,
     card_rgba,
     draw,
-    face_centers,
     field_of,
     shown,
     smooth_field,
@@ -34,7 +30,6 @@ from rosy_addon.field.frames import normalize
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.surface_tone import SurfaceTone
-from rosy_addon.rendering.view_input import ViewInput
 
 
 @pytest.mark.parametrize("perspective", [True, False])
@@ -144,7 +139,7 @@ UNDEFINED_LOOKS = {
 @pytest.mark.parametrize("name", UNDEFINED_LOOKS)
 def test_where_the_field_is_undefined(card, name):
     look, _, drift = look_of(UNDEFINED_LOOKS[name])
-    center = face_centers(BALL)
+    center = BALL.face_center
     is_undefined = (center[:, :1] > 0.2) | (center[:, 2:] > 0.6)
     vectors = np.where(is_undefined, 0.0, smooth_field(BALL, 3).vectors)
     field = RosyField(3, vectors, family_count=3)
@@ -173,8 +168,7 @@ def test_subpixels(card):
 def test_samples_show_what_numpy_draws(card, preset):
     """Tone and contrast of the default method, whose streaks are smooth in another way."""
     look = replace(load_preset(preset).look, supersampling=2)
-    view_input = ViewInput((ball(),), view((240, 216)), look)
-    drawn = [draw(renderer, view_input).rgba for renderer in (card, None)]
+    drawn = [draw(each, [ball()], look, view((240, 216))).rgba for each in (card, None)]
     inside = np.logical_and(*(rgba[..., 3] == 1 for rgba in drawn))
     of_card, of_numpy = (rgba[inside][:, :3] for rgba in drawn)
     assert inside.sum() > 10_000
@@ -187,7 +181,7 @@ def test_samples_show_what_numpy_draws(card, preset):
 @pytest.mark.parametrize("hue", ["one", "families"])
 def test_ink_on_paper_that_is_not_opaque(card, hue, paper):
     look = replace(LOOK, ink="hatch", shading=1.0, paper_color=paper, hue=hue, line_width=3.0)
-    pair = draw_pair(ROSY, card, [ball()], view(), look)
+    pair = draw_pair(card, [ball()], view(), look)
     card_alpha, numpy_alpha = (picture[..., 3] for picture in (pair.card, pair.numpy))
     assert 0.2 < numpy_alpha[numpy_alpha > 0].mean() < 0.8
     assert np.corrcoef(card_alpha.ravel(), numpy_alpha.ravel())[0, 1] > 0.98
@@ -206,7 +200,7 @@ POINT = Light("point", np.array([-1.0, 0.5, -2.0]), np.array([0.2, 0.5, 1.0]), 3
 @pytest.mark.parametrize("perspective", [True, False])
 def test_lights_of_the_scene(card, lights, perspective):
     look = replace(LOOK, shading=0.8, light="scene")
-    assert_parity(card, [ball()], view(perspective=perspective), look, lights)
+    assert_parity(card, [ball()], view(perspective=perspective), look, lights=lights)
 
 
 def test_a_headlight_ignores_lights(card):

@@ -1,7 +1,5 @@
 """Meshes, fields, matrices and cameras: pictures of the card and of numpy, of the same pixels."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +12,6 @@ from harness.gpu_scenes import (
     FREE,
     LOOK,
     MIRROR,
-    ROSY,
     SHEAR,
     SIZE,
     assert_parity,
@@ -22,7 +19,7 @@ from harness.gpu_scenes import (
     boxes,
     card_rgba,
     conjugate_field,
-    face_centers,
+    draw,
     field_of,
     perturbed_field,
     rotation,
@@ -297,7 +294,7 @@ def test_fields_of_two_kinds_are_independent(card, name):
 
 
 def partly_undefined():
-    vectors = np.where(face_centers(BALL)[:, :1] > 0.2, 0.0, field_of(BALL, 4).vectors)
+    vectors = np.where(BALL.face_center[:, :1] > 0.2, 0.0, field_of(BALL, 4).vectors)
     return shown(BALL, RosyField(4, vectors))
 
 
@@ -346,6 +343,6 @@ def test_the_picture_is_empty_if_there_is_nothing_to_draw(card, instances):
 @pytest.mark.parametrize("size", [(1, 1), (3, 200), (200, 3), (257, 129)])
 def test_odd_sizes(card, size):
     rgba = card_rgba(card, [ball()], camera=view(size))
-    expected = ROSY.compose(ROSY.project([ball()], view(size)), replace(LOOK, method="brute")).rgba
+    expected = draw(None, [ball()], camera=view(size)).rgba
     assert rgba.shape == expected.shape
     assert ((rgba[..., 3] > 0) != (expected[..., 3] > 0)).mean() < 0.01

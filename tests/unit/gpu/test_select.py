@@ -1,6 +1,6 @@
 """Which looks the graphics card refuses, before it is asked for, and what 3D views draw of them."""
 
-from __future__ import annotations
+from types import SimpleNamespace
 
 import pytest
 
@@ -10,25 +10,23 @@ from rosy_addon.gpu.cpu_viewport import CpuViewportRenderer
 from rosy_addon.gpu.renderer import GpuRenderer
 from rosy_addon.rendering.draw import bake_picture
 from rosy_addon.rendering.view_input import ViewInput
-from rosy_addon.worker.job import Call, Step, Steps, part, run
+from rosy_addon.worker.job import Call, call_steps, run
 
 REFUSED = {"members": "brute", "ibfv": "sheets"}
 
 
-@pytest.fixture
-def unused_card(monkeypatch):
+@pytest.fixture(autouse=True)
+def _unused_card(monkeypatch):
     """A graphics card that is never drawn with."""
     monkeypatch.setattr(select, "blender_device", lambda: None)
 
 
-@pytest.mark.usefixtures("unused_card")
 @pytest.mark.parametrize("device", ["gpu", "auto"])
 @pytest.mark.parametrize("method", ["sheets", "brute"])
 def test_methods_that_the_card_draws(method, device):
     assert select.select_device(device, Look(method=method)) == "gpu"
 
 
-@pytest.mark.usefixtures("unused_card")
 @pytest.mark.parametrize("method", REFUSED)
 def test_methods_that_the_processor_draws_instead(method, error_of):
     look = Look(method=method)
@@ -42,22 +40,10 @@ def test_methods_that_the_processor_draws_instead(method, error_of):
 def test_pictures_are_a_part_of_a_job(monkeypatch):
     """The processor draws in one call; the card in steps, with calls of its own."""
     view = ViewInput((), None, Look())
-    (call,) = part(select.picture_steps(view, "cpu"), 0.2, 0.6)
-    assert call == Call(bake_picture, (view,), 0.2, 0.6)
+    assert list(select.picture_steps(view, "cpu")) == [Call(bake_picture, (view,))]
 
-    class Card:
-        def __init__(self, device):
-            pass
-
-        def picture_steps(self, view):
-            yield Step(0.5, "drawing")
-            return (yield Call(len, ([1, 2],), 0.5, 1.0, "counting"))
-
-    monkeypatch.setattr(select, "blender_device", lambda: None)
-    monkeypatch.setattr(select, "GpuRenderer", Card)
-    steps: Steps = part(select.picture_steps(view, "gpu"), 0.2, 0.6)
-    assert next(steps) == Step(pytest.approx(0.4), "drawing")
-    assert next(steps)[2:] == (pytest.approx(0.4), pytest.approx(0.6), "counting")
+    card = SimpleNamespace(picture_steps=lambda view: call_steps(len, [1, 2]))
+    monkeypatch.setattr(select, "GpuRenderer", lambda device: card)
     assert run(select.picture_steps(view, "gpu")) == 2
 
 

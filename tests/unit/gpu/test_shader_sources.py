@@ -1,17 +1,24 @@
 """The sources of shaders and their declarations, as far as they can be checked without a graphics card."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
 import pytest
 
-from rosy_addon.gpu import passes
+from rosy_addon.gpu import defines, passes
 from rosy_addon.gpu.device import UNIFORM_WORDS, _pack_uniforms, _std140_order
 
 PASSES = passes.all_passes()
 each_pass = pytest.mark.parametrize("shader", PASSES, ids=lambda shader: shader.name)
+
+#: Files without comments, and the constants that they share with numpy.
+SOURCES = {
+    path.name: re.sub(r"//[^\n]*", "", path.read_text(encoding="utf-8"))
+    for path in sorted(passes.SHADER_FOLDER.glob("*.glsl"))
+}
+DEFINED = dict(
+    line.removeprefix("#define ").split(" ", 1) for line in defines.shader_defines().splitlines()
+)
 
 
 @each_pass
@@ -38,11 +45,8 @@ def test_uniforms_are_aligned_as_in_std140(shader):
 def code_of(shader):
     """Return the source of a pass without comments, and without the file that is common to all."""
     kinds = ("comp",) if isinstance(shader, passes.ComputePass) else ("vert", "frag")
-    return code_of_files(*(f"{shader.name}.{kind}.glsl" for kind in kinds))
-
-
-def code_of_files(*files):
-    return re.sub(r"//[^\n]*|/\*.*?\*/", "", passes.read_source(*files).code, flags=re.S)
+    source = passes.read_source(*(f"{shader.name}.{kind}.glsl" for kind in kinds))
+    return re.sub(r"//[^\n]*|/\*.*?\*/", "", source.code, flags=re.S)
 
 
 def names_in(code):
@@ -50,35 +54,16 @@ def names_in(code):
     return set(re.findall(r"(?<![.\w])[A-Za-z_]\w*", code))
 
 
-def names_of(shader):
-    """Return the uniforms of a pass, and its textures and images with the mark of arrays."""
-    images = shader.images if isinstance(shader, passes.ComputePass) else ()
-    textures = {*shader.declared.textures, *(name for name, _ in images)}
-    return {name for name, _ in shader.uniforms}, textures
-
-
-def listed_names(shader):
-    uniforms, textures = names_of(shader)
-    return uniforms | {name.removesuffix("[]") for name in textures}
-
-
 @each_pass
-def test_sources_use_all_names_of_their_pass_and_no_others(shader):
-    """A pass that uses a uniform, texture or image of another pass has to declare it, too."""
-    code, listed = code_of(shader), listed_names(shader)
-    own = {"vertex_data"}  # the attribute of vertices
+def test_sources_use_all_names_of_their_pass(shader):
+    """Names that are not declared are found by the compiler."""
+    listed = {name for name, _ in shader.uniforms} | set(shader.declared.textures)
     if isinstance(shader, passes.RasterPass):
-        results = {name for name, _ in shader.vertex.outputs + shader.fragment.outputs}
-        assert results <= names_in(code)
-        own |= results
-    assert listed <= names_in(code), f"not used: {sorted(listed - names_in(code))}"
-    # Parameters and variables that are declared in the source may have any name.
-    kinds = r"(?:float|int|uint|bool|[iu]?vec[234])"
-    declared = set(re.findall(rf"\b{kinds}\s+([A-Za-z_]\w*)", code))
-    declared |= names_in(" ".join(re.findall(rf"\b{kinds}\s+[^;()]*;", code)))
-    known = set().union(*map(listed_names, PASSES))
-    used = names_in(code) & known - declared - listed - own
-    assert not used, f"not declared: {sorted(used)}"
+        listed |= {name for name, _ in shader.vertex.outputs + shader.fragment.outputs}
+    else:
+        listed |= {name for name, _ in shader.images}
+    unused = {name.removesuffix("[]") for name in listed} - names_in(code_of(shader))
+    assert not unused, f"not used: {sorted(unused)}"
 
 
 @each_pass
@@ -87,16 +72,6 @@ def test_declarations_and_members(shader):
     code = code_of(shader)
     assert not re.findall(r"^\s*(?:uniform|in|out|layout|#include|#pragma)\b.*", code, flags=re.M)
     assert not re.search(r"\.length\b", code)
-    for name in names_of(shader)[1]:
-        access = rf"(?:texelFetch|imageStore)\({name.removesuffix('[]')},\s*(ivec[23])\("
-        assert set(re.findall(access, code)) <= {"ivec3" if name.endswith("[]") else "ivec2"}
-
-
-def test_common_code_uses_no_uniforms():
-    """The common code is part of every pass: it gets uniforms only as parameters of functions."""
-    known = {name for shader in PASSES for name, _ in shader.uniforms}
-    known |= {name.removesuffix("[]") for shader in PASSES for name in shader.declared.textures}
-    assert not names_in(code_of_files("common.glsl")) & known
 
 
 @each_pass
@@ -108,3 +83,24 @@ def test_no_variable_has_the_name_of_a_uniform(shader):
     declared |= set(re.findall(rf"\b(?:{kinds})\s[^;(]*?,\s*(\w+)\s*[=;,]", code))
     declared |= set(re.findall(r"(?<=[A-Za-z_\])])\.([A-Za-z_]\w*)", code))
     assert not declared & {name for name, _ in shader.uniforms}
+
+
+def test_every_constant_is_defined_and_used():
+    code = "".join(SOURCES.values())
+    used = set(re.findall(r"\b[A-Z][A-Z0-9_]+\b", code))  # names in capitals
+    local = set(re.findall(r"#define\s+(\w+)", code))
+    assert set(DEFINED) <= used <= local | set(DEFINED)
+
+
+def test_shaders_read_records_by_named_texels():
+    for name, code in SOURCES.items():
+        assert not re.search(r"\brecord_texel\(\w+,\s*\d", code), name
+
+
+@pytest.mark.parametrize(
+    "name", [name for name, value in defines.CONSTANTS.items() if isinstance(value, float)]
+)
+def test_literals_round_to_the_same_number(name):
+    text = DEFINED[name].strip("()")
+    assert "." in text or "e" in text, "GLSL would read an integer"
+    assert np.float32(text) == np.float32(defines.CONSTANTS[name])

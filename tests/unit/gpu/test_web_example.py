@@ -27,9 +27,8 @@ def fragment_shader():
     """Return the shader of the material in the dialect of desktop OpenGL."""
     source = MATERIAL.read_text(encoding="utf-8")
     source = source.split("const FRAGMENT = /* glsl */ `")[1].split("`;")[0]
-    source = source.replace("#include <common>", COMMON).replace(
-        "#include <colorspace_fragment>", ""
-    )
+    source = source.replace("#include <common>", COMMON)
+    source = source.replace("#include <colorspace_fragment>", "")
     for web, desktop in (("varying", "in"), ("texture2D", "texture"), ("gl_FragColor", "fragment")):
         source = source.replace(web, desktop)
     return "#version 330\nout vec4 fragment;\n" + source

@@ -1,7 +1,5 @@
 """OpenEXR files that end too early are found."""
 
-from __future__ import annotations
-
 import struct
 
 import pytest

@@ -1,16 +1,15 @@
 """Arrowheads point along the members of fields of odd degree, evenly spaced along strokes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from shapes import icosphere, plane, torus
+from harness.stroke_tracing import planar_strokes
+from shapes import icosphere, torus
 
 from rosy_addon.field.directional_field import field_directions
 from rosy_addon.field.frames import normalize
-from rosy_addon.field.generate import axis_field, generate
+from rosy_addon.field.generate import generate
 from rosy_addon.line_drawing.arrowheads import arrowheads
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
@@ -58,21 +57,12 @@ def test_lines_without_a_direction_have_no_arrowheads():
 
 
 def test_arrowheads_are_evenly_spaced():
-    """On straight strokes, in the middles of equal parts that are about as long as asked for."""
-    square = plane(12, 12)
-    strokes, _, _ = drawn(square, axis_field(square, 1, (1.0, 0.0, 0.0)), taper=0.0)
-    heads = arrowheads(strokes, 4.0, np.ones(len(strokes), dtype=bool))
-    center = heads.points.reshape(-1, 3, 3).mean(axis=1)
-    assert np.abs(heads.points[:, 2]).max() < 1e-9
-    for number in range(len(strokes)):
-        part = slice(strokes.start[number], strokes.start[number + 1])
-        points, spacing = strokes.points[part], strokes.spacing[part]
-        length = np.ptp(points[:, 0])
-        x = np.sort(center[np.abs(center[:, 1] - points[0, 1]) < 1e-6, 0])
-        count = len(x)
-        assert abs(length / count - 4 * spacing.mean()) < 2.2 * spacing.mean() * max(4 / count, 1)
-        # The mean of the three points is a little behind the middle of the arrowhead.
-        expected = points[0, 0] + (np.arange(count) + 0.5) / count * length
-        assert np.abs(x - expected).max() < 0.3 * spacing.max()
-    none = arrowheads(strokes, 4.0, np.zeros(len(strokes), dtype=bool))
+    """In the middles of equal parts of strokes, which are about as long as asked for."""
+    points = np.linspace(0, [3.1, 1.1], 31).T[..., None] * [1.0, 0.0, 0.0]
+    strokes = planar_strokes(points, np.tile((1.0, 0, 0), (62, 1)), 0.1)
+    heads = arrowheads(strokes, 4.0, np.ones(2, dtype=bool)).points.reshape(-1, 3, 3)
+    x = [(np.arange(count) + 0.5) / count * length for count, length in ((8, 3.1), (3, 1.1))]
+    middle = heads[:, 1] / 2 + (heads[:, 0] + heads[:, 2]) / 4  # of the tip and the barbs
+    np.testing.assert_allclose(middle, np.concatenate(x)[:, None] * [1, 0, 0], atol=1e-12)
+    none = arrowheads(strokes, 4.0, np.zeros(2, dtype=bool))
     assert len(none) == 0 and none.names == strokes.names

@@ -1,23 +1,20 @@
 """Outlines in pictures: silhouettes without gaps, creases without specks."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
+from harness.outline_marks import visible_silhouettes
+from harness.stroke_tracing import pixel_lengths
 from scipy.spatial import cKDTree
-from shapes import cylinder, icosphere, plane, rebuilt, torus
+from shapes import cylinder, icosphere, instance_of, plane, rebuilt, torus
 
 import rosy_addon.api as rf
-from rosy_addon.field.generate import axis_field
 from rosy_addon.field.surface import build_surface
 from rosy_addon.line_drawing.outline import OUTLINE_KINDS
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
-from rosy_addon.line_drawing.visibility import project_to_pixels, rasterize_depth
+from rosy_addon.line_drawing.visibility import project_to_pixels
 from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
-
-IDENTITY = np.eye(4)
 
 #: Outlines shorter than this in pixels are specks.
 MIN_MARK_PX = 6.0
@@ -25,33 +22,15 @@ MIN_MARK_PX = 6.0
 
 def outlines_of(surface, camera):
     """Return the outlines of a drawing."""
-    instance = MeshInstance(surface, IDENTITY, axis_field(surface, 4, (0.1, 0.2, 1)))
+    instance = instance_of(surface, 4, (0.1, 0.2, 1))
     strokes = draw_instances([instance], camera, StrokeStyle(spacing=40, outline=True)).strokes
     kinds = [strokes.names.index(kind) for kind in OUTLINE_KINDS]
     return strokes.select(np.isin(strokes.family, kinds))
 
 
-def pixel_lengths(lines, camera):
-    """Return (S,): the lengths of strokes in pixels."""
-    pixels, _ = project_to_pixels(lines.points, camera)
-    step = np.linalg.norm(np.diff(pixels, axis=0), axis=1)
-    step[lines.start[1:-1] - 1] = 0
-    return np.add.reduceat(step, lines.start[:-1])
-
-
 def coverage(lines, surface, camera, tolerance):
-    """Return the share of the border of a surface in a picture that is near an outline.
-
-    The border is where pixels of the surface meet those of the background, at four times the
-    resolution.
-    """
-    fine = camera.scaled(4)
-    shown = rasterize_depth([MeshInstance(surface, IDENTITY)], fine).triangle >= 0
-    borders = []
-    for axis, offset in ((0, (0.5, 1.0)), (1, (1.0, 0.5))):
-        row, column = np.nonzero(np.diff(shown, axis=axis))
-        borders.append((np.stack([column, row], axis=1) + offset) / 4)
-    border = np.concatenate(borders)[::3]
+    """Return the share of the visible silhouettes of a surface that is near an outline."""
+    border, _ = visible_silhouettes(MeshInstance(surface, np.eye(4)), camera)
     pixels, _ = project_to_pixels(lines.points, camera)
     is_first = np.zeros(len(pixels), dtype=bool)
     is_first[lines.start[:-1]] = True

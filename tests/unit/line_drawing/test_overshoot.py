@@ -1,16 +1,13 @@
 """Overshoot: which ends are extended, by which length, and in which direction."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np
 import pytest
-from harness.stroke_tracing import latitudes, turned
+from harness.stroke_tracing import latitudes, pixel_lengths, turned
 from shapes import icosphere, instance_of, moved, placed, plane, sharp_cube
 
 from rosy_addon.field.frames import dot, normalize
-from rosy_addon.field.generate import axis_field
 from rosy_addon.line_drawing.outline import OUTLINE_KINDS
 from rosy_addon.line_drawing.pipeline import TIP_WIDTH, draw_instances
 from rosy_addon.line_drawing.stroke_ends import MIN_EXTENSION_RATIO, extend_free_ends
@@ -19,7 +16,8 @@ from rosy_addon.line_drawing.visibility import project_to_pixels, rasterize_dept
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 
-IDENTITY = np.eye(4)
+pytestmark = pytest.mark.slow
+
 MAX_PIXELS = 12.0
 
 SQUARE = turned(plane(8, 8), 2)
@@ -48,16 +46,9 @@ def ends_of(strokes):
 
 def pixel_growth(plain, extended, camera):
     """Return the (S,) pixels by which strokes are extended."""
-    lengths = []
-    for strokes in (plain, extended):
-        pixels, _ = project_to_pixels(strokes.points, camera)
-        segment_length = np.hypot(*np.diff(pixels, axis=0).T)
-        same = np.diff(strokes.stroke) == 0
-        lengths.append(np.bincount(strokes.stroke[1:][same], segment_length[same]))
-    return lengths[1] - lengths[0]
+    return pixel_lengths(extended, camera) - pixel_lengths(plain, camera)
 
 
-@pytest.mark.slow
 def test_extensions_at_borders_are_straight_and_of_different_lengths():
     plain, extended = draw_both([SQUARE], TOP_CAMERA, spacing=3.0)
     assert len(plain) == len(extended) > 50
@@ -75,7 +66,6 @@ def test_extensions_at_borders_are_straight_and_of_different_lengths():
     assert (np.diff(extended.points[:, 0])[np.diff(extended.stroke) == 0] != 0).all()
 
 
-@pytest.mark.slow
 def test_extensions_cross_the_silhouette():
     plain, extended = draw_both([SPHERE], FRONT_CAMERA, spacing=9.0)
     assert len(plain) == len(extended)
@@ -83,23 +73,19 @@ def test_extensions_cross_the_silhouette():
     assert growth.max() <= 2 * MAX_PIXELS + 0.5
     assert growth[growth > 1].mean() > MIN_EXTENSION_RATIO * MAX_PIXELS
     pixels, depth = project_to_pixels(extended.points, FRONT_CAMERA)
-    column, row = np.clip(pixels.astype(int), 0, (399, 359)).T
-    outside = rasterize_depth([SPHERE], FRONT_CAMERA).triangle[row, column] < 0
     plain_pixels = project_to_pixels(plain.points, FRONT_CAMERA)[0]
     center = project_to_pixels(np.zeros((1, 3)), FRONT_CAMERA)[0]
     max_radius = np.hypot(*(plain_pixels - center).T).max()
     radius = np.hypot(*(pixels - center).T)
-    assert outside.sum() > 200 and radius.max() < max_radius + MAX_PIXELS + 1
-    assert radius.max() > max_radius + 0.5 * MAX_PIXELS
+    assert 0.5 * MAX_PIXELS < radius.max() - max_radius < MAX_PIXELS + 1
     # Extensions are at a constant depth, and straight.
-    is_beyond = outside & (radius > max_radius + 1)
+    is_beyond = radius > max_radius + 1
     inner = is_beyond[:-2] & is_beyond[1:-1] & is_beyond[2:]
     inner &= (np.diff(extended.stroke)[1:] == 0) & (np.diff(extended.stroke)[:-1] == 0)
     assert inner.sum() > 50 and np.abs(np.diff(depth)[1:][inner]).max() < 1e-9
     assert np.abs(np.diff(pixels, 2, axis=0)[inner]).max() < 1e-6
 
 
-@pytest.mark.slow
 def test_extensions_lie_on_occluders_in_front():
     occluder = MeshInstance(plane(), moved(x=1.2, z=0.7))
     plain, extended = draw_both([SQUARE, occluder], TOP_CAMERA, spacing=6.0)
@@ -114,7 +100,6 @@ def test_extensions_lie_on_occluders_in_front():
     assert np.allclose(extended.points[on_square, 2], 0, atol=1e-6)
 
 
-@pytest.mark.slow
 def test_extensions_into_the_light_follow_the_surface():
     plain, extended = draw_both([SPHERE], FRONT_CAMERA, spacing=9.0, light="lamp")
     # Where the sphere is visible, points are on it, within about half a pixel.
@@ -127,14 +112,12 @@ def test_extensions_into_the_light_follow_the_surface():
     assert np.abs(height).max() < 0.02 and pixel_growth(plain, extended, FRONT_CAMERA).mean() > 1
 
 
-@pytest.mark.slow
 def test_ends_at_gaps_and_at_neighbors_are_not_extended():
     plain, extended = draw_both([turned(SQUARE.surface, 4)], TOP_CAMERA, spacing=20.0, gaps=0.3)
     is_inner = np.abs(ends_of(plain)[:, :, :2]).max(axis=(1, 2)) < 1 - 1e-9
     assert is_inner.sum() > 50 and not is_inner.all()
-    for number in np.flatnonzero(is_inner):
-        a, b = (strokes.select([number]) for strokes in (plain, extended))
-        assert np.array_equal(a.points, b.points) and np.allclose(a.width, b.width)
+    a, b = (strokes.select(is_inner) for strokes in (plain, extended))
+    assert np.array_equal(a.points, b.points) and np.allclose(a.width, b.width)
     assert (pixel_growth(plain, extended, TOP_CAMERA)[~is_inner] > 1).all()
     # On the sphere, strokes end where they come too near to others.
     plain, extended = draw_both([SPHERE], FRONT_CAMERA, spacing=9.0)
@@ -142,24 +125,20 @@ def test_ends_at_gaps_and_at_neighbors_are_not_extended():
     assert facing.sum() > 10 and np.allclose(ends_of(plain)[facing], ends_of(extended)[facing])
 
 
-@pytest.mark.slow
 def test_closed_strokes_and_outlines_are_not_extended():
     circles, occluder = latitudes(icosphere(3)), MeshInstance(plane(), moved(x=1.8, z=1.7))
     plain, extended = draw_both([circles, occluder], TOP_CAMERA, spacing=15.0, outline=True)
     closed = plain.closed & extended.closed
     assert closed.sum() >= 4
-    for number in np.flatnonzero(closed):
-        assert np.array_equal(plain.select([number]).points, extended.select([number]).points)
+    assert np.array_equal(plain.select(closed).points, extended.select(closed).points)
     for kind in OUTLINE_KINDS:
         a, b = (s.select(s.family == s.names.index(kind)) for s in (plain, extended))
         assert np.array_equal(a.points, b.points) and np.allclose(a.width, b.width)
     assert (~extended.closed).any()
 
 
-@pytest.mark.slow
 def test_ends_at_creases_are_extended():
-    surface = sharp_cube()
-    instance = MeshInstance(surface, IDENTITY, axis_field(surface, 2, (0.2, 1.0, 0.1)))
+    instance = instance_of(sharp_cube(), 2, (0.2, 1.0, 0.1))
     camera = orthographic_camera(look_at((3, -5, 4), (0, 0, 0)), 300, 300, scale=3.0)
     plain, extended = draw_both([instance], camera, spacing=8.0)
     assert (pixel_growth(plain, extended, camera) > 1).mean() > 0.9
@@ -167,7 +146,6 @@ def test_ends_at_creases_are_extended():
     assert (pixel_growth(plain, extended, camera) > 1).mean() > 0.5
 
 
-@pytest.mark.slow
 def test_extensions_are_clipped_to_the_frame():
     camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 206, 206, scale=2.06)
     for options in ({}, {"hidden": True}):
@@ -178,7 +156,6 @@ def test_extensions_are_clipped_to_the_frame():
         assert np.abs(ends_of(strokes)[:, :, 0]).min() > 1.015
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("taper", [0.0, 1.0])
 def test_extensions_are_tapered(taper):
     style = StrokeStyle(spacing=6, taper=taper, overshoot=MAX_PIXELS)
@@ -189,7 +166,6 @@ def test_extensions_are_tapered(taper):
     assert np.allclose(strokes.width[from_tip >= taper * 0.06 + 1e-9], 1.0)
 
 
-@pytest.mark.slow
 def test_with_hidden_strokes_extensions_are_straight_in_space():
     """On a slanted plane, extensions are in the plane. Their length is along the plane."""
     slope = np.array([[0.6, 0, -0.8], [0, 1, 0], [0.8, 0, 0.6]])
@@ -202,7 +178,6 @@ def test_with_hidden_strokes_extensions_are_straight_in_space():
     assert growth.max() <= 0.01 * MAX_PIXELS + 1e-6
 
 
-@pytest.mark.slow
 def test_extensions_double_short_strokes():
     """Each end is extended by at most half the length."""
     traced = strokes_of((SQUARE,), TOP_CAMERA, StrokeStyle(spacing=6, taper=0))

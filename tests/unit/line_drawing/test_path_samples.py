@@ -1,7 +1,5 @@
 """Samples along traced paths, and tips that grow by several samples at once."""
 
-from __future__ import annotations
-
 import numpy as np
 from harness.stroke_tracing import turned
 from shapes import icosphere, instance_of, plane

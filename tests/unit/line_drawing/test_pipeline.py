@@ -1,7 +1,5 @@
 """Drawings of several instances: families, density, light, and the geometry of the strokes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +7,7 @@ import pytest
 from harness.stroke_tracing import trace_strokes, turned
 from listeners import cancel_at
 from scipy.spatial import cKDTree
-from shapes import from_triangles, icosphere, instance_of, moved, plane, rebuilt
+from shapes import from_triangles, icosphere, instance_of, moved, plane, rebuilt, sharp_cube
 
 from rosy_addon.compositor.shading import Light
 from rosy_addon.core.progress import listening
@@ -173,13 +171,6 @@ def test_errors(error_of):
         (SPHERE, {"unit": "world", "distance": 0.4 * pixel}, "strokes would be 0.4 pixels"),
     ):
         assert message in error_of(draw_instances, [instance], CAMERA, StrokeStyle(**settings))
-    for settings, message in (
-        ({"spacing": 0}, "setting 'spacing' is 0, expected a number from 0.5"),
-        ({"curvature": np.nan}, "setting 'curvature' is nan"),
-        ({"overshoot": -1}, "setting 'overshoot' is -1, expected a number from 0"),
-        ({"light": "sun"}, "'sun', expected one of none, headlight, lamp, scene"),
-    ):
-        assert message in error_of(StrokeStyle, **settings)
     assert "pen" in error_of(Pen, width=0.0)
     style = StrokeStyle(hidden=True, spacing=1)
     unseen = draw_instances([behind], CAMERA, style, clip_to_frame=False)
@@ -201,3 +192,37 @@ def test_swelling_strokes_are_evenly_spaced():
     to_eye = CAMERA.view_directions(swelling.points)
     darkness = 1 - np.clip(dot(normalize(swelling.points), to_eye), 0, 1)
     np.testing.assert_allclose(swelling.width[first], darkness[first], atol=0.05)
+
+
+# --- creases -------------------------------------------------------------------------------------
+
+CUBE_CAMERA = orthographic_camera(look_at((3, -5, 4), (0, 0, 0)), 300, 300, scale=2.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("light", ["none", "scene"])
+def test_spacing_and_width_are_even_up_to_creases(light):
+    """A flat face under a sun has one tone and, without perspective, one spacing."""
+    style = StrokeStyle(spacing=7.0, light=light, layering=0.0, taper=0.0)
+    # Different tones on the three faces of the cube that the camera sees.
+    lights = [Light("sun", np.array([-0.8, 0.3, 0.52]), np.ones(3), 0.9)]
+    cube = instance_of(sharp_cube(), 4, (0.2, 1.0, 0.1))
+    strokes = draw_instances([cube], CUBE_CAMERA, style, lights=lights).strokes
+    assert len(np.unique(strokes.face)) == 3
+    spacings = set()
+    for face in np.unique(strokes.face):
+        spacing, width = strokes.spacing[strokes.face == face], strokes.width[strokes.face == face]
+        assert np.ptp(spacing) < 1e-6 * spacing.max() and np.ptp(width) < 1e-6
+        spacings.add(round(float(spacing[0]), 6))
+    assert len(spacings) == 3
+
+
+@pytest.mark.slow
+def test_strokes_reach_creases_at_full_width():
+    """Only ends inside faces are tapered: at creases, tapered ends leave a pale margin."""
+    instance = instance_of(sharp_cube(), 4)
+    strokes = draw_instances([instance], CUBE_CAMERA, StrokeStyle(spacing=7.0, taper=0.8)).strokes
+    ends = np.concatenate([strokes.start[:-1], strokes.start[1:] - 1])
+    at_crease = (np.abs(np.abs(strokes.points[ends] - 0.5) - 0.5) < 1e-6).sum(axis=1) >= 2
+    assert at_crease.sum() > 60 and strokes.width[ends][at_crease].min() == 1
+    assert strokes.width[ends][~at_crease].min() < 0.5

@@ -1,7 +1,5 @@
 """`PointGrid`: all pairs within radii that differ by orders of magnitude, in bounded time."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree

@@ -1,7 +1,5 @@
 """Tapers, ends that meet, and gaps where strokes cross."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

@@ -9,7 +9,7 @@ import subprocess
 import numpy as np
 import pytest
 from harness.stroke_tracing import trace_strokes, visible_strokes, write_svg
-from PIL import Image
+from PIL import Image, ImageDraw
 from scipy.ndimage import gaussian_filter
 from shapes import instance_of, torus
 
@@ -79,34 +79,24 @@ def ink_of(png):
     return 1 - np.asarray(Image.alpha_composite(paper, image).convert("L")) / 255.0
 
 
-def raster(strokes, camera, width, supersampling=4):
-    """Return the (H, W) coverage of pixels by strokes: discs stamped along them. Row 0 is at the top.
+def raster(strokes, camera, width, scale=16):
+    """Return the (H, W) coverage of pixels by strokes, drawn at a multiple of the size. Row 0 is at the top.
 
     The points are projected by the matrices of the camera, without the code in `strokes`.
     """
     clip = np.column_stack([strokes.points, np.ones(len(strokes.points))])
     clip = clip @ (camera.projection @ camera.view).T
-    size = np.array([camera.width, camera.height]) * supersampling
-    pixels = (clip[:, :2] / clip[:, 3:] * (1, -1) + 1) / 2 * size
-    radius = strokes.width * width * supersampling / 2
-    segment = np.flatnonzero(np.diff(strokes.stroke) == 0)
-    delta = pixels[segment + 1] - pixels[segment]
-    count = np.ceil(np.linalg.norm(delta, axis=1) * 2).astype(int) + 1
-    fraction = np.concatenate([np.linspace(0, 1, n) for n in count])
-    segment, delta = np.repeat(segment, count), np.repeat(delta, count, axis=0)
-    center = pixels[segment] + fraction[:, None] * delta
-    disc_radius = radius[segment] + fraction * (radius[segment + 1] - radius[segment])
-    covered = np.zeros(size[::-1], dtype=bool)
-    reach = int(np.ceil(radius.max())) + 1
-    for i in range(-reach, reach + 1):
-        for j in range(-reach, reach + 1):
-            column, row = (np.floor(center) + (i, j)).astype(int).T
-            distance = np.hypot(column + 0.5 - center[:, 0], row + 0.5 - center[:, 1])
-            inside = (distance <= disc_radius) & (column >= 0) & (row >= 0)
-            inside &= (column < covered.shape[1]) & (row < covered.shape[0])
-            covered[row[inside], column[inside]] = True
-    blocks = covered.reshape(camera.height, supersampling, camera.width, supersampling)
-    return blocks.mean(axis=(1, 3))
+    size = np.array([camera.width, camera.height])
+    places = (clip[:, :2] / clip[:, 3:] * (1, -1) + 1) / 2 * size * scale
+    radius = strokes.width * width * scale / 2
+    image = Image.new("L", (camera.width * scale, camera.height * scale))
+    draw = ImageDraw.Draw(image)
+    for index in np.flatnonzero(np.diff(strokes.stroke) == 0):
+        line_width = round(radius[index] + radius[index + 1])
+        draw.line(places[index : index + 2].ravel().tolist(), 255, line_width)
+    for place, of_disc in zip(places, radius, strict=True):
+        draw.circle(place.tolist(), of_disc - 0.5, 255)  # the border is drawn as well
+    return np.asarray(image.resize(size.tolist(), Image.Resampling.BOX)) / 255
 
 
 def correlation(a, b, blur=0.0):

@@ -1,7 +1,5 @@
 """Cameras: lenses as in Blender, framing, and errors."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,7 +7,7 @@ from hypothesis import strategies as st
 from lenses import shifted
 from shapes import icosphere
 
-from rosy_addon.core.errors import RosyError
+from rosy_addon.line_drawing.visibility import to_clip
 from rosy_addon.projection.camera import (
     Camera,
     look_at,
@@ -26,8 +24,7 @@ angles = st.floats(-400, 400)
 
 def device_coordinates(camera, points):
     """(V, 3) normalized device coordinates."""
-    view = points @ camera.view[:3, :3].T + camera.view[:3, 3]
-    clip = view @ camera.projection[:, :3].T + camera.projection[:, 3]
+    clip = to_clip(points, camera)
     assert (clip[:, 3] > 0).all()
     return clip[:, :3] / clip[:, 3:]
 
@@ -63,8 +60,7 @@ def test_everything_is_framed_and_touches_the_margin(seed, azimuth, elevation, p
     # then be among the points.
     low, high = ndc[:, :2].min(axis=0), ndc[:, :2].max(axis=0)
     touched = (np.isclose(low, -0.9, atol=1e-6) & np.isclose(high, 0.9, atol=1e-6)).any()
-    depth = -(points @ camera.view[:3, :3].T + camera.view[:3, 3])[:, 2]
-    assert touched or depth.min() < 2e-3 * np.ptp(points, axis=0).max()
+    assert touched or camera.depths(points).min() < 2e-3 * np.ptp(points, axis=0).max()
 
 
 def test_framing_ignores_loose_vertices():
@@ -138,7 +134,7 @@ def make_camera(view=GOOD.view, projection=GOOD.projection, size=(10, 10)):
         ({"view": np.diag([-1.0, 1, 1, 1])}, "'Cam' is mirrored"),
         ({"view": np.diag([2.0, 2, 2, 1])}, "'Cam': its view matrix must be a rotation"),
         ({"view": np.full((4, 4), np.nan)}, "'Cam': its view matrix is not finite"),
-        ({"view": np.eye(3)}, r"'Cam': its view matrix must have the shape \(4, 4\)"),
+        ({"view": np.eye(3)}, "'Cam': its view matrix must have the shape (4, 4)"),
         ({"projection": np.full((4, 4), np.inf)}, "'Cam': its projection matrix is not finite"),
         ({"projection": np.diag([1.0, 1, 1, 0])}, "'Cam' is neither perspective nor orthographic"),
         ({"projection": np.diag([-1.0, 1, 1, 1])}, "'Cam': its projection is mirrored or flat"),
@@ -146,9 +142,8 @@ def make_camera(view=GOOD.view, projection=GOOD.projection, size=(10, 10)):
         ({"size": (10.5, 10)}, "size 10.5x10"),
     ],
 )
-def test_impossible_cameras_are_refused(settings, message):
-    with pytest.raises(RosyError, match=message):
-        make_camera(**settings)
+def test_impossible_cameras_are_refused(settings, message, error_of):
+    assert message in error_of(make_camera, **settings)
 
 
 @pytest.mark.parametrize(
@@ -165,6 +160,5 @@ def test_impossible_cameras_are_refused(settings, message):
         lambda: look_at((1, 1, 9), (1, 1, 1)),
     ],
 )
-def test_impossible_views_are_refused(make):
-    with pytest.raises(RosyError):
-        make()
+def test_impossible_views_are_refused(make, error_of):
+    error_of(make)

@@ -1,7 +1,5 @@
 """Shares of pixels, against the surfaces that a frame of all samples shows."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from shapes import cube, icosphere, placed, rebuilt, torus

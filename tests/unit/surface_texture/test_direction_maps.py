@@ -1,7 +1,5 @@
 """Anisotropy maps and flow maps decode to the direction of the field."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from shapes import globe, instance_of, plane, rebuilt, torus

@@ -11,11 +11,6 @@ from rosy_addon.line_drawing.tangent_mesh import TangentMesh, build_tangent_mesh
 from rosy_addon.surface_texture.line_order import first_line_weights, line_order
 
 
-def mesh_of(surface, kind: str, degree: int, matrix=None) -> TangentMesh:
-    """The tangent mesh of a surface with a field."""
-    return build_tangent_mesh(instance_of(surface, degree, kind, matrix))
-
-
 def first_lines(mesh: TangentMesh, angle: float = 0.0, blend: float = 0.02):
     """(T, 3) unit vectors along the first line at the centers of triangles, and (T,) their weights."""
     order = line_order(mesh, angle, blend)
@@ -37,7 +32,7 @@ def share_of(mesh: TangentMesh, is_so: np.ndarray) -> float:
 
 def test_the_first_line_is_horizontal_on_a_cylinder():
     """At an angle of 90 degrees, it is vertical; nowhere do two lines swap."""
-    mesh = mesh_of(cylinder(), "curvature", 4)
+    mesh = build_tangent_mesh(instance_of(cylinder(), 4, "curvature"))
     is_side = np.abs(mesh.normal[:, 2]) < 0.1
     for angle, steepness in ((0.0, 0.0), (np.pi / 2, 1.0)):
         line, share = first_lines(mesh, angle)
@@ -52,7 +47,7 @@ def test_lines_continue_where_the_field_turns():
     In some places, the other line is nearer to the horizontal direction.
     """
     matrix = placed(Rotation.from_euler("x", 30, degrees=True).as_matrix())
-    mesh = mesh_of(torus(), "curvature", 4, matrix)
+    mesh = build_tangent_mesh(instance_of(torus(), 4, "curvature", matrix))
     line, share = first_lines(mesh)
     assert share_of(mesh, share > 0.99) > 0.999
     around = np.cross(matrix[:3, 2], mesh.points.mean(axis=1))
@@ -66,7 +61,7 @@ def test_lines_continue_where_the_field_turns():
 @pytest.mark.slow
 def test_lines_swap_only_between_singularities():
     """On a sphere they must, but on a small part of it."""
-    mesh = mesh_of(icosphere(4), "smoothest", 4)
+    mesh = build_tangent_mesh(instance_of(icosphere(4), 4))
     _, share = first_lines(mesh)
     assert share_of(mesh, share < 0.9) < 0.12 and share.min() < 0.9
 
@@ -75,7 +70,7 @@ def test_lines_swap_only_between_singularities():
 def test_the_order_does_not_depend_on_the_size_of_triangles_or_of_the_mesh():
     """A cube of twelve triangles has one first line on each face, at any scale."""
     for scale in (1e-6, 1e6):
-        mesh = mesh_of(cube(), "axis", 4, placed(scale))
+        mesh = build_tangent_mesh(instance_of(cube(), 4, "axis", placed(scale)))
         line, share = first_lines(mesh, blend=0.02 * scale)
         is_side = np.abs(mesh.normal[:, 2]) < 0.1
         assert share[is_side].min() > 0.99 and np.ptp(np.abs(line[is_side, 2])) < 0.01

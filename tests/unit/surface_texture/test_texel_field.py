@@ -1,7 +1,5 @@
 """Streamlines over the texels of many charts are those of the surface."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from shapes import instance_of, torus

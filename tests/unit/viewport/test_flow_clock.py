@@ -1,7 +1,5 @@
 """The clock of streaks that drift in live views."""
 
-from __future__ import annotations
-
 import pytest
 
 from rosy_addon.viewport.flow_clock import MAX_FRAMES_PER_PICTURE, FlowClock

@@ -1,14 +1,11 @@
 """Messages between two processes, here between two ends of a pipe in one."""
 
-from __future__ import annotations
-
 from multiprocessing import Pipe
 
 import numpy as np
 import pytest
-from shapes import icosphere
+from shapes import icosphere, instance_of
 
-from rosy_addon.field.generate import axis_field
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.worker.channel import CHUNK_BYTES, Channel
 from rosy_addon.worker.start import PACKAGE
@@ -46,7 +43,7 @@ def test_arrays_arrive_and_can_be_written(ends, array):
 
 def test_meshes_are_sent_once(ends):
     ball = icosphere(2)
-    instance = MeshInstance(ball, np.eye(4), axis_field(ball, 4, (0, 0, 1)))
+    instance = instance_of(ball, 4, "axis")
     first = passed(ends, ("draw", instance))[1]
     assert np.array_equal(first.surface.vertices, ball.vertices)
     assert passed(ends, ("draw again", instance, ball)) == ("draw again", first, first.surface)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from pathlib import Path
@@ -11,6 +12,7 @@ from harness.processes import is_running
 
 from rosy_addon.core.errors import RosyError
 from rosy_addon.worker import start as module
+from rosy_addon.worker.frame_workers import parse_frames
 from rosy_addon.worker.helper import Helper, HelperLostError
 
 sys.path.append(str(Path(__file__).parent))
@@ -51,14 +53,14 @@ def test_progress_arrives(helper):
 
 
 def test_errors_are_those_of_the_function_with_its_traceback(helper):
-    with pytest.raises(RosyError, match="no faces") as caught:
-        waited(helper, calls.fail, "no faces")
-    assert "calls.py" in str(caught.value.__cause__)
+    with pytest.raises(RosyError, match="expected") as caught:
+        waited(helper, parse_frames, "no frames")
+    assert "frame_workers.py" in str(caught.value.__cause__)
 
 
 def test_results_that_cannot_be_sent_are_an_error(helper):
     with pytest.raises(RuntimeError, match="pickle"):
-        waited(helper, calls.answer_with_a_function)
+        waited(helper, eval, "lambda: 0")
 
 
 def test_cancelling_ends_the_process_at_once(helper):
@@ -72,7 +74,7 @@ def test_cancelling_ends_the_process_at_once(helper):
 
 def test_a_process_that_ends_is_lost(helper):
     with pytest.raises(HelperLostError, match="has ended") as caught:
-        waited(helper, calls.end)
+        waited(helper, os._exit, 3)
     assert caught.value.has_started and waited(helper, max, 3, 4) == 4
 
 

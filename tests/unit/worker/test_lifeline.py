@@ -1,20 +1,16 @@
 """All processes and temporary folders end with the process that started them, however it ends."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
 import sys
 import tempfile
 import uuid
-from pathlib import Path
 
 import pytest
 from conftest import ROOT
 from harness.processes import all_end, becomes_true, marked_processes
 
-from rosy_addon.core.errors import RosyError
 from rosy_addon.worker.frame_workers import run_local
 from rosy_addon.worker.lifeline import Lifeline
 
@@ -134,7 +130,7 @@ def test_the_next_start_removes_folders_of_killed_processes(tmp_path, monkeypatc
         assert set(tmp_path.iterdir()) == folders and left not in folders
 
 
-def test_no_temporary_folder_is_one_line(monkeypatch):
+def test_no_temporary_folder_is_one_line(monkeypatch, error_of):
     monkeypatch.setattr(tempfile, "tempdir", "/no/such/folder")
-    with pytest.raises(RosyError, match="set TMPDIR to a folder"), Lifeline() as lifeline:
-        Path(lifeline.folder)
+    with Lifeline() as lifeline:
+        assert "set TMPDIR to a folder" in error_of(getattr, lifeline, "folder")

@@ -6,18 +6,15 @@ import os
 import signal
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from harness.processes import becomes_true, is_running
-from shapes import torus
+from shapes import instance_of, torus
 
 from rosy_addon.compositor.look import Look
 from rosy_addon.core.cache import BAKE_CACHE, Cache
 from rosy_addon.core.errors import NothingInViewError
 from rosy_addon.core.progress import listening
-from rosy_addon.field.generate import axis_field
 from rosy_addon.projection.camera import look_at, perspective_camera
-from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.rendering.draw import draw_picture, picture_groups
 from rosy_addon.rendering.view_input import ViewInput
 from rosy_addon.worker import start
@@ -28,13 +25,12 @@ DEGREE, WIDTH, HEIGHT = 11, 160, 1216
 
 
 def view_from(eye, **look) -> ViewInput:
-    ring = torus(24, 12)
-    instance = MeshInstance(ring, np.eye(4), axis_field(ring, DEGREE, (0, 0, 1)))
+    instance = instance_of(torus(24, 12), DEGREE, "axis")
     camera = perspective_camera(look_at(eye, (0, 0, 0)), WIDTH, HEIGHT, fov=0.9)
     return ViewInput((instance,), camera, Look(length=10, **look))
 
 
-VIEW = view_from((0.0, -1.5, 5.0), supersampling=2)
+VIEW = view_from((0.0, -1.5, 5.0), supersampling=2, arrows=40.0)
 
 
 def drawn(view: ViewInput, workers: int = 1) -> bytes:

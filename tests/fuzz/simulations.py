@@ -15,6 +15,7 @@ from typing import Any
 import meshio
 import numpy as np
 import pyvista as pv
+import trimesh
 from numpy.random import Generator
 
 from ..extras.exodus import write_exodus
@@ -137,18 +138,7 @@ def _save_series(rng: Generator, path: Path, surface: pv.PolyData) -> None:
 
 def _save_gltf(_: Generator, path: Path, surface: pv.PolyData) -> None:
     mesh = surface.triangulate()
-    buffers = [np.asarray(mesh.points, "<f4"), mesh.regular_faces.astype("<u4")]
-    sizes = [buffer.nbytes for buffer in buffers]
-    path.with_name("flow.bin").write_bytes(b"".join(map(bytes, buffers)))
-    views = [{"buffer": 0, "byteOffset": sizes[0] * k, "byteLength": sizes[k]} for k in (0, 1)]
-    accessors = [
-        {"bufferView": 0, "componentType": 5126, "count": mesh.n_points, "type": "VEC3"},
-        {"bufferView": 1, "componentType": 5125, "count": 3 * mesh.n_cells, "type": "SCALAR"},
-    ]
-    scene = {"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}]}
-    scene |= {"meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}]}
-    scene |= {"buffers": [{"uri": "flow.bin", "byteLength": sum(sizes)}], "bufferViews": views}
-    path.write_text(json.dumps(scene | {"accessors": accessors}))
+    trimesh.Trimesh(mesh.points, mesh.regular_faces, process=False).export(path)
 
 
 def _save_xdmf(rng: Generator, path: Path, surface: pv.PolyData) -> None:

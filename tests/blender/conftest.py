@@ -20,8 +20,6 @@ else:
     sys.path.insert(0, str(Path(__file__).parents[1]))
     from harness.blender_data import contents, member_vectors, pixels, render_image  # noqa: F401
 
-EXTENSION = "bl_ext.user_default.rosy"
-
 
 @pytest.fixture
 def scene():

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import functools
 import math
-import sys
 import time
 from dataclasses import replace
-from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils import Euler
-
-sys.path.insert(0, str(Path(__file__).parent))
 from conftest import add_suzanne
+from extension import rosy
+from mathutils import Euler
 from monkey_checks import handlers
-from window_steps import call_in_view, capture, in_view, redraws, rosy, view, wait_until
+from window_steps import call_in_view, capture, in_view, redraws, view, wait_until
 
 #: Seconds for which a window at rest is measured, and CPU seconds that it may take in each of them:
 #: it looks for closed views, and draws no pixel.

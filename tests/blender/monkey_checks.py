@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import gc
 import hashlib
-import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from fnmatch import fnmatchcase
@@ -15,8 +14,6 @@ from unicodedata import category
 
 import bpy
 import numpy as np
-
-EXTENSION = "bl_ext.user_default.rosy"
 
 #: Datablocks of Blender's interface and brushes, and others that no operator of RoSy can reach.
 IGNORED_COLLECTIONS = {
@@ -40,11 +37,6 @@ Fingerprint = dict[str, Any]
 
 class CheckError(Exception):
     """A check has failed."""
-
-
-def rosy(name: str) -> Any:
-    """Return a module of the extension."""
-    return sys.modules[f"{EXTENSION}.{name}"]
 
 
 def is_owned(datablock: bpy.types.ID) -> bool:

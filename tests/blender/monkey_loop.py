@@ -14,6 +14,7 @@ import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
 import monkey_blender  # noqa: F401  adds its actions
+from extension import rosy
 from monkey_actions import ACTIONS, DISTURBANCE, Monkey, action, field_in_view, meshes, select
 from monkey_checks import (
     CheckError,
@@ -22,7 +23,6 @@ from monkey_checks import (
     handlers,
     leftovers,
     resident_megabytes,
-    rosy,
     whole_state,
 )
 from monkey_jobs import disturb_jobs

@@ -25,29 +25,29 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from typing import Any
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from harness.processes import all_end, marked_processes
+
 HERE = Path(__file__).resolve().parent
 REPOSITORY = HERE.parents[1]
 
 #: Simulated events. With this option Blender never waits for events, and takes a core at rest.
 SIMULATED_EVENTS = ("--enable-event-simulate",)
 
-#: Scripts that test in a window, by what they test, the size of the window in pixels (small, as views
-#: are drawn in software, but with room for the menu of all presets), and further options.
+#: For each window_*.py, the size of the window in pixels (small, as views are drawn in software, but
+#: with room for the menu of all presets), and further options.
 WINDOWS = {
-    "panel": ("window_panel.py", 1000, 720, SIMULATED_EVENTS),
-    "tools": ("window_tools.py", 1000, 720, SIMULATED_EVENTS),
-    "presets": ("window_presets.py", 1120, 900, SIMULATED_EVENTS),
-    "live": ("window_live.py", 1000, 720, ()),
-    "helper": ("window_helper.py", 1000, 720, SIMULATED_EVENTS),
-    "first-bake": ("window_first_bake.py", 1000, 800, ()),
-    "listing": ("window_listing.py", 1922, 1200, ()),
+    "panel": (1000, 720, SIMULATED_EVENTS),
+    "tools": (1000, 720, SIMULATED_EVENTS),
+    "presets": (1120, 900, SIMULATED_EVENTS),
+    "live": (1000, 720, ()),
+    "helper": (1000, 720, SIMULATED_EVENTS),
+    "first-bake": (1000, 800, ()),
+    "listing": (1922, 1200, ()),
 }
 
 #: Size of the screen that `real-blender gui` makes. Larger windows get a screen of their own.
 SCREEN = 1400, 900
-
-#: Seconds within which processes end after Blender was killed.
-END_SECONDS = 5.0
 
 #: Seconds after which the screen of a window exists.
 START_SECONDS = 4.0
@@ -157,15 +157,17 @@ class Lane:
         status = subprocess.run(monkey, cwd=REPOSITORY, check=False, timeout=300.0).returncode
         self.counts["failed" if status else "passed"] += 1
 
-    def test_in_a_window(self, script: str, width: int, height: int, options: tuple) -> None:
-        """Run the steps of a script in a window."""
-        results_file = self.folder / f"{script}.json"
+    def test_in_a_window(self, name: str) -> None:
+        """Run the steps of a module in a window, and check that no process is left."""
+        width, height, options = WINDOWS[name]
+        results_file = self.folder / f"{name}.json"
         self.environment["ROSY_RESULTS"] = str(results_file)
+        self.environment["ROSY_WINDOW"] = f"window_{name}".replace("-", "_")
         is_large = width > SCREEN[0] or height > SCREEN[1]
         time_limit = 900 if is_large or self.options.many else 600
         arguments = [
             *self.backend, "--window-geometry", "0", "0", str(width), str(height), *options,
-            "--python-exit-code", "1", "-P", str(HERE / script),
+            "--python-exit-code", "1", "-P", str(HERE / "run_window.py"),
         ]  # fmt: skip
         command = ["gui", "-s", str(time_limit), *arguments]
         if is_large:
@@ -175,7 +177,9 @@ class Lane:
         streams = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
         process = self.blender(*command, timeout=time_limit + 60.0, **streams)
         add_window(self.counts, results_file)
-        add_processes(self.counts, results_file.with_suffix(".processes"))
+        if not all_end(str(results_file)):
+            print("processes are left:", *marked_processes(str(results_file)).values(), sep="\n")
+            self.counts["failed"] += 1
         # Errors in the drawing of a panel appear on the terminal alone.
         if "Traceback" in process.stdout:
             text = process.stdout[process.stdout.index("Traceback") :][:3000]
@@ -195,7 +199,7 @@ def run_tests(options: argparse.Namespace, folder: Path) -> dict[str, int]:
     lane.environment["ROSY_SHOTS"] = str(shots)
     for name in options.windows.split(","):
         if name != "none":
-            lane.test_in_a_window(*WINDOWS[name])
+            lane.test_in_a_window(name)
     if options.shots is not None:
         shutil.copytree(shots, options.shots, dirs_exist_ok=True)
     return lane.counts
@@ -235,29 +239,6 @@ def add_window(counts: dict[str, int], results: Path) -> None:
     if "the end" not in steps:
         print("the run in a window did not come to its end")
         counts["errors"] += 1
-
-
-def add_processes(counts: dict[str, int], listing: Path) -> None:
-    """Check that the processes end that a killed Blender had started, if a step has listed them."""
-    if not listing.is_file():
-        return
-    processes = json.loads(listing.read_text())
-    deadline = time.monotonic() + END_SECONDS
-    while any(is_running(process) for process in processes) and time.monotonic() < deadline:
-        time.sleep(0.1)
-    left = [process for process in processes if is_running(process)]
-    if left:
-        print(f"of {len(processes)} processes, {len(left)} are left after Blender was killed")
-    counts["failed" if left else "passed"] += 1
-
-
-def is_running(process: int) -> bool:
-    """Return whether a process runs, given its number."""
-    try:
-        stat = Path(f"/proc/{process}/stat").read_text()
-    except OSError:
-        return False
-    return stat.rpartition(")")[2].split()[0] != "Z"
 
 
 if __name__ == "__main__":

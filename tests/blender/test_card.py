@@ -16,7 +16,7 @@ import bpy
 import gpu
 import numpy as np
 import pytest
-from conftest import EXTENSION
+from extension import EXTENSION
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from harness.gpu_parity import (

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import sys
-
 import bpy
 import numpy as np
 import pytest
 from conftest import contents, error_of, member_vectors
+from extension import rosy
 from harness.blender_data import attribute_values
 
 
@@ -55,7 +54,7 @@ def test_an_object_without_features_does_not_stop_the_others(suzanne, capfd):
 
 
 def test_lack_of_memory_is_reported(with_field, monkeypatch):
-    memory = sys.modules["bl_ext.user_default.rosy.rosy_addon.core.memory"]
+    memory = rosy("rosy_addon.core.memory")
 
     def fail(*_):
         raise MemoryError
@@ -283,7 +282,7 @@ def test_singularities_as_points(scene):
     assert sum(value.value for value in values) == 8
     positions = points.data.attributes["position"].data
     assert all(abs(point.vector.length - 1) < 0.02 for point in positions)
-    overlay = sys.modules["bl_ext.user_default.rosy.rosy_addon.ui.overlay"]
+    overlay = rosy("rosy_addon.ui.overlay")
     assert overlay.shown("Icosphere")
     # They replace the earlier ones.
     assert bpy.ops.rosy.singularities(show="POINTS") == {"FINISHED"}
@@ -295,8 +294,7 @@ def test_singularities_as_points(scene):
 
 def test_singularities_are_where_their_points_are_moved(scene):
     """The points of a field, moved and changed, make a field with these singularities alone."""
-    from bl_ext.user_default.rosy.rosy_addon.scene.singularity_points import read_singularities
-
+    read_singularities = rosy("rosy_addon.scene.singularity_points").read_singularities
     sphere = sphere_with_field(location=(1.0, 2.0, 0.0))
     bpy.ops.rosy.singularities(show="POINTS")
     points = bpy.data.objects["Icosphere singularities"]
@@ -327,10 +325,8 @@ def test_singularities_are_where_their_points_are_moved(scene):
 
 
 def editable_singularities(obj):
-    from bl_ext.user_default.rosy.rosy_addon.scene import singularity_points
-
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    found = singularity_points.read_editable_singularities(obj, depsgraph)
+    read = rosy("rosy_addon.scene.singularity_points").read_editable_singularities
+    found = read(obj, bpy.context.evaluated_depsgraph_get())
     return dict(zip(found.vertex.tolist(), found.index.tolist(), strict=True)), found
 
 
@@ -362,7 +358,7 @@ def test_a_singularity_is_moved(scene):
 
 
 def test_opening_a_file_hides_singularities(scene):
-    overlay = sys.modules["bl_ext.user_default.rosy.rosy_addon.ui.overlay"]
+    overlay = rosy("rosy_addon.ui.overlay")
     handlers = len(bpy.app.handlers.load_pre)
     sphere_with_field()
     bpy.ops.rosy.singularities(show="OVERLAY")

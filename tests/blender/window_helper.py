@@ -1,8 +1,6 @@
 """RoSy in a window: jobs whose calls a helper process makes, and helpers that end.
 
-Run by run.py as ``blender --enable-event-simulate -P window_helper.py``. Every step is a generator
-that yields to let Blender handle its events (`window_steps`). The last step kills Blender, and run.py
-checks that no process of `PROCESSES` is left.
+Run by run.py, as window_panel.py is. The last step kills Blender, and run.py checks that no process is left.
 """
 
 from __future__ import annotations
@@ -11,35 +9,25 @@ import json
 import os
 import re
 import signal
-import sys
 import time
-from pathlib import Path
 
 import bpy
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parent))
 from conftest import contents, pixels
+from extension import preferences, rosy, switch_extension
+from harness.processes import is_running
 from monkey_checks import changes, fingerprint, handlers
-from run import is_running
 from window_steps import (
     RESULTS,
     call_in_view,
-    descendants,
     in_view,
-    preferences,
     press,
-    rosy,
-    run_module,
     scene_with_field,
     start_job,
     status,
     view,
     wait_until,
 )
-
-#: The numbers of the processes that Blender has started when it is killed.
-PROCESSES = RESULTS.with_suffix(".processes")
 
 #: Seconds within which ESC stops a job and ends the helper.
 STOP_SECONDS = 0.2
@@ -274,10 +262,10 @@ def test_switched_off():
     yield from scene_with_field()
     start_bake()
     yield from wait_for_job()
-    first, name = helper_id(), "bl_ext.user_default.rosy"
-    bpy.ops.preferences.addon_disable(module=name)
+    first = helper_id()
+    switch_extension(False)
     assert not is_running(first)
-    bpy.ops.preferences.addon_enable(module=name)
+    switch_extension(True)
     yield 0.2
 
 
@@ -286,13 +274,8 @@ def test_blender_is_killed():
     yield from scene_with_field((1920, 1440))
     bpy.context.scene.rosy.look.supersampling = 2
     yield from start_long_bake()
-    processes = descendants()
-    assert helper_id() in processes
-    PROCESSES.write_text(json.dumps(processes))
+    assert is_running(helper_id())
     results = json.loads(RESULTS.read_text()) if RESULTS.is_file() else {}
     results |= {"blender is killed": ["", 0.0], "the end": ["", 0.0]}
     RESULTS.write_text(json.dumps(results))
     os.kill(os.getpid(), signal.SIGKILL)
-
-
-run_module(globals())

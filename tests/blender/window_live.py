@@ -7,14 +7,11 @@ from __future__ import annotations
 
 import math
 import os
-import sys
-from pathlib import Path
 
 import bpy
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parent))
 from conftest import add_camera
+from extension import preferences, rosy, switch_extension
 from live_views import (
     CAUSES,
     REST_LOAD,
@@ -32,18 +29,7 @@ from live_views import (
     visible_owners,
     wait_for_final_pictures,
 )
-from window_steps import (
-    SHOTS,
-    call_in_view,
-    capture,
-    in_view,
-    preferences,
-    redraws,
-    rosy,
-    run_module,
-    view,
-    wait_until,
-)
+from window_steps import SHOTS, call_in_view, capture, in_view, redraws, view, wait_until
 
 
 @live()
@@ -457,11 +443,8 @@ def test_nothing_is_left():
         elif ending == "FILE":
             bpy.ops.wm.open_mainfile(filepath=path)
         else:
-            bpy.ops.preferences.addon_disable(module="bl_ext.user_default.rosy")
+            switch_extension(False)
         yield 0.5
         assert not (held._kept or held._lookup_textures), ending
         check_nothing_is_left()
     os.remove(path)
-
-
-run_module(globals())

@@ -1,21 +1,19 @@
 """RoSy in a window: the panel in its states, jobs with progress, and jobs that are interrupted.
 
-Run by run.py as ``blender --enable-event-simulate -P window_panel.py``. Every step is a generator
-that yields to let Blender handle its events (`window_steps`).
+Run by run.py, through run_window.py. Every step is a generator that yields to let Blender handle its
+events (`window_steps`).
 """
 
 from __future__ import annotations
 
 import math
-import sys
 from functools import partial
 from pathlib import Path
 
 import bpy
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parent))
 from conftest import add_camera, contents, pixels, render_image
+from extension import preferences, rosy, switch_extension
 from monkey_checks import handlers
 from window_steps import (
     SHOTS,
@@ -23,10 +21,7 @@ from window_steps import (
     capture,
     fresh_scene,
     in_view,
-    preferences,
     press,
-    rosy,
-    run_module,
     save_part,
     scene_with_field,
     start_job,
@@ -190,8 +185,8 @@ def test_stop_when_the_scene_changes():
     """An object is deleted, the field undone, the scene changed, a file opened; RoSy is switched off."""
 
     def switch_off():
-        for switch in (bpy.ops.preferences.addon_disable, bpy.ops.preferences.addon_enable):
-            switch(module="bl_ext.user_default.rosy")
+        switch_extension(False)
+        switch_extension(True)
         preferences().live_first_field = False
 
     actions = [bpy.ops.object.delete, bpy.ops.ed.undo, partial(bpy.ops.scene.new, type="EMPTY")]
@@ -300,6 +295,3 @@ def test_bake_the_current_view():
     call_in_view(bpy.ops.rosy.bake, "EXEC_DEFAULT", True, camera="VIEW")
     (image,) = [image for image in bpy.data.images if image.name.lower().startswith("rosy")]
     assert tuple(image.size) == (view()[2].width, view()[2].height)
-
-
-run_module(globals())

@@ -5,15 +5,9 @@ Run by run.py, as window_panel.py is.
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import bpy
-
-sys.path.insert(0, str(Path(__file__).parent))
-from window_steps import call_in_view, capture, open_tab, press, rosy, run_module, save_part, view
-
-EXTENSION = "bl_ext.user_default.rosy"
+from extension import rosy, switch_extension
+from window_steps import call_in_view, capture, open_tab, press, save_part, view
 
 
 def library():
@@ -54,9 +48,9 @@ def preview_tones(sidebar):
 
 
 def test_panel_with_previews():
-    bpy.ops.preferences.addon_disable(module=EXTENSION)
+    switch_extension(False)
     rosy("rosy_addon.ui.look_panels").VIEW3D_PT_rosy_look.bl_options = set()
-    bpy.ops.preferences.addon_enable(module=EXTENSION)
+    switch_extension(True)
     yield from open_look()
     tones = preview_tones((yield from save_screenshot("presets-1-panel")))
     assert tones.std() > 0.1 and 0.2 < tones.mean() < 0.6, (tones.std(), tones.mean())
@@ -133,10 +127,7 @@ def test_previews_are_freed_with_the_extension():
     yield from wait_for_previews()
     previews = library()._LIBRARY.previews
     assert len(previews) == len(library().entries())
-    bpy.ops.preferences.addon_disable(module=EXTENSION)
+    switch_extension(False)
     assert not len(previews)
     yield 0.2
-    bpy.ops.preferences.addon_enable(module=EXTENSION)
-
-
-run_module(globals())
+    switch_extension(True)

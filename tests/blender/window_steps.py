@@ -19,10 +19,9 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils import Euler, Vector
-
-sys.path.insert(0, str(Path(__file__).parent))
 from conftest import add_camera, add_suzanne
+from extension import preferences, rosy
+from mathutils import Euler, Vector
 
 SHOTS = Path(os.environ["ROSY_SHOTS"])
 RESULTS = Path(os.environ["ROSY_RESULTS"])
@@ -41,22 +40,16 @@ ONLY = os.environ.get("ROSY_STEPS", "").split(",")
 MANY = bool(os.environ.get("ROSY_MANY"))
 
 
-def run_module(module):
-    """Run the functions of a module whose names start with test_, in their order."""
-    run_steps(*(value for name, value in module.items() if name.startswith("test_")))
+def run_module(name):
+    """Run the functions of a module whose names start with test_, in their order, and end Blender.
 
-
-def step_name(step):
-    return step.__name__.removeprefix("test_")
-
-
-def run_steps(*steps):
-    """Run steps as soon as there is a window, write their results, and end Blender.
-
-    If `ONLY` has names, other steps are left out.
+    They run as soon as there is a window, and their results are written. If `ONLY` has names, other steps
+    are left out.
     """
+    functions = vars(importlib.import_module(name)).items()
+    steps = {key[5:]: step for key, step in functions if key.startswith("test_")}
     if any(ONLY):
-        steps = [step for step in steps if step_name(step) in ONLY]
+        steps = {key: step for key, step in steps.items() if key in ONLY}
     bpy.context.preferences.view.show_splash = False
     bpy.context.preferences.view.show_statusbar_stats = False
     bpy.context.preferences.view.smooth_view = 0
@@ -87,26 +80,16 @@ def _resume(work):
 
 def _run_all(steps):
     results = {}
-    for step in steps:
+    for name, step in steps.items():
         start, error = time.monotonic(), ""
         try:
             yield from step()
         except Exception:
             error = traceback.format_exc()
-        results[step_name(step).replace("_", " ")] = error, round(time.monotonic() - start, 1)
+        results[name.replace("_", " ")] = error, round(time.monotonic() - start, 1)
         RESULTS.write_text(json.dumps(results))
     results["the end"] = "", 0.0
     RESULTS.write_text(json.dumps(results))
-
-
-def rosy(name):
-    """Return a module of the extension."""
-    return importlib.import_module(f"bl_ext.user_default.rosy.{name}")
-
-
-def preferences():
-    """Return the preferences of the extension."""
-    return bpy.context.preferences.addons["bl_ext.user_default.rosy"].preferences
 
 
 def view():
@@ -194,22 +177,6 @@ def wait_until(condition, seconds=TIMEOUT_SECONDS):
         if time.monotonic() > deadline:
             raise AssertionError("timed out")
         yield
-
-
-def descendants():
-    """Return the numbers of all processes that this one has started, directly or not."""
-    parents = {}
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = path.read_text().rpartition(")")[2].split()
-        except OSError:
-            continue
-        parents[int(path.parent.name)] = int(fields[1])
-    found, new = set(), {os.getpid()}
-    while new:
-        new = {child for child, parent in parents.items() if parent in new}
-        found |= new
-    return sorted(found)
 
 
 @contextmanager

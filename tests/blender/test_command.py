@@ -13,8 +13,8 @@ from conftest import run_blender
 
 def command(*arguments, scene=None):
     """Run the command in a new Blender process, and return its exit status and its output."""
-    file_arguments = [str(scene)] if scene else []
-    return run_blender(*file_arguments, "--command", "rosy", *map(str, arguments))
+    files = [scene] if scene else []
+    return run_blender(*map(str, (*files, "--command", "rosy", *arguments)))
 
 
 @pytest.fixture
@@ -56,9 +56,8 @@ def test_ctrl_c_stops_the_command(saved, tmp_path):
         "--out",
         tmp_path / "out",
     ]
-    process = subprocess.Popen(
-        [bpy.app.binary_path, *map(str, words)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT
-    )
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+    process = subprocess.Popen([bpy.app.binary_path, *map(str, words)], **streams)
     lines = []
     for line in process.stdout:
         if line.startswith(b"frame ") and not lines:

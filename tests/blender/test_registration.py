@@ -63,13 +63,6 @@ def test_off_and_on_and_off_leaves_nothing():
     switch_extension(True)
 
 
-def test_a_bake_leaves_no_handler(baked):
-    used = snapshot()
-    bpy.ops.rosy.remove()
-    for modules in used["handlers"].values():
-        assert not [module for module in modules if "rosy" in module]
-
-
 def test_settings_survive_off_and_on(with_field):
     with_field.data.rosy.degree = 6
     switch_extension(False)

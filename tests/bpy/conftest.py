@@ -29,7 +29,8 @@ else:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     _import_extension()
     importlib.import_module("rosy.rosy_addon.ui.properties").ensure_registered()
-    from scenes import add_camera, add_field, add_monkey, add_plane, empty_scene
+    from objects import add_camera, add_field, add_monkey, add_plane
+    from scenes import empty_scene
 
 
 @pytest.fixture(autouse=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+from objects import add_camera, link
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.core.cache import BAKE_CACHE
 from rosy.rosy_addon.core.color import to_display
@@ -14,7 +15,7 @@ from rosy.rosy_addon.scene import pictures as pictures_room
 from rosy.rosy_addon.scene.bake_records import has_pictures, list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import scene_cameras
 from rosy.rosy_addon.scene.pictures import show_bake
-from scenes import add_camera, contents, depsgraph, each_step, expect_error, link, pixels, reopen
+from scenes import contents, depsgraph, each_step, expect_error, pixels, reopen
 
 
 def material_of(obj):

@@ -5,6 +5,16 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+from objects import (
+    add_camera,
+    add_field,
+    add_instance,
+    add_mesh,
+    add_plane,
+    aim,
+    link,
+    set_attribute,
+)
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.core import memory
 from rosy.rosy_addon.core.errors import RosyError
@@ -21,20 +31,7 @@ from rosy.rosy_addon.scene.guides import (
 from rosy.rosy_addon.scene.mesh_fields import assign_fields, read_mesh_field, write_mesh_field
 from rosy.rosy_addon.scene.meshes import marked_edges, mesh_surface
 from rosy.rosy_addon.scene.visible_objects import field_objects
-from scenes import (
-    add_camera,
-    add_field,
-    add_mesh,
-    add_plane,
-    aim,
-    contents,
-    depsgraph,
-    empty_scene,
-    expect_error,
-    link,
-    member_vectors,
-    set_attribute,
-)
+from scenes import contents, depsgraph, empty_scene, expect_error, member_vectors
 from test_live_reading import LOSSES
 from test_reading import add_directions
 from test_up_to_date import put
@@ -297,13 +294,16 @@ def test_fields_are_stored_on_all_meshes_or_none(scene, monkey, form):
         for obj in (add_plane(), monkey, other)
     }
     before = contents()
-    with pytest.raises(RosyError, match=f"mesh 'Other' already has an attribute '{name}'"):
-        assign_fields(fields, "taken", form)
+    message = f"mesh 'Other' already has an attribute '{name}'"
+    expect_error(message, assign_fields, fields, "taken", form)
     # Blender would rename this one if it failed to create an attribute.
     next(iter(fields)).attributes.new("Float3", "FLOAT_VECTOR", "EDGE")
     before = contents()
-    with pytest.raises(RosyError, match=r"mesh 'Plane': 'x+' cannot be the name of an attribute"):
-        assign_fields({mesh: fields[mesh] for mesh in list(fields)[:1]}, "x" * 300)
+    message, plane = (
+        r"mesh 'Plane': 'x+' cannot be the name of an attribute",
+        dict([*fields.items()][:1]),
+    )
+    expect_error(message, assign_fields, plane, "x" * 300)
     assert contents() == before
 
 
@@ -334,8 +334,7 @@ def test_linked_objects_are_refused(library, kind):
     if kind == "objects":
         link(data)
     else:
-        empty = link(bpy.data.objects.new("Instance", None))
-        empty.instance_type, empty.instance_collection = "COLLECTION", data
+        add_instance(data)
     assert_refused("object 'Suzanne' is linked from", "library.blend")
 
 

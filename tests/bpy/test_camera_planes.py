@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+from objects import add_camera, aim
 from rosy.rosy_addon.annotation.key_contents import PictureKey
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.core.color import from_hex, to_linear
@@ -15,7 +16,7 @@ from rosy.rosy_addon.scene.camera_planes import update_backdrops
 from rosy.rosy_addon.scene.keys import round_length, text_triangles, update_keys
 from rosy.rosy_addon.scene.look_properties import apply_look
 from rosy.rosy_addon.scene.pictures import OutputSettings, show_bake
-from scenes import add_camera, aim, contents, pixels, render
+from scenes import contents, pixels, render
 
 LOOK = Look(hue="magnitude", singularity_dots="visible", supersampling=2)
 

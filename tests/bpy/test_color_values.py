@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from objects import add_uv, set_attribute
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.jobs.bake_texture import bake_texture
@@ -11,7 +12,7 @@ from rosy.rosy_addon.scene.bake_records import list_bakes
 from rosy.rosy_addon.scene.look_inputs import ReadRequest
 from rosy.rosy_addon.scene.read_view import read_turntable
 from rosy.rosy_addon.scene.scene_reader import read_scene
-from scenes import add_uv, depsgraph, expect_error, set_attribute
+from scenes import depsgraph, expect_error
 
 
 def set_values(mesh, values, name="Angle"):

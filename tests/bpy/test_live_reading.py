@@ -5,20 +5,10 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+from objects import add_field, add_nodes, add_plane, link, set_attribute
 from rosy.rosy_addon.scene import scene_reader
 from rosy.rosy_addon.scene.scene_reader import SceneReader
-from scenes import (
-    add_field,
-    add_nodes,
-    add_plane,
-    contents,
-    depsgraph,
-    link,
-    member_vectors,
-    read_instances,
-    read_live,
-    set_attribute,
-)
+from scenes import contents, depsgraph, member_vectors, read_instances, read_live
 
 
 def read(reader):

@@ -9,12 +9,13 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
+from objects import link
 from rosy.rosy_addon.field.analysis import dirichlet_energy
 from rosy.rosy_addon.field.generate import generate
 from rosy.rosy_addon.field.singularities import find_singularities
 from rosy.rosy_addon.field.surface import build_surface
 from rosy.rosy_addon.scene.meshes import mesh_surface
-from scenes import depsgraph, link
+from scenes import depsgraph
 
 TURN = Matrix.Rotation(np.pi / 2, 4, "Y"), Matrix.Rotation(np.pi / 2, 4, "X"), Matrix.Identity(4)
 

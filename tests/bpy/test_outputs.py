@@ -12,13 +12,14 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from objects import add_uv, link
 from rosy.rosy_addon.core.file_io import check_writable
 from rosy.rosy_addon.jobs.animation import bake_animation
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.jobs.bake_texture import bake_texture
 from rosy.rosy_addon.jobs.draw_strokes import draw_strokes
 from rosy.rosy_addon.scene.blender_images import new_image, new_tiled_image, write_images
-from scenes import add_uv, expect_error
+from scenes import expect_error
 
 OLD = b"the previous contents"
 
@@ -118,8 +119,7 @@ def test_all_tiles_are_checked_first(scene, wall, out):
     """Also before the texture of another object is replaced."""
     wall.name = "Wall"
     add_uv(wall.data)
-    other = bpy.data.objects.new("Before", wall.data.copy())
-    scene.collection.objects.link(other)
+    other = link(bpy.data.objects.new("Before", wall.data.copy()))
     (out / "RoSy_Wall_texture.1002.png").mkdir()
     for name in ("RoSy_Wall_texture.1001.png", "RoSy_Before_texture.1001.png"):
         (out / name).write_bytes(OLD)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from objects import add_camera, add_field
 from rosy.rosy_addon.compositor import stages
 from rosy.rosy_addon.core.cache import BAKE_CACHE
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.projection import project as projection
-from scenes import add_camera, add_field
 
 
 @pytest.fixture

@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from harness.blender_data import attribute_values
+from objects import add_field, add_nodes, add_plane, link
 from rosy.rosy_addon.core.progress import listening
 from rosy.rosy_addon.jobs.draw_strokes import draw_strokes
 from rosy.rosy_addon.line_drawing.outline import OUTLINE_KINDS
@@ -19,7 +20,7 @@ from rosy.rosy_addon.scene.scene_reader import read_scene
 from rosy.rosy_addon.scene.stroke_data import has_grease_pencil_drawings
 from rosy.rosy_addon.scene.stroke_objects import edited_strokes, remove_strokes, stroke_objects
 from rosy.rosy_addon.worker.job import Step
-from scenes import add_field, add_nodes, add_plane, contents, depsgraph, each_step, render
+from scenes import contents, depsgraph, each_step, render, reopen
 from test_bad_input import assert_refused
 
 PLAIN = StrokeStyle(spacing=12, outline=True)
@@ -172,12 +173,10 @@ def test_strokes_are_replaced_and_removed(wall, camera, scene, kind):
 
 def test_copies_belong_to_the_user(wall, camera, scene):
     first = draw_strokes(scene, kind="CURVES", style=PLAIN).obj
-    copy = first.copy()
+    copy = link(first.copy())
     copy.data = first.data.copy()
-    scene.collection.objects.link(copy)
     count = len(copy.data.curves)
-    linked = first.copy()  # on the same data
-    scene.collection.objects.link(linked)
+    linked = link(first.copy())  # on the same data
     assert draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=14)).obj == first
     assert len(copy.data.curves) == len(linked.data.curves) == count > len(first.data.curves)
     assert stroke_objects(scene) == [first]
@@ -338,10 +337,8 @@ def recolor(data):
 def test_edited_strokes_are_recognized(wall, camera, scene, tmp_path, kind, edit):
     name = draw_strokes(scene, kind=kind, style=StrokeStyle(spacing=20)).obj.name
     assert edited_strokes(scene, kind, "Camera") is None
-    path = str(tmp_path / "strokes.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.open_mainfile(filepath=path)
-    scene, obj = bpy.context.scene, bpy.data.objects[name]
+    scene = reopen(tmp_path / "strokes.blend")
+    obj = bpy.data.objects[name]
     assert edited_strokes(scene, kind, "Camera") is None
     obj.location.x += 1
     assert edited_strokes(scene, kind, "Camera") is None

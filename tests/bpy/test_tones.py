@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 import pytest
 from harness.blender_data import attribute_values
+from objects import add_field, add_mesh, add_uv, set_attribute
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.core.color import to_linear
 from rosy.rosy_addon.core.errors import RosyError
@@ -23,7 +24,7 @@ from rosy.rosy_addon.scene.look_inputs import (
 )
 from rosy.rosy_addon.scene.pictures import read_output_settings
 from rosy.rosy_addon.scene.scene_reader import SceneReader, read_scene
-from scenes import add_field, add_mesh, add_uv, depsgraph, expect_error, read_live, set_attribute
+from scenes import depsgraph, expect_error, read_live
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 

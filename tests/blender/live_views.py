@@ -47,6 +47,8 @@ def bare_view():
 def fresh_scene(levels=2):
     """Create a scene with Suzanne and a field, in a bare view."""
     session_module().stop()
+    # Blender's own antialiasing continues over many redraws, and its result varies.
+    bpy.context.preferences.system.viewport_aa = "OFF"
     bpy.ops.wm.read_homefile(use_empty=True)
     yield 0.5
     with in_view():
@@ -127,15 +129,16 @@ def eroded(mask):
     return inside
 
 
-def live(levels=2):
-    """Return a decorator for a step: it begins with a live view of Suzanne, and the view is off afterwards."""
+def live(levels=2, *, is_on=True):
+    """Return a decorator for a step: it begins with a view of Suzanne, live or not, which is off afterwards."""
 
     def decorate(step):
         @functools.wraps(step)
         def run():
             yield from fresh_scene(levels)
-            switch("ON")
-            yield from wait_for_final_pictures()
+            if is_on:
+                switch("ON")
+                yield from wait_for_final_pictures()
             yield from step(bpy.data.objects["Suzanne"])
             switch("OFF")
             yield 0.5

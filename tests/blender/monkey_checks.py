@@ -20,14 +20,6 @@ IGNORED_COLLECTIONS = {
     "all_ids", "window_managers", "screens", "workspaces", "brushes", "fonts", "palettes", "libraries",
 }  # fmt: skip
 
-#: The property of an attribute's values, by its data type; others hold vectors.
-VALUE_PROPERTIES = {
-    **dict.fromkeys(("FLOAT", "INT", "INT8", "BOOLEAN", "INT32_2D", "INT16_2D"), "value"),
-    **dict.fromkeys(("QUATERNION",), "value"),
-    **dict.fromkeys(("FLOAT_COLOR", "BYTE_COLOR"), "color"),
-    **dict.fromkeys(("FLOAT2", "FLOAT_VECTOR"), "vector"),
-}
-
 #: Data types and domains of the attributes that a modifier of RoSy leaves in a mesh if it is applied.
 APPLIED = {"rosy_projection": ("FLOAT_VECTOR", "POINT"), "rosy_material": ("INT", "FACE")}
 
@@ -149,10 +141,11 @@ def _add_mesh(state: Fingerprint, path: str, mesh: bpy.types.Mesh) -> None:
 
 
 def _attribute_digest(attribute: bpy.types.Attribute) -> str | None:
-    name = VALUE_PROPERTIES.get(attribute.data_type)
-    if name is None or not len(attribute.data):
+    if attribute.data_type in ("STRING", "FLOAT4X4") or not len(attribute.data):
         return None
-    size = np.size(getattr(attribute.data[0], name))
+    first = attribute.data[0]
+    name = next(name for name in ("value", "color", "vector") if hasattr(first, name))
+    size = np.size(getattr(first, name))
     values = np.empty(len(attribute.data) * size, dtype=np.float32)
     attribute.data.foreach_get(name, values)
     return _digest(values)

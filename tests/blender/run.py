@@ -22,6 +22,7 @@ import sys
 import tempfile
 import time
 import xml.etree.ElementTree as ElementTree
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -56,16 +57,16 @@ START_SECONDS = 4.0
 def main() -> int:
     options = parse_arguments()
     start = time.monotonic()
-    folder = Path(tempfile.mkdtemp(prefix="blender-lane-"))
-    try:
-        counts = run_tests(options, folder)
-    except subprocess.TimeoutExpired as error:
-        print(f"Blender did not end within {error.timeout:.0f} s")
-        counts = {"errors": 1}
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-    summary = ", ".join(f"{count} {outcome}" for outcome, count in counts.items() if count)
-    passed = counts.get("passed", 0) > 0 and not counts.get("failed") and not counts.get("errors")
+    with tempfile.TemporaryDirectory(prefix="blender-lane-", ignore_cleanup_errors=True) as folder:
+        lane = Lane(options, Path(folder))
+        try:
+            lane.run()
+        except subprocess.TimeoutExpired as error:
+            print(f"Blender did not end within {error.timeout:.0f} s")
+            lane.counts["errors"] += 1
+    counts = lane.counts
+    summary = ", ".join(f"{count} {outcome}" for outcome, count in sorted(counts.items()) if count)
+    passed = counts["passed"] and not counts["failed"] and not counts["errors"]
     line = f" Blender {options.which}: {summary} in {time.monotonic() - start:.0f}s "
     print(line.center(80, "="))
     return 0 if passed else 1
@@ -104,13 +105,13 @@ class Lane:
         Where files go.
     environment : dict of str to str
         The variables of Blender's processes.
-    counts : dict of str to int
+    counts : Counter
         How many tests passed, failed, had errors and were skipped.
     """
 
     def __init__(self, options: argparse.Namespace, folder: Path) -> None:
         self.options, self.folder = options, folder
-        self.counts = {"failed": 0, "passed": 0, "skipped": 0, "errors": 0}
+        self.counts: Counter[str] = Counter()
         self.zip = folder / "rosy.zip"
         shutil.copy(options.zip, self.zip)
         self.environment = os.environ | {
@@ -132,15 +133,24 @@ class Lane:
         settings = {"cwd": REPOSITORY, "env": self.environment, "check": False}
         return subprocess.run(full_command, timeout=timeout, **settings, **run_options)
 
-    def install(self) -> bool:
-        """Install the zip, and return whether that was possible."""
+    def run(self) -> None:
+        """Install the zip, and run all parts."""
         extension = ("run", "--command", "extension")
-        if self.blender(*extension, "validate", str(self.zip)).returncode:
-            self.counts["failed"] += 1
+        self.counts["failed"] += self.blender(*extension, "validate", str(self.zip)).returncode != 0
         installing = ("install-file", "-r", "user_default", "--enable", str(self.zip))
-        is_installed = not self.blender(*extension, *installing).returncode
-        self.counts["errors"] += not is_installed
-        return is_installed
+        if self.blender(*extension, *installing).returncode:
+            self.counts["errors"] += 1
+            return
+        if not self.options.only_window:
+            self.test_without_a_window()
+        shots = self.folder / "shots"
+        shots.mkdir()
+        self.environment["ROSY_SHOTS"] = str(shots)
+        for name in self.options.windows.split(","):
+            if name != "none":
+                self.test_in_a_window(name)
+        if self.options.shots is not None:
+            shutil.copytree(shots, self.options.shots, dirs_exist_ok=True)
 
     def test_without_a_window(self) -> None:
         """Run pytest inside Blender, and the monkey."""
@@ -150,7 +160,7 @@ class Lane:
             "-c", str(HERE / "pytest.ini"), f"--rootdir={HERE}", f"--junitxml={results}",
             *self.options.pytest, str(HERE),
         )  # fmt: skip
-        add_junit(self.counts, results)
+        self.counts.update(junit_counts(results))
         monkey = [sys.executable, str(HERE / "monkey.py"), str(self.zip), "--steps", "400"]
         monkey += ["--blender", str(self.options.real_blender.resolve())]
         monkey += ["--which", self.options.which]
@@ -187,24 +197,6 @@ class Lane:
             self.counts["failed"] += 1
 
 
-def run_tests(options: argparse.Namespace, folder: Path) -> dict[str, int]:
-    """Run all parts, and return how many tests passed, failed, had errors and were skipped."""
-    lane = Lane(options, folder)
-    if not lane.install():
-        return lane.counts
-    if not options.only_window:
-        lane.test_without_a_window()
-    shots = folder / "shots"
-    shots.mkdir()
-    lane.environment["ROSY_SHOTS"] = str(shots)
-    for name in options.windows.split(","):
-        if name != "none":
-            lane.test_in_a_window(name)
-    if options.shots is not None:
-        shutil.copytree(shots, options.shots, dirs_exist_ok=True)
-    return lane.counts
-
-
 def wait_for_turn() -> None:
     """Wait until no other run starts a window: both might choose the same screen.
 
@@ -215,22 +207,20 @@ def wait_for_turn() -> None:
         subprocess.Popen(["sleep", str(START_SECONDS)], pass_fds=[file.fileno()])
 
 
-def add_junit(counts: dict[str, int], results: Path) -> None:
-    """Add the counts of pytest's report. A missing report is an error."""
+def junit_counts(results: Path) -> dict[str, int]:
+    """Return the counts of pytest's report. A missing report is an error."""
     if not results.is_file():
         print("the tests inside Blender did not come to their end")
-        counts["errors"] += 1
-        return
+        return {"errors": 1}
     suite = ElementTree.parse(results).getroot().find("testsuite")
-    suite_counts = {key: int(suite.get(key)) for key in ("tests", "failures", "errors", "skipped")}
-    counts["failed"] += suite_counts["failures"]
-    counts["errors"] += suite_counts["errors"]
-    counts["skipped"] += suite_counts["skipped"]
-    tests = suite_counts.pop("tests")
-    counts["passed"] += tests - sum(suite_counts.values())
+    failed, errors, skipped, tests = (
+        int(suite.get(key)) for key in ("failures", "errors", "skipped", "tests")
+    )
+    passed = tests - failed - errors - skipped
+    return {"failed": failed, "errors": errors, "skipped": skipped, "passed": passed}
 
 
-def add_window(counts: dict[str, int], results: Path) -> None:
+def add_window(counts: Counter[str], results: Path) -> None:
     """Add the results of the steps in a window. A missing end is an error."""
     steps = json.loads(results.read_text()) if results.is_file() else {}
     for step, (failure, seconds) in steps.items():

@@ -20,13 +20,6 @@ def point_on_preview():
     return sidebar.x + sidebar.width // 2 - 15, sidebar.y + sidebar.height - 360
 
 
-def open_look():
-    """Open an empty scene, and RoSy's tab of the sidebar."""
-    bpy.ops.wm.read_homefile(use_empty=True)
-    yield 0.5
-    yield from open_tab()
-
-
 def wait_for_previews():
     """Wait until the previews, which Blender loads in the background, are on the screen."""
     for _ in range(15):
@@ -51,7 +44,9 @@ def test_panel_with_previews():
     switch_extension(False)
     rosy("rosy_addon.ui.look_panels").VIEW3D_PT_rosy_look.bl_options = set()
     switch_extension(True)
-    yield from open_look()
+    bpy.ops.wm.read_homefile(use_empty=True)
+    yield 0.5
+    yield from open_tab()
     tones = preview_tones((yield from save_screenshot("presets-1-panel")))
     assert tones.std() > 0.1 and 0.2 < tones.mean() < 0.6, (tones.std(), tones.mean())
 

@@ -28,10 +28,15 @@ def material_of(obj):
     return material.original if material else None
 
 
-def test_bakes_survive_saving(scene, camera, monkey, tmp_path):
+@pytest.mark.parametrize("store", ["PACKED", "SAVED"])
+def test_bakes_survive_saving(scene, camera, monkey, tmp_path, monkeypatch, store):
+    """Folders are relative to the working directory, also if the .blend file is saved elsewhere."""
+    monkeypatch.chdir(tmp_path)
+    scene.rosy.store, scene.rosy.directory = store, "pictures"
     (baked,) = bake(scene)
     before = pixels(baked.image)
-    scene = reopen(tmp_path / "scene.blend")
+    (tmp_path / "files").mkdir()
+    scene = reopen(tmp_path / "files/scene.blend")
     np.testing.assert_array_equal(pixels(bpy.data.images["RoSy Camera"]), before)
     assert [(bake.camera, bake.stale_reason) for bake in list_bakes(scene)] == [("Camera", "")]
     assert material_of(bpy.data.objects["Suzanne"]).name == "RoSy Camera"
@@ -57,19 +62,6 @@ def test_the_image_holds_the_picture(scene, camera, monkey, tmp_path, store, ima
         np.testing.assert_allclose(stored, expected, atol=1e-3)
     bake(scene)
     assert len(list(tmp_path.iterdir())) == len(files)
-
-
-def test_folders_are_relative_to_the_working_directory(
-    scene, camera, monkey, tmp_path, monkeypatch
-):
-    """Also after the .blend file was saved elsewhere, which moves relative paths."""
-    monkeypatch.chdir(tmp_path)
-    scene.rosy.store, scene.rosy.directory = "SAVED", "pictures"
-    (baked,) = bake(scene)
-    expected = pixels(baked.image)
-    (tmp_path / "files").mkdir()
-    reopen(tmp_path / "files/scene.blend")
-    np.testing.assert_array_equal(pixels(bpy.data.images["RoSy Camera"]), expected)
 
 
 def test_the_users_materials_and_modifiers_stay(scene, camera, monkey):

@@ -87,14 +87,10 @@ def test_wrong_type_or_domain(scene, camera, domain, kind, description):
 def test_not_finite(scene, camera, value, domain):
     plane = add_plane(cuts=3)
     size = {"FACE": 9, "POINT": 16, "CORNER": 36, "ANGLE": 9}[domain]
-    if domain == "ANGLE":
-        values = np.zeros(size)
-        values[1] = value
-        set_attribute(plane.data, values, kind="FLOAT")
-    else:
-        values = np.tile([1.0, 0.0, 0.0], (size, 1))
-        values[1, 2] = value
-        set_attribute(plane.data, values, domain=domain)
+    values = np.zeros((size, 1)) if domain == "ANGLE" else np.tile([1.0, 0.0, 0.0], (size, 1))
+    values[1, -1] = value
+    form = {"kind": "FLOAT"} if domain == "ANGLE" else {"domain": domain}
+    set_attribute(plane.data, values, **form)
     assert_refused("'Plane', attribute 'rosy'", f"1 of {size}", "not finite", "undefined")
     scene.rosy.undefined = True
     (baked,) = bake(scene)

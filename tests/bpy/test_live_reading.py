@@ -198,9 +198,7 @@ def test_edit_mode_names_a_field_that_cannot_be_read(scene):
     bpy.context.view_layer.objects.active = plane
     bpy.ops.object.mode_set(mode="EDIT")
     reader = SceneReader()
-    try:
-        assert read(reader) == [] and "leave edit mode" in str(reader.errors["Plane"])
-    finally:
-        bpy.ops.object.mode_set(mode="OBJECT")
+    assert read(reader) == [] and "leave edit mode" in str(reader.errors["Plane"])
+    bpy.ops.object.mode_set(mode="OBJECT")
     reader.invalidate({"Plane"})
     assert read(reader) == ["Plane"] and not reader.errors

@@ -22,6 +22,7 @@ from rosy.rosy_addon.scene.stroke_objects import edited_strokes, remove_strokes,
 from rosy.rosy_addon.worker.job import Step
 from scenes import contents, depsgraph, each_step, render, reopen
 from test_bad_input import assert_refused
+from test_up_to_date import put
 
 PLAIN = StrokeStyle(spacing=12, outline=True)
 BLACK = Pen(width=1.5)
@@ -286,30 +287,30 @@ def test_cancelling_leaves_nothing(wall, camera, scene):
 
 
 @pytest.mark.parametrize(
-    ("problem", "options", "text"),
+    ("change", "text"),
     [
-        ("camera", {}, "scene 'Scene' has no active camera"),
-        ("field", {}, "no visible object has a RoSy field"),
-        ("away", {}, "camera 'Camera': no stroke is visible"),
-        ("", {"kind": "FILE", "path": "//a.svg"}, "//a.svg: save the .blend file first"),
-        (
-            "",
-            {"kind": "FILE", "path": "/tmp/a.png"},
-            "a.png: the name of the file must end in .svg",
-        ),
-        ("", {"kind": "FILE", "path": "/nowhere/a.svg"}, "the folder /nowhere does not exist"),
-        ("", {"style": StrokeStyle(spacing=1e4)}, "no stroke fits"),
-        ("", {"style": StrokeStyle(unit="world", distance=1e-6)}, "increase their distance"),
+        (put("camera", None), "scene 'Scene' has no active camera"),
+        (put("Suzanne:data.rosy.attribute", "none"), "no visible object has a RoSy field"),
+        (put("Suzanne:location", (0.0, -50.0, 0.0)), "camera 'Camera': no stroke is visible"),
     ],
 )
-def test_wrong_input_is_one_line_and_changes_nothing(monkey, camera, scene, problem, options, text):
-    if problem == "camera":
-        scene.camera = None
-    elif problem == "field":
-        monkey.data.attributes.remove(monkey.data.attributes["rosy"])
-    elif problem == "away":
-        monkey.location.y = -50.0
-        bpy.context.view_layer.update()
+def test_nothing_to_draw_is_an_error(monkey, camera, scene, change, text):
+    change(scene)
+    bpy.context.view_layer.update()
+    assert_refused(text, act=draw_strokes, kind="PENCIL")
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"kind": "FILE", "path": "//a.svg"}, "//a.svg: save the .blend file first"),
+        ({"kind": "FILE", "path": "/tmp/a.png"}, "a.png: the name of the file must end in .svg"),
+        ({"kind": "FILE", "path": "/nowhere/a.svg"}, "the folder /nowhere does not exist"),
+        ({"style": StrokeStyle(spacing=1e4)}, "no stroke fits"),
+        ({"style": StrokeStyle(unit="world", distance=1e-6)}, "increase their distance"),
+    ],
+)
+def test_wrong_input_is_one_line_and_changes_nothing(monkey, camera, scene, options, text):
     assert_refused(text, act=draw_strokes, **{"kind": "PENCIL", **options})
 
 

@@ -9,8 +9,8 @@ import meshio
 import numpy as np
 import pytest
 import pyvista as pv
-from extras.exodus import write_exodus
 from extras.rotations import rotation
+from extras.simulation_files import collection_text, write_exodus
 
 import rosy_addon as rf
 from rosy_addon.external.simulation_files import list_steps, read_simulation
@@ -33,8 +33,7 @@ def write_files(folder, mesh, suffix="vtu"):
 
 def write_collection(path, *steps):
     """Write a .pvd file that lists files, given by their times and names, and return its path."""
-    entries = "".join(f'<DataSet timestep="{time}" file="{name}"/>' for time, name in steps)
-    path.write_text(f'<VTKFile type="Collection"><Collection>{entries}</Collection></VTKFile>')
+    path.write_text(collection_text(*steps))
     return path
 
 

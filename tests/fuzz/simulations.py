@@ -18,20 +18,14 @@ import pyvista as pv
 import trimesh
 from numpy.random import Generator
 
-from ..extras.exodus import write_exodus
+from ..extras.simulation_files import collection_text, parts_text, write_exodus
 from .damage import damaged
 from .meshes import random_mesh
 
 #: Files that a reference may name instead of one of the series or mesh.
 TARGETS = ("pipe", "zero", "/dev/zero", "loop", "folder", "none.vtu", "/proc/self/mem", "x" * 5000)
 
-_PARTS = """<VTKFile type="PUnstructuredGrid"><PUnstructuredGrid GhostLevel="0">
-<PPointData><PDataArray type="Float64" Name="v" NumberOfComponents="3"/></PPointData>
-<PPoints><PDataArray type="Float64" NumberOfComponents="3"/></PPoints>
-<Piece Source="0.vtu"/><Piece Source="1.vtu"/></PUnstructuredGrid></VTKFile>"""
-
-_COLLECTION = """<VTKFile type="Collection"><Collection>
-<DataSet timestep="0" file="0.vtu"/><DataSet timestep="1" file="1.vtu"/></Collection></VTKFile>"""
+_ARRAY = 'type="Float64" Name="v"'
 
 
 def write_simulation(rng: Generator, folder: Path) -> str:
@@ -171,9 +165,9 @@ _WRITERS: dict[str, Callable[[Generator, Path, pv.PolyData], None]] = {
     ".vts": _save_structured,
     ".vtr": _save_structured,
     ".vtm": lambda rng, path, surface: _save(rng, path, pv.MultiBlock([surface, surface])),
-    ".pvtu": _save_listed(_PARTS),
-    ".pvtp": _save_listed(_PARTS.replace("UnstructuredGrid", "PolyData")),
-    ".pvd": _save_listed(_COLLECTION),
+    ".pvtu": _save_listed(parts_text(_ARRAY)),
+    ".pvtp": _save_listed(parts_text(_ARRAY, "PolyData")),
+    ".pvd": _save_listed(collection_text((0, "0.vtu"), (1, "1.vtu"))),
     ".series": _save_series,
     ".xdmf": _save_xdmf,
     ".exo": _save_exodus,

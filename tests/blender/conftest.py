@@ -70,6 +70,11 @@ def baked(with_field):
     return with_field
 
 
+def baked_images():
+    """Return the images of baked pictures."""
+    return [image for image in bpy.data.images if image.name.lower().startswith("rosy")]
+
+
 def run_blender(*arguments):
     """Run another Blender without a window, and return its exit status and its output."""
     command, streams = [bpy.app.binary_path, "-b", *arguments], {"capture_output": True}

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from conftest import pixels, render_image, run_blender
-
-
-def baked_images():
-    return [image for image in bpy.data.images if image.name.lower().startswith("rosy")]
+from conftest import baked_images, pixels, render_image, run_blender
 
 
 def material_of(obj):

@@ -57,13 +57,13 @@ def test_parity_of_uneven_lines(rosy, card, scene):
     assert draw_pair(rosy, card, [instance], camera, look).likeness >= 0.98
 
 
-@pytest.mark.parametrize(("kind", "degree"), [("PERSP", 4), ("ORTHO", 3)])
-def test_parity_of_a_scene(rosy, card, scene, suzanne, kind, degree):
+@pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
+def test_parity_of_a_scene(rosy, card, scene, suzanne, kind):
     """The input of a bake: a field on faces, a modifier, instances, and a shifted lens.
 
     There is no shading, which is the same in both and would raise the correlation.
     """
-    bpy.ops.rosy.field_generate(kind="smoothest", degree=degree)
+    bpy.ops.rosy.field_generate(kind="curvature", degree=4)
     camera = scene.camera
     camera.data.type, camera.data.ortho_scale = kind, 4.0
     camera.data.shift_x, camera.data.shift_y = 0.12, -0.05

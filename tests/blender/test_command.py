@@ -8,7 +8,7 @@ import subprocess
 
 import bpy
 import pytest
-from conftest import run_blender
+from conftest import baked_images, run_blender
 
 
 def command(*arguments, scene=None):
@@ -30,7 +30,7 @@ def test_bake_and_save(saved, tmp_path):
     assert status == 0, output
     assert list((tmp_path / "out").glob("*.png"))
     bpy.ops.wm.open_mainfile(filepath=str(saved))
-    (image,) = [image for image in bpy.data.images if image.name.lower().startswith("rosy")]
+    (image,) = baked_images()
     assert tuple(image.size) == (96, 64)
 
 

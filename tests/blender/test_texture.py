@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from conftest import contents, error_of, pixels
+from conftest import baked_images, contents, error_of, pixels
 from extension import rosy
-from test_bake import baked_images, hatching_node, material_of, plane_in_frame, render
+from test_bake import hatching_node, material_of, plane_in_frame, render
 
 
 def test_hatching_follows_the_tone(scene, tmp_path):

@@ -13,7 +13,7 @@ import time
 
 import bpy
 import numpy as np
-from conftest import contents, pixels
+from conftest import baked_images, contents, pixels
 from extension import preferences, rosy, switch_extension
 from harness.processes import is_running
 from monkey_checks import changes, fingerprint, handlers
@@ -55,8 +55,7 @@ def start_long_bake():
 
 def baked_pixels():
     """Return the pixels of the only baked picture."""
-    (image,) = [image for image in bpy.data.images if image.name.startswith("RoSy")]
-    return pixels(image)
+    return pixels(*baked_images())
 
 
 def wait_for_job():

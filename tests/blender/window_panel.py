@@ -12,7 +12,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from conftest import add_camera, contents, pixels, render_image
+from conftest import add_camera, baked_images, contents, pixels, render_image
 from extension import preferences, rosy, switch_extension
 from monkey_checks import handlers
 from window_steps import (
@@ -85,13 +85,9 @@ def test_singularities_as_dots():
 
 
 def count_dots(name):
-    """Return how many pixels of the 3D view in a screenshot are orange and blue like dots."""
-    image = bpy.data.images.load(str(SHOTS / f"window-{name}.png"))
-    screen = pixels(image)
-    bpy.data.images.remove(image)
-    region = view()[2]
-    screen = screen[region.y : region.y + region.height, region.x : region.x + region.width // 2]
-    red, green, blue = screen[..., 0], screen[..., 1], screen[..., 2]
+    """Return how many pixels in the left half of the 3D view are orange and blue like dots."""
+    screen = capture(f"window-{name}", view()[2])
+    red, green, blue = screen[:, : screen.shape[1] // 2].transpose(2, 0, 1)
     orange = (red > 0.8) & (green < 0.5) & (blue < 0.25)
     is_blue = (blue > 0.8) & (red < 0.3) & (green < 0.5)
     return np.array([np.count_nonzero(orange), np.count_nonzero(is_blue)])
@@ -108,7 +104,7 @@ def test_bake_with_progress():
     assert len(set(fractions)) >= 3, fractions
     assert fractions == sorted(fractions), fractions
     yield from job_ends()
-    assert [image for image in bpy.data.images if image.name.lower().startswith("rosy")]
+    assert baked_images()
 
 
 def test_panel_with_picture():
@@ -293,5 +289,5 @@ def test_edited_strokes_are_replaced_on_request():
 def test_bake_the_current_view():
     yield from scene_with_field()
     call_in_view(bpy.ops.rosy.bake, "EXEC_DEFAULT", True, camera="VIEW")
-    (image,) = [image for image in bpy.data.images if image.name.lower().startswith("rosy")]
+    (image,) = baked_images()
     assert tuple(image.size) == (view()[2].width, view()[2].height)

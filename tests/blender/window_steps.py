@@ -212,13 +212,11 @@ def capture(name, region):
     """
     path = SHOTS / f"{name}.png"
     subprocess.run(["import", "-window", "root", str(path)], check=True, timeout=20)
-    command = ["convert", str(path), "-depth", "8", "-format", "%w %h", "-write", "info:-", "rgb:-"]
+    command = ["convert", str(path), "-depth", "8", "ppm:-"]
     output = subprocess.run(command, check=True, timeout=20, capture_output=True).stdout
-    size = output.split(b" ", 1)
-    width = int(size[0])
-    raw = np.frombuffer(output, dtype=np.uint8)
-    height = len(raw) // (3 * width)
-    screen = raw[len(raw) - 3 * width * height :].reshape(height, width, 3)[::-1]
+    _, size, _, values = output.split(b"\n", 3)
+    width, height = map(int, size.split())
+    screen = np.frombuffer(values, dtype=np.uint8).reshape(height, width, 3)[::-1]
     part = screen[region.y : region.y + region.height, region.x : region.x + region.width]
     return part.astype(np.float32) / 255
 

@@ -37,6 +37,13 @@ def animate(owner, path, values):
         owner.keyframe_insert(path, frame=frame)
 
 
+def load(path, name, kind="objects", **options):
+    """Link or append a datablock of another file, and return it."""
+    with bpy.data.libraries.load(str(path), **options) as (_, target):
+        setattr(target, kind, [name])
+    return getattr(target, kind)[0]
+
+
 def select_only(*objects):
     """Select objects; the first one is active."""
     for obj in bpy.context.scene.objects:

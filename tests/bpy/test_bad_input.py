@@ -13,6 +13,7 @@ from objects import (
     add_plane,
     aim,
     link,
+    load,
     set_attribute,
 )
 from rosy.rosy_addon.compositor.look import Look
@@ -318,15 +319,10 @@ def library(scene, tmp_path):
     return path
 
 
-def linked(path, kind, name):
-    with bpy.data.libraries.load(str(path), link=True) as (_, to):
-        setattr(to, kind, [name])
-    return getattr(to, kind)[0]
-
-
 @pytest.mark.parametrize("kind", ["objects", "collections"])
 def test_linked_objects_are_refused(library, kind):
-    data = linked(library, kind, {"objects": "Suzanne", "collections": "Monkeys"}[kind])
+    name = {"objects": "Suzanne", "collections": "Monkeys"}[kind]
+    data = load(library, name, kind, link=True)
     if kind == "objects":
         link(data)
     else:
@@ -335,7 +331,7 @@ def test_linked_objects_are_refused(library, kind):
 
 
 def test_linked_mesh_can_be_drawn_but_not_written(library):
-    mesh = linked(library, "meshes", "Suzanne")
+    mesh = load(library, "Suzanne", "meshes", link=True)
     obj = link(bpy.data.objects.new("Local", mesh))
     (baked,) = bake(bpy.context.scene)
     assert baked.objects == (obj,)
@@ -350,14 +346,14 @@ def test_cameras_of_one_name(library):
     bpy.ops.wm.save_mainfile()
     bpy.ops.wm.read_homefile(use_empty=True)
     scene = bpy.context.scene
-    link(linked(library, "objects", "Camera"))
+    link(load(library, "Camera", link=True))
     add_camera()
     assert_refused("several cameras have the name 'Camera'", cameras=scene_cameras(scene))
 
 
 def test_missing_libraries_are_named(library):
-    link(linked(library, "objects", "Suzanne"))
-    link(bpy.data.objects.new("Local", linked(library, "meshes", "Suzanne")))
+    link(load(library, "Suzanne", link=True))
+    link(bpy.data.objects.new("Local", load(library, "Suzanne", "meshes", link=True)))
     path = library.with_name("scene.blend")
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     library.rename(library.with_name("moved.blend"))
@@ -375,7 +371,7 @@ def test_missing_libraries_are_named(library):
 
 
 def test_override_can_be_drawn(library):
-    obj = link(linked(library, "objects", "Suzanne"))
+    obj = link(load(library, "Suzanne", link=True))
     local = obj.override_create(remap_local_usages=True)
     (baked,) = bake(bpy.context.scene)
     assert baked.objects == (local,)
@@ -383,7 +379,7 @@ def test_override_can_be_drawn(library):
 
 def test_an_override_of_a_mesh_cannot_be_written(library):
     """Blender would ignore the values without a word."""
-    local = link(linked(library, "objects", "Suzanne")).override_create(remap_local_usages=True)
+    local = link(load(library, "Suzanne", link=True)).override_create(remap_local_usages=True)
     mesh = local.data.override_create(remap_local_usages=True)
     field = read_mesh_field(mesh)
     expect_error("'Suzanne' is linked from its library", write_mesh_field, mesh, field)

@@ -12,7 +12,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from objects import add_uv, link
+from objects import add_uv, link, load
 from rosy.rosy_addon.core.file_io import check_writable
 from rosy.rosy_addon.jobs.animation import bake_animation
 from rosy.rosy_addon.jobs.bake import bake
@@ -84,9 +84,7 @@ def test_all_files_that_drawing_reads_are_inputs(scene, wall, tmp_path):
     path = tmp_path / "saved.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"), copy=True)
-    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, linked):
-        linked.worlds = []
-        linked.objects = [wall.name]
+    load(tmp_path / "library.blend", wall.name, link=True)
     names = ("tone.png", "render_0001.png", "cache.abc", "volume.vdb")
     for name in names:
         (tmp_path / name).write_bytes(OLD)

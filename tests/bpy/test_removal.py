@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from objects import add_camera, add_field, add_plane, apply_modifiers, link, select_only
+from objects import add_camera, add_field, add_plane, apply_modifiers, link, load, select_only
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.scene.bake_records import has_pictures, list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import scene_cameras
@@ -137,7 +137,7 @@ def test_an_appended_object(applied, tmp_path):
     path = baked_file(tmp_path, *(["Plain"] if applied else []))
     scene = build()
     bake(scene)
-    append(path)
+    link(load(path, "Plain"))
     appended = obj("Plain.001")
     infos = list_bakes(scene)
     assert [(info.width, info.height, info.is_shown) for info in infos] == [(24, 24, True)] * 2
@@ -159,16 +159,10 @@ def baked_file(tmp_path, *applied):
     return tmp_path / "baked.blend"
 
 
-def append(path, **options):
-    with bpy.data.libraries.load(str(path), **options) as (_, target):
-        target.objects = ["Plain"]
-    link(target.objects[0])
-
-
 def test_an_appended_object_takes_part_in_the_next_bake(tmp_path):
     path = baked_file(tmp_path)
     scene = build()
-    append(path)
+    link(load(path, "Plain"))
     (info,) = list_bakes(scene)
     assert info.unknown_reason == "baked in another file or scene"
     bake(scene)
@@ -192,7 +186,7 @@ def test_a_camera_that_is_still_in_use_stays():
 def test_a_linked_object_is_left_alone(tmp_path):
     path = baked_file(tmp_path)
     scene = build()
-    append(path, link=True)
+    link(load(path, "Plain", link=True))
     before = contents()
     assert not has_pictures(scene) and not list_bakes(scene)
     remove_bakes(scene)
@@ -203,7 +197,7 @@ def test_an_override_shows_the_picture_of_its_library_again(tmp_path):
     path = baked_file(tmp_path)
     scene = empty_scene(24)
     scene.camera = add_camera()
-    append(path, link=True)
+    link(load(path, "Plain", link=True))
     override = obj("Plain").override_create(remap_local_usages=True)
     bpy.context.view_layer.update()
     group = override.modifiers["RoSy"].node_group

@@ -101,28 +101,11 @@ def test_annotations_guide_a_field():
     view()[1].spaces.active.region_3d.view_perspective = "ORTHO"
     yield 0.5
     scene.tool_settings.annotation_stroke_placement_view3d = "SURFACE"
-    region = view()[2]
-    region_3d = view()[1].spaces.active.region_3d
-    ends = np.linspace((0.0, -1.0, -0.5), (1.0, -1.0, 0.5), 30)
-    at_rest = {"name": "", "location": (0.0, 0.0, 0.0), "mouse_event": (0.0, 0.0), "pressure": 1.0}
-    at_rest |= {"size": 1.0, "pen_flip": False, "x_tilt": 0.0, "y_tilt": 0.0}
-    points = [
-        {
-            **at_rest,
-            "mouse": location_3d_to_region_2d(region, region_3d, point),
-            "time": 0.1 * index,
-            "is_start": index == 0,
-        }
-        for index, point in enumerate(ends)
-    ]
-    # Blender asks for all properties of its version, and for no others.
-    names = bpy.types.OperatorStrokeElement.bl_rna.properties.keys()
-    stroke = [{name: point[name] for name in point if name in names} for point in points]
-    with in_view():
-        bpy.ops.gpencil.annotate("EXEC_DEFAULT", mode="DRAW", stroke=stroke, wait_for_input=False)
-        bpy.ops.rosy.field_generate(
-            "EXEC_DEFAULT", True, kind="guided", degree=2, guides={"ANNOTATIONS"}
-        )
+    call_in_view(bpy.ops.wm.tool_set_by_id, name="builtin.annotate")
+    yield from drag((0.0, -1.0, -0.5), (1.0, -1.0, 0.5), move_count=20)
+    settings = {"kind": "guided", "degree": 2, "guides": {"ANNOTATIONS"}}
+    call_in_view(bpy.ops.rosy.field_generate, "EXEC_DEFAULT", True, **settings)
+    call_in_view(bpy.ops.wm.tool_set_by_id, name="builtin.select_box")
     mesh = bpy.context.object.data
     center = np.array([face.center for face in mesh.polygons])
     x, y, z = center.T
@@ -187,8 +170,9 @@ def move_mouse(point, kind="MOUSEMOVE", value="NOTHING", **keys):
         yield 0.1
 
 
-def drag(start, end, **keys):
-    """Drag from a point of the scene to another one."""
+def drag(start, end, move_count=1, **keys):
+    """Drag from a point of the scene to another one, with a number of moves between them."""
     yield from move_mouse(start, "LEFTMOUSE", "PRESS", **keys)
-    yield from move_mouse((Vector(start) + Vector(end)) / 2, **keys)
+    for point in np.linspace(start, end, move_count + 2)[1:-1]:
+        yield from move_mouse(point, **keys)
     yield from move_mouse(end, "LEFTMOUSE", "RELEASE")

@@ -380,16 +380,13 @@ def test_streaks_drift_while_they_are_played(monkey):
         return any(map(bpy.app.timers.is_registered, session._timers.values()))
 
     play_or_pause()
-    phases, downscales = [], set()
+    phases = []
 
     def drifts():
-        for view_state in session.progressive.views.values():
-            downscales.add(view_state.shown.downscale)
         phases.extend(phase for phase in shown_phases() if phase not in phases)
         return len(phases) > 4
 
     yield from wait_until(drifts)
-    assert downscales == {session.progressive.renderer.downscale_factors[1]}, "previews flash"
     play_or_pause()
     yield from wait_for_final_pictures()
     paused, frames = shown_phases(), session.flow_clock.frames

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
 from objects import add_camera, add_field
@@ -11,25 +13,17 @@ from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.projection import project as projection
 from test_up_to_date import obj, put
 
+ALL = ["project", "surface_pixel_field", "lic_lengths"]
+
 
 @pytest.fixture
-def run_stages(monkeypatch):
-    """The names of the slow steps that were run, in their order."""
-    names = []
-
-    def watch(module, name):
-        real = getattr(module, name)
-
-        def watched(*arguments, **options):
-            names.append(name)
-            return real(*arguments, **options)
-
-        monkeypatch.setattr(module, name, watched)
-
-    watch(projection, "project")
-    watch(stages, "surface_pixel_field")
-    watch(stages, "lic_lengths")
-    return names
+def watched(monkeypatch):
+    """A mock that notes the calls of the slow steps, in their order."""
+    watched = Mock()
+    for module, name in zip((projection, stages, stages), ALL, strict=True):
+        watched.attach_mock(Mock(wraps=getattr(module, name)), name)
+        monkeypatch.setattr(module, name, getattr(watched, name))
+    return watched
 
 
 def draw(scene):
@@ -49,8 +43,6 @@ def turn_field(scene):
 def subdivide(scene):
     obj("Suzanne").modifiers.new("Subdivision", "SUBSURF").levels = 1
 
-
-ALL = ["project", "surface_pixel_field", "lic_lengths"]
 
 #: Changes, and the stages that depend on them.
 CHANGES = {
@@ -75,22 +67,22 @@ CHANGES = {
 
 
 @pytest.mark.parametrize("name", CHANGES)
-def test_a_change_runs_the_stages_that_depend_on_it(scene, camera, monkey, run_stages, name):
+def test_a_change_runs_the_stages_that_depend_on_it(scene, camera, monkey, watched, name):
     change, stages_run = CHANGES[name]
     before = draw(scene)
     change(scene)
-    run_stages.clear()
+    watched.reset_mock()
     after = draw(scene)
-    assert run_stages == stages_run
+    assert [name for name, *_ in watched.mock_calls] == stages_run
     assert not np.array_equal(before, after)
     BAKE_CACHE.clear()
     np.testing.assert_array_equal(after, draw(scene))
 
 
-def test_results_of_two_cameras_are_kept(scene, camera, monkey, run_stages):
+def test_results_of_two_cameras_are_kept(scene, camera, monkey, watched):
     other = add_camera("Other", location=(3, -4, 2))
     cameras = [scene.camera, other]
     bake(scene, cameras=cameras)
-    run_stages.clear()
+    watched.reset_mock()
     bake(scene, cameras=cameras)
-    assert not run_stages
+    assert not watched.mock_calls

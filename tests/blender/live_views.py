@@ -6,6 +6,7 @@ import functools
 import math
 import time
 from dataclasses import replace
+from unittest.mock import patch
 
 import bpy
 import numpy as np
@@ -186,15 +187,9 @@ def _remeshed(monkey):
 
 def _no_memory(monkey):
     renderer = type(session_module()._session.progressive.renderer)
-    original = renderer.texture_steps
-
-    def fail(*_, **__):
-        raise MemoryError
-
-    renderer.texture_steps = fail
-    bpy.context.scene.rosy.look.seed += 1
-    yield
-    renderer.texture_steps = original
+    with patch.object(renderer, "texture_steps", side_effect=MemoryError):
+        bpy.context.scene.rosy.look.seed += 1
+        yield
     bpy.context.scene.rosy.look.seed += 1
 
 

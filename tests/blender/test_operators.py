@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from unittest.mock import patch
+
 import bpy
 import numpy as np
 import pytest
@@ -44,16 +46,11 @@ def test_an_object_without_features_does_not_stop_the_others(suzanne, capfd):
     assert "on 'Cube'" in output
 
 
-def test_lack_of_memory_is_reported(with_field, monkeypatch):
-    memory = rosy("rosy_addon.core.memory")
-
-    def fail(*_):
-        raise MemoryError
-
+def test_lack_of_memory_is_reported(with_field):
     before = contents()
-    monkeypatch.setattr(memory, "available_memory", fail)
-    for operator in (bpy.ops.rosy.bake, bpy.ops.rosy.field_generate):
-        assert "There is not enough memory" in error_of(operator)
+    with patch.object(rosy("rosy_addon.core.memory"), "available_memory", side_effect=MemoryError):
+        for operator in (bpy.ops.rosy.bake, bpy.ops.rosy.field_generate):
+            assert "There is not enough memory" in error_of(operator)
     assert contents() == before
 
 

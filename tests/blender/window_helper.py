@@ -10,6 +10,7 @@ import os
 import re
 import signal
 import time
+from unittest.mock import patch
 
 import bpy
 from conftest import baked_images, contents, pixels
@@ -96,12 +97,9 @@ def test_escape_ends_the_helper_at_once():
         stop(job, reason)
         stopped.append((reason, time.monotonic() - start, is_running(first)))
 
-    job_class.stop = timed_stop
-    try:
+    with patch.object(job_class, "stop", timed_stop):
         press("ESC")
         yield from wait_until(lambda: status().current is None)
-    finally:
-        job_class.stop = stop
     ((reason, seconds, is_left),) = stopped
     assert reason == "cancelled" and seconds < STOP_SECONDS and not is_left, stopped
     assert contents() == before
@@ -211,21 +209,13 @@ def select(name):
 def test_without_a_helper():
     """Blender waits for the picture if no process can be started, or the user wants none."""
     helper = rosy("rosy_addon.worker.helper")
-    start_process = helper.start_module
-
-    def refuse(*_, **__):
-        raise OSError("too many processes")
-
     yield from scene_with_field()
     helper.HELPER.close()
-    helper.start_module = refuse
-    try:
+    with patch.object(helper, "start_module", side_effect=OSError("too many processes")):
         for _ in range(2):
             start_bake()
             yield from wait_for_job()
             assert baked_pixels().shape == (240, 320, 4)
-    finally:
-        helper.start_module = start_process
     assert_reported("Blender waits while RoSy computes")
     preferences().use_helper = False
     try:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import os
+from unittest.mock import patch
 
 import bpy
 import numpy as np
@@ -240,11 +241,10 @@ def test_every_frame_is_drawn(monkey):
 @live(is_on=False)
 def test_fallback_to_the_processor(monkey):
     """If the driver rejects a shader, the processor draws, and a message says so."""
-    sources = rosy("rosy_addon.gpu.passes").ComputePass
-    original_source = sources.source
-    rosy("rosy_addon.gpu.device").release()
-    sources.source = property(lambda self: "void main() { this is not GLSL; }")
-    try:
+    compute_pass, device = rosy("rosy_addon.gpu.passes").ComputePass, rosy("rosy_addon.gpu.device")
+    device.release()
+    source = property(lambda self: "void main() { this is not GLSL; }")
+    with patch.object(compute_pass, "source", source):
         switch("ON")
         session = session_module()._session
         yield from wait_until(lambda: session.fallback_reason)
@@ -259,9 +259,7 @@ def test_fallback_to_the_processor(monkey):
         assert helper.connection is not None, "no other process has drawn"
         switch("OFF")
         assert helper.connection is None
-    finally:
-        sources.source = original_source
-        rosy("rosy_addon.gpu.device").release()
+    device.release()
 
 
 @live(levels=0)

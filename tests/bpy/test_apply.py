@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from unittest.mock import Mock
+
 import bpy
 import numpy as np
 import pytest
@@ -135,11 +137,7 @@ def test_cancelling_at_any_step_changes_nothing(scene, camera, monkey):
 
 def test_an_error_while_applying_leaves_nothing(scene, camera, monkey, monkeypatch):
     before = contents()
-
-    def fails(*_):
-        raise RosyError("no more")
-
-    monkeypatch.setattr(pictures_room, "new_group", fails)
+    monkeypatch.setattr(pictures_room, "new_group", Mock(side_effect=RosyError("no more")))
     expect_error("no more", bake, scene)
     assert contents() == before
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from unittest.mock import Mock
+
 import bpy
 import numpy as np
 import pytest
@@ -182,12 +184,8 @@ def test_faces_that_differ_at_each_evaluation_end_in_an_error(monkey, monkeypatc
 def test_too_little_memory_is_a_message(monkey, monkeypatch, mesh_kind):
     if mesh_kind == "remesh":
         monkey.modifiers.new("Subdivision", "SUBSURF")
-
-    def fail(*_, **__):
-        raise MemoryError
-
     for reader in ("read_mesh_field", "read_evaluated_field"):
-        monkeypatch.setattr(scene_reader, reader, fail)
+        monkeypatch.setattr(scene_reader, reader, Mock(side_effect=MemoryError))
     reader = SceneReader()
     assert read(reader) == [] and isinstance(reader.errors["Suzanne"], MemoryError)
 

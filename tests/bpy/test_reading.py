@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from unittest.mock import Mock
+
 import bmesh
 import bpy
 import numpy as np
@@ -374,11 +376,7 @@ def test_an_error_while_reading_leaves_nothing(scene, monkey, monkeypatch, faili
     """Nothing is left of the attributes that modifiers copy while a scene is read."""
     monkey.modifiers.new("Subdivision", "SUBSURF")
     before = contents()
-
-    def fail(*_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(scene_reader, failing, fail)
+    monkeypatch.setattr(scene_reader, failing, Mock(side_effect=KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
         scene_reader.read_scene(depsgraph())
     assert contents() == before

@@ -9,7 +9,7 @@ import bpy
 import pytest
 from conftest import error_of
 from extension import EXTENSION, preferences
-from test_command import command
+from test_commands import command
 
 
 def folder():

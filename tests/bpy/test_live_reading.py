@@ -10,17 +10,12 @@ import pytest
 from objects import add_field, add_nodes, add_plane, link, set_attribute
 from rosy.rosy_addon.scene import scene_reader
 from rosy.rosy_addon.scene.scene_reader import SceneReader
-from scenes import contents, depsgraph, member_vectors, read_instances, read_live
+from scenes import contents, depsgraph, member_vectors, read_instances, read_live, read_until_rest
 
 
 def read(reader):
     """Read as the live view does until it rests, and return the names of the drawn objects."""
-    entries = read_live(reader)
-    if reader.has_unresolved:
-        reader.resolve_topologies(depsgraph())
-        entries = read_live(reader)
-    assert not reader.has_unresolved, "the scene would be read for ever"
-    return names_with_field(entries)
+    return names_with_field(read_until_rest(reader))
 
 
 def names_with_field(entries):

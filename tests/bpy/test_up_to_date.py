@@ -253,10 +253,6 @@ def exclude(scene, name):
     bpy.context.view_layer.layer_collection.children["Away"].exclude = True
 
 
-def frame(number):
-    return lambda scene: scene.frame_set(number)
-
-
 def there_and_back(scene):
     obj("Plain").location.x += 0.5
     bpy.context.view_layer.update()
@@ -298,7 +294,7 @@ TABLE = {
     "smooth shading": (shade_smooth("Sheet"), bend(1.0), "'Sheet' was changed"),
     "instances moved": (move("Copies", 0.2, 0.0, 0.0), instanced, "'Plain' was moved"),
     "instances removed": (delete("Copies"), instanced, "'Plain' was"),
-    "frame of an animation": (frame(6), animated, "'Plain' was moved"),
+    "frame of an animation": (put("frame_current", 6), animated, "'Plain' was moved"),
     # occluders
     "occluder moved": (move("In Front", 0.2, 0.0, 0.0), None, "'In Front' was moved"),
     "occluder behind moved": (move("Behind", 0.2, 0.5, 0.0), None, ""),

@@ -31,6 +31,12 @@ class CheckError(Exception):
     """A check has failed."""
 
 
+def expect_none(found: list[str], text: str) -> None:
+    """Raise an error that lists what was found, if anything was."""
+    if found:
+        raise CheckError(f"{text}: " + "; ".join(found[:8]))
+
+
 def is_owned(datablock: bpy.types.ID) -> bool:
     """Return whether RoSy made a datablock."""
     return bool(datablock.get("rosy_made"))

@@ -23,7 +23,7 @@ from window_steps import (
     in_view,
     press,
     scene_with_field,
-    start_job,
+    start_long_bake,
     status,
     view,
     wait_until,
@@ -44,13 +44,6 @@ def helper_id():
 
 def start_bake():
     assert call_in_view(bpy.ops.rosy.bake, "INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
-
-
-def start_long_bake():
-    """Start a bake that no other one has prepared, and wait until the helper is at work."""
-    look = bpy.context.scene.rosy.look
-    look.method, look.seed = "brute", look.seed + 1
-    yield from start_job(bpy.ops.rosy.bake)
 
 
 def baked_pixels():

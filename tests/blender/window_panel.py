@@ -24,7 +24,7 @@ from window_steps import (
     press,
     save_part,
     scene_with_field,
-    start_job,
+    start_long_bake,
     status,
     view,
     wait_until,
@@ -95,8 +95,7 @@ def count_dots(name):
 
 def test_bake_with_progress():
     yield from scene_with_field(size=(800, 600))
-    bpy.context.scene.rosy.look.method = "brute"  # slow enough to observe the progress
-    yield from start_job(bpy.ops.rosy.bake)
+    yield from start_long_bake()  # slow enough to observe the progress
     fractions = []
     while status().current is not None:
         fractions.append(status().current.fraction)
@@ -170,8 +169,7 @@ def test_undo_after_bake():
 def interrupt(action):
     """Start a long bake, call an action, and check that the bake ends and leaves nothing."""
     yield from scene_with_field(size=(1600, 1200))
-    bpy.context.scene.rosy.look.method = "brute"
-    yield from start_job(bpy.ops.rosy.bake)
+    yield from start_long_bake()
     action()
     yield from job_ends()
     assert not [material for material in bpy.data.materials if "rosy" in material.name.lower()]

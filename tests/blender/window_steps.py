@@ -151,6 +151,13 @@ def start_job(operator, **settings):
     assert status().current is not None, "the job ended before it could be interrupted"
 
 
+def start_long_bake():
+    """Start a bake that no other one has prepared, and wait until it has made progress."""
+    look = bpy.context.scene.rosy.look
+    look.method, look.seed = "brute", look.seed + 1
+    yield from start_job(bpy.ops.rosy.bake)
+
+
 def press(key):
     """Press and release a key over the window that has opened last, such as a file browser."""
     window = bpy.context.window_manager.windows[-1]

@@ -88,10 +88,6 @@ def _user_name(datablock: bpy.types.ID | None) -> str | None:
     return None if datablock is None or is_owned(datablock) else datablock.name
 
 
-def _digest(values: np.ndarray) -> str:
-    return hashlib.sha1(values.tobytes(), usedforsecurity=False).hexdigest()[:12]
-
-
 def _add_values(state: Fingerprint, path: str, struct: bpy.types.bpy_struct) -> None:
     """Add all plain values of a struct that can be written."""
     for prop in struct.bl_rna.properties:
@@ -154,7 +150,7 @@ def _attribute_digest(attribute: bpy.types.Attribute) -> str | None:
     size = np.size(getattr(first, name))
     values = np.empty(len(attribute.data) * size, dtype=np.float32)
     attribute.data.foreach_get(name, values)
-    return _digest(values)
+    return hashlib.sha1(values.tobytes(), usedforsecurity=False).hexdigest()[:12]
 
 
 def _add_scene(state: Fingerprint, path: str, scene: bpy.types.Scene) -> None:

@@ -105,7 +105,7 @@ KINDS = ("CURVE", "CURVES", "GREASEPENCIL")
 
 
 def add_ball_and_guide(kind):
-    """Add a sphere, and a curve on it or what it is converted to. The sphere is active; both are selected."""
+    """Add a sphere, and an arc on it of a type of objects. The sphere is active; both are selected."""
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=5, location=(1.0, 2.0, 0.5))
     ball = bpy.context.object
     ball.rotation_euler = (0.3, 0.2, 0.1)
@@ -114,10 +114,12 @@ def add_ball_and_guide(kind):
     curve = bpy.data.curves.new("Curve", "CURVE")
     curve.dimensions = "3D"
     spline = curve.splines.new("POLY")
-    points = arc_on(ball)
-    spline.points.add(len(points) - 1)
-    spline.points.foreach_set("co", np.c_[points, np.ones(len(points))].ravel())
+    angle = np.linspace(0, 1.2, 25)
+    arc = np.stack([np.cos(angle), 0 * angle, np.sin(angle)], axis=1)
+    spline.points.add(24)
+    spline.points.foreach_set("co", np.c_[arc, np.ones(25)].ravel())
     guide = bpy.data.objects.new("Curve", curve)
+    guide.matrix_world = ball.matrix_world
     bpy.context.scene.collection.objects.link(guide)
     ball.select_set(False)
     guide.select_set(True)
@@ -129,14 +131,6 @@ def add_ball_and_guide(kind):
     ball.select_set(True)
     bpy.context.view_layer.objects.active = ball
     return ball, guide
-
-
-def arc_on(ball):
-    """Return the points of an arc on the sphere, in world space."""
-    angle = np.linspace(0, 1.2, 25)
-    local = np.stack([np.cos(angle), 0 * angle, np.sin(angle)], axis=1)
-    matrix = np.array(ball.matrix_world)
-    return local @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -144,18 +144,13 @@ def scene_with_field(size=(320, 240)):
     call_in_view(bpy.ops.rosy.field_generate, "EXEC_DEFAULT", True, kind="curvature", degree=4)
 
 
-def start_job(operator, **settings):
-    """Start a job as its button does, and wait until it has made progress."""
-    assert call_in_view(operator, "INVOKE_DEFAULT", True, **settings) == {"RUNNING_MODAL"}
-    yield from wait_until(lambda: status().current is None or status().current.fraction > 0.1)
-    assert status().current is not None, "the job ended before it could be interrupted"
-
-
 def start_long_bake():
-    """Start a bake that no other one has prepared, and wait until it has made progress."""
+    """Start a bake as its button does, one that no other has prepared, and wait until it has made progress."""
     look = bpy.context.scene.rosy.look
     look.method, look.seed = "brute", look.seed + 1
-    yield from start_job(bpy.ops.rosy.bake)
+    assert call_in_view(bpy.ops.rosy.bake, "INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
+    yield from wait_until(lambda: status().current is None or status().current.fraction > 0.1)
+    assert status().current is not None, "the bake ended before it could be interrupted"
 
 
 def press(key):

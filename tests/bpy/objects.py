@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+from awkward import grid
 from mathutils import Vector
 from rosy.rosy_addon.field.generate import GeneratorSettings, generate
 from rosy.rosy_addon.scene.mesh_fields import write_mesh_field
@@ -85,14 +86,8 @@ def add_mesh(name, vertices, faces, edges=()):
 
 def add_plane(name="Plane", size=1.0, cuts=1):
     """Add a square in the plane y = 0 that faces -y."""
-    line = np.linspace(-size, size, cuts + 1)
-    vertices = [(x, 0.0, z) for z in line for x in line]
-    row = cuts + 1
-    faces = [
-        (j * row + i, j * row + i + 1, (j + 1) * row + i + 1, (j + 1) * row + i)
-        for j in range(cuts)
-        for i in range(cuts)
-    ]
+    points, faces = grid(cuts)
+    vertices = (2 * np.array(points)[:, [0, 2, 1]] / cuts - (1, 0, 1)) * size
     return add_mesh(name, vertices, faces)
 
 

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -165,9 +166,10 @@ def test_a_full_disk_leaves_the_old_picture(kind, missing, tmp_path):
 
 KILLED = """
 import sys
-sys.path[:0] = sys.argv[1].split(":")
-import conftest
 from pathlib import Path
+tests = Path(sys.argv[1])
+sys.path[:0] = map(str, (tests, tests.parent, tests.parent / "unit"))
+import conftest
 from test_outputs import new_image, noise
 pixels = noise(2048)
 print("begin", flush=True)
@@ -178,7 +180,7 @@ new_image("a", pixels, stem=Path(sys.argv[2]))
 def test_a_killed_process_leaves_the_old_picture(tmp_path):
     path = tmp_path / "a.exr"
     path.write_bytes(OLD)
-    command = [sys.executable, "-c", KILLED, ":".join(sys.path), path.with_suffix("")]
+    command = [sys.executable, "-c", KILLED, Path(__file__).parent, path.with_suffix("")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout.readline() == "begin\n"
         while sum(file.stat().st_size for file in tmp_path.iterdir()) < 1_000_000:

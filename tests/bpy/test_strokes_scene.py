@@ -21,7 +21,6 @@ from rosy.rosy_addon.scene.stroke_objects import edited_strokes, remove_strokes,
 from rosy.rosy_addon.worker.job import Step
 from scenes import contents, depsgraph, each_step, render, reopen
 from test_bad_input import assert_refused
-from test_up_to_date import put
 
 PLAIN = StrokeStyle(spacing=12, outline=True)
 BLACK = Pen(width=1.5)
@@ -270,13 +269,19 @@ def test_cancelling_leaves_nothing(wall, camera, scene):
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        (put("camera", None), "scene 'Scene' has no active camera"),
-        (put("Suzanne:data.rosy.attribute", "none"), "no visible object has a RoSy field"),
-        (put("Suzanne:location", (0.0, -50.0, 0.0)), "camera 'Camera': no stroke is visible"),
+        (
+            lambda _: setattr(bpy.context.scene, "camera", None),
+            "scene 'Scene' has no active camera",
+        ),
+        (
+            lambda obj: setattr(obj.data.rosy, "attribute", "none"),
+            "no visible object has a RoSy field",
+        ),
+        (lambda obj: setattr(obj.location, "y", -50.0), "camera 'Camera': no stroke is visible"),
     ],
 )
 def test_nothing_to_draw_is_an_error(monkey, camera, scene, change, text):
-    change(scene)
+    change(monkey)
     bpy.context.view_layer.update()
     assert_refused(text, act=draw_strokes, kind="PENCIL")
 

@@ -20,8 +20,6 @@ else:
     sys.path.insert(0, str(Path(__file__).parents[1]))
     from harness.blender_data import contents, member_vectors, pixels, render_image  # noqa: F401
 
-EXTENSION = "bl_ext.user_default.rosy"
-
 
 @pytest.fixture
 def scene():
@@ -70,6 +68,11 @@ def baked(with_field):
     """Suzanne with a field, baked from the scene's camera."""
     assert bpy.ops.rosy.bake() == {"FINISHED"}
     return with_field
+
+
+def baked_images():
+    """Return the images of baked pictures."""
+    return [image for image in bpy.data.images if image.name.lower().startswith("rosy")]
 
 
 def run_blender(*arguments):

@@ -38,12 +38,11 @@ LAST_LINES = 60
 def main() -> int:
     options = parse_arguments()
     command = [options.blender, *(["run", options.which] if options.which else ["-b"])]
-    folder = Path(tempfile.mkdtemp(prefix="monkey-"))
+    install = ["--command", "extension", "install-file", "-r", "user_default", "--enable"]
     failures = 0
-    try:
-        zipped = folder / "rosy.zip"
-        shutil.copy(options.zip, zipped)
-        install = ["--command", "extension", "install-file", "-r", "user_default", "--enable"]
+    with tempfile.TemporaryDirectory(prefix="monkey-", ignore_cleanup_errors=True) as parent:
+        folder = Path(parent)
+        zipped = shutil.copy(options.zip, folder / "rosy.zip")
         subprocess.run(
             [*command, *install, str(zipped)],
             env=environment(folder / "user"), check=True, stdout=subprocess.DEVNULL,
@@ -53,8 +52,6 @@ def main() -> int:
             failures += fault is not None
             print(f"seed {seed}: {fault or lines[-1]}", flush=True)
             print("\n".join(lines[-LAST_LINES:] if fault else []), flush=True)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
     print(f"monkey: {options.seeds - failures} passed, {failures} failed")
     return 1 if failures else 0
 

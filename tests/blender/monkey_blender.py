@@ -10,6 +10,7 @@ import math
 import bmesh
 import bpy
 import numpy as np
+from extension import switch_extension
 from monkey_actions import (
     MAX_OBJECTS,
     NAMES,
@@ -22,7 +23,7 @@ from monkey_actions import (
     select_mesh,
     to_object_mode,
 )
-from monkey_checks import EXTENSION, CheckError, changes, fingerprint
+from monkey_checks import changes, expect_none, fingerprint
 
 ANY = (True, False)
 
@@ -263,7 +264,7 @@ def undo(monkey: Monkey) -> None:
 def new_file(monkey: Monkey) -> None:
     if monkey.chance(0.2):
         bpy.ops.wm.read_factory_settings(use_empty=monkey.chance(0.5))
-        bpy.ops.preferences.addon_enable(module=EXTENSION)
+        switch_extension(True)
     else:
         bpy.ops.wm.read_homefile(use_empty=monkey.chance(0.7))
 
@@ -271,11 +272,11 @@ def new_file(monkey: Monkey) -> None:
 @action(0.5)
 def switch_off_and_on(monkey: Monkey) -> None:
     """Disable RoSy, and enable it after an undo or another action."""
-    bpy.ops.preferences.addon_disable(module=EXTENSION)
+    switch_extension(False)
     try:
         monkey.pick([transform, delete_data, change_scene, undo])(monkey)
     finally:
-        bpy.ops.preferences.addon_enable(module=EXTENSION)
+        switch_extension(True)
 
 
 @action(1.5)
@@ -293,9 +294,7 @@ def save_and_reopen(monkey: Monkey) -> None:
     bpy.ops.wm.open_mainfile(filepath=path)
     # Blender does not save settings of tools, reads what is linked again, and makes paths relative.
     allowed = ("*/tool_settings/*", "*@*.blend*", "cameras/*/custom_filepath")
-    differences = changes(before, fingerprint(), allowed)
-    if differences:
-        raise CheckError("the saved file differs: " + "; ".join(differences[:8]))
+    expect_none(changes(before, fingerprint(), allowed), "the saved file differs")
 
 
 @action(1)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import gc
 import hashlib
-import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from fnmatch import fnmatchcase
@@ -16,20 +15,10 @@ from unicodedata import category
 import bpy
 import numpy as np
 
-EXTENSION = "bl_ext.user_default.rosy"
-
 #: Datablocks of Blender's interface and brushes, and others that no operator of RoSy can reach.
 IGNORED_COLLECTIONS = {
     "all_ids", "window_managers", "screens", "workspaces", "brushes", "fonts", "palettes", "libraries",
 }  # fmt: skip
-
-#: The property of an attribute's values, by its data type; others hold vectors.
-VALUE_PROPERTIES = {
-    **dict.fromkeys(("FLOAT", "INT", "INT8", "BOOLEAN", "INT32_2D", "INT16_2D"), "value"),
-    **dict.fromkeys(("QUATERNION",), "value"),
-    **dict.fromkeys(("FLOAT_COLOR", "BYTE_COLOR"), "color"),
-    **dict.fromkeys(("FLOAT2", "FLOAT_VECTOR"), "vector"),
-}
 
 #: Data types and domains of the attributes that a modifier of RoSy leaves in a mesh if it is applied.
 APPLIED = {"rosy_projection": ("FLOAT_VECTOR", "POINT"), "rosy_material": ("INT", "FACE")}
@@ -42,9 +31,10 @@ class CheckError(Exception):
     """A check has failed."""
 
 
-def rosy(name: str) -> Any:
-    """Return a module of the extension."""
-    return sys.modules[f"{EXTENSION}.{name}"]
+def expect_none(found: list[str], text: str) -> None:
+    """Raise an error that lists what was found, if anything was."""
+    if found:
+        raise CheckError(f"{text}: " + "; ".join(found[:8]))
 
 
 def is_owned(datablock: bpy.types.ID) -> bool:
@@ -96,10 +86,6 @@ def full_name(datablock: bpy.types.ID) -> str:
 def _user_name(datablock: bpy.types.ID | None) -> str | None:
     """Return the name of a datablock of the user; None if there is none, or RoSy made it."""
     return None if datablock is None or is_owned(datablock) else datablock.name
-
-
-def _digest(values: np.ndarray) -> str:
-    return hashlib.sha1(values.tobytes(), usedforsecurity=False).hexdigest()[:12]
 
 
 def _add_values(state: Fingerprint, path: str, struct: bpy.types.bpy_struct) -> None:
@@ -157,13 +143,14 @@ def _add_mesh(state: Fingerprint, path: str, mesh: bpy.types.Mesh) -> None:
 
 
 def _attribute_digest(attribute: bpy.types.Attribute) -> str | None:
-    name = VALUE_PROPERTIES.get(attribute.data_type)
-    if name is None or not len(attribute.data):
+    if attribute.data_type in ("STRING", "FLOAT4X4") or not len(attribute.data):
         return None
-    size = np.size(getattr(attribute.data[0], name))
+    first = attribute.data[0]
+    name = next(name for name in ("value", "color", "vector") if hasattr(first, name))
+    size = np.size(getattr(first, name))
     values = np.empty(len(attribute.data) * size, dtype=np.float32)
     attribute.data.foreach_get(name, values)
-    return _digest(values)
+    return hashlib.sha1(values.tobytes(), usedforsecurity=False).hexdigest()[:12]
 
 
 def _add_scene(state: Fingerprint, path: str, scene: bpy.types.Scene) -> None:

@@ -12,8 +12,9 @@ from itertools import count
 from types import SimpleNamespace
 
 import bpy
+from extension import rosy
 from monkey_actions import Monkey, meshes, objects
-from monkey_checks import fingerprint, rosy
+from monkey_checks import fingerprint
 
 
 def disturb_jobs(monkey: Monkey) -> None:

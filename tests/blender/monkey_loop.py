@@ -14,15 +14,16 @@ import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
 import monkey_blender  # noqa: F401  adds its actions
+from extension import rosy
 from monkey_actions import ACTIONS, DISTURBANCE, Monkey, action, field_in_view, meshes, select
 from monkey_checks import (
     CheckError,
     all_datablocks,
     changes,
+    expect_none,
     handlers,
     leftovers,
     resident_megabytes,
-    rosy,
     whole_state,
 )
 from monkey_jobs import disturb_jobs
@@ -103,8 +104,7 @@ def restart(monkey: Monkey) -> None:
     left = [f"{kind}: {b.name}" for kind, b in all_datablocks() if "rosy" in b.name.lower()]
     rosy("rosy_addon.core.cache").BAKE_CACHE.clear()
     rosy("rosy_addon.scene.staleness").SCENE_STATES.clear()
-    if left := [*left, *handlers()]:
-        raise CheckError("an empty file holds " + "; ".join(left))
+    expect_none([*left, *handlers()], "an empty file holds")
     for path in monkey.folder.iterdir():
         if path.name != "user":
             shutil.rmtree(path) if path.is_dir() else path.unlink()
@@ -130,8 +130,7 @@ def remove_everything(monkey: Monkey) -> None:
     if not was_pressed:
         # The user has deleted all that RoSy could remove; what that used is unused data in the file.
         bpy.ops.outliner.orphans_purge(do_recursive=True)
-    if left := leftovers():
-        raise CheckError("left after everything was removed: " + "; ".join(left[:8]))
+    expect_none(leftovers(), "left after everything was removed")
 
 
 @action(2)
@@ -150,8 +149,7 @@ def make_and_remove(monkey: Monkey) -> None:
     remove_everything(monkey)
     bpy.context.view_layer.update()
     monkey.disturbance = DISTURBANCE
-    if differences := changes(before, whole_state(), ("context",)):
-        raise CheckError("after Remove, " + "; ".join(differences[:8]))
+    expect_none(changes(before, whole_state(), ("context",)), "after Remove")
 
 
 if __name__ == "__main__":

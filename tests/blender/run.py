@@ -22,8 +22,12 @@ import sys
 import tempfile
 import time
 import xml.etree.ElementTree as ElementTree
+from collections import Counter
 from pathlib import Path
 from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from harness.processes import all_end, marked_processes
 
 HERE = Path(__file__).resolve().parent
 REPOSITORY = HERE.parents[1]
@@ -31,23 +35,20 @@ REPOSITORY = HERE.parents[1]
 #: Simulated events. With this option Blender never waits for events, and takes a core at rest.
 SIMULATED_EVENTS = ("--enable-event-simulate",)
 
-#: Scripts that test in a window, by what they test, the size of the window in pixels (small, as views
-#: are drawn in software, but with room for the menu of all presets), and further options.
+#: For each window_*.py, the size of the window in pixels (small, as views are drawn in software, but
+#: with room for the menu of all presets), and further options.
 WINDOWS = {
-    "panel": ("window_panel.py", 1000, 720, SIMULATED_EVENTS),
-    "tools": ("window_tools.py", 1000, 720, SIMULATED_EVENTS),
-    "presets": ("window_presets.py", 1120, 900, SIMULATED_EVENTS),
-    "live": ("window_live.py", 1000, 720, ()),
-    "helper": ("window_helper.py", 1000, 720, SIMULATED_EVENTS),
-    "first-bake": ("window_first_bake.py", 1000, 800, ()),
-    "listing": ("window_listing.py", 1922, 1200, ()),
+    "panel": (1000, 720, SIMULATED_EVENTS),
+    "tools": (1000, 720, SIMULATED_EVENTS),
+    "presets": (1120, 900, SIMULATED_EVENTS),
+    "live": (1000, 720, ()),
+    "helper": (1000, 720, SIMULATED_EVENTS),
+    "first-bake": (1000, 800, ()),
+    "listing": (1922, 1200, ()),
 }
 
 #: Size of the screen that `real-blender gui` makes. Larger windows get a screen of their own.
 SCREEN = 1400, 900
-
-#: Seconds within which processes end after Blender was killed.
-END_SECONDS = 5.0
 
 #: Seconds after which the screen of a window exists.
 START_SECONDS = 4.0
@@ -56,16 +57,16 @@ START_SECONDS = 4.0
 def main() -> int:
     options = parse_arguments()
     start = time.monotonic()
-    folder = Path(tempfile.mkdtemp(prefix="blender-lane-"))
-    try:
-        counts = run_tests(options, folder)
-    except subprocess.TimeoutExpired as error:
-        print(f"Blender did not end within {error.timeout:.0f} s")
-        counts = {"errors": 1}
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-    summary = ", ".join(f"{count} {outcome}" for outcome, count in counts.items() if count)
-    passed = counts.get("passed", 0) > 0 and not counts.get("failed") and not counts.get("errors")
+    with tempfile.TemporaryDirectory(prefix="blender-lane-", ignore_cleanup_errors=True) as folder:
+        lane = Lane(options, Path(folder))
+        try:
+            lane.run()
+        except subprocess.TimeoutExpired as error:
+            print(f"Blender did not end within {error.timeout:.0f} s")
+            lane.counts["errors"] += 1
+    counts = lane.counts
+    summary = ", ".join(f"{count} {outcome}" for outcome, count in sorted(counts.items()) if count)
+    passed = counts["passed"] and not counts["failed"] and not counts["errors"]
     line = f" Blender {options.which}: {summary} in {time.monotonic() - start:.0f}s "
     print(line.center(80, "="))
     return 0 if passed else 1
@@ -104,13 +105,13 @@ class Lane:
         Where files go.
     environment : dict of str to str
         The variables of Blender's processes.
-    counts : dict of str to int
+    counts : Counter
         How many tests passed, failed, had errors and were skipped.
     """
 
     def __init__(self, options: argparse.Namespace, folder: Path) -> None:
         self.options, self.folder = options, folder
-        self.counts = {"failed": 0, "passed": 0, "skipped": 0, "errors": 0}
+        self.counts: Counter[str] = Counter()
         self.zip = folder / "rosy.zip"
         shutil.copy(options.zip, self.zip)
         self.environment = os.environ | {
@@ -132,15 +133,24 @@ class Lane:
         settings = {"cwd": REPOSITORY, "env": self.environment, "check": False}
         return subprocess.run(full_command, timeout=timeout, **settings, **run_options)
 
-    def install(self) -> bool:
-        """Install the zip, and return whether that was possible."""
+    def run(self) -> None:
+        """Install the zip, and run all parts."""
         extension = ("run", "--command", "extension")
-        if self.blender(*extension, "validate", str(self.zip)).returncode:
-            self.counts["failed"] += 1
+        self.counts["failed"] += self.blender(*extension, "validate", str(self.zip)).returncode != 0
         installing = ("install-file", "-r", "user_default", "--enable", str(self.zip))
-        is_installed = not self.blender(*extension, *installing).returncode
-        self.counts["errors"] += not is_installed
-        return is_installed
+        if self.blender(*extension, *installing).returncode:
+            self.counts["errors"] += 1
+            return
+        if not self.options.only_window:
+            self.test_without_a_window()
+        shots = self.folder / "shots"
+        shots.mkdir()
+        self.environment["ROSY_SHOTS"] = str(shots)
+        for name in self.options.windows.split(","):
+            if name != "none":
+                self.test_in_a_window(name)
+        if self.options.shots is not None:
+            shutil.copytree(shots, self.options.shots, dirs_exist_ok=True)
 
     def test_without_a_window(self) -> None:
         """Run pytest inside Blender, and the monkey."""
@@ -150,22 +160,24 @@ class Lane:
             "-c", str(HERE / "pytest.ini"), f"--rootdir={HERE}", f"--junitxml={results}",
             *self.options.pytest, str(HERE),
         )  # fmt: skip
-        add_junit(self.counts, results)
+        self.counts.update(junit_counts(results))
         monkey = [sys.executable, str(HERE / "monkey.py"), str(self.zip), "--steps", "400"]
         monkey += ["--blender", str(self.options.real_blender.resolve())]
         monkey += ["--which", self.options.which]
         status = subprocess.run(monkey, cwd=REPOSITORY, check=False, timeout=300.0).returncode
         self.counts["failed" if status else "passed"] += 1
 
-    def test_in_a_window(self, script: str, width: int, height: int, options: tuple) -> None:
-        """Run the steps of a script in a window."""
-        results_file = self.folder / f"{script}.json"
+    def test_in_a_window(self, name: str) -> None:
+        """Run the steps of a module in a window, and check that no process is left."""
+        width, height, options = WINDOWS[name]
+        results_file = self.folder / f"{name}.json"
         self.environment["ROSY_RESULTS"] = str(results_file)
+        self.environment["ROSY_WINDOW"] = f"window_{name}".replace("-", "_")
         is_large = width > SCREEN[0] or height > SCREEN[1]
         time_limit = 900 if is_large or self.options.many else 600
         arguments = [
             *self.backend, "--window-geometry", "0", "0", str(width), str(height), *options,
-            "--python-exit-code", "1", "-P", str(HERE / script),
+            "--python-exit-code", "1", "-P", str(HERE / "run_window.py"),
         ]  # fmt: skip
         command = ["gui", "-s", str(time_limit), *arguments]
         if is_large:
@@ -175,30 +187,14 @@ class Lane:
         streams = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
         process = self.blender(*command, timeout=time_limit + 60.0, **streams)
         add_window(self.counts, results_file)
-        add_processes(self.counts, results_file.with_suffix(".processes"))
+        if not all_end(str(results_file)):
+            print("processes are left:", *marked_processes(str(results_file)).values(), sep="\n")
+            self.counts["failed"] += 1
         # Errors in the drawing of a panel appear on the terminal alone.
         if "Traceback" in process.stdout:
             text = process.stdout[process.stdout.index("Traceback") :][:3000]
             print(f"in the window:\n{text}")
             self.counts["failed"] += 1
-
-
-def run_tests(options: argparse.Namespace, folder: Path) -> dict[str, int]:
-    """Run all parts, and return how many tests passed, failed, had errors and were skipped."""
-    lane = Lane(options, folder)
-    if not lane.install():
-        return lane.counts
-    if not options.only_window:
-        lane.test_without_a_window()
-    shots = folder / "shots"
-    shots.mkdir()
-    lane.environment["ROSY_SHOTS"] = str(shots)
-    for name in options.windows.split(","):
-        if name != "none":
-            lane.test_in_a_window(*WINDOWS[name])
-    if options.shots is not None:
-        shutil.copytree(shots, options.shots, dirs_exist_ok=True)
-    return lane.counts
 
 
 def wait_for_turn() -> None:
@@ -211,22 +207,20 @@ def wait_for_turn() -> None:
         subprocess.Popen(["sleep", str(START_SECONDS)], pass_fds=[file.fileno()])
 
 
-def add_junit(counts: dict[str, int], results: Path) -> None:
-    """Add the counts of pytest's report. A missing report is an error."""
+def junit_counts(results: Path) -> dict[str, int]:
+    """Return the counts of pytest's report. A missing report is an error."""
     if not results.is_file():
         print("the tests inside Blender did not come to their end")
-        counts["errors"] += 1
-        return
+        return {"errors": 1}
     suite = ElementTree.parse(results).getroot().find("testsuite")
-    suite_counts = {key: int(suite.get(key)) for key in ("tests", "failures", "errors", "skipped")}
-    counts["failed"] += suite_counts["failures"]
-    counts["errors"] += suite_counts["errors"]
-    counts["skipped"] += suite_counts["skipped"]
-    tests = suite_counts.pop("tests")
-    counts["passed"] += tests - sum(suite_counts.values())
+    failed, errors, skipped, tests = (
+        int(suite.get(key)) for key in ("failures", "errors", "skipped", "tests")
+    )
+    passed = tests - failed - errors - skipped
+    return {"failed": failed, "errors": errors, "skipped": skipped, "passed": passed}
 
 
-def add_window(counts: dict[str, int], results: Path) -> None:
+def add_window(counts: Counter[str], results: Path) -> None:
     """Add the results of the steps in a window. A missing end is an error."""
     steps = json.loads(results.read_text()) if results.is_file() else {}
     for step, (failure, seconds) in steps.items():
@@ -235,29 +229,6 @@ def add_window(counts: dict[str, int], results: Path) -> None:
     if "the end" not in steps:
         print("the run in a window did not come to its end")
         counts["errors"] += 1
-
-
-def add_processes(counts: dict[str, int], listing: Path) -> None:
-    """Check that the processes end that a killed Blender had started, if a step has listed them."""
-    if not listing.is_file():
-        return
-    processes = json.loads(listing.read_text())
-    deadline = time.monotonic() + END_SECONDS
-    while any(is_running(process) for process in processes) and time.monotonic() < deadline:
-        time.sleep(0.1)
-    left = [process for process in processes if is_running(process)]
-    if left:
-        print(f"of {len(processes)} processes, {len(left)} are left after Blender was killed")
-    counts["failed" if left else "passed"] += 1
-
-
-def is_running(process: int) -> bool:
-    """Return whether a process runs, given its number."""
-    try:
-        stat = Path(f"/proc/{process}/stat").read_text()
-    except OSError:
-        return False
-    return stat.rpartition(")")[2].split()[0] != "Z"
 
 
 if __name__ == "__main__":

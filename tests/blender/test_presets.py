@@ -7,8 +7,9 @@ from pathlib import Path
 
 import bpy
 import pytest
-from conftest import EXTENSION, error_of
-from test_command import command
+from conftest import error_of
+from extension import EXTENSION, preferences
+from test_commands import command
 
 
 def folder():
@@ -87,17 +88,16 @@ def test_export_and_import(scene, tmp_path):
 
 
 def test_a_scene_starts_from_the_preferred_preset(scene):
-    preferences = bpy.context.preferences.addons[EXTENSION].preferences
     look().length = 90
     save()
     bpy.ops.wm.read_homefile(use_empty=True)
-    preferences.preset = "my-ink"
+    preferences().preset = "my-ink"
     try:
         bpy.ops.mesh.primitive_cube_add()
         bpy.ops.rosy.field_generate(kind="axis", degree=4)
         assert (look().length, bpy.context.scene.rosy.preset) == (90, "my-ink")
     finally:
-        preferences.preset = ""
+        preferences().preset = ""
 
 
 def test_user_presets_on_the_command_line(scene):

@@ -3,7 +3,7 @@
 import sys
 
 import bpy
-from conftest import EXTENSION
+from extension import rosy, switch_extension
 
 #: Words that are small in titles, and property groups whose properties are controls.
 SMALL_WORDS = frozenset(
@@ -44,20 +44,15 @@ def snapshot():
     }
 
 
-def switch(on):
-    operators = bpy.ops.preferences
-    (operators.addon_enable if on else operators.addon_disable)(module=EXTENSION)
-
-
 def test_off_and_on_and_off_leaves_nothing():
     on = snapshot()
     assert any(name.startswith("ROSY_OT_") for name in on["types"])
     assert "rosy" in on["properties"]["Scene"]
-    switch(False)
+    switch_extension(False)
     off = snapshot()
-    switch(True)
+    switch_extension(True)
     assert snapshot() == on
-    switch(False)
+    switch_extension(False)
     assert snapshot() == off
     assert not [name for name in off["types"] if "rosy" in name.lower()]
     assert not off["operators"]
@@ -65,20 +60,13 @@ def test_off_and_on_and_off_leaves_nothing():
         assert "rosy" not in names
     for modules in (*off["handlers"].values(), *off["draw callbacks"].values()):
         assert not [module for module in modules if "rosy" in module]
-    switch(True)
-
-
-def test_a_bake_leaves_no_handler(baked):
-    used = snapshot()
-    bpy.ops.rosy.remove()
-    for modules in used["handlers"].values():
-        assert not [module for module in modules if "rosy" in module]
+    switch_extension(True)
 
 
 def test_settings_survive_off_and_on(with_field):
     with_field.data.rosy.degree = 6
-    switch(False)
-    switch(True)
+    switch_extension(False)
+    switch_extension(True)
     assert with_field.data.rosy.degree == 6
 
 
@@ -95,11 +83,11 @@ def is_title(text):
 
 def controls():
     """Yield the description of each operator, and all properties that a user sees, by their owner."""
-    for cls in sys.modules[f"{EXTENSION}.operators.registration"].CLASSES:
+    for cls in rosy("operators.registration").CLASSES:
         if issubclass(cls, bpy.types.Operator):
             rna = getattr(bpy.ops.rosy, cls.bl_idname.split(".")[1]).get_rna_type()
             yield cls.bl_idname, rna.description, [rna.properties[k] for k in cls.__annotations__]
-    for cls in sys.modules[f"{EXTENSION}.rosy_addon.ui.properties"].CLASSES:
+    for cls in rosy("rosy_addon.ui.properties").CLASSES:
         if cls.__name__ in VISIBLE_GROUPS:
             items = [cls.bl_rna.properties[name] for name in cls.__annotations__]
             yield cls.__name__, None, [item for item in items if item.name != item.identifier]
@@ -124,7 +112,7 @@ def test_every_control_has_a_label_and_a_tooltip():
 
 
 def test_names_of_presets_are_in_title_case():
-    library = sys.modules[f"{EXTENSION}.rosy_addon.ui.preset_library"]
+    library = rosy("rosy_addon.ui.preset_library")
     shipped = [entry.preset for entry in library.entries().values() if not entry.is_user]
     assert len(shipped) > 5
     for preset in shipped:

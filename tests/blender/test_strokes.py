@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 import pytest
 from conftest import contents, render_image
+from mathutils.bvhtree import BVHTree
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -86,8 +87,8 @@ def test_undo_and_remove(with_stroke_settings, scene):
     assert not bpy.ops.rosy.strokes_remove.poll()
 
 
-def bent_tube(scene):
-    """A tube with a field, along the bones of an armature that can bend it."""
+def bent_tube():
+    """A tube with a field, and a modifier that can bend it."""
     bpy.ops.mesh.primitive_cylinder_add(vertices=48, radius=0.5, depth=3.0)
     tube = bpy.context.object
     bpy.ops.object.mode_set(mode="EDIT")
@@ -96,20 +97,9 @@ def bent_tube(scene):
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.ops.object.shade_smooth()
     bpy.ops.rosy.field_generate(kind="form", degree=4)
-    bpy.ops.object.armature_add(location=(0.0, 0.0, -1.5))
-    rig = bpy.context.object
-    bpy.ops.object.mode_set(mode="EDIT")
-    rig.data.edit_bones[0].tail = (0.0, 0.0, 1.5)
-    bone = rig.data.edit_bones.new("Upper")
-    bone.head, bone.tail, bone.parent = (0.0, 0.0, 1.5), (0.0, 0.0, 3.0), rig.data.edit_bones[0]
-    bpy.ops.object.mode_set(mode="OBJECT")
-    z = np.array([vertex.co.z for vertex in tube.data.vertices])
-    for name, weights in (("Bone", 0.5 - z / 3), ("Upper", 0.5 + z / 3)):
-        group = tube.vertex_groups.new(name=name)
-        for index, weight in enumerate(weights.tolist()):
-            group.add([index], weight, "REPLACE")
-    tube.modifiers.new("Armature", "ARMATURE").object = rig
-    return tube, rig
+    bend = tube.modifiers.new("Bend", "SIMPLE_DEFORM")
+    bend.deform_method, bend.angle = "BEND", 0.0
+    return tube, bend
 
 
 def evaluated_points(obj):
@@ -118,11 +108,9 @@ def evaluated_points(obj):
     return np.array([point.position for point in evaluated.data.points])
 
 
-def test_curves_follow_an_armature(scene):
+def test_curves_follow_a_mesh_that_is_bent(scene):
     """Their feet stay on the surface, to a hundredth of the spacing, without a new drawing."""
-    from mathutils.bvhtree import BVHTree
-
-    tube, rig = bent_tube(scene)
+    tube, bend = bent_tube()
     settings = scene.rosy.strokes
     settings.kind, settings.follow, settings.hidden = "CURVES", True, True
     assert bpy.ops.rosy.strokes() == {"FINISHED"}
@@ -136,9 +124,7 @@ def test_curves_follow_an_armature(scene):
     height.foreach_set("value", np.zeros(len(height), dtype=np.float32))
     strokes.data.update_tag()
     for angle in (0.0, 0.5, 1.2):
-        rig.pose.bones["Upper"].rotation_mode = "XYZ"
-        rig.pose.bones["Upper"].rotation_euler.x = angle
-        tube.location.x = angle
+        bend.angle = tube.location.x = angle
         depsgraph = bpy.context.evaluated_depsgraph_get()
         points = evaluated_points(strokes)
         to_tube = np.array(tube.evaluated_get(depsgraph).matrix_world.inverted())

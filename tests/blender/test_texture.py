@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from conftest import contents, error_of, pixels
-from test_bake import baked_images, hatching_node, material_of, plane_in_frame, render
+from conftest import baked_images, contents, error_of, pixels
+from extension import rosy
+from test_bake import hatching_node, material_of, plane_in_frame, render
 
 
 def test_hatching_follows_the_tone(scene, tmp_path):
     """The paper and the ink of a texture have the mean that the tone asks, without a new texture."""
-    from bl_ext.user_default.rosy.rosy_addon.core.color import to_linear
-
+    to_linear = rosy("rosy_addon.core.color").to_linear
     plane = plane_in_frame(scene)
     scene.rosy.texture_size = 1024
     for preset, light_ink in (("cross-hatch", False), ("white-on-black", True)):

@@ -103,14 +103,13 @@ def test_contents(files):
 
 
 def test_manifest(files):
+    """What Blender's own validation, which run.py calls, does not check."""
     manifest = tomllib.loads(files["blender_manifest.toml"].decode())
     assert manifest["website"].startswith("https://")
-    texts = [manifest["tagline"], *manifest["permissions"].values()]
-    for text in texts:
-        assert len(text) <= 64 and text[0].isupper() and text[-1] not in ".!?", text
-    assert all(manifest.values()), "the platform refuses empty values"
+    assert all(
+        text[0].isupper() for text in (manifest["tagline"], *manifest["permissions"].values())
+    )
     assert re.fullmatch(r"\d+\.\d+\.\d+", manifest["version"])
-    assert all(re.fullmatch(r"\d{4}(-\d{4})? \S.*", holder) for holder in manifest["copyright"])
     assert set(manifest["permissions"]) == {"files"}
     assert set(manifest["tags"]) <= TAGS
     assert set(manifest["license"]) == {"SPDX:GPL-3.0-or-later", "SPDX:CC0-1.0"}

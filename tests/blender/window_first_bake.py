@@ -8,26 +8,13 @@ docs/images, and so is that of a live view.
 from __future__ import annotations
 
 import subprocess
-import sys
-from pathlib import Path
 
 import bpy
-
-sys.path.insert(0, str(Path(__file__).parent))
 import window_steps
 from conftest import add_suzanne
+from extension import preferences, rosy
 from live_views import is_live
-from window_steps import (
-    MANY,
-    capture,
-    in_view,
-    preferences,
-    rosy,
-    run_steps,
-    save_part,
-    view,
-    wait_until,
-)
+from window_steps import MANY, capture, in_view, save_part, view, wait_until
 
 #: Distances from the top of the 3D view to buttons of the panel, in pixels. They differ between
 #: versions of Blender by less than half the height of a button.
@@ -160,7 +147,7 @@ def follow_steps(name):
     assert not bpy.context.object.modifiers
 
 
-def default_cube():
+def test_default_cube():
     yield from follow_steps("first-bake")
 
 
@@ -197,4 +184,5 @@ def live_suzanne():
     yield from save_picture("live")
 
 
-run_steps(default_cube, *([suzanne, live_suzanne] if MANY else []))
+if MANY:
+    test_suzanne, test_live_suzanne = suzanne, live_suzanne

@@ -5,22 +5,15 @@ Run by run.py, only where it is asked for: ``--only-window --windows listing --s
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import bpy
-
-sys.path.insert(0, str(Path(__file__).parent))
 from conftest import add_suzanne
+from extension import preferences, rosy
 from window_steps import (
     SHOTS,
     call_in_view,
     capture,
     in_view,
     open_tab,
-    preferences,
-    rosy,
-    run_steps,
     save_part,
     turn_view,
     view,
@@ -51,7 +44,7 @@ def save_view(name):
     (SHOTS / f"screen-{name}.png").unlink()
 
 
-def live():
+def test_live():
     """Suzanne with a live field."""
     preferences().live_first_field = True
     bpy.context.preferences.view.ui_scale = SCALE
@@ -72,7 +65,7 @@ def live():
     yield from save_view("window-live")
 
 
-def baked():
+def test_baked():
     """The same mesh with a picture in ink, on its paper."""
     call_in_view(bpy.ops.rosy.preset_apply, preset="engraving")
     scene = bpy.context.scene
@@ -83,6 +76,3 @@ def baked():
     call_in_view(bpy.ops.rosy.show_here)
     yield 10.0
     yield from save_view("window-baked")
-
-
-run_steps(live, baked)

@@ -7,14 +7,12 @@ from __future__ import annotations
 
 import math
 import os
-import sys
-from pathlib import Path
+from unittest.mock import patch
 
 import bpy
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parent))
 from conftest import add_camera
+from extension import preferences, rosy, switch_extension
 from live_views import (
     CAUSES,
     REST_LOAD,
@@ -32,18 +30,7 @@ from live_views import (
     visible_owners,
     wait_for_final_pictures,
 )
-from window_steps import (
-    SHOTS,
-    call_in_view,
-    capture,
-    in_view,
-    preferences,
-    redraws,
-    rosy,
-    run_module,
-    view,
-    wait_until,
-)
+from window_steps import SHOTS, call_in_view, capture, in_view, redraws, view, wait_until
 
 
 @live()
@@ -56,11 +43,9 @@ def test_every_view_is_a_bake(monkey):
         yield from check_is_bake(f"live-view-{azimuth}")
 
 
-def test_off_restores_the_view():
+@live(is_on=False)
+def test_off_restores_the_view(monkey):
     """Switched on and off again, the view is the same as before, pixel for pixel."""
-    yield from fresh_scene()
-    # Blender's own antialiasing continues over many redraws, and its result varies.
-    bpy.context.preferences.system.viewport_aa = "OFF"
     yield 1.0
     before = capture("live-0-off", view()[2])
     switch("ON")
@@ -68,15 +53,13 @@ def test_off_restores_the_view():
     assert (capture("live-1-on", view()[2]) != before).any()
     switch("OFF")
     yield 1.0
-    bpy.context.preferences.system.viewport_aa = "8"
     after = capture("live-2-off", view()[2])
     assert (after == before).all(), f"{(after != before).any(axis=2).sum()} pixels differ"
-    check_nothing_is_left()
 
 
-def test_surfaces_in_front_occlude():
+@live(is_on=False)
+def test_surfaces_in_front_occlude(monkey):
     """An opaque cube covers the field; what the cube hides is not drawn over it."""
-    yield from fresh_scene()
     with in_view():
         bpy.ops.mesh.primitive_cube_add(size=0.8, location=(0.7, -2.0, 0.2))
         bpy.ops.object.select_all(action="DESELECT")
@@ -88,12 +71,11 @@ def test_surfaces_in_front_occlude():
     outside = eroded(drawn[..., 3] == 0)
     changed = (np.abs(seen[outside] - before[outside]) > 0.1).any(axis=1).mean()
     assert changed < 1e-4, f"{changed:.2%} of what is not the field has changed"
-    switch("OFF")
 
 
-def test_paper_is_behind_everything():
+@live(levels=0)
+def test_paper_is_behind_everything(monkey):
     """The backdrop of a hatching: the whole view, the frame of a camera, nothing if it is off."""
-    yield from fresh_scene(levels=0)
     scene, space = bpy.context.scene, view()[1].spaces.active
     bpy.ops.rosy.preset_apply(preset="cross-hatch")
     scene.rosy.look.paper_color = (0.8, 0.6, 0.3, 1.0)
@@ -102,7 +84,6 @@ def test_paper_is_behind_everything():
     scene.render.resolution_x = scene.render.resolution_y = 400
     scene.camera = add_camera("Camera", (0.0, -6.0, 1.0), (math.radians(80), 0.0, 0.0))
     call_in_view(bpy.ops.mesh.primitive_cube_add, size=0.8, location=(0.0, -2.0, 0.3))
-    switch("ON")
 
     def shows_paper(name):
         seen = capture(name, view()[2])
@@ -127,8 +108,6 @@ def test_paper_is_behind_everything():
         assert not backdrop or is_paper.mean() > 0.05, perspective
         assert perspective != "CAMERA" or not corners.any(), "the paper leaves the frame"
         assert perspective != "CAMERA" or not center, "the paper covers the cube"
-    switch("OFF")
-    check_nothing_is_left()
 
 
 @live()
@@ -164,9 +143,9 @@ def test_only_visible_objects_are_drawn(monkey):
     space.region_3d.view_perspective = "PERSP"
 
 
-def test_clipped_region():
+@live(is_on=False)
+def test_clipped_region(monkey):
     """The side that Blender's clipping region cuts away is not drawn."""
-    yield from fresh_scene()
     region = view()[2]
     middle = region.width // 2
     with in_view():
@@ -182,9 +161,7 @@ def test_clipped_region():
     changed = (on != off).any(axis=2)
     assert changed[:, middle + 5 :].sum() > 2000
     assert changed[:, : middle - 5].sum() == 0
-    switch("OFF")
     call_in_view(bpy.ops.view3d.clip_border)
-    yield 0.5
 
 
 @live()
@@ -261,14 +238,13 @@ def test_every_frame_is_drawn(monkey):
     assert all(shows for _, shows in steps)
 
 
-def test_fallback_to_the_processor():
+@live(is_on=False)
+def test_fallback_to_the_processor(monkey):
     """If the driver rejects a shader, the processor draws, and a message says so."""
-    yield from fresh_scene()
-    sources = rosy("rosy_addon.gpu.passes").ComputePass
-    original_source = sources.source
-    rosy("rosy_addon.gpu.device").release()
-    sources.source = property(lambda self: "void main() { this is not GLSL; }")
-    try:
+    compute_pass, device = rosy("rosy_addon.gpu.passes").ComputePass, rosy("rosy_addon.gpu.device")
+    device.release()
+    source = property(lambda self: "void main() { this is not GLSL; }")
+    with patch.object(compute_pass, "source", source):
         switch("ON")
         session = session_module()._session
         yield from wait_until(lambda: session.fallback_reason)
@@ -283,18 +259,12 @@ def test_fallback_to_the_processor():
         assert helper.connection is not None, "no other process has drawn"
         switch("OFF")
         assert helper.connection is None
-    finally:
-        sources.source = original_source
-        rosy("rosy_addon.gpu.device").release()
-    yield 0.5
-    check_nothing_is_left()
+    device.release()
 
 
 @live(levels=0)
 def test_a_view_without_a_field_says_why_and_rests(monkey):
     """Each cause is named in the view; nothing is drawn again; later the field is back."""
-    # Blender's own antialiasing continues over many redraws.
-    bpy.context.preferences.system.viewport_aa = "OFF"
     for cause, words in CAUSES:
         steps = cause(monkey)
         next(steps)
@@ -308,17 +278,14 @@ def test_a_view_without_a_field_says_why_and_rests(monkey):
         view()[1].tag_redraw()
         yield from wait_until(lambda: not messages())
         assert visible_owners() == [monkey], message
-    bpy.context.preferences.system.viewport_aa = "8"
 
 
-def test_two_windows_with_two_scenes_rest():
+@live(levels=1)
+def test_two_windows_with_two_scenes_rest(monkey):
     """Two scenes share a mesh with modifiers."""
-    yield from fresh_scene(levels=1)
-    bpy.context.preferences.system.viewport_aa = "OFF"
-    first_scene, monkey = bpy.context.scene, bpy.data.objects["Suzanne"]
+    first_scene = bpy.context.scene
     second_scene = bpy.data.scenes.new("Second")
     second_scene.collection.objects.link(monkey)
-    switch("ON")
     call_in_view(bpy.ops.wm.window_new_main)
     yield 0.5
     window = bpy.context.window_manager.windows[-1]
@@ -336,10 +303,7 @@ def test_two_windows_with_two_scenes_rest():
     assert load < REST_LOAD
     with bpy.context.temp_override(window=window):
         bpy.ops.wm.window_close()
-    bpy.context.preferences.system.viewport_aa = "8"
     session_module().stop()
-    yield 0.5
-    check_nothing_is_left()
 
 
 def test_the_first_field_is_shown():
@@ -373,9 +337,9 @@ def test_the_first_field_is_shown():
     check_nothing_is_left()
 
 
-def test_live_views_are_remembered():
+@live(levels=0, is_on=False)
+def test_live_views_are_remembered(monkey):
     """A file shows its live views again if the scene says so, and only then."""
-    yield from fresh_scene(levels=0)
     path = str(SHOTS / "remembered.blend")
     for remember, is_on in ((False, True), (True, True), (True, False)):
         bpy.context.scene.rosy.remember_live = remember
@@ -388,9 +352,6 @@ def test_live_views_are_remembered():
         yield 0.5
         assert is_live() == (remember and is_on), (remember, is_on)
     os.remove(path)
-    switch("OFF")
-    yield 0.3
-    check_nothing_is_left()
 
 
 def shown_phases():
@@ -417,16 +378,13 @@ def test_streaks_drift_while_they_are_played(monkey):
         return any(map(bpy.app.timers.is_registered, session._timers.values()))
 
     play_or_pause()
-    phases, downscales = [], set()
+    phases = []
 
     def drifts():
-        for view_state in session.progressive.views.values():
-            downscales.add(view_state.shown.downscale)
         phases.extend(phase for phase in shown_phases() if phase not in phases)
         return len(phases) > 4
 
     yield from wait_until(drifts)
-    assert downscales == {session.progressive.renderer.downscale_factors[1]}, "previews flash"
     play_or_pause()
     yield from wait_for_final_pictures()
     paused, frames = shown_phases(), session.flow_clock.frames
@@ -457,11 +415,8 @@ def test_nothing_is_left():
         elif ending == "FILE":
             bpy.ops.wm.open_mainfile(filepath=path)
         else:
-            bpy.ops.preferences.addon_disable(module="bl_ext.user_default.rosy")
+            switch_extension(False)
         yield 0.5
         assert not (held._kept or held._lookup_textures), ending
         check_nothing_is_left()
     os.remove(path)
-
-
-run_module(globals())

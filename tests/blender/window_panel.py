@@ -1,21 +1,19 @@
 """RoSy in a window: the panel in its states, jobs with progress, and jobs that are interrupted.
 
-Run by run.py as ``blender --enable-event-simulate -P window_panel.py``. Every step is a generator
-that yields to let Blender handle its events (`window_steps`).
+Run by run.py, through run_window.py. Every step is a generator that yields to let Blender handle its
+events (`window_steps`).
 """
 
 from __future__ import annotations
 
 import math
-import sys
 from functools import partial
 from pathlib import Path
 
 import bpy
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parent))
-from conftest import add_camera, contents, pixels, render_image
+from conftest import add_camera, baked_images, contents, pixels, render_image
+from extension import preferences, rosy, switch_extension
 from monkey_checks import handlers
 from window_steps import (
     SHOTS,
@@ -23,13 +21,10 @@ from window_steps import (
     capture,
     fresh_scene,
     in_view,
-    preferences,
     press,
-    rosy,
-    run_module,
     save_part,
     scene_with_field,
-    start_job,
+    start_long_bake,
     status,
     view,
     wait_until,
@@ -90,13 +85,9 @@ def test_singularities_as_dots():
 
 
 def count_dots(name):
-    """Return how many pixels of the 3D view in a screenshot are orange and blue like dots."""
-    image = bpy.data.images.load(str(SHOTS / f"window-{name}.png"))
-    screen = pixels(image)
-    bpy.data.images.remove(image)
-    region = view()[2]
-    screen = screen[region.y : region.y + region.height, region.x : region.x + region.width // 2]
-    red, green, blue = screen[..., 0], screen[..., 1], screen[..., 2]
+    """Return how many pixels in the left half of the 3D view are orange and blue like dots."""
+    screen = capture(f"window-{name}", view()[2])
+    red, green, blue = screen[:, : screen.shape[1] // 2].transpose(2, 0, 1)
     orange = (red > 0.8) & (green < 0.5) & (blue < 0.25)
     is_blue = (blue > 0.8) & (red < 0.3) & (green < 0.5)
     return np.array([np.count_nonzero(orange), np.count_nonzero(is_blue)])
@@ -104,8 +95,7 @@ def count_dots(name):
 
 def test_bake_with_progress():
     yield from scene_with_field(size=(800, 600))
-    bpy.context.scene.rosy.look.method = "brute"  # slow enough to observe the progress
-    yield from start_job(bpy.ops.rosy.bake)
+    yield from start_long_bake()  # slow enough to observe the progress
     fractions = []
     while status().current is not None:
         fractions.append(status().current.fraction)
@@ -113,7 +103,7 @@ def test_bake_with_progress():
     assert len(set(fractions)) >= 3, fractions
     assert fractions == sorted(fractions), fractions
     yield from job_ends()
-    assert [image for image in bpy.data.images if image.name.lower().startswith("rosy")]
+    assert baked_images()
 
 
 def test_panel_with_picture():
@@ -179,8 +169,7 @@ def test_undo_after_bake():
 def interrupt(action):
     """Start a long bake, call an action, and check that the bake ends and leaves nothing."""
     yield from scene_with_field(size=(1600, 1200))
-    bpy.context.scene.rosy.look.method = "brute"
-    yield from start_job(bpy.ops.rosy.bake)
+    yield from start_long_bake()
     action()
     yield from job_ends()
     assert not [material for material in bpy.data.materials if "rosy" in material.name.lower()]
@@ -190,8 +179,8 @@ def test_stop_when_the_scene_changes():
     """An object is deleted, the field undone, the scene changed, a file opened; RoSy is switched off."""
 
     def switch_off():
-        for switch in (bpy.ops.preferences.addon_disable, bpy.ops.preferences.addon_enable):
-            switch(module="bl_ext.user_default.rosy")
+        switch_extension(False)
+        switch_extension(True)
         preferences().live_first_field = False
 
     actions = [bpy.ops.object.delete, bpy.ops.ed.undo, partial(bpy.ops.scene.new, type="EMPTY")]
@@ -298,8 +287,5 @@ def test_edited_strokes_are_replaced_on_request():
 def test_bake_the_current_view():
     yield from scene_with_field()
     call_in_view(bpy.ops.rosy.bake, "EXEC_DEFAULT", True, camera="VIEW")
-    (image,) = [image for image in bpy.data.images if image.name.lower().startswith("rosy")]
+    (image,) = baked_images()
     assert tuple(image.size) == (view()[2].width, view()[2].height)
-
-
-run_module(globals())

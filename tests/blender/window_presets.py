@@ -5,15 +5,9 @@ Run by run.py, as window_panel.py is.
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import bpy
-
-sys.path.insert(0, str(Path(__file__).parent))
-from window_steps import call_in_view, capture, open_tab, press, rosy, run_module, save_part, view
-
-EXTENSION = "bl_ext.user_default.rosy"
+from extension import rosy, switch_extension
+from window_steps import call_in_view, capture, open_tab, press, save_part, view
 
 
 def library():
@@ -24,13 +18,6 @@ def point_on_preview():
     """Return a point on the preview in the panel, in pixels from the lower left of the window."""
     sidebar = view()[3]
     return sidebar.x + sidebar.width // 2 - 15, sidebar.y + sidebar.height - 360
-
-
-def open_look():
-    """Open an empty scene, and RoSy's tab of the sidebar."""
-    bpy.ops.wm.read_homefile(use_empty=True)
-    yield 0.5
-    yield from open_tab()
 
 
 def wait_for_previews():
@@ -54,10 +41,12 @@ def preview_tones(sidebar):
 
 
 def test_panel_with_previews():
-    bpy.ops.preferences.addon_disable(module=EXTENSION)
+    switch_extension(False)
     rosy("rosy_addon.ui.look_panels").VIEW3D_PT_rosy_look.bl_options = set()
-    bpy.ops.preferences.addon_enable(module=EXTENSION)
-    yield from open_look()
+    switch_extension(True)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    yield 0.5
+    yield from open_tab()
     tones = preview_tones((yield from save_screenshot("presets-1-panel")))
     assert tones.std() > 0.1 and 0.2 < tones.mean() < 0.6, (tones.std(), tones.mean())
 
@@ -133,10 +122,7 @@ def test_previews_are_freed_with_the_extension():
     yield from wait_for_previews()
     previews = library()._LIBRARY.previews
     assert len(previews) == len(library().entries())
-    bpy.ops.preferences.addon_disable(module=EXTENSION)
+    switch_extension(False)
     assert not len(previews)
     yield 0.2
-    bpy.ops.preferences.addon_enable(module=EXTENSION)
-
-
-run_module(globals())
+    switch_extension(True)

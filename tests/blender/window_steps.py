@@ -19,10 +19,9 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils import Euler, Vector
-
-sys.path.insert(0, str(Path(__file__).parent))
 from conftest import add_camera, add_suzanne
+from extension import preferences, rosy
+from mathutils import Euler, Vector
 
 SHOTS = Path(os.environ["ROSY_SHOTS"])
 RESULTS = Path(os.environ["ROSY_RESULTS"])
@@ -41,22 +40,16 @@ ONLY = os.environ.get("ROSY_STEPS", "").split(",")
 MANY = bool(os.environ.get("ROSY_MANY"))
 
 
-def run_module(module):
-    """Run the functions of a module whose names start with test_, in their order."""
-    run_steps(*(value for name, value in module.items() if name.startswith("test_")))
+def run_module(name):
+    """Run the functions of a module whose names start with test_, in their order, and end Blender.
 
-
-def step_name(step):
-    return step.__name__.removeprefix("test_")
-
-
-def run_steps(*steps):
-    """Run steps as soon as there is a window, write their results, and end Blender.
-
-    If `ONLY` has names, other steps are left out.
+    They run as soon as there is a window, and their results are written. If `ONLY` has names, other steps
+    are left out.
     """
+    functions = vars(importlib.import_module(name)).items()
+    steps = {key[5:]: step for key, step in functions if key.startswith("test_")}
     if any(ONLY):
-        steps = [step for step in steps if step_name(step) in ONLY]
+        steps = {key: step for key, step in steps.items() if key in ONLY}
     bpy.context.preferences.view.show_splash = False
     bpy.context.preferences.view.show_statusbar_stats = False
     bpy.context.preferences.view.smooth_view = 0
@@ -87,26 +80,16 @@ def _resume(work):
 
 def _run_all(steps):
     results = {}
-    for step in steps:
+    for name, step in steps.items():
         start, error = time.monotonic(), ""
         try:
             yield from step()
         except Exception:
             error = traceback.format_exc()
-        results[step_name(step).replace("_", " ")] = error, round(time.monotonic() - start, 1)
+        results[name.replace("_", " ")] = error, round(time.monotonic() - start, 1)
         RESULTS.write_text(json.dumps(results))
     results["the end"] = "", 0.0
     RESULTS.write_text(json.dumps(results))
-
-
-def rosy(name):
-    """Return a module of the extension."""
-    return importlib.import_module(f"bl_ext.user_default.rosy.{name}")
-
-
-def preferences():
-    """Return the preferences of the extension."""
-    return bpy.context.preferences.addons["bl_ext.user_default.rosy"].preferences
 
 
 def view():
@@ -161,11 +144,13 @@ def scene_with_field(size=(320, 240)):
     call_in_view(bpy.ops.rosy.field_generate, "EXEC_DEFAULT", True, kind="curvature", degree=4)
 
 
-def start_job(operator, **settings):
-    """Start a job as its button does, and wait until it has made progress."""
-    assert call_in_view(operator, "INVOKE_DEFAULT", True, **settings) == {"RUNNING_MODAL"}
+def start_long_bake():
+    """Start a bake as its button does, one that no other has prepared, and wait until it has made progress."""
+    look = bpy.context.scene.rosy.look
+    look.method, look.seed = "brute", look.seed + 1
+    assert call_in_view(bpy.ops.rosy.bake, "INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
     yield from wait_until(lambda: status().current is None or status().current.fraction > 0.1)
-    assert status().current is not None, "the job ended before it could be interrupted"
+    assert status().current is not None, "the bake ended before it could be interrupted"
 
 
 def press(key):
@@ -194,22 +179,6 @@ def wait_until(condition, seconds=TIMEOUT_SECONDS):
         if time.monotonic() > deadline:
             raise AssertionError("timed out")
         yield
-
-
-def descendants():
-    """Return the numbers of all processes that this one has started, directly or not."""
-    parents = {}
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = path.read_text().rpartition(")")[2].split()
-        except OSError:
-            continue
-        parents[int(path.parent.name)] = int(fields[1])
-    found, new = set(), {os.getpid()}
-    while new:
-        new = {child for child, parent in parents.items() if parent in new}
-        found |= new
-    return sorted(found)
 
 
 @contextmanager
@@ -245,13 +214,11 @@ def capture(name, region):
     """
     path = SHOTS / f"{name}.png"
     subprocess.run(["import", "-window", "root", str(path)], check=True, timeout=20)
-    command = ["convert", str(path), "-depth", "8", "-format", "%w %h", "-write", "info:-", "rgb:-"]
+    command = ["convert", str(path), "-depth", "8", "ppm:-"]
     output = subprocess.run(command, check=True, timeout=20, capture_output=True).stdout
-    size = output.split(b" ", 1)
-    width = int(size[0])
-    raw = np.frombuffer(output, dtype=np.uint8)
-    height = len(raw) // (3 * width)
-    screen = raw[len(raw) - 3 * width * height :].reshape(height, width, 3)[::-1]
+    _, size, _, values = output.split(b"\n", 3)
+    width, height = map(int, size.split())
+    screen = np.frombuffer(values, dtype=np.uint8).reshape(height, width, 3)[::-1]
     part = screen[region.y : region.y + region.height, region.x : region.x + region.width]
     return part.astype(np.float32) / 255
 

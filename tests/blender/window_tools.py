@@ -6,26 +6,14 @@ Run by run.py, as window_panel.py is.
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import bpy
 import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
-from mathutils import Vector
-
-sys.path.insert(0, str(Path(__file__).parent))
 from conftest import member_vectors
-from window_steps import (
-    call_in_view,
-    fresh_scene,
-    in_view,
-    redraw_view,
-    rosy,
-    run_steps,
-    view,
-    wait_until,
-)
+from extension import rosy
+from mathutils import Vector
+from window_steps import call_in_view, fresh_scene, in_view, redraw_view, view, wait_until
 
 
 def fresh_sphere(segments=48, ring_count=24, **options):
@@ -37,48 +25,7 @@ def fresh_sphere(segments=48, ring_count=24, **options):
         bpy.ops.mesh.primitive_uv_sphere_add(segments=segments, ring_count=ring_count, **options)
 
 
-def annotations_guide_a_field():
-    """A stroke of the Annotate tool across the middle of a sphere, drawn on its surface."""
-    yield from fresh_sphere(64, 32, location=(0.5, 0.0, 0.0))
-    scene = bpy.context.scene
-    call_in_view(bpy.ops.view3d.view_axis, type="FRONT")
-    view()[1].spaces.active.region_3d.view_distance = 5.0
-    view()[1].spaces.active.region_3d.view_perspective = "ORTHO"
-    yield 0.5
-    scene.tool_settings.annotation_stroke_placement_view3d = "SURFACE"
-    region = view()[2]
-    region_3d = view()[1].spaces.active.region_3d
-    ends = np.linspace((0.0, -1.0, -0.5), (1.0, -1.0, 0.5), 30)
-    at_rest = {"name": "", "location": (0.0, 0.0, 0.0), "mouse_event": (0.0, 0.0), "pressure": 1.0}
-    at_rest |= {"size": 1.0, "pen_flip": False, "x_tilt": 0.0, "y_tilt": 0.0}
-    points = [
-        {
-            **at_rest,
-            "mouse": location_3d_to_region_2d(region, region_3d, point),
-            "time": 0.1 * index,
-            "is_start": index == 0,
-        }
-        for index, point in enumerate(ends)
-    ]
-    # Blender asks for all properties of its version, and for no others.
-    names = bpy.types.OperatorStrokeElement.bl_rna.properties.keys()
-    stroke = [{name: point[name] for name in point if name in names} for point in points]
-    with in_view():
-        bpy.ops.gpencil.annotate("EXEC_DEFAULT", mode="DRAW", stroke=stroke, wait_for_input=False)
-        bpy.ops.rosy.field_generate(
-            "EXEC_DEFAULT", True, kind="guided", degree=2, guides={"ANNOTATIONS"}
-        )
-    mesh = bpy.context.object.data
-    center = np.array([face.center for face in mesh.polygons])
-    x, y, z = center.T
-    near = (np.abs(x - z) < 0.05) & (np.abs(x) < 0.4) & (y < 0.0)
-    assert near.sum() > 5
-    direction = member_vectors(mesh)[near]
-    angle = np.degrees(np.arctan2(direction[:, 2], direction[:, 0])) % 180.0
-    assert np.abs(angle - 45.0).max() < 5.0, angle
-
-
-def singularities_dragged_with_the_tool():
+def test_singularities_dragged_with_the_tool():
     """Move one, undo that, and drag a new pair apart with Ctrl."""
     yield from fresh_sphere()
     with in_view():
@@ -118,7 +65,7 @@ def singularities_dragged_with_the_tool():
     call_in_view(bpy.ops.wm.tool_set_by_id, name="builtin.select_box")
 
 
-def field_combed_with_the_tool():
+def test_field_combed_with_the_tool():
     """Comb a mesh with modifiers, and undo, replay and take back strokes; in Object Mode and in Sculpt Mode."""
     for mode, tool in (("OBJECT", "rosy.comb_tool"), ("SCULPT", "rosy.comb_sculpt_tool")):
         yield from fresh_sphere()
@@ -143,6 +90,30 @@ def field_combed_with_the_tool():
             brush = "builtin.select_box" if mode == "OBJECT" else "builtin.brush"
             bpy.ops.wm.tool_set_by_id(name=brush)
             bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_annotations_guide_a_field():
+    """A stroke of the Annotate tool across the middle of a sphere, drawn on its surface."""
+    yield from fresh_sphere(64, 32, location=(0.5, 0.0, 0.0))
+    scene = bpy.context.scene
+    call_in_view(bpy.ops.view3d.view_axis, type="FRONT")
+    view()[1].spaces.active.region_3d.view_distance = 5.0
+    view()[1].spaces.active.region_3d.view_perspective = "ORTHO"
+    yield 0.5
+    scene.tool_settings.annotation_stroke_placement_view3d = "SURFACE"
+    call_in_view(bpy.ops.wm.tool_set_by_id, name="builtin.annotate")
+    yield from drag((0.0, -1.0, -0.5), (1.0, -1.0, 0.5), move_count=20)
+    settings = {"kind": "guided", "degree": 2, "guides": {"ANNOTATIONS"}}
+    call_in_view(bpy.ops.rosy.field_generate, "EXEC_DEFAULT", True, **settings)
+    call_in_view(bpy.ops.wm.tool_set_by_id, name="builtin.select_box")
+    mesh = bpy.context.object.data
+    center = np.array([face.center for face in mesh.polygons])
+    x, y, z = center.T
+    near = (np.abs(x - z) < 0.05) & (np.abs(x) < 0.4) & (y < 0.0)
+    assert near.sum() > 5
+    direction = member_vectors(mesh)[near]
+    angle = np.degrees(np.arctan2(direction[:, 2], direction[:, 0])) % 180.0
+    assert np.abs(angle - 45.0).max() < 5.0, angle
 
 
 def comb():
@@ -199,13 +170,9 @@ def move_mouse(point, kind="MOUSEMOVE", value="NOTHING", **keys):
         yield 0.1
 
 
-def drag(start, end, **keys):
-    """Drag from a point of the scene to another one."""
+def drag(start, end, move_count=1, **keys):
+    """Drag from a point of the scene to another one, with a number of moves between them."""
     yield from move_mouse(start, "LEFTMOUSE", "PRESS", **keys)
-    yield from move_mouse((Vector(start) + Vector(end)) / 2, **keys)
+    for point in np.linspace(start, end, move_count + 2)[1:-1]:
+        yield from move_mouse(point, **keys)
     yield from move_mouse(end, "LEFTMOUSE", "RELEASE")
-
-
-run_steps(
-    singularities_dragged_with_the_tool, field_combed_with_the_tool, annotations_guide_a_field
-)

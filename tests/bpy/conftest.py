@@ -15,21 +15,17 @@ if importlib.util.find_spec("bpy") is None:
 else:
     import bpy
 
-    def _import_extension():
-        """The repository's root as the package `rosy`, as Blender imports an extension."""
-        spec = importlib.util.spec_from_file_location(
-            "rosy", ROOT / "__init__.py", submodule_search_locations=[str(ROOT)]
-        )
-        module = importlib.util.module_from_spec(spec)
-        sys.modules["rosy"] = module
-        spec.loader.exec_module(module)
-        return module
-
     sys.path.insert(0, str(Path(__file__).resolve().parent))
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    _import_extension()
+    # The root of the repository is the package `rosy`, as Blender imports an extension.
+    spec = importlib.util.spec_from_file_location(
+        "rosy", ROOT / "__init__.py", submodule_search_locations=[str(ROOT)]
+    )
+    sys.modules["rosy"] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(sys.modules["rosy"])
     importlib.import_module("rosy.rosy_addon.ui.properties").ensure_registered()
-    from scenes import add_camera, add_field, add_monkey, add_plane, empty_scene
+    from objects import add_camera, add_field, add_monkey, add_plane
+    from scenes import empty_scene
 
 
 @pytest.fixture(autouse=True)

@@ -13,6 +13,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from objects import add_camera, animate, link
 from rosy.rosy_addon.cli.parser import main
 from rosy.rosy_addon.core.color import to_linear
 from rosy.rosy_addon.jobs.animation import bake_animation
@@ -21,7 +22,7 @@ from rosy.rosy_addon.scene.bake_records import list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import frame_camera
 from rosy.rosy_addon.scene.files import picture_stem
 from rosy.rosy_addon.scene.pictures import OutputSettings
-from scenes import add_camera, contents, expect_error, link, pixels, render
+from scenes import contents, expect_error, pixels, render
 
 ROOT = Path(__file__).parents[2]
 
@@ -30,19 +31,13 @@ ROOT = Path(__file__).parents[2]
 def moving(scene, camera, monkey):
     """A scene with Suzanne, who turns and is deformed, and a moving camera."""
     scene.render.resolution_x, scene.render.resolution_y = 96, 72
-    for frame, angle in ((1, 0.0), (20, 1.0)):
-        monkey.rotation_euler = (0.0, 0.0, angle)
-        monkey.keyframe_insert("rotation_euler", frame=frame)
+    animate(monkey, "rotation_euler", {1: (0.0, 0.0, 0.0), 20: (0.0, 0.0, 1.0)})
     monkey.shape_key_add(name="Basis")
     key = monkey.shape_key_add(name="Open")
     for point in key.data[:200]:
         point.co.z -= 0.2
-    for frame, value in ((1, 0.0), (20, 1.0)):
-        key.value = value
-        key.keyframe_insert("value", frame=frame)
-    camera.keyframe_insert("location", frame=1)
-    camera.location.x += 1.0
-    camera.keyframe_insert("location", frame=20)
+    animate(key, "value", {1: 0.0, 20: 1.0})
+    animate(camera, "location", {1: (0.0, -5.0, 0.5), 20: (1.0, -5.0, 0.5)})
     scene.frame_set(3)
     return scene
 
@@ -212,10 +207,7 @@ def test_half_floats(moving, tmp_path):
 
 def test_errors_name_the_frame(moving, tmp_path):
     expect_error("need a folder", bake_animation, moving, [1])
-    monkey = bpy.data.objects["Suzanne"]
-    monkey.keyframe_insert("location", frame=1)
-    monkey.location.x = 500
-    monkey.keyframe_insert("location", frame=2)
+    animate(bpy.data.objects["Suzanne"], "location", {1: (0, 0, 0), 2: (500, 0, 0)})
     settings, message = OutputSettings(folder=tmp_path), r"frame 2: .* outside the frame"
     expect_error(message, bake_animation, moving, range(1, 4), settings=settings)
     assert len(frames_of(tmp_path)) == 1 and moving.frame_current == 3

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from unittest.mock import Mock
+
 import bpy
 import numpy as np
 import pytest
+from objects import add_camera, link
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.core.cache import BAKE_CACHE
 from rosy.rosy_addon.core.color import to_display
@@ -14,7 +17,7 @@ from rosy.rosy_addon.scene import pictures as pictures_room
 from rosy.rosy_addon.scene.bake_records import has_pictures, list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import scene_cameras
 from rosy.rosy_addon.scene.pictures import show_bake
-from scenes import add_camera, contents, depsgraph, each_step, expect_error, link, pixels, reopen
+from scenes import contents, depsgraph, each_step, expect_error, pixels, reopen
 
 
 def material_of(obj):
@@ -27,10 +30,15 @@ def material_of(obj):
     return material.original if material else None
 
 
-def test_bakes_survive_saving(scene, camera, monkey, tmp_path):
+@pytest.mark.parametrize("store", ["PACKED", "SAVED"])
+def test_bakes_survive_saving(scene, camera, monkey, tmp_path, monkeypatch, store):
+    """Folders are relative to the working directory, also if the .blend file is saved elsewhere."""
+    monkeypatch.chdir(tmp_path)
+    scene.rosy.store, scene.rosy.directory = store, "pictures"
     (baked,) = bake(scene)
     before = pixels(baked.image)
-    scene = reopen(tmp_path / "scene.blend")
+    (tmp_path / "files").mkdir()
+    scene = reopen(tmp_path / "files/scene.blend")
     np.testing.assert_array_equal(pixels(bpy.data.images["RoSy Camera"]), before)
     assert [(bake.camera, bake.stale_reason) for bake in list_bakes(scene)] == [("Camera", "")]
     assert material_of(bpy.data.objects["Suzanne"]).name == "RoSy Camera"
@@ -56,19 +64,6 @@ def test_the_image_holds_the_picture(scene, camera, monkey, tmp_path, store, ima
         np.testing.assert_allclose(stored, expected, atol=1e-3)
     bake(scene)
     assert len(list(tmp_path.iterdir())) == len(files)
-
-
-def test_folders_are_relative_to_the_working_directory(
-    scene, camera, monkey, tmp_path, monkeypatch
-):
-    """Also after the .blend file was saved elsewhere, which moves relative paths."""
-    monkeypatch.chdir(tmp_path)
-    scene.rosy.store, scene.rosy.directory = "SAVED", "pictures"
-    (baked,) = bake(scene)
-    expected = pixels(baked.image)
-    (tmp_path / "files").mkdir()
-    reopen(tmp_path / "files/scene.blend")
-    np.testing.assert_array_equal(pixels(bpy.data.images["RoSy Camera"]), expected)
 
 
 def test_the_users_materials_and_modifiers_stay(scene, camera, monkey):
@@ -142,11 +137,7 @@ def test_cancelling_at_any_step_changes_nothing(scene, camera, monkey):
 
 def test_an_error_while_applying_leaves_nothing(scene, camera, monkey, monkeypatch):
     before = contents()
-
-    def fails(*_):
-        raise RosyError("no more")
-
-    monkeypatch.setattr(pictures_room, "new_group", fails)
+    monkeypatch.setattr(pictures_room, "new_group", Mock(side_effect=RosyError("no more")))
     expect_error("no more", bake, scene)
     assert contents() == before
 

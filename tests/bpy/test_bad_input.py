@@ -5,6 +5,17 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+from objects import (
+    add_camera,
+    add_field,
+    add_instance,
+    add_mesh,
+    add_plane,
+    aim,
+    link,
+    load,
+    set_attribute,
+)
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.core import memory
 from rosy.rosy_addon.core.errors import RosyError
@@ -21,20 +32,7 @@ from rosy.rosy_addon.scene.guides import (
 from rosy.rosy_addon.scene.mesh_fields import assign_fields, read_mesh_field, write_mesh_field
 from rosy.rosy_addon.scene.meshes import marked_edges, mesh_surface
 from rosy.rosy_addon.scene.visible_objects import field_objects
-from scenes import (
-    add_camera,
-    add_field,
-    add_mesh,
-    add_plane,
-    aim,
-    contents,
-    depsgraph,
-    empty_scene,
-    expect_error,
-    link,
-    member_vectors,
-    set_attribute,
-)
+from scenes import contents, depsgraph, empty_scene, expect_error, member_vectors
 from test_live_reading import LOSSES
 from test_reading import add_directions
 from test_up_to_date import put
@@ -90,14 +88,10 @@ def test_wrong_type_or_domain(scene, camera, domain, kind, description):
 def test_not_finite(scene, camera, value, domain):
     plane = add_plane(cuts=3)
     size = {"FACE": 9, "POINT": 16, "CORNER": 36, "ANGLE": 9}[domain]
-    if domain == "ANGLE":
-        values = np.zeros(size)
-        values[1] = value
-        set_attribute(plane.data, values, kind="FLOAT")
-    else:
-        values = np.tile([1.0, 0.0, 0.0], (size, 1))
-        values[1, 2] = value
-        set_attribute(plane.data, values, domain=domain)
+    values = np.zeros((size, 1)) if domain == "ANGLE" else np.tile([1.0, 0.0, 0.0], (size, 1))
+    values[1, -1] = value
+    form = {"kind": "FLOAT"} if domain == "ANGLE" else {"domain": domain}
+    set_attribute(plane.data, values, **form)
     assert_refused("'Plane', attribute 'rosy'", f"1 of {size}", "not finite", "undefined")
     scene.rosy.undefined = True
     (baked,) = bake(scene)
@@ -297,13 +291,16 @@ def test_fields_are_stored_on_all_meshes_or_none(scene, monkey, form):
         for obj in (add_plane(), monkey, other)
     }
     before = contents()
-    with pytest.raises(RosyError, match=f"mesh 'Other' already has an attribute '{name}'"):
-        assign_fields(fields, "taken", form)
+    message = f"mesh 'Other' already has an attribute '{name}'"
+    expect_error(message, assign_fields, fields, "taken", form)
     # Blender would rename this one if it failed to create an attribute.
     next(iter(fields)).attributes.new("Float3", "FLOAT_VECTOR", "EDGE")
     before = contents()
-    with pytest.raises(RosyError, match=r"mesh 'Plane': 'x+' cannot be the name of an attribute"):
-        assign_fields({mesh: fields[mesh] for mesh in list(fields)[:1]}, "x" * 300)
+    message, plane = (
+        r"mesh 'Plane': 'x+' cannot be the name of an attribute",
+        dict([*fields.items()][:1]),
+    )
+    expect_error(message, assign_fields, plane, "x" * 300)
     assert contents() == before
 
 
@@ -322,25 +319,19 @@ def library(scene, tmp_path):
     return path
 
 
-def linked(path, kind, name):
-    with bpy.data.libraries.load(str(path), link=True) as (_, to):
-        setattr(to, kind, [name])
-    return getattr(to, kind)[0]
-
-
 @pytest.mark.parametrize("kind", ["objects", "collections"])
 def test_linked_objects_are_refused(library, kind):
-    data = linked(library, kind, {"objects": "Suzanne", "collections": "Monkeys"}[kind])
+    name = {"objects": "Suzanne", "collections": "Monkeys"}[kind]
+    data = load(library, name, kind, link=True)
     if kind == "objects":
         link(data)
     else:
-        empty = link(bpy.data.objects.new("Instance", None))
-        empty.instance_type, empty.instance_collection = "COLLECTION", data
+        add_instance(data)
     assert_refused("object 'Suzanne' is linked from", "library.blend")
 
 
 def test_linked_mesh_can_be_drawn_but_not_written(library):
-    mesh = linked(library, "meshes", "Suzanne")
+    mesh = load(library, "Suzanne", "meshes", link=True)
     obj = link(bpy.data.objects.new("Local", mesh))
     (baked,) = bake(bpy.context.scene)
     assert baked.objects == (obj,)
@@ -355,14 +346,14 @@ def test_cameras_of_one_name(library):
     bpy.ops.wm.save_mainfile()
     bpy.ops.wm.read_homefile(use_empty=True)
     scene = bpy.context.scene
-    link(linked(library, "objects", "Camera"))
+    link(load(library, "Camera", link=True))
     add_camera()
     assert_refused("several cameras have the name 'Camera'", cameras=scene_cameras(scene))
 
 
 def test_missing_libraries_are_named(library):
-    link(linked(library, "objects", "Suzanne"))
-    link(bpy.data.objects.new("Local", linked(library, "meshes", "Suzanne")))
+    link(load(library, "Suzanne", link=True))
+    link(bpy.data.objects.new("Local", load(library, "Suzanne", "meshes", link=True)))
     path = library.with_name("scene.blend")
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     library.rename(library.with_name("moved.blend"))
@@ -380,7 +371,7 @@ def test_missing_libraries_are_named(library):
 
 
 def test_override_can_be_drawn(library):
-    obj = link(linked(library, "objects", "Suzanne"))
+    obj = link(load(library, "Suzanne", link=True))
     local = obj.override_create(remap_local_usages=True)
     (baked,) = bake(bpy.context.scene)
     assert baked.objects == (local,)
@@ -388,7 +379,7 @@ def test_override_can_be_drawn(library):
 
 def test_an_override_of_a_mesh_cannot_be_written(library):
     """Blender would ignore the values without a word."""
-    local = link(linked(library, "objects", "Suzanne")).override_create(remap_local_usages=True)
+    local = link(load(library, "Suzanne", link=True)).override_create(remap_local_usages=True)
     mesh = local.data.override_create(remap_local_usages=True)
     field = read_mesh_field(mesh)
     expect_error("'Suzanne' is linked from its library", write_mesh_field, mesh, field)

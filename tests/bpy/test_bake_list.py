@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from unittest.mock import Mock
+
 import bpy
 from rosy.rosy_addon.jobs.animation import bake_animation
 from rosy.rosy_addon.jobs.bake import bake
@@ -80,24 +82,19 @@ def test_a_scene_is_read_again_only_after_changes(tmp_path, monkeypatch):
     monkeypatch.setattr(staleness, "TTL_READINGS", 0.0)
     scene = build(tmp_path)
     bake(scene)
-    reads = []
-    read = staleness.SceneState.__init__
-    monkeypatch.setattr(
-        staleness.SceneState,
-        "__init__",
-        lambda self, *args: (reads.append(1), read(self, *args))[1],
-    )
+    read = Mock(wraps=staleness.SceneState)
+    monkeypatch.setattr(staleness, "SceneState", read)
     for _ in range(3):
         list_bakes(scene, for_panel=True)
-    assert len(reads) == 1
+    assert read.call_count == 1
     handlers = len(bpy.app.handlers.depsgraph_update_post)
     monkeypatch.setattr(staleness, "TTL_READINGS", 1e6)
     for position in (2.0, 3.0):
         obj("Plain").location.x = position
         bpy.context.view_layer.update()
         (info,) = list_bakes(scene, for_panel=True)
-        assert info.stale_reason == ("'Plain' was moved" if len(reads) == 2 else "")
-        assert staleness.SCENE_STATES.seconds_to_wait() > 0 or len(reads) == 2
+        assert info.stale_reason == ("'Plain' was moved" if read.call_count == 2 else "")
+        assert staleness.SCENE_STATES.seconds_to_wait() > 0 or read.call_count == 2
     assert len(bpy.app.handlers.depsgraph_update_post) == handlers
     staleness.SCENE_STATES.clear()
     assert len(bpy.app.handlers.depsgraph_update_post) == handlers - 1

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+from objects import add_camera, aim
 from rosy.rosy_addon.annotation.key_contents import PictureKey
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.core.color import from_hex, to_linear
@@ -15,13 +16,18 @@ from rosy.rosy_addon.scene.camera_planes import update_backdrops
 from rosy.rosy_addon.scene.keys import round_length, text_triangles, update_keys
 from rosy.rosy_addon.scene.look_properties import apply_look
 from rosy.rosy_addon.scene.pictures import OutputSettings, show_bake
-from scenes import add_camera, aim, contents, pixels, render
+from scenes import contents, pixels, render
 
-LOOK = Look(hue="magnitude", singularity_dots="visible", supersampling=2)
+DOTS = {"singularity_dots": "visible", "supersampling": 2}
+LOOK = Look(hue="magnitude", ink="hatch", paper_color="#c08040", **DOTS)
+
+
+def planes(kind):
+    return [obj for obj in bpy.data.objects if obj.get(f"rosy_{kind}")]
 
 
 def keys():
-    return [obj for obj in bpy.data.objects if obj.get("rosy_key")]
+    return planes("key")
 
 
 def key_image(obj):
@@ -31,7 +37,7 @@ def key_image(obj):
 
 @pytest.fixture
 def colored(monkey, camera, scene):
-    """A scene whose look has colors by magnitude, and dots."""
+    """A scene whose look has colors by magnitude, dots, and brown paper."""
     apply_look(scene.rosy, LOOK)
     scene.render.resolution_x, scene.render.resolution_y = 320, 240
     return scene
@@ -55,26 +61,32 @@ def test_text_is_read_without_a_trace(scene):
 # --- the plane -----------------------------------------------------------------------------------
 
 
-def test_the_switch_shows_and_hides_the_key(colored):
+@pytest.mark.parametrize(("kind", "update"), [("key", update_keys), ("backdrop", update_backdrops)])
+def test_the_switch_shows_and_hides_the_plane(colored, kind, update):
     before = contents()
     bake(colored)
     baked = contents()
-    assert not keys()
-    colored.rosy.key = True
-    (obj,) = keys()
+    assert not planes(kind)
+    setattr(colored.rosy, kind, True)
+    (obj,) = planes(kind)
     assert obj.parent == colored.camera and obj.hide_select and not obj.visible_shadow
-    image = key_image(obj)
+    setattr(colored.rosy, kind, False)
+    assert contents() == baked
+    setattr(colored.rosy, kind, True)
+    bake(colored)
+    assert len(planes(kind)) == 1
+    remove_bakes(colored)
+    update(colored)
+    assert contents() == before
+
+
+def test_the_image_of_a_key(colored):
+    colored.rosy.key = True
+    bake(colored)
+    image = key_image(*keys())
     assert image.name == "RoSy Key Camera" and image.packed_file and tuple(image.size) == (320, 240)
     colored.rosy.key_caption = "A head"
     assert len(keys()) == 1 and len([i for i in bpy.data.images if "Key" in i.name]) == 1
-    colored.rosy.key = False
-    assert contents() == baked
-    colored.rosy.key = True
-    bake(colored)
-    assert len(keys()) == 1
-    remove_bakes(colored)
-    update_keys(colored)
-    assert contents() == before
 
 
 def test_a_key_is_not_listed_among_the_pictures(colored):
@@ -192,56 +204,25 @@ def test_renders_show_the_image_in_the_frame(colored, tmp_path, kind):
 
 # --- backdrops -----------------------------------------------------------------------------------
 
-PAPER = Look(ink="hatch", paper_color="#c08040")
 
-
-def backdrops():
-    return [obj for obj in bpy.data.objects if obj.get("rosy_backdrop")]
-
-
-@pytest.fixture
-def hatched(monkey, camera, scene):
-    """A scene whose look has brown paper."""
-    apply_look(scene.rosy, PAPER)
-    return scene
-
-
-def test_without_the_switch_or_without_paper_there_is_none(hatched):
-    bake(hatched)
-    assert not backdrops()
-    apply_look(hatched.rosy, Look())
-    hatched.rosy.backdrop = True
-    bake(hatched)
-    assert not backdrops()
-
-
-def test_the_switch_shows_and_hides_the_backdrop(hatched):
-    before = contents()
-    bake(hatched)
-    baked = contents()
-    hatched.rosy.backdrop = True
-    (obj,) = backdrops()
-    assert obj.parent == hatched.camera and obj.hide_select and not obj.visible_shadow
-    hatched.rosy.backdrop = False
-    assert contents() == baked
-    hatched.rosy.backdrop = True
-    remove_bakes(hatched)
-    update_backdrops(hatched)
-    assert contents() == before
+def test_without_paper_there_is_none(colored):
+    apply_look(colored.rosy, Look())
+    colored.rosy.backdrop = True
+    bake(colored)
+    assert not planes("backdrop")
 
 
 @pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
-def test_renders_show_paper_all_over_the_background(hatched, tmp_path, kind):
-    data = hatched.camera.data
+def test_renders_show_paper_all_over_the_background(colored, tmp_path, kind):
+    data = colored.camera.data
     data.type, data.ortho_scale, data.shift_x, data.shift_y = kind, 6.0, 0.3, 0.1
-    hatched.camera.scale = (2.0, 0.5, 3.0)
-    hatched.render.resolution_x = 192
-    hatched.rosy.backdrop = True
-    (result,) = bake(hatched)
-    rendered = render(hatched, tmp_path / "render.exr")
+    colored.camera.scale = (2.0, 0.5, 3.0)
+    colored.rosy.backdrop = True
+    (result,) = bake(colored)
+    rendered = render(colored, tmp_path / "render.exr")
     background = pixels(result.image)[..., 3] == 0
     for axis in (0, 1):  # without the pixels at the edge of the object
         background &= np.roll(background, 1, axis) & np.roll(background, -1, axis)
     assert 0.3 < background.mean() < 0.95
-    paper = [*to_linear(from_hex(PAPER.paper_color)), 1.0]
+    paper = [*to_linear(from_hex(LOOK.paper_color)), 1.0]
     np.testing.assert_allclose(rendered[background] - paper, 0, atol=1e-3)

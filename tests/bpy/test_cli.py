@@ -8,10 +8,10 @@ from pathlib import Path
 
 import bpy
 import pytest
+from objects import add_camera, animate
 from rosy.rosy_addon.cli.parser import main
 from rosy.rosy_addon.jobs.draw_strokes import draw_strokes
 from rosy.rosy_addon.line_drawing.svg import Pen
-from scenes import add_camera
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -198,10 +198,7 @@ def test_strokes_on_selected_objects_only(with_stroke_settings, rosy, tmp_path):
 
 
 def test_strokes_of_frames(with_stroke_settings, rosy, tmp_path):
-    monkey = bpy.data.objects["Suzanne"]
-    for frame, angle in ((1, 0.0), (3, 1.0)):
-        monkey.rotation_euler.z = angle
-        monkey.keyframe_insert("rotation_euler", frame=frame)
+    animate(bpy.data.objects["Suzanne"], "rotation_euler", {1: (0, 0, 0), 3: (0, 0, 1)})
     bpy.ops.wm.save_mainfile()
     options = "strokes", with_stroke_settings, "--set", "spacing=20", "--size", "120x90"
     succeed(rosy, *options, "--frames", "1-3:2", "-o", tmp_path / "out-###.svg")

@@ -5,57 +5,32 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon.jobs.bake import bake
-from rosy.rosy_addon.projection.project import project
-from rosy.rosy_addon.scene.cameras import camera_of_object
-from rosy.rosy_addon.scene.mesh_fields import read_mesh_field, write_mesh_field
-from rosy.rosy_addon.scene.scene_reader import SceneReader
-from scenes import (
+from objects import (
     add_field,
     add_monkey,
     add_plane,
     aim,
-    assert_same_directions,
-    depsgraph,
-    expect_error,
-    member_vectors,
-    read_instances,
-    read_live,
+    apply_modifiers,
+    select_only,
     set_attribute,
 )
+from rosy.rosy_addon.jobs.bake import bake
+from rosy.rosy_addon.scene.mesh_fields import read_mesh_field, write_mesh_field
+from rosy.rosy_addon.scene.scene_reader import SceneReader
+from scenes import assert_same_directions, expect_error, member_vectors, projected, read_until_rest
 
 #: Turned about all axes, so that no symmetry of the objects hides a mistake.
 ANGLES = (0.5, -0.3, 1.1)
 
 
-def projected(camera, instances=None):
-    instances = read_instances(depsgraph()) if instances is None else instances
-    return project(instances, camera_of_object(bpy.context.scene, depsgraph(), camera))
-
-
 def live_instances():
     reader = SceneReader()
-    read_live(reader)
-    reader.resolve_topologies(depsgraph())
-    return [entry.instance for entry in read_live(reader)], reader.errors
-
-
-def select_only(*objects):
-    bpy.ops.object.select_all(action="DESELECT")
-    for obj in objects:
-        obj.select_set(True)
-    bpy.context.view_layer.objects.active = objects[0]
+    return [entry.instance for entry in read_until_rest(reader)], reader.errors
 
 
 def apply_transform(obj):
     select_only(obj)
     bpy.ops.object.transform_apply(location=True, rotation=True, scale=True)
-
-
-def apply_modifiers(obj):
-    select_only(obj)
-    for modifier in list(obj.modifiers):
-        bpy.ops.object.modifier_apply(modifier=modifier.name)
 
 
 @pytest.mark.parametrize("form", ["VECTOR", "DIRECTIONS", "ANGLE"])

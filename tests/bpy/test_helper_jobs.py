@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from harness.steps import finished
+from objects import add_field, set_attribute
 from rosy.rosy_addon.field.combing import GuideBrush
 from rosy.rosy_addon.jobs.animation import bake_animation
 from rosy.rosy_addon.jobs.bake import bake
@@ -18,7 +19,7 @@ from rosy.rosy_addon.scene.pictures import OutputSettings
 from rosy.rosy_addon.worker.helper import Helper
 from rosy.rosy_addon.worker.job import run
 from rosy.rosy_addon.worker.step_runner import StepRunner
-from scenes import add_field, member_vectors, pixels, set_attribute
+from scenes import member_vectors, pixels
 
 
 @pytest.fixture(scope="module")

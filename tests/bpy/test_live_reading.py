@@ -2,33 +2,20 @@
 
 from __future__ import annotations
 
+from unittest.mock import Mock
+
 import bpy
 import numpy as np
 import pytest
+from objects import add_field, add_nodes, add_plane, link, set_attribute
 from rosy.rosy_addon.scene import scene_reader
 from rosy.rosy_addon.scene.scene_reader import SceneReader
-from scenes import (
-    add_field,
-    add_nodes,
-    add_plane,
-    contents,
-    depsgraph,
-    link,
-    member_vectors,
-    read_instances,
-    read_live,
-    set_attribute,
-)
+from scenes import contents, depsgraph, member_vectors, read_instances, read_live, read_until_rest
 
 
 def read(reader):
     """Read as the live view does until it rests, and return the names of the drawn objects."""
-    entries = read_live(reader)
-    if reader.has_unresolved:
-        reader.resolve_topologies(depsgraph())
-        entries = read_live(reader)
-    assert not reader.has_unresolved, "the scene would be read for ever"
-    return names_with_field(entries)
+    return names_with_field(read_until_rest(reader))
 
 
 def names_with_field(entries):
@@ -192,12 +179,8 @@ def test_faces_that_differ_at_each_evaluation_end_in_an_error(monkey, monkeypatc
 def test_too_little_memory_is_a_message(monkey, monkeypatch, mesh_kind):
     if mesh_kind == "remesh":
         monkey.modifiers.new("Subdivision", "SUBSURF")
-
-    def fail(*_, **__):
-        raise MemoryError
-
     for reader in ("read_mesh_field", "read_evaluated_field"):
-        monkeypatch.setattr(scene_reader, reader, fail)
+        monkeypatch.setattr(scene_reader, reader, Mock(side_effect=MemoryError))
     reader = SceneReader()
     assert read(reader) == [] and isinstance(reader.errors["Suzanne"], MemoryError)
 
@@ -208,9 +191,7 @@ def test_edit_mode_names_a_field_that_cannot_be_read(scene):
     bpy.context.view_layer.objects.active = plane
     bpy.ops.object.mode_set(mode="EDIT")
     reader = SceneReader()
-    try:
-        assert read(reader) == [] and "leave edit mode" in str(reader.errors["Plane"])
-    finally:
-        bpy.ops.object.mode_set(mode="OBJECT")
+    assert read(reader) == [] and "leave edit mode" in str(reader.errors["Plane"])
+    bpy.ops.object.mode_set(mode="OBJECT")
     reader.invalidate({"Plane"})
     assert read(reader) == ["Plane"] and not reader.errors

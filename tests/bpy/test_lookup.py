@@ -7,10 +7,11 @@ from itertools import product
 import bpy
 import numpy as np
 import pytest
+from objects import add_field, add_instance, add_plane, aim, link
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.core.color import to_display
 from rosy.rosy_addon.jobs.bake import bake
-from scenes import add_field, add_plane, aim, link, render
+from scenes import render
 
 #: No shading, so that only the picture is compared.
 LOOK = Look(shading=0.0)
@@ -57,10 +58,8 @@ def instances(scene, camera, monkey):
     scene.collection.objects.unlink(monkey)
     collection.objects.link(monkey)
     for x, angle in ((-0.9, 0.4), (0.9, -0.8)):
-        empty = link(bpy.data.objects.new("Instance", None))
-        empty.instance_type, empty.instance_collection = "COLLECTION", collection
-        empty.location, empty.rotation_euler = (x, 0, 0), (0, 0, angle)
-        empty.scale = (0.7, 0.7, 0.7)
+        empty = add_instance(collection, (x, 0, 0))
+        empty.rotation_euler.z, empty.scale = angle, (0.7, 0.7, 0.7)
 
 
 def shared_mesh(scene, camera, monkey):

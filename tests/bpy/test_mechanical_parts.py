@@ -9,12 +9,13 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
+from objects import link
 from rosy.rosy_addon.field.analysis import dirichlet_energy
 from rosy.rosy_addon.field.generate import generate
 from rosy.rosy_addon.field.singularities import find_singularities
 from rosy.rosy_addon.field.surface import build_surface
 from rosy.rosy_addon.scene.meshes import mesh_surface
-from scenes import depsgraph, link
+from scenes import depsgraph
 
 TURN = Matrix.Rotation(np.pi / 2, 4, "Y"), Matrix.Rotation(np.pi / 2, 4, "X"), Matrix.Identity(4)
 
@@ -97,11 +98,6 @@ def housing():
     return modified(body, "BEVEL", width=0.06, segments=2)
 
 
-def rounded_box():
-    body = without(block(3, 2, 1), rod(0.5, 3), rod(0.25, 3, 1, (1, 0, 0)))
-    return modified(body, "BEVEL", width=0.2, segments=4)
-
-
 def nut():
     return without(common(rod(1, 0.8, sides=6), rod(1, 0.8, end=0.95, sides=64)), rod(0.5, 3))
 
@@ -112,11 +108,6 @@ def crossing_cylinders():
 
 def common_part_of_cylinders():
     return common(*(rod(1, 3, axis, sides=48) for axis in range(3)))
-
-
-def plate():
-    holes = [rod(0.3, 1, at=(x, y, 0), sides=24) for x in (-1.2, 1.2) for y in (-0.7, 0.7)]
-    return modified(without(block(3.2, 2.2, 0.3), *holes), "BEVEL", width=0.05, segments=2)
 
 
 def gear():
@@ -141,7 +132,7 @@ def stepped_shaft():
 
 PARTS = (
     *(crossing_cylinders, common_part_of_cylinders, nut, flange, tee, valve, housing),
-    *(rounded_box, plate, gear, slotted_block, stepped_shaft),
+    *(gear, slotted_block, stepped_shaft),
 )
 
 

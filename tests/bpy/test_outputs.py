@@ -12,13 +12,14 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from objects import add_uv, link, load
 from rosy.rosy_addon.core.file_io import check_writable
 from rosy.rosy_addon.jobs.animation import bake_animation
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.jobs.bake_texture import bake_texture
 from rosy.rosy_addon.jobs.draw_strokes import draw_strokes
 from rosy.rosy_addon.scene.blender_images import new_image, new_tiled_image, write_images
-from scenes import add_uv, expect_error
+from scenes import expect_error
 
 OLD = b"the previous contents"
 
@@ -83,9 +84,7 @@ def test_all_files_that_drawing_reads_are_inputs(scene, wall, tmp_path):
     path = tmp_path / "saved.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"), copy=True)
-    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, linked):
-        linked.worlds = []
-        linked.objects = [wall.name]
+    load(tmp_path / "library.blend", wall.name, link=True)
     names = ("tone.png", "render_0001.png", "cache.abc", "volume.vdb")
     for name in names:
         (tmp_path / name).write_bytes(OLD)
@@ -118,8 +117,7 @@ def test_all_tiles_are_checked_first(scene, wall, out):
     """Also before the texture of another object is replaced."""
     wall.name = "Wall"
     add_uv(wall.data)
-    other = bpy.data.objects.new("Before", wall.data.copy())
-    scene.collection.objects.link(other)
+    other = link(bpy.data.objects.new("Before", wall.data.copy()))
     (out / "RoSy_Wall_texture.1002.png").mkdir()
     for name in ("RoSy_Wall_texture.1001.png", "RoSy_Before_texture.1001.png"):
         (out / name).write_bytes(OLD)
@@ -168,9 +166,10 @@ def test_a_full_disk_leaves_the_old_picture(kind, missing, tmp_path):
 
 KILLED = """
 import sys
-sys.path[:0] = sys.argv[1].split(":")
-import conftest
 from pathlib import Path
+tests = Path(sys.argv[1])
+sys.path[:0] = map(str, (tests, tests.parent, tests.parent / "unit"))
+import conftest
 from test_outputs import new_image, noise
 pixels = noise(2048)
 print("begin", flush=True)
@@ -179,9 +178,9 @@ new_image("a", pixels, stem=Path(sys.argv[2]))
 
 
 def test_a_killed_process_leaves_the_old_picture(tmp_path):
-    path, tests = tmp_path / "a.exr", Path(__file__).resolve().parent
+    path = tmp_path / "a.exr"
     path.write_bytes(OLD)
-    command = [sys.executable, "-c", KILLED, f"{tests}:{tests.parent}", path.with_suffix("")]
+    command = [sys.executable, "-c", KILLED, Path(__file__).parent, path.with_suffix("")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout.readline() == "begin\n"
         while sum(file.stat().st_size for file in tmp_path.iterdir()) < 1_000_000:

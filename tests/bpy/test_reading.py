@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+from unittest.mock import Mock
+
 import bmesh
 import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
+from objects import add_field, add_instance, add_light, add_mesh, add_plane, aim, set_attribute
 from rosy.rosy_addon.core.errors import RosyWarning
 from rosy.rosy_addon.field.directional_field import field_directions, field_from_directions
-from rosy.rosy_addon.field.frames import normalize
 from rosy.rosy_addon.field.generate import axis_field
 from rosy.rosy_addon.field.representation import face_representation
 from rosy.rosy_addon.field.rosy_field import RosyField
-from rosy.rosy_addon.projection.project import project
 from rosy.rosy_addon.scene import scene_reader
-from rosy.rosy_addon.scene.cameras import camera_of_object
 from rosy.rosy_addon.scene.evaluated_field import TEMP_FIELD_ATTRIBUTE
 from rosy.rosy_addon.scene.field_attributes import has_field
 from rosy.rosy_addon.scene.guides import read_combed_guides
@@ -24,18 +24,13 @@ from rosy.rosy_addon.scene.meshes import EDGE_MARKS, mark_sharp, marked_edges, m
 from rosy.rosy_addon.scene.read_view import read_lights
 from rosy.rosy_addon.scene.visible_objects import field_objects
 from scenes import (
-    add_field,
-    add_mesh,
-    add_plane,
-    aim,
     assert_same_directions,
     contents,
     depsgraph,
     expect_error,
-    link,
     member_vectors,
+    projected,
     read_instances,
-    set_attribute,
 )
 
 
@@ -46,17 +41,21 @@ def representation(mesh, field):
 # --- attributes ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("degree", [1, 2, 5, 12])
-def test_fields_are_written_and_read(monkey, degree):
+@pytest.mark.parametrize(
+    ("form", "degree"),
+    [*(("VECTOR", degree) for degree in (1, 2, 5, 12)), ("DIRECTIONS", 4), ("ANGLE", 4)],
+)
+def test_fields_are_written_and_read(monkey, form, degree):
     mesh = monkey.data
-    surface = mesh_surface(mesh)
-    x, _ = surface.face_frames
-    write_mesh_field(mesh, RosyField(degree, 3 * x), "other")
-    assert (mesh.rosy.degree, mesh.rosy.attribute) == (degree, "other")
-    field = read_mesh_field(mesh)
-    assert field.degree == degree
-    np.testing.assert_allclose(field.vectors, 3 * x, atol=1e-5)
-    assert read_mesh_field(mesh, "rosy", 4).degree == 4
+    mesh.attributes.remove(mesh.attributes["rosy"])
+    length = 1 if form == "ANGLE" else 3
+    field = RosyField(degree, length * mesh_surface(mesh).face_frames[0])
+    write_mesh_field(mesh, field, "other", form)
+    assert mesh.attributes["dir3" if form == "DIRECTIONS" else "other"].domain == "FACE"
+    again = read_mesh_field(mesh)
+    assert again.degree == mesh.rosy.degree == degree
+    z, expected = representation(mesh, again), representation(mesh, field)
+    np.testing.assert_allclose(z, expected, atol=1e-4)
 
 
 def test_surface_agrees_with_blender(monkey):
@@ -150,23 +149,6 @@ def test_directions_are_kept_by_modifiers(scene):
     assert sorted(attribute.name for attribute in plane.data.attributes) == names
 
 
-@pytest.mark.parametrize("form", ["VECTOR", "DIRECTIONS", "ANGLE"])
-def test_storage_forms_are_read_again(scene, monkey, form):
-    mesh = monkey.data
-    surface = mesh_surface(mesh)
-    field = read_mesh_field(mesh)
-    field = RosyField(field.degree, normalize(field.vectors))
-    mesh.attributes.remove(mesh.attributes["rosy"])
-    name = "turn" if form == "ANGLE" else "rosy"
-    write_mesh_field(mesh, field, name, form)
-    assert mesh.attributes[name if form != "DIRECTIONS" else "dir3"].domain == "FACE"
-    again = read_mesh_field(mesh, nonfinite="zero")
-    defined = again.magnitude > 0
-    assert defined.mean() > 0.95 and again.degree == 4
-    z, expected = (face_representation(surface, each)[defined] for each in (again, field))
-    np.testing.assert_allclose(z, expected, atol=1e-4)
-
-
 def test_directions_replace_an_earlier_field(scene):
     plane = add_plane(cuts=2)
     surface = mesh_surface(plane.data)
@@ -200,9 +182,7 @@ def test_one_surface_for_all_instances(scene, monkey):
     scene.collection.objects.unlink(monkey)
     collection.objects.link(monkey)
     for x in range(3):
-        empty = link(bpy.data.objects.new("Instance", None))
-        empty.instance_type, empty.instance_collection = "COLLECTION", collection
-        empty.location.x = 3.0 * x
+        add_instance(collection, (3.0 * x, 0.0, 0.0))
     instances = read_instances(depsgraph())
     assert len(instances) == 3
     assert len({id(instance.surface) for instance in instances}) == 1
@@ -232,15 +212,12 @@ def test_an_occluder_hides_pixels(scene, camera):
     far = add_field(add_plane("Far"), kind="axis")
     near = add_plane("Near", size=0.4)
     near.location.y = -1.0
-    graph = depsgraph()
-    view = camera_of_object(scene, graph, camera)
-    with_field = [instance for instance in read_instances(graph) if instance.field]
-    all_pixels = len(project(with_field, view).pixel)
-    visible_pixels = len(project(read_instances(graph), view).pixel)
-    assert 0 < visible_pixels < all_pixels
+    with_field = [instance for instance in read_instances(depsgraph()) if instance.field]
+    visible_pixels = len(projected(camera).pixel)
+    assert 0 < visible_pixels < len(projected(camera, with_field).pixel)
     add_field(near, kind="axis").rosy.include = False
     assert field_objects(bpy.context.view_layer) == [far]
-    assert len(project(read_instances(graph), view).pixel) == visible_pixels
+    assert len(projected(camera).pixel) == visible_pixels
 
 
 def test_reading_changes_nothing(scene, monkey):
@@ -256,16 +233,13 @@ def test_the_field_has_no_preferred_member(scene, camera, monkey, modifier):
     """Whichever member is stored on a face, the picture is the same, also with modifiers."""
     if modifier:
         monkey.modifiers.new("Modifier", modifier).levels = 2
-    graph = depsgraph()
-    view = camera_of_object(scene, graph, camera)
-    first = project(read_instances(graph), view)
-    mesh = monkey.data
+    first, mesh = projected(camera), monkey.data
     surface = mesh_surface(mesh)
     vectors = member_vectors(mesh).astype(np.float64)
     across = np.cross(surface.face_normal, vectors)
     angle = (np.arange(len(vectors)) % 4 * np.pi / 2)[:, None]
     set_attribute(mesh, np.cos(angle) * vectors + np.sin(angle) * across)
-    second = project(read_instances(depsgraph()), view)
+    second = projected(camera)
     np.testing.assert_array_equal(first.pixel, second.pixel)
     scale = np.abs(first.representation).max()
     assert np.abs(first.representation - second.representation).max() < 1e-4 * scale
@@ -295,13 +269,11 @@ def test_the_field_follows_a_deformation(scene, camera, monkey, deform):
     rotation = Matrix.Rotation(0.7, 3, (0.3, 0.5, 0.8))
     monkey.rotation_mode = "QUATERNION"
     monkey.rotation_quaternion = rotation.to_quaternion()
-    graph = depsgraph()
-    view = camera_of_object(scene, graph, camera)
-    expected = project(read_instances(graph), view)
+    bpy.context.view_layer.update()
+    expected = projected(camera)
     monkey.rotation_quaternion = (1, 0, 0, 0)
     deform(monkey, rotation)
-    deformed = project(read_instances(depsgraph()), view)
-    assert_same_directions(expected, deformed, degrees=0.1, percentile=98)
+    assert_same_directions(expected, projected(camera), degrees=0.1, percentile=98)
 
 
 def test_mirrored_and_moved_copies(scene, camera):
@@ -311,8 +283,7 @@ def test_mirrored_and_moved_copies(scene, camera):
         vertex.co.x += 1.5
     plane.modifiers.new("Mirror", "MIRROR")
     aim(camera, (0.0, -12.0, 0.0))
-    graph = depsgraph()
-    buffer = project(read_instances(graph), camera_of_object(scene, graph, camera), "flat")
+    buffer = projected(camera, display="flat")
     left = buffer.position[:, 0] < 0
     expected = np.where(left, np.pi, 0) + np.where(left, -1, 1) * np.arctan2(0.5, 1.0)
     angle = np.angle(buffer.representation * np.exp(-1j * expected))
@@ -335,10 +306,7 @@ def test_evaluated_fields_of_other_forms(scene, monkey):
 
 def test_lights(scene):
     for kind, energy in (("SUN", np.pi), ("POINT", 4 * np.pi**2), ("AREA", 1.0), ("SPOT", 1.0)):
-        data = bpy.data.lights.new(kind, kind)
-        data.energy, data.color = energy, (1.0, 0.5, 0.25)
-        obj = link(bpy.data.objects.new(kind, data))
-        obj.location = (0, 0, 3)
+        add_light(kind, kind, energy, (0, 0, 3)).data.color = (1.0, 0.5, 0.25)
     view = np.eye(4)
     view[2, 3] = -5.0
     lights = sorted(
@@ -408,11 +376,7 @@ def test_an_error_while_reading_leaves_nothing(scene, monkey, monkeypatch, faili
     """Nothing is left of the attributes that modifiers copy while a scene is read."""
     monkey.modifiers.new("Subdivision", "SUBSURF")
     before = contents()
-
-    def fail(*_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(scene_reader, failing, fail)
+    monkeypatch.setattr(scene_reader, failing, Mock(side_effect=KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
         scene_reader.read_scene(depsgraph())
     assert contents() == before

@@ -5,11 +5,12 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+from objects import add_camera, add_field, add_plane, apply_modifiers, link, load, select_only
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.scene.bake_records import has_pictures, list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import scene_cameras
 from rosy.rosy_addon.scene.pictures import show_bake
-from scenes import add_camera, add_field, add_plane, contents, empty_scene, link, reopen
+from scenes import contents, empty_scene, reopen
 from test_up_to_date import deferred, exclude, obj
 
 
@@ -33,16 +34,10 @@ def build(folder=None):
     return scene
 
 
-def select(*names):
-    for other in bpy.context.scene.objects:
-        other.select_set(other.name in names)
-    bpy.context.view_layer.objects.active = obj(names[-1])
-
-
 @deferred
 def selected(tmp_path, operator, *names):
     """An action: call an operator for some objects."""
-    select(*names)
+    select_only(*map(obj, names))
     operator()
 
 
@@ -55,9 +50,7 @@ def rename(tmp_path):
 @deferred
 def apply(tmp_path, *names):
     for name in names:
-        select(name)
-        for modifier in list(obj(name).modifiers):
-            bpy.ops.object.modifier_apply(modifier=modifier.name)
+        apply_modifiers(obj(name))
 
 
 @deferred
@@ -89,8 +82,8 @@ FUNCTIONS = rename, unlink, copy_modifier, save_and_open, bake_with_another_came
 ACTIONS = {function.__name__: function for function in FUNCTIONS}
 ACTIONS |= {
     "nothing": lambda _: None,
-    "duplicate": selected(bpy.ops.object.duplicate, "Sheet", "Plain"),
-    "join": selected(bpy.ops.object.join, "Plain", "Sheet"),
+    "duplicate": selected(bpy.ops.object.duplicate, "Plain", "Sheet"),
+    "join": selected(bpy.ops.object.join, "Sheet", "Plain"),
     "delete": selected(bpy.ops.object.delete, "Plain"),
     "delete_camera": selected(bpy.ops.object.delete, "Second"),
 }
@@ -144,7 +137,7 @@ def test_an_appended_object(applied, tmp_path):
     path = baked_file(tmp_path, *(["Plain"] if applied else []))
     scene = build()
     bake(scene)
-    append(path)
+    link(load(path, "Plain"))
     appended = obj("Plain.001")
     infos = list_bakes(scene)
     assert [(info.width, info.height, info.is_shown) for info in infos] == [(24, 24, True)] * 2
@@ -166,16 +159,10 @@ def baked_file(tmp_path, *applied):
     return tmp_path / "baked.blend"
 
 
-def append(path, **options):
-    with bpy.data.libraries.load(str(path), **options) as (_, target):
-        target.objects = ["Plain"]
-    link(target.objects[0])
-
-
 def test_an_appended_object_takes_part_in_the_next_bake(tmp_path):
     path = baked_file(tmp_path)
     scene = build()
-    append(path)
+    link(load(path, "Plain"))
     (info,) = list_bakes(scene)
     assert info.unknown_reason == "baked in another file or scene"
     bake(scene)
@@ -199,7 +186,7 @@ def test_a_camera_that_is_still_in_use_stays():
 def test_a_linked_object_is_left_alone(tmp_path):
     path = baked_file(tmp_path)
     scene = build()
-    append(path, link=True)
+    link(load(path, "Plain", link=True))
     before = contents()
     assert not has_pictures(scene) and not list_bakes(scene)
     remove_bakes(scene)
@@ -210,7 +197,7 @@ def test_an_override_shows_the_picture_of_its_library_again(tmp_path):
     path = baked_file(tmp_path)
     scene = empty_scene(24)
     scene.camera = add_camera()
-    append(path, link=True)
+    link(load(path, "Plain", link=True))
     override = obj("Plain").override_create(remap_local_usages=True)
     bpy.context.view_layer.update()
     group = override.modifiers["RoSy"].node_group
@@ -269,7 +256,7 @@ def test_a_duplicate_shows_the_picture_of_another_camera(tmp_path):
     scene = build()
     bake(scene, cameras=scene_cameras(scene))
     rename(tmp_path)
-    select("My Plain")
+    select_only(obj("My Plain"))
     bpy.ops.object.duplicate()
     show_bake(scene, "Second")
     shown = {info.camera: info.is_shown for info in list_bakes(scene)}

@@ -7,12 +7,13 @@ import json
 import bpy
 import numpy as np
 import pytest
+from objects import add_field, add_light, apply_modifiers, link
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.jobs.bake_texture import bake_texture
 from rosy.rosy_addon.scene.bake_records import list_bakes, remove_bakes
 from rosy.rosy_addon.scene.pictures import show_bake
 from rosy.rosy_addon.surface_texture import line_order
-from scenes import add_field, contents, depsgraph, expect_error, render, reopen
+from scenes import contents, depsgraph, expect_error, render, reopen
 
 
 @pytest.fixture
@@ -102,9 +103,8 @@ def test_baking_again_replaces_the_texture(scene, textured):
 
 def test_copies_share_a_texture_until_they_are_baked(scene, textured):
     """Then each has its own. The texture follows an object that is renamed."""
-    copy = textured.copy()
+    copy = link(textured.copy())
     copy.data = textured.data.copy()
-    scene.collection.objects.link(copy)
     textured.name = "Renamed"
     bpy.context.view_layer.update()
     assert [info.camera for info in list_bakes(scene)] == ["Renamed"]
@@ -144,8 +144,7 @@ def test_tiles_are_pictures_of_their_own(scene, textured, tmp_path):
     assert [tile.number for tile in result.image.tiles] == numbers
     assert stale_reason(scene) == ""
     name = textured.name
-    bpy.ops.object.light_add(type="SUN", rotation=(1.2, 0.0, 0.0))
-    bpy.context.object.data.energy = 5.0
+    add_light("Sun", "SUN", 5.0).rotation_euler.x = 1.2
     scene = reopen(tmp_path / "saved.blend")
     (image,) = (image for image in bpy.data.images if image.source == "TILED")
     assert all(file.filepath.startswith("//RoSy ") for file in image.packed_files)
@@ -186,9 +185,7 @@ def test_light_can_be_baked(scene, textured):
     scene.rosy.look.ink, scene.rosy.look.shading = "hatch", 1.0
     scene.rosy.texture_bake_light = True
     expect_error("'Scene' has no lights", bake_texture, scene, [textured])
-    lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "SUN"))
-    scene.collection.objects.link(lamp)
-    means = []
+    lamp, means = add_light("Lamp", "SUN", 1.0), []
     for strength in (0.3, 1.0):
         lamp.data.energy = strength * np.pi
         bpy.context.view_layer.update()
@@ -232,9 +229,7 @@ def test_exporters_take_textures_along(scene, textured, tmp_path):
     bpy.ops.export_scene.fbx(filepath=str(path), path_mode="COPY", embed_textures=True)
     assert b"\x89PNG" in path.read_bytes()
     # The exporter of USD takes materials from slots.
-    with bpy.context.temp_override(object=textured):
-        for modifier in list(textured.modifiers):
-            bpy.ops.object.modifier_apply(modifier=modifier.name)
+    apply_modifiers(textured)
     bpy.ops.wm.usd_export(filepath=str(tmp_path / "look.usda"))
     assert "UsdUVTexture" in (tmp_path / "look.usda").read_text()
     assert [file.suffix for file in (tmp_path / "textures").iterdir()] == [".png"]

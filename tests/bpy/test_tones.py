@@ -1,4 +1,4 @@
-"""Sources of tone in Blender: attributes, images, reference renders, shadows and occlusion."""
+"""Sources of tone in Blender: attributes, images, reference renders, shadows and occlusion; and colors of numbers."""
 
 from __future__ import annotations
 
@@ -9,11 +9,14 @@ import bpy
 import numpy as np
 import pytest
 from harness.blender_data import attribute_values
+from objects import add_field, add_mesh, add_uv, set_attribute
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.core.color import to_linear
 from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.jobs.animation import bake_animation
 from rosy.rosy_addon.jobs.bake import bake
+from rosy.rosy_addon.jobs.bake_texture import bake_texture
+from rosy.rosy_addon.scene.bake_records import list_bakes
 from rosy.rosy_addon.scene.computed_attributes import OCCLUSION_ATTRIBUTE, store_occlusion
 from rosy.rosy_addon.scene.look_inputs import (
     ReadRequest,
@@ -21,8 +24,10 @@ from rosy.rosy_addon.scene.look_inputs import (
     load_reference,
 )
 from rosy.rosy_addon.scene.pictures import read_output_settings
+from rosy.rosy_addon.scene.read_view import read_turntable
 from rosy.rosy_addon.scene.scene_reader import SceneReader, read_scene
-from scenes import add_field, add_mesh, add_uv, depsgraph, expect_error, read_live, set_attribute
+from scenes import depsgraph, expect_error, read_live
+from test_bad_input import assert_refused
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
@@ -166,25 +171,18 @@ def test_pictures_from_files(scene, wall, tmp_path):
 
 
 def test_unsuitable_pictures(scene, wall, tmp_path):
-    def error(path):
-        scene.rosy.tone_picture = str(path)
-        with pytest.raises(RosyError) as caught:
-            bake(scene, look=PICTURE, size=(64, 64))
-        assert "\n" not in str(caught.value)
-        return str(caught.value)
-
-    images = set(bpy.data.images)
-    assert "choose a file" in error("")
-    assert "none.png" in error(tmp_path / "none.png")
     (tmp_path / "text.png").write_text("no picture")
-    assert "text.png" in error(tmp_path / "text.png")
     os.mkfifo(tmp_path / "pipe.png")
-    assert "pipe.png: cannot be read: it is not a regular file" in error(tmp_path / "pipe.png")
-    assert set(bpy.data.images) == images
     save_picture(tmp_path / "wide.png", np.zeros((16, 32)))
-    message = error(tmp_path / "wide.png")
-    assert "wide.png" in message and "32 x 16" in message and "128 x 128" in message
-    assert not scene.rosy.bakes
+    for path, *words in (
+        ("", "choose a file"),
+        (tmp_path / "none.png", "none.png"),
+        (tmp_path / "text.png", "text.png"),
+        (tmp_path / "pipe.png", "pipe.png: cannot be read: it is not a regular file"),
+        (tmp_path / "wide.png", "wide.png", "32 x 16", "128 x 128"),
+    ):
+        scene.rosy.tone_picture = str(path)
+        assert_refused(*words, look=PICTURE, size=(64, 64))
 
 
 def test_animations_take_the_picture_of_each_frame(scene, wall, tmp_path):
@@ -267,3 +265,69 @@ def test_occlusion_does_not_replace_other_attributes(scene, wall):
     message = "mesh 'Plane' already has an attribute 'Occlusion'"
     expect_error(message, store_occlusion, depsgraph(), [wall], direction_count=4)
     assert wall.data.attributes[OCCLUSION_ATTRIBUTE].data[3].value == 3
+
+
+# --- numbers as colors ----------------------------------------------------------------------------
+
+
+def set_values(mesh, values, name="Angle"):
+    set_attribute(mesh, values, name, kind="FLOAT")
+
+
+def values_of(name, obj):
+    scene_data = read_scene(depsgraph(), None, ReadRequest(color_attribute=name))
+    return scene_data.instances[scene_data.objects.index(obj)].color_values
+
+
+def test_numbers_that_are_not_finite_are_none(wall, monkey):
+    set_values(wall.data, [np.nan, np.inf, 2.0, 3.0])
+    expected = np.repeat([np.nan, np.nan, 2.0, 3.0], 4)
+    np.testing.assert_array_equal(values_of("Angle", wall), expected)
+    assert values_of("Angle", monkey) is None
+
+
+def test_mistakes_are_one_line_that_lists_the_attributes(wall):
+    set_values(wall.data, np.zeros(4), name="Error")
+    only = "'Error'$"
+    expect_error(f"^'Plane': there is no attribute 'Angel' .*only {only}", values_of, "Angel", wall)
+    expect_error(f"^'Plane': choose an attribute for the colors.*: {only}", values_of, "", wall)
+    expect_error("object 'Plane', attribute 'rosy': expected a number", values_of, "rosy", wall)
+
+
+@pytest.fixture
+def colored(scene, wall):
+    """The wall with a number on each face, drawn in flat colors."""
+    set_values(wall.data, [0.0, 1.0, 2.0, np.nan])
+    look = scene.rosy.look
+    look.hue, look.gain, look.shading, scene.rosy.color_attribute = "values", 0.0, 0.0, "Angle"
+    return wall
+
+
+def test_turntables_have_the_numbers(scene, colored):
+    instance, _ = read_turntable(scene, depsgraph(), colored, Look(hue="values"))
+    assert np.isfinite(instance.color_values).sum() == 12
+
+
+def test_textures(scene, colored):
+    add_uv(colored.data)
+    scene.rosy.texture_size, scene.rosy.texture_margin = 64, 0
+    bake_texture(scene, [colored])
+    (info,) = list_bakes(scene)
+    assert info.stale_reason == ""
+    set_values(colored.data, [0.0, 1.5, 2.0, 0.0])
+    (info,) = list_bakes(scene)
+    assert "'Plane' was changed" in info.stale_reason
+    bake_texture(scene, [colored])
+    scene.rosy.color_attribute = ""
+    expect_error("choose an attribute", bake_texture, scene, [colored])
+    # The thresholds of hatching have no color.
+    scene.rosy.look.ink = "hatch"
+    bake_texture(scene, [colored])
+
+
+def test_relit_hatching_needs_no_numbers(scene, colored):
+    scene.rosy.color_attribute = "none"
+    scene.rosy.look.ink = "hatch"
+    expect_error("no attribute 'none'", bake, scene)
+    scene.rosy.relight = True
+    bake(scene)

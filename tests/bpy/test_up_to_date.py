@@ -13,6 +13,16 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
+from objects import (
+    add_camera,
+    add_field,
+    add_instance,
+    add_light,
+    add_plane,
+    animate,
+    link,
+    set_attribute,
+)
 from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.gpu.select import automatic_device
 from rosy.rosy_addon.image_io.png import png_bytes
@@ -21,7 +31,7 @@ from rosy.rosy_addon.projection.camera import look_at, perspective_camera
 from rosy.rosy_addon.scene import staleness
 from rosy.rosy_addon.scene.bake_records import list_bakes
 from rosy.rosy_addon.scene.cameras import VIEW_NAME
-from scenes import add_camera, add_field, add_plane, empty_scene, link, pixels, set_attribute
+from scenes import empty_scene, pixels
 
 SIZE = 40
 
@@ -43,9 +53,7 @@ def build(tmp_path):
     add_plane("In Front", size=0.25).location = (-0.4, -1.0, 0.2)
     add_plane("Behind", size=3.0).location = (0.0, 2.0, 0.0)
     add_plane("Aside", size=0.2).location = (30.0, -1.0, 0.0)
-    lamp = link(bpy.data.objects.new("Key", bpy.data.lights.new("Key", "POINT")))
-    lamp.data.energy = 300.0
-    lamp.location = (2.0, -3.0, 3.0)
+    add_light("Key", "POINT", 300.0, (2.0, -3.0, 3.0))
     scene.rosy.directory = str(tmp_path)
     bpy.context.view_layer.update()
     return scene
@@ -130,10 +138,7 @@ def subdivided(scene):
 
 
 def animated(scene):
-    lift = obj("Plain")
-    lift.keyframe_insert("location", frame=1)
-    lift.location.z += 1.0
-    lift.keyframe_insert("location", frame=11)
+    animate(obj("Plain"), "location", {1: (0.9, 0.0, 0.9), 11: (0.9, 0.0, 1.9)})
     scene.frame_set(1)
 
 
@@ -147,9 +152,7 @@ def tracked(scene):
 def instanced(scene):
     collection = bpy.data.collections.new("Copies")
     collection.objects.link(obj("Plain"))
-    copies = link(bpy.data.objects.new("Copies", None))
-    copies.instance_type, copies.instance_collection = "COLLECTION", collection
-    copies.location = (-1.6, 0.0, 0.0)
+    add_instance(collection, (-1.6, 0.0, 0.0)).name = "Copies"
 
 
 def relit(scene):
@@ -189,10 +192,8 @@ def delete(name):
     return lambda scene: bpy.data.objects.remove(obj(name))
 
 
-def add_light(scene):
-    lamp = link(bpy.data.objects.new("Fill", bpy.data.lights.new("Fill", "SUN")))
-    lamp.data.energy = 2.0
-    lamp.rotation_euler.x = 1.0
+def add_fill(scene):
+    add_light("Fill", "SUN", 2.0).rotation_euler.x = 1.0
 
 
 @deferred
@@ -252,10 +253,6 @@ def exclude(scene, name):
     bpy.context.view_layer.layer_collection.children["Away"].exclude = True
 
 
-def frame(number):
-    return lambda scene: scene.frame_set(number)
-
-
 def there_and_back(scene):
     obj("Plain").location.x += 0.5
     bpy.context.view_layer.update()
@@ -297,7 +294,7 @@ TABLE = {
     "smooth shading": (shade_smooth("Sheet"), bend(1.0), "'Sheet' was changed"),
     "instances moved": (move("Copies", 0.2, 0.0, 0.0), instanced, "'Plain' was moved"),
     "instances removed": (delete("Copies"), instanced, "'Plain' was"),
-    "frame of an animation": (frame(6), animated, "'Plain' was moved"),
+    "frame of an animation": (put("frame_current", 6), animated, "'Plain' was moved"),
     # occluders
     "occluder moved": (move("In Front", 0.2, 0.0, 0.0), None, "'In Front' was moved"),
     "occluder behind moved": (move("Behind", 0.2, 0.5, 0.0), None, ""),
@@ -311,7 +308,7 @@ TABLE = {
     "lamp moved": (move("Key", -2.0, 0.0, 0.0), scene_lights, "light 'Key' was changed"),
     "lamp turned": (put("Key:rotation_euler", (1.0, 0.0, 0.0)), scene_lights, ""),
     "lamp renamed": (put("Key:name", "Lamp"), scene_lights, ""),
-    "lamp added": (add_light, scene_lights, "light 'Fill' was added"),
+    "lamp added": (add_fill, scene_lights, "light 'Fill' was added"),
     "lamp deleted": (delete("Key"), scene_lights, "light 'Key' was deleted"),
     "lamp energy with a headlight": (put("Key:data.energy", 900.0), None, ""),
     # look

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import pyvista as pv
-from extras.rotations import rotation
 from harness.errors import error_of as error_of
 
 from rosy_addon.extras.command_line import main
@@ -28,7 +27,7 @@ def sphere() -> pv.PolyData:
     """A unit sphere of triangles with the rotation about z at its points."""
     mesh = pv.Icosphere(nsub=3)
     mesh.clear_data()
-    mesh.point_data["rotation"] = rotation(mesh.points)
+    mesh.point_data["rotation"] = np.cross((0, 0, 1), mesh.points)
     return mesh
 
 

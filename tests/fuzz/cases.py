@@ -17,7 +17,7 @@ from numpy.random import Generator
 from .damage import damaged, random_word
 from .files import FIELD_SUFFIXES, field_bytes, guide_bytes, png_bytes, preset_bytes
 from .links import link_case
-from .meshes import WRITERS, Polygons, closed_mesh, mesh_bytes, random_mesh
+from .meshes import WRITERS, Polygons, closed_mesh, mesh_bytes, random_mesh, with_texture_rows
 from .names import hostile_stem, hostile_text
 from .options import random_options
 from .signals import write_command
@@ -261,10 +261,7 @@ def _texture_case(rng: Generator, folder: Path) -> Case:
         data = mesh_bytes(rng, ".obj", mesh)
         if rng.random() < 0.5:  # few values, so that corners coincide
             scale = 10.0 ** rng.uniform(-6, 6)
-            rows = [b"vt %.9g %.9g" % (scale * x, scale * y) for x, y in rng.random((9, 2))]
-            lines = data.split(b"\n")
-            lines = [rows[i % 9] if line[:2] == b"vt" else line for i, line in enumerate(lines)]
-            data = b"\n".join(lines)
+            data = with_texture_rows(data, scale * rng.random((9, 2)))
     inputs = [_write(rng, folder, "mesh.obj", data)]
     if rng.random() < 0.3:
         inputs.append(_write_field(rng, folder, mesh))

@@ -116,7 +116,7 @@ def _fork(case: Case, folder: Path, streams: list[Path]) -> int:
 
 def _start_process(case: Case, folder: Path, streams: list[Path]) -> int:
     """Start a case as ``python -m rosy_addon``. Return the number of the process."""
-    read_end, temporary = None, folder.with_suffix(".tmp")
+    temporary = folder.with_suffix(".tmp")
     temporary.mkdir()
     with streams[0].open("wb") as stdout, streams[1].open("wb") as stderr:
         output = stdout

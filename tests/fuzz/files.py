@@ -13,6 +13,7 @@ from numpy.random import Generator
 
 from rosy_addon.compositor.look import Look
 from rosy_addon.core.settings import settings_of
+from rosy_addon.image_io.png import _pack_chunk
 
 from .meshes import Polygons
 from .options import setting_value
@@ -142,10 +143,7 @@ def png_bytes(rng: Generator, size: tuple[int, int] | None = None) -> bytes:
     if rng.random() < 0.05:
         del chunks[rng.integers(len(chunks))]
     data = b"\x89PNG\r\n\x1a\n"
-    for kind, content in chunks:
-        data += struct.pack(">I", len(content)) + kind + content
-        data += struct.pack(">I", zlib.crc32(kind + content))
-    return data
+    return data + b"".join(_pack_chunk(kind, content) for kind, content in chunks)
 
 
 _OTHER_VALUES = (None, [], {}, [1], "", "nan", True, -1, 10**400, 1e308, "\x1b[31m", "\u202e", 0.1)

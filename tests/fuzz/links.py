@@ -9,7 +9,7 @@ import numpy as np
 from numpy.random import Generator
 
 from ..unit.awkward import cube
-from .meshes import mesh_bytes, random_mesh
+from .meshes import mesh_bytes, random_mesh, with_texture_rows
 
 #: Commands with options, the suffixes of their outputs, and how often they occur.
 COMMANDS = {
@@ -95,13 +95,8 @@ def _make_link(rng: Generator, folder: Path, name: str, inputs: list[str]) -> st
 
 def _make_tiles(rng: Generator, folder: Path, inputs: list[str]) -> None:
     """Spread the UV map over a few tiles. Make links, folders, pipes and files of their names."""
-    mesh, places = folder / "mesh.obj", 2 * rng.random((9, 2))
-    rows = mesh.read_bytes().split(b"\n")
-    rows = [
-        b"vt %.6g %.6g" % tuple(places[i % 9]) if row.startswith(b"vt") else row
-        for i, row in enumerate(rows)
-    ]
-    mesh.write_bytes(b"\n".join(rows))
+    mesh = folder / "mesh.obj"
+    mesh.write_bytes(with_texture_rows(mesh.read_bytes(), 2 * rng.random((9, 2))))
     for number in (1001, 1002, 1011, 1012):
         name, kind = f"out.{number}.png", rng.random()
         if kind < 0.5:

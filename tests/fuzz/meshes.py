@@ -131,8 +131,11 @@ def _prism(rng: Generator) -> Polygons:
 
 
 def _ring(rng: Generator) -> Polygons:
-    """A torus of quads."""
-    columns, rows = (int(count) for count in rng.integers(3, 16, 2))
+    return torus(*rng.integers(3, 16, 2).tolist())
+
+
+def torus(columns: int, rows: int) -> Polygons:
+    """Return a torus of quads."""
     u, v = (part.ravel() for part in np.indices((columns, rows)))
     tube = 2 * np.pi * v / rows
     radius, around = 2 + np.cos(tube), 2 * np.pi * u / columns
@@ -214,6 +217,13 @@ _PLY_TYPES = {"uchar": "u1", "ushort": "u2", "int": "i4", "float": "f4", "double
 def mesh_bytes(rng: Generator, suffix: str, mesh: Polygons) -> bytes:
     """Return the contents of a mesh file with one of the extensions in `WRITERS`."""
     return WRITERS[suffix](rng, *mesh)
+
+
+def with_texture_rows(obj: bytes, rows: np.ndarray) -> bytes:
+    """Return an `.obj` file whose texture coordinates are these (n, 2) rows, over and over."""
+    texts, lines = [b"vt %.9g %.9g" % tuple(row) for row in rows], obj.split(b"\n")
+    is_row = [line.startswith(b"vt") for line in lines]
+    return b"\n".join(texts[i % len(texts)] if is_row[i] else line for i, line in enumerate(lines))
 
 
 def _obj(rng: Generator, points: np.ndarray, faces: list) -> bytes:

@@ -6,73 +6,22 @@ from numpy.random import Generator
 
 #: Control characters, bytes that are not UTF-8 (lone surrogates), and characters that XML cannot hold.
 _CONTROLS = (
-    "\x01",
-    "\x1b[31m",
-    "\x07",
-    "\r",
-    "\n",
-    "\t",
-    "\x7f",
-    "\x9b2J",
-    "\udcff\udc80",
-    "\ufffe",
+    *("\x01", "\x1b[31m", "\x07", "\r", "\n", "\t", "\x7f", "\x9b2J", "\udcff\udc80", "\ufffe"),
 )
 
 #: Other scripts, some of them from right to left, signs that join or combine, and signs without a glyph.
 _SCRIPTS = (
     *("\u202e", "\u05e9\u05dc\u05d5\u05dd", "\u0645\u0631\u062d\u0628\u0627", "\u65e5\u672c\u8a9e"),
-    *(
-        "\U0001f600",
-        "\ufeff",
-        "e\u0301\u0301",
-        "\u200d",
-        "\u0915\u094d\u0937",
-        "\U0010ffff",
-        "\u2028",
-    ),
+    *("\U0001f600", "\ufeff", "e\u0301\u0301", "\u200d", "\u0915\u094d\u0937", "\U0010ffff"),
+    "\u2028",
 )
 
 #: Formulas, markup, patterns, and parts of command lines and of paths.
 _SYNTAX = (
-    *(
-        r"$\frac{",
-        "$E = mc^2$",
-        "$\u65e5$",
-        r"\$",
-        "$$",
-        r"$\x01$",
-        "$x_",
-        r"$\sqrt[3]{\alpha}$",
-        "^_{}~",
-    ),
-    *(
-        "<b>&amp;",
-        "]]>",
-        "&#0;",
-        '"/><script>',
-        "<!--",
-        "'",
-        "%d",
-        "%s%n",
-        "%(default)s",
-        "{0}",
-        "{x}",
-    ),
-    *(
-        "\\",
-        "=",
-        "form",
-        "--",
-        "-o",
-        " ",
-        "..",
-        "a",
-        "Ours",
-        "#",
-        "<UDIM>",
-        "\\input{a}",
-        "(endobj",
-    ),
+    *(r"$\frac{", "$E = mc^2$", "$\u65e5$", r"\$", "$$", r"$\x01$", "$x_", r"$\sqrt[3]{\alpha}$"),
+    *("^_{}~", "<b>&amp;", "]]>", "&#0;", '"/><script>', "<!--", "'", "%d", "%s%n", "%(default)s"),
+    *("{0}", "{x}", "\\", "=", "form", "--", "-o", " ", "..", "a", "Ours", "#", "<UDIM>"),
+    *("\\input{a}", "(endobj"),
 )
 
 

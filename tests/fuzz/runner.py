@@ -48,11 +48,10 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=math.inf, help="stop after this time")
     parser.add_argument("--jobs", type=int, default=multiprocessing.cpu_count())
     parser.add_argument(
-        "--category", action="append", choices=list(CATEGORIES), help="by default all of them"
+        "--category", action="append", choices=list(CATEGORIES), help="by default all"
     )
-    folder = Path("dist/fuzz")
     parser.add_argument(
-        "--keep", type=Path, default=folder, help="folder for the cases with faults"
+        "--keep", type=Path, default="dist/fuzz", help="folder for cases with faults"
     )
     parser.add_argument("--verbose", action="store_true", help="print the outcome of every case")
     options = parser.parse_args()

@@ -13,7 +13,10 @@ from pathlib import Path
 import numpy as np
 from numpy.random import Generator
 
+from rosy_addon import api
 from rosy_addon.extras.blender import BLENDER_VARIABLE
+
+from .meshes import torus
 
 #: Script that writes a .blend file with a camera and a turning mesh with a field.
 SCENE_SCRIPT = """
@@ -90,22 +93,13 @@ def scene_bytes() -> bytes:
 
 def _write_torus(rng: Generator, folder: Path) -> None:
     """Write a torus as mesh.obj, with a UV map, and three fields on it."""
-    rows, columns = 40, 80
-    v, u = np.divmod(np.arange(rows * columns), columns)
-    a, b = 2 * np.pi * u / columns, 2 * np.pi * v / rows
-    radius = 2 + np.cos(b)
-    points = np.stack([radius * np.cos(a), radius * np.sin(a), np.sin(b)], axis=1)
-    u1, v1 = (u + 1) % columns, (v + 1) % rows
-    faces = 1 + np.stack(
-        [v * columns + u, v * columns + u1, v1 * columns + u1, v1 * columns + u], axis=1
-    )
-    lines = ["v {} {} {}".format(*point) for point in points]
-    lines += [f"vt {x / columns} {y / rows}" for x, y in zip(u, v, strict=True)]
-    lines += ["f " + " ".join(f"{corner}/{corner}" for corner in face) for face in faces]
+    points, faces = torus(80, 40)
+    uv = np.stack(np.divmod(np.arange(len(points)), 40), axis=1) / (80, 40)
+    lines = ["v {} {} {}".format(*point) for point in points.tolist()]
+    lines += ["vt {} {}".format(*pair) for pair in uv.tolist()]
+    lines += ["f " + " ".join(f"{v + 1}/{v + 1}" for v in face) for face in faces]
     (folder / "mesh.obj").write_text("\n".join(lines) + "\n")
-    corners = points[faces - 1]
-    normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    surface = api.Surface(points, faces)
     for name in "abc":
-        vectors = np.cross(normals, rng.normal(size=3))
-        rows_of_text = [" ".join(map(str, vector)) for vector in vectors]
-        (folder / f"{name}.rosy").write_text(f"{len(vectors)} 4\n" + "\n".join(rows_of_text) + "\n")
+        field = api.along_axis(surface, rng.normal(size=3), degree=4)
+        field.save(folder / f"{name}.rosy")

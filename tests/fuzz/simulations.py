@@ -15,22 +15,17 @@ from typing import Any
 import meshio
 import numpy as np
 import pyvista as pv
+import trimesh
 from numpy.random import Generator
 
-from ..extras.exodus import write_exodus
+from ..extras.simulation_files import collection_text, parts_text, write_exodus
 from .damage import damaged
 from .meshes import random_mesh
 
 #: Files that a reference may name instead of one of the series or mesh.
 TARGETS = ("pipe", "zero", "/dev/zero", "loop", "folder", "none.vtu", "/proc/self/mem", "x" * 5000)
 
-_PARTS = """<VTKFile type="PUnstructuredGrid"><PUnstructuredGrid GhostLevel="0">
-<PPointData><PDataArray type="Float64" Name="v" NumberOfComponents="3"/></PPointData>
-<PPoints><PDataArray type="Float64" NumberOfComponents="3"/></PPoints>
-<Piece Source="0.vtu"/><Piece Source="1.vtu"/></PUnstructuredGrid></VTKFile>"""
-
-_COLLECTION = """<VTKFile type="Collection"><Collection>
-<DataSet timestep="0" file="0.vtu"/><DataSet timestep="1" file="1.vtu"/></Collection></VTKFile>"""
+_ARRAY = 'type="Float64" Name="v"'
 
 
 def write_simulation(rng: Generator, folder: Path) -> str:
@@ -137,18 +132,7 @@ def _save_series(rng: Generator, path: Path, surface: pv.PolyData) -> None:
 
 def _save_gltf(_: Generator, path: Path, surface: pv.PolyData) -> None:
     mesh = surface.triangulate()
-    buffers = [np.asarray(mesh.points, "<f4"), mesh.regular_faces.astype("<u4")]
-    sizes = [buffer.nbytes for buffer in buffers]
-    path.with_name("flow.bin").write_bytes(b"".join(map(bytes, buffers)))
-    views = [{"buffer": 0, "byteOffset": sizes[0] * k, "byteLength": sizes[k]} for k in (0, 1)]
-    accessors = [
-        {"bufferView": 0, "componentType": 5126, "count": mesh.n_points, "type": "VEC3"},
-        {"bufferView": 1, "componentType": 5125, "count": 3 * mesh.n_cells, "type": "SCALAR"},
-    ]
-    scene = {"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}]}
-    scene |= {"meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}]}
-    scene |= {"buffers": [{"uri": "flow.bin", "byteLength": sum(sizes)}], "bufferViews": views}
-    path.write_text(json.dumps(scene | {"accessors": accessors}))
+    trimesh.Trimesh(mesh.points, mesh.regular_faces, process=False).export(path)
 
 
 def _save_xdmf(rng: Generator, path: Path, surface: pv.PolyData) -> None:
@@ -181,9 +165,9 @@ _WRITERS: dict[str, Callable[[Generator, Path, pv.PolyData], None]] = {
     ".vts": _save_structured,
     ".vtr": _save_structured,
     ".vtm": lambda rng, path, surface: _save(rng, path, pv.MultiBlock([surface, surface])),
-    ".pvtu": _save_listed(_PARTS),
-    ".pvtp": _save_listed(_PARTS.replace("UnstructuredGrid", "PolyData")),
-    ".pvd": _save_listed(_COLLECTION),
+    ".pvtu": _save_listed(parts_text(_ARRAY)),
+    ".pvtp": _save_listed(parts_text(_ARRAY, "PolyData")),
+    ".pvd": _save_listed(collection_text((0, "0.vtu"), (1, "1.vtu"))),
     ".series": _save_series,
     ".xdmf": _save_xdmf,
     ".exo": _save_exodus,

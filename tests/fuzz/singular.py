@@ -23,14 +23,13 @@ def singularity_bytes(rng: Generator, mesh: Polygons) -> bytes:
     points, faces = mesh
     degree = int(rng.choice([1, 2, 3, 4, 4, 4, 6, 12]))
     sides = Counter((face[i - 1], face[i]) for face in faces for i in range(len(face)))
-    is_closed = all(count == sides[b, a] == 1 for (a, b), count in sides.items())
-    at_border = {a for (a, b), count in sides.items() if not count == sides[b, a] == 1}
-    at_border |= {b for (a, b), count in sides.items() if not count == sides[b, a] == 1}
+    border = [(a, b) for (a, b), count in sides.items() if not count == sides[b, a] == 1]
+    at_border = {vertex for side in border for vertex in side}
     free = sorted({vertex for face in faces for vertex in face} - at_border)
     free = rng.permutation(free if free and rng.random() < 0.9 else len(points)).tolist()
     # All that a closed surface needs, spread evenly, and pairs; or any, near their mean on a closed surface.
-    total = degree * (len(free) - len(sides) // 2 + len(faces)) if is_closed else 0
-    if is_closed and rng.random() < 0.5:
+    total = degree * (len(free) - len(sides) // 2 + len(faces)) if not border else 0
+    if not border and rng.random() < 0.5:
         index = [(total + place) // len(free) for place in range(len(free))]
         for _ in range(rng.integers(3)):
             index[rng.integers(len(free))] += 1

@@ -18,13 +18,8 @@ _HOSTILE = ("nan", "inf", "1e300", "-0.0", "1e-320", "0.9999999999", "1000.00000
 #: Names of outputs, with the placeholder once, twice, elsewhere and not at all.
 OUTPUTS = (
     *("out.<UDIM>.png", "out.<UDIM>.png", "out.<UDIM>.png", "<UDIM>.png", "out.png", "out.png"),
-    *(
-        "a<UDIM>b<UDIM>.png",
-        "out.<udim>.png",
-        "out<UDIM>.PNG",
-        "<UDIM>/out.png",
-        "<UDIM>/<UDIM>.png",
-    ),
+    *("a<UDIM>b<UDIM>.png", "out.<udim>.png", "out<UDIM>.PNG", "<UDIM>/out.png"),
+    "<UDIM>/<UDIM>.png",
 )
 
 

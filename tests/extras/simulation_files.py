@@ -1,4 +1,4 @@
-"""Write Exodus II files, which neither pyvista nor meshio write as other programs read them."""
+"""Files of simulations that neither pyvista nor meshio write, or not as other programs read them."""
 
 from __future__ import annotations
 
@@ -6,6 +6,20 @@ from pathlib import Path
 
 import netCDF4
 import numpy as np
+
+
+def parts_text(array: str, kind: str = "UnstructuredGrid") -> str:
+    """Return a .pvtu or .pvtp file of the parts 0.vtu and 1.vtu, which have vectors at their points."""
+    return f"""<VTKFile type="P{kind}"><P{kind} GhostLevel="0">
+<PPointData><PDataArray {array} NumberOfComponents="3"/></PPointData>
+<PPoints><PDataArray type="Float64" NumberOfComponents="3"/></PPoints>
+<Piece Source="0.vtu"/><Piece Source="1.vtu"/></P{kind}></VTKFile>"""
+
+
+def collection_text(*steps: tuple[float, str]) -> str:
+    """Return a .pvd file that lists files, given by their times and names."""
+    entries = "".join(f'<DataSet timestep="{time}" file="{name}"/>' for time, name in steps)
+    return f'<VTKFile type="Collection"><Collection>{entries}</Collection></VTKFile>'
 
 
 def write_exodus(

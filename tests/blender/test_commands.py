@@ -1,4 +1,4 @@
-"""The command line of the Python package, in a Python without bpy: it runs this Blender."""
+"""Commands: ``blender -b SCENE --command rosy ...``, and the Python package, which runs this Blender."""
 
 from __future__ import annotations
 
@@ -12,9 +12,16 @@ from pathlib import Path
 
 import bpy
 import pytest
+from conftest import baked_images, run_blender
 from harness.processes import all_end
 
 ROOT = Path(__file__).resolve().parents[2]
+
+
+def command(*arguments, scene=None):
+    """Run the command in a new Blender process, and return its exit status and its output."""
+    files = [scene] if scene else []
+    return run_blender(*map(str, (*files, "--command", "rosy", *arguments)))
 
 
 def start(*arguments, **variables):
@@ -32,7 +39,7 @@ def start(*arguments, **variables):
 
 
 def run(*arguments):
-    """Run a command, and return its exit status, its output and its errors."""
+    """Run a command of the package, and return its exit status, its output and its errors."""
     process = start(*arguments)
     output, errors = process.communicate(timeout=240)
     return process.returncode, output, errors
@@ -47,6 +54,38 @@ def saved(with_field, tmp_path):
     path = folder / "suzanne.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     return path
+
+
+def test_a_command_bakes_and_saves(saved, tmp_path):
+    options = ("--size", "96x64", "--out", tmp_path / "out", "--save")
+    status, output = command("bake", *options, scene=saved)
+    assert status == 0, output
+    assert list((tmp_path / "out").glob("*.png"))
+    bpy.ops.wm.open_mainfile(filepath=str(saved))
+    (image,) = baked_images()
+    assert tuple(image.size) == (96, 64)
+
+
+def test_bad_input_of_a_command_is_one_line_and_status_2(saved, tmp_path):
+    status, output = command("bake", "--object", "Nobody", "--out", tmp_path, scene=saved)
+    assert status == 2
+    (line,) = [line for line in output.splitlines() if line.startswith("rosy: ")]
+    assert "Nobody" in line
+    assert "Traceback" not in output
+    assert not list(tmp_path.glob("*.png"))
+
+
+def test_ctrl_c_stops_the_command(saved, tmp_path):
+    """Blender alone would ignore it."""
+    words = ["bake", "--frames", "1-90", "--out", str(tmp_path / "out")]
+    words = [bpy.app.binary_path, "-b", str(saved), "--command", "rosy", *words]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    lines = []
+    for line in process.stdout:
+        if line.startswith(b"frame ") and not lines:
+            os.kill(process.pid, signal.SIGINT)
+        lines += [line] * (bool(lines) or line.startswith(b"frame "))
+    assert process.wait(timeout=60) == 130 and b"rosy: stopped\n" in lines
 
 
 def test_strokes_are_those_of_the_button_and_nothing_else_is_printed(saved):

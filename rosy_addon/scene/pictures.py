@@ -12,11 +12,12 @@ transformed, and slides over one that deforms. A texture is mapped by a UV map, 
 from __future__ import annotations
 
 import glob
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
+import bpy
 import numpy as np
 from bpy.types import Image, Material, NodeTree, Object, Scene
 
@@ -218,6 +219,7 @@ def apply_picture(
     size, key = image_size(image_data), picture_key(view.look, picture)
     store_record(scene, camera.name, image, material, source, {None: state}, size=size, key=key)
     _show_on_objects(node_groups)
+    _remove_from_others(material, node_groups)
     warnings = (*scene_data.warnings, *_display_warnings(scene))
     return BakeResult(camera.name, image, material, tuple(matrices), picture, warnings)
 
@@ -275,6 +277,7 @@ def apply_sequence(
         frame_range=f"{sequence.first} to {sequence.last}",
     )
     _show_on_objects(node_groups)
+    _remove_from_others(material, node_groups)
 
 
 def apply_texture(
@@ -382,6 +385,25 @@ def _show_on_objects(node_groups: Mapping[Object, NodeTree], *, keep_textures: b
     datablocks.delete_unused()
 
 
+def _remove_from_others(material: Material, objects: Container[Object]) -> None:
+    """Remove a picture from objects that showed an earlier one from the same camera, but are left out of this one.
+
+    They show another picture again or, without one, their own materials. `material` is the one of the picture,
+    and `objects` are the objects that it shows.
+    """
+    pictures = recorded_materials() - {material}
+    for obj in bpy.data.objects:
+        projections = {} if obj in objects else _projections(obj)
+        if material not in projections:
+            continue
+        others = [other for other in projections if other in pictures]
+        if not others:
+            datablocks.remove_picture_modifiers(obj)
+        elif material in picture_nodes.shown_materials(obj):
+            _show(obj, others[-1], projections[others[-1]], pictures)
+    datablocks.delete_unused()
+
+
 def show_bake(scene: Scene, camera: str) -> None:
     """Let the objects of a picture show it again, if they show another one.
 
@@ -402,15 +424,27 @@ def show_bake(scene: Scene, camera: str) -> None:
         raise RosyError(f"no picture was baked from camera '{camera}', only from {names}")
     materials = recorded_materials()
     for obj in baked_objects(scene):
-        projections = {}
-        for modifier in datablocks.removable_modifiers(obj):
-            projections |= picture_nodes.projections_of_group(modifier.node_group)
+        projections = _projections(obj)
         if record.material in projections and datablocks.is_editable(obj):
-            matrix = projections[record.material]
-            node_group = new_group(f"RoSy {obj.name}", record.material, matrix)
-            node_group[datablocks.OWNED_TAG] = True
-            picture_nodes.set_picture_modifier(obj, node_group, materials)
+            _show(obj, record.material, projections[record.material], materials)
     update_keys(scene)
+
+
+def _projections(obj: Object) -> dict[Material, np.ndarray | None]:
+    """Return the projections of the pictures that an object can show; see `projections_of_group`."""
+    projections = {}
+    for modifier in datablocks.removable_modifiers(obj):
+        projections |= picture_nodes.projections_of_group(modifier.node_group)
+    return projections
+
+
+def _show(
+    obj: Object, material: Material, matrix: np.ndarray | None, pictures: Container[Material]
+) -> None:
+    """Let an object show a picture that it showed before; see `new_group` and `set_picture_modifier`."""
+    node_group = new_group(f"RoSy {obj.name}", material, matrix)
+    node_group[datablocks.OWNED_TAG] = True
+    picture_nodes.set_picture_modifier(obj, node_group, pictures)
 
 
 def _object_to_clip_matrices(

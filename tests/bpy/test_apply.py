@@ -14,7 +14,18 @@ from rosy.rosy_addon.scene import pictures as pictures_room
 from rosy.rosy_addon.scene.bake_records import has_pictures, list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import scene_cameras
 from rosy.rosy_addon.scene.pictures import show_bake
-from scenes import add_camera, contents, depsgraph, each_step, expect_error, link, pixels, reopen
+from scenes import (
+    add_camera,
+    add_field,
+    add_monkey,
+    contents,
+    depsgraph,
+    each_step,
+    expect_error,
+    link,
+    pixels,
+    reopen,
+)
 
 
 def material_of(obj):
@@ -164,6 +175,24 @@ def test_several_cameras(scene, camera, monkey):
     assert [entry.is_shown for entry in list_bakes(scene)] == [False, True]
     assert len(bpy.data.node_groups) == groups
     expect_error("camera 'Third', only from 'Second', 'Camera'", show_bake, scene, "Third")
+
+
+def test_an_object_that_is_left_out_shows_what_it_showed_before(scene, camera, monkey):
+    toon = bpy.data.materials.new("Toon")
+    monkey.data.materials.append(toon)
+    other, above = add_field(add_monkey(), "axis", 2), add_camera("Above", (0.0, -1.0, 5.0))
+    bake(scene)
+    other.rosy.include = False
+    bake(scene)
+    assert material_of(monkey).name == "RoSy Camera" and not other.modifiers
+    monkey.rosy.include, other.rosy.include = False, True
+    bake(scene)
+    assert material_of(monkey) == toon and not monkey.modifiers
+    monkey.rosy.include = True
+    bake(scene, cameras=[camera, above])
+    monkey.rosy.include = False
+    bake(scene, cameras=[above])
+    assert [material_of(obj).name for obj in (monkey, other)] == ["RoSy Camera", "RoSy Above"]
 
 
 def test_warnings(scene, camera, monkey):

@@ -61,7 +61,7 @@ def _draw_existing_field(layout: UILayout, context: Context, obj: Object) -> Non
     box.label(text=f"Degree {mesh.rosy.degree} on {faces}, {name}")
     row = layout.row(align=True)
     row.operator("rosy.field_export", text="Export", icon="EXPORT")
-    is_shown = overlay.shown(obj.name) is not None
+    is_shown = overlay.shown(obj) is not None
     button = row.operator("rosy.singularities", icon="OVERLAY", depress=is_shown)
     button.show = "NONE" if is_shown else "OVERLAY"
     if (body := sidebar.closed_panel(layout, "convert_field", "Convert")) is not None:

@@ -114,10 +114,10 @@ def show_handles(context: Context, obj: Object) -> None:
     RosyError
         If the field cannot be read.
     """
-    shown = overlay.shown(obj.name)
+    shown = overlay.shown(obj)
     if shown is None or shown.vertex is None:
         depsgraph = context.evaluated_depsgraph_get()
-        overlay.show(obj.name, read_editable_singularities(obj, depsgraph))
+        overlay.show(obj, read_editable_singularities(obj, depsgraph))
 
 
 def _own_points(context: Context, obj: Object) -> np.ndarray:
@@ -153,7 +153,7 @@ def _handle_under(context: Context, obj: Object, mouse: tuple[float, float]) -> 
 
     The vertex is an index into the original mesh. `mouse` is in pixels of the region.
     """
-    shown = overlay.shown(obj.name)
+    shown = overlay.shown(obj)
     assert shown is not None and shown.vertex is not None
     points = overlay.offset_points(obj, shown)
     pixels = to_pixels(context.region, context.region_data, points)

@@ -142,6 +142,8 @@ def make_and_remove(monkey: Monkey) -> None:
     monkey.disturbance = 0.0
     remove_everything(monkey)
     field_in_view(monkey)
+    for show in ("OVERLAY", "NONE"):  # which forgets the dots of deleted objects
+        monkey.rosy("singularities", show=show)
     bpy.ops.outliner.orphans_purge(do_recursive=True)
     bpy.context.view_layer.update()
     before = whole_state()

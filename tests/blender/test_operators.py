@@ -284,7 +284,7 @@ def test_singularities_as_points(scene):
     positions = points.data.attributes["position"].data
     assert all(abs(point.vector.length - 1) < 0.02 for point in positions)
     overlay = sys.modules["bl_ext.user_default.rosy.rosy_addon.ui.overlay"]
-    assert overlay.shown("Icosphere")
+    assert overlay.shown(bpy.data.objects["Icosphere"])
     # They replace the earlier ones.
     assert bpy.ops.rosy.singularities(show="POINTS") == {"FINISHED"}
     assert [obj.name for obj in bpy.data.objects if "singularities" in obj.name] == [name]
@@ -366,9 +366,23 @@ def test_opening_a_file_hides_singularities(scene):
     handlers = len(bpy.app.handlers.load_pre)
     sphere_with_field()
     bpy.ops.rosy.singularities(show="OVERLAY")
-    assert overlay.shown("Icosphere") and len(bpy.app.handlers.load_pre) == handlers + 1
+    assert overlay.shown(bpy.context.object)
+    assert len(bpy.app.handlers.load_pre) == handlers + 1
     bpy.ops.wm.read_homefile(use_empty=True)
-    assert not overlay.shown("Icosphere") and len(bpy.app.handlers.load_pre) == handlers
+    assert len(bpy.app.handlers.load_pre) == handlers
+
+
+def test_dots_stay_with_renamed_objects_and_go_without_a_field(scene):
+    overlay = sys.modules["bl_ext.user_default.rosy.rosy_addon.ui.overlay"]
+    handlers = len(bpy.app.handlers.load_pre)
+    sphere = sphere_with_field()
+    bpy.ops.rosy.singularities(show="OVERLAY")
+    sphere.name = "Ball"
+    assert overlay.shown(sphere)
+    sphere.data.attributes.remove(sphere.data.attributes["rosy"])
+    bpy.ops.rosy.singularities(show="NONE")
+    assert not overlay.shown(sphere) and len(bpy.app.handlers.load_pre) == handlers
+    assert not bpy.ops.rosy.singularities.poll()
 
 
 def test_exports_and_imports(suzanne, tmp_path):

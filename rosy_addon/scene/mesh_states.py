@@ -16,6 +16,7 @@ from .datablocks import user_modifiers
 from .field_attributes import ANGLE_TYPE, VECTOR_TYPE, attribute_name, field_degree
 from .look_inputs import ReadRequest, color_values_digest, tone_digest
 from .meshes import read_attribute, shape_digest, vertex_positions
+from .transparency import transparent_slots
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,13 +55,13 @@ def mesh_state_key(obj: Object, owner: Object, request: ReadRequest | None) -> t
     request : ReadRequest or None
         What is read from the mesh. None: the object has no field to draw, and only hides others.
     """
-    return owner.session_uid, obj.data.as_pointer(), request
+    return owner.session_uid, obj.data.as_pointer(), request or transparent_slots(obj.data, owner)
 
 
 def read_mesh_state(
     mesh: Mesh | None, owner: Object, request: ReadRequest | None
 ) -> MeshState | None:
-    """Return the state of an evaluated mesh; None if it has no faces.
+    """Return the state of an evaluated mesh; None if it has no faces, or has no field and is transparent.
 
     Parameters
     ----------
@@ -76,7 +77,14 @@ def read_mesh_state(
     positions = vertex_positions(mesh)
     bounds = np.stack([positions.min(axis=0), positions.max(axis=0)])
     if request is None:
-        return MeshState(digest(shape_digest(mesh, occluder_only=True)), bounds)
+        slots, transparent = (
+            read_attribute(mesh, "material_index", np.int32, 1),
+            transparent_slots(mesh, owner),
+        )
+        if transparent and all(transparent):
+            return None
+        shape = shape_digest(mesh, occluder_only=True)
+        return MeshState(digest(shape, slots, *transparent), bounds)
     original = owner.data
     digest_of_tone = tone_digest(mesh, owner, request.tone)
     parts = [shape_digest(mesh), *field_parts(mesh, original), digest_of_tone]

@@ -22,7 +22,9 @@ from ..scene.scene_reader import SceneInstance, SceneReader
 from ..scene.visible_objects import shown_instances
 
 #: Types of datablocks that may change a picture if they change.
-RELEVANT_ID_TYPES = ("OBJECT", "MESH", "COLLECTION", "SCENE", "LIGHT", "ARMATURE", "KEY", "IMAGE")
+RELEVANT_ID_TYPES = (
+    *("OBJECT", "MESH", "COLLECTION", "SCENE", "LIGHT", "ARMATURE", "KEY", "IMAGE", "MATERIAL"),
+)
 
 #: Length of one time slice for reading meshes, in seconds.
 SLICE_SECONDS = 0.08

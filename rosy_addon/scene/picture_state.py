@@ -33,7 +33,9 @@ from .read_view import rendered_lights
 from .visible_objects import field_objects, rendered_instances
 
 #: Properties of ``scene.rosy`` that decide how a picture is stored and shown, but not how it is drawn.
-OUTPUT_PROPERTIES = ("placement", "emission", "diffuse", "store", "directory", "image_format")
+OUTPUT_PROPERTIES = (
+    *("placement", "over_material", "emission", "diffuse", "store", "directory", "image_format"),
+)
 
 #: Properties of ``scene.rosy`` that decide what a texture shows, and how it is stored.
 TEXTURE_OUTPUT = (
@@ -175,6 +177,7 @@ class SceneState:
             look = unlit_look(look)
         settings = applied_settings(look, self._lacks_tone)
         output = _used_output(scene.rosy, OUTPUT_PROPERTIES) | {"relight": is_relit}
+        output["over_material"] &= is_hatched(look)
         if is_frame:
             del output["placement"]  # frames always fill the frame of the camera
         occluders = self._relevant_occluders(camera, settings["shadows"])

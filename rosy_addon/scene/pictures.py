@@ -42,6 +42,7 @@ from .bake_records import (
 from .blender_images import image_path, load_sequence, new_image, new_tiled_image
 from .cameras import CameraSource
 from .files import output_folder, picture_stem
+from .ink_objects import find_ink_object, new_ink_object
 from .keys import update_keys
 from .picture_nodes import OutputSettings, new_group
 from .picture_state import PictureState
@@ -121,6 +122,7 @@ def read_output_settings(scene: Scene, folder: Path | None = None) -> OutputSett
         folder=folder,
         device=properties.device.lower(),
         relight=properties.relight,
+        over_material=properties.over_material,
     )
 
 
@@ -215,7 +217,8 @@ def apply_picture(
         image = track(new_image(name, image_data, is_color=hatching is None, stem=stem))
         material = picture_nodes.new_material(image, camera, track, settings, view.look, hatching)
         matrices = _object_to_clip_matrices(scene_data, camera)
-        node_groups = _new_groups(material, matrices, track)
+        is_over = settings.over_material and has_clear_paper(view.look)
+        node_groups = _new_groups(material, matrices, track, is_over=is_over)
     size, key = image_size(image_data), picture_key(view.look, picture)
     store_record(scene, camera.name, image, material, source, {None: state}, size=size, key=key)
     _show_on_objects(node_groups)
@@ -264,7 +267,9 @@ def apply_sequence(
         image.name = f"{NAME_PREFIX}{sequence.name}"
         material = picture_nodes.new_material(image, camera, track, settings, look)
         picture_nodes.set_sequence_frames(material, sequence.first, sequence.last)
-        node_groups = _new_groups(material, dict.fromkeys(scene_data.objects), track)
+        matrices = dict.fromkeys(scene_data.objects)
+        is_over = settings.over_material and has_clear_paper(look)
+        node_groups = _new_groups(material, matrices, track, is_over=is_over)
     store_record(
         scene,
         sequence.name,
@@ -336,7 +341,8 @@ def apply_texture(
         elif hatching is not None:
             add_shader = partial(texture_nodes.hatching_shader, hatching=hatching, track=track)
         material = track(texture_nodes.new_texture_material(name, image, uv_map, add_shader))
-        node_groups = _new_groups(material, {obj: None}, track)
+        is_over = settings.over_material and is_clear
+        node_groups = _new_groups(material, {obj: None}, track, is_over=is_over)
     size = image_size(first)
     store_record(scene, obj.name, image, material, obj, {None: state}, size=size, is_texture=True)
     # The object can still show its pictures, but no longer an earlier texture.
@@ -359,17 +365,23 @@ def _image_stem(settings: OutputSettings, name: str, kind: str = "camera") -> Pa
 
 
 def _new_groups(
-    material: Material, matrices: Mapping[Object, np.ndarray | None], track: datablocks.Track
+    material: Material,
+    matrices: Mapping[Object, np.ndarray | None],
+    track: datablocks.Track,
+    *,
+    is_over: bool,
 ) -> dict[Object, NodeTree]:
-    """Create the node groups that show a picture on objects; see `new_group`.
+    """Create the node groups that show a picture, by the objects that get them; see `new_group`.
 
-    `matrices` holds each object's (4, 4) matrix from object space to clip space, or None. `track` is called
-    with each new group.
+    These are the keys of `matrices`, or their ink objects if the picture is shown over their materials (`is_over`). The
+    values are (4, 4) matrices from object space to clip space, or None. `track` is called with each new datablock.
     """
-    return {
-        obj: track(new_group(f"RoSy {obj.name}", material, matrix))
-        for obj, matrix in matrices.items()
-    }
+    groups = {}
+    for obj, matrix in matrices.items():
+        if is_over:
+            obj = find_ink_object(obj) or new_ink_object(obj, track)
+        groups[obj] = track(new_group(obj, material, matrix))
+    return groups
 
 
 def _show_on_objects(node_groups: Mapping[Object, NodeTree], *, keep_textures: bool = True) -> None:
@@ -382,6 +394,9 @@ def _show_on_objects(node_groups: Mapping[Object, NodeTree], *, keep_textures: b
     materials = recorded_materials(textures=keep_textures)
     for obj, node_group in node_groups.items():
         picture_nodes.set_picture_modifier(obj, node_group, materials)
+        replaced = obj.parent if obj.get(datablocks.INK_TAG) else find_ink_object(obj)
+        if replaced is not None:
+            datablocks.remove_picture_modifiers(replaced)
     datablocks.delete_unused()
 
 
@@ -392,7 +407,7 @@ def _remove_from_others(material: Material, objects: Container[Object]) -> None:
     and `objects` are the objects that it shows.
     """
     pictures = recorded_materials() - {material}
-    for obj in bpy.data.objects:
+    for obj in list(bpy.data.objects):
         projections = {} if obj in objects else _projections(obj)
         if material not in projections:
             continue
@@ -442,7 +457,7 @@ def _show(
     obj: Object, material: Material, matrix: np.ndarray | None, pictures: Container[Material]
 ) -> None:
     """Let an object show a picture that it showed before; see `new_group` and `set_picture_modifier`."""
-    node_group = new_group(f"RoSy {obj.name}", material, matrix)
+    node_group = new_group(obj, material, matrix)
     node_group[datablocks.OWNED_TAG] = True
     picture_nodes.set_picture_modifier(obj, node_group, pictures)
 

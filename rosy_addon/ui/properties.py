@@ -235,6 +235,10 @@ class RosyScene(bpy.types.PropertyGroup):
         "Store from which darkness on each pixel is covered by ink, instead of the ink. The material "
         "then draws the hatching by the light of the scene, in EEVEE, without a new bake",
     )
+    over_material: toggle(
+        "Over Material",
+        "Draw the ink over the materials that the meshes have, without paper",
+    )
     emission: real(
         "Emission",
         "Emission strength of the picture. 1: as it was drawn",

@@ -23,11 +23,11 @@ def hatching_node(obj):
     return next(node for node in nodes if node.bl_idname == "ShaderNodeGroup")
 
 
-def render(scene, folder):
-    """Render the scene with Cycles: (H, W, 4) display values, sampled at the centers of pixels."""
+def render(scene, folder, engine="CYCLES"):
+    """Render the scene: (H, W, 4) display values, in Cycles sampled at the centers of pixels."""
     scene.cycles.samples, scene.cycles.use_denoising = 4, False
     scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 0.01
-    return render_image(scene, folder / "cycles.png", "CYCLES")
+    return render_image(scene, folder / "render.png", engine)
 
 
 def plane_in_frame(scene):
@@ -110,6 +110,45 @@ def test_clear_paper_shows_what_is_behind(with_field, scene, tmp_path):
     assert (
         ink.max(axis=1) < 2 / 255
     ).mean() > 0.9  # at silhouettes, other samples miss the surface
+
+
+def test_ink_over_the_own_material(with_field, scene, tmp_path):
+    """Each pixel is as without RoSy where the picture has no ink, and ink where it is full."""
+    suzanne = bpy.context.object
+    material = bpy.data.materials.new("Checkered")
+    material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.clear()
+    checker, diffuse = nodes.new("ShaderNodeTexChecker"), nodes.new("ShaderNodeBsdfDiffuse")
+    output = nodes.new("ShaderNodeOutputMaterial")
+    links.new(checker.outputs["Color"], diffuse.inputs["Color"])
+    links.new(diffuse.outputs[0], output.inputs["Surface"])
+    suzanne.data.materials.append(material)
+    bpy.ops.object.light_add(type="SUN", rotation=(0.7, 0.4, 0.2))
+    bpy.context.object.data.angle, scene.cycles.max_bounces = 0.0, 0
+    engines = ["CYCLES", "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0, 0) else "BLENDER_EEVEE"]
+    before = {engine: render(scene, tmp_path, engine) for engine in engines}
+    look = scene.rosy.look
+    look.ink, look.ink_color, look.supersampling = "hatch", (0.0, 0.0, 0.0), 1
+    scene.rosy.over_material = True
+    assert bpy.ops.rosy.bake() == {"FINISHED"}
+    assert material_of(suzanne) == material
+    assert not any(modifier.type == "NODES" for modifier in suzanne.modifiers)
+    alpha = pixels(baked_images()[0])[..., 3]
+    window = np.lib.stride_tricks.sliding_window_view(alpha, (3, 3))
+    inside = (slice(1, -1), slice(1, -1))
+    is_free, is_inked = window.max(axis=(2, 3)) == 0, window.min(axis=(2, 3)) == 1
+    assert is_inked.sum() > 50
+    for engine in engines:
+        image, own = render(scene, tmp_path, engine)[inside], before[engine][inside]
+        assert np.abs(image - own)[is_free].max() < 2.5 / 255, engine
+        assert np.abs(own[..., :3])[is_inked].max() > 0.1
+        assert image[..., :3][is_inked].max() < 2 / 255, engine
+    suzanne.hide_render = True
+    bpy.context.view_layer.update()
+    assert np.ptp(render(scene, tmp_path)[..., 3]) == 0
+    assert bpy.ops.rosy.remove() == {"FINISHED"}
+    assert not suzanne.children
 
 
 def test_bake_animation(with_field, scene, tmp_path):

@@ -195,6 +195,39 @@ def test_an_object_that_is_left_out_shows_what_it_showed_before(scene, camera, m
     assert [material_of(obj).name for obj in (monkey, other)] == ["RoSy Camera", "RoSy Above"]
 
 
+def test_pictures_over_materials_take_turns_with_others(scene, camera, monkey):
+    add_camera("Second", (3.0, -4.0, 1.0))
+    before = contents()
+    scene.rosy.look.ink, scene.rosy.over_material = "hatch", True
+    (result,) = bake(scene)
+    (ink,) = monkey.children
+    assert result.objects == (monkey,) and not monkey.modifiers
+    assert material_of(ink).name == "RoSy Camera"
+    assert list_bakes(scene)[0].stale_reason == ""
+    bake(scene, cameras=scene_cameras(scene))
+    assert monkey.children == (ink,)
+    show_bake(scene, "Second")
+    assert material_of(ink).name == "RoSy Second"
+    scene.rosy.over_material = False
+    bake(scene)
+    assert not monkey.children and material_of(monkey).name == "RoSy Camera"
+    scene.rosy.over_material = True
+    bake(scene)
+    (ink,) = monkey.children
+    assert not monkey.modifiers and ink.users_collection == monkey.users_collection
+    monkey.hide_viewport = True
+    bpy.context.view_layer.update()
+    assert ink.hide_viewport
+    monkey.hide_viewport = False
+    other = add_field(add_monkey(), "axis", 2)
+    monkey.rosy.include = False
+    bake(scene)
+    assert not monkey.children and len(other.children) == 1
+    remove_bakes(scene)
+    bpy.data.meshes.remove(other.data)
+    assert contents() == before
+
+
 def test_warnings(scene, camera, monkey):
     assert bake(scene)[0].warnings == ()
     scene.view_settings.view_transform = "Filmic"

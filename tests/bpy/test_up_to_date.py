@@ -353,6 +353,8 @@ TABLE = {
     "relighting without hatching": (put("rosy.relight", True), None, ""),
     "light of a relit picture": (move("Key", -2.0, 0.0, 0.0), relit, ""),
     "ink of a relit picture": (put("rosy.look.crispness", 0.2), relit, "the look was changed"),
+    "over material": (put("rosy.over_material", True), hatched, "the look was changed"),
+    "over material without ink": (put("rosy.over_material", True), None, ""),
     "emission": (put("rosy.emission", 0.5), None, "the emission was changed"),
     "store": (put("rosy.store", "SAVED"), None, "the storage was changed"),
     "format": (put("rosy.image_format", "FLOAT"), None, "the format was changed"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
@@ -12,15 +14,16 @@ from ..rosy_addon.core.errors import NoFeaturesError, RosyError, counted
 from ..rosy_addon.field.generate import GeneratorSettings, generate
 from ..rosy_addon.field.guides import feature_edges
 from ..rosy_addon.field.mesh_checks import copies_warning, orientation_warning
-from ..rosy_addon.field.rosy_field import MAX_DEGREE
+from ..rosy_addon.field.rosy_field import MAX_DEGREE, RosyField
 from ..rosy_addon.field.singularities import description
 from ..rosy_addon.field.surface import Surface
 from ..rosy_addon.scene import guides, singularity_points
+from ..rosy_addon.scene.field_meshes import FieldTargets, discard, field_targets
 from ..rosy_addon.scene.look_properties import read_settings
 from ..rosy_addon.scene.meshes import EDGE_MARKS, marked_edges, mesh_surface, read_uvs
 from ..rosy_addon.ui.operator_settings import draw_generator_settings, draw_settings
 from ..rosy_addon.ui.property_makers import choice, integer, setting_properties, text
-from ..rosy_addon.worker.job import Call, Steps, shares
+from ..rosy_addon.worker.job import Call, Steps, part, shares
 from .base import EDITABLE, selected_mesh_objects
 from .modal_job import ModalJobMixin
 
@@ -61,6 +64,15 @@ def _search_uv_maps(_operator: Any, context: Context, _typed: str) -> list[str]:
 
 def _search_attributes(_operator: Any, context: Context, _typed: str) -> list[str]:
     return selected_mesh_objects(context)[0].data.attributes.keys()
+
+
+@contextmanager
+def collecting(errors: list[RosyError]) -> Iterator[None]:
+    """Context manager: append a `NoFeaturesError` of the block to a list."""
+    try:
+        yield
+    except NoFeaturesError as error:
+        errors.append(error)
 
 
 class ROSY_OT_field_generate(ModalJobMixin, Operator):
@@ -123,20 +135,23 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
         A mesh without features to follow, or on which the field is undefined everywhere, is left out and
         reported. If no other mesh is selected, an error is raised.
         """
+        targets = field_targets(self.objects, context.evaluated_depsgraph_get())
         inputs, errors = [], []
-        for mesh in self.meshes:
-            surface = mesh_surface(mesh)
-            try:
-                settings = self._generator_settings(context, mesh, surface)
-            except NoFeaturesError as error:
-                errors.append(error)
-                continue
-            inputs.append((mesh, surface, settings))
-        return self._generate(context, inputs, errors)
+        try:
+            for mesh, (owner, *_) in targets.items():
+                surface = mesh_surface(mesh, f"object '{owner.name}'")
+                with collecting(errors):
+                    settings = self._generator_settings(context, owner, mesh, surface)
+                    inputs.append((mesh, surface, settings))
+        except BaseException:
+            discard(targets)
+            raise
+        return self._generate(context, targets, inputs, errors)
 
     def _generate(
         self,
         context: Context,
+        targets: FieldTargets,
         inputs: list[tuple[Mesh, Surface, GeneratorSettings]],
         errors: list[RosyError],
     ) -> Steps[str]:
@@ -144,12 +159,34 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
 
         `errors` has the errors of meshes that have been left out.
         """
-        fields, fields_on_surfaces = {}, []
-        for (mesh, surface, settings), start, stop in shares(inputs, 0.9):
-            try:
+        try:
+            fields, surfaces = yield from part(self._make_fields(inputs, errors), 0.0, 0.9)
+            if not fields:
+                raise errors[0]
+            self.report_warnings(*map(str, errors))
+            # To count singularities must not take longer than to generate the field.
+            face_count = sum(surface.face_count for surface in surfaces)
+            is_cheap = self.kind not in FAST_KINDS or face_count <= MAX_FAST_FACES
+            describe = partial(description, count_singularities=is_cheap)
+            pairs = list(zip(surfaces, fields.values(), strict=True))
+            notes = yield Call(describe, (pairs,), 0.9)
+            self.store_fields(context, fields, self.attribute, targets)
+        finally:
+            discard(targets)
+        names = [targets[mesh][0].name for mesh in fields]
+        target = f"'{names[0]}'" if len(fields) == 1 else counted(len(fields), "mesh", "meshes")
+        return f"Made a field of degree {self.degree} on {target}{notes and ': '}{notes}"
+
+    def _make_fields(
+        self, inputs: list[tuple[Mesh, Surface, GeneratorSettings]], errors: list[RosyError]
+    ) -> Steps[tuple[dict[Mesh, RosyField], list[Surface]]]:
+        """Generate fields. The result holds them, and their surfaces. Errors of single meshes are added to `errors`."""
+        fields, surfaces = {}, []
+        for (mesh, surface, settings), start, stop in shares(inputs, 1.0):
+            field = None
+            with collecting(errors):
                 field = yield Call(generate, (surface, settings, self.degree), start, stop)
-            except NoFeaturesError as error:
-                errors.append(error)
+            if field is None:
                 continue
             if surface.face_count and not field.vectors.any():
                 kind = self.properties.bl_rna.properties["kind"].enum_items[self.kind].name
@@ -157,28 +194,19 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
                 errors.append(RosyError(f"{surface.name}: {kind} {reason}"))
                 continue
             fields[mesh] = field
-            fields_on_surfaces.append((surface, field))
+            surfaces.append(surface)
             for warning in (orientation_warning, copies_warning):
                 if note := (yield Call(warning, (surface,), stop, stop, "checking the mesh")):
                     self.report_warnings(note)
-        if not fields:
-            raise errors[0]
-        self.report_warnings(*map(str, errors))
-        # To count singularities must not take longer than to generate the field.
-        face_count = sum(surface.face_count for surface, _ in fields_on_surfaces)
-        is_cheap = self.kind not in FAST_KINDS or face_count <= MAX_FAST_FACES
-        describe = partial(description, count_singularities=is_cheap)
-        notes = yield Call(describe, (fields_on_surfaces,), 0.9)
-        self.store_fields(context, fields, self.attribute)
-        names = [obj.name for obj in self.objects if obj.data in fields]
-        target = f"'{names[0]}'" if len(fields) == 1 else counted(len(fields), "mesh", "meshes")
-        return f"Made a field of degree {self.degree} on {target}{notes and ': '}{notes}"
+        return fields, surfaces
 
     def _generator_settings(
-        self, context: Context, mesh: Mesh, surface: Surface
+        self, context: Context, owner: Object, mesh: Mesh, surface: Surface
     ) -> GeneratorSettings:
-        """Return the settings of the generator for a mesh. They contain the guides, read from the scene."""
-        owner = next(obj for obj in self.objects if obj.data == mesh)
+        """Return the settings of the generator for a mesh. They contain the guides, read from the scene.
+
+        The mesh is the one of the object `owner`, or its field mesh.
+        """
         kind_guides = {"features": {"EDGES"}, "uv": {"UV"}, "guided": self.guides}
         guide_kinds = kind_guides.get(self.kind, ())
         values = read_settings(self, GeneratorSettings)

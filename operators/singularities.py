@@ -10,6 +10,7 @@ from ..rosy_addon.core.errors import REPORTED_ERRORS, RosyError, counted
 from ..rosy_addon.field.singularities import format_index
 from ..rosy_addon.field.singularity_changes import OUTSIDE, move_index
 from ..rosy_addon.scene import singularity_points
+from ..rosy_addon.scene.datablocks import field_mesh
 from ..rosy_addon.scene.field_attributes import has_field
 from ..rosy_addon.scene.mesh_fields import read_mesh_field
 from ..rosy_addon.scene.meshes import mesh_surface
@@ -113,7 +114,7 @@ class ROSY_OT_field_singularities(ActiveMeshMixin, ModalJobMixin, bpy.types.Oper
 
     def begin(self, context: bpy.types.Context) -> Steps[None]:
         """Return the steps of the job that changes the singularities of the field of the active mesh."""
-        mesh = self.objects[0].data
+        mesh = field_mesh(self.objects[0])
         surface = mesh_surface(mesh)
         field = read_mesh_field(mesh, surface=surface)
         reach = self.reach * surface.extent

@@ -164,6 +164,14 @@ def has_rosy_properties() -> bool:
     return hasattr(bpy.types.Scene, "rosy") and hasattr(bpy.types.Mesh, "rosy")
 
 
+def field_mesh(obj: bpy.types.Object) -> Any:
+    """Return the mesh that holds the field of an object: its field mesh, or its own data.
+
+    See the module `field_meshes`.
+    """
+    return (obj.rosy.field_mesh if has_rosy_properties() else None) or obj.data
+
+
 def is_editable(datablock: bpy.types.ID) -> bool:
     """Return whether a datablock can be changed: it is local, or a library override, but not of a mesh.
 

@@ -12,7 +12,7 @@ from bpy.types import Mesh, Object
 
 from ..core.cache import content_hash
 from ..field.rosy_field import MAX_DEGREE
-from .datablocks import user_modifiers
+from .datablocks import field_mesh, user_modifiers
 from .field_attributes import ANGLE_TYPE, VECTOR_TYPE, attribute_name, field_degree
 from .look_inputs import ReadRequest, color_values_digest, tone_digest
 from .meshes import read_attribute, shape_digest, vertex_positions
@@ -85,13 +85,14 @@ def read_mesh_state(
             return None
         shape = shape_digest(mesh, occluder_only=True)
         return MeshState(digest(shape, slots, *transparent), bounds)
-    original = owner.data
+    original, holder = owner.data, field_mesh(owner)
     digest_of_tone = tone_digest(mesh, owner, request.tone)
-    parts = [shape_digest(mesh), *field_parts(mesh, original), digest_of_tone]
-    parts.append(color_values_digest(mesh, request.color_attribute))
+    field_source = mesh if holder == original else holder
+    parts = [shape_digest(mesh), *field_parts(field_source, holder), digest_of_tone]
+    parts += [color_values_digest(each, request.color_attribute) for each in (mesh, holder)]
     if user_modifiers(owner) or original.shape_keys:
         # The evaluated field also depends on the original mesh: on its shape, normals and field.
-        parts += [shape_digest(original), *field_parts(original, original)]
+        parts += [shape_digest(holder), *field_parts(holder, holder)]
     if any(isinstance(part, np.ndarray) and not np.isfinite(part).all() for part in parts):
         parts.append(request.nonfinite)
     lacks_tone = request.tone is not None and not digest_of_tone

@@ -15,6 +15,7 @@ from ..core.errors import NoFeaturesError, RosyError
 from ..core.progress import progress
 from ..field.connectivity import are_pairs, smooth_fans
 from ..field.surface import Surface, build_surface
+from .datablocks import field_mesh
 
 #: Ways to mark edges in Blender: RNA property, label, and description in the user interface.
 EDGE_MARKS = {
@@ -38,7 +39,7 @@ def mesh_label(mesh: Mesh) -> str:
 
     Selected objects are preferred.
     """
-    users = [obj for obj in bpy.data.objects if obj.data == mesh]
+    users = [obj for obj in bpy.data.objects if mesh in (obj.data, field_mesh(obj))]
     if not users:
         return f"mesh '{mesh.name}'"
     return f"object '{next((obj for obj in users if obj.select_get()), users[0]).name}'"

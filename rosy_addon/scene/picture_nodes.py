@@ -147,6 +147,10 @@ def new_material(
             transparent = build("ShaderNodeBsdfTransparent").outputs["BSDF"]
             shader = build.mix_shaders(coverage, transparent, shader)
     build("ShaderNodeOutputMaterial", {"Surface": shader})
+    if has_clear_paper(look) and hasattr(material, "cycles"):
+        material.cycles.emission_sampling = (
+            "NONE"  # ink is no lamp: to sample it makes the rest noisier
+        )
     return material
 
 

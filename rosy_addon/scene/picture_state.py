@@ -24,6 +24,7 @@ from ..field.polygon_arrays import box_corners
 from ..projection.camera import Camera
 from ..surface_texture.draw import DIRECTION_SETTINGS, TEXTURE_SETTINGS, texture_colors_values
 from .cameras import CameraSource, camera_of_object, render_camera, resolve_camera
+from .datablocks import field_mesh
 from .field_attributes import attribute_name, field_degree
 from .look_inputs import ReadRequest, color_values_digest, read_request, reference_path
 from .look_properties import read_look
@@ -277,7 +278,7 @@ def read_texture_state(scene: Scene, depsgraph: Depsgraph, obj: Object) -> Pictu
 
     It does not depend on movement and deformation of the object, unless light is baked into the texture.
     """
-    settings, mesh = scene.rosy, obj.data
+    settings, mesh = scene.rosy, field_mesh(obj)
     look = read_look(settings)
     shape = [shape_digest(mesh), *field_parts(mesh, mesh), settings.undefined]
     uv_parts = [settings.texture_margin]
@@ -326,7 +327,7 @@ def settings_key(scene: Scene, view_layer: ViewLayer) -> tuple:
     look = read_look(scene.rosy)
     objects = []
     for obj in field_objects(view_layer):
-        image, mesh = obj.rosy.tone_image, obj.data
+        image, mesh = obj.rosy.tone_image, field_mesh(obj)
         image_key = image and (image.session_uid, *image.size, image.is_dirty)
         tone_key = image_key, obj.rosy.tone_uv_map
         objects.append((obj.session_uid, attribute_name(mesh), field_degree(mesh), tone_key))

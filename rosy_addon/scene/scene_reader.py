@@ -26,7 +26,7 @@ from ..field.surface import Surface, have_same_polygons
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 from . import look_inputs
-from .datablocks import remedy_for_absence, user_modifiers
+from .datablocks import field_mesh, remedy_for_absence, user_modifiers
 from .evaluated_field import (
     Errors,
     FieldLayout,
@@ -434,6 +434,20 @@ class SceneReader:
         surface = mesh_surface(mesh, label, cache=cache)
         tone = look_inputs.read_tone(mesh, owner, request.tone, cache)
         values = look_inputs.read_color_values(mesh, request.color_attribute, label, cache)
+        if (holder := field_mesh(owner)) != original:
+            undeformed = mesh_surface(holder, label, cache=cache)
+            if not have_same_polygons(surface, undeformed):
+                raise RosyError(
+                    f"{label}: its modifiers make other faces now than when its field was made: make the field again"
+                )
+            if values is None:
+                values = look_inputs.read_color_values(
+                    holder, request.color_attribute, label, cache
+                )
+            field = read_mesh_field(
+                holder, surface=undeformed, nonfinite=request.nonfinite, label=label, cache=cache
+            )
+            return self._with_rest(surface, undeformed.vertices), field, tone, values
         if original.is_editmode:
             return surface, self._edit_mode_field(mesh, owner, surface, label), tone, values
         modifiers, undeformed = user_modifiers(owner), surface

@@ -10,6 +10,7 @@ from ..core.errors import counted
 from ..gpu.select import automatic_device
 from ..scene.bake_records import BakeInfo, has_pictures, list_bakes
 from ..scene.computed_attributes import other_field_names
+from ..scene.datablocks import field_mesh
 from ..scene.field_attributes import has_field
 from ..scene.pictures import NEUTRAL_VIEW_TRANSFORMS
 from ..scene.staleness import SCENE_STATES
@@ -50,7 +51,7 @@ def _draw_field_section(layout: UILayout, context: Context) -> None:
 
 
 def _draw_existing_field(layout: UILayout, context: Context, obj: Object) -> None:
-    mesh = obj.data
+    mesh = field_mesh(obj)
     box = layout.box().column(align=True)
     row = box.row()
     row.label(text=obj.name, icon="OUTLINER_OB_MESH")

@@ -16,6 +16,7 @@ import numpy as np
 from ..core.errors import RosyError
 from ..projection.rest_coordinates import matrix_scale
 from ..scene.app_handlers import add_handlers, remove_handlers
+from ..scene.datablocks import field_mesh
 from ..scene.singularity_points import (
     Singularities,
     read_editable_singularities,
@@ -69,7 +70,7 @@ def refresh(context: bpy.types.Context, meshes: Container[bpy.types.Mesh]) -> No
     """
     for obj in context.view_layer.objects:
         shown_before = shown(obj)
-        if shown_before is None or obj.data not in meshes:
+        if shown_before is None or field_mesh(obj) not in meshes:
             continue
         read = read_singularities if shown_before.vertex is None else read_editable_singularities
         try:
@@ -81,7 +82,7 @@ def refresh(context: bpy.types.Context, meshes: Container[bpy.types.Mesh]) -> No
 def _read_again(*_: Any) -> None:
     """Compute all shown singularities again after an undo or redo, which may have changed the fields."""
     context = bpy.context
-    refresh(context, {obj.data for obj in context.view_layer.objects if obj.type == "MESH"})
+    refresh(context, {field_mesh(obj) for obj in context.view_layer.objects if obj.type == "MESH"})
 
 
 #: Handlers of Blender's events while something is shown, by the names of their lists in `bpy.app.handlers`.

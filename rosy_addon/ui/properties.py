@@ -396,6 +396,11 @@ class RosyObject(bpy.types.PropertyGroup):
     )
     tone_uv_map: text("UV Map", "UV map of the image. Empty: the active UV map")
     texture_uv_map: text("UV Map", "UV map of the texture. Empty: the active UV map")
+    field_mesh: bpy.props.PointerProperty(
+        name="Field Mesh",
+        description="The faces with modifiers, with the field. Empty: the mesh of the object has the field",
+        type=bpy.types.Mesh,
+    )
 
 
 #: The classes of this module, in the order of their definition.

@@ -15,6 +15,7 @@ from bpy.types import Context, Object, Region, SpaceView3D, UILayout, WorkSpaceT
 from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_3d
 
 from ..core.errors import RosyError
+from ..scene.datablocks import field_mesh
 from ..scene.field_attributes import has_field
 from ..scene.meshes import vertex_positions
 from ..scene.singularity_points import mesh_of_own_vertices, read_editable_singularities
@@ -126,7 +127,9 @@ def _own_points(context: Context, obj: Object) -> np.ndarray:
     Vertices that modifiers add are left out.
     """
     evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
-    return vertex_positions(mesh_of_own_vertices(obj, evaluated.data))[: len(obj.data.vertices)]
+    return vertex_positions(mesh_of_own_vertices(obj, evaluated.data))[
+        : len(field_mesh(obj).vertices)
+    ]
 
 
 def _vertex_under(

@@ -18,6 +18,7 @@ from ..core.errors import REPORTED_ERRORS, RosyError, error_text
 from ..core.file_io import file_stamp
 from ..scene import look_inputs
 from ..scene.cameras import render_camera
+from ..scene.datablocks import field_mesh
 from ..scene.scene_reader import SceneInstance, SceneReader
 from ..scene.visible_objects import shown_instances
 
@@ -127,7 +128,9 @@ class LayerStates:
                     obj.name_full for obj in objects if obj.rosy.tone_image == datablock
                 }
             elif datablock.id_type == "MESH" and update.is_updated_geometry:
-                remeshed_names |= {obj.name_full for obj in objects if obj.data == datablock}
+                remeshed_names |= {
+                    obj.name_full for obj in objects if datablock in (obj.data, field_mesh(obj))
+                }
             elif datablock.id_type == "OBJECT" and update.is_updated_geometry:
                 changed_names.add(datablock.name_full)
         for (scene_name, _), layer in self._layers.items():

@@ -14,7 +14,7 @@ from harness.blender_data import attribute_values
 @pytest.mark.parametrize(("kind", "degree"), [("curvature", 4), ("axis", 12), ("uv", 4)])
 def test_generate(suzanne, kind, degree):
     assert bpy.ops.rosy.field_generate(kind=kind, degree=degree) == {"FINISHED"}
-    mesh = suzanne.data
+    mesh = suzanne.rosy.field_mesh  # of the subdivided faces
     attribute = mesh.attributes["rosy"]
     assert (attribute.domain, attribute.data_type) == ("FACE", "FLOAT_VECTOR")
     assert mesh.rosy.degree == degree
@@ -29,8 +29,9 @@ def test_generate_on_all_selected(suzanne):
     suzanne.select_set(True)
     assert bpy.ops.rosy.field_generate(kind="axis", degree=3, axis=(1, 0, 0)) == {"FINISHED"}
     for obj in bpy.context.selected_objects:
-        assert obj.data.rosy.degree == 3
-        assert "rosy" in obj.data.attributes
+        mesh = obj.rosy.field_mesh or obj.data
+        assert mesh.rosy.degree == 3
+        assert "rosy" in mesh.attributes
 
 
 def test_an_object_without_features_does_not_stop_the_others(suzanne, capfd):
@@ -195,11 +196,11 @@ def test_convert(suzanne):
         degree=8, angle=0.1, smooth=0.01, magnitude="values", values="Weights"
     )
     assert converted == {"FINISHED"}
-    assert suzanne.data.rosy.degree == 8
-    length = np.linalg.norm(member_vectors(suzanne.data), axis=1)
+    assert suzanne.rosy.field_mesh.rosy.degree == 8
+    length = np.linalg.norm(member_vectors(suzanne.rosy.field_mesh), axis=1)
     assert 0.4 < length.max() <= 0.5 + 1e-6 and length.min() == 0
     bpy.ops.rosy.field_convert(degree=4)
-    assert suzanne.data.rosy.degree == 4
+    assert suzanne.rosy.field_mesh.rosy.degree == 4
 
 
 # --- combing ---------------------------------------------------------------------------------
@@ -387,7 +388,7 @@ def test_dots_stay_with_renamed_objects_and_go_without_a_field(scene):
 
 def test_exports_and_imports(suzanne, tmp_path):
     bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
-    before = member_vectors(suzanne.data)
+    before = member_vectors(suzanne.rosy.field_mesh)
     for kind in (".rosy", ".rawfield", ".txt", ".npy", ".obj", ".sings"):
         path = str(tmp_path / f"a{kind}")
         assert bpy.ops.rosy.field_export(filepath=path, file_format=kind) == {"FINISHED"}
@@ -395,7 +396,7 @@ def test_exports_and_imports(suzanne, tmp_path):
             continue
         assert bpy.ops.rosy.field_import(filepath=path) == {"FINISHED"}
         if kind != ".obj":
-            np.testing.assert_array_equal(member_vectors(suzanne.data), before)
+            np.testing.assert_array_equal(member_vectors(suzanne.rosy.field_mesh), before)
 
 
 def test_no_operator_replaces_the_open_file(suzanne, tmp_path):
@@ -418,6 +419,7 @@ def test_no_operator_replaces_the_open_file(suzanne, tmp_path):
 
 def test_what_is_imported_from_other_programs(suzanne, tmp_path):
     """A cross in two files, with vectors off the surface; and feature edges."""
+    suzanne.modifiers.clear()
     mesh = suzanne.data
     normals = np.array([polygon.normal for polygon in mesh.polygons])
     axis = np.cross(normals, (0.1, 0.2, 1.0))
@@ -438,6 +440,7 @@ def test_what_is_imported_from_other_programs(suzanne, tmp_path):
 
 
 def test_a_file_of_the_mesh_before_it_was_triangulated(suzanne, tmp_path):
+    suzanne.modifiers.clear()
     bpy.ops.rosy.field_generate(kind="axis", degree=4, axis=(0.2, 0.3, 1.0))
     path = tmp_path / "a.rosy"
     assert bpy.ops.rosy.field_export(filepath=str(path)) == {"FINISHED"}
@@ -461,8 +464,9 @@ def test_a_file_of_the_mesh_before_it_was_triangulated(suzanne, tmp_path):
 
 def test_fields_are_compared(suzanne):
     """A field that is turned by 0.2 under another name: the angle is an attribute and the color."""
-    mesh, settings = suzanne.data, bpy.context.scene.rosy
+    settings = bpy.context.scene.rosy
     bpy.ops.rosy.field_generate(kind="axis", degree=2)
+    mesh = suzanne.rosy.field_mesh
     message = error_of(bpy.ops.rosy.field_compare)
     assert "make one with another name of the attribute" in message
     bpy.ops.rosy.field_generate(kind="axis", degree=2, attribute="turned")
@@ -477,6 +481,7 @@ def test_fields_are_compared(suzanne):
     assert defined.mean() > 0.9 and np.allclose(values[defined], np.degrees(0.2), atol=0.01)
     assert (settings.color_attribute, settings.look.hue) == ("Difference", "values")
     assert tuple(settings.look.color_range) == (90, 0)
+    assert bpy.ops.rosy.bake() == {"FINISHED"}
     assert "choose 'rosy'" in error_of(bpy.ops.rosy.field_compare, other="turned")
     mesh.attributes.remove(mesh.attributes["Difference"])
     mesh.attributes.new("Difference", "INT", "POINT")

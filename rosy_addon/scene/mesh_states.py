@@ -15,7 +15,7 @@ from ..field.rosy_field import MAX_DEGREE
 from .datablocks import field_mesh, user_modifiers
 from .field_attributes import ANGLE_TYPE, VECTOR_TYPE, attribute_name, field_degree
 from .look_inputs import ReadRequest, color_values_digest, tone_digest
-from .meshes import read_attribute, shape_digest, vertex_positions
+from .meshes import material_indices, read_attribute, shape_digest, vertex_positions
 from .transparency import transparent_slots
 
 
@@ -78,7 +78,7 @@ def read_mesh_state(
     bounds = np.stack([positions.min(axis=0), positions.max(axis=0)])
     if request is None:
         slots, transparent = (
-            read_attribute(mesh, "material_index", np.int32, 1),
+            material_indices(mesh),
             transparent_slots(mesh, owner),
         )
         if transparent and all(transparent):

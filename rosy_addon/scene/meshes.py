@@ -27,6 +27,18 @@ EDGE_MARKS = {
 #: Name of the RNA property with the values of an attribute, by its data type. For other types it is "value".
 VALUE_KEYS = {"FLOAT_VECTOR": "vector", "FLOAT2": "vector", "FLOAT_COLOR": "color"}
 
+#: Number of columns and kind (`numpy.dtype.kind`) of the values of an attribute, by its data type.
+VALUE_SHAPES = {
+    "FLOAT": (1, "f"),
+    "FLOAT2": (2, "f"),
+    "FLOAT_VECTOR": (3, "f"),
+    **dict.fromkeys(("FLOAT_COLOR", "BYTE_COLOR", "QUATERNION"), (4, "f")),
+    "BOOLEAN": (1, "b"),
+    "INT": (1, "i"),
+    "INT8": (1, "i"),
+    "INT32_2D": (2, "i"),
+}
+
 #: Attribute in which Blender stores which edges are selected.
 EDGE_SELECTION_ATTRIBUTE = ".select_edge"
 
@@ -128,9 +140,9 @@ def _read_shape(
     if not occluder_only:
         flat_faces = read_attribute(mesh, "sharp_face", bool, 1)
         sharp_edges = read_attribute(mesh, "sharp_edge", bool, 1)
-        if sharp_edges is not None and sharp_edges.any():
+        if sharp_edges is not None and len(sharp_edges) == len(mesh.edges) and sharp_edges.any():
             topology["sharp_edges"] = _edge_vertices(mesh)[sharp_edges]
-        if flat_faces is not None and flat_faces.any():
+        if flat_faces is not None and len(flat_faces) == len(mesh.polygons) and flat_faces.any():
             topology["flat_faces"] = flat_faces
         if mesh.has_custom_normals:
             custom_normals = _corner_normals(mesh)
@@ -203,6 +215,13 @@ def vertex_positions(mesh: Mesh) -> np.ndarray:
     return _attribute_or_collection(mesh, "position", mesh.vertices, "co", np.float32, 3)
 
 
+def material_indices(mesh: Mesh) -> np.ndarray:
+    """Return the indices of the material slots of the faces, (F,) int32."""
+    faces = mesh.polygons
+    # Without the attribute, all are 0. Users' attributes of this name may have other types.
+    return _attribute_or_collection(mesh, "material_index", faces, "material_index", np.int32)
+
+
 @contextmanager
 def evaluated_mesh(obj: Object) -> Iterator[Mesh | None]:
     """Context manager: yield the temporary mesh of an evaluated object; None if it has no faces."""
@@ -260,9 +279,14 @@ def flush_edit_mode(mesh: Mesh) -> None:
 
 
 def read_attribute(mesh: Mesh, name: str, dtype: type, columns: int) -> np.ndarray | None:
-    """Return an attribute as (n, columns), or (n,) for one column; None if it is missing or empty."""
+    """Return an attribute as (n, columns), or (n,) for one column; None if it is missing or empty.
+
+    Also None if it has another type: users may give any name to an attribute.
+    """
     attribute = mesh.attributes.get(name)
     if attribute is None or not len(attribute.data):  # in edit mode, attributes are empty
+        return None
+    if VALUE_SHAPES.get(attribute.data_type) != (columns, np.dtype(dtype).kind):
         return None
     key = VALUE_KEYS.get(attribute.data_type, "value")
     return read_collection(attribute.data, key, dtype, columns)

@@ -6,7 +6,7 @@ import numpy as np
 from bpy.types import Material, Mesh, Node, NodeTree, Object
 
 from ..field.surface import Surface
-from .meshes import read_attribute
+from .meshes import material_indices
 
 #: Shader nodes through which one sees what is behind them.
 _TRANSPARENT_NODES = ("BSDF_TRANSPARENT", "BSDF_GLASS", "BSDF_REFRACTION")
@@ -33,9 +33,7 @@ def opaque_triangles(surface: Surface, mesh: Mesh, owner: Object) -> np.ndarray:
     See `transparent_slots`. `surface` is the surface of the mesh.
     """
     is_transparent = np.array(transparent_slots(mesh, owner) or (False,))
-    slot = read_attribute(mesh, "material_index", np.int32, 1)
-    slot = np.zeros(surface.face_count, dtype=np.int32) if slot is None else slot
-    slot = np.clip(slot, 0, len(is_transparent) - 1)
+    slot = np.clip(material_indices(mesh), 0, len(is_transparent) - 1)
     return np.flatnonzero(~is_transparent[slot[surface.triangle_face]])
 
 

@@ -284,6 +284,24 @@ def test_transparent_faces_hide_nothing(scene, camera):
     assert visible() == a_quarter
 
 
+def test_users_may_name_attributes_like_those_of_blender(scene, monkey):
+    """Blender 5 lets them have other types."""
+    wall = add_plane("Wall", cuts=2)
+    wall.data.materials.append(None)
+    expected = read_instances(depsgraph())
+    for mesh in (monkey.data, wall.data):
+        for name, kind, domain in [
+            ("material_index", "FLOAT_VECTOR", "FACE"),
+            ("sharp_face", "FLOAT", "FACE"),
+            ("sharp_edge", "BOOLEAN", "FACE"),
+        ]:
+            mesh.attributes.new(name, kind, domain)
+    found = read_instances(depsgraph())
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(one.surface.corner_fan, other.surface.corner_fan)
+        np.testing.assert_array_equal(one.surface.triangles, other.surface.triangles)
+
+
 def test_reading_changes_nothing(scene, monkey):
     monkey.modifiers.new("Subdivision", "SUBSURF")
     before = contents()

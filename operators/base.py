@@ -17,6 +17,7 @@ from ..rosy_addon.core.errors import (
 )
 from ..rosy_addon.field.rosy_field import RosyField
 from ..rosy_addon.scene.field_attributes import has_field
+from ..rosy_addon.scene.field_meshes import FieldTargets, hold_fields
 from ..rosy_addon.scene.mesh_fields import assign_fields
 from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.ui import job_status, live_views, overlay
@@ -158,7 +159,13 @@ class RosyOperator:
                 self.report({"WARNING"}, as_sentence(message))
         self._reported |= {*messages}
 
-    def store_fields(self, context: Context, fields: dict[Mesh, RosyField], name: str = "") -> None:
+    def store_fields(
+        self,
+        context: Context,
+        fields: dict[Mesh, RosyField],
+        name: str = "",
+        targets: FieldTargets | None = None,
+    ) -> None:
         """Store fields on meshes with `assign_fields`, and apply the preferences to the scene.
 
         Shown singularities are updated. With the first field of a scene, the 3D view is made live if the
@@ -171,6 +178,8 @@ class RosyOperator:
         fields : dict of bpy.types.Mesh to RosyField
         name : str, optional
             Name of the attribute. By default the existing field of each mesh is replaced.
+        targets : dict of bpy.types.Mesh to list of bpy.types.Object, optional
+            The objects of new fields; see `field_targets`.
 
         Raises
         ------
@@ -179,6 +188,7 @@ class RosyOperator:
         """
         is_first = not any(has_field(obj) for obj in context.scene.objects)
         assign_fields(fields, name)
+        hold_fields({mesh: objs for mesh, objs in (targets or {}).items() if mesh in fields})
         overlay.refresh(context, fields)
         try:
             apply_preferences(context)

@@ -10,6 +10,7 @@ from bpy.types import Context, Operator
 from ..rosy_addon.core.errors import counted
 from ..rosy_addon.field.analysis import FieldComparison, format_degrees
 from ..rosy_addon.scene import computed_attributes
+from ..rosy_addon.scene.datablocks import field_mesh
 from ..rosy_addon.ui.operator_settings import draw_settings
 from ..rosy_addon.ui.property_makers import text, toggle
 from ..rosy_addon.worker.job import Steps
@@ -18,7 +19,7 @@ from .modal_job import ActiveMeshMixin, ModalJobMixin
 
 
 def _search_fields(_operator: Any, context: Context, _typed: str) -> list[str]:
-    return computed_attributes.other_field_names(selected_mesh_objects(context)[0].data)
+    return computed_attributes.other_field_names(field_mesh(selected_mesh_objects(context)[0]))
 
 
 class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, Operator):
@@ -39,7 +40,7 @@ class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, Operator):
     )
 
     def begin(self, context: Context) -> Steps[tuple[str, int, FieldComparison]]:
-        return computed_attributes.store_difference.begin(self.objects[0].data, self.other)
+        return computed_attributes.store_difference.begin(field_mesh(self.objects[0]), self.other)
 
     def finish(self, context: Context, result: tuple[str, int, FieldComparison]) -> None:
         other, degree, comparison = result

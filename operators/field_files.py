@@ -9,14 +9,16 @@ from pathlib import Path
 import bpy
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from ..rosy_addon.core.errors import RosyError, counted
+from ..rosy_addon.core.errors import RosyError, RowCountError, counted
 from ..rosy_addon.core.file_io import check_writable, write_bytes
 from ..rosy_addon.field.directional_field import field_directions
 from ..rosy_addon.field.field_io import READ_SUFFIXES, field_file, load_field
 from ..rosy_addon.field.formats.feature_edges import EDGE_SUFFIXES, read_edges
 from ..rosy_addon.field.rosy_field import MAX_DEGREE, RosyField
 from ..rosy_addon.field.validate import VectorPolicy
+from ..rosy_addon.scene.datablocks import field_mesh
 from ..rosy_addon.scene.field_attributes import field_degree
+from ..rosy_addon.scene.field_meshes import field_targets
 from ..rosy_addon.scene.guides import read_combed_guides
 from ..rosy_addon.scene.mesh_fields import check_writable as check_writable_mesh
 from ..rosy_addon.scene.mesh_fields import read_mesh_field
@@ -97,14 +99,24 @@ class ROSY_OT_field_import(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Im
         mesh_file = bpy.path.abspath(self.mesh_file) if self.mesh_file else None
         paths = [path, *([bpy.path.abspath(self.second_file)] if self.second_file else [])]
         policy = VectorPolicy(self.undefined, self.off_surface)
-        inputs = paths, surface, self.degree or None, policy
-        field, note = yield Call(partial(load_field, mesh=mesh_file), inputs, 0.0, 0.9)
-        if field.direction_ratios is not None and field.source_directions is None:
-            directions = yield Call(
-                field_directions, (surface, field), 0.9, label="computing directions"
-            )
-            field = replace(field, source_directions=directions)
-        self.store_fields(context, {mesh: field}, self.attribute)
+        load, settings = partial(load_field, mesh=mesh_file), (self.degree or None, policy)
+        errors: list[RosyError] = []
+        with field_targets([obj], context.evaluated_depsgraph_get()) as targets:
+            for mesh in dict.fromkeys([obj.data, *targets]):  # the rows may fit either
+                surface = mesh_surface(mesh, f"object '{obj.name}'")
+                try:
+                    field, note = yield Call(load, (paths, surface, *settings), 0.0, 0.9)
+                    break
+                except RowCountError as error:
+                    errors.append(error)
+            else:
+                raise errors[0]
+            if field.direction_ratios is not None and field.source_directions is None:
+                directions = yield Call(
+                    field_directions, (surface, field), 0.9, label="computing directions"
+                )
+                field = replace(field, source_directions=directions)
+            self.store_fields(context, {mesh: field}, self.attribute, {mesh: [obj]})
         if note:
             self.report_warnings(note)
         faces = counted(len(field.vectors), "face")
@@ -180,7 +192,7 @@ class ROSY_OT_field_export(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, Ex
 
     def begin(self, context: bpy.types.Context) -> Steps[Path]:
         """Read the field or the combed guides of the active mesh, and write them to the file."""
-        mesh = self.objects[0].data
+        mesh = field_mesh(self.objects[0])
         surface, path = mesh_surface(mesh), Path(bpy.path.abspath(self.filepath))
         if self.content == "GUIDES":
             if path.suffix.lower() not in GUIDE_FORMATS:

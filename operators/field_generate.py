@@ -16,6 +16,7 @@ from ..rosy_addon.field.rosy_field import MAX_DEGREE
 from ..rosy_addon.field.singularities import description
 from ..rosy_addon.field.surface import Surface
 from ..rosy_addon.scene import guides, singularity_points
+from ..rosy_addon.scene.field_meshes import FieldTargets, field_targets
 from ..rosy_addon.scene.look_properties import read_settings
 from ..rosy_addon.scene.meshes import EDGE_MARKS, marked_edges, mesh_surface, read_uvs
 from ..rosy_addon.ui.operator_settings import draw_generator_settings, draw_settings
@@ -123,11 +124,16 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
         A mesh without features to follow, or on which the field is undefined everywhere, is left out and
         reported. If no other mesh is selected, an error is raised.
         """
+        with field_targets(self.objects, context.evaluated_depsgraph_get()) as targets:
+            return (yield from self._generate(context, targets))
+
+    def _generate(self, context: Context, targets: FieldTargets) -> Steps[str]:
+        """Generate fields on meshes, and let their objects have them. The result is a message to the user."""
         inputs, errors = [], []
-        for mesh in self.meshes:
-            surface = mesh_surface(mesh)
+        for mesh, (owner, *_) in targets.items():
+            surface = mesh_surface(mesh, f"object '{owner.name}'")
             try:
-                settings = self._settings_for(context, mesh, surface)
+                settings = self._settings_for(context, owner, mesh, surface)
             except NoFeaturesError as error:
                 errors.append(error)
                 continue
@@ -157,14 +163,18 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
         describe = partial(description, count_singularities=is_cheap)
         notes = yield Call(describe, (list(made.values()),), 0.9)
         fields = {mesh: field for mesh, (_, field) in made.items()}
-        self.store_fields(context, fields, self.attribute)
-        names = [obj.name for obj in self.objects if obj.data in made]
+        self.store_fields(context, fields, self.attribute, targets)
+        names = [targets[mesh][0].name for mesh in made]
         target = f"'{names[0]}'" if len(made) == 1 else counted(len(made), "mesh", "meshes")
         return f"Made a field of degree {self.degree} on {target}{notes and ': '}{notes}"
 
-    def _settings_for(self, context: Context, mesh: Mesh, surface: Surface) -> GeneratorSettings:
-        """Return the settings of the generator for a mesh. They contain the guides, read from the scene."""
-        owner = next(obj for obj in self.objects if obj.data == mesh)
+    def _settings_for(
+        self, context: Context, owner: Object, mesh: Mesh, surface: Surface
+    ) -> GeneratorSettings:
+        """Return the settings of the generator for a mesh. They contain the guides, read from the scene.
+
+        The mesh is the one of the object `owner`, or its field mesh.
+        """
         kind_guides = {"features": {"EDGES"}, "uv": {"UV"}, "guided": self.guides}
         guide_kinds = kind_guides.get(self.kind, ())
         values = read_settings(self, GeneratorSettings)

@@ -24,6 +24,7 @@ from ..rosy_addon.core.errors import (
     telling_warnings,
 )
 from ..rosy_addon.scene.app_handlers import add_handlers, remove_handlers
+from ..rosy_addon.scene.datablocks import field_mesh
 from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.ui import job_status
 from ..rosy_addon.ui.preferences import uses_helper
@@ -256,8 +257,8 @@ class ModalJobMixin(RosyOperator):
 
     @property
     def meshes(self) -> list[Mesh]:
-        """The meshes of the objects, each once."""
-        return list(dict.fromkeys(obj.data for obj in self.objects))
+        """The meshes that hold the fields of the objects, each once."""
+        return list(dict.fromkeys(map(field_mesh, self.objects)))
 
     #: Sentence for the user that says in which state the scene or files are after the job was cancelled.
     cancel_note = "nothing was changed"

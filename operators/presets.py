@@ -113,7 +113,7 @@ class ROSY_OT_preset_save(_DescribedPreset, bpy.types.Operator):
 
     def act(self, context: bpy.types.Context) -> None:
         settings = context.scene.rosy
-        preset = store.Preset(self.name.strip(), self.sentence.strip(), read_look(settings))
+        preset = store.Preset(self.name.strip(), self.sentence.strip(), read_look(settings.look))
         folder = user_presets_folder()
         settings.preset_name = store.save_preset(preset, folder, replace=self.replace)
         self.report_done(f"Saved preset '{preset.name}'")

@@ -10,6 +10,7 @@ from ..rosy_addon.core.errors import REPORTED_ERRORS, RosyError, counted
 from ..rosy_addon.field.singularities import format_index
 from ..rosy_addon.field.singularity_changes import OUTSIDE, move_index
 from ..rosy_addon.scene import singularity_points
+from ..rosy_addon.scene.datablocks import field_mesh
 from ..rosy_addon.scene.field_attributes import has_field
 from ..rosy_addon.scene.mesh_fields import read_mesh_field
 from ..rosy_addon.scene.meshes import mesh_surface
@@ -17,7 +18,7 @@ from ..rosy_addon.ui import overlay, singularity_handles
 from ..rosy_addon.ui.operator_settings import draw_settings
 from ..rosy_addon.ui.property_makers import choice, fraction, integer, toggle
 from ..rosy_addon.worker.job import Call, Steps
-from .base import ACTIVE_FIELD, IDLE, IN_3D_VIEW, RosyOperator, selected_mesh_objects
+from .base import ACTIVE_FIELD, IDLE, IN_3D_VIEW, Condition, RosyOperator, selected_mesh_objects
 from .modal_job import ActiveMeshMixin, ModalJobMixin
 
 #: The property for the distance over which directions change, relative to `Surface.extent`.
@@ -31,11 +32,20 @@ REACH = fraction(
 )
 
 
+#: The condition for showing and hiding singularities. An object whose field was removed may still show them.
+FIELD_OR_DOTS = Condition(
+    lambda context: any(
+        has_field(obj) or overlay.shown(obj) for obj in selected_mesh_objects(context)[:1]
+    ),
+    ACTIVE_FIELD.message,
+)
+
+
 class ROSY_OT_singularities(RosyOperator, bpy.types.Operator):
     """Show the singularities of the fields of the selected meshes: orange for positive index, blue for negative index"""
 
     bl_label = "Singularities"
-    conditions = (IDLE, ACTIVE_FIELD)
+    conditions = (IDLE, FIELD_OR_DOTS)
 
     show: choice(
         "Show",
@@ -49,10 +59,10 @@ class ROSY_OT_singularities(RosyOperator, bpy.types.Operator):
     )
 
     def act(self, context: bpy.types.Context) -> None:
-        objects = [obj for obj in selected_mesh_objects(context) if has_field(obj)]
         if self.show == "NONE":
-            _hide(context, objects)
+            _hide(context, selected_mesh_objects(context))
             return
+        objects = [obj for obj in selected_mesh_objects(context) if has_field(obj)]
         depsgraph = context.evaluated_depsgraph_get()
         singularities_by_object = {
             obj: singularity_points.read_singularities(obj, depsgraph) for obj in objects
@@ -60,7 +70,7 @@ class ROSY_OT_singularities(RosyOperator, bpy.types.Operator):
         _hide(context, objects)
         for obj, singularities in singularities_by_object.items():
             if self.show in ("OVERLAY", "BOTH"):
-                overlay.show(obj.name, singularities)
+                overlay.show(obj, singularities)
             if self.show in ("POINTS", "BOTH"):
                 singularity_points.add_singularity_points(context.scene, obj, singularities)
         count = sum(map(len, singularities_by_object.values()))
@@ -75,7 +85,7 @@ class ROSY_OT_singularities(RosyOperator, bpy.types.Operator):
 def _hide(context: bpy.types.Context, objects: list[bpy.types.Object]) -> None:
     """Hide the singularities of objects in the overlay, and remove the point objects that show them."""
     for obj in objects:
-        overlay.hide(obj.name)
+        overlay.hide(obj)
         singularity_points.remove_singularity_points(context.scene, obj)
 
 
@@ -104,7 +114,7 @@ class ROSY_OT_field_singularities(ActiveMeshMixin, ModalJobMixin, bpy.types.Oper
 
     def begin(self, context: bpy.types.Context) -> Steps[None]:
         """Return the steps of the job that changes the singularities of the field of the active mesh."""
-        mesh = self.objects[0].data
+        mesh = field_mesh(self.objects[0])
         surface = mesh_surface(mesh)
         field = read_mesh_field(mesh, surface=surface)
         reach = self.reach * surface.extent

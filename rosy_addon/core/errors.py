@@ -79,6 +79,10 @@ class NoFeaturesError(RosyError):
     """The error that a mesh has no edges that a field can follow."""
 
 
+class RowCountError(RosyError):
+    """The error that a field has another number of rows than a mesh has faces or vertices."""
+
+
 class DeviceError(RosyError):
     """The error that there is no usable graphics card, or that the shaders do not compile on it."""
 

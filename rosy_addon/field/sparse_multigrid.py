@@ -11,6 +11,7 @@ prolongation is then smoothed by a Jacobi step (smoothed aggregation: Vanek, Man
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -392,15 +393,16 @@ def _positive_diagonal(matrix: CSRMatrix) -> np.ndarray:
 def dense_inverse(matrix: CSRMatrix) -> np.ndarray:
     """Return the inverse of a sparse matrix as a dense array.
 
-    If the matrix is singular, its diagonal is enlarged a little. The inverse is used as a preconditioner, so
-    this changes the rate of convergence and not the solution.
+    If the matrix is singular, or its inverse is too large for floating-point numbers, its diagonal is enlarged a little.
+    The inverse is used as a preconditioner, so this changes the rate of convergence and not the solution.
     """
     dense = matrix.dense()
-    try:
-        return np.linalg.inv(dense)
-    except np.linalg.LinAlgError:
-        np.fill_diagonal(dense, (1 + SINGULAR_SHIFT) * _positive_diagonal(matrix))
-        return np.linalg.inv(dense)
+    with suppress(np.linalg.LinAlgError):
+        inverse = np.linalg.inv(dense)
+        if np.isfinite(inverse).all():
+            return inverse
+    np.fill_diagonal(dense, (1 + SINGULAR_SHIFT) * _positive_diagonal(matrix))
+    return np.linalg.inv(dense)
 
 
 def _smoothed_prolongation(

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.errors import RosyError, counted
+from ..core.errors import RosyError, RowCountError, counted
 from .blocks import bincount_rows, by_rows, row_blocks
 from .corner_fans import corner_angles, corner_rotations
 from .directional_field import (
@@ -146,7 +146,7 @@ def checked_domain(surface: Surface, count: int, domain: str | None, source: str
     if domain is None:
         domain = "face" if count == faces else "vertex"
     if count != {"face": faces, "vertex": vertices}.get(domain):
-        raise RosyError(
+        raise RowCountError(
             f"{source}: contains {counted(count, 'row')}, but {surface.name} has "
             f"{counted(faces, 'face')} and {counted(vertices, 'vertex', 'vertices')}"
         )

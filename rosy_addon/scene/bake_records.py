@@ -21,6 +21,7 @@ from ..core.errors import RosyError
 from ..projection.camera import Camera
 from .cameras import FRAME_CAMERAS, CameraSource, frame_camera
 from .datablocks import (
+    INK_TAG,
     delete_owned,
     delete_unused,
     removable_modifiers,
@@ -172,7 +173,7 @@ def _find_texture_record(scene: Scene, obj: Object) -> PropertyGroup | None:
 def _texture_objects(record: PropertyGroup) -> list[Object]:
     """Return the objects whose modifier has the texture of a record, sorted by name."""
     objects = [
-        obj
+        obj.parent if obj.get(INK_TAG) else obj
         for obj in bpy.data.objects
         if obj.users_collection
         and any(
@@ -384,8 +385,8 @@ def remove_bakes(scene: Scene) -> RemovalCounts:
         bpy.ops.object.mode_set(mode="OBJECT")
     try:
         for obj in objects:
-            remove_picture_modifiers(obj)
             remove_applied_picture(obj.data)
+            remove_picture_modifiers(obj)
     finally:
         if is_editing:
             bpy.ops.object.mode_set(mode="EDIT")

@@ -24,6 +24,9 @@ OWNED_TAG = "rosy_made"
 #: strokes, not with the pictures.
 STROKES_TAG = "rosy_surface_strokes"
 
+#: Custom property on ink objects, which show the pictures of their parents; see `ink_objects`.
+INK_TAG = "rosy_ink"
+
 #: Custom property on the objects and materials of keys (legends). Their images are not pictures of a field.
 KEY_TAG = "rosy_key"
 
@@ -59,7 +62,13 @@ def removable_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
 
 
 def remove_picture_modifiers(obj: bpy.types.Object) -> None:
-    """Remove the modifiers of `removable_modifiers`, or give them the node groups of their library again."""
+    """Remove the modifiers of `removable_modifiers`, or give them the node groups of their library again.
+
+    An ink object is deleted.
+    """
+    if obj.get(INK_TAG):
+        bpy.data.batch_remove([obj, obj.data])
+        return
     for modifier in removable_modifiers(obj):
         if _is_from_library(modifier):
             original = obj.override_library.reference.modifiers.get(modifier.name)
@@ -153,6 +162,14 @@ def remedy_for_absence(otherwise: str) -> str:
 def has_rosy_properties() -> bool:
     """Return whether RoSy's properties are registered, as they are while the extension is enabled."""
     return hasattr(bpy.types.Scene, "rosy") and hasattr(bpy.types.Mesh, "rosy")
+
+
+def field_mesh(obj: bpy.types.Object) -> Any:
+    """Return the mesh that holds the field of an object: its field mesh, or its own data.
+
+    See the module `field_meshes`.
+    """
+    return (obj.rosy.field_mesh if has_rosy_properties() else None) or obj.data
 
 
 def is_editable(datablock: bpy.types.ID) -> bool:

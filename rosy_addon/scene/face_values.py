@@ -9,8 +9,9 @@ from ..core.color import REC709_LUMINANCE
 from ..core.errors import RosyError
 from ..field.polygon_arrays import mean_per_face
 from ..field.validate import apply_nonfinite_policy
+from .datablocks import field_mesh
 from .field_attributes import describe_type, field_values
-from .meshes import mesh_label, polygon_arrays, read_collection
+from .meshes import evaluated_mesh, mesh_label, polygon_arrays, read_collection
 
 #: Blender's types of scalar attributes, with the dtypes of their values; and its types of color attributes.
 NUMBER_TYPES = {"FLOAT": np.float32, "INT": np.int32, "INT8": np.int32, "BOOLEAN": bool}
@@ -57,14 +58,30 @@ def read_face_scalars(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
         attribute is not supported, or a value is not finite.
     """
     source = f"{mesh_label(mesh)}, '{name}'"
+    users = [obj for obj in bpy.data.objects if field_mesh(obj) == mesh]
+    if not users or users[0].data == mesh:
+        return _face_scalars(mesh, name, users, source)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    with evaluated_mesh(users[0].evaluated_get(depsgraph)) as seen:
+        is_same = seen is not None and len(seen.polygons) == len(mesh.polygons)
+        return _face_scalars(seen if is_same else mesh, name, users, source)
+
+
+def _face_scalars(
+    mesh: bpy.types.Mesh, name: str, users: list[bpy.types.Object], source: str
+) -> np.ndarray:
+    """Return the result of `read_face_scalars`, read from a mesh with the faces of the field.
+
+    `users` are the objects that may have a vertex group of this name, and `source` is the name in messages.
+    """
     attribute = mesh.attributes.get(name)
     if attribute is not None:
         domain, values = attribute.domain, scalar_values(attribute, source)
     else:
-        users = [obj for obj in bpy.data.objects if obj.data == mesh and name in obj.vertex_groups]
-        if not users:
+        owners = [obj for obj in users if name in obj.vertex_groups]
+        if not owners:
             raise RosyError(f"{source}: no attribute or vertex group has this name")
-        group = users[0].vertex_groups[name].index
+        group = owners[0].vertex_groups[name].index
         domain, values = "POINT", np.zeros(len(mesh.vertices))
         for vertex in mesh.vertices:
             for membership in vertex.groups:

@@ -28,7 +28,7 @@ from bpy.types import Attribute, Mesh, Object
 from ..core.errors import RosyError
 from ..field.carry import carried_vectors
 from ..field.surface import Surface
-from .datablocks import has_rosy_properties
+from .datablocks import field_mesh, has_rosy_properties
 from .meshes import read_attribute, read_collection, write_attribute
 
 DEFAULT_FIELD_NAME = "rosy"
@@ -56,8 +56,8 @@ def has_field(obj: Object) -> bool:
     """Return whether an object is a mesh with a field attribute, which may be invalid."""
     if obj.type != "MESH" or obj.data is None:
         return False
-    attributes = obj.data.attributes
-    return attribute_name(obj.data) in attributes or "dir0" in attributes
+    mesh = field_mesh(obj)
+    return attribute_name(mesh) in mesh.attributes or "dir0" in mesh.attributes
 
 
 def is_face_vector_field(mesh: Mesh, name: str | None = None) -> bool:

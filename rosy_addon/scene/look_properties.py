@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import bpy
 
 from ..compositor.flow import Drift, drift_at
-from ..compositor.look import Look
+from ..compositor.look import Look, is_hatched
 from ..core.color import alpha_from_hex, from_hex, to_hex
 from ..core.settings import Color, Number, Numbers, Setting, settings_of
 
@@ -19,9 +20,12 @@ def read_look(settings: Any) -> Look:
     Parameters
     ----------
     settings : PropertyGroup
-        ``scene.rosy``, or ``scene.rosy.look``.
+        ``scene.rosy``, or ``scene.rosy.look``. The paper is clear in ``scene.rosy`` if ink is drawn over materials.
     """
-    return Look(**read_settings(getattr(settings, "look", settings), Look))
+    look = Look(**read_settings(getattr(settings, "look", settings), Look))
+    if getattr(settings, "over_material", False) and is_hatched(look):
+        return replace(look, paper_color=to_hex((*from_hex(look.paper_color), 0.0)))
+    return look
 
 
 def apply_look(settings: Any, look: Look) -> None:
@@ -49,7 +53,7 @@ def drift_in_scene(scene: bpy.types.Scene, look: Look, frame: float) -> Drift:
 
 def matches_look(settings: Any, look: Look) -> bool:
     """Return whether Blender properties hold a look, up to the single precision of the properties."""
-    current = read_look(settings)
+    current = read_look(getattr(settings, "look", settings))
     return all(_is_equal(getattr(current, name), getattr(look, name)) for name in settings_of(Look))
 
 

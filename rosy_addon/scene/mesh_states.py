@@ -12,10 +12,11 @@ from bpy.types import Mesh, Object
 
 from ..core.cache import content_hash
 from ..field.rosy_field import MAX_DEGREE
-from .datablocks import user_modifiers
+from .datablocks import field_mesh, user_modifiers
 from .field_attributes import ANGLE_TYPE, VECTOR_TYPE, attribute_name, field_degree
 from .look_inputs import ReadRequest, color_values_digest, tone_digest
-from .meshes import read_attribute, shape_digest, vertex_positions
+from .meshes import material_indices, read_attribute, shape_digest, vertex_positions
+from .transparency import transparent_slots
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,13 +55,13 @@ def mesh_state_key(obj: Object, owner: Object, request: ReadRequest | None) -> t
     request : ReadRequest or None
         What is read from the mesh. None: the object has no field to draw, and only hides others.
     """
-    return owner.session_uid, obj.data.as_pointer(), request
+    return owner.session_uid, obj.data.as_pointer(), request or transparent_slots(obj.data, owner)
 
 
 def read_mesh_state(
     mesh: Mesh | None, owner: Object, request: ReadRequest | None
 ) -> MeshState | None:
-    """Return the state of an evaluated mesh; None if it has no faces.
+    """Return the state of an evaluated mesh; None if it has no faces, or has no field and is transparent.
 
     Parameters
     ----------
@@ -76,14 +77,20 @@ def read_mesh_state(
     positions = vertex_positions(mesh)
     bounds = np.stack([positions.min(axis=0), positions.max(axis=0)])
     if request is None:
-        return MeshState(digest(shape_digest(mesh, occluder_only=True)), bounds)
-    original = owner.data
+        transparent = transparent_slots(mesh, owner)
+        if transparent and all(transparent):
+            return None
+        slots = material_indices(mesh) if any(transparent) else None
+        parts = shape_digest(mesh, occluder_only=True), slots, *transparent
+        return MeshState(digest(*parts), bounds)
+    original, holder = owner.data, field_mesh(owner)
     digest_of_tone = tone_digest(mesh, owner, request)
-    parts = [shape_digest(mesh), *field_parts(mesh, original), digest_of_tone]
-    parts.append(color_values_digest(mesh, request.color_attribute))
+    field_source = mesh if holder == original else holder
+    parts = [shape_digest(mesh), *field_parts(field_source, holder), digest_of_tone]
+    parts += [color_values_digest(each, request.color_attribute) for each in (mesh, holder)]
     if user_modifiers(owner) or original.shape_keys:
         # The evaluated field also depends on the original mesh: on its shape, normals and field.
-        parts += [shape_digest(original), *field_parts(original, original)]
+        parts += [shape_digest(holder), *field_parts(holder, holder)]
     if any(isinstance(part, np.ndarray) and not np.isfinite(part).all() for part in parts):
         parts.append(request.nonfinite)
     lacks_tone = bool(request.tone) and not digest_of_tone

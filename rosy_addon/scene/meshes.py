@@ -15,6 +15,7 @@ from ..core.errors import NoFeaturesError, RosyError
 from ..core.progress import progress
 from ..field.connectivity import are_pairs, smooth_fans
 from ..field.surface import Surface, build_surface
+from .datablocks import field_mesh
 
 #: Ways to mark edges in Blender: RNA property, label, and description in the user interface.
 EDGE_MARKS = {
@@ -25,6 +26,18 @@ EDGE_MARKS = {
 
 #: Name of the RNA property with the values of an attribute, by its data type. For other types it is "value".
 VALUE_KEYS = {"FLOAT_VECTOR": "vector", "FLOAT2": "vector", "FLOAT_COLOR": "color"}
+
+#: Number of columns and kind (`numpy.dtype.kind`) of the values of an attribute, by its data type.
+VALUE_SHAPES = {
+    "FLOAT": (1, "f"),
+    "FLOAT2": (2, "f"),
+    "FLOAT_VECTOR": (3, "f"),
+    **dict.fromkeys(("FLOAT_COLOR", "BYTE_COLOR", "QUATERNION"), (4, "f")),
+    "BOOLEAN": (1, "b"),
+    "INT": (1, "i"),
+    "INT8": (1, "i"),
+    "INT32_2D": (2, "i"),
+}
 
 #: Attribute in which Blender stores which edges are selected.
 EDGE_SELECTION_ATTRIBUTE = ".select_edge"
@@ -38,7 +51,7 @@ def mesh_label(mesh: Mesh) -> str:
 
     Selected objects are preferred.
     """
-    users = [obj for obj in bpy.data.objects if obj.data == mesh]
+    users = [obj for obj in bpy.data.objects if mesh in (obj.data, field_mesh(obj))]
     if not users:
         return f"mesh '{mesh.name}'"
     return f"object '{next((obj for obj in users if obj.select_get()), users[0]).name}'"
@@ -127,9 +140,9 @@ def _read_shape(
     if not occluder_only:
         flat_faces = read_attribute(mesh, "sharp_face", bool, 1)
         sharp_edges = read_attribute(mesh, "sharp_edge", bool, 1)
-        if sharp_edges is not None and sharp_edges.any():
+        if sharp_edges is not None and len(sharp_edges) == len(mesh.edges) and sharp_edges.any():
             topology["sharp_edges"] = _edge_vertices(mesh)[sharp_edges]
-        if flat_faces is not None and flat_faces.any():
+        if flat_faces is not None and len(flat_faces) == len(mesh.polygons) and flat_faces.any():
             topology["flat_faces"] = flat_faces
         if mesh.has_custom_normals:
             custom_normals = _corner_normals(mesh)
@@ -203,6 +216,14 @@ def vertex_positions(mesh: Mesh) -> np.ndarray:
     return _attribute_or_collection(mesh, "position", mesh.vertices, "co", np.float32, 3)
 
 
+def material_indices(mesh: Mesh) -> np.ndarray:
+    """Return the indices of the material slots of the faces, (F,) int32."""
+    name, faces = "material_index", mesh.polygons
+    if name not in mesh.attributes:
+        return np.zeros(len(faces), dtype=np.int32)
+    return _attribute_or_collection(mesh, name, faces, name, np.int32, 1)
+
+
 @contextmanager
 def evaluated_mesh(obj: Object) -> Iterator[Mesh | None]:
     """Context manager: yield the temporary mesh of an evaluated object; None if it has no faces."""
@@ -260,9 +281,14 @@ def flush_edit_mode(mesh: Mesh) -> None:
 
 
 def read_attribute(mesh: Mesh, name: str, dtype: type, columns: int) -> np.ndarray | None:
-    """Return an attribute as (n, columns), or (n,) for one column; None if it is missing or empty."""
+    """Return an attribute as (n, columns), or (n,) for one column; None if it is missing or empty.
+
+    Also None if it has another type: users may give any name to an attribute.
+    """
     attribute = mesh.attributes.get(name)
     if attribute is None or not len(attribute.data):  # in edit mode, attributes are empty
+        return None
+    if VALUE_SHAPES.get(attribute.data_type) != (columns, np.dtype(dtype).kind):
         return None
     key = VALUE_KEYS.get(attribute.data_type, "value")
     return read_collection(attribute.data, key, dtype, columns)

@@ -17,7 +17,8 @@ from bpy.types import ID, Image, Material, Mesh, Node, NodeTree, Object
 from ..compositor.look import Look, has_clear_paper
 from ..projection.camera import Camera
 from ..rendering.picture_images import NEUTRAL_GRAY
-from .datablocks import KEY_TAG, OWNED_TAG, Track, is_editable, rosy_modifiers
+from .datablocks import INK_TAG, KEY_TAG, OWNED_TAG, Track, is_editable, rosy_modifiers
+from .ink_objects import geometry_of_parent, lifted
 from .meshes import read_attribute
 from .node_builder import NodeBuilder, first_node, new_empty_material, new_modifier_group
 from .texture_nodes import Hatching, hatching_shader
@@ -59,6 +60,8 @@ class OutputSettings:
     relight : bool
         Whether pictures of hatching store its thresholds, from which the material draws hatching in the light
         of the scene. Such pictures are drawn on the CPU.
+    over_material : bool
+        Whether pictures with clear paper are shown over the own materials of objects, by ink objects.
     """
 
     window_coordinates: bool = False
@@ -68,6 +71,7 @@ class OutputSettings:
     folder: Path | None = None
     device: str = "cpu"
     relight: bool = False
+    over_material: bool = False
 
 
 def new_material(
@@ -143,6 +147,10 @@ def new_material(
             transparent = build("ShaderNodeBsdfTransparent").outputs["BSDF"]
             shader = build.mix_shaders(coverage, transparent, shader)
     build("ShaderNodeOutputMaterial", {"Surface": shader})
+    if has_clear_paper(look) and hasattr(material, "cycles"):
+        material.cycles.emission_sampling = (
+            "NONE"  # ink is no lamp: to sample it makes the rest noisier
+        )
     return material
 
 
@@ -171,26 +179,33 @@ def _clip_position(build: NodeBuilder, view_projection: np.ndarray) -> Node:
     return build("ShaderNodeSeparateXYZ", {0: clip})
 
 
-def new_group(material: Material, matrix: np.ndarray | None) -> NodeTree:
+def new_group(obj: Object, material: Material, matrix: np.ndarray | None) -> NodeTree:
     """Create a geometry node group that sets a material and the attribute `CLIP_ATTRIBUTE`.
 
     It is the node group of RoSy's modifier (`set_picture_modifier`, which names it). The mesh, its material slots and other modifiers stay unchanged.
 
     Parameters
     ----------
+    obj : bpy.types.Object
+        The object that gets the modifier. If it is an ink object, the group starts from the geometry of its parent.
     material : bpy.types.Material
     matrix : (4, 4) ndarray or None
         Transforms object space to clip space. None for objects with several instances; they get no attribute.
     """
     group, build, geometry = new_modifier_group(MODIFIER_NAME)
-    material_index = build("GeometryNodeInputMaterialIndex").outputs[0]
-    geometry = build.stored_attribute(geometry, MATERIAL_ATTRIBUTE, "INT", "FACE", material_index)
+    if obj.get(INK_TAG):
+        geometry = geometry_of_parent(build, obj)
+    else:
+        index = build("GeometryNodeInputMaterialIndex").outputs[0]
+        geometry = build.stored_attribute(geometry, MATERIAL_ATTRIBUTE, "INT", "FACE", index)
     inputs = {"Geometry": geometry, "Material": material}
     geometry = build("GeometryNodeSetMaterial", inputs).outputs["Geometry"]
     if matrix is not None:
         position = build("GeometryNodeInputPosition").outputs[0]
         clip = build.projected(position, matrix)
         geometry = build.stored_attribute(geometry, CLIP_ATTRIBUTE, "FLOAT_VECTOR", "POINT", clip)
+    if obj.get(INK_TAG):
+        geometry = lifted(build, geometry, obj)
     build("NodeGroupOutput", {"Geometry": geometry})
     _add_projection(group, material, matrix)
     return group

@@ -24,6 +24,7 @@ from ..field.polygon_arrays import box_corners
 from ..projection.camera import Camera
 from ..surface_texture.draw import DIRECTION_SETTINGS, TEXTURE_SETTINGS, texture_colors_values
 from .cameras import CameraSource, camera_of_object, render_camera, resolve_camera
+from .datablocks import field_mesh
 from .field_attributes import attribute_name, field_degree
 from .look_inputs import color_values_digest, read_request, reference_path
 from .look_properties import read_look
@@ -33,7 +34,9 @@ from .read_view import rendered_lights
 from .visible_objects import field_objects, rendered_instances
 
 #: Properties of ``scene.rosy`` that decide how a picture is stored and shown, but not how it is drawn.
-OUTPUT_PROPERTIES = ("placement", "emission", "diffuse", "store", "directory", "image_format")
+OUTPUT_PROPERTIES = (
+    *("placement", "over_material", "emission", "diffuse", "store", "directory", "image_format"),
+)
 
 #: Properties of ``scene.rosy`` that decide what a texture shows, and how it is stored.
 TEXTURE_OUTPUT = (
@@ -170,6 +173,7 @@ class SceneState:
             look = unlit_look(look)
         settings = applied_settings(look, self._lacks_tone)
         output = _used_output(scene.rosy, OUTPUT_PROPERTIES) | {"relight": is_relit}
+        output["over_material"] &= is_hatched(look)
         if is_frame:
             del output["placement"]  # frames always fill the frame of the camera
         occluders = self._used_occluders(camera, settings["shadows"])
@@ -249,7 +253,7 @@ def read_texture_state(scene: Scene, depsgraph: Depsgraph, obj: Object) -> Pictu
 
     It does not depend on movement and deformation of the object, unless light is baked into the texture.
     """
-    settings, mesh = scene.rosy, obj.data
+    settings, mesh = scene.rosy, field_mesh(obj)
     look = read_look(settings)
     shape = [shape_digest(mesh), *field_parts(mesh, mesh), settings.undefined]
     uv_parts = [settings.texture_margin]
@@ -296,7 +300,7 @@ def settings_key(scene: Scene, view_layer: ViewLayer) -> tuple:
     look = read_look(scene.rosy)
     objects = []
     for obj in field_objects(view_layer):
-        image, mesh = obj.rosy.tone_image, obj.data
+        image, mesh = obj.rosy.tone_image, field_mesh(obj)
         image_key = image and (image.session_uid, *image.size, image.is_dirty)
         tone_key = image_key, obj.rosy.tone_uv_map
         objects.append((obj.session_uid, attribute_name(mesh), field_degree(mesh), tone_key))

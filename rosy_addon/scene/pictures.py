@@ -12,11 +12,12 @@ transformed, and slides over one that deforms. A texture is mapped by a UV map, 
 from __future__ import annotations
 
 import glob
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
+import bpy
 import numpy as np
 from bpy.types import Image, Material, NodeTree, Object, Scene
 
@@ -41,6 +42,7 @@ from .bake_records import (
 from .blender_images import image_path, load_sequence, new_image, new_tiled_image
 from .cameras import CameraSource
 from .files import output_folder, picture_stem
+from .ink_objects import find_ink_object, new_ink_object
 from .keys import update_keys
 from .picture_nodes import OutputSettings, new_group
 from .picture_state import PictureState
@@ -100,6 +102,7 @@ def read_output_settings(scene: Scene, folder: Path | None = None) -> OutputSett
         folder=folder,
         device=properties.device.lower(),
         relight=properties.relight,
+        over_material=properties.over_material,
     )
 
 
@@ -194,10 +197,12 @@ def apply_picture(
         image = track(new_image(name, image_data, is_color=hatching is None, stem=stem))
         material = picture_nodes.new_material(image, camera, track, settings, view.look, hatching)
         matrices = _clip_matrices(scene_data, camera)
-        node_groups = {obj: track(new_group(material, matrix)) for obj, matrix in matrices.items()}
+        is_over = settings.over_material and has_clear_paper(view.look)
+        node_groups = _new_groups(material, matrices, track, is_over=is_over)
     size, key = image_size(image_data), picture_key(view.look, picture)
     store_record(scene, camera.name, image, material, source, {None: state}, size, key)
     _show_on_objects(node_groups)
+    _remove_from_others(material, node_groups)
     warnings = (*scene_data.warnings, *_display_warnings(scene))
     return BakeResult(camera.name, image, material, tuple(matrices), picture, warnings)
 
@@ -246,9 +251,12 @@ def apply_sequence(
         image.name = f"{NAME_PREFIX}{name}"
         material = picture_nodes.new_material(image, camera, track, settings, look)
         picture_nodes.set_sequence_frames(material, min(states), max(states))
-        node_groups = {obj: track(new_group(material, None)) for obj in scene_data.objects}
+        matrices = dict.fromkeys(scene_data.objects)
+        is_over = settings.over_material and has_clear_paper(look)
+        node_groups = _new_groups(material, matrices, track, is_over=is_over)
     store_record(scene, name, image, material, source, states, camera.size, key)
     _show_on_objects(node_groups)
+    _remove_from_others(material, node_groups)
 
 
 def apply_texture(
@@ -301,7 +309,8 @@ def apply_texture(
             hatching = texture_nodes.Hatching(look, texture.line_count)
             add_shader = partial(texture_nodes.hatching_shader, hatching=hatching, track=track)
         material = track(texture_nodes.new_texture_material(name, image, uv_map, add_shader))
-        node_groups = {obj: track(new_group(material, None))}
+        is_over = settings.over_material and is_clear
+        node_groups = _new_groups(material, {obj: None}, track, is_over=is_over)
     store_record(scene, obj.name, image, material, obj, {None: state}, image_size(first))
     # The object can still show its pictures, but no longer an earlier texture.
     _show_on_objects(node_groups, keep_textures=False)
@@ -322,6 +331,26 @@ def _image_stem(settings: OutputSettings, name: str, kind: str = "camera") -> Pa
     return None if settings.folder is None else settings.folder / picture_stem(name, kind)
 
 
+def _new_groups(
+    material: Material,
+    matrices: Mapping[Object, np.ndarray | None],
+    track: datablocks.Track,
+    *,
+    is_over: bool,
+) -> dict[Object, NodeTree]:
+    """Create the node groups that show a picture, by the objects that get them; see `new_group`.
+
+    These are the keys of `matrices`, or their ink objects if the picture is shown over their materials (`is_over`). The
+    values are (4, 4) matrices from object space to clip space, or None. `track` is called with each new datablock.
+    """
+    groups = {}
+    for obj, matrix in matrices.items():
+        if is_over:
+            obj = find_ink_object(obj) or new_ink_object(obj, track)
+        groups[obj] = track(new_group(obj, material, matrix))
+    return groups
+
+
 def _show_on_objects(node_groups: Mapping[Object, NodeTree], *, keep_textures: bool = True) -> None:
     """Show a recorded picture on objects, with one new node group for each, and delete the earlier groups.
 
@@ -332,6 +361,28 @@ def _show_on_objects(node_groups: Mapping[Object, NodeTree], *, keep_textures: b
     materials = recorded_materials(textures=keep_textures)
     for obj, node_group in node_groups.items():
         picture_nodes.set_picture_modifier(obj, node_group, materials)
+        replaced = obj.parent if obj.get(datablocks.INK_TAG) else find_ink_object(obj)
+        if replaced is not None:
+            datablocks.remove_picture_modifiers(replaced)
+    datablocks.delete_unused()
+
+
+def _remove_from_others(material: Material, objects: Container[Object]) -> None:
+    """Remove a picture from objects that showed an earlier one from the same camera, but are left out of this one.
+
+    They show another picture again or, without one, their own materials. `material` is the one of the picture,
+    and `objects` are the objects that it shows.
+    """
+    pictures = recorded_materials() - {material}
+    for obj in list(bpy.data.objects):
+        projections = {} if obj in objects else _projections(obj)
+        if material not in projections:
+            continue
+        others = [other for other in projections if other in pictures]
+        if not others:
+            datablocks.remove_picture_modifiers(obj)
+        elif material in picture_nodes.shown_materials(obj):
+            _show(obj, others[-1], projections[others[-1]], pictures)
     datablocks.delete_unused()
 
 
@@ -355,15 +406,27 @@ def show_bake(scene: Scene, camera: str) -> None:
         raise RosyError(f"no picture was baked from camera '{camera}', only from {names}")
     materials = recorded_materials()
     for obj in baked_objects(scene):
-        projections = {}
-        for modifier in datablocks.removable_modifiers(obj):
-            projections |= picture_nodes.projections_of_group(modifier.node_group)
+        projections = _projections(obj)
         if record.material in projections and datablocks.is_editable(obj):
-            matrix = projections[record.material]
-            node_group = new_group(record.material, matrix)
-            node_group[datablocks.OWNED_TAG] = True
-            picture_nodes.set_picture_modifier(obj, node_group, materials)
+            _show(obj, record.material, projections[record.material], materials)
     update_keys(scene)
+
+
+def _projections(obj: Object) -> dict[Material, np.ndarray | None]:
+    """Return the projections of the pictures that an object can show; see `projections_of_group`."""
+    projections = {}
+    for modifier in datablocks.removable_modifiers(obj):
+        projections |= picture_nodes.projections_of_group(modifier.node_group)
+    return projections
+
+
+def _show(
+    obj: Object, material: Material, matrix: np.ndarray | None, pictures: Container[Material]
+) -> None:
+    """Let an object show a picture that it showed before; see `new_group` and `set_picture_modifier`."""
+    node_group = new_group(obj, material, matrix)
+    node_group[datablocks.OWNED_TAG] = True
+    picture_nodes.set_picture_modifier(obj, node_group, pictures)
 
 
 def _clip_matrices(scene_data: SceneData, camera: Camera) -> dict[Object, np.ndarray | None]:

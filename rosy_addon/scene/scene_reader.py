@@ -26,7 +26,7 @@ from ..field.surface import Surface, have_same_polygons
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 from . import look_inputs
-from .datablocks import remedy_for_absence, user_modifiers
+from .datablocks import field_mesh, remedy_for_absence, user_modifiers
 from .evaluated_field import (
     Errors,
     FieldLayout,
@@ -39,6 +39,7 @@ from .field_attributes import attribute_name, field_degree, is_face_vector_field
 from .mesh_fields import read_mesh_field
 from .mesh_states import MeshStates, mesh_state_key, read_mesh_state
 from .meshes import REST_ATTRIBUTE, evaluated_mesh, mesh_surface, read_attribute
+from .transparency import opaque_triangles, transparent_slots
 from .visible_objects import Instances, field_objects, rendered_instances
 
 #: Cache key of the mesh instances of the last call of `SceneReader.read`.
@@ -210,8 +211,8 @@ class SceneReader:
         self._request = look_inputs.FIELDS_ONLY
         self._deadline = math.inf
         self._has_read_any = False
-        # Keys: the full name of the object, the pointer of its mesh, `tone_image_key`, and whether its field
-        # is drawn. None: the mesh has no faces.
+        # Keys: the full name of the object, the pointer of its mesh, whether its field is drawn, and
+        # `tone_image_key` or, without a field, `transparent_slots`. None: the mesh has no faces.
         self._meshes: dict[tuple, _MeshData | None] = {}
         # The results of `resolve_topologies`. An error is kept until its object changes.
         self._topologies: dict[_TopologyKey, _Topology | Exception] = {}
@@ -378,7 +379,10 @@ class SceneReader:
         Return None if it has no faces, has an error, or is left for a later call.
         """
         pointer, request = obj.data.as_pointer(), self._request
-        key = owner.name_full, pointer, look_inputs.tone_image_key(owner, request), draws_field
+        kind = look_inputs.tone_image_key(owner, request)
+        if not draws_field:
+            kind = transparent_slots(obj.data, owner)
+        key = owner.name_full, pointer, draws_field, kind
         if key in self._meshes:
             return self._meshes[key]
         if draws_field and owner.name_full in self.errors:
@@ -386,18 +390,16 @@ class SceneReader:
         if self._has_read_any and time.monotonic() > self._deadline:
             self.is_complete = False
             return None
-        self._has_read_any = True
+        self._has_read_any, is_waiting = True, False
         try:
             with evaluated_mesh(obj) as mesh:
                 if mesh is None:
                     mesh_data = None
                 elif draws_field:
                     mesh_data = self._read_field_mesh(mesh, owner)
+                    is_waiting = mesh_data is None
                 else:
-                    label = f"object '{owner.name}'"
-                    surface = mesh_surface(mesh, label, occluder_only=True, cache=self.cache)
-                    mesh_data = surface, None, None, None
-                is_waiting = mesh is not None and mesh_data is None
+                    mesh_data = self._read_occluder(mesh, owner)
                 if self.mesh_states is not None and not is_waiting:
                     state_request = request if draws_field else None
                     state_key = mesh_state_key(obj, owner, state_request)
@@ -409,6 +411,17 @@ class SceneReader:
             self._meshes[key] = mesh_data
         return mesh_data
 
+    def _read_occluder(self, mesh: Mesh, owner: Object) -> _MeshData | None:
+        """Read a mesh that only hides others. Return None if it hides nothing."""
+        surface = mesh_surface(mesh, f"object '{owner.name}'", occluder_only=True, cache=self.cache)
+        shown = opaque_triangles(surface, mesh, owner)
+        if len(shown) < len(surface.triangles):
+            names = "triangles", "triangle_face"
+            parts = {name: getattr(surface, name)[shown] for name in names}
+            with_parts = partial(surface.with_parts, **parts)
+            surface = cached(self.cache, with_parts, surface, "opaque", shown)
+        return (surface, None, None, None) if len(shown) else None
+
     def _read_field_mesh(self, mesh: Mesh, owner: Object) -> _MeshData | None:
         """Read an evaluated mesh with its field. Return None if it needs `resolve_topologies` first."""
         request, cache, label = self._request, self.cache, f"object '{owner.name}'"
@@ -416,6 +429,20 @@ class SceneReader:
         surface = mesh_surface(mesh, label, cache=cache)
         tone = look_inputs.read_tone(mesh, owner, request, cache)
         values = look_inputs.read_color_values(mesh, request.color_attribute, label, cache)
+        if (holder := field_mesh(owner)) != original:
+            undeformed = mesh_surface(holder, label, cache=cache)
+            if not have_same_polygons(surface, undeformed):
+                raise RosyError(
+                    f"{label}: its modifiers make other faces now than when its field was made: make the field again"
+                )
+            if values is None:
+                values = look_inputs.read_color_values(
+                    holder, request.color_attribute, label, cache
+                )
+            field = read_mesh_field(
+                holder, surface=undeformed, nonfinite=request.nonfinite, cache=cache
+            )
+            return self._with_rest(surface, undeformed.vertices), field, tone, values
         if original.is_editmode:
             return surface, self._edit_mode_field(mesh, owner, surface), tone, values
         modifiers, undeformed = user_modifiers(owner), surface

@@ -14,7 +14,7 @@ from ..field.singularities import find_singularities
 from ..field.surface import Surface
 from ..field.validate import vertex_normals
 from . import meshes
-from .datablocks import OWNED_TAG, user_modifiers
+from .datablocks import OWNED_TAG, field_mesh, user_modifiers
 from .look_inputs import ReadRequest
 from .mesh_fields import read_mesh_field
 from .scene_reader import read_scene
@@ -77,8 +77,9 @@ def read_singularities(obj: Object, depsgraph: Depsgraph) -> Singularities:
 
 def _own_field(obj: Object) -> tuple[Surface, RosyField]:
     """Return the surface and the field of an object's original mesh."""
-    surface = meshes.mesh_surface(obj.data, f"object '{obj.name}'")
-    return surface, read_mesh_field(obj.data, surface=surface, nonfinite="zero")
+    mesh = field_mesh(obj)
+    surface = meshes.mesh_surface(mesh, f"object '{obj.name}'")
+    return surface, read_mesh_field(mesh, surface=surface, nonfinite="zero")
 
 
 def read_editable_singularities(obj: Object, depsgraph: Depsgraph) -> Singularities:
@@ -108,8 +109,9 @@ def mesh_of_own_vertices(obj: Object, evaluated: Mesh | None) -> Mesh:
     and *Mirror* keep the vertices, and add new ones after them. Otherwise, or if there is no evaluated mesh
     (None), the original mesh is returned.
     """
-    is_lost = evaluated is None or len(evaluated.vertices) < len(obj.data.vertices)
-    return obj.data if is_lost else evaluated
+    own = field_mesh(obj)
+    is_lost = evaluated is None or len(evaluated.vertices) < len(own.vertices)
+    return own if is_lost else evaluated
 
 
 def add_singularity_points(scene: Scene, obj: Object, singularity_data: Singularities) -> Object:
@@ -194,7 +196,7 @@ def read_singularity_points(
     points = meshes.read_attribute(source.data, "position", np.float32, 3)
     to_mesh = np.array(obj.matrix_world.inverted_safe() @ source.matrix_world)
     points = points @ to_mesh[:3, :3].T + to_mesh[:3, 3]
-    vertices = meshes.vertex_positions(obj.data)
+    vertices = meshes.vertex_positions(field_mesh(obj))
     nearest = [np.square(vertices - point).sum(axis=1).argmin() for point in points]
     vertex, position = np.unique(np.array(nearest, dtype=np.int64), return_inverse=True)
     total = np.zeros(len(vertex), dtype=np.int64)

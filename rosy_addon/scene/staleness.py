@@ -27,6 +27,7 @@ _OUTPUT_LABELS = {
     "texture_bake_light": "baked light",
     "texture_udim": "kind of tiles",
     "relight": "relighting",
+    "over_material": "material under the ink",
     "store": "storage",
     "directory": "folder",
     "image_format": "format",

@@ -8,7 +8,13 @@ import bpy
 from bpy.types import Depsgraph, DepsgraphObjectInstance, LayerCollection, Object, ViewLayer
 
 from ..core.errors import RosyError
-from .datablocks import OWNED_TAG, check_object_type, has_rosy_properties, remedy_for_absence
+from .datablocks import (
+    OWNED_TAG,
+    check_object_type,
+    field_mesh,
+    has_rosy_properties,
+    remedy_for_absence,
+)
 from .field_attributes import attribute_name, has_field
 
 
@@ -118,7 +124,7 @@ def _find_field_object(name: str, candidates: dict[str, Object]) -> Object:
         raise RosyError(f"there is no object '{name}': {remedy_for_absence('check its name')}")
     check_object_type(obj, "MESH")
     if not has_field(obj):
-        field_name = attribute_name(obj.data)
+        field_name = attribute_name(field_mesh(obj))
         raise RosyError(
             f"object '{name}' has no attribute '{field_name}' with a field: make or import a field first"
         )

@@ -18,7 +18,10 @@ from .operator_settings import draw_settings
 LOOK_PANELS = ("streaks", "color", "light", "tone", "ink", "singularities", "quality")
 
 #: Properties of `Scene.rosy` that determine how the picture is made and shown, and how it is stored.
-OUTPUT_SETTINGS = "percentage", "device", "placement", "relight", "emission", "diffuse", "backdrop"
+OUTPUT_SETTINGS = (
+    *("percentage", "device", "placement", "relight", "over_material"),
+    *("emission", "diffuse", "backdrop"),
+)
 STORAGE_SETTINGS = "store", "directory", "image_format"
 
 #: Height of the picture of a preset, in the panel and in the pop-up to choose one, in units of Blender's
@@ -157,7 +160,7 @@ def _make_settings_panel(
 def _unused_output(settings: PropertyGroup) -> tuple[str, ...]:
     """Return the names of properties of the output that have no effect with the present settings."""
     if not is_hatched(settings.look):
-        return "backdrop", "relight"
+        return "backdrop", "relight", "over_material"
     return ("device", "emission", "diffuse") if settings.relight else ()
 
 

@@ -10,6 +10,7 @@ from ..core.errors import counted
 from ..gpu.select import automatic_device
 from ..scene.bake_records import BakeInfo, has_pictures, list_bakes
 from ..scene.computed_attributes import other_field_names
+from ..scene.datablocks import field_mesh
 from ..scene.field_attributes import has_field
 from ..scene.pictures import NEUTRAL_VIEW_TRANSFORMS
 from ..scene.staleness import SCENE_STATES
@@ -50,7 +51,7 @@ def _draw_field_section(layout: UILayout, context: Context) -> None:
 
 
 def _draw_existing_field(layout: UILayout, context: Context, obj: Object) -> None:
-    mesh = obj.data
+    mesh = field_mesh(obj)
     box = layout.box().column(align=True)
     row = box.row()
     row.label(text=obj.name, icon="OUTLINER_OB_MESH")
@@ -61,7 +62,7 @@ def _draw_existing_field(layout: UILayout, context: Context, obj: Object) -> Non
     box.label(text=f"Degree {mesh.rosy.degree} on {faces}, {name}")
     row = layout.row(align=True)
     row.operator("rosy.field_export", text="Export", icon="EXPORT")
-    is_shown = overlay.shown(obj.name) is not None
+    is_shown = overlay.shown(obj) is not None
     button = row.operator("rosy.singularities", icon="OVERLAY", depress=is_shown)
     button.show = "NONE" if is_shown else "OVERLAY"
     if (body := sidebar.closed_panel(layout, "convert_field", "Convert")) is not None:

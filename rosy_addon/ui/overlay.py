@@ -16,6 +16,7 @@ import numpy as np
 from ..core.errors import RosyError
 from ..projection.rest_coordinates import matrix_scale
 from ..scene.app_handlers import add_handlers, remove_handlers
+from ..scene.datablocks import field_mesh
 from ..scene.singularity_points import (
     Singularities,
     read_editable_singularities,
@@ -32,16 +33,16 @@ DOT_DIAMETER = 9.0
 SURFACE_OFFSET = 0.004
 
 
-#: The singularities that are shown, by the names of their objects.
-_SINGULARITIES: dict[str, Singularities] = {}
+#: The singularities that are shown, by the session UIDs of their objects.
+_SINGULARITIES: dict[int, Singularities] = {}
 
 #: The draw handlers, while something is shown.
 DRAW_HANDLERS: list[Any] = []
 
 
-def show(object_name: str, singularities: Singularities) -> None:
+def show(obj: bpy.types.Object, singularities: Singularities) -> None:
     """Show the singularities of an object, in place of those shown before."""
-    _SINGULARITIES[object_name] = singularities
+    _SINGULARITIES[obj.session_uid] = singularities
     add_handlers(_APP_HANDLERS)
     if not DRAW_HANDLERS and not bpy.app.background:
         add = bpy.types.SpaceView3D.draw_handler_add
@@ -50,12 +51,11 @@ def show(object_name: str, singularities: Singularities) -> None:
     redraw()
 
 
-def hide(object_name: str | None = None) -> None:
-    """Hide the singularities of an object, or of all objects if no name is given."""
-    if object_name is None:
-        _SINGULARITIES.clear()
-    else:
-        _SINGULARITIES.pop(object_name, None)
+def hide(obj: bpy.types.Object | None = None) -> None:
+    """Hide the singularities of an object, or of all objects if it is None. Forget those of deleted objects."""
+    kept = () if obj is None else {other.session_uid for other in bpy.data.objects if other != obj}
+    for uid in _SINGULARITIES.keys() - kept:
+        del _SINGULARITIES[uid]
     if not _SINGULARITIES:
         remove_handlers(_APP_HANDLERS)
         while DRAW_HANDLERS:
@@ -68,42 +68,42 @@ def refresh(context: bpy.types.Context, meshes: Container[bpy.types.Mesh]) -> No
 
     If they cannot be computed, for example because a modifier loses the field, they are hidden.
     """
-    for name, shown_before in list(_SINGULARITIES.items()):
-        obj = context.view_layer.objects.get(name)
-        if obj is None or obj.data not in meshes:
+    for obj in context.view_layer.objects:
+        shown_before = shown(obj)
+        if shown_before is None or field_mesh(obj) not in meshes:
             continue
         read = read_singularities if shown_before.vertex is None else read_editable_singularities
         try:
-            show(name, read(obj, context.evaluated_depsgraph_get()))
+            show(obj, read(obj, context.evaluated_depsgraph_get()))
         except RosyError:
-            hide(name)
+            hide(obj)
 
 
 def _read_again(*_: Any) -> None:
     """Compute all shown singularities again after an undo or redo, which may have changed the fields."""
     context = bpy.context
-    refresh(context, {obj.data for obj in context.view_layer.objects if obj.type == "MESH"})
+    refresh(context, {field_mesh(obj) for obj in context.view_layer.objects if obj.type == "MESH"})
 
 
 #: Handlers of Blender's events while something is shown, by the names of their lists in `bpy.app.handlers`.
-#: Objects of a file that is loaded may have the names of those before.
 _APP_HANDLERS = dict.fromkeys(("undo_post", "redo_post"), _read_again)
 _APP_HANDLERS["load_pre"] = lambda *_: hide()
 
 
-def shown(object_name: str) -> Singularities | None:
+def shown(obj: bpy.types.Object) -> Singularities | None:
     """Return the shown singularities of an object; None if they are not shown."""
-    return _SINGULARITIES.get(object_name)
+    return _SINGULARITIES.get(obj.session_uid)
 
 
 def _all_dots() -> list[SingularityDots]:
-    """Return the dots of each visible object. Objects that were removed or renamed are left out."""
-    dots = []
-    for name, shown in _SINGULARITIES.items():
-        obj = bpy.context.view_layer.objects.get(name)
-        if obj is not None and obj.visible_get():
-            dots.append(SingularityDots(offset_points(obj, shown), shown.index, shown.degree))
-    return dots
+    """Return the dots of each visible object."""
+    return [
+        SingularityDots(
+            offset_points(obj, singularities), singularities.index, singularities.degree
+        )
+        for obj in bpy.context.view_layer.objects
+        if (singularities := shown(obj)) is not None and obj.visible_get()
+    ]
 
 
 def _draw(draw: Callable[..., None], is_text: bool) -> None:

@@ -235,6 +235,10 @@ class RosyScene(bpy.types.PropertyGroup):
         "Store from which darkness on each pixel is covered by ink, instead of the ink. The material "
         "then draws the hatching by the light of the scene, in EEVEE, without a new bake",
     )
+    over_material: toggle(
+        "Over Material",
+        "Draw the ink over the materials that the meshes have, without paper",
+    )
     emission: real(
         "Emission",
         "Emission strength of the picture. 1: as it was drawn",
@@ -392,6 +396,11 @@ class RosyObject(bpy.types.PropertyGroup):
     )
     tone_uv_map: text("UV Map", "UV map of the image. Empty: the active UV map")
     texture_uv_map: text("UV Map", "UV map of the texture. Empty: the active UV map")
+    field_mesh: bpy.props.PointerProperty(
+        name="Field Mesh",
+        description="The faces with modifiers, with the field. Empty: the mesh of the object has the field",
+        type=bpy.types.Mesh,
+    )
 
 
 #: The classes of this module, in the order of their definition.

@@ -15,6 +15,7 @@ from bpy.types import Context, Object, Region, SpaceView3D, UILayout, WorkSpaceT
 from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_3d
 
 from ..core.errors import RosyError
+from ..scene.datablocks import field_mesh
 from ..scene.field_attributes import has_field
 from ..scene.meshes import vertex_positions
 from ..scene.singularity_points import mesh_of_own_vertices, read_editable_singularities
@@ -114,10 +115,10 @@ def show_handles(context: Context, obj: Object) -> None:
     RosyError
         If the field cannot be read.
     """
-    shown = overlay.shown(obj.name)
+    shown = overlay.shown(obj)
     if shown is None or shown.vertex is None:
         depsgraph = context.evaluated_depsgraph_get()
-        overlay.show(obj.name, read_editable_singularities(obj, depsgraph))
+        overlay.show(obj, read_editable_singularities(obj, depsgraph))
 
 
 def _own_points(context: Context, obj: Object) -> np.ndarray:
@@ -126,7 +127,9 @@ def _own_points(context: Context, obj: Object) -> np.ndarray:
     Vertices that modifiers add are left out.
     """
     evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
-    return vertex_positions(mesh_of_own_vertices(obj, evaluated.data))[: len(obj.data.vertices)]
+    return vertex_positions(mesh_of_own_vertices(obj, evaluated.data))[
+        : len(field_mesh(obj).vertices)
+    ]
 
 
 def _vertex_under(
@@ -153,7 +156,7 @@ def _handle_under(context: Context, obj: Object, mouse: tuple[float, float]) -> 
 
     The vertex is an index into the original mesh. `mouse` is in pixels of the region.
     """
-    shown = overlay.shown(obj.name)
+    shown = overlay.shown(obj)
     assert shown is not None and shown.vertex is not None
     points = overlay.offset_points(obj, shown)
     pixels = to_pixels(context.region, context.region_data, points)

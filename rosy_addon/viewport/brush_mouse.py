@@ -12,6 +12,7 @@ from mathutils import Vector
 from ..core.cache import BAKE_CACHE
 from ..scene.app_handlers import add_handlers, remove_handlers
 from ..scene.brush_surface import BrushSurface
+from ..scene.datablocks import field_mesh
 from ..scene.field_attributes import attribute_name, field_degree, is_face_vector_field
 from ..scene.guides import GUIDE_ATTRIBUTE, STROKE_FIRMNESS
 from ..scene.meshes import mesh_surface, read_attribute
@@ -24,7 +25,7 @@ class BrushMouse:
     def __init__(self, context: Context, obj: Object) -> None:
         self._region, self._view = context.region, context.region_data
         self._obj = obj
-        surface = mesh_surface(obj.data, cache=BAKE_CACHE)
+        surface = mesh_surface(field_mesh(obj), cache=BAKE_CACHE)
         self._surface = BrushSurface(obj, context.evaluated_depsgraph_get(), surface)
 
     def place(self, mouse: tuple[float, float]) -> np.ndarray | None:
@@ -64,7 +65,7 @@ class BrushMouse:
         is_guided : (K,) bool ndarray
             Whether a firm guide determines the field at each segment.
         """
-        mesh = self._obj.data
+        mesh = field_mesh(self._obj)
         if not is_face_vector_field(mesh):
             return np.empty((0, 2, 3)), np.empty(0, dtype=bool)
         vectors = read_attribute(mesh, attribute_name(mesh), np.float32, 3)

@@ -18,11 +18,14 @@ from ..core.errors import REPORTED_ERRORS, RosyError, error_text
 from ..core.file_io import file_stamp
 from ..scene import look_inputs
 from ..scene.cameras import render_camera
+from ..scene.datablocks import field_mesh
 from ..scene.scene_reader import SceneInstance, SceneReader
 from ..scene.visible_objects import shown_instances
 
 #: Types of datablocks that may change a picture if they change.
-RELEVANT_ID_TYPES = ("OBJECT", "MESH", "COLLECTION", "SCENE", "LIGHT", "ARMATURE", "KEY", "IMAGE")
+RELEVANT_ID_TYPES = (
+    *("OBJECT", "MESH", "COLLECTION", "SCENE", "LIGHT", "ARMATURE", "KEY", "IMAGE", "MATERIAL"),
+)
 
 #: Length of one time slice for reading meshes, in seconds.
 SLICE_SECONDS = 0.08
@@ -123,7 +126,9 @@ class LayerStates:
             if block.id_type == "IMAGE":
                 changed_names |= {obj.name_full for obj in objects if obj.rosy.tone_image == block}
             elif block.id_type == "MESH" and update.is_updated_geometry:
-                remeshed_names |= {obj.name_full for obj in objects if obj.data == block}
+                remeshed_names |= {
+                    obj.name_full for obj in objects if block in (obj.data, field_mesh(obj))
+                }
             elif block.id_type == "OBJECT" and update.is_updated_geometry:
                 changed_names.add(block.name_full)
         for (scene_name, _), layer in self._layers.items():

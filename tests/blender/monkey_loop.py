@@ -142,9 +142,15 @@ def make_and_remove(monkey: Monkey) -> None:
     remove_everything(monkey)
     field_in_view(monkey)
     bpy.ops.outliner.orphans_purge(do_recursive=True)
+    for show in (
+        ("OVERLAY", "NONE") if bpy.context.selected_objects else ()
+    ):  # which forgets the dots of deleted objects
+        monkey.rosy("singularities", show=show)
     bpy.context.view_layer.update()
     before = whole_state()
-    for operator, settings in monkey.random.sample(list(MADE.items()), 2):
+    # The dots of an object that cannot be selected cannot be hidden by the button.
+    can_select = bool(bpy.context.selected_objects)
+    for operator, settings in monkey.random.sample(list(MADE.items()), 2) if can_select else ():
         monkey.rosy(operator, **settings)
     remove_everything(monkey)
     bpy.context.view_layer.update()

@@ -19,11 +19,11 @@ def hatching_node(obj):
     return next(node for node in nodes if node.bl_idname == "ShaderNodeGroup")
 
 
-def render(scene, folder):
-    """Render the scene with Cycles: (H, W, 4) display values, sampled at the centers of pixels."""
+def render(scene, folder, engine="CYCLES"):
+    """Render the scene: (H, W, 4) display values, in Cycles sampled at the centers of pixels."""
     scene.cycles.samples, scene.cycles.use_denoising = 4, False
     scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 0.01
-    return render_image(scene, folder / "cycles.png", "CYCLES")
+    return render_image(scene, folder / "render.png", engine)
 
 
 def plane_in_frame(scene):
@@ -102,6 +102,64 @@ def test_clear_paper_shows_what_is_behind(with_field, scene, tmp_path):
     ink = image[alpha == 1][:, :3].max(axis=1)
     # At silhouettes, other samples miss the surface.
     assert len(ink) > 100 and (ink < 2 / 255).mean() > 0.9
+
+
+RENDER_WITHOUT_AND_WITH_INK = """
+import bpy
+scene = bpy.context.scene
+scene.render.engine = "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0, 0) else "BLENDER_EEVEE"
+scene.eevee.taa_render_samples = 4
+ink = bpy.data.objects["Suzanne ink"]
+for name in ("with", "without"):
+    scene.render.filepath = f"//{name}.png"
+    bpy.ops.render.render(write_still=True)
+    scene.collection.objects.unlink(ink) if name == "with" else None
+"""
+
+
+def test_ink_over_the_own_material(with_field, scene, tmp_path):
+    """Each pixel is as without RoSy where the picture has no ink, and ink where it is full."""
+    suzanne = bpy.context.object
+    material = bpy.data.materials.new("Checkered")
+    material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.clear()
+    checker, diffuse = nodes.new("ShaderNodeTexChecker"), nodes.new("ShaderNodeBsdfDiffuse")
+    output = nodes.new("ShaderNodeOutputMaterial")
+    links.new(checker.outputs["Color"], diffuse.inputs["Color"])
+    links.new(diffuse.outputs[0], output.inputs["Surface"])
+    suzanne.data.materials.append(material)
+    bpy.ops.object.light_add(type="SUN", rotation=(0.7, 0.4, 0.2))
+    bpy.context.object.data.angle, scene.cycles.max_bounces = 0.0, 0
+    before = render(scene, tmp_path)
+    look = scene.rosy.look
+    look.ink, look.ink_color, look.supersampling = "hatch", (0.0, 0.0, 0.0), 1
+    scene.rosy.over_material = True
+    assert bpy.ops.rosy.bake() == {"FINISHED"}
+    assert material_of(suzanne) == material
+    assert not any(modifier.type == "NODES" for modifier in suzanne.modifiers)
+    alpha = pixels(baked_images()[0])[..., 3]
+    is_free = np.zeros(alpha.shape, dtype=bool)
+    window = np.lib.stride_tricks.sliding_window_view(alpha, (3, 3))
+    is_free[1:-1, 1:-1] = window.max(axis=(2, 3)) == 0
+
+    def check(image, own, ink_level):
+        assert np.abs(image - own)[is_free].max() < 2.5 / 255
+        ink = np.median(image[alpha == 1][:, :3])  # at silhouettes, samples may miss the surface
+        assert ink <= ink_level < 0.15 < np.median(own[alpha == 1][:, :3])
+
+    check(render(scene, tmp_path), before, 2 / 255)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "ink.blend"), copy=True)
+    options = ["--factory-startup", str(tmp_path / "ink.blend"), "--python-exit-code", "1"]
+    status, text = run_blender(*options, "--python-expr", RENDER_WITHOUT_AND_WITH_INK)
+    assert status == 0, text
+    files = (str(tmp_path / f"{name}.png") for name in ("with", "without"))
+    check(*(pixels(bpy.data.images.load(path)) for path in files), 0.12)  # EEVEE filters
+    suzanne.hide_render = True
+    bpy.context.view_layer.update()
+    assert np.ptp(render(scene, tmp_path)[..., 3]) == 0
+    assert bpy.ops.rosy.remove() == {"FINISHED"}
+    assert not suzanne.children
 
 
 def test_bake_animation(with_field, scene, tmp_path):

@@ -75,7 +75,7 @@ def test_parity_of_a_scene(card, scene, suzanne, kind):
     camera = scene.camera
     camera.data.type, camera.data.ortho_scale = kind, 4.0
     camera.data.shift_x, camera.data.shift_y = 0.12, -0.05
-    mirrored = bpy.data.objects.new("Mirrored", suzanne.data)
+    mirrored = suzanne.copy()
     mirrored.location, mirrored.scale = (1.6, 1.0, 0.3), (-0.7, 0.7, 0.7)
     occluder = bpy.data.objects.new("Hiding", bpy.data.meshes.new("Hiding"))
     occluder.data.from_pydata([(-1, -2, -1), (0, -2, -1), (0, -2, 0)], [], [(0, 1, 2)])

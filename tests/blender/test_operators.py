@@ -17,7 +17,8 @@ def test_generate_on_all_selected(suzanne, kind, degree):
     bpy.ops.mesh.primitive_torus_add(location=(3, 0, 0))
     suzanne.select_set(True)
     assert bpy.ops.rosy.field_generate(kind=kind, degree=degree) == {"FINISHED"}
-    for mesh in (obj.data for obj in bpy.context.selected_objects):
+    for obj in bpy.context.selected_objects:
+        mesh = obj.rosy.field_mesh or obj.data  # of the subdivided faces
         vectors = member_vectors(mesh)
         normal = np.array([face.normal for face in mesh.polygons])
         assert mesh.rosy.degree == degree
@@ -159,11 +160,11 @@ def test_convert(suzanne):
         degree=8, angle=0.1, smooth=0.01, magnitude="values", values="Weights"
     )
     assert converted == {"FINISHED"}
-    assert suzanne.data.rosy.degree == 8
-    length = np.linalg.norm(member_vectors(suzanne.data), axis=1)
+    assert suzanne.rosy.field_mesh.rosy.degree == 8
+    length = np.linalg.norm(member_vectors(suzanne.rosy.field_mesh), axis=1)
     assert 0.4 < length.max() <= 0.5 + 1e-6 and length.min() == 0
     bpy.ops.rosy.field_convert(degree=4)
-    assert suzanne.data.rosy.degree == 4
+    assert suzanne.rosy.field_mesh.rosy.degree == 4
 
 
 # --- combing ---------------------------------------------------------------------------------
@@ -248,7 +249,7 @@ def test_singularities_as_points(scene):
     positions = points.data.attributes["position"].data
     assert all(abs(point.vector.length - 1) < 0.02 for point in positions)
     overlay = rosy("rosy_addon.ui.overlay")
-    assert overlay.shown("Icosphere")
+    assert overlay.shown(ball)
     # They replace the earlier ones.
     assert bpy.ops.rosy.singularities(show="POINTS") == {"FINISHED"}
     assert [obj.name for obj in bpy.data.objects if "singularities" in obj.name] == [name]
@@ -327,14 +328,28 @@ def test_opening_a_file_hides_singularities(scene):
     handlers = len(bpy.app.handlers.load_pre)
     sphere_with_field()
     bpy.ops.rosy.singularities(show="OVERLAY")
-    assert overlay.shown("Icosphere") and len(bpy.app.handlers.load_pre) == handlers + 1
+    assert overlay.shown(bpy.context.object)
+    assert len(bpy.app.handlers.load_pre) == handlers + 1
     bpy.ops.wm.read_homefile(use_empty=True)
-    assert not overlay.shown("Icosphere") and len(bpy.app.handlers.load_pre) == handlers
+    assert len(bpy.app.handlers.load_pre) == handlers
+
+
+def test_dots_stay_with_renamed_objects_and_go_without_a_field(scene):
+    overlay = rosy("rosy_addon.ui.overlay")
+    handlers = len(bpy.app.handlers.load_pre)
+    sphere = sphere_with_field()
+    bpy.ops.rosy.singularities(show="OVERLAY")
+    sphere.name = "Ball"
+    assert overlay.shown(sphere)
+    sphere.data.attributes.remove(sphere.data.attributes["rosy"])
+    bpy.ops.rosy.singularities(show="NONE")
+    assert not overlay.shown(sphere) and len(bpy.app.handlers.load_pre) == handlers
+    assert not bpy.ops.rosy.singularities.poll()
 
 
 def test_exports_and_imports(suzanne, tmp_path):
     bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
-    before = member_vectors(suzanne.data)
+    before = member_vectors(suzanne.rosy.field_mesh)
     for kind in (".rosy", ".rawfield", ".txt", ".npy", ".obj", ".sings"):
         path = str(tmp_path / f"a{kind}")
         assert bpy.ops.rosy.field_export(filepath=path, file_format=kind) == {"FINISHED"}
@@ -342,7 +357,7 @@ def test_exports_and_imports(suzanne, tmp_path):
             continue
         assert bpy.ops.rosy.field_import(filepath=path) == {"FINISHED"}
         if kind != ".obj":
-            np.testing.assert_array_equal(member_vectors(suzanne.data), before)
+            np.testing.assert_array_equal(member_vectors(suzanne.rosy.field_mesh), before)
 
 
 def test_no_operator_replaces_the_open_file(suzanne, tmp_path):
@@ -365,6 +380,7 @@ def test_no_operator_replaces_the_open_file(suzanne, tmp_path):
 
 def test_what_is_imported_from_other_programs(suzanne, tmp_path):
     """A cross in two files, with vectors off the surface; and feature edges."""
+    suzanne.modifiers.clear()
     mesh = suzanne.data
     normals = np.array([polygon.normal for polygon in mesh.polygons])
     axis = np.cross(normals, (0.1, 0.2, 1.0))
@@ -385,6 +401,7 @@ def test_what_is_imported_from_other_programs(suzanne, tmp_path):
 
 
 def test_a_file_of_the_mesh_before_it_was_triangulated(suzanne, tmp_path):
+    suzanne.modifiers.clear()
     bpy.ops.rosy.field_generate(kind="axis", degree=4, axis=(0.2, 0.3, 1.0))
     path = tmp_path / "a.rosy"
     assert bpy.ops.rosy.field_export(filepath=str(path)) == {"FINISHED"}
@@ -408,8 +425,9 @@ def test_a_file_of_the_mesh_before_it_was_triangulated(suzanne, tmp_path):
 
 def test_fields_are_compared(suzanne):
     """A field that is turned by 0.2 under another name: the angle is an attribute and the color."""
-    mesh, settings = suzanne.data, bpy.context.scene.rosy
+    settings = bpy.context.scene.rosy
     bpy.ops.rosy.field_generate(kind="axis", degree=2)
+    mesh = suzanne.rosy.field_mesh
     message = error_of(bpy.ops.rosy.field_compare)
     assert "make one with another name of the attribute" in message
     bpy.ops.rosy.field_generate(kind="axis", degree=2, attribute="turned")
@@ -424,6 +442,7 @@ def test_fields_are_compared(suzanne):
     assert defined.mean() > 0.9 and np.allclose(values[defined], np.degrees(0.2), atol=0.01)
     assert (settings.color_attribute, settings.look.hue) == ("Difference", "values")
     assert tuple(settings.look.color_range) == (90, 0)
+    assert bpy.ops.rosy.bake() == {"FINISHED"}
     assert "choose 'rosy'" in error_of(bpy.ops.rosy.field_compare, other="turned")
     mesh.attributes.remove(mesh.attributes["Difference"])
     mesh.attributes.new("Difference", "INT", "POINT")

@@ -40,7 +40,7 @@ def test_singularities_dragged_with_the_tool():
     overlay = rosy("rosy_addon.ui.overlay")
     yield from redraw_view()
     yield from move_mouse((0.0, -1.0, 0.0))
-    yield from wait_until(lambda: overlay.shown("Sphere") is not None)
+    yield from wait_until(lambda: overlay.shown(bpy.data.objects["Sphere"]) is not None)
     before = shown_singularities()
     points = {vertex: bpy.context.object.data.vertices[vertex].co.copy() for vertex in before}
     source = min(points, key=lambda vertex: (points[vertex] - Vector((0.2, -1.0, 0.0))).length)

@@ -7,7 +7,7 @@ from unittest.mock import Mock
 import bpy
 import numpy as np
 import pytest
-from objects import add_camera, link
+from objects import add_camera, add_field, add_monkey, link
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.core.cache import BAKE_CACHE
 from rosy.rosy_addon.core.color import to_display
@@ -155,6 +155,57 @@ def test_several_cameras(scene, camera, monkey):
     assert [entry.is_shown for entry in list_bakes(scene)] == [False, True]
     assert len(bpy.data.node_groups) == groups
     expect_error("camera 'Third', only from 'Second', 'Camera'", show_bake, scene, "Third")
+
+
+def test_an_object_that_is_left_out_shows_what_it_showed_before(scene, camera, monkey):
+    toon = bpy.data.materials.new("Toon")
+    monkey.data.materials.append(toon)
+    other, above = add_field(add_monkey(), "axis", 2), add_camera("Above", (0.0, -1.0, 5.0))
+    bake(scene)
+    other.rosy.include = False
+    bake(scene)
+    assert material_of(monkey).name == "RoSy Camera" and not other.modifiers
+    monkey.rosy.include, other.rosy.include = False, True
+    bake(scene)
+    assert material_of(monkey) == toon and not monkey.modifiers
+    monkey.rosy.include = True
+    bake(scene, cameras=[camera, above])
+    monkey.rosy.include = False
+    bake(scene, cameras=[above])
+    assert [material_of(obj).name for obj in (monkey, other)] == ["RoSy Camera", "RoSy Above"]
+
+
+def test_pictures_over_materials_take_turns_with_others(scene, camera, monkey):
+    add_camera("Second", (3.0, -4.0, 1.0))
+    before = contents()
+    scene.rosy.look.ink, scene.rosy.over_material = "hatch", True
+    (result,) = bake(scene)
+    (ink,) = monkey.children
+    assert result.objects == (monkey,) and not monkey.modifiers
+    assert material_of(ink).name == "RoSy Camera"
+    assert list_bakes(scene)[0].stale_reason == ""
+    bake(scene, cameras=scene_cameras(scene))
+    assert monkey.children == (ink,)
+    show_bake(scene, "Second")
+    assert material_of(ink).name == "RoSy Second"
+    scene.rosy.over_material = False
+    bake(scene)
+    assert not monkey.children and material_of(monkey).name == "RoSy Camera"
+    scene.rosy.over_material = True
+    bake(scene)
+    (ink,) = monkey.children
+    assert not monkey.modifiers and ink.users_collection == monkey.users_collection
+    monkey.hide_viewport = True
+    bpy.context.view_layer.update()
+    assert ink.hide_viewport
+    monkey.hide_viewport = False
+    other = add_field(add_monkey(), "axis", 2)
+    monkey.rosy.include = False
+    bake(scene)
+    assert not monkey.children and len(other.children) == 1
+    remove_bakes(scene)
+    bpy.data.meshes.remove(other.data)
+    assert contents() == before
 
 
 def test_warnings(scene, camera, monkey):

@@ -220,6 +220,63 @@ def test_an_occluder_hides_pixels(scene, camera):
     assert len(projected(camera).pixel) == visible_pixels
 
 
+def shader_material(kind, **inputs):
+    """A material whose surface is a shader node of a type, with some values of its inputs."""
+    material = bpy.data.materials.new(kind)
+    material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    node = nodes.new(f"ShaderNode{kind}")
+    for name, value in inputs.items():
+        node.inputs[name].default_value = value
+    links.new(node.outputs[0], nodes["Material Output"].inputs["Surface"])
+    return material
+
+
+def test_transparent_faces_hide_nothing(scene, camera):
+    add_field(add_plane("Far", size=2.0), kind="axis")
+    near = add_plane("Near", size=1.0, cuts=2)
+    near.location.y = -1.0
+
+    def visible():
+        """Return the number of visible pixels of the field."""
+        return len(projected(camera).pixel)
+
+    opaque, glass = shader_material("BsdfDiffuse"), shader_material("BsdfGlass")
+    near.data.materials.append(opaque)
+    nothing = visible()
+    near.data.materials.append(glass)
+    near.data.polygons[0].material_index = 1
+    a_quarter = visible()
+    near.data.materials[0] = shader_material("BsdfPrincipled", Alpha=0.3)
+    everything = visible()
+    assert 0.2 < (a_quarter - nothing) / (everything - nothing) < 0.3
+    near.material_slots[0].link = "OBJECT"
+    near.material_slots[0].material = opaque
+    assert visible() == a_quarter
+    near.material_slots[0].material = None
+    assert visible() == a_quarter
+    glass.node_tree.links.clear()
+    assert visible() == a_quarter
+
+
+def test_users_may_name_attributes_like_those_of_blender(scene, monkey):
+    """Blender 5 lets them have other types."""
+    wall = add_plane("Wall", cuts=2)
+    wall.data.materials.append(None)
+    expected = read_instances(depsgraph())
+    for mesh in (monkey.data, wall.data):
+        for name, kind, domain in [
+            ("material_index", "FLOAT_VECTOR", "FACE"),
+            ("sharp_face", "FLOAT", "FACE"),
+            ("sharp_edge", "BOOLEAN", "FACE"),
+        ]:
+            mesh.attributes.new(name, kind, domain)
+    found = read_instances(depsgraph())
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(one.surface.corner_fan, other.surface.corner_fan)
+        np.testing.assert_array_equal(one.surface.triangles, other.surface.triangles)
+
+
 def test_reading_changes_nothing(scene, monkey):
     monkey.modifiers.new("Subdivision", "SUBSURF")
     before = contents()

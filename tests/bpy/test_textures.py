@@ -101,6 +101,15 @@ def test_baking_again_replaces_the_texture(scene, textured):
     assert len(textured.modifiers) == 2
 
 
+def test_a_texture_over_the_own_material(scene, textured):
+    scene.rosy.look.ink, scene.rosy.over_material = "hatch", True
+    bake_texture(scene, [textured])
+    (ink,) = textured.children
+    assert [info.camera for info in list_bakes(scene)] == [textured.name]
+    assert not any(modifier.type == "NODES" for modifier in textured.modifiers)
+    assert ink.evaluated_get(depsgraph()).data.uv_layers
+
+
 def test_copies_share_a_texture_until_they_are_baked(scene, textured):
     """Then each has its own. The texture follows an object that is renamed."""
     copy = link(textured.copy())

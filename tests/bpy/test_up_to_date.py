@@ -184,6 +184,14 @@ def add_occluder(scene, x):
     add_plane("Wall", size=0.3).location = (x, -1.5, 0.1)
 
 
+def glaze(scene):
+    """Give the object in front a material through which one sees."""
+    glass = bpy.data.materials.new("Glass")
+    glass.use_nodes = True
+    glass.node_tree.nodes["Principled BSDF"].inputs["Transmission Weight"].default_value = 1.0
+    obj("In Front").data.materials.append(glass)
+
+
 def add_field_object(scene):
     add_field(add_plane("New", size=0.3, cuts=2), kind="axis").location = (-0.9, -0.2, -0.9)
 
@@ -301,6 +309,8 @@ TABLE = {
     "occluder aside moved": (move("Aside", 1.0, 0.0, 0.0), None, ""),
     "occluder added": (add_occluder(0.3), None, "'Wall' was added"),
     "occluder added aside": (add_occluder(9.0), None, ""),
+    "occluder of glass": (glaze, None, "'In Front' is not visible any more"),
+    "glass moved": (move("In Front", 0.2, 0.0, 0.0), glaze, ""),
     "occluder smooth": (shade_smooth("In Front"), None, ""),
     "occluder with shadows": (move("Behind", 0.0, -2.2, 0.0), shadows, "'Behind' was moved"),
     # lights
@@ -340,6 +350,8 @@ TABLE = {
     "relighting without hatching": (put("rosy.relight", True), None, ""),
     "light of a relit picture": (move("Key", -2.0, 0.0, 0.0), relit, ""),
     "ink of a relit picture": (put("rosy.look.crispness", 0.2), relit, "the look was changed"),
+    "over material": (put("rosy.over_material", True), hatched, "the look was changed"),
+    "over material without ink": (put("rosy.over_material", True), None, ""),
     "emission": (put("rosy.emission", 0.5), None, "the emission was changed"),
     "store": (put("rosy.store", "SAVED"), None, "the storage was changed"),
     "format": (put("rosy.image_format", "FLOAT"), None, "the format was changed"),

@@ -15,6 +15,7 @@ from rosy_addon.field.connection import laplacian as field_laplacian
 from rosy_addon.field.sparse_multigrid import (
     add_diagonal,
     from_coo,
+    from_edges,
     hierarchy,
     matrix_product,
     w_cycle,
@@ -115,3 +116,12 @@ def test_cycles_converge_and_ignore_rows_of_rounding():
             solution += w_cycle(levels, rhs - with_row @ solution)
             errors.append(np.linalg.norm(solution[:-1] - expected))
     assert len(levels) > 1 and (np.array(errors[1:]) < 0.8 * np.array(errors[:-1])).all()
+
+
+def test_unknowns_whose_inverses_overflow_stay_finite():
+    """As those of faces far smaller than the others, which are not joined to them."""
+    off_diagonal, diagonal = np.array([-1.0, -1e-309]), np.array([2.0, 2.0, 2e-309, 2e-309])
+    matrix = from_edges(np.array([0, 2]), np.array([1, 3]), off_diagonal, diagonal)
+    solution = conjugate_gradient(matrix, np.array([1.0, 0.0, 1e-300, 0.0]))
+    np.testing.assert_allclose(solution[:2], [2 / 3, 1 / 3])
+    assert np.isfinite(solution).all()

@@ -1,0 +1,84 @@
+"""Field meshes: copies of evaluated meshes, which hold the fields of objects whose modifiers change the faces.
+
+Such an object has the property ``obj.rosy.field_mesh``. Its field is made for the faces that are seen, and follows them
+when a modifier or an edit moves them. The vertices of the field mesh are the rest shape. All other objects have their fields on
+their own meshes; see `field_attributes.field_mesh`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+
+import bpy
+from bpy.types import Depsgraph, Mesh, Object
+
+from ..field.surface import have_same_polygons
+from .datablocks import is_editable, user_modifiers
+from .meshes import evaluated_mesh, mesh_surface
+from .picture_nodes import CLIP_ATTRIBUTE, MATERIAL_ATTRIBUTE
+
+#: Custom property of field meshes.
+_TAG = "rosy_field_mesh"
+
+#: Meshes on which fields are made, each with the objects whose fields they will hold.
+FieldTargets = dict[Mesh, list[Object]]
+
+
+@contextmanager
+def field_targets(objects: Sequence[Object], depsgraph: Depsgraph) -> Iterator[FieldTargets]:
+    """Context manager: yield the meshes on which new fields of objects are made.
+
+    They are the meshes of the objects or, if modifiers change the faces, their field meshes with the positions that are seen
+    now, or new copies of the evaluated meshes. Copies that `hold_fields` has not given to objects are deleted at the end.
+    """
+    targets: FieldTargets = {}
+    try:
+        for obj in objects:
+            targets.setdefault(_target(obj, depsgraph), []).append(obj)
+        yield targets
+    finally:
+        _discard(targets)
+
+
+def _target(obj: Object, depsgraph: Depsgraph) -> Mesh:
+    """Return the mesh on which a new field of an object is made."""
+    if not user_modifiers(obj) or not is_editable(obj):
+        return obj.data
+    evaluated = obj.evaluated_get(depsgraph)
+    with evaluated_mesh(evaluated) as mesh:
+        surface = None if mesh is None else mesh_surface(mesh)
+    if surface is None or have_same_polygons(surface, mesh_surface(obj.data)):
+        return obj.data
+    earlier = obj.rosy.field_mesh
+    if earlier is not None and have_same_polygons(surface, mesh_surface(earlier)):
+        earlier.vertices.foreach_set("co", surface.vertices.astype("f").ravel())
+        earlier.update()
+        return earlier
+    copy = bpy.data.meshes.new_from_object(evaluated, depsgraph=depsgraph)
+    copy.name = f"{obj.name} field"
+    copy[_TAG] = True
+    copy.materials.clear()
+    for name in (CLIP_ATTRIBUTE, MATERIAL_ATTRIBUTE):
+        if name in copy.attributes:
+            copy.attributes.remove(copy.attributes[name])
+    return copy
+
+
+def hold_fields(targets: FieldTargets) -> None:
+    """Let the meshes of `field_targets`, on which fields have been stored, hold the fields of their objects."""
+    for mesh, objects in targets.items():
+        for obj in objects:
+            earlier = obj.rosy.field_mesh
+            obj.rosy.field_mesh = None if mesh == obj.data else mesh
+            obj.update_tag()
+            if earlier is not None:
+                _discard([earlier])
+
+
+def _discard(meshes: Iterable[Mesh]) -> None:
+    """Delete the field meshes among meshes that nothing uses."""
+    for mesh in meshes:
+        with suppress(ReferenceError):  # deleted
+            if mesh.get(_TAG) and not mesh.users:
+                bpy.data.meshes.remove(mesh)

@@ -18,7 +18,7 @@ from .face_graph import LABEL, FaceGraph, face_graph
 from .prescribed import check_index_ranges, index_at_nodes
 from .rosy_field import check_degree
 from .smoothest import eigenproblem, spectral_shift
-from .sparse_multigrid import CSRMatrix, from_edges
+from .sparse_matrix import CSRMatrix, from_edges
 from .surface import Surface
 from .turning_angles import least_angles, potential_solver
 

@@ -8,7 +8,8 @@ from functools import partial
 import numpy as np
 
 from ..core.progress import progress, report
-from .sparse_multigrid import CSRMatrix, hierarchy, w_cycle
+from .sparse_matrix import CSRMatrix
+from .sparse_multigrid import hierarchy, w_cycle
 
 #: Residual norm at which the iteration stops by default, relative to the norm of the right-hand side.
 RELATIVE_TOLERANCE = 1e-9

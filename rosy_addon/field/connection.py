@@ -25,7 +25,7 @@ from .blocks import row_blocks
 from .connectivity import build_edges, connected_components, sums_from_roots
 from .frames import dot
 from .polygon_arrays import next_corners
-from .sparse_multigrid import CSRMatrix, from_edges
+from .sparse_matrix import CSRMatrix, from_edges
 from .surface import Surface
 
 #: Largest absolute value of a cotangent. Without a limit, slivers would dominate the energy.

@@ -11,7 +11,7 @@ from .blocks import mask
 from .conjugate_gradient import conjugate_gradient
 from .guides import guides_from_edges
 from .representation import edge_unfolding, power, to_representation
-from .sparse_multigrid import from_edges
+from .sparse_matrix import from_edges
 from .surface import Surface
 
 #: Distance along edges over which their directions are averaged, relative to the size of the surface. With half of it,

@@ -25,7 +25,8 @@ from .connection import build_connection, laplacian
 from .representation import complex_bincount, from_representation, to_representation, unit_complex
 from .rosy_field import RosyField, check_degree
 from .smoothest import smoothest_field
-from .sparse_multigrid import CSRMatrix, Level, add_diagonal, hierarchy, w_cycle
+from .sparse_matrix import CSRMatrix
+from .sparse_multigrid import Level, add_diagonal, hierarchy, w_cycle
 from .surface import Surface
 from .surface_averages import SurfaceAverages
 

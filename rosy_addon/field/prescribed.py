@@ -27,7 +27,8 @@ from .face_graph import LABEL, FaceGraph, face_graph
 from .frames import normalize
 from .representation import complex_bincount, from_representation, to_representation, unit_complex
 from .rosy_field import RosyField, check_degree
-from .sparse_multigrid import Level, from_edges, hierarchy, w_cycle
+from .sparse_matrix import from_edges
+from .sparse_multigrid import Level, hierarchy, w_cycle
 from .surface import Surface
 from .turning_angles import added_resistance, turning_angles
 

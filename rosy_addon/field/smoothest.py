@@ -24,7 +24,8 @@ from .conjugate_gradient import conjugate_gradient
 from .free_rotation import freely_rotated
 from .representation import complex_bincount, from_representation, is_tie, unit_complex
 from .rosy_field import RosyField, check_degree
-from .sparse_multigrid import CSRMatrix, Level, hierarchy, w_cycle
+from .sparse_matrix import CSRMatrix
+from .sparse_multigrid import Level, hierarchy, w_cycle
 from .surface import Surface
 from .unit_descent import CHOICE_GAIN, FEW_FACES, FaceEnergy, descend, face_energy, least_of_few
 

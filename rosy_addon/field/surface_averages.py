@@ -11,7 +11,7 @@ from .blocks import row_blocks
 from .connection import BLOCK_TRIANGLES, Connection, laplacian
 from .frames import dot, quotient
 from .representation import complex_bincount
-from .sparse_multigrid import CSRMatrix
+from .sparse_matrix import CSRMatrix
 from .surface import Surface
 
 #: Relative norm of the residual at which the conjugate gradient method stops.

@@ -25,7 +25,8 @@ from .blocks import mask
 from .conjugate_gradient import conjugate_gradient
 from .connectivity import connected_components
 from .face_graph import LABEL, FaceGraph, SpanningForest, spanning_forest, triangle_graph
-from .sparse_multigrid import CSRMatrix, from_edges, hierarchy, w_cycle
+from .sparse_matrix import CSRMatrix, from_edges
+from .sparse_multigrid import hierarchy, w_cycle
 
 #: Residual norm at which the solver stops, relative to the norm of the right-hand side.
 TOLERANCE = 1e-10

@@ -16,7 +16,8 @@ from .analysis import edge_lengths
 from .blocks import by_rows
 from .connectivity import connected_components
 from .representation import edge_unfolding, power, unit_complex
-from .sparse_multigrid import CSRMatrix, dense_inverse, from_edges
+from .sparse_matrix import CSRMatrix, from_edges
+from .sparse_multigrid import dense_inverse
 from .surface import Surface
 
 #: The descent stops when the last steps together reduce the energy by less than this fraction.

@@ -263,7 +263,7 @@ def read_combed_guides(mesh: Mesh, surface: Surface) -> np.ndarray:
     guides = np.zeros((surface.face_count, 3))
     checks = read_attribute(mesh, FIELD_CHECK_ATTRIBUTE, np.float32, 1)
     are_stored = is_face_vector_field(mesh, GUIDE_ATTRIBUTE) and is_face_vector_field(mesh)
-    if not are_stored or checks is None:
+    if not are_stored or checks is None or len(checks) != len(guides):  # converted by the user
         return guides
     names = GUIDE_ATTRIBUTE, attribute_name(mesh)
     values, field = (read_attribute(mesh, name, np.float32, 3) for name in names)

@@ -18,7 +18,11 @@ from rosy.rosy_addon.field.rosy_field import RosyField
 from rosy.rosy_addon.scene import scene_reader
 from rosy.rosy_addon.scene.evaluated_field import TEMP_FIELD_ATTRIBUTE
 from rosy.rosy_addon.scene.field_attributes import has_field
-from rosy.rosy_addon.scene.guides import read_combed_guides
+from rosy.rosy_addon.scene.guides import (
+    FIELD_CHECK_ATTRIBUTE,
+    read_combed_guides,
+    store_combed_guides,
+)
 from rosy.rosy_addon.scene.mesh_fields import read_mesh_field, write_mesh_field
 from rosy.rosy_addon.scene.meshes import EDGE_MARKS, mark_sharp, marked_edges, mesh_surface
 from rosy.rosy_addon.scene.read_view import read_lights
@@ -106,6 +110,17 @@ def test_angles(scene):
     # The face points to -y. Seen from there, x points to the right and z up.
     np.testing.assert_allclose(field.vectors, [[np.cos(np.pi / 6), 0, 0.5]], atol=1e-6)
     assert not read_combed_guides(plane.data, mesh_surface(plane.data)).any()
+
+
+def test_guides_without_their_checks_are_ignored(scene):
+    """The user has converted the checks to another domain."""
+    plane = add_field(add_plane(cuts=3), kind="axis")
+    store_combed_guides(plane.data, read_mesh_field(plane.data).vectors)
+    surface = mesh_surface(plane.data)
+    assert read_combed_guides(plane.data, surface).any()
+    plane.data.attributes.remove(plane.data.attributes[FIELD_CHECK_ATTRIBUTE])
+    set_attribute(plane.data, np.zeros(16), FIELD_CHECK_ATTRIBUTE, "POINT", "FLOAT")
+    assert not read_combed_guides(plane.data, surface).any()
 
 
 def add_directions(mesh, degree, angle_offset=0.0, length_factor=1.0):

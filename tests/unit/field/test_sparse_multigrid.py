@@ -12,14 +12,8 @@ from shapes import icosphere, torus
 from rosy_addon.field.conjugate_gradient import conjugate_gradient
 from rosy_addon.field.connection import build_connection
 from rosy_addon.field.connection import laplacian as field_laplacian
-from rosy_addon.field.sparse_multigrid import (
-    add_diagonal,
-    from_coo,
-    from_edges,
-    hierarchy,
-    matrix_product,
-    w_cycle,
-)
+from rosy_addon.field.sparse_matrix import from_coo, from_edges, matrix_product
+from rosy_addon.field.sparse_multigrid import add_diagonal, hierarchy, w_cycle
 
 TORUS_LAPLACIAN = field_laplacian(build_connection(torus(60, 30)), 4)
 LAPLACIAN = TORUS_LAPLACIAN.plus_diagonal(1e-3 * TORUS_LAPLACIAN.diagonal)

@@ -189,7 +189,10 @@ def changes(before: Fingerprint, after: Fingerprint, allowed: tuple[str, ...] = 
 #: Patterns of the paths that an operator may change, if it succeeds: RoSy's own data, its settings, and
 #: what is listed for the operator. SELECTED stands for each selected mesh.
 OWN = ("owned/*", "picture/*", "scenes/*/rosy/*")
-FIELD = ("meshes/SELECTED/attributes/*", "meshes/SELECTED/rosy/*", "meshes/SELECTED/counts")
+FIELD = (
+    *("meshes/SELECTED/attributes/*", "meshes/SELECTED/rosy/*", "meshes/SELECTED/counts"),
+    *("meshes/* field*", "objects/*/rosy/field_mesh"),
+)
 FURTHER = {
     "occlusion": ("meshes/*/attributes/Occlusion",),
     "bake_texture": ("meshes/SELECTED/*", "context"),

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from lenses import shifted
 from shapes import icosphere
 
-from rosy_addon.line_drawing.visibility import to_clip
+from rosy_addon.field.frames import transformed
 from rosy_addon.projection.camera import (
     Camera,
     look_at,
@@ -24,7 +24,7 @@ angles = st.floats(-400, 400)
 
 def device_coordinates(camera, points):
     """(V, 3) normalized device coordinates."""
-    clip = to_clip(points, camera)
+    clip = transformed(points, camera.projection @ camera.view)
     assert (clip[:, 3] > 0).all()
     return clip[:, :3] / clip[:, 3:]
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from rays import ray_intersections
 from shapes import plane
 
-from rosy_addon.line_drawing.visibility import to_clip
+from rosy_addon.field.frames import transformed
 from rosy_addon.projection import near_clipping, rasterizer
 from rosy_addon.projection.camera import orthographic_camera, perspective_camera
 from rosy_addon.projection.rasterizer import rasterize
@@ -64,7 +64,9 @@ def test_visible_triangles_match_a_ray_caster(seed, perspective):
     points = random.normal(size=(24, 3)) * (2, 2, 4) + (0, 0, -2)
     triangles = np.arange(24).reshape(8, 3)
     owner, weights, depth, doubtful = cast_rays(points, triangles, camera)
-    fragments = rasterize(to_clip(points, camera), triangles, camera.width, camera.height)
+    fragments = rasterize(
+        transformed(points, camera.projection @ camera.view), triangles, camera.width, camera.height
+    )
     actual = np.full(len(owner), -1)
     actual[fragments.pixel] = fragments.triangle
     assert (actual == owner)[~doubtful].all()
@@ -132,7 +134,7 @@ def test_no_cracks_where_the_near_plane_cuts(seed):
     camera = make_camera(True)
     x, y, triangles = jittered_grid(random, 5, 0)
     points = np.stack([(x - 14.5) * 30, np.full(x.shape, -0.1), (y - 14.5) * 0.7], axis=1)
-    clip = to_clip(points, camera)
+    clip = transformed(points, camera.projection @ camera.view)
     # w is from behind the eye to in front of it; the near plane is at w = 0.1.
     clip[:, 2] = -0.1
     count = coverage(clip, triangles)
@@ -152,7 +154,7 @@ def test_order_of_triangles_and_corners_does_not_matter(seed):
     triangles = random.permuted(np.tile(np.arange(40), (60, 1)), axis=1)[:, :3]
     _, distinct = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
     triangles = triangles[distinct]
-    clip = to_clip(points, camera)
+    clip = transformed(points, camera.projection @ camera.view)
     fragments = rasterize(clip, triangles, WIDTH, HEIGHT)
     order = random.permutation(len(triangles))
     again = rasterize(clip, triangles[order], WIDTH, HEIGHT)
@@ -173,7 +175,8 @@ def test_the_size_of_blocks_does_not_matter(monkeypatch, block, band):
     points = np.random.default_rng(5).normal(size=(60, 3)) * (2, 2, 2) + (0, 0, -3)
     triangles = np.arange(60).reshape(20, 3)
     triangles = np.concatenate([triangles, triangles])
-    clip = to_clip(points, make_camera(True))
+    camera = make_camera(True)
+    clip = transformed(points, camera.projection @ camera.view)
     expected = rasterize(clip, triangles, WIDTH, HEIGHT)
     monkeypatch.setattr(rasterizer, "BLOCK_SIZE", block)
     monkeypatch.setattr(rasterizer, "MAX_BAND_PIXELS", band)
@@ -225,5 +228,10 @@ def test_the_first_of_equal_depths_is_visible_among_clipped_triangles():
     points = np.array([[-50, -1, 60], [60, -1, 50], [40, -1, -70], [-45, -1, -40.0], [0, 1, -80]])
     # A floor four times, clipped in different ways, and a wall that is not clipped.
     triangles = np.array([[0, 1, 2], [1, 2, 0], [2, 3, 0], [0, 2, 3], [2, 3, 4], [2, 4, 3]])
-    fragments = rasterize(to_clip(points, camera), triangles[[4, 0, 2, 5, 0, 2]], WIDTH, HEIGHT)
+    fragments = rasterize(
+        transformed(points, camera.projection @ camera.view),
+        triangles[[4, 0, 2, 5, 0, 2]],
+        WIDTH,
+        HEIGHT,
+    )
     assert set(fragments.triangle) <= {0, 1, 2}

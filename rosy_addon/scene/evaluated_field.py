@@ -270,7 +270,9 @@ def lost_field_error(obj: Object, attribute: str | None) -> RosyError:
     if attribute is None and not len(obj.data.polygons):
         return no_faces_error(obj.data, f"object '{obj.name}'")
     names = ", ".join(modifier.name for modifier in user_modifiers(obj)) or "none"
-    problem = "has no faces" if attribute is None else f"has no attribute '{attribute}'"
+    problem = "has no faces"
+    if attribute is not None:
+        problem = f"has no attribute '{attribute}': make the field again"
     return RosyError(f"object '{obj.name}': after its modifiers ({names}) the mesh {problem}")
 
 

@@ -56,7 +56,8 @@ ACTIVE_FIELD = Condition(
     "The active mesh has no field: make or import one first",
 )
 VISIBLE_FIELD = Condition(
-    lambda context: field_objects(context.view_layer),
+    # An object that is hidden may be shown by instances of Geometry Nodes.
+    lambda context: field_objects(context.view_layer) or any(map(has_field, context.scene.objects)),
     "No visible mesh has a field: make or import one first",
 )
 

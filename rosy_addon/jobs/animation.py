@@ -40,7 +40,7 @@ from ..scene.look_properties import read_look
 from ..scene.picture_state import PictureState, SceneState
 from ..scene.read_view import read_views, scene_depsgraph
 from ..scene.scene_reader import SceneData
-from ..scene.visible_objects import field_objects
+from ..scene.visible_objects import drawn_objects
 from ..worker.job import Call, Step, Steps, job, part, shares
 
 #: Suffix of a sidecar file, after the name of the picture.
@@ -133,7 +133,7 @@ def bake_animation(
     file_io.remove_leftovers(settings.folder)
     frames = list(frames)
     depsgraph = scene_depsgraph(scene)
-    targets = field_objects(depsgraph.view_layer) if objects is None else list(objects)
+    targets = drawn_objects(depsgraph) if objects is None else list(objects)
     if show:
         pictures.check_targets(targets, settings)
     cache = Cache()  # meshes and fields; `_frame_steps` removes those that a frame has not used

@@ -31,7 +31,7 @@ from .look_properties import read_look
 from .mesh_states import MeshStates, digest, field_parts, mesh_state_key, read_mesh_state
 from .meshes import evaluated_mesh, polygon_arrays, read_uvs, shape_digest
 from .read_view import rendered_lights
-from .visible_objects import field_objects, rendered_instances
+from .visible_objects import drawn_objects, field_objects, rendered_instances
 
 #: Properties of ``scene.rosy`` that decide how a picture is stored and shown, but not how it is drawn.
 OUTPUT_PROPERTIES = (
@@ -137,7 +137,7 @@ class SceneState:
         self._occluders: dict[str, _Instances] = {}
         self._texture_states: dict[tuple, PictureState] = {}
         look = read_look(scene.rosy)
-        request, targets = read_request(scene, look), field_objects(depsgraph.view_layer)
+        request, targets = read_request(scene, look), drawn_objects(depsgraph)
         self._lights = _light_digests(depsgraph) if _uses_lights(look) else {}
         for instance, draws_field in rendered_instances(depsgraph, targets):
             obj, owner = instance.object, instance.object.original

@@ -40,7 +40,7 @@ from .mesh_fields import read_mesh_field
 from .mesh_states import MeshStates, mesh_state_key, read_mesh_state
 from .meshes import REST_ATTRIBUTE, evaluated_mesh, mesh_surface, read_attribute
 from .transparency import opaque_triangles, transparent_slots
-from .visible_objects import Instances, field_objects, rendered_instances
+from .visible_objects import Instances, drawn_objects, rendered_instances
 
 #: Cache key of the mesh instances of the last call of `SceneReader.read`.
 _INSTANCES_KEY = "instances of the last reading"
@@ -106,7 +106,7 @@ def read_scene(
         If no object has a field that can be drawn, or none has the requested tone or values for the color
         map. If one of `objects` is hidden, its field cannot be read, or its modifiers remove the field.
     """
-    targets = field_objects(depsgraph.view_layer) if objects is None else list(objects)
+    targets = drawn_objects(depsgraph) if objects is None else list(objects)
     if not targets:
         remedy = remedy_for_absence("make or import one first")
         raise RosyError(f"no visible object has a RoSy field: {remedy}")

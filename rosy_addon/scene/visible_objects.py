@@ -40,6 +40,22 @@ def field_objects(view_layer: ViewLayer, names: Iterable[str] | None = None) -> 
     return [_find_field_object(name, candidates) for name in dict.fromkeys(names)]
 
 
+def drawn_objects(depsgraph: Depsgraph) -> list[Object]:
+    """Return the objects with a field that renders of a view layer show, themselves or as instances.
+
+    These are all `field_objects`, and others that only instances of Geometry Nodes show.
+    """
+    objects = field_objects(depsgraph.view_layer)
+    visible_objects = set(_visible_objects(depsgraph.view_layer))
+    instanced = {
+        instance.object.original
+        for instance in depsgraph.object_instances
+        if instance.is_instance and _is_rendered(instance, visible_objects)
+    }
+    others = filter(_draws_field, instanced.difference(objects))
+    return objects + sorted(others, key=lambda obj: obj.name_full)
+
+
 #: Iterator over instances of meshes, each with whether its field is drawn. An instance is valid until the
 #: next one is taken.
 Instances = Iterator[tuple[DepsgraphObjectInstance, bool]]
@@ -80,7 +96,9 @@ def _is_rendered(instance: DepsgraphObjectInstance, visible_objects: set[Object]
     if instance.is_instance:
         instancer = instance.parent
         is_shown = instancer is None or instancer.original in visible_objects
-        return is_shown and not obj.original.hide_render
+        # Geometry Nodes also show instances of objects that are hidden themselves.
+        is_from_nodes = instancer is not None and instancer.instance_type == "NONE"
+        return is_shown and (is_from_nodes or not obj.original.hide_render)
     return obj.original in visible_objects
 
 

@@ -9,7 +9,16 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
-from objects import add_field, add_instance, add_light, add_mesh, add_plane, aim, set_attribute
+from objects import (
+    add_field,
+    add_instance,
+    add_light,
+    add_mesh,
+    add_nodes,
+    add_plane,
+    aim,
+    set_attribute,
+)
 from rosy.rosy_addon.core.errors import RosyWarning
 from rosy.rosy_addon.field.directional_field import field_directions, field_from_directions
 from rosy.rosy_addon.field.generate import axis_field
@@ -26,7 +35,7 @@ from rosy.rosy_addon.scene.guides import (
 from rosy.rosy_addon.scene.mesh_fields import read_mesh_field, write_mesh_field
 from rosy.rosy_addon.scene.meshes import EDGE_MARKS, mark_sharp, marked_edges, mesh_surface
 from rosy.rosy_addon.scene.read_view import read_lights
-from rosy.rosy_addon.scene.visible_objects import field_objects
+from rosy.rosy_addon.scene.visible_objects import drawn_objects, field_objects
 from scenes import (
     assert_same_directions,
     contents,
@@ -203,6 +212,32 @@ def test_one_surface_for_all_instances(scene, monkey):
     assert len({id(instance.surface) for instance in instances}) == 1
     assert sorted(instance.matrix[0, 3] for instance in instances) == [0, 3, 6]
     assert field_objects(bpy.context.view_layer) == [monkey]
+
+
+@pytest.mark.parametrize("is_excluded", [False, True])
+def test_instances_of_geometry_nodes_show_objects_that_are_hidden(scene, monkey, is_excluded):
+    if is_excluded:
+        collection = bpy.data.collections.new("Assets")
+        scene.collection.children.link(collection)
+        collection.objects.link(monkey)
+        scene.collection.objects.unlink(monkey)
+        bpy.context.view_layer.layer_collection.children["Assets"].exclude = True
+    else:
+        monkey.hide_render = True
+        monkey.hide_set(True)
+    assert field_objects(bpy.context.view_layer) == drawn_objects(depsgraph()) == []
+    points = add_mesh("Points", [(2.0, 0, 0), (5.0, 0, 0), (9.0, 0, 0)], [])
+    group = add_nodes(points, "GeometryNodeInstanceOnPoints")
+    source = group.nodes.new("GeometryNodeObjectInfo")
+    source.inputs["Object"].default_value = monkey
+    source.inputs["As Instance"].default_value = True
+    instance_socket = group.nodes["Instance on Points"].inputs["Instance"]
+    group.links.new(source.outputs["Geometry"], instance_socket)
+    assert drawn_objects(depsgraph()) == [monkey]
+    instances = read_instances(depsgraph())
+    assert [instance.matrix[0, 3] for instance in instances if instance.field] == [2, 5, 9]
+    points.hide_render = True
+    assert drawn_objects(depsgraph()) == []
 
 
 def test_all_kinds_of_surfaces_occlude(scene, monkey):

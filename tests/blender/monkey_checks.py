@@ -63,6 +63,8 @@ def fingerprint() -> Fingerprint:
         path = f"{kind}/{full_name(datablock)}"
         if kind == "objects" and datablock.type == "CAMERA" and not datablock.users_collection:
             continue  # a camera that the user has deleted, and that the record of a bake keeps
+        if kind == "images" and datablock.type == "RENDER_RESULT":
+            continue  # Blender makes it when it likes
         if is_owned(datablock):
             state[f"owned/{path}"] = None
             continue
@@ -187,11 +189,11 @@ def changes(before: Fingerprint, after: Fingerprint, allowed: tuple[str, ...] = 
 
 
 #: Patterns of the paths that an operator may change, if it succeeds: RoSy's own data, its settings, and
-#: what is listed for the operator. SELECTED stands for each selected mesh.
+#: what is listed for the operator. SELECTED stands for each selected mesh, HOLDER for each field mesh.
 OWN = ("owned/*", "picture/*", "scenes/*/rosy/*")
 FIELD = (
     *("meshes/SELECTED/attributes/*", "meshes/SELECTED/rosy/*", "meshes/SELECTED/counts"),
-    *("meshes/* field*", "objects/*/rosy/field_mesh"),
+    *("meshes/* field*", "meshes/HOLDER", "meshes/HOLDER/*", "objects/*/rosy/field_mesh"),
 )
 FURTHER = {
     "occlusion": ("meshes/*/attributes/Occlusion",),
@@ -206,11 +208,14 @@ def allowed_changes(operator: str) -> tuple[str, ...]:
     objects = [*bpy.context.selected_objects, bpy.context.view_layer.objects.active]
     meshes = {obj.data for obj in objects if obj is not None and obj.type == "MESH"}
     patterns = FIELD if operator.startswith("field_") else FURTHER.get(operator, ())
-    names = [escape(full_name(mesh)) for mesh in meshes]
-    return (
-        *OWN,
-        *(pattern.replace("SELECTED", name) for pattern in patterns for name in names or [""]),
+    holders = {mesh for mesh in bpy.data.meshes if mesh.get("rosy_field_mesh")}
+    filled = (
+        pattern.replace(word, escape(full_name(mesh)))
+        for word, group in (("SELECTED", meshes), ("HOLDER", holders))
+        for mesh in group
+        for pattern in patterns
     )
+    return *OWN, *patterns, *filled
 
 
 def check_message(message: str) -> None:

@@ -2,7 +2,7 @@
 
 Such an object has the property ``obj.rosy.field_mesh``. Its field is made for the faces that are seen, and follows them
 when a modifier or an edit moves them. The vertices of the field mesh are the rest shape. All other objects have their fields on
-their own meshes; see `field_attributes.field_mesh`.
+their own meshes; see `datablocks.field_mesh`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import bpy
 from bpy.types import Depsgraph, Mesh, Object
 
 from ..field.surface import have_same_polygons
-from .datablocks import is_editable, user_modifiers
+from .datablocks import user_modifiers
 from .meshes import evaluated_mesh, mesh_surface
 from .picture_nodes import CLIP_ATTRIBUTE, MATERIAL_ATTRIBUTE
 
@@ -43,8 +43,8 @@ def field_targets(objects: Sequence[Object], depsgraph: Depsgraph) -> Iterator[F
 
 def _target(obj: Object, depsgraph: Depsgraph) -> Mesh:
     """Return the mesh on which a new field of an object is made."""
-    if not user_modifiers(obj) or not is_editable(obj):
-        return obj.data
+    if not user_modifiers(obj) or obj.library or obj.override_library:
+        return obj.data  # a library override would lose its field mesh when the file is saved
     evaluated = obj.evaluated_get(depsgraph)
     with evaluated_mesh(evaluated) as mesh:
         surface = None if mesh is None else mesh_surface(mesh)

@@ -194,7 +194,7 @@ def test_export_and_import_from_the_file_browser():
     yield from scene_with_field()
     path = SHOTS / "browser.rosy"
     path.unlink(missing_ok=True)
-    attributes = bpy.context.object.data.attributes
+    attributes = bpy.context.object.rosy.field_mesh.attributes
     for operator, is_done in (
         (bpy.ops.rosy.field_export, path.is_file),
         (bpy.ops.rosy.field_import, lambda: "rosy" in attributes),

@@ -120,7 +120,7 @@ def comb():
     """Comb the sphere, undo that, replay the stroke as a script does, and take back another stroke with ESC."""
     before = field_bytes()
     yield from drag((-0.4, -0.9, 0.2), (0.4, -0.8, 0.3))
-    yield from wait_until(lambda: "rosy_guides" in bpy.context.object.data.attributes)
+    yield from wait_until(lambda: "rosy_guides" in field_mesh().attributes)
     combed = field_bytes()
     assert combed != before
     operator = bpy.context.window_manager.operators[-1]
@@ -147,14 +147,19 @@ def comb():
     assert bpy.context.object.location.length == 0
 
 
+def field_mesh():
+    """Return the mesh that holds the active object's field."""
+    return rosy("rosy_addon.scene.datablocks").field_mesh(bpy.context.object)
+
+
 def field_bytes():
     """Return the vectors of the active object's field."""
-    return member_vectors(bpy.context.object.data).tobytes()
+    return member_vectors(field_mesh()).tobytes()
 
 
 def shown_singularities():
     """Return the indices of the sphere's singularities that the overlay shows, by their vertices."""
-    shown = rosy("rosy_addon.ui.overlay").shown("Sphere")
+    shown = rosy("rosy_addon.ui.overlay").shown(bpy.data.objects["Sphere"])
     return dict(zip(shown.vertex.tolist(), shown.index.tolist(), strict=True))
 
 

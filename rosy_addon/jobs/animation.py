@@ -234,8 +234,9 @@ def _frame_steps(
 ) -> Steps[tuple[SceneData, list[_Frame]]]:
     """Draw one frame from all cameras as part of a job.
 
-    Return what was read, and the frame of each camera. It is the current frame of the scene. If `cameras` is None, it is drawn from the camera that renders it. `cache` has the meshes and
-    fields of earlier frames. The other parameters are as in `bake_animation`.
+    Return what was read, and the frame of each camera. It is the current frame of the scene. If `cameras` is
+    None, it is drawn from the camera that renders it. `cache` has the meshes and fields of earlier frames. The
+    other parameters are as in `bake_animation`.
     """
     frame, look = scene.frame_current, read_look(scene.rosy) if look is None else look
     # The look may be animated, and not every device can draw every method, so the device is chosen per frame.

@@ -254,11 +254,13 @@ def list_bakes(
     """
     recorded = [record for record in scene.rosy.bakes if record.image is not None]
     shown = {material for obj in baked_objects(scene) for material in shown_materials(obj)}
-    depsgraph = scene_depsgraph(scene)
-    if for_panel:
-        state = SCENE_STATES.get(scene, depsgraph) if recorded else SCENE_STATES.clear()
-    else:
-        state = SceneState(scene, depsgraph, {})
+    state = None
+    if recorded and for_panel:
+        state = SCENE_STATES.get(scene, scene_depsgraph(scene))
+    elif recorded:
+        state = SceneState(scene, scene_depsgraph(scene), {})
+    elif for_panel:
+        SCENE_STATES.clear()
     infos = [
         BakeInfo(
             camera_name(record),

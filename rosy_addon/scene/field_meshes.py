@@ -1,8 +1,8 @@
 """Field meshes: copies of evaluated meshes, which hold the fields of objects whose modifiers change the faces.
 
 Such an object has the property ``obj.rosy.field_mesh``. Its field is made for the faces that are seen, and follows them
-when a modifier or an edit moves them. The vertices of the field mesh are the rest shape. All other objects have their fields on
-their own meshes; see `datablocks.field_mesh`.
+when a modifier or an edit moves them. The vertices of the field mesh are the rest shape. All other objects have their
+fields on their own meshes; see `datablocks.field_mesh`.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 
 import bpy
+import numpy as np
 from bpy.types import Depsgraph, Mesh, Object
 
-from ..field.surface import have_same_polygons
 from .datablocks import user_modifiers
-from .meshes import evaluated_mesh, mesh_surface
+from .meshes import evaluated_mesh, polygon_arrays, vertex_positions
 from .picture_nodes import CLIP_ATTRIBUTE, MATERIAL_ATTRIBUTE
 
 #: Custom property of field meshes.
@@ -47,14 +47,13 @@ def _target(obj: Object, depsgraph: Depsgraph) -> Mesh:
         return obj.data  # a library override would lose its field mesh when the file is saved
     evaluated = obj.evaluated_get(depsgraph)
     with evaluated_mesh(evaluated) as mesh:
-        surface = None if mesh is None else mesh_surface(mesh)
-    if surface is None or have_same_polygons(surface, mesh_surface(obj.data)):
-        return obj.data
-    earlier = obj.rosy.field_mesh
-    if earlier is not None and have_same_polygons(surface, mesh_surface(earlier)):
-        earlier.vertices.foreach_set("co", surface.vertices.astype("f").ravel())
-        earlier.update()
-        return earlier
+        if mesh is None or _have_same_faces(mesh, obj.data):
+            return obj.data
+        earlier = obj.rosy.field_mesh
+        if earlier is not None and _have_same_faces(mesh, earlier):
+            earlier.vertices.foreach_set("co", vertex_positions(mesh).ravel())
+            earlier.update()
+            return earlier
     copy = bpy.data.meshes.new_from_object(evaluated, depsgraph=depsgraph)
     copy.name = f"{obj.name} field"
     copy[_TAG] = True
@@ -63,6 +62,13 @@ def _target(obj: Object, depsgraph: Depsgraph) -> Mesh:
         if name in copy.attributes:
             copy.attributes.remove(copy.attributes[name])
     return copy
+
+
+def _have_same_faces(mesh: Mesh, other: Mesh) -> bool:
+    """Return whether two meshes have the same faces by vertex index. Positions may differ."""
+    return len(mesh.vertices) == len(other.vertices) and all(
+        map(np.array_equal, polygon_arrays(mesh), polygon_arrays(other))
+    )
 
 
 def hold_fields(targets: FieldTargets) -> None:

@@ -121,7 +121,8 @@ def _field_from_directions(
     """Read a field from the attributes ``dir0`` ... ``dir{N-1}``. Their number N is the degree.
 
     Two attributes are the lines of a cross if their directions are nowhere opposite and `degree`, the
-    expected degree, is not 2. A `RosyWarning` says so. `nonfinite` is "error" or "zero": vectors that are not finite raise an error, or are undefined.
+    expected degree, is not 2. A `RosyWarning` says so. `nonfinite` is "error" or "zero": vectors that are not
+    finite raise an error, or are undefined.
     """
     label, count = surface.name, 0
     while f"dir{count}" in mesh.attributes:

@@ -148,9 +148,8 @@ def new_material(
             shader = build.mix_shaders(coverage, transparent, shader)
     build("ShaderNodeOutputMaterial", {"Surface": shader})
     if has_clear_paper(look) and hasattr(material, "cycles"):
-        material.cycles.emission_sampling = (
-            "NONE"  # ink is no lamp: to sample it makes the rest noisier
-        )
+        # Ink is no lamp: to sample it makes the rest noisier.
+        material.cycles.emission_sampling = "NONE"
     return material
 
 
@@ -182,7 +181,8 @@ def _clip_position(build: NodeBuilder, view_projection: np.ndarray) -> Node:
 def new_group(obj: Object, material: Material, matrix: np.ndarray | None) -> NodeTree:
     """Create a geometry node group that sets a material and the attribute `CLIP_ATTRIBUTE`.
 
-    It is the node group of RoSy's modifier (`set_picture_modifier`, which names it). The mesh, its material slots and other modifiers stay unchanged.
+    It is the node group of RoSy's modifier (`set_picture_modifier`, which names it). The mesh, its material slots and other
+    modifiers stay unchanged.
 
     Parameters
     ----------

@@ -425,34 +425,27 @@ class SceneReader:
     def _read_field_mesh(self, mesh: Mesh, owner: Object) -> _MeshData | None:
         """Read an evaluated mesh with its field. Return None if it needs `resolve_topologies` first."""
         request, cache, label = self._request, self.cache, f"object '{owner.name}'"
-        original = owner.data
-        surface = mesh_surface(mesh, label, cache=cache)
+        original, holder = owner.data, field_mesh(owner)
+        surface = undeformed = mesh_surface(mesh, label, cache=cache)
         tone = look_inputs.read_tone(mesh, owner, request, cache)
         values = look_inputs.read_color_values(mesh, request.color_attribute, label, cache)
-        if (holder := field_mesh(owner)) != original:
-            undeformed = mesh_surface(holder, label, cache=cache)
-            if not have_same_polygons(surface, undeformed):
-                raise RosyError(
-                    f"{label}: its modifiers make other faces now than when its field was made: make the field again"
-                )
-            if values is None:
-                values = look_inputs.read_color_values(
-                    holder, request.color_attribute, label, cache
-                )
-            field = read_mesh_field(
-                holder, surface=undeformed, nonfinite=request.nonfinite, cache=cache
-            )
-            return self._with_rest(surface, undeformed.vertices), field, tone, values
-        if original.is_editmode:
+        if holder == original and original.is_editmode:
             return surface, self._edit_mode_field(mesh, owner, surface), tone, values
-        modifiers, undeformed = user_modifiers(owner), surface
-        if modifiers or original.shape_keys:
-            undeformed = mesh_surface(original, label, cache=cache)
-        keeps_field = all(modifier.type != "NODES" for modifier in modifiers)
+        modifiers = user_modifiers(owner)
+        if holder != original or modifiers or original.shape_keys:
+            undeformed = mesh_surface(holder, label, cache=cache)
+        keeps_field = holder != original or all(each.type != "NODES" for each in modifiers)
         if keeps_field and have_same_polygons(surface, undeformed):
+            if values is None and holder != original:  # values that RoSy has computed
+                name = request.color_attribute
+                values = look_inputs.read_color_values(holder, name, label, cache)
             inputs = {"surface": undeformed, "nonfinite": request.nonfinite, "cache": cache}
-            field = read_mesh_field(original, **inputs)
+            field = read_mesh_field(holder, **inputs)
             return self._with_rest(surface, undeformed.vertices), field, tone, values
+        if holder != original:
+            raise RosyError(
+                f"{label}: its modifiers make other faces now than when its field was made: make the field again"
+            )
         key = owner.name_full, topology_hash(mesh, original)
         topology = self._topologies.get(key)
         if topology is None:

@@ -32,10 +32,8 @@ from ..rendering.view_input import ViewInput
 from ..scene import pictures
 from ..scene.blender_images import frame_path, write_images
 from ..scene.cameras import CameraSource, frame_camera
-from ..scene.evaluated_field import temp_attributes
 from ..scene.files import picture_stem
 from ..scene.keys import update_camera_planes
-from ..scene.look_inputs import nonfinite_policy
 from ..scene.look_properties import read_look
 from ..scene.picture_state import PictureState, SceneState
 from ..scene.read_view import read_views, scene_depsgraph
@@ -132,18 +130,14 @@ def bake_animation(
     file_io.check_folder(settings.folder)
     file_io.remove_leftovers(settings.folder)
     frames = list(frames)
-    depsgraph = scene_depsgraph(scene)
-    targets = drawn_objects(depsgraph) if objects is None else list(objects)
     if show:
+        targets = drawn_objects(scene_depsgraph(scene)) if objects is None else list(objects)
         pictures.check_targets(targets, settings)
     cache = Cache()  # meshes and fields; `_frame_steps` removes those that a frame has not used
     start_time, rendered_count = time.monotonic(), 0
     sequences: dict[str, list[_Frame]] = {}
     scene_data, warnings = None, {}
-    # The temporary attributes are added once. To add them for each frame would take two more evaluations of
-    # the scene: up to half of the time of reading.
-    attributes = temp_attributes(depsgraph, targets, nonfinite_policy(scene), cache, {})
-    with _restored_frame(scene), attributes:
+    with _restored_frame(scene):
         for index, frame in enumerate(frames):
             start, stop = index / len(frames), (index + 1) / len(frames)
             label = f"frame {frame}{_time_left(start_time, rendered_count, len(frames) - index)}"

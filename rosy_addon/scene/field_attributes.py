@@ -21,6 +21,7 @@ rotated with their faces.
 from __future__ import annotations
 
 from contextlib import suppress
+from itertools import count, takewhile
 
 import numpy as np
 from bpy.types import Attribute, Mesh, Object
@@ -50,6 +51,12 @@ def attribute_name(mesh: Mesh) -> str:
 def field_degree(mesh: Mesh) -> int:
     """Return the degree of the mesh's field."""
     return mesh.rosy.degree if has_rosy_properties() else DEFAULT_DEGREE
+
+
+def direction_names(mesh: Mesh) -> list[str]:
+    """Return those of the names ``dir0``, ``dir1`` ... without a gap that are attributes of a mesh."""
+    names = (f"dir{index}" for index in count())
+    return list(takewhile(mesh.attributes.keys().__contains__, names))
 
 
 def has_field(obj: Object) -> bool:

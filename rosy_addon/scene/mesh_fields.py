@@ -28,6 +28,7 @@ from .field_attributes import (
     attribute_name,
     check_attribute_type,
     describe_type,
+    direction_names,
     ensure_attribute,
     field_degree,
     field_values,
@@ -49,6 +50,7 @@ def read_mesh_field(
     surface: Surface | None = None,
     *,
     nonfinite: str = "error",
+    off_surface: str = "error",
     label: str | None = None,
     cache: Cache | None = None,
 ) -> RosyField:
@@ -66,6 +68,8 @@ def read_mesh_field(
         The surface of the mesh, if it has been read already. Messages have its name.
     nonfinite : {"error", "zero"}
         Raise an error if a value is not finite, or treat it as undefined.
+    off_surface : {"error", "project", "undefined"}
+        What to do about vectors that are not tangent; see `VectorPolicy`.
     label : str, optional
         Name of the mesh in messages, if there is no surface. By default `mesh_label`.
     cache : Cache, optional
@@ -88,9 +92,10 @@ def read_mesh_field(
     label = surface.name
     field_name = name or attribute_name(mesh)
     degree = check_degree(field_degree(mesh) if degree is None else degree)
+    policy = validate.VectorPolicy(nonfinite, off_surface)
     if field_name not in mesh.attributes and "dir0" in mesh.attributes:
         with progress(0.5, 1.0):
-            return _field_from_directions(mesh, surface, degree, nonfinite, cache)
+            return _field_from_directions(mesh, surface, degree, policy, cache)
     attribute = mesh.attributes.get(field_name)
     if attribute is None:
         raise RosyError(
@@ -106,27 +111,23 @@ def read_mesh_field(
         if data_type == ANGLE_TYPE:
             return _field_from_angles(surface, values, degree, source, nonfinite)
         if domain == "CORNER":
-            return _field_from_corners(surface, values, degree, source, nonfinite)
-        policy = validate.VectorPolicy(nonfinite)
+            return _field_from_corners(surface, values, degree, source, policy)
         return validate.validated_field(surface, values, degree, source, policy, ELEMENTS[domain])
 
-    key_parts = "attribute", domain, data_type, values, degree, source, nonfinite
+    key_parts = "attribute", domain, data_type, values, degree, source, *policy
     with progress(0.5, 1.0, "reading the field"):
         return cached(cache, build, surface, *key_parts)
 
 
 def _field_from_directions(
-    mesh: Mesh, surface: Surface, degree: int, nonfinite: str, cache: Cache | None
+    mesh: Mesh, surface: Surface, degree: int, policy: validate.VectorPolicy, cache: Cache | None
 ) -> RosyField:
     """Read a field from the attributes ``dir0`` ... ``dir{N-1}``. Their number N is the degree.
 
     Two attributes are the lines of a cross if their directions are nowhere opposite and `degree`, the
-    expected degree, is not 2. A `RosyWarning` says so. `nonfinite` is "error" or "zero": vectors that are not
-    finite raise an error, or are undefined.
+    expected degree, is not 2. A `RosyWarning` says so. `policy` says what to do about invalid vectors.
     """
-    label, count = surface.name, 0
-    while f"dir{count}" in mesh.attributes:
-        count += 1
+    label, count = surface.name, len(direction_names(mesh))
     if count > MAX_DEGREE:
         raise RosyError(
             f"{label}: has {count} attributes dir0, dir1 ..., but at most {MAX_DEGREE} are supported"
@@ -150,7 +151,7 @@ def _field_from_directions(
     directions = with_opposites(directions, 2 if degree == 2 else None)
     if directions.shape[1] > count:
         warnings.warn(f"{source}: {HALF_CROSS_NOTE}", RosyWarning, stacklevel=3)
-    policy, element = validate.VectorPolicy(nonfinite), ELEMENTS[domain]
+    element = ELEMENTS[domain]
     build = partial(validate.validated_directions, surface, directions, source, policy, element)
     with progress(0.0, 1.0, "reading the field"):
         return cached(cache, build, surface, "directions", directions, source, *policy, element)
@@ -174,21 +175,23 @@ def _field_from_angles(
 
 
 def _field_from_corners(
-    surface: Surface, vectors: np.ndarray, degree: int, source: str, nonfinite: str
+    surface: Surface, vectors: np.ndarray, degree: int, source: str, policy: validate.VectorPolicy
 ) -> RosyField:
     """Return a field from (C, 3) vectors on face corners, averaged over each face.
 
     The vectors are projected to the face. Their representations z are averaged, so that different members at
-    the corners of a face do not cancel out. `source` is the name of the attribute in messages. `nonfinite` is
-    "error" or "zero": vectors that are not finite raise an error, or are undefined.
+    the corners of a face do not cancel out. `source` is the name of the attribute in messages. `policy` says
+    what to do about invalid vectors.
     """
     vectors = as_float64(vectors)
-    validate.apply_nonfinite_policy(vectors, source, "corner", nonfinite)
+    validate.apply_nonfinite_policy(vectors, source, "corner", policy.nonfinite)
     normal = surface.face_normal
     corner_normal = normal[surface.corner_face]
     report(0.2, "reading the field")
     with progress(0.2, 0.7):
-        vectors = validate.project_to_tangent(vectors, corner_normal, source, "corner")
+        vectors = validate.project_to_tangent(
+            vectors, corner_normal, source, "corner", policy.off_surface
+        )
     x, y = tangent_frame(normal)
     z = to_representation(vectors, x[surface.corner_face], y[surface.corner_face], degree)
     report(0.9, "reading the field")

@@ -1,6 +1,6 @@
 """Compute digests of evaluated meshes and their fields. They tell whether a picture is out of date.
 
-Computing a digest is much faster than reading a surface, and needs no temporary attributes.
+Computing a digest is much faster than reading a surface.
 """
 
 from __future__ import annotations
@@ -11,9 +11,8 @@ import numpy as np
 from bpy.types import Mesh, Object
 
 from ..core.cache import content_hash
-from ..field.rosy_field import MAX_DEGREE
 from .datablocks import field_mesh, user_modifiers
-from .field_attributes import ANGLE_TYPE, VECTOR_TYPE, attribute_name, field_degree
+from .field_attributes import ANGLE_TYPE, VECTOR_TYPE, attribute_name, direction_names, field_degree
 from .look_inputs import ReadRequest, color_values_digest, tone_digest
 from .meshes import material_indices, read_attribute, shape_digest, vertex_positions
 from .transparency import transparent_slots
@@ -107,8 +106,7 @@ def field_parts(mesh: Mesh, original: Mesh) -> list:
     if name in original.attributes:
         names, parts = [name], [field_degree(original)]
     else:
-        names = [f"dir{index}" for index in range(MAX_DEGREE) if f"dir{index}" in mesh.attributes]
-        parts = []
+        names, parts = direction_names(mesh), []
     for name in names:
         attribute = mesh.attributes.get(name)
         if attribute is None or attribute.data_type not in (VECTOR_TYPE, ANGLE_TYPE):

@@ -42,9 +42,6 @@ VALUE_SHAPES = {
 #: Attribute in which Blender stores which edges are selected.
 EDGE_SELECTION_ATTRIBUTE = ".select_edge"
 
-#: Attribute in which Blender stores the undeformed positions, if `Object.add_rest_position_attribute` is set.
-REST_ATTRIBUTE = "rest_position"
-
 
 def mesh_label(mesh: Mesh) -> str:
     """Return the name of a mesh for messages: the name of an object that uses it, if there is one.

@@ -1,7 +1,6 @@
 """Read the state of a scene that a picture depends on, as a `PictureState`. States are compared and stored.
 
-Reading does not change anything in the file, so it is possible while Blender draws a panel. Evaluated meshes
-are read without the temporary attributes that `scene_reader` adds.
+Reading does not change anything in the file, so it is possible while Blender draws a panel.
 """
 
 from __future__ import annotations

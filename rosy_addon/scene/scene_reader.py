@@ -1,10 +1,8 @@
 """Read a scene as mesh instances: evaluated meshes with their fields, and occluders.
 
-Bakes and live views use the same `SceneReader`. If modifiers only deform an object, its rest positions and
-its field are read from the original mesh, and nothing is changed in the file. If modifiers change the
-topology, or may change the attribute of the field, both are read from the evaluated mesh.
-`SceneReader.resolve_topologies` then adds temporary attributes to the original mesh, which modifiers copy to
-the evaluated mesh.
+Bakes and live views use the same `SceneReader`. Nothing is changed in the file. The field and the rest positions of an
+object are read from the mesh that holds its field, if that has the faces that are seen. Otherwise the field is read from
+the attributes that modifiers have copied to the evaluated mesh, and a note says so.
 """
 
 from __future__ import annotations
@@ -15,7 +13,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-import bpy
 import numpy as np
 from bpy.types import Depsgraph, Mesh, Object
 
@@ -27,27 +24,15 @@ from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 from . import look_inputs
 from .datablocks import field_mesh, remedy_for_absence, user_modifiers
-from .evaluated_field import (
-    Errors,
-    FieldLayout,
-    lost_field_error,
-    read_evaluated_field,
-    temp_attributes,
-    topology_hash,
-)
-from .field_attributes import attribute_name, field_degree, is_face_vector_field
+from .field_attributes import ANGLE_TYPE, attribute_name, direction_names, field_degree
 from .mesh_fields import read_mesh_field
 from .mesh_states import MeshStates, mesh_state_key, read_mesh_state
-from .meshes import REST_ATTRIBUTE, evaluated_mesh, mesh_surface, read_attribute
+from .meshes import evaluated_mesh, mesh_surface, no_faces_error
 from .transparency import opaque_triangles, transparent_slots
 from .visible_objects import Instances, drawn_objects, rendered_instances
 
 #: Cache key of the mesh instances of the last call of `SceneReader.read`.
 _INSTANCES_KEY = "instances of the last reading"
-
-#: Number of calls of `SceneReader.resolve_topologies` in a row after which an object that still needs one is
-#: given up: its modifiers make other faces at each evaluation.
-MAX_ATTEMPTS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +46,8 @@ class SceneData:
     objects : list of bpy.types.Object
         The original object of each instance with a field, in the same order.
     warnings : tuple of str
-        One message for each object that was left out because its field cannot be drawn, with the reason.
+        One message for each object that was left out because its field cannot be drawn, with the reason, and for each
+        whose field was made for other faces.
     mesh_states : dict
         Digests of the meshes that were read; see the module `mesh_states`.
     """
@@ -113,9 +99,6 @@ def read_scene(
     depsgraph.update()
     reader = SceneReader(cache, mesh_states={})
     entries = reader.read(rendered_instances(depsgraph, targets), request)
-    while reader.has_unresolved:
-        reader.resolve_topologies(depsgraph)
-        entries = reader.read(rendered_instances(depsgraph, targets), request)
     errors = _field_errors(reader.errors, entries, targets)
     if errors and (objects is not None or len(errors) == len(targets)):
         raise errors[0]
@@ -125,7 +108,7 @@ def read_scene(
     return SceneData(
         [entry.instance for entry in with_field] + occluders,
         [entry.owner for entry in with_field],
-        tuple(f"{error}. It was left out" for error in errors),
+        (*(f"{error}. It was left out" for error in errors), *reader.notes.values()),
         reader.mesh_states,
     )
 
@@ -176,12 +159,6 @@ class SceneInstance:
 #: A surface, its field, its tone and its values for the color map. Occluders have only the surface.
 _MeshData = tuple[Surface, RosyField | None, SurfaceTone | None, np.ndarray | None]
 
-#: The full name (`name_full`) of an object, and the `topology_hash` of one of its evaluated meshes.
-_TopologyKey = tuple[str, bytes]
-
-#: Rest positions and field of an evaluated mesh, which cannot be read from the original mesh.
-_Topology = tuple[np.ndarray | None, RosyField]
-
 
 class SceneReader:
     """A reader of the meshes of one view layer. Repeated calls of `read` read only what has changed.
@@ -199,6 +176,8 @@ class SceneReader:
     mesh_states : dict or None
     errors : dict of str to Exception
         By the full name of an object: why its field cannot be drawn, or why it cannot be read at all.
+    notes : dict of str to str
+        By the full name of an object: a message if its field is drawn, but was made for other faces.
     is_complete : bool
         Whether the last call of `read` read all objects before its deadline.
     """
@@ -207,6 +186,7 @@ class SceneReader:
         self.cache = Cache() if cache is None else cache
         self.mesh_states = mesh_states
         self.errors: dict[str, Exception] = {}
+        self.notes: dict[str, str] = {}
         self.is_complete = True
         self._request = look_inputs.FIELDS_ONLY
         self._deadline = math.inf
@@ -214,31 +194,13 @@ class SceneReader:
         # Keys: the full name of the object, the pointer of its mesh, whether its field is drawn, and
         # `tone_image_key` or, without a field, `transparent_slots`. None: the mesh has no faces.
         self._meshes: dict[tuple, _MeshData | None] = {}
-        # The results of `resolve_topologies`. An error is kept until its object changes.
-        self._topologies: dict[_TopologyKey, _Topology | Exception] = {}
-        # Meshes that need `resolve_topologies`.
-        self._unresolved: set[_TopologyKey] = set()
-        # By the name of an object: how often in a row `resolve_topologies` was called for it; see
-        # MAX_ATTEMPTS.
-        self._attempts: dict[str, int] = {}
 
-    def invalidate(self, names: set[str], *, topology_changed: bool = True) -> None:
-        """Mark objects as changed, so that the next call of `read` reads them again.
-
-        Parameters
-        ----------
-        names : set of str
-            Full names of the changed objects.
-        topology_changed : bool
-            Whether faces or fields may have changed. False: only positions of vertices have changed.
-        """
+    def invalidate(self, names: set[str]) -> None:
+        """Mark objects with these full names as changed, so that the next call of `read` reads them again."""
         self._meshes = {key: data for key, data in self._meshes.items() if key[0] not in names}
-        for key in [key for key in self._topologies if key[0] in names]:
-            if topology_changed or isinstance(self._topologies[key], Exception):
-                del self._topologies[key]
         for name in names:
-            self._attempts.pop(name, None)
             self.errors.pop(name, None)
+            self.notes.pop(name, None)
 
     def read(
         self,
@@ -248,8 +210,7 @@ class SceneReader:
     ) -> list[SceneInstance]:
         """Return the mesh instances of a scene in their current state.
 
-        Objects that need `resolve_topologies` first are left out; see `has_unresolved`. Objects that cannot
-        be read are left out too; see `errors`. Nothing is changed in the file.
+        Objects that cannot be read are left out; see `errors`.
 
         Parameters
         ----------
@@ -268,7 +229,6 @@ class SceneReader:
             self._meshes.clear()
             self._request = request
         self._deadline, self._has_read_any, self.is_complete = deadline, False, True
-        self._unresolved.clear()
         entries: list[SceneInstance] = []
         last_instances = self.cache.get(_INSTANCES_KEY) or {}
         mesh_instances: dict[tuple, MeshInstance] = {}
@@ -290,88 +250,17 @@ class SceneReader:
             is_shown_by_parent = instance.is_instance and instance.parent
             visibility_object = instance.parent.original if is_shown_by_parent else owner
             entries.append(SceneInstance(mesh_instances[key], owner, visibility_object))
-        waiting = {name for name, _ in self._unresolved}
-        self._attempts = {name: n for name, n in self._attempts.items() if name in waiting}
         if self.is_complete:
-            for owner in faceless - {entry.owner for entry in entries}:
-                if owner.name_full not in waiting:
-                    self.errors.setdefault(owner.name_full, lost_field_error(owner, None))
+            owners = {entry.owner for entry in entries}
+            for owner in faceless - owners:
+                self.errors.setdefault(owner.name_full, lost_field_error(owner, None))
+            names = {owner.name_full for owner in owners}
+            self.notes = {name: note for name, note in self.notes.items() if name in names}
         # The instances of the last call are released only now: the keys have ids of surfaces, and while a
         # surface is alive, no new object can have its id.
         self.cache.put(_INSTANCES_KEY, mesh_instances)
         self.cache.evict_over_limit()
         return entries
-
-    @property
-    def has_unresolved(self) -> bool:
-        """Return whether the last call of `read` left out objects that need `resolve_topologies`."""
-        return bool(self._unresolved)
-
-    def resolve_topologies(self, depsgraph: Depsgraph, deadline: float = math.inf) -> None:
-        """Read the rest positions and fields of objects whose modifiers change the topology.
-
-        It adds temporary attributes to the meshes, so it must not be called while Blender draws. At least one
-        object is read. Those that are not read by the deadline (seconds of `time.monotonic`) are left for the
-        next call.
-        """
-        while self._unresolved:
-            names = {name for name, _ in self._unresolved}
-            self._resolve(depsgraph, names if deadline == math.inf else {min(names)})
-            if time.monotonic() > deadline:
-                return
-
-    def _resolve(self, depsgraph: Depsgraph, names: set[str]) -> None:
-        """Read the rest positions and fields of the evaluated meshes of objects with these full names."""
-        unresolved = {key for key in self._unresolved if key[0] in names}
-        self._unresolved -= unresolved
-        for name in names:
-            self._attempts[name] = self._attempts.get(name, 0) + 1
-        for key in [key for key in self._topologies if key[0] in names]:
-            del self._topologies[key]
-        objects = [obj for obj in bpy.data.objects if obj.name_full in names]
-        problems: dict[str, Exception] = {
-            obj.name_full: lost_field_error(obj, attribute_name(obj.data)) for obj in objects
-        }
-        errors: Errors = {}
-        nonfinite = self._request.nonfinite
-        try:
-            with temp_attributes(depsgraph, objects, nonfinite, self.cache, errors) as layouts:
-                self._read_topologies(depsgraph, layouts, errors)
-        except MemoryError as error:
-            problems = dict.fromkeys(problems, error)
-        problems |= {obj.name_full: error for obj, error in errors.items()}
-        # Meshes that could not be read now are not tried again until their objects change.
-        for key in unresolved:
-            if key[0] in problems:  # if not, the object was deleted
-                self._topologies.setdefault(key, problems[key[0]])
-
-    def _read_topologies(
-        self, depsgraph: Depsgraph, layouts: Mapping[Object, FieldLayout], errors: Errors
-    ) -> None:
-        """Add rest positions and fields of evaluated meshes to `_topologies`, or errors to `errors`.
-
-        `layouts` holds the field's attributes by original object.
-        """
-        for instance in depsgraph.object_instances:
-            obj, owner = instance.object, instance.object.original
-            layout = layouts.get(owner)
-            if obj.type != "MESH" or layout is None:
-                continue
-            with evaluated_mesh(obj) as mesh:
-                if mesh is None or not layout.is_on(mesh):
-                    continue
-                key = owner.name_full, topology_hash(mesh, owner.data)
-                if key in self._topologies:
-                    continue
-                label = f"object '{owner.name}'"
-                try:
-                    rest = read_attribute(mesh, REST_ATTRIBUTE, np.float32, 3)
-                    surface = self._with_rest(mesh_surface(mesh, label, cache=self.cache), rest)
-                    nonfinite = self._request.nonfinite
-                    field = read_evaluated_field(mesh, layout, surface, nonfinite, self.cache)
-                    self._topologies[key] = rest, field
-                except RosyError as error:
-                    errors[owner] = error
 
     def _mesh_data(self, obj: Object, owner: Object, draws_field: bool) -> _MeshData | None:
         """Return the data of the mesh of the evaluated object `obj`, whose original object is `owner`.
@@ -390,25 +279,23 @@ class SceneReader:
         if self._has_read_any and time.monotonic() > self._deadline:
             self.is_complete = False
             return None
-        self._has_read_any, is_waiting = True, False
+        self._has_read_any = True
         try:
             with evaluated_mesh(obj) as mesh:
                 if mesh is None:
                     mesh_data = None
                 elif draws_field:
                     mesh_data = self._read_field_mesh(mesh, owner)
-                    is_waiting = mesh_data is None
                 else:
                     mesh_data = self._read_occluder(mesh, owner)
-                if self.mesh_states is not None and not is_waiting:
+                if self.mesh_states is not None:
                     state_request = request if draws_field else None
                     state_key = mesh_state_key(obj, owner, state_request)
                     self.mesh_states[state_key] = read_mesh_state(mesh, owner, state_request)
         except REPORTED_ERRORS as error:
             self.errors[owner.name_full] = error
             return None
-        if not is_waiting:
-            self._meshes[key] = mesh_data
+        self._meshes[key] = mesh_data
         return mesh_data
 
     def _read_occluder(self, mesh: Mesh, owner: Object) -> _MeshData | None:
@@ -422,54 +309,57 @@ class SceneReader:
             surface = cached(self.cache, with_parts, surface, "opaque", shown)
         return (surface, None, None, None) if len(shown) else None
 
-    def _read_field_mesh(self, mesh: Mesh, owner: Object) -> _MeshData | None:
-        """Read an evaluated mesh with its field. Return None if it needs `resolve_topologies` first."""
+    def _read_field_mesh(self, mesh: Mesh, owner: Object) -> _MeshData:
+        """Read an evaluated mesh with its field."""
         request, cache, label = self._request, self.cache, f"object '{owner.name}'"
         original, holder = owner.data, field_mesh(owner)
         surface = undeformed = mesh_surface(mesh, label, cache=cache)
         tone = look_inputs.read_tone(mesh, owner, request, cache)
         values = look_inputs.read_color_values(mesh, request.color_attribute, label, cache)
-        if holder == original and original.is_editmode:
-            return surface, self._edit_mode_field(mesh, owner, surface), tone, values
-        modifiers = user_modifiers(owner)
-        if holder != original or modifiers or original.shape_keys:
+        modifiers, is_edited = user_modifiers(owner), holder == original and original.is_editmode
+        if not is_edited and (holder != original or modifiers or original.shape_keys):
             undeformed = mesh_surface(holder, label, cache=cache)
-        keeps_field = holder != original or all(each.type != "NODES" for each in modifiers)
-        if keeps_field and have_same_polygons(surface, undeformed):
-            if values is None and holder != original:  # values that RoSy has computed
-                name = request.color_attribute
-                values = look_inputs.read_color_values(holder, name, label, cache)
-            inputs = {"surface": undeformed, "nonfinite": request.nonfinite, "cache": cache}
-            field = read_mesh_field(holder, **inputs)
-            return self._with_rest(surface, undeformed.vertices), field, tone, values
-        if holder != original:
-            raise RosyError(
-                f"{label}: its modifiers make other faces now than when its field was made: make the field again"
+        has_same_faces = is_edited or have_same_polygons(surface, undeformed)
+        if has_same_faces:
+            surface = self._with_rest(surface, undeformed.vertices)
+        elif holder != original:
+            problem = "its modifiers make other faces now than when its field was made"
+            raise RosyError(f"{label}: {problem}: make the field again")
+        else:
+            self.notes[owner.name_full] = (
+                f"{label}: its field was made for the faces without modifiers: make it again for those that are seen"
             )
-        key = owner.name_full, topology_hash(mesh, original)
-        topology = self._topologies.get(key)
-        if topology is None:
-            if self._attempts.get(owner.name_full, 0) >= MAX_ATTEMPTS:
-                raise RosyError(f"{label}: its modifiers make other faces at each evaluation")
-            self._unresolved.add(key)
-            return None
-        if isinstance(topology, Exception):
-            raise topology
-        rest, field = topology
-        return self._with_rest(surface, rest), field, tone, values
+        may_change_field = is_edited or any(each.type == "NODES" for each in modifiers)
+        if not has_same_faces or (holder == original and may_change_field):
+            field = self._copied_field(mesh, owner, undeformed if has_same_faces else surface)
+            return surface, field, tone, values
+        if values is None and holder != original:  # values that RoSy has computed
+            values = look_inputs.read_color_values(holder, request.color_attribute, label, cache)
+        field = read_mesh_field(
+            holder, surface=undeformed, nonfinite=request.nonfinite, cache=cache
+        )
+        return surface, field, tone, values
 
-    def _edit_mode_field(self, mesh: Mesh, owner: Object, surface: Surface) -> RosyField:
-        """Return the field of an object in edit mode. Only its evaluated mesh has attributes then."""
+    def _copied_field(self, mesh: Mesh, owner: Object, surface: Surface) -> RosyField:
+        """Return the field of an evaluated mesh, whose attributes modifiers or edit mode have copied.
+
+        Modifiers copy the vector of a face to all of its parts, so vectors are projected to `surface`.
+        """
         original = owner.data
-        name = attribute_name(original)
-        if name in original.attributes and name not in mesh.attributes:
+        name, degree = attribute_name(original), field_degree(original)
+        names = [name] if name in original.attributes else direction_names(original)
+        if not all(each in mesh.attributes for each in names):
             raise lost_field_error(owner, name)
-        if name not in mesh.attributes or not is_face_vector_field(mesh, name):
-            raise RosyError(
-                f"{surface.name}: in edit mode, only fields stored as vectors on faces can be read: leave edit mode (Tab)"
-            )
-        layout = FieldLayout(name, field_degree(original))
-        return read_evaluated_field(mesh, layout, surface, self._request.nonfinite)
+        if (
+            name in names
+            and mesh.attributes[name].data_type == ANGLE_TYPE
+            and owner.name_full in self.notes
+        ):
+            problem = "modifiers do not keep a field that is stored as angles"
+            raise RosyError(f"{surface.name}: {problem}: make the field again")
+        nonfinite, cache = self._request.nonfinite, self.cache
+        policy = {"nonfinite": nonfinite, "off_surface": "project"}
+        return read_mesh_field(mesh, name, degree, surface, **policy, cache=cache)
 
     def _with_rest(self, surface: Surface, rest: np.ndarray | None) -> Surface:
         """Return a surface with rest positions.
@@ -481,3 +371,17 @@ class SceneReader:
         rest = np.asarray(rest, dtype=np.float64)
         with_rest = partial(surface.with_parts, rest_vertices=rest)
         return cached(self.cache, with_rest, surface, "rest", rest)
+
+
+def lost_field_error(obj: Object, attribute: str | None) -> RosyError:
+    """Return the error for an object whose modifiers remove an attribute.
+
+    `attribute` is the name of the attribute. If it is None, the modifiers remove all faces.
+    """
+    if attribute is None and not len(obj.data.polygons):
+        return no_faces_error(obj.data, f"object '{obj.name}'")
+    names = ", ".join(modifier.name for modifier in user_modifiers(obj)) or "none"
+    problem = "has no faces"
+    if attribute is not None:
+        problem = f"has no attribute '{attribute}': make the field again"
+    return RosyError(f"object '{obj.name}': after its modifiers ({names}) the mesh {problem}")

@@ -54,15 +54,10 @@ class LayerState:
 
 
 class LayerStates:
-    """The states of all view layers that are shown in live views.
-
-    Some data cannot be read while Blender draws. If `SceneReader.has_unresolved` of a layer is true,
-    `resolve_topologies` must be called later to read it.
-    """
+    """The states of all view layers that are shown in live views."""
 
     def __init__(self) -> None:
         self._layers: dict[tuple[str, str], LayerState] = {}
-        self._is_resolving = False
 
     def get(self, scene: Scene, view_layer: ViewLayer) -> LayerState | None:
         """Return the state of a view layer, or None if it was never read."""
@@ -89,8 +84,7 @@ class LayerStates:
                 deadline=time.monotonic() + SLICE_SECONDS if layer.is_starting else math.inf,
             )
             layer.request = request if layer.reader.is_complete else None
-            if layer.reader.is_complete and not layer.reader.has_unresolved:
-                layer.is_starting = False
+            layer.is_starting &= not layer.reader.is_complete
         return layer
 
     def clear(self) -> None:
@@ -116,61 +110,22 @@ class LayerStates:
         depsgraph : bpy.types.Depsgraph, optional
             Its `updates` list the datablocks that have changed. If it is None, all may have changed.
         """
-        if self._is_resolving:
-            return
         updates = () if depsgraph is None else depsgraph.updates
         updates = [update for update in updates if update.id.original.id_type in RELEVANT_ID_TYPES]
-        changed_names, remeshed_names = set(), set()
+        changed_names = set()
         for update in updates:
             block, objects = update.id.original, bpy.data.objects
             if block.id_type == "IMAGE":
                 changed_names |= {obj.name_full for obj in objects if obj.rosy.tone_image == block}
             elif block.id_type == "MESH" and update.is_updated_geometry:
-                remeshed_names |= {
-                    obj.name_full for obj in objects if block in (obj.data, field_mesh(obj))
-                }
+                meshes = {obj.name_full: (obj.data, field_mesh(obj)) for obj in objects}
+                changed_names |= {name for name, used in meshes.items() if block in used}
             elif block.id_type == "OBJECT" and update.is_updated_geometry:
                 changed_names.add(block.name_full)
         for (scene_name, _), layer in self._layers.items():
             if scene_name == scene.name and (updates or depsgraph is None):
-                layer.reader.invalidate(changed_names, topology_changed=False)
-                layer.reader.invalidate(remeshed_names)
+                layer.reader.invalidate(changed_names)
                 layer.request = None
-
-    def resolve_topologies(self) -> bool:
-        """Read data that cannot be read while Blender draws, for all windows, during one slice of time.
-
-        Returns
-        -------
-        bool
-            Whether all such data was read. If not, this function must be called again.
-        """
-        deadline = time.monotonic() + SLICE_SECONDS
-        # Record the changes of the user first. Later changes are temporary attributes, which are ignored.
-        _evaluate_windows()
-        self._is_resolving = True
-        try:
-            for window in bpy.context.window_manager.windows:
-                layer = self.get(window.scene, window.view_layer)
-                if layer is None or not layer.reader.has_unresolved:
-                    continue
-                with bpy.context.temp_override(window=window):
-                    depsgraph = bpy.context.evaluated_depsgraph_get()
-                    layer.reader.resolve_topologies(depsgraph, deadline)
-                layer.request = None
-                if layer.reader.has_unresolved:
-                    return False
-            return True
-        finally:
-            _evaluate_windows()
-            self._is_resolving = False
-
-
-def _evaluate_windows() -> None:
-    """Evaluate the scenes of all windows, so that Blender calls the handlers for all changes so far."""
-    for window in bpy.context.window_manager.windows:
-        with bpy.context.temp_override(window=window):
-            bpy.context.evaluated_depsgraph_get()
 
 
 class ReferenceImages:

@@ -297,8 +297,6 @@ class ViewportSession:
         look, overlay.problem = look_in_view(look, self.progressive.renderer)
         include_occluders = self.progressive.renderer.needs_occluders or look.shadows
         layer = self.layers.read(context, depsgraph, look, include_occluders=include_occluders)
-        if layer.reader.has_unresolved:
-            self._redraw_when(self.layers.resolve_topologies)
         if layer.is_starting:
             self._schedule_redraw(0.0)
             return None
@@ -310,7 +308,7 @@ class ViewportSession:
         ]
         with_field = [entry for entry in visible if entry.instance.field is not None]
         if not with_field:
-            if layer.reader.errors or layer.reader.has_unresolved:
+            if layer.reader.errors:
                 return None
             raise RosyError(
                 "no object with a field is visible here: make a field, or show its object"
@@ -362,10 +360,13 @@ class ViewportSession:
         problem = self._overlays[pointers].problem
         if problem is not None:
             lines.append(problem)
-        errors = [error_text(error) for error in layer.reader.errors.values()] if layer else []
+        if layer is None:
+            return lines
+        errors = [error_text(error) for error in layer.reader.errors.values()]
         lines += errors[:MAX_OBJECT_ERRORS]
         rest = len(errors) - MAX_OBJECT_ERRORS
-        return lines + [f"{counted(rest, 'more object')} cannot be drawn"] * (rest > 0)
+        lines += [f"{counted(rest, 'more object')} cannot be drawn"] * (rest > 0)
+        return lines + list(layer.reader.notes.values())[:MAX_OBJECT_ERRORS]
 
     def messages(self, area: Area) -> list[str]:
         """Return the rows of text in the views of an area, as they were drawn last."""

@@ -253,8 +253,7 @@ def leftovers() -> list[str]:
             left += [
                 f"'{attribute.name}' of '{mesh.name}'"
                 for attribute in mesh.attributes
-                if attribute.name.startswith(("rosy_stand_in", "rosy_face_normal"))
-                or APPLIED.get(attribute.name) == (attribute.data_type, attribute.domain)
+                if APPLIED.get(attribute.name) == (attribute.data_type, attribute.domain)
             ]
     return left
 

@@ -82,9 +82,7 @@ def delete(monkey: Monkey) -> str | None:
 
 def rename(monkey: Monkey) -> str | None:
     obj = monkey.pick(meshes())
-    # The rest position that a job has added for a while would be taken for one of the renamed object.
-    is_plain = not any(other.add_rest_position_attribute for other in bpy.data.objects)
-    if obj is not None and obj.library is None and is_plain:
+    if obj is not None and obj.library is None:
         obj.name = monkey.pick(["Renamed", "a/b", ""]) or "b"
         return obj.name
     return None

@@ -88,16 +88,6 @@ def read_live(reader, request=FIELDS_ONLY, **options):
     return reader.read(instances, request, **options)
 
 
-def read_until_rest(reader):
-    """Read the objects with a field as the live view does until it rests."""
-    entries = read_live(reader)
-    if reader.has_unresolved:
-        reader.resolve_topologies(depsgraph())
-        entries = read_live(reader)
-    assert not reader.has_unresolved, "the scene would be read for ever"
-    return entries
-
-
 def assert_same_directions(first, second, degrees=0.5, percentile=99.0):
     """Most directions of two G-buffers are the same."""
     same = np.intersect1d(first.pixel, second.pixel, return_indices=True)[1:]

@@ -17,7 +17,7 @@ from objects import (
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.scene.mesh_fields import read_mesh_field, write_mesh_field
 from rosy.rosy_addon.scene.scene_reader import SceneReader
-from scenes import assert_same_directions, expect_error, member_vectors, projected, read_until_rest
+from scenes import assert_same_directions, expect_error, member_vectors, projected, read_live
 
 #: Turned about all axes, so that no symmetry of the objects hides a mistake.
 ANGLES = (0.5, -0.3, 1.1)
@@ -25,7 +25,7 @@ ANGLES = (0.5, -0.3, 1.1)
 
 def live_instances():
     reader = SceneReader()
-    return [entry.instance for entry in read_until_rest(reader)], reader.errors
+    return [entry.instance for entry in read_live(reader)], reader.errors
 
 
 def apply_transform(obj):

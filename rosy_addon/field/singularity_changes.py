@@ -100,7 +100,7 @@ def cancel_pairs(surface: Surface, field: RosyField, max_distance: float) -> Ros
     Pairs with opposite indices are removed first, and then the clusters of all others whose sum is 0, such as
     +2/4 and two of -1/4. Directions change most near removed singularities, and less with the distance from
     them. All other singularities stay. A group is kept if the field without it would turn by pi / N or more
-    between two faces.
+    between two faces: after each attempt, the groups nearest to such faces are kept, twice as many as before.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def cancel_pairs(surface: Surface, field: RosyField, max_distance: float) -> Ros
         vertex, index = find_singularities(surface, field)
     with progress(0.2, 0.4):
         group = _opposite_groups(surface, vertex, index, max_distance)
-    start = 0.4
+    start, least = 0.4, 1
     while (group >= 0).any():
         chosen = np.flatnonzero(group >= 0)
         change = vertex[chosen], -index[chosen]
@@ -134,9 +134,9 @@ def cancel_pairs(surface: Surface, field: RosyField, max_distance: float) -> Ros
             with progress(start, 1.0):
                 return change_singularities(surface, field, *change, max_distance)
         except TurningError as error:
-            is_near = _are_near(surface, vertex[chosen], error.vertices)
+            is_near = _are_near(surface, vertex[chosen], error.vertices, least)
             group[np.isin(group, group[chosen[is_near]])] = -1
-        start = 0.5 * (start + 1.0)
+        start, least = 0.5 * (start + 1.0), 2 * least
     return field
 
 
@@ -200,15 +200,15 @@ def cluster_singularities(
     return vertex[order], index[order]
 
 
-def _are_near(surface: Surface, places: np.ndarray, vertices: np.ndarray) -> np.ndarray:
+def _are_near(surface: Surface, places: np.ndarray, vertices: np.ndarray, least: int) -> np.ndarray:
     """Return (n,) bool: which of the n vertices `places` are nearest to the given other vertices.
 
-    The distance of a vertex is the number of rings of faces from the given vertices to it. All with the
-    smallest distance are marked.
+    The distance of a vertex is the number of rings of faces from the given vertices to it. All up to some
+    distance are marked: `least` or more, if there are as many.
     """
     is_near = mask(len(surface.vertices), vertices)
     corner_vertex, corner_face = surface.corner_vertex, surface.corner_face
-    while not is_near[places].any():
+    while is_near[places].sum() < least:
         touches = mask(surface.face_count, corner_face[is_near[corner_vertex]])
         before = int(is_near.sum())
         is_near[corner_vertex[touches[corner_face]]] = True

@@ -325,13 +325,9 @@ class SceneReader:
         elif holder != original:
             problem = "its modifiers make other faces now than when its field was made"
             raise RosyError(f"{label}: {problem}: make the field again")
-        else:
-            self.notes[owner.name_full] = (
-                f"{label}: its field was made for the faces without modifiers: make it again for those that are seen"
-            )
         may_change_field = is_edited or any(each.type == "NODES" for each in modifiers)
         if not has_same_faces or (holder == original and may_change_field):
-            field = self._copied_field(mesh, owner, undeformed if has_same_faces else surface)
+            field = self._copied_field(mesh, owner, surface, undeformed if has_same_faces else None)
             return surface, field, tone, values
         if values is None and holder != original:  # values that RoSy has computed
             values = look_inputs.read_color_values(holder, request.color_attribute, label, cache)
@@ -340,26 +336,32 @@ class SceneReader:
         )
         return surface, field, tone, values
 
-    def _copied_field(self, mesh: Mesh, owner: Object, surface: Surface) -> RosyField:
+    def _copied_field(
+        self, mesh: Mesh, owner: Object, surface: Surface, undeformed: Surface | None
+    ) -> RosyField:
         """Return the field of an evaluated mesh, whose attributes modifiers or edit mode have copied.
 
-        Modifiers copy the vector of a face to all of its parts, so vectors are projected to `surface`.
+        `surface` is that of the mesh. `undeformed` has its faces in the shape of the field, or is None: then
+        modifiers have copied the vector of a face to all of its parts, vectors are projected, and a note says so.
         """
         original = owner.data
         name, degree = attribute_name(original), field_degree(original)
         names = [name] if name in original.attributes else direction_names(original)
         if not all(each in mesh.attributes for each in names):
             raise lost_field_error(owner, name)
-        if (
-            name in names
-            and mesh.attributes[name].data_type == ANGLE_TYPE
-            and owner.name_full in self.notes
-        ):
+        is_angle = name in names and mesh.attributes[name].data_type == ANGLE_TYPE
+        has_other_faces = undeformed is None or (original.is_editmode and user_modifiers(owner))
+        if is_angle and has_other_faces:
             problem = "modifiers do not keep a field that is stored as angles"
             raise RosyError(f"{surface.name}: {problem}: make the field again")
-        nonfinite, cache = self._request.nonfinite, self.cache
-        policy = {"nonfinite": nonfinite, "off_surface": "project"}
-        return read_mesh_field(mesh, name, degree, surface, **policy, cache=cache)
+        policy = {"nonfinite": self._request.nonfinite, "off_surface": "project"}
+        shape = undeformed or surface
+        field = read_mesh_field(mesh, name, degree, shape, **policy, cache=self.cache)
+        if undeformed is None:
+            problem = "its field was made for the faces without modifiers"
+            note = f"{surface.name}: {problem}: make it again for those that are seen"
+            self.notes[owner.name_full] = note
+        return field
 
     def _with_rest(self, surface: Surface, rest: np.ndarray | None) -> Surface:
         """Return a surface with rest positions.

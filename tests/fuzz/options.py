@@ -32,7 +32,7 @@ CANDIDATES = (
 )
 
 #: Largest values of options that would take minutes.
-LIMITS = {"pictures": 4, "workers": 4, "dpi": 80, "columns": 4}
+LIMITS = {"pictures": 4, "workers": 4, "dpi": 80, "columns": 4, "width": 30}
 
 
 def random_options(

@@ -5,14 +5,16 @@ import pytest
 from field_helpers import angle_differences
 from shapes import cylinder, globe, icosphere, plane, rebuilt, torus
 
+from rosy_addon.field import singularity_changes
 from rosy_addon.field.convert import Conversion, convert
 from rosy_addon.field.frames import dot
 from rosy_addon.field.generate import GeneratorSettings, generate
-from rosy_addon.field.prescribed import change_singularities, prescribed_field
+from rosy_addon.field.prescribed import TurningError, change_singularities, prescribed_field
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.singularity_changes import (
     OUTSIDE,
+    cancel_pairs,
     cluster_singularities,
     move_index,
     opposite_pairs,
@@ -235,3 +237,19 @@ def test_a_singularity_leaves_over_a_border():
 )
 def test_moves_that_cannot_be_are_refused(field, source, target, index, message, error_of):
     assert message in error_of(move_index, BALL, field, source, target, index)
+
+
+def test_attempts_to_cancel_are_few(monkeypatch):
+    """Even if no pair can be cancelled, each attempt leaves out twice as many as the one before."""
+    surface, calls = icosphere(3), []
+    angle = np.random.default_rng(1).uniform(0, np.pi, (surface.face_count, 1))
+    x, y = surface.face_frames
+    field = RosyField(2, np.cos(angle) * x + np.sin(angle) * y)
+
+    def fail(_surface, _field, vertex, *_):
+        calls.append(len(vertex))
+        raise TurningError(vertex[:1], "too large")
+
+    monkeypatch.setattr(singularity_changes, "change_singularities", fail)
+    assert cancel_pairs(surface, field, 10.0) is field
+    assert calls[0] > 100 and len(calls) <= np.log2(calls[0]) + 1, calls

@@ -19,7 +19,6 @@ from ..line_drawing.polyline_files import check_drawing_suffix, polyline_file
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen, svg_text
 from ..projection.camera import Camera, check_size, orbit_camera
-from ..rendering.mesh_view import check_light
 from .pictures import DEFAULT_SIZE, DEFAULT_VIEW, upright_instance
 
 
@@ -162,7 +161,6 @@ def strokes(
     True
     """
     stroke_style = StrokeStyle().with_settings(style)
-    check_light(stroke_style.light, surface.name)
     pen = Pen(width, tuple(colors), None if plotter else paper, millimeters, plotter)
     instance = upright_instance(surface, field)
     points, frame = instance.face_points(), (*view, *check_size(*size))

@@ -30,7 +30,7 @@ from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 from ..rendering import turntable as turntable_video
 from ..rendering.draw import draw_picture
-from ..rendering.mesh_view import check_light, mesh_instance
+from ..rendering.mesh_view import mesh_instance
 from ..rendering.turntable import Encoder
 from ..rendering.view_input import ViewInput
 from .generators import form, uv_map
@@ -298,13 +298,12 @@ def picture_look(
     Raises
     ------
     RosyError
-        If a setting is invalid, more than one tone source is given, or the look uses the lights of a scene.
+        If a setting is invalid, or more than one tone source is given.
     """
     look = preset_look(preset)
     if look.supersampling == Look().supersampling:
         look = replace(look, supersampling=SUPERSAMPLING)
     look = look.with_settings(dict(settings))
-    check_light(look.light, name)
     tones = [tone for key, tone in TONE_SOURCES.items() if sources.get(key) is not None]
     if len(tones) > 1:
         raise RosyError(f"{name}: choose one source of the tone, {' or '.join(tones)}")

@@ -19,7 +19,6 @@ from ..line_drawing.polyline_files import check_drawing_suffix
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen
 from ..projection.camera import check_size
-from ..rendering.mesh_view import check_light
 from ..worker.frame_workers import parse_frames
 from .mesh_field import JOIN_TEXT, add_field_options, load_mesh_and_field
 from .options import Options, add_subcommand, float_between
@@ -71,7 +70,7 @@ def run_strokes(options: Options) -> None:
     if check_drawing_suffix(options.output) != ".svg":
         options.check_only_for(PICTURES, options.output)
     # Errors in the options are reported before files are read.
-    style = StrokeStyle().with_settings(options.requested_settings())
+    StrokeStyle().with_settings(options.requested_settings())
     if options.mesh is None and "bpy" not in sys.modules:
         raise RosyError("no input: give a mesh file, or SCENE.blend")
     if options.mesh is None or options.mesh.suffix.lower() == ".blend":
@@ -80,7 +79,6 @@ def run_strokes(options: Options) -> None:
         return
     options.check_only_for(SCENES, options.mesh)
     pen = pen_of(options, Pen())
-    check_light(style.light, str(options.mesh))
     size = check_size(*(options.size or DEFAULT_SIZE))
     arguments = {"view": options.view, "size": size, "orthographic": bool(options.orthographic)}
     arguments |= {name: getattr(pen, name) for name in PEN_ARGUMENTS}

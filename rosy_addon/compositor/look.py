@@ -363,12 +363,13 @@ class Look:
         0.7, "Strength of the diffuse shading in the picture", **_shading("light")
     )
     light: str = choice(
-        "headlight",
+        "scene",
         "Light source of the shading",
         {
             "headlight": "A light at the camera",
             "lamp": "A lamp above and to the left of the camera",
-            "scene": "The lights of the scene",
+            "scene": "The lights of the scene, with their shadows. If there are none, the lamp for ink, and the "
+            "headlight for soft streaks",
         },
         label="Light Source",
         panel_label="Source",
@@ -376,8 +377,8 @@ class Look:
     )
     shadows: bool = switch(
         False,
-        "Cast shadows. The headlight casts none",
-        **_shading("light", lambda look: _is_lit(look) and look.light != "headlight"),
+        "Cast shadows of the lamp. Lights of the scene cast theirs, and the headlight casts none",
+        **_shading("light", lambda look: _is_lit(look) and look.light == "lamp"),
     )
     tone: str = choice(
         "light",

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from ..core.cache import Cache, cached
+from ..core.color import LUMINANCE_WEIGHTS
 from ..field.frames import dot, normalize
-from ..projection.gbuffer import GBuffer
+from ..projection.gbuffer import GBuffer, MeshInstance, with_field
 from ..projection.shadow_maps import light_cameras, shadow_visibility
 from .look import Look
 
@@ -30,12 +31,20 @@ class Light:
     strength : float
         Radiance of a white diffuse surface that faces the light; 1 is white. If the light is a point light,
         the surface is at a distance of one Blender unit.
+    has_shadow : bool
+        Whether it casts shadows, where shadows are drawn.
     """
 
     kind: str
     vector: np.ndarray
     color: np.ndarray
     strength: float
+    has_shadow: bool = True
+
+    @property
+    def luminance(self) -> float:
+        """The luminance of the color."""
+        return float(LUMINANCE_WEIGHTS @ self.color)
 
     def transformed(self, matrix: np.ndarray) -> Light:
         """Return the light in another space. `matrix` is the (4, 4) rigid transform to that space."""
@@ -67,6 +76,9 @@ class Light:
         return self.strength * np.maximum(dot(normal, normalize(to_light)), 0) / distance_squared
 
 
+#: Most triangles on which lights are metered; of more, every second, third and so on is used.
+METERED_TRIANGLES = 20_000
+
 #: The light of a look whose `light` is "lamp": a sun over the left shoulder of the viewer.
 KEY_LIGHT = Light("sun", np.array([-0.50, 0.60, 0.62]) / 0.9975, np.ones(3), 1.0)
 
@@ -74,10 +86,63 @@ KEY_LIGHT = Light("sun", np.array([-0.50, 0.60, 0.62]) / 0.9975, np.ones(3), 1.0
 def lights_of(look: Any, lights: Sequence[Light]) -> Sequence[Light]:
     """Return the lights that a look or a style of strokes uses.
 
-    They depend on the setting `light`: `KEY_LIGHT` for "lamp", the given lights of the scene for "scene", and
-    none for "headlight", which needs no `Light`.
+    They depend on the `light_source`: `KEY_LIGHT` for "lamp", the given lights of the scene for "scene", and none
+    for "headlight", which needs no `Light`.
     """
-    return {"lamp": (KEY_LIGHT,), "scene": lights}.get(look.light, ())
+    return {"lamp": (KEY_LIGHT,), "scene": lights}.get(light_source(look, lights), ())
+
+
+def light_source(look: Any, lights: Sequence[Light]) -> str:
+    """Return the light of a look or a style of strokes, given the lights of the scene.
+
+    If the setting `light` is "scene", but there are no lights, soft streaks have the headlight, and ink the lamp.
+    """
+    if look.light != "scene" or lights:
+        return look.light
+    return "headlight" if getattr(look, "ink", "") == "soft" else "lamp"
+
+
+def casts_shadows(look: Look, lights: Sequence[Light]) -> bool:
+    """Return whether a look draws cast shadows, given the lights of the scene."""
+    return look.shadows or (look.light == "scene" and any(light.has_shadow for light in lights))
+
+
+def metered(
+    lights: Sequence[Light], instances: Sequence[MeshInstance], exposure: float = 0.0
+) -> tuple[Light, ...]:
+    """Return lights scaled so that the brightest tenth of the lit surface is white.
+
+    Shadows are ignored, and so is the camera: the result is the same for all views.
+
+    Parameters
+    ----------
+    lights : sequence of Light
+        In world space.
+    instances : sequence of MeshInstance
+        The surface is that of the instances with a field.
+    exposure : float
+        Further scale, in stops: 1 doubles the light.
+    """
+    if not lights:
+        return ()
+    meshes = with_field(instances)
+    step = sum(len(mesh.surface.triangles) for mesh in meshes) // METERED_TRIANGLES + 1
+    irradiance, area = [np.zeros(0)], [np.zeros(0)]
+    for mesh in meshes:
+        corners = mesh.to_world(mesh.surface.vertices[mesh.surface.triangle_vertex[::step]])
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        area.append(np.linalg.norm(normal, axis=1))
+        position, normal = corners.mean(axis=1), normalize(normal)
+        irradiance.append(
+            sum(light.luminance * light.irradiance(position, normal) for light in lights)
+        )
+    value, weight = np.concatenate(irradiance), np.concatenate(area)
+    order = np.argsort(value)[np.sort(value) > 0]
+    if not len(order):
+        return tuple(lights)
+    covered = np.cumsum(weight[order])
+    white = value[order[np.searchsorted(covered, 0.9 * covered[-1])]]
+    return tuple(replace(light, strength=light.strength * 2**exposure / white) for light in lights)
 
 
 def diffuse(
@@ -106,7 +171,7 @@ def diffuse(
     """
     if look.shading == 0:
         return np.ones((len(gbuffer.pixel), 3), dtype=np.float32)
-    if look.light == "headlight":
+    if light_source(look, lights) == "headlight":
         cosine = np.maximum(dot(gbuffer.normal, gbuffer.view_direction), 0)
         light = np.repeat(cosine[:, None], 3, axis=1)
     else:
@@ -139,10 +204,13 @@ def light_visibility(
     list of (P,) float32 ndarray
         One array for each light from `lights_of`. The list is empty if there are no shadows.
     """
-    if look.shading == 0 or not look.shadows:
+    if look.shading == 0 or not casts_shadows(look, lights):
         return []
     visibility = []
     for light in lights_of(look, lights):
+        if not light.has_shadow:
+            visibility.append(np.ones(len(gbuffer.pixel), dtype=np.float32))
+            continue
         vector = np.asarray(light.vector, dtype=np.float64)
         cameras = light_cameras(gbuffer.instances, gbuffer.camera, light.kind, vector)
         compute = functools.partial(shadow_visibility, gbuffer, cameras)

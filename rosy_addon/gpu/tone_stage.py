@@ -9,7 +9,7 @@ import numpy as np
 from ..compositor.color_values import value_scale
 from ..compositor.look import colors_values
 from ..projection.shadow_maps import light_cameras
-from .defines import HEADLIGHT, SUN_LIGHT, TONE_SOURCES
+from .defines import SUN_LIGHT, TONE_SOURCES
 from .frame import Box, Frame, is_empty, union_box
 from .passes import ComputePass, RasterPass
 from .uniforms import light_uniforms, light_view_uniforms, shadow_uniforms, tone_uniforms
@@ -60,15 +60,14 @@ def _lighting(frame: Frame) -> Any:
     images = [frame.image(f"lighting {index}") for index in range(2)]
     lights = [] if is_empty(box) else light_uniforms(frame.look, frame.view.lights)
     for index, light in enumerate(lights):
-        is_shadowed = frame.look.shadows and light["light_kind"] != HEADLIGHT
         textures = {
             "shadow_visibility": _shadow_visibility(frame, light, box)
-            if is_shadowed
+            if light["is_shadowed"]
             else frame.textures["normals"],
             "previous_lighting": images[1],
             "lighting": images[0],
         }
-        uniforms = {**light, "is_shadowed": int(is_shadowed), "is_first": int(index == 0)}
+        uniforms = {**light, "is_first": int(index == 0)}
         frame.run(ComputePass("lighting"), box, textures, uniforms)
         images.reverse()
     return images[1]

@@ -29,7 +29,7 @@ from ..compositor.look import (
 )
 from ..compositor.look_units import PixelLook, instance_line_spacing
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, PAPER_GRAIN_STRENGTH, line_offset
-from ..compositor.shading import Light, lights_of
+from ..compositor.shading import Light, casts_shadows, light_source, lights_of
 from ..compositor.surface_noise import FEATURE_CELLS, LATTICE_SCALE, SUBPIXEL_OFFSETS, lattice_axes
 from ..compositor.target_tone import ReferenceRender, tone_curve
 from ..compositor.wobble import MEAN_WAVELENGTH_WIDTHS, WOBBLE_STD, has_wobble
@@ -147,14 +147,16 @@ def light_uniforms(look: Look, lights: Sequence[Light]) -> list[dict[str, Any]]:
 
     `lights` are in camera space.
     """
-    headlight = {"light_kind": defines.HEADLIGHT, "light_vector": (0.0,) * 4}
-    if look.light == "headlight":
+    headlight = {"light_kind": defines.HEADLIGHT, "light_vector": (0.0,) * 4, "is_shadowed": 0}
+    has_shadows = casts_shadows(look, lights)
+    if light_source(look, lights) == "headlight":
         return [{**headlight, "light_color": (1.0,) * 4}]
     result = [
         {
             "light_kind": defines.SUN_LIGHT if light.kind == "sun" else defines.POINT_LIGHT,
             "light_vector": (*np.asarray(light.vector, dtype=float), 0.0),
             "light_color": (*np.asarray(light.color) * light.strength, 1.0),
+            "is_shadowed": int(has_shadows and light.has_shadow),
         }
         for light in lights_of(look, lights)
     ]

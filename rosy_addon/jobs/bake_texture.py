@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
 from bpy.types import Image, Object, Scene
 
 from ..core.errors import RosyError
@@ -78,7 +77,7 @@ def bake_texture(scene: Scene, objects: Sequence[Object]) -> Steps[list[TextureR
     depsgraph = scene_depsgraph(scene)
     lights = None
     if bakes_light(scene.rosy, look):
-        lights = read_lights(depsgraph, np.eye(4))  # in world space
+        lights = read_lights(depsgraph)  # in world space
         if not lights:
             raise RosyError(f"scene '{scene.name}' has no lights: add one, or turn Bake Light off")
     drift = drift_in_scene(scene, look, scene.frame_current_final)

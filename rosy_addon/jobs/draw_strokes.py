@@ -21,7 +21,7 @@ from ..projection.gbuffer import MeshInstance
 from ..scene.cameras import CameraSource, render_camera, render_size, resolve_camera
 from ..scene.files import absolute_path
 from ..scene.look_inputs import ReadRequest, nonfinite_policy
-from ..scene.read_view import read_lights, scene_depsgraph
+from ..scene.read_view import lights_for, scene_depsgraph
 from ..scene.scene_reader import SceneData, read_scene
 from ..scene.stroke_objects import read_pen, read_stroke_style, store_strokes
 from ..worker.job import Call, Step, Steps, job
@@ -123,7 +123,8 @@ def draw_strokes(
     BAKE_CACHE.evict_over_limit()
     is_following = kind == "CURVES" and settings.follow
     followed = _followed_instance(scene_data) if is_following else None
-    lights = lights_of(style, read_lights(depsgraph, view.view))
+    lights = lights_for(scene, depsgraph, style, scene_data.instances)
+    lights = lights_of(style, [light.transformed(view.view) for light in lights])
     inputs = StrokeInput(scene_data.instances, view, style, pen, lights)
     if kind == "FILE":
         drawing, contents = yield Call(drawing_file, (suffix, inputs))

@@ -51,7 +51,7 @@ class StrokeStyle:
             "none": "Even strokes, without a light",
             "headlight": "A light at the camera",
             "lamp": "A lamp above and to the left of the camera",
-            "scene": "The lights of the scene",
+            "scene": "The lights of the scene. If there are none, the lamp",
         },
         panel="density",
     )

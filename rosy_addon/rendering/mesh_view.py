@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.errors import RosyError
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..field.up_axis import UP_AXIS_MATRIX
@@ -32,24 +31,3 @@ def mesh_instance(
         Values for the color map, at the C corners of the mesh.
     """
     return MeshInstance(surface, UP_AXIS_MATRIX[surface.up], field, tone, color_values)
-
-
-def check_light(light: str, name: str) -> None:
-    """Check that a look or style does not ask for the lights of a scene, for a mesh that is not in one.
-
-    Parameters
-    ----------
-    light : str
-        `Look.light` or `StrokeStyle.light`.
-    name : str
-        Name of the mesh in the message.
-
-    Raises
-    ------
-    RosyError
-        If the light is "scene".
-    """
-    if light == "scene":
-        raise RosyError(
-            f"{name}: has no lights, because it is not in a scene: choose the light 'headlight' or 'lamp'"
-        )

@@ -7,12 +7,10 @@ import numpy as np
 from bpy.types import Material, Object, PropertyGroup, Scene
 from mathutils import Matrix
 
-from ..compositor.look import is_hatched
-from ..core.color import from_hex, to_linear
 from ..projection.camera import Camera
 from .cameras import FRAME_CAMERAS, camera_of_object
 from .datablocks import Track, delete_owned, rollback_on_error
-from .look_properties import read_look
+from .look_properties import backdrop_color, read_look
 from .node_builder import new_emissive_material
 from .picture_nodes import shown_materials
 from .read_view import scene_depsgraph
@@ -129,23 +127,22 @@ OVERSIZE = 1.5
 def update_backdrops(scene: Scene) -> None:
     """Replace the backdrops of a scene by the ones that its settings ask for.
 
-    If backdrops are switched on and the look is hatching (lines of ink on paper), a backdrop in the color of
-    the paper is added for each of `pictured_cameras`.
+    They have the color of `backdrop_color`, and there is one for each of `pictured_cameras`.
     """
     remove_camera_planes(scene, BACKDROP_TAG)
-    look = read_look(scene.rosy)
-    if scene.rosy.backdrop and is_hatched(look):
+    paper = backdrop_color(scene, read_look(scene.rosy))
+    if paper is not None:
         for camera in pictured_cameras(scene):
-            _add_backdrop(scene, camera, look.paper_color)
+            _add_backdrop(scene, camera, paper)
 
 
-def _add_backdrop(scene: Scene, camera: Object, paper: str) -> None:
-    """Add a plane with the color of the paper, given as a hex color, parented to a camera."""
+def _add_backdrop(scene: Scene, camera: Object, paper: np.ndarray) -> None:
+    """Add a plane in a linear RGB color, parented to a camera."""
     name = f"RoSy Backdrop {camera.name}"
     view = camera_of_object(scene, scene_depsgraph(scene), camera)
     corners = frame_corners(view, DISTANCE * camera.data.clip_end, OVERSIZE)
     with rollback_on_error() as track:
-        color = (*to_linear(from_hex(paper)).tolist(), 1.0)
+        color = (*paper.tolist(), 1.0)
         material = track(new_emissive_material(name, color, scene.rosy.emission))
         material.diffuse_color = color  # in views with Solid shading
         material.use_backface_culling = True

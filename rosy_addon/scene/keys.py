@@ -14,9 +14,8 @@ from ..annotation.draw_key import DARK_PLATES, LIGHT_PLATES, KeyColors, draw_key
 from ..annotation.key_contents import PictureKey
 from ..annotation.key_layout import KeyParts, lay_out_key
 from ..annotation.round_numbers import format_number, round_below
-from ..compositor.look import is_hatched
 from ..compositor.picture import Picture
-from ..core.color import LUMINANCE_WEIGHTS, from_hex, to_linear
+from ..core.color import LUMINANCE_WEIGHTS
 from ..core.errors import RosyError
 from ..projection.camera import Camera
 from ..rendering.picture_images import picture_image
@@ -24,7 +23,7 @@ from . import camera_planes
 from .blender_images import new_image
 from .cameras import camera_of_object
 from .datablocks import KEY_TAG, rollback_on_error
-from .look_properties import read_look
+from .look_properties import backdrop_color, read_look
 from .meshes import read_collection, vertex_positions
 from .node_builder import first_node, new_empty_material
 from .read_view import scene_depsgraph
@@ -181,13 +180,9 @@ def round_length(largest: float, units: UnitSettings) -> tuple[float, str]:
 
 def _key_colors(scene: Scene) -> KeyColors:
     """Return the colors of a key: dark panels if the background is known to be dark, light ones otherwise."""
-    look = read_look(scene.rosy)
-    if scene.rosy.backdrop and is_hatched(look):
-        background = to_linear(from_hex(look.paper_color))
-    elif scene.render.film_transparent:
-        return LIGHT_PLATES
-    else:
-        background = _world_color(scene.world)
+    background = backdrop_color(scene, read_look(scene.rosy))
+    if background is None:
+        background = None if scene.render.film_transparent else _world_color(scene.world)
     is_dark = background is not None and background @ LUMINANCE_WEIGHTS < DARK_BACKGROUND
     return DARK_PLATES if is_dark else LIGHT_PLATES
 

@@ -7,10 +7,11 @@ from dataclasses import replace
 from typing import Any
 
 import bpy
+import numpy as np
 
 from ..compositor.flow import Drift, drift_at
-from ..compositor.look import Look, is_hatched
-from ..core.color import alpha_from_hex, from_hex, to_hex
+from ..compositor.look import Look, has_clear_paper, is_hatched
+from ..core.color import alpha_from_hex, from_hex, to_hex, to_linear
 from ..core.settings import Color, Number, Numbers, Setting, settings_of
 
 
@@ -26,6 +27,14 @@ def read_look(settings: Any) -> Look:
     if getattr(settings, "over_material", False) and is_hatched(look):
         return replace(look, paper_color=to_hex((*from_hex(look.paper_color), 0.0)))
     return look
+
+
+def backdrop_color(scene: bpy.types.Scene, look: Look) -> np.ndarray | None:
+    """Return the linear RGB color of the paper behind all objects of a scene; None if there is no backdrop."""
+    is_opaque = is_hatched(look) and not has_clear_paper(look)
+    if not (scene.rosy.backdrop and is_opaque) or scene.render.film_transparent:
+        return None
+    return to_linear(from_hex(look.paper_color))
 
 
 def apply_look(settings: Any, look: Look) -> None:

@@ -173,9 +173,10 @@ class SceneState:
         settings = applied_settings(look, self._lacks_tone)
         output = _used_output(scene.rosy, OUTPUT_PROPERTIES) | {"relight": is_relit}
         output["over_material"] &= is_hatched(look)
+        output["exposure"] = scene.rosy.exposure if self._lights else 0.0
         if is_frame:
             del output["placement"]  # frames always fill the frame of the camera
-        occluders = self._used_occluders(camera, settings["shadows"])
+        occluders = self._used_occluders(camera, settings["shadows"] or bool(self._lights))
         has_reference = settings["tone"] == "picture"
         return PictureState(
             look=settings,
@@ -228,7 +229,7 @@ class SceneState:
 def _light_digests(depsgraph: Depsgraph) -> dict[str, list[str]]:
     """Return the digests of the visible lights of a scene, by the names of their objects."""
     lights: dict[str, list[str]] = {}
-    for light, owner in rendered_lights(depsgraph, np.eye(4)):
+    for light, owner in rendered_lights(depsgraph):
         lights.setdefault(owner.name_full, []).append(digest(*vars(light).values()))
     return {name: sorted(digests) for name, digests in lights.items()}
 

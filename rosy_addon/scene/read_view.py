@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import bpy
 import numpy as np
 from bpy.types import Depsgraph, Object, Scene
 
 from ..compositor.look import Look
-from ..compositor.shading import Light
+from ..compositor.shading import Light, metered
 from ..core.cache import BAKE_CACHE, Cache
 from ..core.errors import RosyError
 from ..projection.gbuffer import MeshInstance
@@ -77,24 +78,24 @@ def read_views(
         reference = load_reference(scene, depsgraph, render_camera(scene))
     instances = tuple(scene_data.instances)
     drift = drift_in_scene(scene, look, scene.frame_current_final)
-    views = []
+    lights, views = lights_for(scene, depsgraph, look, instances), []
     for camera in resolved_cameras:
-        lights = read_lights(depsgraph, camera.view) if look.light == "scene" else ()
-        views.append(ViewInput(instances, camera, look, tuple(lights), reference, drift=drift))
+        in_view = tuple(light.transformed(camera.view) for light in lights)
+        views.append(ViewInput(instances, camera, look, in_view, reference, drift=drift))
     return tuple(views), scene_data
 
 
 def read_turntable(
     scene: Scene, depsgraph: Depsgraph, obj: Object, look: Look
-) -> tuple[MeshInstance, list[Light]]:
+) -> tuple[MeshInstance, tuple[Light, ...]]:
     """Read one object and the lights of the scene, for views of the object from all sides.
 
     Returns
     -------
     instance : MeshInstance
         The object's mesh with its field, in world space.
-    lights : list of Light
-        In world space. Empty if the look does not use the lights of the scene.
+    lights : tuple of Light
+        See `lights_for`.
 
     Raises
     ------
@@ -102,8 +103,7 @@ def read_turntable(
         See `read_scene`.
     """
     scene_data = read_scene(depsgraph, [obj], read_request(scene, look))
-    lights = read_lights(depsgraph, np.eye(4)) if look.light == "scene" else []
-    return scene_data.instances[0], lights
+    return scene_data.instances[0], lights_for(scene, depsgraph, look, scene_data.instances)
 
 
 def scene_depsgraph(scene: Scene) -> Depsgraph:
@@ -118,8 +118,19 @@ def scene_depsgraph(scene: Scene) -> Depsgraph:
         return context.evaluated_depsgraph_get()
 
 
-def read_lights(depsgraph: Depsgraph, view_matrix: np.ndarray) -> list[Light]:
-    """Return all lights that are visible in renders, including instances, in camera space.
+def lights_for(
+    scene: Scene, depsgraph: Depsgraph, look: Any, instances: Sequence[MeshInstance]
+) -> tuple[Light, ...]:
+    """Return the lights of a scene in world space, metered on mesh instances; none if a look does not use them.
+
+    `look` is a `Look` or a `StrokeStyle`. See `metered`.
+    """
+    lights = read_lights(depsgraph) if look.light == "scene" else ()
+    return metered(lights, instances, scene.rosy.exposure)
+
+
+def read_lights(depsgraph: Depsgraph) -> list[Light]:
+    """Return all lights that are visible in renders, including instances, in world space.
 
     A white diffuse surface that faces a sun with a strength of pi W/m2 has a radiance of 1. At the distance r
     from a point light of power P, it has a radiance of P / (4 pi^2 r^2). Spots and area lights are treated as
@@ -129,38 +140,37 @@ def read_lights(depsgraph: Depsgraph, view_matrix: np.ndarray) -> list[Light]:
     Parameters
     ----------
     depsgraph : bpy.types.Depsgraph
-    view_matrix : (4, 4) ndarray
-        Transforms world space to camera space.
 
     Returns
     -------
     list of Light
     """
-    return [light for light, _ in rendered_lights(depsgraph, view_matrix)]
+    return [light for light, _ in rendered_lights(depsgraph)]
 
 
-def rendered_lights(depsgraph: Depsgraph, view_matrix: np.ndarray) -> list[tuple[Light, Object]]:
+def rendered_lights(depsgraph: Depsgraph) -> list[tuple[Light, Object]]:
     """Return the lights of `read_lights`, each with its original object."""
     lights = []
     for instance in depsgraph.object_instances:
         obj = instance.object
         if obj.type == "LIGHT" and not obj.original.hide_render and instance.show_self:
-            matrix = view_matrix @ np.array(instance.matrix_world)
+            matrix = np.array(instance.matrix_world)
             lights.append((_convert_light(obj.data, matrix), obj.original))
     return lights
 
 
 def _convert_light(data: bpy.types.Light, matrix: np.ndarray) -> Light:
-    """Convert a light of Blender to a `Light`. `matrix` transforms its local space to camera space."""
+    """Convert a light of Blender to a `Light`. `matrix` transforms its local space to world space."""
     has_temperature = getattr(data, "use_temperature", False)
     temperature_color = data.temperature_color if has_temperature else np.ones(3)
     color = np.array(data.color) * np.array(temperature_color)
     energy = data.energy * 2.0 ** getattr(data, "exposure", 0.0)
     if data.type == "SUN":
         direction = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
-        return Light("sun", direction, color, energy / np.pi)
+        return Light("sun", direction, color, energy / np.pi, data.use_shadow)
     axial_gain = 4.0 if data.type == "AREA" else 1.0
-    return Light("point", matrix[:3, 3].copy(), color, axial_gain * energy / (4 * np.pi**2))
+    strength = axial_gain * energy / (4 * np.pi**2)
+    return Light("point", matrix[:3, 3].copy(), color, strength, data.use_shadow)
 
 
 def read_texture_input(

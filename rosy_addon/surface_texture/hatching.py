@@ -29,7 +29,6 @@ from ..compositor.streak_statistics import look_streak_statistics
 from ..compositor.target_tone import apply_tone_curve
 from ..compositor.undirected import undirected_texture
 from ..compositor.wobble import WOBBLE_STD, has_wobble, rotate_pixel_field, solid_wobble_angle
-from ..core.color import LUMINANCE_WEIGHTS
 from ..core.progress import progress
 from ..projection.pixel_blocks import reported_blocks
 from ..projection.rest_coordinates import matrix_scale, rest_positions
@@ -130,10 +129,7 @@ def lit_ink(
         triangle, weights = on.texels.triangle[block], on.texels.barycentric[block]
         position = on.mesh.points_at(triangle, weights)
         normal = on.mesh.shading_normals_at(triangle, weights)
-        irradiance = sum(
-            light.irradiance(position, normal) * float(light.color @ LUMINANCE_WEIGHTS)
-            for light in lights
-        )
+        irradiance = sum(light.irradiance(position, normal) * light.luminance for light in lights)
         light = 1 - look.shading + look.shading * irradiance
         tone = np.minimum(apply_tone_curve(light, look), 1)
         color, coverage = ink_of_thresholds(pixels[block], tone, look, on.mesh.family_count)

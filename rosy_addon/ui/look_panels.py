@@ -137,6 +137,9 @@ def _make_settings_panel(
             _draw_setting(part, settings.look, setting)
             if name == "hue" and settings.look.hue == "values":
                 _draw_name(column.row(), settings, "color_attribute", _active_mesh_object(context))
+            if name == "light":
+                row = sidebar.new_row(column, active=settings.look.light == "scene")
+                row.prop(settings, "exposure")
             if name == "tone":
                 _draw_tone_source(column, context)
         unused = _unused_output(settings)

@@ -286,7 +286,9 @@ class RosyScene(bpy.types.PropertyGroup):
     )
     backdrop: toggle(
         "Backdrop",
-        "Fill the background of cameras that have pictures with the paper of the hatching",
+        "Fill the background of cameras that have pictures with the paper of the hatching, unless the paper or "
+        "the background of renders is transparent",
+        default=True,
         update=_show_backdrops,
     )
     key: toggle(
@@ -335,6 +337,15 @@ class RosyScene(bpy.types.PropertyGroup):
     undefined: toggle(
         "Skip Bad Vectors",
         "Treat vectors that are not finite as undefined, instead of reporting an error",
+    )
+    exposure: real(
+        "Exposure",
+        "Brightness of the lights of the scene in stops: 1 doubles it. At 0, the brightest tenth of the lit "
+        "surface is white",
+        min=-10,
+        max=10,
+        soft_min=-3,
+        soft_max=3,
     )
     color_attribute: text(
         "Attribute",

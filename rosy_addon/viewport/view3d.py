@@ -6,13 +6,13 @@ import bpy
 import numpy as np
 from bpy.types import Area, Context, Depsgraph, Object, RegionView3D, SpaceView3D
 
-from ..compositor.look import Look, is_hatched
-from ..core.color import from_hex, to_linear
+from ..compositor.look import Look
 from ..core.errors import RosyError
 from ..projection.camera import Camera
 from ..rendering.view_input import Background
 from ..scene.camera_planes import frame_corners
 from ..scene.cameras import camera_of_object
+from ..scene.look_properties import backdrop_color
 
 #: A clip plane (x, y, z, w) that cuts nothing away.
 _NO_CLIP_PLANE = 0.0, 0.0, 0.0, 1.0
@@ -97,8 +97,8 @@ def clip_planes(region_3d: RegionView3D) -> np.ndarray | None:
 def view_background(context: Context, camera: Camera, look: Look) -> Background | None:
     """Return the background of a view in the color of the paper.
 
-    Return None if the backdrop is switched off in the scene, or the look has no paper. In a camera view, the
-    background fills only the frame of the camera.
+    Return None if there is no backdrop; see `backdrop_color`. In a camera view, the background fills only the
+    frame of the camera.
 
     Parameters
     ----------
@@ -108,9 +108,10 @@ def view_background(context: Context, camera: Camera, look: Look) -> Background 
         Camera of the view.
     look : Look
     """
-    if not context.scene.rosy.backdrop or not is_hatched(look):
+    paper = backdrop_color(context.scene, look)
+    if paper is None:
         return None
-    color = tuple(to_linear(from_hex(look.paper_color)).tolist())
+    color = tuple(paper.tolist())
     if context.region_data.view_perspective != "CAMERA":
         return Background(color)
     space = context.space_data

@@ -64,6 +64,7 @@ def test_text_is_read_without_a_trace(scene):
 @pytest.mark.parametrize(("kind", "update"), [("key", update_keys), ("backdrop", update_backdrops)])
 def test_the_switch_shows_and_hides_the_plane(colored, kind, update):
     before = contents()
+    setattr(colored.rosy, kind, False)
     bake(colored)
     baked = contents()
     assert not planes(kind)
@@ -205,9 +206,25 @@ def test_renders_show_the_image_in_the_frame(colored, tmp_path, kind):
 # --- backdrops -----------------------------------------------------------------------------------
 
 
-def test_without_paper_there_is_none(colored):
-    apply_look(colored.rosy, Look())
-    colored.rosy.backdrop = True
+def without_paper(scene):
+    apply_look(scene.rosy, Look())
+
+
+def clear_paper(scene):
+    apply_look(scene.rosy, LOOK.with_settings({"paper_color": "#ffffff00"}))
+
+
+def over_material(scene):
+    scene.rosy.over_material = True
+
+
+def transparent_renders(scene):
+    scene.render.film_transparent = True
+
+
+@pytest.mark.parametrize("change", [without_paper, clear_paper, over_material, transparent_renders])
+def test_what_shows_through_has_no_backdrop(colored, change):
+    change(colored)
     bake(colored)
     assert not planes("backdrop")
 
@@ -217,7 +234,6 @@ def test_renders_show_paper_all_over_the_background(colored, tmp_path, kind):
     data = colored.camera.data
     data.type, data.ortho_scale, data.shift_x, data.shift_y = kind, 6.0, 0.3, 0.1
     colored.camera.scale = (2.0, 0.5, 3.0)
-    colored.rosy.backdrop = True
     (result,) = bake(colored)
     rendered = render(colored, tmp_path / "render.exr")
     background = pixels(result.image)[..., 3] == 0

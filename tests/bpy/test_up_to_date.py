@@ -54,7 +54,7 @@ def build(tmp_path):
     add_plane("Behind", size=3.0).location = (0.0, 2.0, 0.0)
     add_plane("Aside", size=0.2).location = (30.0, -1.0, 0.0)
     add_light("Key", "POINT", 300.0, (2.0, -3.0, 3.0))
-    scene.rosy.directory = str(tmp_path)
+    scene.rosy.directory, scene.rosy.look.light = str(tmp_path), "headlight"
     bpy.context.view_layer.update()
     return scene
 
@@ -314,7 +314,9 @@ TABLE = {
     "occluder smooth": (shade_smooth("In Front"), None, ""),
     "occluder with shadows": (move("Behind", 0.0, -2.2, 0.0), shadows, "'Behind' was moved"),
     # lights
-    "lamp energy": (put("Key:data.energy", 900.0), scene_lights, "light 'Key' was changed"),
+    "lamp color": (put("Key:data.color", (1.0, 0.2, 0.2)), scene_lights, "light 'Key' was changed"),
+    "exposure": (put("rosy.exposure", -1.0), scene_lights, "the exposure was changed"),
+    "exposure with a headlight": (put("rosy.exposure", -1.0), None, ""),
     "lamp moved": (move("Key", -2.0, 0.0, 0.0), scene_lights, "light 'Key' was changed"),
     "lamp turned": (put("Key:rotation_euler", (1.0, 0.0, 0.0)), scene_lights, ""),
     "lamp renamed": (put("Key:name", "Lamp"), scene_lights, ""),
@@ -335,7 +337,11 @@ TABLE = {
     "tone picture": (write_reference(0.6), tone_picture, "the picture of the tone was changed"),
     "tone picture of the same name": (write_reference(0.3), tone_picture, ""),
     "lamp with tones": (put("Key:data.energy", 900.0), tone_and_lights, ""),
-    "lamp without a tone": (put("Key:data.energy", 9.0), tone_of_one_and_lights, "light 'Key'"),
+    "lamp without a tone": (
+        put("Key:data.color", (1.0, 0.2, 0.2)),
+        tone_of_one_and_lights,
+        "light 'Key'",
+    ),
     "tone image": (paint_tone, tone_image, "field of 'Plain' was changed"),
     # camera and output
     "camera moved": (move("Camera", 0.1, 0.0, 0.0), None, "camera 'Camera' was changed"),

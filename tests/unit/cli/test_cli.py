@@ -27,7 +27,6 @@ REFUSED = {
     "size 0": ("{render} --size 0x10", "size 0x10: a side must be"),
     "preset": ("{render} --preset none", "there is no preset 'none'"),
     "setting": ("{render} --set lenght=3", "unknown setting 'lenght'"),
-    "lights": ("{render} --set light=scene", "has no lights"),
     "still without flow": ("turntable {mesh} -o {out}.gif --still", "nothing moves"),
     "value": ("{render} --set length=long", "--set length=long: expected a whole"),
     "numbers": ("{render} --set color_range=0;1", "color_range=0;1: expected numbers with commas"),

@@ -10,7 +10,7 @@ from shapes import icosphere, moved, plane, torus
 
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.shading import Light, diffuse
+from rosy_addon.compositor.shading import Light, diffuse, metered
 from rosy_addon.core.color import map_colors, to_display, to_linear
 from rosy_addon.field.directional_field import field_from_directions, tensor_field
 from rosy_addon.field.frames import normalize
@@ -115,7 +115,29 @@ def test_lights_of_the_scene():
     across = np.hypot(gbuffer.position[:, 0], gbuffer.position[:, 1])
     expected = 4 / (4 + across**2) * 2 / np.sqrt(4 + across**2)
     assert np.allclose(lighting[:, 0], expected, atol=1e-4)
-    assert np.allclose(lighting[:, 1], expected / 2, atol=1e-4) and not diffuse(gbuffer, look).any()
+    assert np.allclose(lighting[:, 1], expected / 2, atol=1e-4)
+    # Without lights, soft streaks have the headlight, and ink the lamp.
+    for ink, light in (("soft", "headlight"), ("even", "lamp")):
+        tones = (
+            diffuse(gbuffer, plain(shading=1.0, light=each, ink=ink)) for each in ("scene", light)
+        )
+        np.testing.assert_array_equal(*tones)
+
+
+def test_metered_lights_make_the_brightest_tenth_white():
+    """On a ball in the light of a sun, the irradiance of the lit half is uniformly distributed."""
+    ball = icosphere(4)
+    instances = [MeshInstance(ball, np.eye(4), axis_field(ball, 1))]
+    suns = [
+        Light("sun", np.array([0.0, 0.0, 1.0]), np.full(3, 0.5), power) for power in (0.1, 400.0)
+    ]
+    for lights in (suns[:1], suns[1:], suns):
+        strength = sum(light.strength * 0.5 for light in metered(lights, instances))
+        np.testing.assert_allclose(strength * 0.9, 1.0, atol=0.01)
+    ratio = metered(suns, instances, 1.0)[1].strength / metered(suns, instances)[1].strength
+    np.testing.assert_allclose(ratio, 2.0)
+    away = Light("sun", np.array([0.0, 0.0, 1.0]), np.zeros(3), 1.0)
+    assert metered([away], instances) == (away,) and metered([], instances) == ()
 
 
 @pytest.mark.parametrize("ends", [(0.0, 1.0), (0.25, 0.75), (1.0, 0.0)], ids=str)

@@ -1,7 +1,5 @@
 """Fields of objects whose modifiers change the faces: made for the faces that are seen, and kept with the object."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 import pytest

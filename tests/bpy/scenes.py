@@ -1,7 +1,5 @@
 """Scenes: how they are opened, read and rendered, and what they hold."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Errors of input that cannot be drawn: one line that names it, and an unchanged file."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The list of pictures: which are compared with what, and when a scene is read again."""
 
-from __future__ import annotations
-
 from unittest.mock import Mock
 
 import bpy

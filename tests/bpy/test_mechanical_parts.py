@@ -1,7 +1,5 @@
 """Fields along the form of mechanical parts, made by Blender's booleans and bevels."""
 
-from __future__ import annotations
-
 from functools import reduce
 
 import bmesh

@@ -1,7 +1,5 @@
 """Whatever users do with objects that show pictures: Remove leaves nothing of RoSy's, and all of theirs."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Stroke objects of a scene: their data, what renders show, and that nothing else changes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import bpy

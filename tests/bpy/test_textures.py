@@ -1,7 +1,5 @@
 """Textures baked into UV maps: what they show, when they are up to date, and how they go."""
 
-from __future__ import annotations
-
 import json
 
 import bpy

@@ -1,7 +1,5 @@
 """Sources of tone in Blender: attributes, images, reference renders, shadows and occlusion; and colors of numbers."""
 
-from __future__ import annotations
-
 import os
 import tracemalloc
 

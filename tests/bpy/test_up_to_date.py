@@ -3,8 +3,6 @@
 A change either changes what the next bake gives, and the panel says so, or neither.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 

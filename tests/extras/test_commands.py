@@ -1,7 +1,5 @@
 """The commands of the Python package with files of simulations, and without the libraries."""
 
-from __future__ import annotations
-
 import gc
 import os
 import subprocess

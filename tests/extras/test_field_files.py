@@ -1,7 +1,5 @@
 """Fields that RoSy writes, read by the libraries that own the formats; and theirs, read by RoSy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import pyvista as pv

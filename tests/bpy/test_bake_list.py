@@ -56,7 +56,6 @@ def test_a_change_during_a_bake_counts(tmp_path):
     obj("Plain").location.x = 0.7
     for _ in stepping:
         pass
-    bpy.context.view_layer.update()
     assert list_bakes(scene)[0].stale_reason == "'Plain' was moved"
 
 

@@ -197,7 +197,6 @@ def test_an_override_shows_the_picture_of_its_library_again(tmp_path):
     scene.camera = add_camera()
     link(load(path, "Plain", link=True))
     override = obj("Plain").override_create(remap_local_usages=True)
-    bpy.context.view_layer.update()
     group = override.modifiers["RoSy"].node_group
     before = contents()
     assert not has_pictures(scene)

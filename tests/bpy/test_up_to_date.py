@@ -53,7 +53,6 @@ def build(tmp_path):
     add_plane("Aside", size=0.2).location = (30.0, -1.0, 0.0)
     add_light("Key", "POINT", 300.0, (2.0, -3.0, 3.0))
     scene.rosy.directory = str(tmp_path)
-    bpy.context.view_layer.update()
     return scene
 
 
@@ -144,7 +143,6 @@ def tracked(scene):
     target = link(bpy.data.objects.new("Target", None))
     constraint = scene.camera.constraints.new("TRACK_TO")
     constraint.target = target
-    bpy.context.view_layer.update()
 
 
 def instanced(scene):
@@ -261,7 +259,6 @@ def exclude(scene, name):
 
 def there_and_back(scene):
     obj("Plain").location.x += 0.5
-    bpy.context.view_layer.update()
     bake_word(scene)
     obj("Plain").location.x -= 0.5
     obj("Plain").location.x = 0.9
@@ -432,8 +429,6 @@ def test_a_3d_view(tmp_path, watched):
     assert (baked.camera, tuple(baked.image.size)) == ("3D View", (30, 20))
     obj("Aside").location.x += 1.0
     scene.camera.location.x += 1.0
-    bpy.context.view_layer.update()
     assert bake_word(scene) == ""
     obj("In Front").location.x += 0.1
-    bpy.context.view_layer.update()
     assert bake_word(scene) == "'In Front' was moved"

@@ -368,13 +368,6 @@ def test_missing_libraries_are_named(library):
     expect_error("no object 'Head': relink the missing library", field_objects, layer, ["Head"])
 
 
-def test_override_can_be_drawn(library):
-    obj = link(load(library, "Suzanne", link=True))
-    local = obj.override_create(remap_local_usages=True)
-    (baked,) = bake(bpy.context.scene)
-    assert baked.objects == (local,)
-
-
 def test_an_override_of_a_mesh_cannot_be_written(library):
     """Blender would ignore the values without a word."""
     local = link(load(library, "Suzanne", link=True)).override_create(remap_local_usages=True)

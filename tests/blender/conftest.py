@@ -1,7 +1,5 @@
 """Tests of the built extension, inside a full Blender. Elsewhere nothing here is collected."""
 
-from __future__ import annotations
-
 import importlib.util
 import math
 import os

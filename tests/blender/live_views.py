@@ -1,7 +1,5 @@
 """What the tests of the live view in a window share: its scenes, and what the screen has to show."""
 
-from __future__ import annotations
-
 import functools
 import math
 import time

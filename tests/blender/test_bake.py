@@ -1,7 +1,5 @@
 """The main job in Blender: bake, render what was baked, remove."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 from conftest import baked_images, pixels, render_image, run_blender

@@ -4,8 +4,6 @@
 Blender.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Commands: ``blender -b SCENE --command rosy ...``, and the Python package, which runs this Blender."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal

@@ -1,7 +1,5 @@
 """Fields of objects whose modifiers change the faces: made for the faces that are seen, and kept with the object."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 import pytest
@@ -82,10 +80,7 @@ def test_the_field_follows_until_the_faces_change(suzanne, scene):
     assert bpy.ops.rosy.field_generate(kind="form", degree=4) == {"FINISHED"}
     assert bpy.ops.rosy.bake() == {"FINISHED"}
     used = [mesh for mesh in bpy.data.meshes if mesh.users and "singularities" not in mesh.name]
-    assert used == [
-        suzanne.data,
-        suzanne.rosy.field_mesh,
-    ]
+    assert used == [suzanne.data, suzanne.rosy.field_mesh]
 
 
 def test_files_fit_the_mesh_or_what_is_seen(suzanne, tmp_path):

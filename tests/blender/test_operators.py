@@ -1,7 +1,5 @@
 """Each operator with a real mesh, its errors, and why its button is disabled."""
 
-from __future__ import annotations
-
 from unittest.mock import patch
 
 import bpy

@@ -1,7 +1,5 @@
 """Presets of the user, with the operators of the installed extension."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Strokes in a full Blender: drawn by the operator, rendered, undone and removed."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ElementTree
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Textures in Blender: bake, unwrap, undo, remove, and the file without the extension."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 from conftest import baked_images, contents, error_of, pixels

@@ -5,8 +5,6 @@ a picture of the 3D view is saved after each step. Those of the cube, and the la
 docs/images, and so is that of a live view.
 """
 
-from __future__ import annotations
-
 import subprocess
 
 import bpy

@@ -3,8 +3,6 @@
 Run by run.py, as window_panel.py is. The last step kills Blender, and run.py checks that no process is left.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

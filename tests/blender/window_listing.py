@@ -3,8 +3,6 @@
 Run by run.py, only where it is asked for: ``--only-window --windows listing --shots FOLDER``.
 """
 
-from __future__ import annotations
-
 import bpy
 from conftest import add_suzanne
 from extension import preferences, rosy

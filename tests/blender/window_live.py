@@ -3,8 +3,6 @@
 Run by run.py, as window_panel.py is.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from unittest.mock import patch

@@ -4,8 +4,6 @@ Run by run.py, through run_window.py. Every step is a generator that yields to l
 events (`window_steps`).
 """
 
-from __future__ import annotations
-
 import math
 from functools import partial
 from pathlib import Path

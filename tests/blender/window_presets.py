@@ -3,8 +3,6 @@
 Run by run.py, as window_panel.py is.
 """
 
-from __future__ import annotations
-
 import bpy
 from extension import rosy, switch_extension
 from window_steps import call_in_view, capture, open_tab, press, save_part, view

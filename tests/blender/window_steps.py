@@ -4,8 +4,6 @@ Every step is a generator. Whenever it yields, Blender continues, and a timer re
 results are written to the file of ROSY_RESULTS, as {step: [error or "", seconds]}.
 """
 
-from __future__ import annotations
-
 import importlib
 import json
 import math

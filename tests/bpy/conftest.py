@@ -1,7 +1,5 @@
 """Blender's Python module with RoSy in it, and an empty file for every test."""
 
-from __future__ import annotations
-
 import importlib.util
 import sys
 from pathlib import Path

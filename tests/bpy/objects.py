@@ -1,7 +1,5 @@
 """Objects for scenes: how they are added, selected and animated, and their attributes."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 from awkward import grid

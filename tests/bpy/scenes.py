@@ -1,39 +1,22 @@
 """Scenes: how they are opened, read and rendered, and what they hold."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 import pytest
 from harness.blender_data import contents, member_vectors, pixels, render_image  # noqa: F401
+from harness.steps import each_step  # noqa: F401
 from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.projection.project import project
 from rosy.rosy_addon.scene.cameras import camera_of_object
 from rosy.rosy_addon.scene.look_inputs import FIELDS_ONLY
 from rosy.rosy_addon.scene.scene_reader import read_scene
 from rosy.rosy_addon.scene.visible_objects import shown_instances
-from rosy.rosy_addon.worker.job import Call
 
 
 def expect_error(match, function, *arguments, **options):
     """Call a function, which raises a RosyError with this text."""
     with pytest.raises(RosyError, match=match):
         function(*arguments, **options)
-
-
-def each_step(steps):
-    """Yield what a job yields, and make its calls. Closing this generator cancels the job."""
-    answer = None
-    try:
-        while True:
-            try:
-                step = steps.send(answer)
-            except StopIteration:
-                return
-            yield step
-            answer = step() if isinstance(step, Call) else None
-    finally:
-        steps.close()
 
 
 def empty_scene(size):

@@ -1,7 +1,5 @@
 """Frames of animations: which are drawn, in which processes, and what an interruption leaves."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

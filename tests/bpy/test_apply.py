@@ -1,7 +1,5 @@
 """Pictures on objects: applied, replaced, recorded and removed, as a whole or not at all."""
 
-from __future__ import annotations
-
 from unittest.mock import Mock
 
 import bpy

@@ -1,7 +1,5 @@
 """Errors of input that cannot be drawn: one line that names it, and an unchanged file."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 import pytest
@@ -368,13 +366,6 @@ def test_missing_libraries_are_named(library):
     expect_error(message, guide_strokes_and_empties, [suzanne], local)
     assert_refused("visible object has a RoSy field: relink the missing library", "library.blend")
     expect_error("no object 'Head': relink the missing library", field_objects, layer, ["Head"])
-
-
-def test_override_can_be_drawn(library):
-    obj = link(load(library, "Suzanne", link=True))
-    local = obj.override_create(remap_local_usages=True)
-    (baked,) = bake(bpy.context.scene)
-    assert baked.objects == (local,)
 
 
 def test_an_override_of_a_mesh_cannot_be_written(library):

@@ -1,7 +1,5 @@
 """The list of pictures: which are compared with what, and when a scene is read again."""
 
-from __future__ import annotations
-
 from unittest.mock import Mock
 
 import bpy
@@ -58,7 +56,6 @@ def test_a_change_during_a_bake_counts(tmp_path):
     obj("Plain").location.x = 0.7
     for _ in stepping:
         pass
-    bpy.context.view_layer.update()
     assert list_bakes(scene)[0].stale_reason == "'Plain' was moved"
 
 

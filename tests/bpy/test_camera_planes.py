@@ -1,7 +1,5 @@
 """Planes in front of cameras: keys, which explain pictures, and backdrops, the paper behind them."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 import pytest

@@ -119,7 +119,6 @@ BAKE_ERRORS = [
     (["--camera", "None"], "there is no camera 'None' in scene 'Scene', only 'Camera', 'Side'"),
     (["--camera", "Suzanne"], "object 'Suzanne' is not a camera, but of type Mesh"),
     (["--object", "Nobody"], "there is no object 'Nobody'"),
-    (["--size", "0x64"], "size 0x64: a side must be"),
     (["--preset", "none"], "there is no preset 'none'"),
     (["--out", "{saved}"], "suzanne.blend: is not a folder"),
 ]

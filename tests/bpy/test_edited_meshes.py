@@ -1,7 +1,5 @@
 """Fields on meshes that were turned, joined, edited, or had modifiers applied, since they were made."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 import pytest

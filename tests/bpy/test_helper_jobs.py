@@ -1,7 +1,5 @@
 """Jobs whose calls a helper process makes give what they give in place."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from harness.steps import finished

@@ -1,7 +1,5 @@
 """Renders of the baked material, compared with the picture of the compositor."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import bpy

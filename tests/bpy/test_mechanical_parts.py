@@ -1,7 +1,5 @@
 """Fields along the form of mechanical parts, made by Blender's booleans and bevels."""
 
-from __future__ import annotations
-
 from functools import reduce
 
 import bmesh
@@ -106,10 +104,6 @@ def crossing_cylinders():
     return union(*(rod(0.5, 3, axis) for axis in range(3)))
 
 
-def common_part_of_cylinders():
-    return common(*(rod(1, 3, axis, sides=48) for axis in range(3)))
-
-
 def gear():
     size = Matrix.Translation((1.55, 0, 0)) @ Matrix.Diagonal((0.5, 0.36, 0.5, 1))
     turns = [Matrix.Rotation(k * np.pi / 6, 4, "Z") @ size for k in range(12)]
@@ -131,8 +125,8 @@ def stepped_shaft():
 
 
 PARTS = (
-    *(crossing_cylinders, common_part_of_cylinders, nut, flange, tee, valve, housing),
-    *(gear, slotted_block, stepped_shaft),
+    *(crossing_cylinders, nut, flange, tee, valve, housing, gear, slotted_block),
+    stepped_shaft,
 )
 
 

@@ -1,7 +1,5 @@
 """The preset of a scene, and whether the look has changed since it was applied."""
 
-from __future__ import annotations
-
 import pytest
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.preset_files import store

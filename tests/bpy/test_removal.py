@@ -1,7 +1,5 @@
 """Whatever users do with objects that show pictures: Remove leaves nothing of RoSy's, and all of theirs."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 import pytest
@@ -199,7 +197,6 @@ def test_an_override_shows_the_picture_of_its_library_again(tmp_path):
     scene.camera = add_camera()
     link(load(path, "Plain", link=True))
     override = obj("Plain").override_create(remap_local_usages=True)
-    bpy.context.view_layer.update()
     group = override.modifiers["RoSy"].node_group
     before = contents()
     assert not has_pictures(scene)

@@ -1,7 +1,5 @@
 """Reuse of results: a change runs the stages that it affects, and no others."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

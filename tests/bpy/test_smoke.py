@@ -1,7 +1,5 @@
 """The main job from end to end, for every version of Blender: field, picture, strokes, removal."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import sys

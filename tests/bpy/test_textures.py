@@ -1,7 +1,5 @@
 """Textures baked into UV maps: what they show, when they are up to date, and how they go."""
 
-from __future__ import annotations
-
 import json
 
 import bpy
@@ -30,14 +28,12 @@ def torus(scene, camera, monkeypatch):
 def textured(scene, torus):
     """The torus, smoothed, with a texture of 64 x 64 texels."""
     torus.modifiers.new("Smooth", "SUBSURF").levels = 1
-    bpy.context.view_layer.update()
     (result,) = bake_texture(scene, [torus])
     assert result.image.size[:] == (64, 64)
     return torus
 
 
 def stale_reason(scene):
-    bpy.context.view_layer.update()
     (info,) = list_bakes(scene)
     assert info.is_texture
     return info.stale_reason
@@ -45,7 +41,6 @@ def stale_reason(scene):
 
 def test_the_texture_is_on_the_evaluated_mesh(scene, textured):
     """In a plain material on the UV map, which the modifier sets. The user's slots stay empty."""
-    bpy.context.view_layer.update()
     evaluated = textured.evaluated_get(depsgraph())
     (material,) = evaluated.data.materials
     nodes = {node.bl_idname: node for node in material.original.node_tree.nodes}
@@ -115,23 +110,19 @@ def test_copies_share_a_texture_until_they_are_baked(scene, textured):
     copy = link(textured.copy())
     copy.data = textured.data.copy()
     textured.name = "Renamed"
-    bpy.context.view_layer.update()
     assert [info.camera for info in list_bakes(scene)] == ["Renamed"]
     copy.name = "Copy"
     add_field(copy, kind="axis")
-    bpy.context.view_layer.update()
     bake_texture(scene, [copy])
     infos = [(info.camera, info.stale_reason) for info in list_bakes(scene)]
     assert infos == [("Copy", ""), ("Renamed", "")]
     bpy.data.objects.remove(copy)
-    bpy.context.view_layer.update()
     assert len(bpy.data.objects) == 2
     info = list_bakes(scene)[0]
     assert info.camera == "Copy" and "does not show it" in info.unknown_reason
 
 
 def test_remove_leaves_nothing(scene, torus):
-    bpy.context.view_layer.update()
     before = contents()
     bake_texture(scene, [torus])
     assert contents() != before
@@ -197,7 +188,6 @@ def test_light_can_be_baked(scene, textured):
     lamp, means = add_light("Lamp", "SUN", 1.0), []
     for strength in (0.3, 1.0):
         lamp.data.energy = strength * np.pi
-        bpy.context.view_layer.update()
         (result,) = bake_texture(scene, [textured])
         assert result.image.colorspace_settings.name == "sRGB"
         means.append(np.array(result.image.pixels).reshape(-1, 4)[:, 0].mean())

@@ -1,7 +1,5 @@
 """Sources of tone in Blender: attributes, images, reference renders, shadows and occlusion; and colors of numbers."""
 
-from __future__ import annotations
-
 import os
 import tracemalloc
 
@@ -18,11 +16,7 @@ from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.jobs.bake_texture import bake_texture
 from rosy.rosy_addon.scene.bake_records import list_bakes
 from rosy.rosy_addon.scene.computed_attributes import OCCLUSION_ATTRIBUTE, store_occlusion
-from rosy.rosy_addon.scene.look_inputs import (
-    ReadRequest,
-    image_luminance,
-    load_reference,
-)
+from rosy.rosy_addon.scene.look_inputs import ReadRequest, image_luminance, load_reference
 from rosy.rosy_addon.scene.pictures import read_output_settings
 from rosy.rosy_addon.scene.read_view import read_turntable
 from rosy.rosy_addon.scene.scene_reader import SceneReader, read_scene
@@ -141,13 +135,11 @@ def test_memory_of_a_large_image(monkeypatch):
 def test_missing_images_and_uv_maps(wall):
     expect_error("'Plane': choose an image for the tone", tone_of, "image")
     wall.rosy.tone_image = add_image()
-    bpy.context.view_layer.update()
     expect_error("object 'Plane' has no UV map: unwrap", tone_of, "image")
     add_uv(wall.data)
     tone = tone_of("image")
-    np.testing.assert_allclose(
-        tone.image, to_linear(np.array([[0, 1], [128 / 255, 64 / 255]])), atol=1e-3
-    )
+    expected = to_linear(np.array([[0, 1], [128 / 255, 64 / 255]]))
+    np.testing.assert_allclose(tone.image, expected, atol=1e-3)
     assert tone.values.min() == 0 and tone.values.max() == 1
     wall.rosy.tone_uv_map = "Other"
     expect_error("no UV map 'Other'", tone_of, "image")
@@ -164,9 +156,8 @@ def test_pictures_from_files(scene, wall, tmp_path):
     scene.rosy.tone_picture = str(tmp_path / "shot.png")
     images = set(bpy.data.images)
     reference = load_reference(scene, depsgraph(), scene.camera)
-    np.testing.assert_allclose(
-        reference.luminance, to_linear(np.rint(values * 255) / 255), atol=2e-3
-    )
+    expected = to_linear(np.rint(values * 255) / 255)
+    np.testing.assert_allclose(reference.luminance, expected, atol=2e-3)
     assert set(bpy.data.images) == images
 
 
@@ -235,7 +226,6 @@ def test_a_live_view_reads_values_again_when_they_change(wall, kind):
 def test_occlusion_is_stored_and_drawn(scene, wall):
     floor = add_mesh("Floor", [(-9, 0, -1), (9, 0, -1), (9, -9, -1), (-9, -9, -1)], [(3, 2, 1, 0)])
     add_field(floor, "axis", 2, (1.0, 0.0, 0.0))
-    bpy.context.view_layer.update()
     store_occlusion(depsgraph(), [wall], direction_count=64)
     attribute = wall.data.attributes[OCCLUSION_ATTRIBUTE]
     assert (attribute.domain, attribute.data_type) == ("CORNER", "FLOAT")
@@ -254,7 +244,6 @@ def test_occlusion_is_stored_and_drawn(scene, wall):
 
 def test_occlusion_of_meshes_with_new_faces(scene, wall):
     wall.modifiers.new("Subdivision", "SUBSURF").subdivision_type = "SIMPLE"
-    bpy.context.view_layer.update()
     store_occlusion(depsgraph(), [wall], direction_count=16)
     assert len(wall.data.attributes[OCCLUSION_ATTRIBUTE].data) == 16
     assert len(tone_of("attribute", OCCLUSION_ATTRIBUTE).values) == 64

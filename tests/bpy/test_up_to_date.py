@@ -3,8 +3,6 @@
 A change either changes what the next bake gives, and the panel says so, or neither.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 
@@ -55,7 +53,6 @@ def build(tmp_path):
     add_plane("Aside", size=0.2).location = (30.0, -1.0, 0.0)
     add_light("Key", "POINT", 300.0, (2.0, -3.0, 3.0))
     scene.rosy.directory, scene.rosy.look.light = str(tmp_path), "headlight"
-    bpy.context.view_layer.update()
     return scene
 
 
@@ -146,7 +143,6 @@ def tracked(scene):
     target = link(bpy.data.objects.new("Target", None))
     constraint = scene.camera.constraints.new("TRACK_TO")
     constraint.target = target
-    bpy.context.view_layer.update()
 
 
 def instanced(scene):
@@ -263,7 +259,6 @@ def exclude(scene, name):
 
 def there_and_back(scene):
     obj("Plain").location.x += 0.5
-    bpy.context.view_layer.update()
     bake_word(scene)
     obj("Plain").location.x -= 0.5
     obj("Plain").location.x = 0.9
@@ -440,8 +435,6 @@ def test_a_3d_view(tmp_path, watched):
     assert (baked.camera, tuple(baked.image.size)) == ("3D View", (30, 20))
     obj("Aside").location.x += 1.0
     scene.camera.location.x += 1.0
-    bpy.context.view_layer.update()
     assert bake_word(scene) == ""
     obj("In Front").location.x += 0.1
-    bpy.context.view_layer.update()
     assert bake_word(scene) == "'In Front' was moved"

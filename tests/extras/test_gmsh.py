@@ -1,7 +1,5 @@
 """Files as Gmsh itself writes them, against the positions and values that were given to Gmsh."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What files of other programs mean: tensors by the names of their components, and grids that close."""
 
-from __future__ import annotations
-
 import h5py
 import meshio
 import numpy as np

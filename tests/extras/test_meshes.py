@@ -1,7 +1,5 @@
 """Surfaces and arrays in the files that pyvista and meshio write."""
 
-from __future__ import annotations
-
 import meshio
 import numpy as np
 import pytest

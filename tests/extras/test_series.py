@@ -1,7 +1,5 @@
 """Steps of series, one by one."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 

@@ -61,9 +61,8 @@ def test_pyvista_strips_grids_and_texture_coordinates():
     plane = pyvista.Plane(i_resolution=3, j_resolution=2)
     surface = rf.Surface(plane)
     assert surface.face_count == 6
-    np.testing.assert_array_equal(
-        surface.uv, plane.active_texture_coordinates[surface.corner_vertex]
-    )
+    expected = plane.active_texture_coordinates[surface.corner_vertex]
+    np.testing.assert_array_equal(surface.uv, expected)
     strips = plane.triangulate().strip()
     assert strips.n_strips and rf.Surface(strips).face_count == 12
     grid = plane.cast_to_unstructured_grid()

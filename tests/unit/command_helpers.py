@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import json
 import subprocess
+import sys
 
 import numpy as np
 from conftest import ROOT
 from harness.forked import run_command
 from PIL import Image
 from shapes import cube
+
+
+def python(*words, **options) -> subprocess.CompletedProcess:
+    """Run Python in the folder of the repository, and return its status and its output as text."""
+    options = {"cwd": ROOT, "capture_output": True, "text": True} | options
+    return subprocess.run([sys.executable, *words], check=False, **options)
 
 
 def rosy(*arguments) -> subprocess.CompletedProcess:

@@ -39,6 +39,13 @@ def awkward_surface(name):
     return build_surface(points, np.concatenate(faces), np.cumsum([0, *map(len, faces)]), name=name)
 
 
+def directions_at_angles(surface, angles, lengths=1.0):
+    """(F, N, 3) directions at N angles from the first edge of each face; lengths of all or of each."""
+    x, y = (axis[:, None] for axis in surface.face_frames)
+    w = (np.exp(1j * np.array(angles)) * lengths)[..., None]
+    return w.real * x + w.imag * y
+
+
 def random_field(surface, degree, seed=0):
     """A field of random directions, and of random magnitudes from 0.5 to 1."""
     random = np.random.default_rng(seed)

@@ -89,9 +89,7 @@ def test_arrowheads_point_along_the_directions_of_a_field(case, normal_up):
 
 def test_arrowheads_follow_the_smooth_field_of_curved_surfaces():
     surface = globe(24, 48)
-    east = np.cross([0.0, 0.0, 1.0], surface.face_center)
-    normal = surface.face_normal
-    field = RosyField(1, east - (east * normal).sum(axis=1)[:, None] * normal)
+    field = RosyField(1, np.cross([0.0, 0.0, 1.0], surface.face_normal))
     marks = arrows([MeshInstance(surface, np.eye(4), field)])
     error = angle_errors(marks, [np.cross([0.0, 0.0, 1.0], marks.anchor)])
     assert len(marks) > 60 and np.degrees(error).max() < 1.0

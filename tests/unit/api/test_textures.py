@@ -131,7 +131,6 @@ def test_textures_that_are_refused(error_of):
     for keywords, expected in (
         ({"size": 8}, "a size of 8 texels: choose 16 to 16384"),
         ({"margin": -1}, "a margin of -1 texels"),
-        ({"preset": "none"}, "there is no preset 'none'"),
         ({"lenght": 3}, "lenght"),
     ):
         assert expected in error_of(rf.texture, square, field, **keywords)

@@ -1,11 +1,10 @@
 """A few random hostile cases of each category, always the same ones; `make fuzz` runs others."""
 
-import subprocess
 import sys
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from command_helpers import python
 
 from tests.fuzz.options import random_options
 
@@ -21,7 +20,6 @@ def test_every_option_has_random_values(command):
 @pytest.mark.skipif(sys.platform != "linux", reason="cases run in forks, with limits of Linux")
 def test_no_case_shows_a_fault(tmp_path):
     words = ["--cases", "16", "--seed", "1", "--jobs", "1", "--keep", str(tmp_path)]
-    command = [sys.executable, "-m", "tests.fuzz", *words]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    done = python("-m", "tests.fuzz", *words)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "16 cases" in done.stdout

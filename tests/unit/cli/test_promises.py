@@ -5,13 +5,11 @@ from __future__ import annotations
 import io
 import pickle
 import shutil
-import subprocess
 import sys
 
 import numpy as np
 import pytest
-from command_helpers import refusal, write_obj
-from conftest import ROOT
+from command_helpers import python, refusal, write_obj
 from shapes import grid_of_quads
 
 from rosy_addon.extras.command_line import main
@@ -67,8 +65,7 @@ def test_a_full_disk_leaves_all_files_as_they_were(tmp_path):
     lines = command_lines(tmp_path)
     for name in lines:
         (tmp_path / name).write_text("old")
-    command = [sys.executable, "-c", LIMITED, *lines.values()]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    done = python("-c", LIMITED, *lines.values())
     statuses = [line for line in done.stdout.splitlines() if line.isdecimal()]
     assert statuses == ["2"] * len(lines), done.stderr
     errors = [line for line in done.stderr.splitlines() if "file too large" in line]

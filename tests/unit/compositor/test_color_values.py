@@ -61,13 +61,12 @@ def test_colors_are_those_of_interpolated_numbers(look, name):
 @pytest.mark.parametrize(
     ("low", "high", "position"),
     [
-        (-2.0, 2.0, lambda x: (x + 2) / 4),
         (0.5, -0.5, lambda x: 0.5 - x),
         (0.0, 1.0, lambda x: x),
         (-1.0, 0.0, lambda x: x + 1),
         (0.3, 0.3, lambda x: x > 0.3),
     ],
-    ids=["wider", "inverted", "from 0", "to 0", "a step"],
+    ids=["inverted", "from 0", "to 0", "a step"],
 )
 def test_the_range_of_the_look(low, high, position):
     """Numbers beyond it have the colors at its ends."""
@@ -82,9 +81,8 @@ def test_numbers_of_faces_are_constant_on_them():
     """Exactly: no rounding shows, even of large numbers that differ little."""
     numbers = 1e6 + np.arange(GRID.face_count)
     gbuffer = project([numbered(GRID, numbers[GRID.corner_face])], CAMERA)
-    np.testing.assert_array_equal(
-        surface_values(gbuffer), numbers[GRID.triangle_face[gbuffer.triangle]]
-    )
+    expected = numbers[GRID.triangle_face[gbuffer.triangle]]
+    np.testing.assert_array_equal(surface_values(gbuffer), expected)
 
 
 def test_the_range_is_that_of_all_instances_with_a_field():

@@ -50,7 +50,6 @@ COLORED_INKS = {
         "paper_color": "#182028",
     },
     "families": {"hue": "families"},
-    "families, colored": {"hue": "families", "ink_color": "#204890", "paper_color": "#f4ecd8"},
     "families, light": {"hue": "families", "ink_color": "#f0e8d0", "paper_color": "#101418"},
 }
 

@@ -58,10 +58,8 @@ def test_corner_values_may_differ_between_faces():
     values = np.repeat([0.2, 0.9], 4)[:, None].astype(np.float32)
     instance = make_instance(surface, tone=SurfaceTone(values))
     gbuffer = project([instance], make_camera(position=(0, -0.5, 5)))
-    tones = surface_tones(gbuffer)
-    np.testing.assert_allclose(
-        tones, np.where(surface.triangle_face[gbuffer.triangle] == 0, 0.2, 0.9), atol=1e-6
-    )
+    expected = np.where(surface.triangle_face[gbuffer.triangle] == 0, 0.2, 0.9)
+    np.testing.assert_allclose(surface_tones(gbuffer), expected, atol=1e-6)
 
 
 def test_instances_without_a_tone_use_the_light():

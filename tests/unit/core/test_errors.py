@@ -8,7 +8,6 @@ from rosy_addon.core.errors import RosyError, as_sentence, counted
 @pytest.mark.parametrize(
     ("message", "shown"),
     [
-        ("no visible object has a RoSy field", "No visible object has a RoSy field"),
         ("object 'a/b': the mesh has no faces", "Object 'a/b': the mesh has no faces"),
         ("an .mp4 needs ffmpeg", "An .mp4 needs ffmpeg"),
         ("'plaid' is not one of your presets", "'plaid' is not one of your presets"),

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 
 import numpy as np
 import pytest
-from command_helpers import refusal
-from conftest import ROOT, traced_peak
+from command_helpers import python, refusal
+from conftest import traced_peak
 from field_helpers import write_off
 from shapes import plane
 
@@ -16,7 +15,6 @@ from bench import cases
 from rosy_addon.compositor.look import Look
 from rosy_addon.core import memory
 from rosy_addon.core.cache import Cache
-from rosy_addon.core.errors import RosyError
 from rosy_addon.field.field_io import load_field
 from rosy_addon.field.generate import generate
 from rosy_addon.field.surface import Surface
@@ -81,8 +79,7 @@ def test_a_limit_of_the_address_space():
         "import resource; resource.setrlimit(resource.RLIMIT_AS, (1 << 30, 1 << 30));"
         "from rosy_addon.core.memory import available_memory; print(available_memory())"
     )
-    free = subprocess.check_output([sys.executable, "-c", code], cwd=ROOT)
-    assert (1 << 28) < int(free) < (1 << 30)
+    assert (1 << 28) < int(python("-c", code).stdout) < (1 << 30)
 
 
 # --- the bound of a picture ------------------------------------------------------------------------------------
@@ -114,7 +111,7 @@ def test_pictures_are_refused_before_they_are_drawn(monkeypatch, error_of):
 
 
 @pytest.mark.slow
-def test_the_cache_gives_its_memory_back(monkeypatch):
+def test_the_cache_gives_its_memory_back(monkeypatch, error_of):
     """It is emptied only if there is not enough without."""
     view, cache = ball_view(), Cache()
     cache.put("an earlier picture", np.zeros(3))
@@ -122,8 +119,7 @@ def test_the_cache_gives_its_memory_back(monkeypatch):
     draw_picture(view, cache, keep_gbuffers=False)
     assert cache.get("an earlier picture") is not None
     limit_memory(monkeypatch, 1e6)
-    with pytest.raises(RosyError):
-        draw_picture(view, cache)
+    error_of(draw_picture, view, cache)
     assert not len(cache)
 
 

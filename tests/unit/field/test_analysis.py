@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from field_helpers import with_random_members
+from field_helpers import directions_at_angles, with_random_members
 from scipy.spatial.distance import cdist
 from shapes import from_triangles, icosphere, plane, rebuilt, torus
 
@@ -81,11 +81,9 @@ def test_percentiles_of_errors_are_weighted_by_area():
 def test_fields_that_are_no_rosys_are_compared_by_their_best_matching():
     """Three directions at free angles, once with the first and once with the second one stored."""
     ball = icosphere(2)
-    x, y = (axis[:, None] for axis in ball.face_frames)
 
     def field_at(*angles):
-        turned = np.array(angles)[:, None]
-        return field_from_directions(ball, np.cos(turned) * x + np.sin(turned) * y)
+        return field_from_directions(ball, directions_at_angles(ball, angles))
 
     field = field_at(0.1, 1.0, 4.0)
     for other, error in ((field_at(1.0, 4.0, 0.1), 0), (field_at(3.7, 0.4, 1.0), 0.2)):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from field_helpers import angle_differences, read_field, write_off
+from field_helpers import angle_differences, directions_at_angles, read_field, write_off
 from shapes import from_triangles, icosphere, plane, rebuilt, torus
 
 from rosy_addon.field.curvature import curvature_field
@@ -23,11 +23,8 @@ CROSS = field_directions(BALL, axis_field(BALL, 4, (0.3, -0.2, 1.0)))
 def free_directions(degree, seed=0):
     """(F, N, 3) directions on the ball that are not a RoSy."""
     random = np.random.default_rng(seed)
-    x, y = (axis[:, None] for axis in BALL.face_frames)
     angle = np.sort(random.random(degree)) * 2 * np.pi
-    length = 0.5 + random.random((BALL.face_count, degree))
-    w = (np.exp(1j * angle) * length)[..., None]
-    return w.real * x + w.imag * y
+    return directions_at_angles(BALL, angle, 0.5 + random.random((BALL.face_count, degree)))
 
 
 # --- there and back --------------------------------------------------------------------------

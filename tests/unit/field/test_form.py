@@ -35,8 +35,7 @@ def with_noise(surface: Surface, share: float) -> Surface:
 
 
 def direction_on_torus(center: np.ndarray) -> np.ndarray:
-    angle = np.arctan2(center[:, 1], center[:, 0])
-    return np.stack([-np.sin(angle), np.cos(angle), 0 * angle], axis=1)
+    return normalize(np.cross((0, 0, 1), center))
 
 
 def direction_on_ellipsoid(center: np.ndarray) -> np.ndarray:

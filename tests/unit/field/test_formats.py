@@ -51,7 +51,6 @@ FILES = {
     "text.dmat": dmat_bytes(HALVES),
     "binary.dmat": dmat_bytes(HALVES, binary=True),
     "flags.dmat": dmat_bytes(FLAGGED),
-    "numbers.dmat": dmat_bytes(np.column_stack([np.arange(len(HALVES)), HALVES])),
     "a.crossfield": crossfield_bytes(HALVES),
     "a.ffield": frames_bytes(HALVES),
     "compressed.npz": archive_bytes(Q=HALVES),

@@ -218,7 +218,6 @@ DAMAGED = {
     "torn.stl": (text_stl()[:-60], "corners in 2 complete triangles"),
     "none.stl": (b"solid nothing\nendsolid nothing\n", "no faces"),
     "garbage.stl": (b"\x89PNG", "is not an .stl file"),
-    "mesh.step": (b"", "is not a mesh file"),
 }  # fmt: skip
 
 

@@ -65,7 +65,6 @@ POLYGONS = {
     "a comb": "0 0  6 0  6 3  5 3  5 1  4 1  4 3  3 3  3 1  1 1  1 3  0 3",
     "a spiral": "0 0  5 0  5 4  1 4  1 2  3 2  3 3  4 3  4 1  .5 1  .5 5  0 5",
     "a triangle with a flat corner": "0 0  1 0  2 0  1 2",
-    "a square with a flat corner": "0 0  1 0  2 0  2 2  0 2",
     "a square with four flat corners": "0 0  1 0  2 0  2 1  2 2  1 2  0 2  0 1",
 }
 

@@ -51,17 +51,13 @@ DRIFTING = {"flow": 2.0, "drift": Drift(0.2)}
 #: These looks have every part of the shaders.
 LOOKS = {
     "color noise": {"hue": "noise"},
-    "magnitude as color, with a range": {"hue": "magnitude", "color_range": (0.0, 0.8)},
     "magnitude as both, with an inverted range": BOTH | {"color_range": (1.1, 0.6)},
-    "magnitude as length": {"magnitude_length": True},
     "magnitude as both": BOTH | {"color_map": "magma"},
     "families, of a field without families": {"hue": "families"},
     "oriented, three directions": {"fade": "tail", "degree": 3, "density": 0.03, "seed": 1},
     "supersampled color noise": {"supersampling": 2, "hue": "noise", "degree": 3},
     "guided, five directions": {"guiding_angle": -2.5, "degree": 5},
-    "flat": {"display": "flat"},
     "shaded": {"shading": 0.7},
-    "coarse noise": {"line_width": 5.0, "seed": 7},
     "on the surface, supersampled": ON_SURFACE | {"supersampling": 2, "seed": 3},
     "on the surface, color noise": ON_SURFACE | {"hue": "noise", "high_pass": 0.0},
     "in Blender units": ON_SURFACE | {"unit_size": 0.007},
@@ -74,8 +70,6 @@ LOOKS = {
     "hatched, an ink per family": HATCH | {"hue": "families", "degree": 6, "layering": 0.1},
     "hatched, ink ramp, light on dark": LIGHT_INK | {"hue": "tone", "ink_color_light": "#fff0f0"},
     "hatched in Blender units, uneven": HATCH | UNEVEN_IN_UNITS,
-    "hatched by families, with an outline": LIGHT_INK
-    | {"hue": "families", "outline": 1.5, "supersampling": 2},
     "hatched, overshoot": HATCH | {"light": "lamp", "shadows": True, "overshoot": 9.0, "length": 7},
     "hatched, all effects": HATCH
     | ON_SURFACE
@@ -131,7 +125,7 @@ UNDEFINED_LOOKS = {
     "magnitude, paper": {"hue": "magnitude", "undefined": "paper"},
     "magnitude, texture": {"hue": "magnitude", "undefined": "texture"},
     "hatched, left out": HATCH | {"undefined": "hidden"},
-    "hatched, paper": HATCH | {"undefined": "paper"},
+    "even": EVEN,
     "even, paper": EVEN | UNEVEN | {"undefined": "paper"},
 }
 

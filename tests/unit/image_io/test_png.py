@@ -27,12 +27,6 @@ def test_files_hold_srgb_values_from_the_top(tmp_path):
     assert np.abs(stored[..., 3] - np.clip(rgba[..., 3], 0, 1)).max() <= 0.5 / 255 + 1e-6
 
 
-def test_unwritable_files(tmp_path, error_of):
-    rgba = np.zeros((2, 2, 4), dtype=np.float32)
-    assert "does not exist" in error_of(write_png, tmp_path / "no" / "a.png", rgba)
-    assert "is a folder" in error_of(write_png, tmp_path, rgba)
-
-
 # --- reading --------------------------------------------------------------------------------------
 
 

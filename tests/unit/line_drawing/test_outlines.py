@@ -5,10 +5,9 @@ import pytest
 from harness.outline_marks import visible_silhouettes
 from harness.stroke_tracing import pixel_lengths
 from scipy.spatial import cKDTree
-from shapes import cylinder, icosphere, instance_of, plane, rebuilt, torus
+from shapes import capped_cylinder, icosphere, instance_of, plane, rebuilt, torus
 
 import rosy_addon.api as rf
-from rosy_addon.field.surface import build_surface
 from rosy_addon.line_drawing.outline import OUTLINE_KINDS
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
@@ -41,11 +40,7 @@ def coverage(lines, surface, camera, tolerance):
 
 def closed_cylinder(columns):
     """Return a cylinder with ends, whose edges are sharp above 60 degrees."""
-    tube = cylinder(columns, 1)
-    vertex = np.arange(2 * columns).reshape(columns, 2)
-    corners = np.concatenate([tube.corner_vertex, vertex[::-1, 0], vertex[:, 1]])
-    start = [*tube.face_start, 5 * columns, 6 * columns]
-    return build_surface(tube.vertices, corners, start, name="cylinder", sharp_angle=np.pi / 3)
+    return rebuilt(capped_cylinder(columns), sharp_angle=np.pi / 3)
 
 
 @pytest.mark.slow

@@ -288,8 +288,7 @@ def test_families_are_consistent_on_a_torus():
     strokes = trace_strokes(instance, 0.15)
     assert strokes.names == ("family 1", "family 2")
     middle = (strokes.start[:-1] + strokes.start[1:]) // 2
-    x, y, _ = strokes.points[middle].T
-    around = normalize(np.stack([-y, x, 0 * x], axis=1))
+    around = normalize(np.cross((0, 0, 1), strokes.points[middle]))
     is_around = np.abs(dot(strokes.member[middle], around)) > 0.7
     for family in (0, 1):
         assert len(np.unique(is_around[strokes.family == family])) == 1

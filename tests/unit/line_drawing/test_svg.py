@@ -134,7 +134,6 @@ def test_command_line(tmp_path, capsys, monkeypatch):
         (["--frames", "1-3"], "ball.off: --frames applies only to .blend files"),
         (["--set", "light=scene"], "ball.off: has no lights"),
         (["--set", "taper=-1"], "setting 'taper' is -1.0, expected a number from 0"),
-        (["--set", "wobble=1"], "--set wobble=1: unknown setting 'wobble'"),
     ):
         assert main([*command, *arguments]) == 2 and message in capsys.readouterr().err
     assert main(["strokes", "-o", str(out)]) == 2 and "give a mesh file" in capsys.readouterr().err

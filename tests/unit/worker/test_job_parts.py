@@ -7,7 +7,7 @@ import time
 from unittest.mock import Mock
 
 import pytest
-from harness.steps import finished
+from harness.steps import each_step, finished
 from listeners import CancelledError, cancel_at
 
 from rosy_addon.core.errors import RosyError
@@ -35,20 +35,9 @@ def test_a_part_gives_the_same_result_with_scaled_progress():
         return (yield from part(halves.begin(6), 0.2, 0.6))
 
     assert run(whole()) == halves(6) == 9
-    steps = list_steps(whole())
-    found = [step[-3:] if isinstance(step, Call) else step for step in steps]
+    found = [step[-3:] if isinstance(step, Call) else step for step in each_step(whole())]
     assert found == [(0.2, 0.4, "dividing"), (0.4, "thinking"), (0.4, 0.6, None)]
-    assert {step.label for step in list_steps(part(halves.begin(6), 0, 1, "all"))} == {"all"}
-
-
-def list_steps(steps):
-    answer, found = None, []
-    while True:
-        try:
-            found.append(steps.send(answer))
-        except StopIteration:
-            return found
-        answer = found[-1]() if isinstance(found[-1], Call) else None
+    assert {step.label for step in each_step(part(halves.begin(6), 0, 1, "all"))} == {"all"}
 
 
 def test_errors_pass_through_parts(error_of):

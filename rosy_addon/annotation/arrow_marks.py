@@ -19,12 +19,14 @@ import numpy as np
 
 from ..core.cache import Cache
 from ..core.progress import progress, report
+from ..field.blocks import joined
 from ..field.directional_field import evaluate_harmonics, field_symmetry
 from ..field.frames import dot
 from ..field.surface import Surface
 from ..projection.camera import Camera
 from ..projection.field_channel import deviations
 from ..projection.gbuffer import GBuffer, MeshInstance, SurfacePoints
+from ..projection.pixel_blocks import part_of
 from ..projection.pixel_neighbors import screen_jacobians
 from ..projection.project import surface_points
 from ..projection.rest_coordinates import matrix_scale
@@ -160,7 +162,7 @@ def arrow_marks(
     with progress(0.2, 0.6):
         projected = project_points(instances, camera, points, clip_planes, finds_hidden=is_exact)
     kept = np.flatnonzero(projected.is_visible)
-    points, projected = points.part(kept), projected.part(kept)
+    points, projected = part_of(points, kept), part_of(projected, kept)
     with progress(0.6, 0.9):
         gbuffer = surface_points(instances, camera, display, points, projected.position, cache)
     directions = _screen_directions(gbuffer)
@@ -205,17 +207,17 @@ def _places_in_order(
         points = SurfacePoints.of(number, places.triangle, places.barycentric)
         needed = _needed_distances(instance, camera, points, spacing)
         kept = np.flatnonzero(places.distance * scale >= needed)
-        parts.append(points.part(kept))
+        parts.append(part_of(points, kept))
         keys.append(np.stack([-places.distance[kept] * scale, np.zeros(len(kept))]))
         if places.finest > smallest:
             *samples, rank = progressive_samples(instance, camera, spacing)
             points = SurfacePoints.of(number, *samples)
             needed = _needed_distances(instance, camera, points, spacing)
             kept = np.flatnonzero(needed < places.finest * scale)
-            parts.append(points.part(kept))
+            parts.append(part_of(points, kept))
             keys.append(np.stack([rank[kept], np.ones(len(kept))]))
     # Sort places by their distance, and the points between them, which are last, by their rank.
-    return SurfacePoints.concatenate(parts).part(np.lexsort(np.concatenate(keys, axis=1)))
+    return part_of(joined(parts), np.lexsort(np.concatenate(keys, axis=1)))
 
 
 def _needed_distances(

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..field.singularities import format_index
+from ..projection.pixel_blocks import part_of
 from .singularity_marks import OUTLINE, SingularityMarks, dot_diameters
 
 #: Display colors of labels, and of the halo around them.
@@ -70,7 +71,7 @@ def placed_labels(marks: SingularityMarks) -> list[Label]:
     visible = np.flatnonzero(marks.is_visible)
     if not marks.has_labels or len(visible) > MAX_LABELS:
         return []
-    marks = marks.part(visible[np.argsort(marks.depth[visible], kind="stable")])
+    marks = part_of(marks, visible[np.argsort(marks.depth[visible], kind="stable")])
     size = marks.size
     height, padding = LABEL_HEIGHT * size, stroke_width(size) / 2 + HALO * size
 

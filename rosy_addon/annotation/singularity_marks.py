@@ -84,13 +84,9 @@ class SingularityMarks:
     def __len__(self) -> int:
         return len(self.index)
 
-    def part(self, chosen: np.ndarray) -> SingularityMarks:
-        """Return the singularities that a bool mask or an array of indices selects."""
-        return part_of(self, chosen)
-
     def in_drawing_order(self) -> SingularityMarks:
         """Return the singularities in the order in which their dots are drawn: hidden and far ones first."""
-        return self.part(np.lexsort((-self.depth, self.is_visible)))
+        return part_of(self, np.lexsort((-self.depth, self.is_visible)))
 
     @property
     def radius(self) -> np.ndarray:
@@ -154,7 +150,8 @@ def singularity_marks(
     index, degree = np.concatenate(indices), np.concatenate(degrees)
     position, depth, is_visible = projected.position, projected.depth, projected.is_visible
     style = camera.size, settings.singularity_size, shows_indices(settings)
-    return SingularityMarks(position, index, degree, depth, is_visible, *style).part(kept)
+    marks = SingularityMarks(position, index, degree, depth, is_visible, *style)
+    return part_of(marks, kept)
 
 
 def shown_singularities(

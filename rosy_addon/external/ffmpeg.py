@@ -5,9 +5,8 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from ..core.errors import RosyError
 from ..rendering.turntable import Encoder
-from ..worker.program import run_program
+from ..worker.program import run_encoder
 
 
 def find_encoder() -> Encoder | None:
@@ -31,9 +30,6 @@ def find_encoder() -> Encoder | None:
             program, "-v", "error", "-y", "-framerate", f"{fps:g}", "-i", pictures,
             "-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p", str(path),
         ]  # fmt: skip
-        status, output = run_program(command, "encoding the video")
-        if status:
-            message = (output.strip().splitlines() or ["it failed"])[-1]
-            raise RosyError(f"ffmpeg: {message}")
+        run_encoder(command, "ffmpeg")
 
     return encode

@@ -27,7 +27,7 @@ from ..cli.scene import import_blender
 from ..core.errors import RosyError
 from ..rendering.turntable import Encoder
 from ..worker.lifeline import Lifeline
-from ..worker.program import run_program
+from ..worker.program import run_encoder
 from ..worker.start import inheriting
 
 #: The oldest version of Blender that RoSy runs in.
@@ -347,9 +347,6 @@ def blender_encoder(requested: str | None) -> Encoder | None:
         """Encode the pictures in a folder; see `Encoder`."""
         command = [program, *BLENDER_OPTIONS, "--python", str(script), "--"]
         command += map(str, (folder, count, *size, repr(fps), path))
-        status, output = run_program(command, "encoding the video")
-        if status or not path.is_file():
-            message = (output.strip().splitlines() or ["it failed"])[-1]
-            raise RosyError(f"{path}: {program} cannot encode a video: {message}")
+        run_encoder(command, f"{path}: {program} cannot encode a video", path)
 
     return encode

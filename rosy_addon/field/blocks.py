@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,6 +18,8 @@ MANY_ELEMENTS, BYTES_PER_ELEMENT = 1 << 24, 50
 
 #: One or several arrays, as the result of a function.
 Arrays = np.ndarray | tuple[np.ndarray, ...]
+
+Record = TypeVar("Record", bound=tuple[np.ndarray, ...])
 
 
 def row_blocks(count: int, size: int | None = None) -> list[slice]:
@@ -57,6 +60,11 @@ def by_rows(function: Callable[..., Arrays], *arrays: np.ndarray) -> Arrays:
     if isinstance(parts[0], tuple):
         return tuple(np.concatenate(columns) for columns in zip(*parts, strict=True))
     return np.concatenate(parts)
+
+
+def joined(parts: Sequence[Record]) -> Record:
+    """Return a named tuple of arrays with the rows of all parts, one part after another."""
+    return type(parts[0])(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
 def mask(count: int, index: np.ndarray) -> np.ndarray:

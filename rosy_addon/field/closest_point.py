@@ -144,7 +144,7 @@ class _ClosestSearch:
         side = np.arange(-ring, ring + 1)
         offset = np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
         offset = offset[np.abs(offset).max(axis=1) == ring]
-        block = max(MAX_PAIRS // (8 * len(offset)), 1)
+        block, size = max(MAX_PAIRS // (8 * len(offset)), 1), self.cell_size
         for start in range(0, len(selection), block):
             report(1 - (len(selection) - start) / len(self.points), LABEL)
             chunk = selection[start : start + block]
@@ -152,25 +152,17 @@ class _ClosestSearch:
             cell = (own_cell[:, None] + offset).reshape(-1, 3)
             limit = np.repeat(self.distance[chunk], len(offset))
             exists = ((cell >= 0) & (cell < self.shape)).all(axis=1)
-            exists &= self._cell_distances(chunk, own_cell, offset) < limit
+            # The distances of the points from the boxes of the cells.
+            position = (self.points[chunk] - self.origin - own_cell * size)[:, None]
+            gap = np.maximum(
+                np.maximum(offset * size - position, position - (offset + 1) * size), 0
+            )
+            exists &= np.sqrt(dot(gap, gap)).ravel() < limit
             key = self._keys_of(cell[exists])
             first = np.searchsorted(self.key, key, side="left")
             count = np.searchsorted(self.key, key, side="right") - first
             point = np.repeat(np.repeat(chunk, len(offset))[exists], count)
             self.update(point, self.cell_triangle[concatenated_ranges(first, count)])
-
-    def _cell_distances(
-        self, selection: np.ndarray, own_cell: np.ndarray, offset: np.ndarray
-    ) -> np.ndarray:
-        """Return the distances of the k selected points from c cells each, as a (k c,) array.
-
-        `selection` holds the (k,) indices of the points, and `own_cell` their (k, 3) cells. The c cells are
-        given by (c, 3) offsets from the cell of each point.
-        """
-        size = self.cell_size
-        position = (self.points[selection] - self.origin - own_cell * size)[:, None]
-        gap = np.maximum(np.maximum(offset * size - position, position - (offset + 1) * size), 0)
-        return np.sqrt(dot(gap, gap)).ravel()
 
     def update(self, owner: np.ndarray, candidate: np.ndarray) -> None:
         """Update the results, given (m,) pairs of a point and a candidate for its closest triangle.

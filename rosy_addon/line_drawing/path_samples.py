@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..projection.pixel_blocks import part_of
 from .surface_particles import SurfaceParticles, TracedPath
 
 #: Two positions along a path count as the same if they differ by less than this fraction of a step.
@@ -56,7 +57,7 @@ class SampledPath:
     """
 
     def __init__(self, path: TracedPath, sign: np.ndarray) -> None:
-        self.path = path.take(np.argsort(path.particle, kind="stable"))
+        self.path = part_of(path, np.argsort(path.particle, kind="stable"))
         self.sign = sign
         particle, length = self.path.particle, self.path.length
         # Distances along all paths, one after another.
@@ -128,7 +129,7 @@ class SampledPath:
         begin = self._end - path.length - self._start[path.particle]
         fraction = (arc[path.particle] - begin) / np.where(path.length > 0, path.length, 1)
         kept = np.flatnonzero(fraction > ARC_EPS)
-        path, fraction = path.take(kept), fraction[kept]
+        path, fraction = part_of(path, kept), fraction[kept]
         is_cut = fraction < 1 - ARC_EPS
         begin, end = path.begin_weights, path.end_weights
         end = np.where(is_cut[:, None], begin + fraction[:, None] * (end - begin), end)

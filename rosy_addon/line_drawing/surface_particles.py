@@ -7,12 +7,13 @@ field at its midpoint (the midpoint rule) and is short enough that the field rot
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
 import numpy as np
 
+from ..field.blocks import joined
+from ..projection.pixel_blocks import part_of
 from .tangent_mesh import ZERO_FIELD_RATIO, TangentMesh, nearest_member
 
 #: Largest angle by which the field rotates along a segment, in radians, as estimated at the start of the
@@ -111,15 +112,6 @@ class TracedPath(NamedTuple):
     member: np.ndarray
     length: np.ndarray
 
-    def take(self, indices: np.ndarray) -> TracedPath:
-        """Return the segments with the given indices."""
-        return TracedPath(*(column[indices] for column in self))
-
-    @staticmethod
-    def concatenate(paths: Sequence[TracedPath]) -> TracedPath:
-        """Return the segments of all paths, one after another."""
-        return TracedPath(*(np.concatenate(column) for column in zip(*paths, strict=True)))
-
 
 def advance(
     mesh: TangentMesh,
@@ -176,14 +168,14 @@ def advance(
             mesh, current, max_length, max_segment_length[active], rotation[active]
         )
         path = TracedPath(active, *current.columns[:2], weights, direction, member, step)
-        paths.append(path.take(~stuck))
+        paths.append(part_of(path, ~stuck))
         current.weights, current.member = weights, member
         remaining[active] -= step
         stopped = stuck | _cross_edges(mesh, current, edge)[0]
         result.assign(active[~stuck], current.take(~stuck))
         ended[active[stopped]] = True
         active = active[~stopped & (remaining[active] > 1e-9 * length[active])]
-    return result, length - remaining, ended, TracedPath.concatenate(paths)
+    return result, length - remaining, ended, joined(paths)
 
 
 def trace_geodesics(

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core.errors import RosyError
 from ..core.progress import progress, report
-from ..field.blocks import mask
+from ..field.blocks import joined, mask
 from ..field.formats.polygons import offsets_from_sizes
 from ..field.frames import dot, normalize
 from .lateral_neighbors import SeparationRules
@@ -389,7 +389,7 @@ def _trace_loops(
         total_walked[active] += walked
         active = active[~ended & (walked > 0)]
     end = mesh.points_at(particles.triangle, particles.weights)
-    return TracedPath.concatenate(paths), _left_offset(strokes, first, end), passed
+    return joined(paths), _left_offset(strokes, first, end), passed
 
 
 def _particles_at_start(mesh: TangentMesh, strokes: Strokes, first: np.ndarray) -> SurfaceParticles:

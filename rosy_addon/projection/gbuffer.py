@@ -94,20 +94,11 @@ class SurfacePoints(NamedTuple):
     triangle: np.ndarray
     barycentric: np.ndarray
 
-    def part(self, chosen: np.ndarray) -> SurfacePoints:
-        """Return the points that a mask or an array of indices selects."""
-        return SurfacePoints(*(column[chosen] for column in self))
-
     @staticmethod
     def of(instance_id: int, triangle: np.ndarray, barycentric: np.ndarray) -> SurfacePoints:
         """Return points on one instance, given their (P,) triangles and (P, 3) barycentric coordinates."""
         instance_ids = np.full(len(triangle), instance_id, dtype=np.int32)
         return SurfacePoints(instance_ids, triangle, barycentric)
-
-    @staticmethod
-    def concatenate(parts: list[SurfacePoints]) -> SurfacePoints:
-        """Return the points of all parts, in their order."""
-        return SurfacePoints(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
 class PixelCoverage(NamedTuple):

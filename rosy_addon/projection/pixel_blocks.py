@@ -46,7 +46,12 @@ def reported_blocks(
 
 
 def part_of(record: Record, index: Any) -> Record:
-    """Return a copy of a dataclass in which each array is replaced by ``array[index]``, also in dicts."""
+    """Return a copy of a record in which each array is replaced by ``array[index]``.
+
+    `record` is a named tuple of arrays, or a dataclass. Arrays in dicts of a dataclass are replaced, too.
+    """
+    if isinstance(record, tuple):
+        return type(record)(*(array[index] for array in record))
 
     def parts(values: Mapping[Any, Any]) -> dict[Any, Any]:
         return {key: value[index] for key, value in values.items() if isinstance(value, np.ndarray)}

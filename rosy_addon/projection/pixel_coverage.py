@@ -14,7 +14,7 @@ import numpy as np
 from .barycentrics import LABEL
 from .camera import Camera, pixel_rays, z_at_depth
 from .gbuffer import GBuffer, PixelCoverage, PixelSamples
-from .pixel_blocks import pixel_blocks, reported_blocks
+from .pixel_blocks import part_of, pixel_blocks, reported_blocks
 from .pixel_neighbors import PixelTable, depth_slopes
 from .rasterized_samples import SampledTriangles
 
@@ -50,10 +50,6 @@ class _OtherSamples(NamedTuple):
     depth: np.ndarray
     instance_id: np.ndarray
     normal: np.ndarray
-
-    def part(self, index: np.ndarray | slice) -> _OtherSamples:
-        """Return the samples with the given indices."""
-        return _OtherSamples(*(values[..., index] for values in self))
 
 
 class _Entries(NamedTuple):
@@ -113,17 +109,17 @@ def pixel_coverage(
     entry = others.entry.copy()
     elsewhere = []
     for block in reported_blocks(len(entry), LABEL, 0.0, 0.7):
-        shown = entries.shows(entry[block], others.part(block))
+        shown = entries.shows(entry[block], part_of(others, (..., block)))
         elsewhere.append(block.start + np.flatnonzero(~shown))
     elsewhere = np.concatenate([np.empty(0, dtype=np.intp), *elsewhere])
     for block in reported_blocks(len(elsewhere), LABEL, 0.7, 1.0):
         part = elsewhere[block]
-        sample, home = others.part(part), entry[part]
+        sample, home = part_of(others, (..., part)), entry[part]
         nearest = np.full(len(part), np.inf, dtype=np.float32)
         for dx, dy in NEIGHBORS:
             neighbor = table.beside(home, dx, dy)
             exists = np.flatnonzero(neighbor >= 0)
-            exists = exists[entries.shows(neighbor[exists], sample.part(exists))]
+            exists = exists[entries.shows(neighbor[exists], part_of(sample, (..., exists)))]
             candidate = neighbor[exists]
             x, y = entries.x[candidate] - sample.x[exists], entries.y[candidate] - sample.y[exists]
             distance = x * x + y * y

@@ -62,7 +62,10 @@ def fill_pixels(
             np.conjugate(z, out=z, where=~front_facing)
         z *= signed_power(rotation, order)
         if channel == REPRESENTATION:
-            z *= _scale_to_magnitude(corner_field, triangle, weights, z)
+            # The modulus of z is smaller where directions differ, as around singularities.
+            corners = zip(weights, corner_field.magnitude, strict=True)
+            magnitude = sum(weight * corner.take(triangle) for weight, corner in corners)
+            z *= quotient(magnitude, np.abs(z))
         _channel_pixels(gbuffer, channel)[pixels] = z
     gbuffer.normal[pixels] = normal.T
     gbuffer.geometric_normal[pixels] = geometric_normal.T
@@ -152,20 +155,6 @@ def _interpolated_values(
     z0 += z1
     z0 += z2
     return z0
-
-
-def _scale_to_magnitude(
-    corner_field: CornerField, triangle: np.ndarray, weights: np.ndarray, z: np.ndarray
-) -> np.ndarray:
-    """Return the (P,) float32 factors that give z the modulus of the interpolated magnitude.
-
-    `triangle`, (P,), and `weights`, (3, P), are the triangles and barycentric coordinates of pixels, and `z`,
-    (P,), is the representation interpolated there. Its modulus is smaller where directions differ, as around
-    singularities.
-    """
-    corners = zip(weights, corner_field.magnitude, strict=True)
-    magnitude = sum(weight * corner.take(triangle) for weight, corner in corners)
-    return quotient(magnitude, np.abs(z))
 
 
 def _squared_phase(half: np.ndarray) -> np.ndarray:

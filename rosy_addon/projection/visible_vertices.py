@@ -58,10 +58,6 @@ class ProjectedPoints(NamedTuple):
     is_in_view: np.ndarray
     is_visible: np.ndarray
 
-    def part(self, chosen: np.ndarray) -> ProjectedPoints:
-        """Return the points that a mask or an array of indices selects."""
-        return ProjectedPoints(*(column[chosen] for column in self))
-
 
 def project_vertices(
     instances: MeshInstances,

@@ -363,12 +363,9 @@ class SceneReader:
             self.notes[owner.name_full] = note
         return field
 
-    def _with_rest(self, surface: Surface, rest: np.ndarray | None) -> Surface:
-        """Return a surface with rest positions.
-
-        If they are None or equal to the positions of the surface, return the surface itself.
-        """
-        if rest is None or np.array_equal(rest, surface.vertices):
+    def _with_rest(self, surface: Surface, rest: np.ndarray) -> Surface:
+        """Return a surface with rest positions: the surface itself if they are equal to its positions."""
+        if np.array_equal(rest, surface.vertices):
             return surface
         rest = np.asarray(rest, dtype=np.float64)
         with_rest = partial(surface.with_parts, rest_vertices=rest)

@@ -8,7 +8,7 @@ import bpy
 
 from ..core.errors import RosyError
 from ..worker.job import Step, Steps, job
-from ..worker.program import run_program
+from ..worker.program import run_encoder
 from . import video_encoding
 
 
@@ -37,9 +37,8 @@ def encode_video(
     RosyError
         If this build of Blender cannot encode the video.
     """
-    label = "encoding the video"
     if bpy.app.background or not bpy.app.binary_path:
-        yield Step(0.0, label)
+        yield Step(0.0, "encoding the video")
         try:
             video_encoding.encode_video(folder, count, size, fps, path)
         except (RuntimeError, TypeError, AttributeError) as reason:
@@ -48,7 +47,4 @@ def encode_video(
     command = [bpy.app.binary_path, "-b", "--factory-startup", "--python-exit-code", "1"]
     command += ["--python", video_encoding.__file__, "--"]
     command += map(str, (folder, count, *size, repr(fps), path))
-    status, output = yield from run_program.begin(command, label)
-    if status or not path.is_file():
-        message = (output.strip().splitlines() or ["it failed"])[-1]
-        raise RosyError(f"{path}: this Blender cannot encode a video: {message}")
+    yield from run_encoder.begin(command, f"{path}: this Blender cannot encode a video", path)

@@ -1,11 +1,13 @@
-"""`run_program`: runs another program as part of a job."""
+"""Run another program as part of a job."""
 
 from __future__ import annotations
 
 import subprocess
 from collections.abc import Sequence
 from contextlib import suppress
+from pathlib import Path
 
+from ..core.errors import RosyError
 from .job import Step, Steps, job
 from .lifeline import Lifeline
 
@@ -39,3 +41,27 @@ def run_program(command: Sequence[str], label: str) -> Steps[tuple[int, str]]:
                 process.wait(WAIT_SECONDS)
         log.seek(0)
         return process.returncode, log.read().decode(errors="replace")
+
+
+@job
+def run_encoder(command: Sequence[str], failure: str, result: Path | None = None) -> Steps[None]:
+    """Run a program that encodes a video, with `run_program`.
+
+    Parameters
+    ----------
+    command : sequence of str
+        The program and its arguments.
+    failure : str
+        Start of the error message if the program fails. It ends with the last line that the program printed.
+    result : Path, optional
+        The file that the program must have written.
+
+    Raises
+    ------
+    RosyError
+        If the program fails.
+    """
+    status, output = yield from run_program.begin(command, "encoding the video")
+    if status or (result is not None and not result.is_file()):
+        message = (output.strip().splitlines() or ["it failed"])[-1]
+        raise RosyError(f"{failure}: {message}")

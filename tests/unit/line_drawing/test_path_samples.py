@@ -11,6 +11,7 @@ from rosy_addon.line_drawing.seeding import candidate_seeds, thinned_seeds
 from rosy_addon.line_drawing.spacing import CornerSpacing
 from rosy_addon.line_drawing.surface_particles import advance
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
+from rosy_addon.projection.pixel_blocks import part_of
 
 
 def test_samples_of_a_straight_path():
@@ -50,7 +51,7 @@ def test_samples_of_a_straight_path():
 
     # Paths that are much shorter than a step, and begin with a segment without length.
     first = np.unique(path.path.particle, return_index=True)[1]
-    short = path.path.take(np.repeat(first, 2))
+    short = part_of(path.path, np.repeat(first, 2))
     short.length[::2], short.length[1::2] = 0, 1e-12
     short.end_weights[:] = short.begin_weights
     samples = SampledPath(short, seeds.sign).samples(np.full(len(seeds), 0.1), next_step, ended)

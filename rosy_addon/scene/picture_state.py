@@ -51,7 +51,7 @@ class PictureState:
     Attributes
     ----------
     look : dict
-        Values of the settings of the look, by name. Settings without an effect have their defaults.
+        Values of the settings of the look that have an effect, by name.
     size : list of int
         Width and height in pixels.
     camera : str
@@ -137,7 +137,7 @@ class SceneState:
         self._texture_states: dict[tuple, PictureState] = {}
         look = read_look(scene.rosy)
         request, targets = read_request(scene, look), drawn_objects(depsgraph)
-        self._lights = _light_digests(depsgraph) if _uses_lights(look) else {}
+        self._lights = _light_digests(depsgraph) if look.light == "scene" else {}
         for instance, draws_field in rendered_instances(depsgraph, targets):
             obj, owner = instance.object, instance.object.original
             mesh_request = request if draws_field else None
@@ -171,12 +171,13 @@ class SceneState:
         if is_relit:
             look = unlit_look(look)
         settings = applied_settings(look, self._lacks_tone)
+        lights = self._lights if settings.get("light") == "scene" else {}
         output = _used_output(scene.rosy, OUTPUT_PROPERTIES) | {"relight": is_relit}
         output["over_material"] &= is_hatched(look)
-        output["exposure"] = scene.rosy.exposure if self._lights else 0.0
+        output["exposure"] = scene.rosy.exposure if lights else 0.0
         if is_frame:
             del output["placement"]  # frames always fill the frame of the camera
-        occluders = self._used_occluders(camera, settings["shadows"] or bool(self._lights))
+        occluders = self._used_occluders(camera, bool(settings.get("shadows") or lights))
         has_reference = settings["tone"] == "picture"
         return PictureState(
             look=settings,
@@ -186,7 +187,7 @@ class SceneState:
             device="cpu" if is_relit else scene.rosy.device.lower(),
             objects={name: instances.digest_pair() for name, instances in self._fields.items()},
             occluders={name: instances.digest_pair() for name, instances in occluders.items()},
-            lights=self._lights if settings["light"] == "scene" else {},
+            lights=lights,
             reference=_reference_digest(scene, depsgraph) if has_reference else "",
         )
 
@@ -290,11 +291,6 @@ def _used_output(settings: PropertyGroup, names: Iterable[str]) -> dict:
     return {name: getattr(settings, name) for name in names if name != "directory" or not is_packed}
 
 
-def _uses_lights(look: Look) -> bool:
-    """Return whether a look is lit by the lights of the scene."""
-    return look.light == "scene" and look.shading > 0
-
-
 def settings_key(scene: Scene, view_layer: ViewLayer) -> tuple:
     """Return the settings on which a `SceneState` depends. Blender does not report all changes of them."""
     look = read_look(scene.rosy)
@@ -304,11 +300,11 @@ def settings_key(scene: Scene, view_layer: ViewLayer) -> tuple:
         image_key = image and (image.session_uid, *image.size, image.is_dirty)
         tone_key = image_key, obj.rosy.tone_uv_map
         objects.append((obj.session_uid, attribute_name(mesh), field_degree(mesh), tone_key))
-    return read_request(scene, look), _uses_lights(look), tuple(objects)
+    return read_request(scene, look), look.light, tuple(objects)
 
 
 def applied_settings(look: Look, lacks_tone: bool = False) -> dict:
-    """Return the settings of a look by name. Settings that have no effect get their defaults.
+    """Return the settings of a look that have an effect, by name.
 
     Parameters
     ----------
@@ -319,8 +315,9 @@ def applied_settings(look: Look, lacks_tone: bool = False) -> dict:
     """
     drawn_look = replace(look, tone_lit=True) if lacks_tone else look
     return {
-        name: getattr(look, name) if setting.applies(drawn_look) else setting.default
+        name: getattr(look, name)
         for name, setting in settings_of(Look).items()
+        if setting.applies(drawn_look)
     }
 
 

@@ -129,8 +129,8 @@ def difference(recorded: PictureState, present: PictureState, source: str) -> st
         return f"{source} was changed"
     reason = (
         _object_difference(recorded.objects, present.objects, of_mesh="the mesh or field of ")
-        or _object_difference(recorded.occluders, present.occluders)
         or _object_difference(recorded.lights, present.lights, kind="light ")
+        or _object_difference(recorded.occluders, present.occluders)
     )
     if reason:
         return reason

@@ -72,7 +72,7 @@ CHANGES = {
     "hue of magnitude": (look("hue", "magnitude"), []),
     "gain": (look("gain", 1.0), []),
     "shading": (look("shading", 0.2), []),
-    "light": (look("light", "scene"), []),
+    "light": (look("light", "lamp"), []),
 }
 
 

@@ -55,7 +55,7 @@ def pair(other_bend=0.0, bend=0.0, zoom=1.0):
 
 
 #: The light is even, because shading does not move with the surface.
-STEADY = replace(INK, light="scene", shading=0.35, gain=1.2, crispness=0.5)
+STEADY = replace(INK, shading=0.0, tone_levels=(0.0, 1 / 0.65, 1.0), gain=1.2, crispness=0.5)
 LOOKS = {
     "hatch": STEADY,
     "uneven": replace(STEADY, wobble=1.0, breaks=0.3),
@@ -95,7 +95,9 @@ def line_width(picture):
 )
 def test_widths_of_lines_through_a_zoom(unit_size, zooms):
     """They are constant in pixels, or proportional to the zoom; in between, lines of two widths mix."""
-    look = replace(INK, light="scene", shading=0.4, unit_size=unit_size, supersampling=1)
+    look = replace(
+        INK, shading=0.0, tone_levels=(0.0, 1 / 0.6, 1.0), unit_size=unit_size, supersampling=1
+    )
     widths = []
     for zoom in zooms:
         camera = camera_before_wall(8 / zoom, 0.3, 0.2).resized(384, 384)

@@ -174,7 +174,15 @@ def test_samples_show_what_numpy_draws(card, preset):
 @pytest.mark.parametrize("paper", ["#ffffff00", "#e0c08080"])
 @pytest.mark.parametrize("hue", ["one", "families"])
 def test_ink_on_paper_that_is_not_opaque(card, hue, paper):
-    look = replace(LOOK, ink="hatch", shading=1.0, paper_color=paper, hue=hue, line_width=3.0)
+    look = replace(
+        LOOK,
+        ink="hatch",
+        shading=1.0,
+        paper_color=paper,
+        hue=hue,
+        line_width=3.0,
+        light="headlight",
+    )
     pair = draw_pair(card, [ball()], view(), look)
     card_alpha, numpy_alpha = (picture[..., 3] for picture in (pair.card, pair.numpy))
     assert 0.2 < numpy_alpha[numpy_alpha > 0].mean() < 0.8
@@ -198,7 +206,7 @@ def test_lights_of_the_scene(card, lights, perspective):
 
 
 def test_a_headlight_ignores_lights(card):
-    look = replace(LOOK, shading=0.8)
+    look = replace(LOOK, shading=0.8, light="headlight")
     dark, lit = (card_rgba(card, [ball()], look, lights=lights) for lights in ((), (SUN,)))
     np.testing.assert_array_equal(dark, lit)
 
@@ -212,9 +220,10 @@ def test_shadows(card, ink):
         ball(4, 0.5, (-0.5, 0.2, 0)),
         shown(BALL, None, 0.3, (0.6, -0.3, 0.1)),
     ]
-    look = replace(LOOK, light="scene", shading=0.9, shadows=True, ink=ink)
+    look = replace(LOOK, light="scene", shading=0.9, ink=ink)
     shaded = assert_parity(card, instances, look=look, lights=[SUN, POINT], agreement=0.995)
-    bare = card_rgba(card, instances, replace(look, shadows=False), lights=(SUN, POINT))
+    without = [replace(light, has_shadow=False) for light in (SUN, POINT)]
+    bare = card_rgba(card, instances, look, lights=tuple(without))
     assert shaded.card[..., :3].mean() < 0.98 * bare[..., :3].mean()
 
 

@@ -132,7 +132,6 @@ def test_command_line(tmp_path, capsys, monkeypatch):
         (["-o", str(tmp_path / "ball.png")], "ball.png"),
         (["--camera", "Close"], "ball.off: --camera applies only to .blend files"),
         (["--frames", "1-3"], "ball.off: --frames applies only to .blend files"),
-        (["--set", "light=scene"], "ball.off: has no lights"),
         (["--set", "taper=-1"], "setting 'taper' is -1.0, expected a number from 0"),
     ):
         assert main([*command, *arguments]) == 2 and message in capsys.readouterr().err

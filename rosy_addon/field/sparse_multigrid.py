@@ -63,7 +63,7 @@ class Level:
     inverse: np.ndarray | None
 
 
-def hierarchy(matrix: CSRMatrix) -> list[Level]:
+def hierarchy(matrix: CSRMatrix, direct_size: int = DIRECT_SOLVE_SIZE) -> list[Level]:
     """Build the multigrid levels of a positive definite matrix.
 
     Coarsening stops when a level is small enough for a dense inverse, or when aggregation no longer
@@ -73,6 +73,8 @@ def hierarchy(matrix: CSRMatrix) -> list[Level]:
     ----------
     matrix : CSRMatrix
         The (n, n) matrix, Hermitian.
+    direct_size : int
+        A level with at most this number of unknowns is the coarsest one.
 
     Returns
     -------
@@ -88,11 +90,15 @@ def hierarchy(matrix: CSRMatrix) -> list[Level]:
         report(parts[0], label)
         jacobi_weight = _jacobi_weights(matrix)
         aggregation = None
-        if len(matrix) > DIRECT_SOLVE_SIZE:
+        if len(matrix) > direct_size:
             with progress(parts[0], parts[1], label):
                 aggregation = _aggregates(matrix)
         if aggregation is None or aggregation[1] > 0.8 * len(matrix):
-            inverse = dense_inverse(matrix) if len(matrix) <= 4 * DIRECT_SOLVE_SIZE else None
+            inverse = (
+                dense_inverse(matrix)
+                if len(matrix) <= max(4 * DIRECT_SOLVE_SIZE, direct_size)
+                else None
+            )
             levels.append(Level(matrix, None, jacobi_weight, inverse))
             return levels
         with progress(parts[1], parts[2], label):

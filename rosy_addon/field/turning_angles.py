@@ -26,7 +26,7 @@ from .conjugate_gradient import conjugate_gradient
 from .connectivity import connected_components
 from .face_graph import LABEL, FaceGraph, SpanningForest, spanning_forest, triangle_graph
 from .sparse_matrix import CSRMatrix, from_edges
-from .sparse_multigrid import hierarchy, w_cycle
+from .sparse_multigrid import DIRECT_SOLVE_SIZE, hierarchy, w_cycle
 
 #: Residual norm at which the solver stops, relative to the norm of the right-hand side.
 TOLERANCE = 1e-10
@@ -50,6 +50,9 @@ MIN_EIGENVALUE = 1e-8
 
 #: With at most this number of loops, the search also changes the multiples of 2 pi / N of two loops at once.
 MAX_PAIRED_LOOPS = 20
+
+#: Largest number of unknowns of a dense inverse: 8 MB, a tenth of a second.
+MAX_DENSE_SIZE = 1000
 
 #: Loops of faces. Each is an array of the edges that it crosses, and an array of signs: 1 for an edge that is
 #: crossed from its source to its target, -1 otherwise.
@@ -175,7 +178,7 @@ def least_angles(
     or is 0. `degree` is N.
     """
     with progress(0.0, 0.5):
-        solver = potential_solver(graph)
+        solver = potential_solver(graph, direct_size=len(loops) * DIRECT_SOLVE_SIZE)
     share = 0.5 / (len(loops) + 1)
     with progress(0.5, 0.5 + share):
         drop = graph.drop(solver(required))
@@ -204,19 +207,21 @@ def _sums_around(loops: Loops, angle: np.ndarray) -> np.ndarray:
 
 
 def potential_solver(
-    graph: FaceGraph, tolerance: float = TOLERANCE
+    graph: FaceGraph, tolerance: float = TOLERANCE, direct_size: int = 0
 ) -> Callable[[np.ndarray], np.ndarray]:
     """Return a function that solves the Poisson equation of a graph.
 
     It takes the (n,) sums of angles around the interior nodes, in radians, and returns the (n,) potential at
     the nodes. The solver stops when the residual norm is `tolerance` times the norm of the right-hand side.
+    `direct_size` is the number of unknowns up to which a dense inverse pays, as there are many solutions.
     """
     matrix = levels = None
     if graph.is_interior.any():
         with progress(0.0, 0.2):
             matrix = _potential_matrix(graph)
         with progress(0.2, 1.0):
-            levels = hierarchy(matrix)
+            sizes = DIRECT_SOLVE_SIZE, min(direct_size, MAX_DENSE_SIZE)
+            levels = hierarchy(matrix, max(sizes))
 
     def solve(sums: np.ndarray) -> np.ndarray:
         potential = np.zeros(graph.node_count)

@@ -39,6 +39,9 @@ VALUE_SHAPES = {
     "INT32_2D": (2, "i"),
 }
 
+#: Meshes with at most this number of faces may be meant to be shaded flat.
+FEW_FACES = 50
+
 #: Attribute in which Blender stores which edges are selected.
 EDGE_SELECTION_ATTRIBUTE = ".select_edge"
 
@@ -229,6 +232,16 @@ def evaluated_mesh(obj: Object) -> Iterator[Mesh | None]:
         yield mesh if mesh is not None and len(mesh.polygons) else None
     finally:
         obj.to_mesh_clear()
+
+
+def is_shaded_flat(mesh: Mesh) -> bool:
+    """Return whether the first face of a mesh of more than `FEW_FACES` is shaded flat.
+
+    Only one value is read, so that panels can ask at each redraw.
+    """
+    sharp = mesh.attributes.get("sharp_face")
+    is_sharp = sharp is not None and sharp.domain == "FACE" and sharp.data_type == "BOOLEAN"
+    return is_sharp and len(sharp.data) > FEW_FACES and sharp.data[0].value
 
 
 def marked_edges(mesh: Mesh, mark: str) -> np.ndarray:

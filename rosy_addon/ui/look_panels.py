@@ -1,4 +1,4 @@
-"""The panels of the look of pictures: presets, settings of the look, output, and the key (legend)."""
+"""The panels of the look of pictures: presets, settings of the look, output, and the legend."""
 
 from __future__ import annotations
 
@@ -218,7 +218,7 @@ def _draw_tone_source(column: UILayout, context: Context) -> None:
 class VIEW3D_PT_rosy_look_key(sidebar.SidebarPanel, Panel):
     """The key (legend) that explains a picture in renders."""
 
-    bl_label = "Key"
+    bl_label = "Legend"
     bl_parent_id = "VIEW3D_PT_rosy_look"
     bl_options = {"DEFAULT_CLOSED"}
 

@@ -12,6 +12,7 @@ from ..scene.bake_records import BakeInfo, has_pictures, list_bakes
 from ..scene.computed_attributes import other_field_names
 from ..scene.datablocks import field_mesh
 from ..scene.field_attributes import has_field
+from ..scene.meshes import is_shaded_flat
 from ..scene.pictures import NEUTRAL_VIEW_TRANSFORMS
 from ..scene.staleness import SCENE_STATES
 from ..scene.visible_objects import field_objects
@@ -19,6 +20,9 @@ from ..viewport import session
 from ..viewport.view3d import redraw
 from . import job_status, overlay, sidebar
 from .operator_settings import draw_convert_settings, draw_generator_settings, draw_settings
+
+#: Types of objects that Blender can convert to meshes.
+CONVERTIBLE_TYPES = ("CURVE", "SURFACE", "FONT", "META")
 
 #: Types of viewport shading in which a 3D view does not show baked pictures.
 SHADING_WITHOUT_MATERIALS = ("WIREFRAME", "SOLID")
@@ -41,7 +45,10 @@ class VIEW3D_PT_rosy(sidebar.SidebarPanel, Panel):
 def _draw_field_section(layout: UILayout, context: Context) -> None:
     obj = context.view_layer.objects.active
     layout.label(text="1.  Field", icon="FORCE_VORTEX")
-    if obj is None or obj.type != "MESH":
+    if obj is not None and obj.type in CONVERTIBLE_TYPES:
+        layout.label(text=f"{obj.name} is not a mesh", icon="INFO")
+        layout.operator("object.convert", text="Convert to Mesh", icon="MESH_DATA").target = "MESH"
+    elif obj is None or obj.type != "MESH":
         layout.label(text="Select a mesh to draw on")
     elif has_field(obj):
         _draw_existing_field(layout, context, obj)
@@ -60,6 +67,9 @@ def _draw_existing_field(layout: UILayout, context: Context, obj: Object) -> Non
     name = f"'{mesh.rosy.attribute}'" if has_attribute else "dir0 ..."
     faces = counted(len(mesh.polygons), "face")
     box.label(text=f"Degree {mesh.rosy.degree} on {faces}, {name}")
+    if is_shaded_flat(obj.data):
+        layout.label(text="Faces are shaded flat: each is seen", icon="INFO")
+        layout.operator("object.shade_smooth_by_angle", icon="SMOOTHCURVE")
     row = layout.row(align=True)
     row.operator("rosy.field_export", text="Export", icon="EXPORT")
     is_shown = overlay.shown(obj) is not None
@@ -130,10 +140,17 @@ def _draw_bakes(layout: UILayout, context: Context) -> None:
         bpy.app.timers.register(redraw, first_interval=wait)  # the panel may be outdated
     for bake in bake_infos:
         _draw_bake_info(layout, context, bake, several=len(bake_infos) > 1)
-    if objects:
-        layout.prop(context.scene.rosy, "camera")
-        if len(objects) > 1:
-            layout.label(text=f"Draws {len(objects)} objects")
+    settings = context.scene.rosy
+    if objects and settings.camera == "SCENE" and context.scene.camera is None:
+        layout.label(text="The scene has no camera", icon="INFO")
+        button = layout.operator(
+            "wm.context_set_enum", text="Draw from Current View", icon="VIEW3D"
+        )
+        button.data_path, button.value = "scene.rosy.camera", "VIEW"
+    elif objects:
+        layout.prop(settings, "camera")
+    if len(objects) > 1:
+        layout.label(text=f"Draws {len(objects)} objects")
     row = sidebar.new_row(layout, scale_y=1.5)
     row.operator("rosy.bake", text=bake_label(bake_infos), icon="RENDER_STILL")
     row = layout.row(align=True)

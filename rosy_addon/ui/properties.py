@@ -292,7 +292,7 @@ class RosyScene(bpy.types.PropertyGroup):
         update=_show_backdrops,
     )
     key: toggle(
-        "Key",
+        "Legend",
         "Explain the pictures in renders: a color bar, a legend of the singularities, a scale bar "
         "and a caption, on a plane in front of each camera that has a picture",
         update=_show_keys,

@@ -29,7 +29,13 @@ from rosy.rosy_addon.scene.guides import (
     store_combed_guides,
 )
 from rosy.rosy_addon.scene.mesh_fields import read_mesh_field, write_mesh_field
-from rosy.rosy_addon.scene.meshes import EDGE_MARKS, mark_sharp, marked_edges, mesh_surface
+from rosy.rosy_addon.scene.meshes import (
+    EDGE_MARKS,
+    is_shaded_flat,
+    mark_sharp,
+    marked_edges,
+    mesh_surface,
+)
 from rosy.rosy_addon.scene.read_view import read_lights
 from rosy.rosy_addon.scene.scene_reader import read_scene
 from rosy.rosy_addon.scene.visible_objects import drawn_objects, field_objects
@@ -409,6 +415,13 @@ def test_a_field_that_was_made_for_other_faces_is_said(scene, monkey):
     expect_error("stored as angles: make the field again", read_scene, depsgraph())
     modifier.levels = 0
     assert not read_scene(depsgraph()).warnings
+
+
+def test_flat_shading_is_seen(scene, monkey):
+    """A new object is shaded flat. Few faces may be meant so."""
+    assert is_shaded_flat(monkey.data) and not is_shaded_flat(add_plane(cuts=2).data)
+    monkey.data.shade_smooth()
+    assert not is_shaded_flat(monkey.data)
 
 
 def test_lights(scene):

@@ -418,7 +418,8 @@ def test_a_field_that_was_made_for_other_faces_is_said(scene, monkey):
 
 
 def test_flat_shading_is_seen(scene, monkey):
-    """A new object is shaded flat. Few faces may be meant so."""
+    """Few faces may be meant so."""
+    monkey.data.shade_flat()
     assert is_shaded_flat(monkey.data) and not is_shaded_flat(add_plane(cuts=2).data)
     monkey.data.shade_smooth()
     assert not is_shaded_flat(monkey.data)

@@ -7,6 +7,9 @@ shorter distances, after each of which the field gets length 1 again (Merriman, 
 and Osting 2019). This moves singularities and cancels pairs. Then the angles descend to a local minimum, and the field with
 the least energy is taken. All this is done on a coarse multigrid level. On each finer level, the field is diffused over
 shorter distances and descends again.
+
+Eigenvectors of a torus have zeros, and descend to fields with singularities. So a closed component of this kind also has
+another start: the field without singularities that turns least.
 """
 
 from __future__ import annotations
@@ -21,12 +24,14 @@ from ..core.errors import RosyError
 from ..core.memory import raise_mmap_threshold
 from ..core.progress import progress, report
 from .conjugate_gradient import conjugate_gradient
+from .face_graph import face_graph
 from .free_rotation import freely_rotated
 from .representation import complex_bincount, from_representation, is_tie, unit_complex
 from .rosy_field import RosyField, check_degree
 from .sparse_matrix import CSRMatrix
 from .sparse_multigrid import Level, hierarchy, w_cycle
 from .surface import Surface
+from .turning_angles import turning_angles
 from .unit_descent import CHOICE_GAIN, FEW_FACES, FaceEnergy, descend, face_energy, least_of_few
 
 #: The eigensolver stops when the eigenvector changes by less than this in an iteration (the sine of an angle), so that the
@@ -46,6 +51,9 @@ START_COUNT, START_UNKNOWNS = 4, 500
 #: Of starts whose energies differ by less than this part, the first is taken. With 0.01, less symmetric fields with up to 4 %
 #: less energy are chosen, and the energies of fields on twelve meshes are equal on average.
 EQUAL_ENERGY = 0.05
+
+#: On a torus, the field without singularities is taken if its energy is less by this part.
+LESS_ENERGY = 1e-3
 
 #: Largest part of the weights that the gradient is at a saddle: a rounding error. Standard deviation of the random angles,
 #: in radians, that are added there.
@@ -100,9 +108,35 @@ def smoothest_field(surface: Surface, degree: int) -> RosyField:
     with progress(0.8, 0.95):
         z = np.where(is_defined, z, 0)
         z = least_of_few(energy, z) if len(z) <= FEW_FACES else descend(energy, z)
+        z = _with_smooth_tori(surface, degree, energy, z)
     report(0.95, "rotating the field")
     z = freely_rotated(surface, z, degree)
     return RosyField(degree, from_representation(z, x, y, degree))
+
+
+def _with_smooth_tori(
+    surface: Surface, degree: int, energy: FaceEnergy, z: np.ndarray
+) -> np.ndarray:
+    """Return (F,) representations of modulus 1: without singularities on tori, if that has less energy.
+
+    Tori are the closed components of Euler characteristic 0. On all others, the result is `z`.
+    """
+    component = energy.component
+    corner_component, count = component[surface.corner_face], int(component.max()) + 1
+    vertex_component = np.zeros(len(surface.vertices), dtype=component.dtype)
+    vertex_component[surface.corner_vertex] = corner_component
+    elements = vertex_component[surface.used_vertices], component[energy.source], component
+    vertices, edges, faces = (np.bincount(each, minlength=count) for each in elements)
+    is_closed = np.bincount(corner_component, minlength=count) == 2 * edges
+    on_torus = (is_closed & (vertices - edges + faces == 0))[component]
+    if not on_torus.any():
+        return z
+    graph = face_graph(surface, on_torus)
+    _, direction = turning_angles(graph, degree, -graph.defect)
+    smooth = descend(energy, np.where(on_torus, np.exp(1j * degree * direction), z))
+    energies = [energy.of_components(each, component) for each in (smooth, z)]
+    is_less = energies[0] < (1 - LESS_ENERGY) * energies[1]
+    return np.where(on_torus & is_less[component], smooth, z)
 
 
 def spectral_shift(mass: np.ndarray) -> float:

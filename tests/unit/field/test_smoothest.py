@@ -225,7 +225,9 @@ def test_coarse_start_reaches_the_energy_of_a_fine_one(monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize("degree", [2, 4])
 @pytest.mark.parametrize(
-    "surface", [bumpy(icosphere(4)), bumpy(torus(60, 30))], ids=["ball", "torus"]
+    "surface",
+    [bumpy(icosphere(4)), bumpy(torus(60, 30)), joined(icosphere(3), torus())],
+    ids=["ball", "torus", "both"],
 )
 def test_no_other_kind_has_less_energy(surface, degree):
     energy = dirichlet_energy(surface, smoothest_field(surface, degree))

@@ -125,7 +125,7 @@ def check_comparison(text):
 
 
 def check_drawing(text):
-    assert "8 singularities, sum of the indices 0" in text
+    assert "0 singularities, sum of the indices 0" in text
     assert "['field.npz', 'field.png', 'strokes.svg']" in text
     assert "'0.000000 degrees'" in text
 

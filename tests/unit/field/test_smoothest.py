@@ -214,7 +214,7 @@ def test_another_eigenvector_gives_less_energy():
 @pytest.mark.slow
 def test_coarse_start_reaches_the_energy_of_a_fine_one(monkeypatch):
     """The search starts on a coarse multigrid level."""
-    surface = bumpy(icosphere(4))
+    surface = bumpy(icosphere(3))
     energies = []
     for unknowns in (smoothest.START_UNKNOWNS, 50_000):
         monkeypatch.setattr(smoothest, "START_UNKNOWNS", unknowns)

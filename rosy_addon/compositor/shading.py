@@ -137,9 +137,10 @@ def metered(
             sum(light.luminance * light.irradiance(position, normal) for light in lights)
         )
     value, weight = np.concatenate(irradiance), np.concatenate(area)
-    order = np.argsort(value)[np.sort(value) > 0]
-    if not len(order):
+    lit = np.flatnonzero(value > 0)
+    if not len(lit):
         return tuple(lights)
+    order = lit[np.argsort(value[lit])]
     covered = np.cumsum(weight[order])
     white = value[order[np.searchsorted(covered, 0.9 * covered[-1])]]
     return tuple(replace(light, strength=light.strength * 2**exposure / white) for light in lights)

@@ -178,7 +178,8 @@ def least_angles(
     or is 0. `degree` is N.
     """
     with progress(0.0, 0.5):
-        solver = potential_solver(graph, direct_size=len(loops) * DIRECT_SOLVE_SIZE)
+        many = min(len(loops) * DIRECT_SOLVE_SIZE, MAX_DENSE_SIZE)
+        solver = potential_solver(graph, direct_size=max(many, DIRECT_SOLVE_SIZE))
     share = 0.5 / (len(loops) + 1)
     with progress(0.5, 0.5 + share):
         drop = graph.drop(solver(required))
@@ -207,21 +208,20 @@ def _sums_around(loops: Loops, angle: np.ndarray) -> np.ndarray:
 
 
 def potential_solver(
-    graph: FaceGraph, tolerance: float = TOLERANCE, direct_size: int = 0
+    graph: FaceGraph, tolerance: float = TOLERANCE, direct_size: int = DIRECT_SOLVE_SIZE
 ) -> Callable[[np.ndarray], np.ndarray]:
     """Return a function that solves the Poisson equation of a graph.
 
     It takes the (n,) sums of angles around the interior nodes, in radians, and returns the (n,) potential at
     the nodes. The solver stops when the residual norm is `tolerance` times the norm of the right-hand side.
-    `direct_size` is the number of unknowns up to which a dense inverse pays, as there are many solutions.
+    `direct_size` is the number of unknowns up to which a dense inverse pays: more if there are many solutions.
     """
     matrix = levels = None
     if graph.is_interior.any():
         with progress(0.0, 0.2):
             matrix = _potential_matrix(graph)
         with progress(0.2, 1.0):
-            sizes = DIRECT_SOLVE_SIZE, min(direct_size, MAX_DENSE_SIZE)
-            levels = hierarchy(matrix, max(sizes))
+            levels = hierarchy(matrix, direct_size)
 
     def solve(sums: np.ndarray) -> np.ndarray:
         potential = np.zeros(graph.node_count)

@@ -253,7 +253,7 @@ class SceneReader:
         if self.is_complete:
             owners = {entry.owner for entry in entries}
             for owner in faceless - owners:
-                self.errors.setdefault(owner.name_full, lost_field_error(owner, None))
+                self.errors.setdefault(owner.name_full, _lost_field_error(owner, None))
             names = {owner.name_full for owner in owners}
             self.notes = {name: note for name, note in self.notes.items() if name in names}
         # The instances of the last call are released only now: the keys have ids of surfaces, and while a
@@ -348,7 +348,7 @@ class SceneReader:
         name, degree = attribute_name(original), field_degree(original)
         names = [name] if name in original.attributes else direction_names(original)
         if not all(each in mesh.attributes for each in names):
-            raise lost_field_error(owner, name)
+            raise _lost_field_error(owner, name)
         is_angle = name in names and mesh.attributes[name].data_type == ANGLE_TYPE
         has_other_faces = undeformed is None or (original.is_editmode and user_modifiers(owner))
         if is_angle and has_other_faces:
@@ -372,7 +372,7 @@ class SceneReader:
         return cached(self.cache, with_rest, surface, "rest", rest)
 
 
-def lost_field_error(obj: Object, attribute: str | None) -> RosyError:
+def _lost_field_error(obj: Object, attribute: str | None) -> RosyError:
     """Return the error for an object whose modifiers remove an attribute.
 
     `attribute` is the name of the attribute. If it is None, the modifiers remove all faces.

@@ -68,7 +68,7 @@ def _draw_existing_field(layout: UILayout, context: Context, obj: Object) -> Non
     faces = counted(len(mesh.polygons), "face")
     box.label(text=f"Degree {mesh.rosy.degree} on {faces}, {name}")
     if is_shaded_flat(obj.data):
-        layout.label(text="Faces are shaded flat: each is seen", icon="INFO")
+        layout.label(text="Flat shading shows each face", icon="INFO")
         layout.operator("object.shade_smooth_by_angle", icon="SMOOTHCURVE")
     row = layout.row(align=True)
     row.operator("rosy.field_export", text="Export", icon="EXPORT")

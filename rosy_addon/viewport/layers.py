@@ -13,12 +13,14 @@ import numpy as np
 from bpy.types import Context, Depsgraph, Scene, ViewLayer
 
 from ..compositor.look import Look
+from ..compositor.shading import Light
 from ..compositor.target_tone import ReferenceRender
 from ..core.errors import REPORTED_ERRORS, RosyError, error_text
 from ..core.file_io import file_stamp
 from ..scene import look_inputs
 from ..scene.cameras import render_camera
 from ..scene.datablocks import field_mesh
+from ..scene.read_view import lights_for
 from ..scene.scene_reader import SceneInstance, SceneReader
 from ..scene.visible_objects import shown_instances
 
@@ -40,16 +42,19 @@ class LayerState:
     reader : SceneReader
     instances : list of SceneInstance
         The instances at the last reading.
-    request : tuple of (ReadRequest, bool), or None
-        The request with which the instances were read, and whether meshes without a field were read too, as
-        occluders. None if the instances must be read again.
+    lights : tuple of Light
+        The lights of the look, in world space; see `lights_for`.
+    request : tuple, or None
+        What was read: the request for the meshes, whether meshes without a field were read too, as occluders, and
+        the light and its exposure. None if all must be read again.
     is_starting : bool
         Whether the layer has not been read completely yet. Until then it is read in slices of time.
     """
 
     reader: SceneReader = field(default_factory=SceneReader)
     instances: list[SceneInstance] = field(default_factory=list)
-    request: tuple[look_inputs.ReadRequest, bool] | None = None
+    lights: tuple[Light, ...] = ()
+    request: tuple[look_inputs.ReadRequest, bool, str, float] | None = None
     is_starting: bool = True
 
 
@@ -76,13 +81,17 @@ class LayerStates:
             self._layers[key] = LayerState()
             return self._layers[key]
         layer = self._layers[key]
-        request = look_inputs.read_request(context.scene, look), include_occluders
+        scene = context.scene
+        light = look.light, scene.rosy.exposure
+        request = look_inputs.read_request(scene, look), include_occluders, *light
         if layer.request != request:
             layer.instances = layer.reader.read(
                 shown_instances(depsgraph, include_occluders=include_occluders),
                 request[0],
                 deadline=time.monotonic() + SLICE_SECONDS if layer.is_starting else math.inf,
             )
+            instances = [entry.instance for entry in layer.instances]
+            layer.lights = lights_for(scene, depsgraph, look, instances)
             layer.request = request if layer.reader.is_complete else None
             layer.is_starting &= not layer.reader.is_complete
         return layer

@@ -25,7 +25,6 @@ from ..scene.app_handlers import add_handlers, remove_handlers
 from ..scene.cameras import camera_of_view
 from ..scene.look_inputs import check_sources, read_request
 from ..scene.look_properties import drift_in_scene, read_look
-from ..scene.read_view import lights_for
 from ..worker.helper import Helper
 from . import overlays, view3d
 from .flow_clock import FlowClock
@@ -321,7 +320,6 @@ class ViewportSession:
         if look.tone == "picture" and reference is None:
             self._redraw_when(self._references.load_pending)
             return None
-        lights = lights_for(context.scene, depsgraph, look, [entry.instance for entry in visible])
         self._has_shown_flow |= has_flow(look)
         # Streaks drift with the frames of the scene, and with the clock.
         frame = context.scene.frame_current_final + self.flow_clock.frames
@@ -329,7 +327,7 @@ class ViewportSession:
             instances=tuple(entry.instance for entry in visible),
             camera=camera,
             look=look,
-            lights=tuple(light.transformed(camera.view) for light in lights),
+            lights=tuple(light.transformed(camera.view) for light in layer.lights),
             reference=reference,
             clip_planes=view3d.clip_planes(context.region_data),
             drift=drift_in_scene(context.scene, look, frame),

@@ -1,7 +1,5 @@
 """Measure how long a bake in Blender takes after a change of one setting, relative to a first bake."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Measure how long the command line takes for an animation with one process, relative to two processes."""
 
-from __future__ import annotations
-
 import itertools
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Inputs of benchmarks: a planar field with singularities, and surfaces with any number of triangles."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """Measure how long the least eigenvector takes, relative to SciPy's sparse LU, and the smoothest field by mesh size."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from rosy_addon.field.connection import build_connection, laplacian

@@ -7,8 +7,6 @@ counts while the card waits for them. This script needs numpy, moderngl and a dr
 Blender nor a display.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

@@ -5,8 +5,6 @@ with all cores, the same mesh, camera and coverage, and 41 samples per streamlin
 after the camera has moved, until the driver is done; neither picture is read back.
 """
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

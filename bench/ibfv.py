@@ -4,8 +4,6 @@ Both are timed for a single picture, and for a frame of an animation in which me
 streaks drift.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Measure pictures at the sizes that users draw: presets, sizes, and several processes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 

@@ -5,8 +5,6 @@ resident memory that is taken from the beginning of the drawing up to the writin
 process held before.
 """
 
-from __future__ import annotations
-
 import ctypes
 import subprocess
 import sys

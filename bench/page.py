@@ -8,8 +8,6 @@ PATTERN has the groups `row` and `column`, their texts are the rows and columns 
 are the ratios, with targets in parentheses.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import sys

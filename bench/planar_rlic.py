@@ -1,7 +1,5 @@
 """Measure how long a picture of a planar cross field takes, relative to four LIC images by `rlic`."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

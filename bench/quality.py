@@ -5,8 +5,6 @@ smaller value), and the autocorrelation (as the largest difference). With --data
 fields are compared, too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path

@@ -4,8 +4,6 @@ Two functions run in turn several times. The median ratio of their times is prin
 largest. --json FILE writes all cases to a file, as a list of objects.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import subprocess

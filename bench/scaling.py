@@ -1,7 +1,5 @@
 """Measure how time grows with streamline length, degree, and numbers of pixels, samples and triangles."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from . import cases

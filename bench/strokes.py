@@ -1,7 +1,5 @@
 """Measure how long it takes to trace 20,000 strokes on 200,000 triangles, and to draw those a camera sees."""
 
-from __future__ import annotations
-
 import numpy as np
 from harness.stroke_spacing import lateral_gaps
 from harness.stroke_tracing import trace_strokes

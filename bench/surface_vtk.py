@@ -4,8 +4,6 @@ Both use one core, the same mesh and camera, the same part of the picture, and 4
 draws with Mesa's llvmpipe unless the system has a graphics card. The name of its renderer is printed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Measure Table 1 of the paper: the method "sheets" relative to "members" and "brute", by degree."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -3,8 +3,6 @@
 The two functions of a ratio run in turn, so the load of the machine affects both equally.
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib
 import importlib.metadata

@@ -3,8 +3,6 @@
 The comparison is that of `surface_vtk`, but RoSy draws with two processes, and VTK's driver with two threads.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Base class and functions of operators: conditions, reports, selected meshes, storing of fields."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Operator: generate fields on the selected meshes."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Register the operators with Blender."""
 
-from __future__ import annotations
-
 import bpy
 
 from ..rosy_addon.ui.comb_brush import VIEW3D_TOOL_rosy_comb, VIEW3D_TOOL_rosy_comb_sculpt

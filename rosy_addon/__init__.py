@@ -27,8 +27,6 @@ Only ``scene``, ``jobs``, ``viewport``, ``ui``, ``cli`` and a file of ``gpu`` im
 names come from `api`, which is loaded when one of them is first used.
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 # ruff: noqa: F403, F405

@@ -4,8 +4,6 @@ The builder stores the files in the order of the file system, with their times a
 replaced, so that the same files give the same bytes.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import subprocess

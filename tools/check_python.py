@@ -1,7 +1,5 @@
 """Check that a Python interpreter can be used for an environment. If not, print the reason in one line."""
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path

@@ -3,8 +3,6 @@
 tools/check_tag.py vVERSION
 """
 
-from __future__ import annotations
-
 import re
 import sys
 import tomllib

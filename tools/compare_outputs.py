@@ -18,8 +18,6 @@ Outputs of commits are cached in build/compare/SHA/DIGEST. DIGEST is computed fr
 the versions of Python and numpy.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import hashlib

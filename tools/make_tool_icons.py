@@ -6,8 +6,6 @@ and y of all corners of the triangles, one byte each, and the RGBA colors of the
 of tools have this format.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

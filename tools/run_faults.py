@@ -6,8 +6,6 @@ tests/faults.toml lists the faults. Each fault is applied to a temporary copy of
 tests have to fail. The exit status is 0 only if every fault is caught.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import queue

@@ -1,7 +1,5 @@
 """Copy the working tree of git."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

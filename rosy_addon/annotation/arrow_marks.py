@@ -9,8 +9,6 @@ a close view, the places of the finest level are too far apart. Then points of
 arrowheads.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product

@@ -1,7 +1,5 @@
 """Draw a key (color bar, legend, scale bar and caption) over a picture, according to its layout."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Draw arrowheads, and the dots and labels of singularities, over a picture in linear light."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

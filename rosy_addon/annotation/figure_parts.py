@@ -3,8 +3,6 @@
 `external.matplotlib_figure` draws figures.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 The letters are made of line segments. No font is needed, so that labels look the same on all systems.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ behind it. If the plates do not fit, all parts are drawn smaller. Coordinates ar
 corner of the frame.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 

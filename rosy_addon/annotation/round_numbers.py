@@ -1,7 +1,5 @@
 """Round numbers for ticks and scale bars, and numbers as text."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The settings of singularities, which the settings classes `Look` and `StrokeStyle` share."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from ..core.settings import choice, number

@@ -1,7 +1,5 @@
 """`compare`: measure how several fields differ, and list it in a table."""
 
-from __future__ import annotations
-
 import json
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """`strokes`: draw evenly spaced lines along a field, as an SVG document or as polylines in space."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from functools import cached_property

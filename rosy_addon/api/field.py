@@ -1,7 +1,5 @@
 """Make fields from arrays and files."""
 
-from __future__ import annotations
-
 import os
 import warnings
 from collections.abc import Sequence

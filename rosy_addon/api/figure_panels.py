@@ -1,7 +1,5 @@
 """`Studio`: draws the panels of a figure, all from the same camera."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Films: draw the fields of a series from one camera, as a video."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Compute fields from a surface, or from guides on it."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Integral

@@ -1,7 +1,5 @@
 """Draw pictures with `render` and videos with `turntable`, and compute tones with `ambient_occlusion`."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Mapping
 from contextlib import suppress

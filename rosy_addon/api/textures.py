@@ -1,7 +1,5 @@
 """`texture`: draw a field as a texture for the UV map of a surface."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
 from pathlib import Path

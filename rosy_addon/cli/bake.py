@@ -1,7 +1,5 @@
 """The command `bake`: draw pictures of a .blend file from its cameras, in one process or several."""
 
-from __future__ import annotations
-
 import os
 import sys
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The commands `field`, `info` and `compare`: write, convert, describe and compare fields."""
 
-from __future__ import annotations
-
 import json
 import logging
 import os

@@ -1,7 +1,5 @@
 """Options of a mesh and its field, shared by the commands that read mesh files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from .. import api

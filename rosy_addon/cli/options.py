@@ -1,7 +1,5 @@
 """`CommandParser` and `Options`: the parser of a command, with options that several commands share."""
 
-from __future__ import annotations
-
 import argparse
 import inspect
 import os

@@ -1,7 +1,5 @@
 """The parser of all commands, and `main`."""
 
-from __future__ import annotations
-
 import re
 import signal
 import sys

@@ -1,7 +1,5 @@
 """The commands `render`, `turntable` and `texture`: draw pictures, videos and textures of a mesh file."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The command `presets`: list the presets of looks."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Access to .blend files, for the commands that read them."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

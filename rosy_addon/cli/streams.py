@@ -1,7 +1,5 @@
 """Print the output of commands so that it is safe on any terminal."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Iterator

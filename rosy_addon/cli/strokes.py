@@ -1,7 +1,5 @@
 """The command `strokes`: draw evenly spaced streamlines as an .svg file, or as polylines in space."""
 
-from __future__ import annotations
-
 import argparse
 import re
 import sys

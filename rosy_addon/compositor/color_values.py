@@ -1,7 +1,5 @@
 """Color values: numbers on the surfaces that a color map shows. Their range and positions in the map."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

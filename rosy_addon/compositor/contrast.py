@@ -4,8 +4,6 @@ The paper is Palacios and Zhang, IEEE TVCG 2011 (see `compositor`). P is the num
 noise channels.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from .filter_kernel import full_sample_count

@@ -20,8 +20,6 @@ Pixels are stored as *cells* of a rectangular window of the frame with an empty 
 neighbor is then the index of the cell plus a constant, and no table of neighbors is read.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ around the sample q is therefore a weighted sum of only a few values of E. Betwe
 are interpolated.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

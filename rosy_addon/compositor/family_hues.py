@@ -9,8 +9,6 @@ the brightest streak at the pixel dominates. The weights are scaled by the stand
 which is known from theory (`contrast.expected_std`), so no image has to be analyzed.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from .contrast import expected_std

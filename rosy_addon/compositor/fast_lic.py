@@ -8,8 +8,6 @@ streamline has passed become the seeds of the next round. Many streamlines are t
 arrays (see `streamline_batch`). A state costs a few steps, whatever the length of the streamlines.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace

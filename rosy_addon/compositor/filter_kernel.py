@@ -6,8 +6,6 @@ weights fall along the direction of the field: streaks have a bright head and a 
 Groeller and Purgathofer, Animating flow fields: rendering of oriented line integral convolution, 1997).
 """
 
-from __future__ import annotations
-
 from typing import Any, Literal, NamedTuple
 
 import numpy as np

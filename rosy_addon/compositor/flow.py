@@ -18,8 +18,6 @@ Cabral and Leedom (Imaging vector fields using line integral convolution, SIGGRA
 kernels that are periodic along the streamline. Those change their shape, and have no constant contrast.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -26,8 +26,6 @@ Streaks of a field of odd degree are averages upstream along its directions. In 
 line is a pair of opposite sheets, and its streaks are the mean of both.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

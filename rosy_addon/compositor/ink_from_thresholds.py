@@ -4,8 +4,6 @@
 arrays, and `scene.hatching_nodes` with sockets of shader nodes, to make the node group *RoSy Hatching*.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import reduce
 from operator import add

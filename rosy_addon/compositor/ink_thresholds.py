@@ -14,8 +14,6 @@ has a share between those of the two places. Both are merged into the first of t
 where the density of the tone exceeds the smaller of both bounds. Such thresholds depend on the shares.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

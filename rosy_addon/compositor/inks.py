@@ -7,8 +7,6 @@ transmittances are multiplied. If the ink is lighter than the paper, the same is
 complements (1 - light), which is the blend mode "screen".
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

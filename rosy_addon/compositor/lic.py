@@ -1,7 +1,5 @@
 """Choice of the LIC method by the settings of a look, and the noise that is convolved."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

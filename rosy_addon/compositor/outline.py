@@ -7,8 +7,6 @@ are visible. A group of connected pixels at edges (a *mark*) is not drawn if it 
 background is next to it, or it surrounds a part of a mesh.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core.cache import Cache

@@ -5,8 +5,6 @@ that stays in place while the surfaces move would look like a dirty window (the 
 effect).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache
 

@@ -5,8 +5,6 @@ blends two sets of their LIC images. The paper compares it with brute force, in 
 each step the best match among the N members.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial

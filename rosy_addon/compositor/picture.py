@@ -1,7 +1,5 @@
 """`Picture`: the finished image of a field."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Collection
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The contents of the key (legend) of a picture, which explains its colors and dots."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from ..annotation.key_contents import ColorScale, PictureKey, count_indices

@@ -1,7 +1,5 @@
 """Stages between a G-buffer and a picture, with their cache: pixel field, noise, LIC images, outline."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial

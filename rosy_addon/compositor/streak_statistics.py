@@ -5,8 +5,6 @@ on the picture, so it is measured once for a look, in a sample of noise that is 
 straight lines.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -4,8 +4,6 @@ A *state* is a pixel with one direction of the field there, a *line* is a pair o
 `covering`). The noise has K channels. The covering surface has C cells and M lines in each cell.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

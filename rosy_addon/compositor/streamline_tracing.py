@@ -4,8 +4,6 @@ A *lane* is one half of a streamline, forward or backward. A *state* is a pixel 
 field there, and *sheet* is the number of that direction (see `covering`).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from .covering import ALL_NEIGHBORS, SINK_CELL, Covering, unpack_neighbor_mask

@@ -1,7 +1,5 @@
 """Division of a picture into strips of rows, and of the strips among processes; see `strips`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 

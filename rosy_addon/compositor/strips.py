@@ -8,8 +8,6 @@ Streamlines differ between two strips. So the first rows of a strip are drawn tw
 below, and fade from the lower strip to the upper one (`join_strips`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -8,8 +8,6 @@ their width on screen when the view zooms. The method is that of Benard, Boussea
 weights that keep the variance constant.
 """
 
-from __future__ import annotations
-
 import zlib
 from collections import Counter
 from collections.abc import Sequence

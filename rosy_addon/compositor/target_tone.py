@@ -1,7 +1,5 @@
 """The target tone of each pixel, from light, an attribute, an image, or a reference render."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

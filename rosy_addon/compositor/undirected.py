@@ -5,8 +5,6 @@ a mean of noise over a disc is used instead. It is thresholded like a streak, wi
 the picture keeps its tone.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from .image_noise import NOISE_MEAN

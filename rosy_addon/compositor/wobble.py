@@ -6,8 +6,6 @@ of a pixel, and two octaves are blended, similar to `surface_noise`. So the wave
 surface and keep their wavelength on screen.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

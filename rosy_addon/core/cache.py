@@ -4,8 +4,6 @@ So cached results cannot be out of date. Settings are in the key by value,
 arrays by `content_hash`, and immutable objects (meshes, fields, G-buffers) by identity.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections import OrderedDict
 from collections.abc import Callable, Hashable

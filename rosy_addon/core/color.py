@@ -1,7 +1,5 @@
 """Color conversion: sRGB display values, linear light, luminance, hex codes and color maps."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

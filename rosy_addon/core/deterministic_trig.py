@@ -6,8 +6,6 @@ evaluate polynomials. They use only sums, products, quotients and square roots, 
 IEEE 754.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 # Coefficients of three polynomials, highest power first. They interpolate, at Chebyshev nodes, atan(a) / a as

@@ -4,8 +4,6 @@ No file is replaced that is an input: `check_writable` compares each output with
 that were read in a `guarding_inputs` block, and the files that `INPUT_LISTERS` return.
 """
 
-from __future__ import annotations
-
 import os
 import platform
 import re

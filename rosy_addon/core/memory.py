@@ -1,7 +1,5 @@
 """Estimate the memory that pictures need, find out how much is free, and refuse work that needs more."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import sys

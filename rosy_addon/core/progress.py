@@ -6,8 +6,6 @@ both take almost no time. The listener is stored in a context variable, so it is
 function.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextvars import ContextVar
 from typing import NamedTuple

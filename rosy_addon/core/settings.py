@@ -7,8 +7,6 @@ validation, command line options, tables of the documentation and cache keys are
 descriptions. Other fields of the class, such as arrays, have no description.
 """
 
-from __future__ import annotations
-
 import re
 import reprlib
 from collections.abc import Callable, Mapping

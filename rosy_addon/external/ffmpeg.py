@@ -1,7 +1,5 @@
 """Encode videos with the program ffmpeg."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

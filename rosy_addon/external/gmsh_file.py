@@ -3,8 +3,6 @@
 meshio assumes that data are complete and in the order of the file, and refuses nodes with parameters.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

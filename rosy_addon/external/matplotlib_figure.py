@@ -3,8 +3,6 @@
 `api.figures` imports this module when a figure is drawn, and raises an error if matplotlib is missing.
 """
 
-from __future__ import annotations
-
 import io
 import logging
 import re

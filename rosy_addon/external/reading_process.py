@@ -3,8 +3,6 @@
 Damaged files make VTK and meshio crash, wait forever, or take all memory.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import re

@@ -4,8 +4,6 @@
 one of the arrays.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

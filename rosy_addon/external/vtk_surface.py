@@ -1,7 +1,5 @@
 """`surface_arrays`: extract the surface of VTK datasets, as polygons with arrays."""
 
-from __future__ import annotations
-
 import itertools
 import re
 from collections.abc import Sequence

@@ -9,8 +9,6 @@ The command writes its exit status to a report file, because Blender can exit re
 status 0. If there is no report, Blender itself failed, and its log says why.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

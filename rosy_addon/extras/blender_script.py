@@ -18,8 +18,6 @@ encodings
     Two encodings: of the output and of the errors. Each is a name and an error handler.
 """
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 import json

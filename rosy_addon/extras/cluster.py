@@ -1,7 +1,5 @@
 """Run a command for many frames on the workers of a Dask cluster."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator, Iterator, Sequence
 from typing import Any
 

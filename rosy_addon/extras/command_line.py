@@ -1,7 +1,5 @@
 """Run commands of the Python package, including those that the extension for Blender lacks."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from functools import partial

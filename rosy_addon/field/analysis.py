@@ -1,7 +1,5 @@
 """Measure a field: its Dirichlet energy, and its difference from another field."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

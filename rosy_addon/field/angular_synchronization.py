@@ -6,8 +6,6 @@ Sorkine-Hornung, "Instant Field-Aligned Meshes" (SIGGRAPH Asia 2015). An edge ma
 complex conjugate of its neighbor's value.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple

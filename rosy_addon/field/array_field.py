@@ -1,7 +1,5 @@
 """Make fields from named arrays at the vertices or faces of a surface, such as the results of simulations."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

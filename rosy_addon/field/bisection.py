@@ -5,8 +5,6 @@ T-junctions. Each bisected triangle becomes the parent of its two halves in a bi
 find the refined triangle that contains a point with given barycentric coordinates.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Process the rows of arrays in blocks, which bounds memory, and work with ranges of rows."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from typing import TypeVar
 

@@ -1,7 +1,5 @@
 """Rotate the vectors on the faces of a mesh along with the faces, when the mesh is rotated or deformed."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .frames import coordinates, dot, normalize, tangent_frame

@@ -7,8 +7,6 @@ neighboring vertex, as long as the sum of the squared turning angles of the fiel
 all other singularities and of the curvature. Singularities of opposite indices vanish where they meet.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core.errors import RosyError

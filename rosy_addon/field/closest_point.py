@@ -1,7 +1,5 @@
 """Find the triangle of a surface that is closest to each of many points, with a uniform grid."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core.progress import report

@@ -6,8 +6,6 @@ The guide of a face is the RoSy that the field should have there, stored as a re
 is solved near the brush only; `Combing.settle` solves it everywhere.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product

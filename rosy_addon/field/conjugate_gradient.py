@@ -1,7 +1,5 @@
 """The conjugate gradient method for sparse Hermitian matrices, preconditioned by multigrid."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

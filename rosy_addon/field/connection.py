@@ -13,8 +13,6 @@ Reference: Knöppel, Crane, Pinkall and Schröder, "Globally Optimal Direction F
 section 6. Here, weights are cotangents and masses are lumped.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """Find how the faces of polygon meshes are connected: edges, smooth fans, and components of graphs."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

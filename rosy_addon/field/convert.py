@@ -1,7 +1,5 @@
 """Convert a field: change its degree, rotate or smooth it, cancel singularities or replace magnitudes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Find faces that lie on others, such as the second side of a two-sided sheet."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core.errors import counted

@@ -3,8 +3,6 @@
 A smooth fan is a set of corners at a vertex that share a normal.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from .blocks import by_rows

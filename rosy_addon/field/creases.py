@@ -5,8 +5,6 @@ Canny, "A Computational Approach to Edge Detection", PAMI 1986. The result does 
 creases do not flicker in animations.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core.progress import report

@@ -1,7 +1,5 @@
 """Compute principal directions and curvatures on the faces of a surface."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core.errors import RosyError

@@ -18,8 +18,6 @@ depend on which member is the first. Like z, they can be transported between fra
 interpolated. For a RoSy, C_0 is 1 and all other harmonics are 0.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Make guides along salient edges, except edges with steps, as voxel remeshing makes them."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Measure the curvature of a surface between its sharp edges, and how noise of the vertices changes it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Read and write fields in the file formats of other programs."""
 
-from __future__ import annotations
-
 import os
 import warnings
 from collections.abc import Callable, Sequence

@@ -5,8 +5,6 @@ where the two principal curvatures differ by more than the noise of the mesh cou
 field is smooth.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Vectors and their transforms, tangent frames, and the transport of tangent vectors by minimal rotations."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

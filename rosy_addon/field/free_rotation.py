@@ -14,8 +14,6 @@ Criteria 4 and 6 leave several rotations, and the one nearest to criterion 3 is 
 none of them, they are images of each other under the symmetries of the surface, and rounding errors decide.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -4,8 +4,6 @@
 have opposite orientations; see `mesh_checks.count_inconsistent_edges`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any

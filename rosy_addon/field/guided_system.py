@@ -9,8 +9,6 @@ The system of a surface can be reused when its guides change, because guides onl
 matrix.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import partial
 

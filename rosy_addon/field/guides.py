@@ -4,8 +4,6 @@ A *guide* is a vector on a face that one of the N members of the field should fo
 zero on faces without a guide.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Interpolate between two fields, on meshes with the same polygons."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core.errors import RosyError

@@ -1,7 +1,5 @@
 """Join the borders of a mesh where they coincide: at the seam of a closed grid, and at its poles."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping
 from typing import Any

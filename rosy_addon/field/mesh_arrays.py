@@ -3,8 +3,6 @@
 Such libraries are meshio, PyVista, trimesh and Open3D. None of them is imported here.
 """
 
-from __future__ import annotations
-
 import os
 import warnings
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Find what disturbs fields on a mesh: faces of opposite orientations, and faces on top of each other."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core.errors import counted

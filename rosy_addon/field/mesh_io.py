@@ -1,7 +1,5 @@
 """Read meshes from .obj, .off, .ply, .stl and .om files."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path

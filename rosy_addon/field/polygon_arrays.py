@@ -4,8 +4,6 @@ The corners of face f are ``face_start[f] .. face_start[f + 1] - 1``. `corner_ve
 corner. F is the number of faces, and C is the number of corners.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from .blocks import bincount_rows

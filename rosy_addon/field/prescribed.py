@@ -12,8 +12,6 @@ linear equation. The first choice comes from a linear equation for the represent
 singularities. The choice is then improved until each guide has the multiple nearest to the angle.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

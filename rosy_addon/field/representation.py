@@ -6,8 +6,6 @@ of representations is a mean of RoSys (Palacios and Zhang 2007), and the mean of
 averages, interpolations and comparisons use z.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from .blocks import by_rows

@@ -5,8 +5,6 @@ other by 2 pi / N. Storing one of them is enough. A field of N directions that a
 symmetric is stored as a RoSy field and the ratios of its directions to the members.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Find the singularities of a field on faces, and their indices."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Change singularities of a field: move them by hand, cancel near ones, and read near ones as one."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core.errors import RosyError

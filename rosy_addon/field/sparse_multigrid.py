@@ -6,8 +6,6 @@ neighboring unknowns) contains such phases, which are accumulated along a tree w
 prolongation is then smoothed by a Jacobi step (smoothed aggregation: Vanek, Mandel and Brezina 1996).
 """
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import dataclass, replace
 

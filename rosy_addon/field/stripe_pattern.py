@@ -20,8 +20,6 @@ across an edge if their directions match. If a family continues as the opposite 
 its value is the complex conjugate of the value of the other family.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Averages of the values on faces: at the vertices, back on the faces, and smoothed over a given distance."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 

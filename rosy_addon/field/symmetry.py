@@ -1,7 +1,5 @@
 """The symmetry of a field: how many lines (pairs of opposite directions) its N directions form."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

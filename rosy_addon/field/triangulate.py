@@ -1,7 +1,5 @@
 """Triangulate polygons, as fans where possible and by ear clipping otherwise."""
 
-from __future__ import annotations
-
 import heapq
 
 import numpy as np

@@ -12,8 +12,6 @@ second is a combination of harmonic angles, one set for each loop. The multiples
 are chosen so that this sum of squares, the *energy*, is small.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Unfold faces that are folded over their neighbors, as some are in scans."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .blocks import bincount_rows, mask

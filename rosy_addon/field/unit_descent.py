@@ -4,8 +4,6 @@ The angles of the faces descend to a minimum by nonlinear conjugate gradients. O
 are moved as well.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property, partial
 

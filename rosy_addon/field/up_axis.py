@@ -1,7 +1,5 @@
 """The axis that points up in mesh files of each format. In world space, z points up."""
 
-from __future__ import annotations
-
 import numpy as np
 
 #: The matrix from mesh space to world space, for each upward axis of a mesh.

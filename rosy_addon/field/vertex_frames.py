@@ -1,7 +1,5 @@
 """The tangent frames of geometry-central at vertices, in which its vectors have two numbers."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core.errors import RosyError

@@ -1,7 +1,5 @@
 """Drawing into a 3D view: pictures over its surfaces, and a background color behind everything."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The viewport renderer for machines without a graphics card that compiles the shaders."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Sequence
 from dataclasses import replace
 from typing import Any

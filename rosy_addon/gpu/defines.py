@@ -3,8 +3,6 @@
 Each constant is written once, in Python. `shader_defines` precedes the source of every shader.
 """
 
-from __future__ import annotations
-
 import operator
 from collections.abc import Sequence
 from functools import cache

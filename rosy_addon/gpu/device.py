@@ -3,8 +3,6 @@
 Tests and benchmarks use a class with the same methods that needs no Blender.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Any

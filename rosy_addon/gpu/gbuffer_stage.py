@@ -1,7 +1,5 @@
 """The G-buffer of a picture: the triangle that is visible at each pixel, and the surface and field there."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ Evenly spaced lines come from phases on the surfaces, which are evaluated at the
 traced for line integral convolution. The picture is then colored and lit, or drawn in ink.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Hashable
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """Lookup tables of shaders, as textures: colors, inks, thresholds, noise and paper grain."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """Vertex buffers and triangle records: a surface and its field in the layout of the shaders."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 

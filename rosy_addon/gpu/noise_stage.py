@@ -1,7 +1,5 @@
 """The noise of a picture: input noise of line integral convolution, paper grain, and wobble."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Hashable
 from functools import partial
 from typing import Any

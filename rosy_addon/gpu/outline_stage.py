@@ -1,7 +1,5 @@
 """The outline of a picture: lines at silhouettes, borders and creases."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Hashable
 from functools import partial
 from typing import Any

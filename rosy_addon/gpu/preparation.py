@@ -1,7 +1,5 @@
 """Preparation of a picture: compiling shaders, and computing data of meshes and sending it to the device."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 

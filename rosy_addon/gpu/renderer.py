@@ -5,8 +5,6 @@ Streamlines are traced from every pixel along every line direction of its field.
 averages are shared between pixels.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Choice of the renderer for pictures and for 3D views: numpy, or the graphics card."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from ..compositor.look import Look

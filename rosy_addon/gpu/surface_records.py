@@ -3,8 +3,6 @@
 These functions take long for large meshes. They do not need Blender, so a helper process can call them.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core.cache import BAKE_CACHE

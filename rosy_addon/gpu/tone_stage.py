@@ -1,7 +1,5 @@
 """The tone of a picture: light, shadows, and the target tone of each pixel."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

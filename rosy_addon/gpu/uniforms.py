@@ -1,7 +1,5 @@
 """The uniforms of shaders, computed from cameras, looks, lights and draw items."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Check OpenEXR files that Blender has written. Blender does not notice every error of the disk."""
 
-from __future__ import annotations
-
 import os
 import struct
 

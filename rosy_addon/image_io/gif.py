@@ -1,7 +1,5 @@
 """Encode animated GIF files (GIF89a) with a fixed palette of 256 colors and ordered dithering."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """`ImageData`: the contents of an image for Blender, as a PNG file or as pixels in single precision."""
 
-from __future__ import annotations
-
 import struct
 from typing import TypeAlias
 

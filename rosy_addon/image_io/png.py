@@ -1,7 +1,5 @@
 """Read and write PNG files with numpy and zlib."""
 
-from __future__ import annotations
-
 import os
 import struct
 import zlib

@@ -8,8 +8,6 @@ written under a temporary name and then renamed, and equal inputs give equal byt
 write to one folder; at worst they draw a frame twice.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import time

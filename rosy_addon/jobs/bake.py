@@ -1,7 +1,5 @@
 """The main job: read the scene, draw its fields, and apply the pictures to the objects."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The job of textures: read objects with their UV maps, draw their fields, and apply the textures."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Combing: read the field and the guides of a mesh, change them along a brush stroke, and store them."""
 
-from __future__ import annotations
-
 import numpy as np
 from bpy.types import Mesh
 

@@ -1,7 +1,5 @@
 """The job of strokes: draw strokes along the fields of a scene, and store them as an object or a file."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

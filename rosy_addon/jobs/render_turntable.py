@@ -1,7 +1,5 @@
 """The job of turntables: read an object, draw it from a camera that orbits it, and write a video."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Arrowheads along strokes, for fields in which directions have no opposite direction."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Find crossings of strokes, and cut gaps into the strokes that pass under others."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Draw meshes with strokes, and return the drawing as the contents of a file or as curves in world space."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple

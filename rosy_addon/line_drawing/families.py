@@ -7,8 +7,6 @@ directions of a triangle. If there is no such path, the families are consistent 
 Otherwise the family depends on the angle between the stroke and a guide direction.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

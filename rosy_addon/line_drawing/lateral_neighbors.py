@@ -4,8 +4,6 @@ Only samples of the same family (line direction of the field) are compared. Dist
 surface.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple

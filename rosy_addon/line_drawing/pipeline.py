@@ -1,7 +1,5 @@
 """Draw the mesh instances of a scene with strokes: from the spacing over tracing to clipping."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce

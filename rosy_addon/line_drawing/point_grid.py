@@ -4,8 +4,6 @@ Points with very different search radii are stored in different levels: grids wh
 sizes. So no cell holds many points, and no query visits many cells.
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Write strokes as 3D polylines, for robots, printers and geometry software."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
 from itertools import pairwise

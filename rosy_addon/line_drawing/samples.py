@@ -4,8 +4,6 @@ Strokes are sampled every half spacing. The left or right side of a sample is co
 stroke beside the sample on this side. Otherwise, the side is open. New strokes are seeded at open sides.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import NamedTuple

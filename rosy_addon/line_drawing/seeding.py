@@ -13,8 +13,6 @@ Without these seeds, strokes would reach the singularity from elsewhere, at diff
 sectors.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core.progress import report

@@ -10,8 +10,6 @@ After placement, strokes are compared at smaller steps near such points and near
 that are too near to each other, the shorter one is cut.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

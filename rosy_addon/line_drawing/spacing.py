@@ -5,8 +5,6 @@ along this direction keep their distance, but strokes across it, along the silho
 spacing depends on the direction of strokes, so that they do not crowd at silhouettes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any

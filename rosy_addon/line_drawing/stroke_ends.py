@@ -4,8 +4,6 @@ A free end is at an occluding edge, at a border or at the end of a shaded area. 
 beyond it (overshoot) imitate quick drawings by hand, in which lines continue a little too far.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

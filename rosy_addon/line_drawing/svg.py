@@ -1,7 +1,5 @@
 """Write strokes as SVG documents for browsers, plotters and Inkscape, in which each family is a layer."""
 
-from __future__ import annotations
-
 import itertools
 import re
 from collections.abc import Sequence

@@ -6,8 +6,6 @@ triangle. Tangents are complex numbers in the frame of their triangle. At an edg
 transported by unfolding the two triangles.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 

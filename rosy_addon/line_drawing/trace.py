@@ -1,7 +1,5 @@
 """Trace evenly spaced strokes on a tangent mesh, and close the strokes that return to their first point."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Draw preview pictures of looks. They all show the same trefoil knot."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

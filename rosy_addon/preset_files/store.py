@@ -6,8 +6,6 @@ format. The preview picture is a .png file next to it. It can be drawn again fro
 (`preview.draw_preview`), so shared presets need none, and pictures from others are never read.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import reprlib

@@ -1,7 +1,5 @@
 """Ambient occlusion at the corners of a surface, from shadow maps in many directions."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core.errors import RosyError

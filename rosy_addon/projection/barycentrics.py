@@ -1,7 +1,5 @@
 """Perspective-correct barycentric coordinates of pixel centers."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .pixel_blocks import reported_blocks

@@ -1,7 +1,5 @@
 """The pixels at which a line segment in space is visible, such as an edge of a crease."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The field on the faces of a deformed surface, transported from the rest shape."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

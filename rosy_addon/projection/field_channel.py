@@ -1,7 +1,5 @@
 """Field channels: the representation z of a field, and complex values that it can have in addition."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Clipping of triangles at the near plane."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Creases and connected components of a mesh, from which its outline is drawn in any view."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import NamedTuple
 

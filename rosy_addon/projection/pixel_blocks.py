@@ -3,8 +3,6 @@
 A block bounds the memory of intermediate results and fits the caches of the processor.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, TypeVar

@@ -5,8 +5,6 @@ at its center. Most samples show the same surface as the center. At silhouettes 
 show the surface of a neighboring pixel instead. An entry is the index of a pixel in the G-buffer.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

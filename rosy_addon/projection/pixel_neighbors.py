@@ -4,8 +4,6 @@
 neighboring pixels on which the surface continues, without a silhouette in between.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Normals and field values at pixels, interpolated from the corners of triangles."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -6,8 +6,6 @@ plane. Both steps work on the representation z = rho exp(i N t), so that the res
 on which of the N members is stored.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

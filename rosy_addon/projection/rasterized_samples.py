@@ -1,7 +1,5 @@
 """The rasterizer at several samples of each pixel."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

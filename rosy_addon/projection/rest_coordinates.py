@@ -3,8 +3,6 @@
 Points of the surface keep these positions when the mesh is transformed or deformed.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -7,8 +7,6 @@ are moved along their normal, by as much as the filter width requires (Holbert, 
 Shadow Acne", 2011).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

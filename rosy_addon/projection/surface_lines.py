@@ -4,8 +4,6 @@ The phase of the lines (`field.stripe_pattern`) is computed on the rest shape, s
 stretch with the surface. It is evaluated at the visible pixels.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Sampling of surfaces at the pixels of a G-buffer: tones, values for the color map, feature curvatures."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The tone of a surface, given at its corners or by an image. The image is sampled from a mip map."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -4,8 +4,6 @@ Vectors are three contiguous arrays: their x, y and z components. The corners of
 same number of corners are given relative to the first one (`relative_to_first`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 

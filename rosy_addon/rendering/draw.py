@@ -3,8 +3,6 @@
 A large picture is divided into strips of rows, which several processes draw.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Draw marks over the finished picture of a view: arrowheads, then singularities."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

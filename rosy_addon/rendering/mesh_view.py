@@ -1,7 +1,5 @@
 """Make the input of a renderer for a mesh that is not in a scene of Blender, such as a mesh from a file."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..field.rosy_field import RosyField

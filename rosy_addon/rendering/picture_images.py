@@ -1,7 +1,5 @@
 """Convert pictures for images of Blender. Colors are extended past the silhouette of the surfaces."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..compositor.picture import Picture

@@ -1,7 +1,5 @@
 """`ViewportRenderer`: the interface of the renderers of 3D views."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Turntables: draw a mesh from a camera that orbits it, and write the pictures as a video."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial

@@ -1,7 +1,5 @@
 """`ViewInput`: everything that a renderer needs to draw one picture."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Add functions to Blender's lists of application handlers, and remove them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

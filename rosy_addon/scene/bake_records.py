@@ -4,8 +4,6 @@ A record holds the image, the material, the camera, and the state of the scene w
 An object that was appended from another file may show a picture for which this file has no record.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace

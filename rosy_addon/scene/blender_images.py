@@ -1,7 +1,5 @@
 """Create Blender images from pictures: packed, saved to a file, or as a file for each frame."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager

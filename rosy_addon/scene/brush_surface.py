@@ -1,7 +1,5 @@
 """The surface under a brush: maps points of the evaluated mesh to points of the original mesh."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cached_property
 

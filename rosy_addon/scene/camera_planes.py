@@ -1,7 +1,5 @@
 """Planes in front of cameras that only camera rays hit. Backdrops and keys (legends) are such planes."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 from bpy.types import Material, Object, PropertyGroup, Scene

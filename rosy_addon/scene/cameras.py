@@ -1,7 +1,5 @@
 """Convert the cameras and 3D views of Blender to `Camera`, and find the cameras of a scene."""
 
-from __future__ import annotations
-
 import numpy as np
 from bpy.types import Depsgraph, Object, Region, RegionView3D, Scene
 

@@ -4,8 +4,6 @@ The jobs read meshes, compute values, and store them; `assign_tangents` stores t
 cannot be stored, an error is raised before anything is computed or changed.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Read mesh attributes as one vector per face, or as one scalar per face or corner."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 

@@ -18,8 +18,6 @@ The checksum shows whether the vector has been changed since. When the field is 
 rotated with their faces.
 """
 
-from __future__ import annotations
-
 from contextlib import suppress
 from itertools import count, takewhile
 

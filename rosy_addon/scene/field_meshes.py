@@ -5,8 +5,6 @@ when a modifier or an edit moves them. The vertices of the field mesh are the re
 fields on their own meshes; see `datablocks.field_mesh`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 

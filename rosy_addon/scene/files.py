@@ -1,7 +1,5 @@
 """Files and folders: open and save .blend files, name picture files, and find the user's folders."""
 
-from __future__ import annotations
-
 import atexit
 import os
 import unicodedata

@@ -6,8 +6,6 @@ vector, from 0 to 1, is the firmness of the guide. Two more things are stored wi
 fields (`field_attributes`), and a checksum of the field that was computed from the guides.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

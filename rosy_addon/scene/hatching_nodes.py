@@ -6,8 +6,6 @@ same formulas as `compositor.hatching`, so it draws what a picture in the same l
 are Blender's own, so it works where RoSy is not installed.
 """
 
-from __future__ import annotations
-
 from functools import reduce
 from operator import add
 from typing import Any, NamedTuple

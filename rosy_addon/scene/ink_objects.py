@@ -4,8 +4,6 @@ An ink object has the evaluated geometry of its parent, slightly above the surfa
 transparent between the lines. So its parent stays as it is, and what the user changes there is seen at once.
 """
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 from bpy.types import NodeSocket, Object

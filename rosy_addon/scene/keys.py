@@ -1,7 +1,5 @@
 """Keys (legends) on a plane in front of a camera: color scale, kinds of singularities, scale bar, caption."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache

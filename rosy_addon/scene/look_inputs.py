@@ -5,8 +5,6 @@ images that are mapped to meshes, values for the color map from mesh attributes,
 files.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Conversion between a `Look` and Blender's properties."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Read and store the field of a mesh, in any of the forms that `field_attributes` lists."""
 
-from __future__ import annotations
-
 import warnings
 from functools import partial
 

@@ -3,8 +3,6 @@
 Computing a digest is much faster than reading a surface.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Convert Blender meshes to `Surface`, and read their attributes and edges as arrays."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial

@@ -4,8 +4,6 @@ The modifier gives the object the material and an attribute with the projection.
 modifier, the material and the attributes are on the mesh of the object.
 """
 
-from __future__ import annotations
-
 from collections.abc import Container
 from dataclasses import dataclass
 from pathlib import Path

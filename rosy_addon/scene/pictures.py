@@ -9,8 +9,6 @@ A picture is projected onto the shape at the time of the bake. It moves with an 
 transformed, and slides over one that deforms. A texture is mapped by a UV map, and stays in place.
 """
 
-from __future__ import annotations
-
 import glob
 from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Read a scene as the input of a renderer: one `ViewInput` per camera, with the lights of the scene."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

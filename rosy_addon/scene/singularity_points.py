@@ -1,7 +1,5 @@
 """Find the singularities of an object's field, and show them in the scene as point objects."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import bpy

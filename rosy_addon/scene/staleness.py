@@ -1,7 +1,5 @@
 """Find out whether a picture is out of date: compare the recorded state of the scene with the present one."""
 
-from __future__ import annotations
-
 import atexit
 import time
 

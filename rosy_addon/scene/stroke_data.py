@@ -3,8 +3,6 @@
 A modifier with a node group lets Curves follow the surface that they were drawn on.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial, reduce
 from itertools import pairwise

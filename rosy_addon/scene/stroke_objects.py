@@ -5,8 +5,6 @@ For each camera there is at most one Grease Pencil object and one Curves object.
 When strokes are drawn again, the object gets new data, and keeps its modifiers, name and collections.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import bpy

@@ -1,7 +1,5 @@
 """Materials that show a texture: as colors, as hatching in the light of the scene, or as brushed metal."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Find the parts of meshes through which one sees what is behind them. They hide nothing in pictures."""
 
-from __future__ import annotations
-
 import numpy as np
 from bpy.types import Material, Mesh, Node, NodeTree, Object
 

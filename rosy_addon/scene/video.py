@@ -1,7 +1,5 @@
 """The job that encodes a video from image files with Blender's encoder."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import bpy

@@ -5,8 +5,6 @@ A second Blender process runs this file as a script, so the file does not import
     blender -b --factory-startup --python video_encoding.py -- FOLDER COUNT WIDTH HEIGHT FPS VIDEO.mp4
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Find the objects of a view layer that are visible in renders, and the ones with a field."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Iterator
 
 import bpy

@@ -11,8 +11,6 @@ interpolated like the field. Each average is over the triangles around a vertex 
 not separated by sharp edges (a smooth fan).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

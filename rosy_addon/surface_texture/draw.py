@@ -1,7 +1,5 @@
 """Draw the field of a mesh as a texture for one of its UV maps."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple

@@ -3,8 +3,6 @@
 `compositor.ink_thresholds` describes the thresholds.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -24,8 +24,6 @@ The Khronos Group, "KHR_materials_anisotropy", 2023. Flow maps: Vlachos, "Water 
 2010 course "Advances in Real-Time Rendering".
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

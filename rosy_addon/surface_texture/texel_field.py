@@ -7,8 +7,6 @@ texel in which it ends.
 The noise is fixed to the surface. Its cells have the same size, in Blender units, everywhere.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

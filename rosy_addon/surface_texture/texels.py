@@ -9,8 +9,6 @@ show the surface beyond the seam, so that no seam is visible where texels are in
 repeat the nearest color. They are visible only in smaller mipmap levels of the texture.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """The tool *Comb Field* of the 3D view: its cursor and its settings."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from pathlib import Path
 from typing import Any

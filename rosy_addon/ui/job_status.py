@@ -4,8 +4,6 @@ The helper process runs the computations of jobs. It starts before the first job
 wait for it.
 """
 
-from __future__ import annotations
-
 from contextlib import suppress
 
 import bpy

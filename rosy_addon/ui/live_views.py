@@ -1,7 +1,5 @@
 """Switch on live views automatically: when a scene gets its first field, and when a file is loaded."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The panels of the look of pictures: presets, settings of the look, output, and the legend."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The main panel: make a field, bake its picture and look at it."""
 
-from __future__ import annotations
-
 import bpy
 from bpy.types import Context, Menu, Object, Panel, Scene, UILayout
 

@@ -1,7 +1,5 @@
 """Draw the settings of operators on fields, in panels and in the dialogs of the operators."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from bpy.types import UILayout

@@ -5,8 +5,6 @@ a field is stored, and after an undo. So the dots move with the object, but do n
 mesh.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Container
 from typing import Any
 

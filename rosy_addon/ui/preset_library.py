@@ -1,7 +1,5 @@
 """The presets that the panels show, with their pictures. They are read again when files change."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 from typing import Any, NamedTuple

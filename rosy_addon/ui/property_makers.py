@@ -3,8 +3,6 @@
 Further keyword arguments are passed on to the functions of `bpy.props`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

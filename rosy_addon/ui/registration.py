@@ -1,7 +1,5 @@
 """Register the user interface with Blender."""
 
-from __future__ import annotations
-
 import bpy
 
 from . import (

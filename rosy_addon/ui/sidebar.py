@@ -1,7 +1,5 @@
 """Base class of the panels in the sidebar of the 3D view, and functions that they share."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Sequence
 from typing import Any

@@ -3,8 +3,6 @@
 The handles are the dots of the overlay. Operators change the field.
 """
 
-from __future__ import annotations
-
 from contextlib import suppress
 from pathlib import Path
 from typing import Any

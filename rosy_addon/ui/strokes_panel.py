@@ -1,7 +1,5 @@
 """The panel with the settings of strokes."""
 
-from __future__ import annotations
-
 from bpy.types import Context, Panel, PropertyGroup, UILayout
 
 from ..core.settings import panel_settings, settings_of

@@ -1,7 +1,5 @@
 """Project points to pixels of a 3D view, and draw lines over it."""
 
-from __future__ import annotations
-
 import gpu
 import numpy as np
 from bpy.types import Region, RegionView3D

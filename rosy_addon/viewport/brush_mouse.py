@@ -1,7 +1,5 @@
 """Points on an object under the mouse, for the tool *Comb Field* and its operator."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -3,8 +3,6 @@
 It is not saved: it starts and ends with the session of the live views.
 """
 
-from __future__ import annotations
-
 #: Largest number of frames that pass between two pictures. If pictures take longer, the clock slows down:
 #: otherwise the eye could not follow the streaks from one picture to the next.
 MAX_FRAMES_PER_PICTURE = 2.0

@@ -1,7 +1,5 @@
 """The data that live views read: meshes of view layers, and reference renders for the tone "picture"."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Hashable

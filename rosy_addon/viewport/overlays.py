@@ -1,7 +1,5 @@
 """Overlays over the picture of a 3D view: dots at singularities, their labels, arrowheads, messages."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field

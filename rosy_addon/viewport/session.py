@@ -1,7 +1,5 @@
 """The session of all live views: handlers, timers and drawing."""
 
-from __future__ import annotations
-
 import time
 import traceback
 from collections import defaultdict

@@ -1,7 +1,5 @@
 """Queries about Blender's 3D views, and redraws."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 from bpy.types import Area, Context, Depsgraph, Object, RegionView3D, SpaceView3D

@@ -1,7 +1,5 @@
 """The program of a helper process: run function calls that the parent process sends, until that ends."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import sys

@@ -5,8 +5,6 @@ another look takes only a few kilobytes. The other process gets the same Python 
 in its caches, which compare meshes by identity.
 """
 
-from __future__ import annotations
-
 import io
 import pickle
 import time

@@ -4,8 +4,6 @@ Each process runs the same command for some of the frames. It must be safe to ru
 at the same time. This module does not depend on what the command does.
 """
 
-from __future__ import annotations
-
 import re
 import reprlib
 import subprocess

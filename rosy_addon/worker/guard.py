@@ -3,8 +3,6 @@
 It imports as little as possible, because each `Lifeline` has a guard process.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal

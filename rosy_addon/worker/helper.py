@@ -1,7 +1,5 @@
 """`Helper`: a process that runs function calls for this one."""
 
-from __future__ import annotations
-
 import subprocess
 import time
 from collections.abc import Callable, Mapping

@@ -5,8 +5,6 @@ script, the function is called in the same process (`run`). In Blender's window,
 that Blender stays responsive.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator, Iterable, Iterator
 from functools import update_wrapper
 from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar

@@ -1,7 +1,5 @@
 """`Lifeline`: programs and a temporary folder that end with this process."""
 
-from __future__ import annotations
-
 import os
 import secrets
 import signal

@@ -1,7 +1,5 @@
 """`Pool`: helper processes that share function calls, such as drawing the strips of a large picture."""
 
-from __future__ import annotations
-
 import os
 from collections import deque
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Run another program as part of a job."""
 
-from __future__ import annotations
-
 import subprocess
 from collections.abc import Sequence
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Start processes of this package with a connection to them. They end when it closes."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """`StepRunner`: runs a job step by step, with its function calls in a helper process."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import Any, NoReturn

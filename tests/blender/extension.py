@@ -1,7 +1,5 @@
 """The installed extension: its modules and preferences, and how it is switched off and on."""
 
-from __future__ import annotations
-
 import importlib
 from types import ModuleType
 

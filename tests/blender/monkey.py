@@ -13,8 +13,6 @@ seed and the last actions are printed. `--seed N` repeats them. The exit status 
 passed.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import shutil

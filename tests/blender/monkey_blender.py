@@ -3,8 +3,6 @@
 This includes what RoSy made, and what a user or a script does behind RoSy's back.
 """
 
-from __future__ import annotations
-
 import math
 
 import bmesh

@@ -1,7 +1,5 @@
 """What the monkey checks: what an action has changed, what RoSy leaves behind, and memory."""
 
-from __future__ import annotations
-
 import ctypes
 import gc
 import hashlib

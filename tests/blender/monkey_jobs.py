@@ -5,8 +5,6 @@ as a `Job`, and acts between its steps. So that a seed repeats a run, there is n
 `Job.advance` makes one step.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import count
 from types import SimpleNamespace

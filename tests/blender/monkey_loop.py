@@ -1,7 +1,5 @@
 """The loop of the monkey, inside Blender. Run by monkey.py, which reads what this prints."""
 
-from __future__ import annotations
-
 import argparse
 import faulthandler
 import os

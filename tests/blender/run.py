@@ -9,8 +9,6 @@ panel are saved in DIR. The exit status is 0 only if all tests passed. The last 
 summary.
 """
 
-from __future__ import annotations
-
 import argparse
 import fcntl
 import json

@@ -1,7 +1,5 @@
 """``bake`` and ``strokes`` of Blender files on the command line, with Blender's module."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

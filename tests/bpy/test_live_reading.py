@@ -1,7 +1,5 @@
 """Reading for the live view: what is left out is named, and nothing is read again without need."""
 
-from __future__ import annotations
-
 from unittest.mock import Mock
 
 import bpy

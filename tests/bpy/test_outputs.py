@@ -1,7 +1,5 @@
 """Files that are written from Blender: whole or untouched, never an input, and no links of others."""
 
-from __future__ import annotations
-
 import resource
 import signal
 import subprocess

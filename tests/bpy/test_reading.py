@@ -1,7 +1,5 @@
 """Reading scenes as arrays, and reading and writing fields."""
 
-from __future__ import annotations
-
 import bmesh
 import bpy
 import numpy as np

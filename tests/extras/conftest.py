@@ -1,7 +1,5 @@
 """Meshes, fields and fixtures that the tests of the extras share."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import pyvista as pv

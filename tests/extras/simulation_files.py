@@ -1,7 +1,5 @@
 """Files of simulations that neither pyvista nor meshio write, or not as other programs read them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import netCDF4

@@ -1,7 +1,5 @@
 """`figure`: pictures, keys and text are what and where they should be, also in the files."""
 
-from __future__ import annotations
-
 import io
 import os
 import re

@@ -1,7 +1,5 @@
 """The categories of cases: each makes files in a folder and returns a command line."""
 
-from __future__ import annotations
-
 import os
 import signal
 import stat

@@ -1,7 +1,5 @@
 """Faults of the bytes, lines and words of a file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from numpy.random import Generator

@@ -1,7 +1,5 @@
 """Run a case in a process of its own, with limits, and record all that it did."""
 
-from __future__ import annotations
-
 import os
 import resource
 import shutil

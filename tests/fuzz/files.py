@@ -1,7 +1,5 @@
 """Write field files of each format, guide strokes, pictures and presets: mostly valid ones."""
 
-from __future__ import annotations
-
 import io
 import json
 import struct

@@ -1,7 +1,5 @@
 """Links at the paths of outputs: to inputs, to other files, to folders, to nothing, and to themselves."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Random polygon meshes: ordinary, odd, degenerate and far out of scale; and their files."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Hostile names: titles of fields, labels, and names of files."""
 
-from __future__ import annotations
-
 from numpy.random import Generator
 
 #: Control characters, bytes that are not UTF-8 (lone surrogates), and characters that XML cannot hold.

@@ -1,7 +1,5 @@
 """Random options of a command, from its parser: the values are texts that the parser accepts."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Collection
 from functools import cache

@@ -1,7 +1,5 @@
 """Make, run and judge many cases, several at once, and print what came of them."""
 
-from __future__ import annotations
-
 import argparse
 import math
 import multiprocessing

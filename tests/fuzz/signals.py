@@ -1,7 +1,5 @@
 """Commands that start other processes, and their files."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

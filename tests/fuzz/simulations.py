@@ -1,7 +1,5 @@
 """Write files of simulations, damaged, and with references to other files that are hostile."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

@@ -1,7 +1,5 @@
 """Fields with given singularities: the files, and whether what was given is what is found."""
 
-from __future__ import annotations
-
 import warnings
 from collections import Counter
 from pathlib import Path

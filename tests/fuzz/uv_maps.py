@@ -1,7 +1,5 @@
 """UV maps in several tiles, on their borders, outside of them, overlapping, tiny and huge; and files of tiles."""
 
-from __future__ import annotations
-
 import os
 import re
 from pathlib import Path

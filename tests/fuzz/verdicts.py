@@ -1,7 +1,5 @@
 """What is wrong with a run: its streams, its exit status, and the files that it leaves."""
 
-from __future__ import annotations
-
 import io
 import json
 import re

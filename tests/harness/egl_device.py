@@ -1,7 +1,5 @@
 """`EglDevice`: runs the shaders without Blender, on OpenGL with an EGL context."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The fixture `error_of`, for errors that users see."""
 
-from __future__ import annotations
-
 import pytest
 
 from rosy_addon.core.errors import RosyError

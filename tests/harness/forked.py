@@ -1,7 +1,5 @@
 """Run the command line in a copy of this process, several times faster than Python is started."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Compare the G-buffers and pictures of the graphics card with the results of numpy."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any

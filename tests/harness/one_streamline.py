@@ -5,8 +5,6 @@ and those of pixels with several samples by that of `lic_trace.glsl`, with inter
 "sheets" shares streamlines between pixels, so that its streaks are a little different.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Measure outlines: the lengths of their marks, and the share of silhouettes that they cover."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

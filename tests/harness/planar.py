@@ -1,7 +1,5 @@
 """Pictures of planar fields, and the layers that pictures are composed of."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 from unittest import mock
 

@@ -1,7 +1,5 @@
 """Modules of RoSy: of the installed extension in a full Blender, of the repository elsewhere."""
 
-from __future__ import annotations
-
 import importlib
 import os
 from typing import Any

@@ -1,7 +1,5 @@
 """Measurements of pictures: correlation, orientation spectra and persistence of streaks."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy import ndimage
 

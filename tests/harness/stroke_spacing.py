@@ -5,8 +5,6 @@ stroke of the same family, perpendicular to the stroke, divided by the required 
 are chords, corrected to the length of an arc that bends by the angle between the two normals.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Strokes on a mesh instance, from its field to their families, and their files."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 ``dist/notebooks`` keeps them with their outputs.
 """
 
-from __future__ import annotations
-
 import base64
 import io
 import os

@@ -1,7 +1,5 @@
 """Run the command line, read its pictures, and write meshes for it."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

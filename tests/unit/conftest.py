@@ -1,7 +1,5 @@
 """Settings, fixtures and parameter helpers that the unit tests share."""
 
-from __future__ import annotations
-
 import tracemalloc
 from pathlib import Path
 

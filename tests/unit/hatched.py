@@ -1,7 +1,5 @@
 """A tube, a ball and a wall with fields, their pictures, and the error of the tone of hatching."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """Cameras with a shifted lens."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from rosy_addon.projection.camera import Camera

@@ -1,7 +1,5 @@
 """Planar fields with known singularities, for tests of the compositor."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from rosy_addon.compositor.look import Look

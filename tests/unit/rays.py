@@ -1,7 +1,5 @@
 """Intersections of all rays with all triangles."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

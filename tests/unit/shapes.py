@@ -1,7 +1,5 @@
 """Surfaces in closed form, instances with fields, and matrices, for tests."""
 
-from __future__ import annotations
-
 from itertools import combinations, product
 
 import awkward

@@ -3,8 +3,6 @@
 The other interpreter makes them with ``python test_numpy_versions.py FILE.npz``.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Imports run one way, also inside rooms, and the numpy rooms import without Blender."""
 
-from __future__ import annotations
-
 import ast
 import subprocess
 import sys

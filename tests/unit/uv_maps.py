@@ -1,7 +1,5 @@
 """UV maps of the torus of `shapes`, and the colors of a texture at points of a surface."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.ndimage import map_coordinates
 

@@ -1,7 +1,5 @@
 """Helpers for the tests of the installed wheel, which run without the tree on the path."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

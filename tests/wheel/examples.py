@@ -1,7 +1,5 @@
 """Write the documented examples as a program, so that mypy checks their types: ``examples.py FILE``."""
 
-from __future__ import annotations
-
 import doctest
 import re
 import sys

@@ -1,7 +1,5 @@
 """The wheel `rosyfields`, installed with numpy and nothing else."""
 
-from __future__ import annotations
-
 import doctest
 import pkgutil
 import re

@@ -1,7 +1,5 @@
 """Draw the pictures of the documentation, and fill the tables of docs/gallery: all, or the named ones."""
 
-from __future__ import annotations
-
 import argparse
 import importlib
 import sys

@@ -1,7 +1,5 @@
 """Draw the pictures of docs/editing.md: a combed head, a film of the combing, and moved singularities."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Draw figure 2: one direction of a 6-RoSy field, and all six directions."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tests.harness.streaks import orientation_spectrum, peaks

@@ -1,7 +1,5 @@
 """Draw figure 5: the steps from a 3-RoSy field to a picture."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Draw figure 6: how blending reduces contrast, and how that is corrected."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.figure import Figure
 

@@ -1,7 +1,5 @@
 """Draw figures 7 and 8: members of fields on surfaces that are tilted against the view direction."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy import ndimage
 

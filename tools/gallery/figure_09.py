@@ -1,7 +1,5 @@
 """Draw figure 9: the magnitude of a field as color, as the length of streaks, and as both."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

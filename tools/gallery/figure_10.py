@@ -1,7 +1,5 @@
 """Draw figure 10: how legible fields with many directions are."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.figure import Figure
 

@@ -1,7 +1,5 @@
 """Fill the tables of figure 11: fields on surfaces. `pictures.toml` describes its pictures."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from rosy_addon.compositor.contrast import expected_std

@@ -1,7 +1,5 @@
 """Draw pictures of docs/figures.md: comparisons, and a render with a key (legend)."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Draw the picture at the top of the README."""
 
-from __future__ import annotations
-
 import numpy as np
 from PIL import Image
 

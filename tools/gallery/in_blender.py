@@ -1,7 +1,5 @@
 """Functions that make objects in Blender, which several pages use."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import bpy

@@ -1,7 +1,5 @@
 """Draw the pictures of docs/listing, for the page of the extension on Blender's Extensions platform."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

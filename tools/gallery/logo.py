@@ -1,7 +1,5 @@
 """Draw the logo and the favicon of the site: a disc of streaks around a singularity of a 4-RoSy field."""
 
-from __future__ import annotations
-
 import numpy as np
 from PIL import Image
 

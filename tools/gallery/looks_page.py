@@ -1,7 +1,5 @@
 """Fill in the settings of looks in docs/looks.md, with a picture of each, as `settings.toml` describes."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Folders of the documentation, and functions that fill in its pictures and tables."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path

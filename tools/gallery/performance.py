@@ -1,7 +1,5 @@
 """Draw closeups of singularities, for docs/performance.md."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Make planar fields, and draw them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

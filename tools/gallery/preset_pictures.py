@@ -1,7 +1,5 @@
 """Draw the preview pictures of the presets that come with RoSy, which are part of the zip."""
 
-from __future__ import annotations
-
 from PIL import Image
 
 from rosy_addon.compositor.look import Look

@@ -5,8 +5,6 @@ which are not part of this repository. (`python -m tools.gallery preset-pictures
 presets in the zip.)
 """
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 from pathlib import Path

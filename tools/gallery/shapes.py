@@ -1,7 +1,5 @@
 """Make meshes that are free of license restrictions: computed ones, and the monkey of Blender."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

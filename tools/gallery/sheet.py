@@ -1,7 +1,5 @@
 """Compose sheets of labeled pictures, and draw on pictures. Pictures are scaled only by whole factors."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass

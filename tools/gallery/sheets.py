@@ -1,7 +1,5 @@
 """Draw the sheets of pictures and the films that `pictures.toml` describes."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Sequence
 from dataclasses import replace

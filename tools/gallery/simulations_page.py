@@ -1,7 +1,5 @@
 """Draw the picture of docs/simulations.md: the stress at the boundary of a beam, from a .vtu file."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Make fields on surfaces, and draw them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Draw the picture of docs/start/scripters.md, with the script on that page."""
 
-from __future__ import annotations
-
 import contextlib
 import sys
 import tempfile

@@ -1,7 +1,5 @@
 """Draw the pictures of docs/strokes.md."""
 
-from __future__ import annotations
-
 import numpy as np
 from PIL import Image, ImageDraw
 

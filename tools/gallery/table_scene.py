@@ -1,7 +1,5 @@
 """The scene in which docs/hatching.md shows tones: Suzanne and a ball on a table."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 

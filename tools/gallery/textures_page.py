@@ -1,7 +1,5 @@
 """Draw the pictures of docs/textures.md."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable
 from functools import partial

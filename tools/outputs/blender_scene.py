@@ -1,7 +1,5 @@
 """The scene in which cases run in Blender, and functions that write the data that a case has made."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Sequence

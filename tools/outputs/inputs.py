@@ -1,7 +1,5 @@
 """Write the input files of cases: meshes, fields and images. The code of a case names them after `@`."""
 
-from __future__ import annotations
-
 import importlib.util
 import itertools
 import shutil

@@ -7,8 +7,6 @@ compare_outputs.py starts it as a child process::
 Each case runs in the folder OUTPUTS/NAME, where its outputs stay.
 """
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import importlib.util

@@ -9,8 +9,6 @@ Three things are checked:
 Links and anchors are checked by `mkdocs build --strict`.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Iterator

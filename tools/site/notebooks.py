@@ -4,8 +4,6 @@ The notebooks in the repository have no outputs. If a cell shows a picture, its 
 for readers who cannot see it: `"alt": "Bunny with a cross field"`.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Hook of MkDocs: give pictures a link to the file, and their size, so that pages do not jump."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import posixpath

@@ -1,7 +1,5 @@
 """Hook of MkDocs: add clickable pictures of the presets, and their settings, to the page of the presets."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import NamedTuple

@@ -4,8 +4,6 @@ The pages are written for the repository: `docs/first-bake.md` has a link to `..
 one to `docs/first-bake.md`. With these names, MkDocs can follow and check such links without changes.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

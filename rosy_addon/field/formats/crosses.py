@@ -1,7 +1,5 @@
 """Read crosses that are stored as two directions, one per line: `.crossfield`, `.ffield`, `.vfield`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Read `.dmat` files, the matrices of libigl, as text or binary."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

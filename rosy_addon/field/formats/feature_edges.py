@@ -1,7 +1,5 @@
 """Read feature edges: `.sharp` files of QuadWild and `.feature` files of TriCrossField."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

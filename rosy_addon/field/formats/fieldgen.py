@@ -8,8 +8,6 @@ fieldgen is the program of Knöppel, Crane, Pinkall and Schröder,
 https://github.com/GeometryCollective/fieldgen.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 

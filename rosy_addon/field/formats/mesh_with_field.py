@@ -1,7 +1,5 @@
 """Write a mesh with directions, magnitudes and singularities of its field: `.vtp`, `.vtu`, `.ply`, `.npz`."""
 
-from __future__ import annotations
-
 import base64
 import io
 

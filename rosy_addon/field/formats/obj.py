@@ -3,8 +3,6 @@
 Normals, materials and groups are ignored.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path

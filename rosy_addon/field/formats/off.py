@@ -3,8 +3,6 @@
 Colors, normals and texture coordinates, which variants of the format have, are ignored.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

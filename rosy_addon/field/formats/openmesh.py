@@ -5,8 +5,6 @@ their dimension and size. Properties that a program has added have a name, the n
 in bytes. OpenMesh's package for Python skips these.
 """
 
-from __future__ import annotations
-
 import struct
 from pathlib import Path
 

@@ -5,8 +5,6 @@ numbers), one direction of each line of a cross (6 numbers; see `directional_fie
 symmetric tensor (9 numbers).
 """
 
-from __future__ import annotations
-
 import io
 import math
 import zipfile

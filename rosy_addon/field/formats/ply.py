@@ -4,8 +4,6 @@ A .ply file consists of *elements*: tables with a name, rows and named *properti
 `vertex` and `face` are read. Other elements are skipped.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, field
 from pathlib import Path

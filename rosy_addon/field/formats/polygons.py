@@ -1,7 +1,5 @@
 """The results of file readers: polygons as flat arrays, and the unchecked contents of a field file."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

@@ -3,8 +3,6 @@
 `.rawfield` is a format of the library Directional.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -4,8 +4,6 @@ A file holds the degree, the number of singularities, and for each a row with th
 face) and its singularity index.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Read stereolithography .stl files, text and binary, and merge corners at equal positions into vertices."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Arrowheads over the lines of pictures: their directions, their spacing, and where there are none."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Dots and labels of singularities: their places, sizes and colors, in pictures and in drawings."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The pages of the documentation name functions, modules and operators that exist."""
 
-from __future__ import annotations
-
 import ast
 import re
 

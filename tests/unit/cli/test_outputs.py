@@ -1,7 +1,5 @@
 """Outputs are compared with all inputs, and links are followed only where the user has named them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from command_helpers import finished, refusal, rosy, write_obj

@@ -1,7 +1,5 @@
 """What docs/reliability.md and SECURITY.md promise about all files: whole, the same everywhere, and never code."""
 
-from __future__ import annotations
-
 import io
 import pickle
 import shutil

@@ -1,7 +1,5 @@
 """Image based flow visualization: directions, contrast, drift, loops."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

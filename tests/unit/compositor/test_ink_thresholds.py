@@ -1,7 +1,5 @@
 """Thresholds of hatching: the coverage from which each point is covered by ink."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Outlines: no specks, all silhouettes and creases, and stability under motion."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache, partial
 

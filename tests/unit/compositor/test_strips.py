@@ -1,7 +1,5 @@
 """A picture is the same to the last bit, however its strips are grouped, and has no seams between them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

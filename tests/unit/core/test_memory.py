@@ -1,7 +1,5 @@
 """Memory: how much is free, the refusal of what needs more, and how close the bound is."""
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

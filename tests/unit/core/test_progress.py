@@ -1,7 +1,5 @@
 """Progress: long functions report it to a listener, which can end them."""
 
-from __future__ import annotations
-
 import contextvars
 import itertools
 

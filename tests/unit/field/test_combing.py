@@ -1,7 +1,5 @@
 """Combing: guides along strokes, and the field that follows them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from field_helpers import angle_differences

@@ -1,7 +1,5 @@
 """Two-sided sheets: faces that lie on others are said, and removed on request."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from command_helpers import write_obj

@@ -1,7 +1,5 @@
 """Fields that follow the form, against closed forms, with noise, and on the first meshes people try."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Guided fields: exact and soft guides, edges, features, and invariance to numbering."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.sparse as sparse

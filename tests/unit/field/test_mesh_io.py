@@ -1,7 +1,5 @@
 """Reading of meshes: every format, and the errors for damaged files."""
 
-from __future__ import annotations
-
 import struct
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The smoothest field with given singularities: closed forms, all surfaces, and a dense solver."""
 
-from __future__ import annotations
-
 import itertools
 
 import awkward

@@ -1,7 +1,5 @@
 """Folded and reversed faces: found, mended, and without an influence on fields that follow the form."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from awkward import AWKWARD

@@ -1,7 +1,5 @@
 """PNG files: writing, reading, and the errors of damaged files."""
 
-from __future__ import annotations
-
 import struct
 import zlib
 

@@ -1,7 +1,5 @@
 """SVG files of strokes, as a browser and Inkscape draw them. Skipped without these programs."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Which vertices a camera sees, against convex solids and rays against every triangle."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from rays import ray_intersections

@@ -1,7 +1,5 @@
 """The order of lines on surfaces: the first line continues as far as the field allows."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -1,7 +1,5 @@
 """A function that helpers call in tests. It would be in the package, whose modules helpers find."""
 
-from __future__ import annotations
-
 import time
 
 from rosy_addon.core.progress import report

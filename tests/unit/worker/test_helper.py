@@ -1,7 +1,5 @@
 """A helper process, as it is started by Blender and by the command line."""
 
-from __future__ import annotations
-
 import os
 import sys
 import time

@@ -1,7 +1,5 @@
 """Pictures that several processes draw together."""
 
-from __future__ import annotations
-
 import os
 import signal
 from dataclasses import replace

@@ -1,11 +1,10 @@
-"""Measure how long it takes to trace 20,000 strokes on 200,000 triangles, and to draw those a camera sees."""
+"""Measure how long it takes to trace strokes on 200,000 triangles, and to draw those a camera sees."""
 
 import numpy as np
 from harness.stroke_spacing import lateral_gaps
 from harness.stroke_tracing import trace_strokes
 
 from rosy_addon.field.smoothest import smoothest_field
-from rosy_addon.line_drawing.lateral_neighbors import SeparationRules
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
@@ -17,9 +16,8 @@ from .timing import Bench, main
 
 DEGREE = 4
 
-#: Spacing of strokes in world space, and their maximum length as a multiple of it, as for hatching. They give
-#: about 20,000 strokes.
-SPACING, MAX_LENGTH = 0.0102, 12.0
+#: Spacing of strokes in world space.
+SPACING = 0.0102
 
 #: Maximum time of tracing in seconds.
 MAX_SECONDS = 30.0
@@ -29,8 +27,7 @@ def measure(bench: Bench) -> None:
     """Time tracing relative to the smoothest field, and drawing without and with hidden strokes."""
     surface = cases.ball(200_000)
     instance = MeshInstance(surface, np.eye(4), smoothest_field(surface, DEGREE))
-    rules = SeparationRules(max_length=MAX_LENGTH)
-    strokes = trace_strokes(instance, SPACING, rules=rules)
+    strokes = trace_strokes(instance, SPACING)
     gaps = lateral_gaps(build_tangent_mesh(instance), strokes)
     print(
         f"{len(strokes)} strokes, {100 * gaps.evenness:.1f} % of gaps within 25 %, "
@@ -38,7 +35,7 @@ def measure(bench: Bench) -> None:
     )
     case = bench.compare(
         f"{len(strokes)} strokes / smoothest field, 200K triangles, N = {DEGREE}",
-        lambda: trace_strokes(instance, SPACING, rules=rules),
+        lambda: trace_strokes(instance, SPACING),
         lambda: smoothest_field(surface, DEGREE),
         runs=3,
     )

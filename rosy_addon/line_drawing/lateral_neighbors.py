@@ -53,14 +53,11 @@ class SeparationRules:
         between them (see `MAX_COVERED_GAP`).
     min_length : float
         Strokes that are shorter than this are removed.
-    max_length : float
-        Strokes stop growing when they are longer than this.
     """
 
     min_separation: float = 0.75
     max_gap: float = 1.24
     min_length: float = 1.5
-    max_length: float = np.inf
 
 
 class LateralNeighbors(NamedTuple):

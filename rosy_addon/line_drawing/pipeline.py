@@ -235,7 +235,7 @@ def _instance_strokes(
     subject = f"{name}: a drawing of strokes with this spacing"
     check_memory(needed, subject, "increase the spacing, or choose a smaller size")
     with progress(0.1, 0.9):
-        strokes = part.on_whole_mesh(trace_on_mesh(part.mesh, spacing, surface_name=name))
+        strokes = part.on_whole_mesh(trace_on_mesh(part.mesh, spacing, name))
     strokes = mark_free_boundary_ends(strokes, mesh)
     if style.cross_creases:
         # Strokes may cross creases. Families are matched on a mesh without connections across creases.

@@ -213,7 +213,6 @@ class StreamlinePlacer:
     mesh : TangentMesh
     spacing : CornerSpacing
         Required spacing of strokes.
-    rules : SeparationRules
 
     Attributes
     ----------
@@ -240,8 +239,8 @@ class StreamlinePlacer:
     rosy_addon.line_drawing.trace.place_streamlines : Calls these methods until the mesh is covered.
     """
 
-    def __init__(self, mesh: TangentMesh, spacing: CornerSpacing, rules: SeparationRules) -> None:
-        self.mesh, self.spacing, self.rules = mesh, spacing, rules
+    def __init__(self, mesh: TangentMesh, spacing: CornerSpacing) -> None:
+        self.mesh, self.spacing, self.rules = mesh, spacing, SeparationRules()
         self.samples = StrokeSamples(mesh, spacing)
         self.strokes = GrowingStrokes()
         self.tips = NO_TIPS
@@ -283,8 +282,6 @@ class StreamlinePlacer:
         tips.arc += tips.sign * walked
         tips.step_scale[rejected] /= 2
         ended = np.where(rejected, tips.step_scale < MIN_STEP_SCALE, ended)
-        max_length = self.rules.max_length * strokes.spacing[tips.stroke]
-        ended |= strokes.length(tips.stroke) > max_length
         self._finish_tips(tips.take(np.flatnonzero(ended)))
         self.tips = tips.take(np.flatnonzero(~ended))
 
@@ -313,12 +310,9 @@ class StreamlinePlacer:
         ended : (n,) bool ndarray
             Whether a tip cannot continue after its last sample.
         """
-        mesh, tips, strokes = self.mesh, self.tips, self.strokes
+        mesh, tips = self.mesh, self.tips
         step = SAMPLE_STEP * tips.step_scale * self.samples.spacing_at(tips)
-        # Both tips of a stroke may grow by all of the length that is left.
-        left = self.rules.max_length * strokes.spacing[tips.stroke] - strokes.length(tips.stroke)
         count = np.where(tips.step_scale < 1, min(sample_count, MAX_RETRIED_SAMPLES), sample_count)
-        count = np.minimum(count, 1 + np.maximum(left / (2 * step), 0)).astype(np.intp)
         limit = max(MIN_SEGMENTS, SEGMENTS_PER_SAMPLE * int(count.max()))
         longest = SAMPLES_PER_SEGMENT * step
         _, _, ended, path = advance(mesh, tips.particles, count * step, None, longest, limit)

@@ -9,7 +9,6 @@ from ..core.progress import progress, report
 from ..field.blocks import joined, mask
 from ..field.formats.polygons import offsets_from_sizes
 from ..field.frames import dot, normalize
-from .lateral_neighbors import SeparationRules
 from .placement import StreamlinePlacer
 from .seeding import candidate_seeds, seeds_around_singularities, thinned_seeds, uncovered_seeds
 from .separation import enforce_separation
@@ -58,12 +57,7 @@ MAX_ITERATIONS, CLOSING_TOLERANCE = 4, 1e-3
 TRACE_STEP, STEPS_PER_REPORT = 0.5, 8
 
 
-def trace_on_mesh(
-    mesh: TangentMesh,
-    spacing: CornerSpacing,
-    rules: SeparationRules | None = None,
-    surface_name: str = "mesh",
-) -> Strokes:
+def trace_on_mesh(mesh: TangentMesh, spacing: CornerSpacing, surface_name: str) -> Strokes:
     """Cover a tangent mesh with evenly spaced strokes along its field.
 
     Parameters
@@ -71,8 +65,6 @@ def trace_on_mesh(
     mesh : TangentMesh
     spacing : CornerSpacing
         Spacing between strokes of the same family.
-    rules : SeparationRules, optional
-        Limits on the separation and the length of strokes. By default, the defaults of the class.
     surface_name : str
         Name of the surface in error messages.
 
@@ -89,8 +81,8 @@ def trace_on_mesh(
     """
     if not (np.isfinite(spacing.values).all() and (spacing.values > 0).all()):
         raise RosyError(f"{surface_name}: the spacing of strokes must be above 0")
-    placer = StreamlinePlacer(mesh, spacing, rules or SeparationRules())
-    rules = placer.rules
+    placer = StreamlinePlacer(mesh, spacing)
+    min_length = placer.rules.min_length
     with progress(0.0, 0.9):
         place_streamlines(placer)
     with progress(0.9, 0.92):
@@ -99,7 +91,7 @@ def trace_on_mesh(
     with progress(0.92, 0.95):
         strokes = close_loops(mesh, strokes, spacing)
     with progress(0.95, 1.0):
-        return enforce_separation(mesh, strokes, rules.min_length)
+        return enforce_separation(mesh, strokes, min_length)
 
 
 def place_streamlines(placer: StreamlinePlacer) -> None:

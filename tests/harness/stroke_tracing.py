@@ -8,7 +8,6 @@ import numpy as np
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.line_drawing.families import label_families
-from rosy_addon.line_drawing.lateral_neighbors import SeparationRules
 from rosy_addon.line_drawing.spacing import CornerSpacing
 from rosy_addon.line_drawing.stroke_set import Strokes
 from rosy_addon.line_drawing.svg import svg_text
@@ -20,11 +19,7 @@ from rosy_addon.projection.gbuffer import MeshInstance
 
 
 def trace_strokes(
-    instance: MeshInstance,
-    spacing: np.ndarray | float,
-    *,
-    rules: SeparationRules | None = None,
-    cross_creases: bool = False,
+    instance: MeshInstance, spacing: np.ndarray | float, *, cross_creases: bool = False
 ) -> Strokes:
     """Cover a mesh instance with evenly spaced strokes along its field.
 
@@ -33,7 +28,7 @@ def trace_strokes(
     mesh = build_tangent_mesh(instance, crease_angle=None if cross_creases else CREASE_ANGLE)
     corners, values = instance.surface.triangle_vertex, np.asarray(spacing, dtype=np.float64)
     values = np.broadcast_to(values[corners] if values.ndim == 1 else values, corners.shape)
-    strokes = trace_on_mesh(mesh, CornerSpacing(values), rules, instance.surface.name)
+    strokes = trace_on_mesh(mesh, CornerSpacing(values), instance.surface.name)
     return label_families(strokes, mesh)
 
 

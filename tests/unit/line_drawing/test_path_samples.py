@@ -71,8 +71,8 @@ def test_samples_are_accepted_one_after_the_other(monkeypatch):
     spacing = CornerSpacing(np.full((len(mesh.points), 3), 0.1))
     reached = []
     for sample_counts in ((6,), (1,) * 6):
-        rules = SeparationRules(min_length=0.0, max_gap=np.inf)
-        placer = placement.StreamlinePlacer(mesh, spacing, rules)
+        placer = placement.StreamlinePlacer(mesh, spacing)
+        placer.rules = SeparationRules(min_length=0.0, max_gap=np.inf)
         seeds = candidate_seeds(mesh, spacing.values)
         placer.add_seeds(thinned_seeds(mesh, seeds, 0.2, np.ones(len(seeds))))
         for count in sample_counts:

@@ -63,14 +63,12 @@ def test_streaks_drift_from_frame_to_frame(moving, tmp_path):
 
 
 def test_the_frame_and_the_camera_are_restored(moving, tmp_path):
-    marker = moving.timeline_markers.new("Other", frame=4)
-    marker.camera = add_camera("Other")
+    moving.timeline_markers.new("Other", frame=4).camera = add_camera("Other")
     moving.frame_set(-5, subframe=0.5)
     moving.camera = None
     before = moving.frame_current, moving.frame_subframe
     bake_animation(moving, [5], settings=OutputSettings(folder=tmp_path))
-    assert (moving.frame_current, moving.frame_subframe) == before
-    assert moving.camera is None
+    assert (moving.frame_current, moving.frame_subframe) == before and moving.camera is None
 
 
 def test_frames_that_are_up_to_date_are_skipped(moving, tmp_path):
@@ -126,8 +124,7 @@ def test_cameras_and_scenes_have_files_of_their_own(moving, tmp_path):
     assert len({name.casefold() for name in files}) == 5 and "RoSy_Cam_A_0001.png" in files
     # One camera alone has the same file as among others.
     (again,) = bake_animation(moving, [1], cameras=cameras[:1], settings=settings)
-    assert again.camera == names[0]
-    assert again.skipped == (1,)
+    assert (again.camera, again.skipped) == (names[0], (1,))
     stills = tmp_path / "stills"
     for camera in cameras:
         bake(moving, cameras=[camera], settings=OutputSettings(folder=stills))
@@ -197,8 +194,7 @@ def test_half_floats(moving, tmp_path):
     name, _, kind = channels.partition(b"\0")
     assert name == b"A" and kind[:4] == b"\1\0\0\0"  # half
     bake_animation(moving, [2], settings=OutputSettings(folder=tmp_path))
-    png = pixels(bpy.data.images.load(str(tmp_path / "RoSy_Scene_0002.png")))
-    linear = to_linear(png)
+    linear = to_linear(pixels(bpy.data.images.load(str(tmp_path / "RoSy_Scene_0002.png"))))
     np.testing.assert_allclose(pixels(image)[..., :3], linear[..., :3], atol=0.01)
     assert sorted(scene.name for scene in bpy.data.scenes) == before
 
@@ -229,9 +225,8 @@ def start(file, folder, *options):
 
 
 def wait_for(process):
-    out, err = process.communicate(timeout=300)
+    _, err = process.communicate(timeout=300)
     assert process.returncode == 0, err
-    return out
 
 
 def test_processes_share_the_frames(file, tmp_path):

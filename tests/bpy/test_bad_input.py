@@ -65,20 +65,13 @@ def test_more_memory_than_there_is(scene, camera, monkey, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("domain", "kind", "description"),
-    [
-        ("FACE", "INT", "INT on FACE"),
-        ("FACE", "FLOAT_COLOR", "FLOAT_COLOR on FACE"),
-        ("POINT", "FLOAT", "FLOAT on POINT"),
-        ("EDGE", "FLOAT_VECTOR", "FLOAT_VECTOR on EDGE"),
-    ],
+    ("domain", "kind"),
+    [("FACE", "INT"), ("FACE", "FLOAT_COLOR"), ("POINT", "FLOAT"), ("EDGE", "FLOAT_VECTOR")],
 )
-def test_wrong_type_or_domain(scene, camera, domain, kind, description):
-    plane = add_plane()
-    plane.data.attributes.new("rosy", kind, domain)
-    assert_refused(
-        "object 'Plane', attribute 'rosy'", "expected FLOAT_VECTOR on FACE", f"found {description}"
-    )
+def test_wrong_type_or_domain(scene, camera, domain, kind):
+    add_plane().data.attributes.new("rosy", kind, domain)
+    words = "object 'Plane', attribute 'rosy'", "expected FLOAT_VECTOR on FACE"
+    assert_refused(*words, f"found {kind} on {domain}")
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
@@ -134,15 +127,14 @@ def test_messages_name_the_object_and_not_its_mesh(scene):
     expect_error(r"^mesh 'Data' has no attribute 'rosy'", read_mesh_field, mesh)
 
 
+FIN = [(0, 0, -1), (0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0)]
+
+
 @pytest.mark.parametrize(
     ("vertices", "faces", "edges"),
     [
         ([(-1, 0, -1), (1, 0, -1), (0, 0, 1), (2, 0, 2)], [(0, 1, 2)], [(2, 3)]),
-        (
-            [(0, 0, -1), (0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0)],
-            [(0, 2, 1), (0, 3, 1), (0, 4, 1)],
-            [],
-        ),
+        (FIN, [(0, 2, 1), (0, 3, 1), (0, 4, 1)], []),
     ],
     ids=["loose edge", "three faces at an edge"],
 )
@@ -284,32 +276,26 @@ def test_fields_are_stored_on_all_meshes_or_none(scene, monkey, form):
     other = add_plane("Other")
     name = {"VECTOR": "taken", "DIRECTIONS": "dir0", "ANGLE": "taken"}[form]
     other.data.attributes.new(name, "BOOLEAN", "POINT")
-    fields = {
-        obj.data: generate(mesh_surface(obj.data), "axis", 4)
-        for obj in (add_plane(), monkey, other)
-    }
+    meshes = [obj.data for obj in (add_plane(), monkey, other)]
+    fields = {mesh: generate(mesh_surface(mesh), "axis", 4) for mesh in meshes}
     before = contents()
     message = f"mesh 'Other' already has an attribute '{name}'"
     expect_error(message, assign_fields, fields, "taken", form)
+    assert contents() == before
     # Blender would rename this one if it failed to create an attribute.
-    next(iter(fields)).attributes.new("Float3", "FLOAT_VECTOR", "EDGE")
-    before = contents()
-    message, plane = (
-        r"mesh 'Plane': 'x+' cannot be the name of an attribute",
-        dict([*fields.items()][:1]),
-    )
-    expect_error(message, assign_fields, plane, "x" * 300)
+    meshes[0].attributes.new("Float3", "FLOAT_VECTOR", "EDGE")
+    before, first = contents(), {meshes[0]: fields[meshes[0]]}
+    message = r"mesh 'Plane': 'x+' cannot be the name of an attribute"
+    expect_error(message, assign_fields, first, "x" * 300)
     assert contents() == before
 
 
 @pytest.fixture
-def library(scene, tmp_path):
+def library(scene, monkey, tmp_path):
     """A .blend file with Suzanne, her field and an empty file to link it into."""
-    bpy.ops.mesh.primitive_monkey_add()
-    add_field(bpy.context.object)
     collection = bpy.data.collections.new("Monkeys")
     scene.collection.children.link(collection)
-    collection.objects.link(bpy.context.object)
+    collection.objects.link(monkey)
     path = tmp_path / "library.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     scene = empty_scene(64)
@@ -317,14 +303,12 @@ def library(scene, tmp_path):
     return path
 
 
-@pytest.mark.parametrize("kind", ["objects", "collections"])
-def test_linked_objects_are_refused(library, kind):
-    name = {"objects": "Suzanne", "collections": "Monkeys"}[kind]
-    data = load(library, name, kind, link=True)
-    if kind == "objects":
-        link(data)
-    else:
-        add_instance(data)
+@pytest.mark.parametrize(
+    ("kind", "name", "show"),
+    [("objects", "Suzanne", link), ("collections", "Monkeys", add_instance)],
+)
+def test_linked_objects_are_refused(library, kind, name, show):
+    show(load(library, name, kind, link=True))
     assert_refused("object 'Suzanne' is linked from", "library.blend")
 
 
@@ -342,8 +326,7 @@ def test_cameras_of_one_name(library):
     bpy.ops.wm.open_mainfile(filepath=str(library))
     add_camera()
     bpy.ops.wm.save_mainfile()
-    bpy.ops.wm.read_homefile(use_empty=True)
-    scene = bpy.context.scene
+    scene = empty_scene(64)
     link(load(library, "Camera", link=True))
     add_camera()
     assert_refused("several cameras have the name 'Camera'", cameras=scene_cameras(scene))

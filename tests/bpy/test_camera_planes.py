@@ -41,6 +41,13 @@ def colored(monkey, camera, scene):
     return scene
 
 
+@pytest.fixture
+def keyed(colored):
+    """The same scene, with keys."""
+    colored.rosy.key = True
+    return colored
+
+
 # --- text ----------------------------------------------------------------------------------------
 
 
@@ -79,64 +86,58 @@ def test_the_switch_shows_and_hides_the_plane(colored, kind, update):
     assert contents() == before
 
 
-def test_the_image_of_a_key(colored):
-    colored.rosy.key = True
-    bake(colored)
+def test_the_image_of_a_key(keyed):
+    bake(keyed)
     image = key_image(*keys())
     assert image.name == "RoSy Key Camera" and image.packed_file and tuple(image.size) == (320, 240)
-    colored.rosy.key_caption = "A head"
+    keyed.rosy.key_caption = "A head"
     assert len(keys()) == 1 and len([i for i in bpy.data.images if "Key" in i.name]) == 1
 
 
-def test_a_key_is_not_listed_among_the_pictures(colored):
-    colored.rosy.key = True
-    bake(colored)
-    assert [info.camera for info in list_bakes(colored)] == ["Camera"]
-    assert baked_objects(colored) == [bpy.data.objects["Suzanne"]]
-    assert remove_bakes(colored) == (1, 1)
+def test_a_key_is_not_listed_among_the_pictures(keyed):
+    bake(keyed)
+    assert [info.camera for info in list_bakes(keyed)] == ["Camera"]
+    assert baked_objects(keyed) == [bpy.data.objects["Suzanne"]]
+    assert remove_bakes(keyed) == (1, 1)
     assert not keys()
 
 
-def test_a_panoramic_camera_has_no_key(colored):
-    colored.rosy.key = True
-    bake(colored)
-    colored.camera.data.type = "PANO"
-    colored.rosy.key_size = 12
+def test_a_panoramic_camera_has_no_key(keyed):
+    bake(keyed)
+    keyed.camera.data.type = "PANO"
+    keyed.rosy.key_size = 12
     assert not keys()
 
 
-def test_animations_have_numbers_only_with_a_range(colored, tmp_path):
-    colored.rosy.key = True
+def test_animations_have_numbers_only_with_a_range(keyed, tmp_path):
     settings = OutputSettings(folder=tmp_path)
     for top, expected in ((0.0, None), (0.5, 0.5)):
-        colored.rosy.look.color_range = 0.0, top
-        bake_animation(colored, range(1, 3), settings=settings)
-        key = PictureKey.from_json(colored.rosy.bakes[0].key)
+        keyed.rosy.look.color_range = 0.0, top
+        bake_animation(keyed, range(1, 3), settings=settings)
+        key = PictureKey.from_json(keyed.rosy.bakes[0].key)
         assert key.color_scale.high == expected
         assert key.indices and all(entry.count is None for entry in key.indices)
         (obj,) = keys()
-        assert obj.parent == colored.camera
+        assert obj.parent == keyed.camera
 
 
-def test_the_key_is_that_of_the_picture_that_is_shown(colored, tmp_path):
-    colored.rosy.key = True
-    bake(colored)
-    bake_animation(colored, range(1, 2), settings=OutputSettings(folder=tmp_path))
+def test_the_key_is_that_of_the_picture_that_is_shown(keyed, tmp_path):
+    bake(keyed)
+    bake_animation(keyed, range(1, 2), settings=OutputSettings(folder=tmp_path))
     animated = pixels(key_image(keys()[0]))
-    show_bake(colored, "Camera")
+    show_bake(keyed, "Camera")
     still = pixels(key_image(keys()[0]))
     assert (still != animated).any()
-    bake(colored)
+    bake(keyed)
     np.testing.assert_array_equal(pixels(key_image(keys()[0])), still)
-    show_bake(colored, colored.name)
+    show_bake(keyed, keyed.name)
     np.testing.assert_array_equal(pixels(key_image(keys()[0])), animated)
 
 
-def test_every_camera_has_its_own(colored):
-    colored.rosy.key = True
+def test_every_camera_has_its_own(keyed):
     other = add_camera("Other", (4.0, 0.0, 0.0))
-    bake(colored, cameras=[colored.camera, other])
-    assert {obj.parent for obj in keys()} == {colored.camera, other}
+    bake(keyed, cameras=[keyed.camera, other])
+    assert {obj.parent for obj in keys()} == {keyed.camera, other}
     assert len({key_image(obj) for obj in keys()}) == 2
 
 
@@ -159,16 +160,15 @@ def test_scale_bars_have_round_lengths(scene, system, scale, largest, length, la
     assert found == (pytest.approx(length), label)
 
 
-def test_only_orthographic_cameras_have_a_scale_bar(colored):
-    colored.rosy.key = True
-    colored.rosy.key_bar = colored.rosy.key_legend = False
-    bake(colored)
+def test_only_orthographic_cameras_have_a_scale_bar(keyed):
+    keyed.rosy.key_bar = keyed.rosy.key_legend = False
+    bake(keyed)
     assert not keys(), "a key that shows nothing is not made"
     for caption in ("A head", ""):
-        colored.rosy.key_caption = caption
+        keyed.rosy.key_caption = caption
         assert len(keys()) == bool(caption)
-    colored.camera.data.type, colored.camera.data.ortho_scale = "ORTHO", 8.0
-    bake(colored)
+    keyed.camera.data.type, keyed.camera.data.ortho_scale = "ORTHO", 8.0
+    bake(keyed)
     (obj,) = keys()
     opaque = pixels(key_image(obj))[..., 3] > 0.99
     # 1 m is 320 / 8 pixels.

@@ -178,12 +178,10 @@ def test_fields_are_read_in_edit_mode(scene, form, domain, count):
     else:
         set_attribute(plane.data, vectors, domain=domain)
     reader = SceneReader()
-    (expected,) = read_live(reader)
+    (expected,) = (entry.instance.field for entry in read_live(reader))
     bpy.context.view_layer.objects.active = plane
     bpy.ops.object.mode_set(mode="EDIT")
     reader.invalidate({"Plane"})
-    (entry,) = read_live(reader)
-    assert entry.instance.field.degree == expected.instance.field.degree
-    np.testing.assert_allclose(
-        entry.instance.field.vectors, expected.instance.field.vectors, atol=1e-6
-    )
+    (field,) = (entry.instance.field for entry in read_live(reader))
+    assert field.degree == expected.degree
+    np.testing.assert_allclose(field.vectors, expected.vectors, atol=1e-6)

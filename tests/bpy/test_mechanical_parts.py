@@ -124,10 +124,7 @@ def stepped_shaft():
     return modified(body, "BEVEL", width=0.03, segments=2)
 
 
-PARTS = (
-    *(crossing_cylinders, nut, flange, tee, valve, housing, gear, slotted_block),
-    stepped_shaft,
-)
+PARTS = crossing_cylinders, nut, flange, tee, valve, housing, gear, slotted_block, stepped_shaft
 
 
 def measured(part, kind):

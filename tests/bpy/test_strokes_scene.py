@@ -22,6 +22,7 @@ from test_bad_input import assert_refused
 from test_up_to_date import put
 
 PLAIN = StrokeStyle(spacing=12, outline=True)
+WIDE = StrokeStyle(spacing=20)
 BLACK = Pen(width=1.5)
 
 #: Type of a Grease Pencil object, which is another one since Blender 4.3.
@@ -88,7 +89,6 @@ def test_curves_hold_the_strokes_and_their_attributes(monkey, camera, scene):
     normal = attribute_values(attributes["surface_normal"], "vector", 3)
     has_member = member.any(axis=1)
     assert np.allclose(np.linalg.norm(member[has_member], axis=1), 1, atol=1e-4)
-    points = attribute_values(attributes["position"], "vector", 3)
     camera_view = view(scene)
     first = np.array([curve.first_point_index for curve in data.curves])
     begins = strokes.start[:-1]
@@ -96,7 +96,7 @@ def test_curves_hold_the_strokes_and_their_attributes(monkey, camera, scene):
     np.testing.assert_allclose(normal[first], strokes.normal[begins], atol=1e-4)
     face = attribute_values(attributes["face_index"])
     np.testing.assert_array_equal(face[first], strokes.face[begins])
-    points = points[first].astype(float)
+    points = attribute_values(attributes["position"], "vector", 3)[first].astype(float)
     positions, _ = project_to_pixels(points, camera_view)
     expected, _ = project_to_pixels(strokes.points[begins], camera_view)
     np.testing.assert_allclose(positions, expected, atol=0.01)
@@ -193,25 +193,22 @@ def test_chosen_objects_are_drawn_and_others_occlude(monkey, camera, scene):
     wall.location.y = -2.0
     instances = read_scene(depsgraph()).instances
     assert len(instances) == 2
-    result = draw_strokes(
-        scene, kind="FILE", path="/tmp/unused.svg", objects=[wall], style=StrokeStyle(spacing=20)
-    )
+    result = draw_strokes(scene, kind="FILE", path="/tmp/unused.svg", objects=[wall], style=WIDE)
     assert np.allclose(result.drawing.strokes.points[:, 1], -2.0)
-    style = StrokeStyle(spacing=20)
-    behind = draw_strokes(scene, kind="CURVES", objects=[monkey], style=style).drawing.strokes
+    behind = draw_strokes(scene, kind="CURVES", objects=[monkey], style=WIDE).drawing.strokes
     wall.hide_render = True
-    assert len(draw_strokes(scene, kind="CURVES", style=style).drawing.strokes) > len(behind)
+    assert len(draw_strokes(scene, kind="CURVES", style=WIDE).drawing.strokes) > len(behind)
 
 
 def test_meshes_from_strokes_do_not_occlude(wall, camera, scene):
     """Geometry Nodes may turn stroke objects into meshes; these are not read as occluders."""
-    first = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=20))
+    first = draw_strokes(scene, kind="CURVES", style=WIDE)
     group = add_nodes(first.obj, "GeometryNodeCurveToMesh")
     circle = group.nodes.new("GeometryNodeCurvePrimitiveCircle")
     circle.inputs["Radius"].default_value = 0.3
     profile = group.nodes["Curve to Mesh"].inputs["Profile Curve"]
     group.links.new(circle.outputs["Curve"], profile)
-    again = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=20))
+    again = draw_strokes(scene, kind="CURVES", style=WIDE)
     np.testing.assert_array_equal(again.drawing.strokes.points, first.drawing.strokes.points)
 
 
@@ -308,7 +305,7 @@ def recolor(data):
 @pytest.mark.parametrize("edit", [move_a_point, recolor])
 @pytest.mark.parametrize("kind", ["PENCIL", "CURVES"])
 def test_edited_strokes_are_recognized(wall, camera, scene, tmp_path, kind, edit):
-    name = draw_strokes(scene, kind=kind, style=StrokeStyle(spacing=20)).obj.name
+    name = draw_strokes(scene, kind=kind, style=WIDE).obj.name
     assert edited_strokes(scene, kind, "Camera") is None
     scene = reopen(tmp_path / "strokes.blend")
     obj = bpy.data.objects[name]
@@ -318,7 +315,7 @@ def test_edited_strokes_are_recognized(wall, camera, scene, tmp_path, kind, edit
     edit(obj.data)
     assert edited_strokes(scene, kind, "Camera") == obj
     assert edited_strokes(scene, kind, "Other") is None
-    draw_strokes(scene, kind=kind, style=StrokeStyle(spacing=20))
+    draw_strokes(scene, kind=kind, style=WIDE)
     assert edited_strokes(scene, kind, "Camera") is None
 
 
@@ -327,8 +324,7 @@ def test_new_strokes_are_put_into_a_collection(wall, camera, scene):
     first, second = (bpy.data.collections.new(name) for name in ("First", "Second"))
     for collection in (first, second):
         scene.collection.children.link(collection)
-    style = StrokeStyle(spacing=20)
-    obj = draw_strokes(scene, kind="CURVES", style=style, collection=first).obj
+    obj = draw_strokes(scene, kind="CURVES", style=WIDE, collection=first).obj
     assert obj.users_collection == (first,)
-    draw_strokes(scene, kind="CURVES", style=style, collection=second)
+    draw_strokes(scene, kind="CURVES", style=WIDE, collection=second)
     assert obj.users_collection == (first,)

@@ -141,8 +141,7 @@ def animated(scene):
 
 def tracked(scene):
     target = link(bpy.data.objects.new("Target", None))
-    constraint = scene.camera.constraints.new("TRACK_TO")
-    constraint.target = target
+    scene.camera.constraints.new("TRACK_TO").target = target
 
 
 def instanced(scene):
@@ -173,6 +172,7 @@ def put(scene, path, value):
 bend = partial(put, 'Sheet:data.shape_keys.key_blocks["Bent"].value')
 SUBDIVISION, WAVE = 'Plain:modifiers["Subdivision"]', 'Sheet:modifiers["Wave"]'
 hatched = put("rosy.look.ink", "hatch")
+recolor_key = put("Key:data.color", (1.0, 0.2, 0.2))
 
 
 @deferred
@@ -309,7 +309,7 @@ TABLE = {
     "occluder smooth": (shade_smooth("In Front"), None, ""),
     "occluder with shadows": (move("Behind", 0.0, -2.2, 0.0), shadows, "'Behind' was moved"),
     # lights
-    "lamp color": (put("Key:data.color", (1.0, 0.2, 0.2)), scene_lights, "light 'Key' was changed"),
+    "lamp color": (recolor_key, scene_lights, "light 'Key' was changed"),
     "exposure": (put("rosy.exposure", -1.0), scene_lights, "the exposure was changed"),
     "exposure with a headlight": (put("rosy.exposure", -1.0), None, ""),
     "lamp moved": (move("Key", -2.0, 0.0, 0.0), scene_lights, "light 'Key' was changed"),
@@ -332,11 +332,7 @@ TABLE = {
     "tone picture": (write_reference(0.6), tone_picture, "the picture of the tone was changed"),
     "tone picture of the same name": (write_reference(0.3), tone_picture, ""),
     "lamp with tones": (put("Key:data.energy", 900.0), tone_and_lights, ""),
-    "lamp without a tone": (
-        put("Key:data.color", (1.0, 0.2, 0.2)),
-        tone_of_one_and_lights,
-        "light 'Key'",
-    ),
+    "lamp without a tone": (recolor_key, tone_of_one_and_lights, "light 'Key' was changed"),
     "tone image": (paint_tone, tone_image, "field of 'Plain' was changed"),
     # camera and output
     "camera moved": (move("Camera", 0.1, 0.0, 0.0), None, "camera 'Camera' was changed"),

@@ -94,6 +94,11 @@ FLOW = replace(LOOK, flow=1.5)
 CYCLE = 60 / cycle_distance(FLOW.length, FLOW.method)
 
 
+#: A bright spot in gray noise.
+SPOT = np.full((64, 200, 3), 0.5, dtype=np.float32)
+SPOT[32, 100] += (1.0, -0.5, 0.3)
+
+
 def drift_of(frame):
     return Drift(frame * FLOW.flow / 60 % 1, CYCLE)
 
@@ -101,12 +106,10 @@ def drift_of(frame):
 @pytest.mark.parametrize(("degree", "backward"), [(1, 0), (2, 0), (3, 0), (1, 1)])
 def test_streaks_drift_by_the_flow(degree, backward):
     """The streak of a pixel is a wave that fades. After two frames, it is three pixels further."""
-    noise = np.full((64, 200, 3), 0.5, dtype=np.float32)
-    noise[32, 100] += (1.0, -0.5, 0.3)
     field = planar_pixel_field(np.full((64, 200), np.pi * backward), degree)
     frames = []
     for number in (5, 7):
-        image = frame(lic(field, FLOW, noise.reshape(-1, 3), drift_of(number)).members[0], field)
+        image = frame(lic(field, FLOW, SPOT.reshape(-1, 3), drift_of(number)).members[0], field)
         frames.append((image[32, ::-1] if backward else image[32]) - 0.5)
     decay = float(decay_of_samples(np.array(full_sample_count(FLOW.length, "box")), False))
     source = 200 - 101 if backward else 100
@@ -117,11 +120,9 @@ def test_streaks_drift_by_the_flow(degree, backward):
 
 
 def test_lines_across_the_guiding_angle_drift_both_ways():
-    noise = np.full((64, 200, 3), 0.5, dtype=np.float32)
-    noise[32, 100] += (1.0, -0.5, 0.3)
     field = planar_pixel_field(np.zeros((64, 200)), 2)
     look = replace(FLOW, guiding_angle=np.pi / 2)
-    image = lic(field, look, noise.reshape(-1, 3), Drift(0.3, CYCLE)).members[0]
+    image = lic(field, look, SPOT.reshape(-1, 3), Drift(0.3, CYCLE)).members[0]
     row = frame(image, field)[32] - 0.5
     np.testing.assert_allclose(row[101:180], row[99:20:-1], atol=1e-4)
     assert np.abs(row[110]) > 0.1 * np.abs(row).max()

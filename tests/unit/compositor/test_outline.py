@@ -235,8 +235,7 @@ def test_marks_grow_without_a_jump(block_side):
     border = np.zeros(len(pixel), dtype=np.uint8)
     strength = _mark_strength(pixel, border, frame.shape[1], block_side)
     mark = pixel // frame.shape[1] // (4 * block_side)
-    by_length = np.array([np.unique(strength[mark == index]) for index in range(len(lengths))])
-    by_length = by_length[:, 0]
+    by_length = np.array([np.unique(strength[mark == k]).item() for k in range(len(lengths))])
     assert not by_length[lengths < MIN_MARK_LENGTH].any()
     assert (by_length[lengths >= FULL_MARK_LENGTH] == 1).all()
     assert (np.diff(by_length) >= 0).all() and np.diff(by_length).max() < 0.2

@@ -24,12 +24,10 @@ from rosy_addon.projection.project import project
 pytestmark = pytest.mark.slow
 
 
-def project_surface(
-    surface, field, size=256, eye=(0, 0, 4), scale=2.4, up=(0, 1, 0), display="smooth"
-):
+def project_surface(surface, field, size=256, eye=(0, 0, 4), scale=2.4, up=(0, 1, 0)):
     """A G-buffer of one surface under an orthographic camera."""
     camera = orthographic_camera(look_at(eye, (0, 0, 0), up), size, size, scale=scale)
-    return project([MeshInstance(surface, np.eye(4), field)], camera, display)
+    return project([MeshInstance(surface, np.eye(4), field)], camera)
 
 
 def test_decomposition_agrees_with_brute_force_on_a_sphere():
@@ -118,26 +116,23 @@ def test_lights_of_the_scene():
     assert np.allclose(lighting[:, 1], expected / 2, atol=1e-4)
     # Without lights, soft streaks have the headlight, and ink the lamp.
     for ink, light in (("soft", "headlight"), ("even", "lamp")):
-        tones = (
-            diffuse(gbuffer, plain(shading=1.0, light=each, ink=ink)) for each in ("scene", light)
-        )
-        np.testing.assert_array_equal(*tones)
+        looks = (plain(shading=1.0, light=each, ink=ink) for each in ("scene", light))
+        np.testing.assert_array_equal(*(diffuse(gbuffer, look) for look in looks))
 
 
 def test_metered_lights_make_the_brightest_tenth_white():
     """On a ball in the light of a sun, the irradiance of the lit half is uniformly distributed."""
     ball = icosphere(4)
     instances = [MeshInstance(ball, np.eye(4), axis_field(ball, 1))]
-    suns = [
-        Light("sun", np.array([0.0, 0.0, 1.0]), np.full(3, 0.5), power) for power in (0.1, 400.0)
-    ]
+    above = np.array([0.0, 0.0, 1.0])
+    suns = [Light("sun", above, np.full(3, 0.5), power) for power in (0.1, 400.0)]
     for lights in (suns[:1], suns[1:], suns):
         strength = sum(light.strength * 0.5 for light in metered(lights, instances))
         np.testing.assert_allclose(strength * 0.9, 1.0, atol=0.01)
     ratio = metered(suns, instances, 1.0)[1].strength / metered(suns, instances)[1].strength
     np.testing.assert_allclose(ratio, 2.0)
-    away = Light("sun", np.array([0.0, 0.0, 1.0]), np.zeros(3), 1.0)
-    assert metered([away], instances) == (away,) and metered([], instances) == ()
+    black = Light("sun", above, np.zeros(3), 1.0)
+    assert metered([black], instances) == (black,) and metered([], instances) == ()
 
 
 @pytest.mark.parametrize("ends", [(0.0, 1.0), (0.25, 0.75), (1.0, 0.0)], ids=str)
@@ -171,10 +166,9 @@ def test_lines_do_not_depend_on_the_scale_of_magnitudes(degree):
     surface = plane(4, 4)
     rho = 10.0 ** np.linspace(-29, 29, surface.face_count)[:, None]
     look = plain(display="flat", supersampling=1)
-    pictures = [
-        compose(project_surface(surface, RosyField(degree, length * [1.0, 0, 0]), 32), look).rgba
-        for length in (rho, np.ones_like(rho))
-    ]
+    fields = (RosyField(degree, length * [1.0, 0, 0]) for length in (rho, np.ones_like(rho)))
+    gbuffers = (project_surface(surface, field, 32) for field in fields)
+    pictures = (compose(gbuffer, look).rgba for gbuffer in gbuffers)
     np.testing.assert_allclose(*pictures, atol=1e-5)
 
 

@@ -30,10 +30,8 @@ def _many_strips(monkeypatch):
 
 def instances() -> tuple[MeshInstance, ...]:
     """A torus with a field of degree 4, and in front a ball with one of degree 3."""
-    return (
-        instance_of(torus(30, 15), 4, "axis"),
-        instance_of(icosphere(3), 3, matrix=moved(0.2, -0.5, 1.0)),
-    )
+    ball = instance_of(icosphere(3), 3, matrix=moved(0.2, -0.5, 1.0))
+    return instance_of(torus(30, 15), 4, "axis"), ball
 
 
 PAPER_GRAIN = {"anchor": "surface", "high_pass": 0.0, "ink": "hatch", "paper_grain": 0.8}

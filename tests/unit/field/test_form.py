@@ -89,14 +89,10 @@ def test_a_noisy_ball_has_as_few_singularities_as_possible(share):
     assert len(vertices) == 8 and (index == 1).all()
 
 
-def test_the_field_follows_the_edges_of_a_cube():
-    field = generate(cube(), "form", 4)
-    np.testing.assert_allclose(np.sort(np.abs(field.vectors), axis=1), [[0, 0, 1]] * 6, atol=1e-9)
-
-
-def test_the_field_follows_the_border_of_a_plane():
-    field = generate(plane(8, 8), "form", 4)
-    np.testing.assert_allclose(np.abs(field.vectors).max(axis=1), 1.0, atol=1e-9)
+@pytest.mark.parametrize("surface", [cube(), plane(8, 8)], ids=["cube", "plane"])
+def test_the_field_follows_sharp_edges_and_borders(surface):
+    members = np.sort(np.abs(generate(surface, "form", 4).vectors), axis=1)
+    np.testing.assert_allclose(members, [[0, 0, 1]] * surface.face_count, atol=1e-9)
 
 
 def test_salient_edges():

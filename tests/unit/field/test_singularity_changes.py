@@ -21,6 +21,7 @@ from rosy_addon.field.singularity_changes import (
 
 #: Many faces meet at its poles, so that they can have large indices.
 BALL = globe(32, 64)
+POLES = NORTH, SOUTH = 0, len(BALL.vertices) - 1
 
 
 def turned_by(surface, field, other):
@@ -34,26 +35,24 @@ def nearest_vertex(point):
 
 
 def pole_field(degree, pairs):
-    """A field on the ball with singularities at two poles, and with further pairs."""
-    poles = [0, len(BALL.vertices) - 1]
-    vertex = [*poles, *(nearest_vertex(point) for pair in pairs for point in pair)]
-    index = [degree, degree, *([1, -1] * len(pairs))]
-    return prescribed_field(BALL, degree, vertex, index), poles
+    """A field on the ball with singularities at the poles, and with further pairs."""
+    vertex = [*POLES, *(nearest_vertex(point) for pair in pairs for point in pair)]
+    return prescribed_field(BALL, degree, vertex, [degree, degree, *([1, -1] * len(pairs))])
 
 
 def test_near_pairs_are_cancelled_and_nothing_else():
     pairs = [((1, 0, 0), (1, 0.2, 0)), ((0, 1, 0.3), (0, 1, -0.3)), ((0, -1, 0), (-1, 0, 0))]
-    field, poles = pole_field(4, pairs)
+    field = pole_field(4, pairs)
     assert len(find_singularities(BALL, field)[0]) == 8
     for reach, left in ((0.05, 8), (0.15, 6), (0.4, 4), (1.0, 2)):
         clean = convert(BALL, field, Conversion(pair_distance=reach))
         vertex, _ = find_singularities(BALL, clean)
-        assert len(vertex) == left and set(poles) <= set(vertex)
-    assert indices(BALL, clean) == dict.fromkeys(poles, 4)
+        assert len(vertex) == left and set(POLES) <= set(vertex)
+    assert indices(BALL, clean) == dict.fromkeys(POLES, 4)
 
 
 def test_far_from_a_pair_nothing_turns():
-    field, _ = pole_field(4, [((1, 0, 0), (1, 0.2, 0))])
+    field = pole_field(4, [((1, 0, 0), (1, 0.2, 0))])
     turned = turned_by(BALL, field, convert(BALL, field, Conversion(pair_distance=0.15)))
     distance = np.linalg.norm(BALL.face_center - (1, 0.1, 0), axis=1)
     assert turned[distance > 1].max() < 0.5 and turned[distance < 0.1].max() > 20
@@ -61,7 +60,7 @@ def test_far_from_a_pair_nothing_turns():
 
 
 def test_magnitudes_and_undefined_faces_stay():
-    field, _ = pole_field(2, [((1, 0, 0), (1, 0.2, 0))])
+    field = pole_field(2, [((1, 0, 0), (1, 0.2, 0))])
     vectors = field.vectors * np.linspace(1, 3, BALL.face_count)[:, None]
     vectors[BALL.face_center[:, 2] < -0.5] = 0
     clean = convert(BALL, RosyField(2, vectors), Conversion(pair_distance=0.15))
@@ -127,40 +126,37 @@ def test_clusters_are_joined_along_edges():
 
 def test_a_pole_that_noise_divides_is_one_cluster():
     """Five of +1/4 around one of -1/4 are a pole of index 1, with the singularity in the middle as its place."""
-    far = len(BALL.vertices) - 1
     around = 0.2 * np.stack([f(2 * np.pi * np.arange(5) / 5) for f in (np.cos, np.sin)], axis=1)
     middle, *ring = (nearest_vertex((1, y, z)) for y, z in ((0, 0), *around))
-    field = prescribed_field(BALL, 4, [far, middle, *ring], [4, -1, *[1] * 5])
+    field = prescribed_field(BALL, 4, [SOUTH, middle, *ring], [4, -1, *[1] * 5])
     found = find_singularities(BALL, field)
     assert len(found[0]) == 7 and found[1].sum() == 4 * BALL.euler_characteristic
     clusters = cluster_singularities(BALL, *found, 0.4)
-    assert dict(zip(*clusters, strict=True)) == {middle: 4, far: 4}
+    assert dict(zip(*clusters, strict=True)) == {middle: 4, SOUTH: 4}
 
 
 def test_a_cluster_that_sums_to_zero_is_cancelled():
     """+2/4 between two of -1/4 has no opposite, but the three together have no index."""
     middle, *sides = (nearest_vertex((1, y, 0)) for y in (0, -0.4, 0.4))
-    poles = [0, len(BALL.vertices) - 1]
-    field = prescribed_field(BALL, 4, [*poles, middle, *sides], [4, 4, 2, -1, -1])
+    field = prescribed_field(BALL, 4, [*POLES, middle, *sides], [4, 4, 2, -1, -1])
     assert len(find_singularities(BALL, field)[0]) == 5
     assert convert(BALL, field, Conversion(pair_distance=0.05)) is field
     clean = convert(BALL, field, Conversion(pair_distance=0.4))
-    assert indices(BALL, clean) == dict.fromkeys(poles, 4)
+    assert indices(BALL, clean) == dict.fromkeys(POLES, 4)
 
 
 @pytest.mark.parametrize("degree", [1, 4])
 def test_guides_bend_a_field_with_the_same_singularities(degree):
     """Near the guides the field follows them, and no singularity comes or goes."""
-    last = pole_field(degree, [])[1]
     guides = np.zeros((BALL.face_count, 3))
     directions = {(1, 0, 0): (0, 1, 1), (-1, 0.3, 0): (0, 1, 0.2), (0, 1, 0): (1, 0, 0)}
     for center, direction in directions.items():
         center = np.divide(center, np.linalg.norm(center))
         distance = np.linalg.norm(BALL.face_center - center, axis=1)
         guides[distance < 0.15] = direction
-    whole = prescribed_field(BALL, degree, last, [degree, degree], guides)
-    bent = prescribed_field(BALL, degree, last, [degree, degree], guides, 0.02)
-    assert indices(BALL, bent) == dict.fromkeys(last, degree)
+    whole = prescribed_field(BALL, degree, POLES, [degree, degree], guides)
+    bent = prescribed_field(BALL, degree, POLES, [degree, degree], guides, 0.02)
+    assert indices(BALL, bent) == dict.fromkeys(POLES, degree)
     turned = (turned_by(BALL, RosyField(degree, guides), field) for field in (bent, whole))
     error, error_of_whole = (each[guides.any(axis=1)] for each in turned)
     assert np.median(error) < 3 and error.max() < 10 and error_of_whole.max() > 15
@@ -183,8 +179,7 @@ def test_a_field_bends_by_several_members(degree):
 
 # --- by hand ---------------------------------------------------------------------------------
 
-#: The poles, and vertices on three parallels of one meridian.
-NORTH, SOUTH = 0, len(BALL.vertices) - 1
+#: Vertices on three parallels of one meridian.
 NEAR_NORTH, EQUATOR, NEAR_SOUTH = (1 + row * 64 for row in (4, 15, 27))
 
 

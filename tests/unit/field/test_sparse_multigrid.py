@@ -94,13 +94,10 @@ def test_cycles_converge_and_ignore_rows_of_rounding():
     """The row of a component of tiny area can be all rounding, with 0 on the diagonal."""
     matrix = field_laplacian(build_connection(bumpy(icosphere(4))), 4, 0.1)
     count = len(matrix)
-    with_row = from_coo(
-        np.concatenate([matrix.row_indices, [count, count, 0]]),
-        np.concatenate([matrix.indices, [count, 0, count]]),
-        np.concatenate([matrix.data, [0, 1e-16, 1e-16]]),
-        count + 1,
-        count + 1,
-    )
+    row = np.append(matrix.row_indices, [count, count, 0])
+    column = np.append(matrix.indices, [count, 0, count])
+    data = np.append(matrix.data, [0, 1e-16, 1e-16])
+    with_row = from_coo(row, column, data, count + 1, count + 1)
     rhs = np.append(np.random.default_rng(0).standard_normal(count), 0) + 0j
     expected = spsolve(as_scipy(matrix).tocsc(), rhs[:-1])
     solution, errors = np.zeros_like(rhs), []

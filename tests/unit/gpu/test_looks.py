@@ -174,15 +174,8 @@ def test_samples_show_what_numpy_draws(card, preset):
 @pytest.mark.parametrize("paper", ["#ffffff00", "#e0c08080"])
 @pytest.mark.parametrize("hue", ["one", "families"])
 def test_ink_on_paper_that_is_not_opaque(card, hue, paper):
-    look = replace(
-        LOOK,
-        ink="hatch",
-        shading=1.0,
-        paper_color=paper,
-        hue=hue,
-        line_width=3.0,
-        light="headlight",
-    )
+    hatched = LOOK.with_settings(LOOKS["hatched"])
+    look = replace(hatched, paper_color=paper, hue=hue, light="headlight")
     pair = draw_pair(card, [ball()], view(), look)
     card_alpha, numpy_alpha = (picture[..., 3] for picture in (pair.card, pair.numpy))
     assert 0.2 < numpy_alpha[numpy_alpha > 0].mean() < 0.8

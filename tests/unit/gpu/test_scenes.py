@@ -49,14 +49,10 @@ def camera_from(eye, target=(0, 0, 0), fov=0.7, scale=1.0):
 
 def grid(degrees):
     """Return balls side by side: some are occluded, and some are instances of one mesh."""
-    return [
-        ball(
-            degree,
-            (0.3 + 0.05 * index) * rotation(index, 0, 1),
-            (0.75 * (index % 2) - 0.4, 0.2 * index, 0.9 * (index // 2) - 0.45),
-        )
-        for index, degree in enumerate(degrees)
-    ]
+    numbers = range(len(degrees))
+    turns = [(0.3 + 0.05 * k) * rotation(k, 0, 1) for k in numbers]
+    places = [(0.75 * (k % 2) - 0.4, 0.2 * k, 0.9 * (k // 2) - 0.45) for k in numbers]
+    return list(map(ball, degrees, turns, places))
 
 
 def pair_of(first, second):
@@ -98,16 +94,10 @@ SKEWED = view().projection + np.pad([[0, 0.3], [-0.2, 0]], ((0, 2), (0, 2)))
 #: Instances and a camera.
 SCENES = {
     # The streamlines end there, even if the other mesh continues the first one with the same field.
-    "another mesh in the same plane": lambda: (
-        same_plane(),
-        camera_from((0.2, -1.0, 3.0), fov=0.6),
-    ),
+    "two meshes in one plane": lambda: (same_plane(), camera_from((0.2, -1.0, 3.0), fov=0.6)),
     "several degrees": lambda: ([*grid((1, 4, 3, 4)), ball(6, 0.9, (0, 2, 0))], view()),
     "far from its own origin": lambda: ([moved_back()], view()),
-    "far from the origin": lambda: (
-        [ball(shift=FAR)],
-        camera_from(FAR + 4 * np.array([0.4, -0.9, 0.5]), FAR, fov=0.65),
-    ),
+    "far away": lambda: ([ball(shift=FAR)], camera_from(FAR + (1.6, -3.6, 2.0), FAR, fov=0.65)),
     "close to a wide plane": lambda: ([wide_plane()], camera_from((0, 0, 1), (0, 2, 0), fov=0.9)),
     "triangles without area": lambda: ([with_degenerate_triangles()], view()),
     "a skewed projection": lambda: ([ball()], Camera(view().view, SKEWED, *SIZE)),
@@ -297,9 +287,7 @@ EVEN_LINE_SCENES = {
         f"free directions, {name}": lambda name=name: [shown(BALL, FREE[name](BALL))]
         for name in ("two", "three", "four", "two lines")
     },
-    "the back of a tube": lambda: [
-        with_axis_field(cylinder(64, 16), 3, (0.2, 0.4, 1.0), linear=MIRROR)
-    ],
+    "the back of a tube": lambda: [with_axis_field(cylinder(64, 16), 3, (0.2, 0.4, 1.0), MIRROR)],
     "several meshes": lambda: grid((1, 4, 3, 4)),
     "triangles that need no bisection": lambda: [ball(surface=icosphere(5))],
 }

@@ -119,9 +119,8 @@ def test_every_triangle_that_is_not_hidden_is_seen(camera):
     occluders = [other.world_points()[other.surface.triangle_vertex] for other in instances]
     weights = np.random.default_rng(3).dirichlet(np.ones(3), size=len(corners))
     points = np.einsum("tk,tki->ti", weights, corners)
-    barycentric, distance = ray_intersections(
-        points, camera.view_directions(points), np.concatenate(occluders)
-    )
+    toward = camera.view_directions(points)
+    barycentric, distance = ray_intersections(points, toward, np.concatenate(occluders))
     is_seen = ~((barycentric >= 0).all(axis=2) & (distance > 1e-6)).any(axis=1)
     assert is_seen.sum() > 50 and found[is_seen].mean() > 0.98
     pixels, _ = project_to_pixels(corners.reshape(-1, 3), camera)

@@ -111,8 +111,7 @@ def test_strokes_look_like_the_render():
 
 @pytest.mark.slow
 def test_strokes_stop_at_creases_unless_asked():
-    surface = sharp_cube()
-    instance = instance_of(surface, 4, (1, 0.3, 0.2))
+    instance = instance_of(sharp_cube(), 4, (1, 0.3, 0.2))
 
     def face_counts(strokes):
         return [len(np.unique(strokes.face[a:b])) for a, b in pairwise(strokes.start)]
@@ -218,9 +217,7 @@ def test_thin_sheets_do_not_interfere():
     """Two planes are a hundredth of the spacing apart and face away from each other."""
     upper = plane()
     lower = from_quads(upper.vertices - (0, 0, 0.001), upper.corner_vertex.reshape(-1, 4)[:, ::-1])
-    surface = joined(upper, lower)
-    instance = instance_of(surface, 2, (1, 0, 0))
-    strokes = trace_strokes(instance, 0.1)
+    strokes = trace_strokes(instance_of(joined(upper, lower), 2, (1, 0, 0)), 0.1)
     is_upper = strokes.normal[strokes.start[:-1], 2] > 0
     assert 18 <= is_upper.sum() <= 22 and 18 <= (~is_upper).sum() <= 22
 

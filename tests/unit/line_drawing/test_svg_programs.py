@@ -38,15 +38,9 @@ needs_inkscape = pytest.mark.skipif(not INKSCAPE, reason="no Inkscape on the PAT
 
 def run(*command) -> str:
     """Run a command and return its standard output."""
-    done = subprocess.run(
-        [str(word) for word in command],
-        capture_output=True,
-        text=True,
-        timeout=240,
-        check=True,
-        env={key: value for key, value in os.environ.items() if key != "DISPLAY"},
-    )
-    return done.stdout
+    environment = {key: value for key, value in os.environ.items() if key != "DISPLAY"}
+    options = {"capture_output": True, "text": True, "timeout": 240, "check": True}
+    return subprocess.run([str(word) for word in command], env=environment, **options).stdout
 
 
 def browser(svg, png):
@@ -55,11 +49,8 @@ def browser(svg, png):
         BROWSER,
         *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
         *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
-        f"--user-data-dir={png.parent / 'profile'}",
-        f"--window-size={WIDTH},{HEIGHT}",
-        "--hide-scrollbars",
-        f"--screenshot={png}",
-        svg.as_uri(),
+        *("--hide-scrollbars", f"--user-data-dir={png.parent / 'profile'}"),
+        *(f"--window-size={WIDTH},{HEIGHT}", f"--screenshot={png}", svg.as_uri()),
     )
 
 

@@ -20,6 +20,7 @@ from rosy_addon.projection.camera import (
 from rosy_addon.projection.gbuffer import MeshInstance
 
 angles = st.floats(-400, 400)
+sizes = st.sampled_from([(64, 64), (90, 40), (30, 70)])
 
 
 def device_coordinates(camera, points):
@@ -43,13 +44,7 @@ def test_view_directions_match_blender(azimuth, elevation, right, up, back):
     np.testing.assert_allclose(orbit_basis(azimuth, elevation), [right, up, back], atol=1e-12)
 
 
-@given(
-    st.integers(0, 2**32 - 1),
-    angles,
-    angles,
-    st.booleans(),
-    st.sampled_from([(64, 64), (90, 40), (30, 70)]),
-)
+@given(st.integers(0, 2**32 - 1), angles, angles, st.booleans(), sizes)
 def test_everything_is_framed_and_touches_the_margin(seed, azimuth, elevation, perspective, size):
     random = np.random.default_rng(seed)
     points = random.normal(size=(20, 3)) * random.uniform(0.01, 100, 3) + random.normal(size=3) * 50

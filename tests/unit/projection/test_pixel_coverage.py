@@ -27,11 +27,10 @@ SCENES = {
     "behind an occluder": [instance(icosphere(3)), instance(CUBE, 0.3, (0.6, -2, 0.2), False)],
     "specks": [instance(icosphere(1), 0.02, (0.013 * k, -k / 2, 0.1 * k)) for k in range(4)],
 }
+VIEW = look_at((0.8, -4, 1.1), (0, 0, 0))
 CAMERAS = {
-    "perspective": perspective_camera(look_at((0.8, -4, 1.1), (0, 0, 0)), SIZE, SIZE - 7, fov=0.8),
-    "orthographic": orthographic_camera(
-        look_at((0.8, -4, 1.1), (0, 0, 0)), SIZE, SIZE - 7, scale=3
-    ),
+    "perspective": perspective_camera(VIEW, SIZE, SIZE - 7, fov=0.8),
+    "orthographic": orthographic_camera(VIEW, SIZE, SIZE - 7, scale=3),
 }
 
 

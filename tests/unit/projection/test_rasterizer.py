@@ -64,9 +64,8 @@ def test_visible_triangles_match_a_ray_caster(seed, perspective):
     points = random.normal(size=(24, 3)) * (2, 2, 4) + (0, 0, -2)
     triangles = np.arange(24).reshape(8, 3)
     owner, weights, depth, doubtful = cast_rays(points, triangles, camera)
-    fragments = rasterize(
-        transformed(points, camera.projection @ camera.view), triangles, camera.width, camera.height
-    )
+    clip = transformed(points, camera.projection @ camera.view)
+    fragments = rasterize(clip, triangles, camera.width, camera.height)
     actual = np.full(len(owner), -1)
     actual[fragments.pixel] = fragments.triangle
     assert (actual == owner)[~doubtful].all()
@@ -228,10 +227,6 @@ def test_the_first_of_equal_depths_is_visible_among_clipped_triangles():
     points = np.array([[-50, -1, 60], [60, -1, 50], [40, -1, -70], [-45, -1, -40.0], [0, 1, -80]])
     # A floor four times, clipped in different ways, and a wall that is not clipped.
     triangles = np.array([[0, 1, 2], [1, 2, 0], [2, 3, 0], [0, 2, 3], [2, 3, 4], [2, 4, 3]])
-    fragments = rasterize(
-        transformed(points, camera.projection @ camera.view),
-        triangles[[4, 0, 2, 5, 0, 2]],
-        WIDTH,
-        HEIGHT,
-    )
+    clip = transformed(points, camera.projection @ camera.view)
+    fragments = rasterize(clip, triangles[[4, 0, 2, 5, 0, 2]], WIDTH, HEIGHT)
     assert set(fragments.triangle) <= {0, 1, 2}

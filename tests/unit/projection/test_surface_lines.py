@@ -151,9 +151,8 @@ def test_phases_are_continuous_where_lines_end():
         phase = lines.pattern.evaluate(triangles, weights, np.zeros(len(vertex), dtype=int))
         values.append(np.abs(phase - np.rint(phase)))
         edges.append(np.sort(vertex[:, [corner, following]], axis=1))
-    _, edge, count = np.unique(
-        np.concatenate(edges), axis=0, return_inverse=True, return_counts=True
-    )
+    edges = np.concatenate(edges)
+    _, edge, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
     assert (count == 2).all()
     pairs = np.concatenate(values)[np.argsort(edge)].reshape(-1, 2)
     # Around the singular vertices, triangles have phases of their own.

@@ -39,17 +39,13 @@ from rosy_addon.rendering.view_input import ViewInput
 CAMERA = perspective_camera(look_at((2.5, -3.0, 1.5), (0, 0, 0)), 240, 200, fov=0.7)
 
 
-def marks(position, index, degree=4, depth=1.0, is_visible=True, **settings) -> SingularityMarks:
-    count = len(position)
-    return SingularityMarks(
-        np.array(position, dtype=np.float64),
-        np.array(index),
-        np.full(count, degree),
-        np.broadcast_to(depth, count).astype(float),
-        np.broadcast_to(np.array(is_visible, dtype=bool), count),
-        (160, 100),
-        **settings,
-    )
+def marks(position, index, depth=1.0, is_visible=True, **settings) -> SingularityMarks:
+    """Marks of a field of degree 4 in a frame of 160 x 100 pixels."""
+    place, index, count = np.array(position, dtype=float), np.array(index), len(position)
+    depth = np.broadcast_to(depth, count).astype(float)
+    is_visible = np.broadcast_to(is_visible, count).astype(bool)
+    degree = np.full(count, 4)
+    return SingularityMarks(place, index, degree, depth, is_visible, (160, 100), **settings)
 
 
 def gray(height=60, width=80):

@@ -85,10 +85,8 @@ def test_sources_of_tones_and_colors(words, name, painted, tmp_path, monkeypatch
     write_png("shot.png", np.linspace(0.2, 0.9, 64 * 64 * 4, dtype=np.float32).reshape(64, 64, 4))
     mesh = painted
     if name == "tone_image":
-        points, uv = (
-            [(-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1)],
-            [(0, 0), (1, 0), (1, 1), (0, 1)],
-        )
+        points = [(-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1)]
+        uv = [(0, 0), (1, 0), (1, 1), (0, 1)]
         mesh = write_obj(tmp_path / "square.obj", points, [range(4)], uv)
     view = "--generate smoothest --size 64x64 --view 0,0 --up z --ortho"
     pictures = []

@@ -62,8 +62,7 @@ def test_unknown_memory_is_none(monkeypatch, tmp_path):
     def fail():
         raise OSError
 
-    sources = ("_system_memory", "_control_group_memory", "_address_space")
-    for name in sources:
+    for name in ("_system_memory", "_control_group_memory", "_address_space"):
         monkeypatch.setattr(memory, name, fail)
     assert memory.available_memory() is None
     memory.check_memory(1e30, "a picture", "choose a smaller size")

@@ -33,9 +33,9 @@ CAMERA = orbit_camera(INSTANCE.face_points(), 20, 40, 200, 200)
 # --- parts and labels -----------------------------------------------------------------------------
 
 
-def steps(*fractions: float, label: str = "step") -> None:
+def steps(*fractions: float) -> None:
     for fraction in fractions:
-        report(fraction, label)
+        report(fraction, "step")
 
 
 def test_parts_are_scaled_within_parts():
@@ -101,6 +101,7 @@ CONVERSION = Conversion(
     2, rotation=0.1, smoothing_length=0.05, pair_distance=0.2, magnitude="curvature"
 )
 VIEW = ViewInput((INSTANCE,), CAMERA, Look(), (SUN,))
+STYLE = StrokeStyle(spacing=40.0, arrows=30.0, overshoot=4.0, outline=True)
 
 #: Long functions, their arguments, and the least part of the work at which the last report comes.
 LONG = {
@@ -110,11 +111,7 @@ LONG = {
     "convert": (convert, (SURFACE, FIELD, CONVERSION), 0.9),
     "occlusion": (ambient_occlusion, ([INSTANCE], 0, 16), 0.9),
     "picture": (draw_picture, (VIEW,), 0.9),
-    "strokes": (
-        draw_instances,
-        ([INSTANCE], CAMERA, StrokeStyle(spacing=40.0, arrows=30.0, overshoot=4.0, outline=True)),
-        0.9,
-    ),
+    "strokes": (draw_instances, ([INSTANCE], CAMERA, STYLE), 0.9),
     "texture": (draw_texture, (INSTANCE, torus_uv(48, 24), Look(length=20), 128), 0.9),
 }
 

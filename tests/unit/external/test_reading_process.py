@@ -64,9 +64,8 @@ def test_time_and_memory_have_limits(tmp_path, error_of, monkeypatch):
         message = error_of(read_in_helper, [path], np.ones, 200_000_000)
         assert message.endswith("it needs more memory than is free: choose a smaller file")
     message = error_of(read_in_helper, [path], os.abort)
-    assert message.startswith(
-        f"{path}: cannot be read: its reader crashed: it is damaged, or needs"
-    )
+    expected = f"{path}: cannot be read: its reader crashed: it is damaged, or needs"
+    assert message.startswith(expected)
     assert read_in_helper([path], np.ones, 2).tolist() == [1, 1], "another process is started"
 
 

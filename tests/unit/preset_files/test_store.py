@@ -196,16 +196,10 @@ def test_an_endless_file_is_refused(tmp_path, error_of):
 @pytest.mark.parametrize(
     ("name", "expected"),
     [
-        ("  Ink / pen:  2 ", "ink-pen-2"),
-        ("../../etc/passwd", "etc-passwd"),
-        ("C:\\Windows\\ink", "c-windows-ink"),
-        ("a.json", "a-json"),
-        ("Чернила №5", "чернила-5"),
-        ("e\u0301tude", "étude"),
-        ("CON", "con-preset"),
-        ("lpt1", "lpt1-preset"),
-        ("~", None),
-        ("", None),
+        *(("  Ink / pen:  2 ", "ink-pen-2"), ("Чернила №5", "чернила-5"), ("e\u0301tude", "étude")),
+        *(("../../etc/passwd", "etc-passwd"), ("C:\\Windows\\ink", "c-windows-ink")),
+        *(("a.json", "a-json"), ("CON", "con-preset"), ("lpt1", "lpt1-preset")),
+        *(("~", None), ("", None)),
     ],
 )
 def test_keys_of_names(name, expected):

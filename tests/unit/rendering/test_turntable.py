@@ -103,10 +103,8 @@ def test_lights_stay_fixed_while_the_camera_orbits():
     """A sun from +y lights the far side in the first view and the near side in the second."""
     look = Look(length=8, shading=1.0, light="scene")
     sun = Light("sun", np.array([0.0, 1.0, 0.0]), np.ones(3), 1.0)
-    dark, lit = (
-        draw_picture(view).rgba[20:44, 20:44, :3].mean()
-        for view in turntable_views(BALL, look, 2, (64, 64), (0.0, 0.0), lights=[sun])
-    )
+    views = turntable_views(BALL, look, 2, (64, 64), (0.0, 0.0), lights=[sun])
+    dark, lit = (draw_picture(view).rgba[20:44, 20:44, :3].mean() for view in views)
     assert dark < 0.05 < 0.2 < lit
 
 

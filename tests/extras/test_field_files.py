@@ -85,7 +85,6 @@ def test_vectors_of_geometry_central_at_vertices(is_open, sphere, tmp_path):
 
 
 def test_frames_need_one_fan_of_faces(error_of):
-    bow_tie = rf.Surface(
-        [[0, 0, 0], [1, 0, 0], [0, 1, 1], [-1, 0, 0], [0, -1, 1]], [[0, 1, 2], [0, 3, 4]]
-    )
+    points = [[0, 0, 0], [1, 0, 0], [0, 1, 1], [-1, 0, 0], [0, -1, 1]]
+    bow_tie = rf.Surface(points, [[0, 1, 2], [0, 3, 4]])
     assert "are not one fan" in error_of(rf.from_vectors, bow_tie, np.ones((5, 2)), 1)

@@ -194,8 +194,7 @@ def svg_texts(path):
 def test_settings_of_matplotlib_change_nothing(fields, tmp_path, suffix):
     """A figure is drawn and written with the defaults, also by `savefig`, and the settings stay."""
     parts = {"parts": ("fields", "differences", "table"), "scale_bar": "mm", **SMALL}
-    metadata = {"CreationDate": None} if suffix == "pdf" else {"Date": None}
-    metadata = {} if suffix == "png" else metadata
+    metadata = {"pdf": {"CreationDate": None}, "svg": {"Date": None}, "png": {}}[suffix]
     files = [tmp_path / f"{name}.{suffix}" for name in ("default", "user", "saved")]
     rf.save_figures(files[0], rf.figure(fields, **parts))
     with matplotlib.rc_context(USER_SETTINGS | {"savefig.facecolor": "red"}):
@@ -216,13 +215,9 @@ def test_a_matplotlibrc_of_the_folder_is_not_read(tmp_path, surface):
     rows = [f"{name}: {value}" for name, value in USER_SETTINGS.items()]
     (tmp_path / "rc").write_text("\n".join(rows))
     words = ["compare", "ball.ply", "form", "-o", "a.svg", "--dpi", "50"]
-    done = subprocess.run(
-        [sys.executable, "-m", "rosy_addon", *words],
-        cwd=folder,
-        env=os.environ | {"PYTHONPATH": str(ROOT), "MATPLOTLIBRC": str(tmp_path / "rc")},
-        capture_output=True,
-        check=False,
-    )
+    command = [sys.executable, "-m", "rosy_addon", *words]
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "MATPLOTLIBRC": str(tmp_path / "rc")}
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, check=False)
     assert (done.returncode, done.stderr) == (0, b"")
     assert b"DejaVu Sans" in (folder / "a.svg").read_bytes()
 
@@ -248,11 +243,8 @@ def test_letters_without_a_glyph_are_named(fields, tmp_path, recwarn, capfd):
     rf.save_figures(tmp_path / "a.svg", rf.figure({"\u65e5\u672c": one, "b": other}, **SMALL))
     assert not recwarn.list and "(a) \u65e5\u672c" in svg_texts(tmp_path / "a.svg")
     figure = rf.figure({"\u65e5\u672c": one, "$\u8a9e$": other}, **SMALL)
-    for name, letters in (
-        ("a.svg", "\u8a9e"),
-        ("a.pdf", "\u65e5\u672c\u8a9e"),
-        ("a.png", "\u65e5\u672c\u8a9e"),
-    ):
+    every = "\u65e5\u672c\u8a9e"
+    for name, letters in (("a.svg", "\u8a9e"), ("a.pdf", every), ("a.png", every)):
         for write in (rf.save_figures, lambda path, page: page.savefig(path)):
             with pytest.warns(rf.RosyWarning, match=f"no glyph for {letters}: write an") as warned:
                 write(tmp_path / name, figure)

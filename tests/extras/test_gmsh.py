@@ -37,9 +37,8 @@ def write_view(path, kind, tags, values):
     """Add values to the mesh, and write both to a file."""
     view = gmsh.view.add("wind")
     model = gmsh.model.getCurrent()
-    gmsh.view.addHomogeneousModelData(
-        view, 0, model, kind, tags, values.ravel(), numComponents=values.shape[1]
-    )
+    size = {"numComponents": values.shape[1]}
+    gmsh.view.addHomogeneousModelData(view, 0, model, kind, tags, values.ravel(), **size)
     gmsh.view.write(view, str(path))
 
 

@@ -138,11 +138,8 @@ def test_images_and_structured_grids(tmp_path):
 def test_surface_cells_go_before_volume_cells(tmp_path, box):
     """Lines and volume cells are left out, and so are the points that only they use."""
     points = np.asarray(box.points, dtype=float)
-    cells = [
-        ("line", [[0, 1]]),
-        ("tetra", box.cells_dict[pv.CellType.TETRA]),
-        ("triangle", [[5, 6, 7], [7, 9, 8]]),
-    ]
+    tetra = box.cells_dict[pv.CellType.TETRA]
+    cells = [("line", [[0, 1]]), ("tetra", tetra), ("triangle", [[5, 6, 7], [7, 9, 8]])]
     data = {"part": [np.full(len(block), k) for k, (_, block) in enumerate(cells)]}
     meshio.write(tmp_path / "a.vtu", meshio.Mesh(points, cells, cell_data=data))
     mesh = read_simulation(tmp_path / "a.vtu")

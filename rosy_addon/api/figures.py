@@ -160,7 +160,7 @@ def figure(
     shown = {"singularity_dots": "visible", **settings}
     look = picture_look(name, preset, shown, color_values=color_values)
     instances = _instances(name, comparison.fields, color_values)
-    look = _figure_look(look, comparison.fields, instances.values(), dpi / LENGTH_DPI)
+    look = _figure_look(look, comparison.fields, instances.values(), dpi)
     if color_label is None:
         color_label = color_values if isinstance(color_values, str) else ""
         color_label = "magnitude" if colors_magnitude(look) else color_label
@@ -336,10 +336,12 @@ def _instances(
 
 
 def _figure_look(
-    look: Look, fields: Mapping[str, Field], instances: Iterable[MeshInstance], scale: float
+    look: Look, fields: Mapping[str, Field], instances: Iterable[MeshInstance], dpi: float
 ) -> Look:
-    """Return the look of all panels: lengths are multiplied by `scale`, the color range covers all fields."""
-    look = scaled_look(look, scale)
+    """Return the look of all panels: lengths fit the resolution, the color range covers all fields."""
+    scale = dpi / LENGTH_DPI
+    is_print = look.unit == "millimeters"
+    look = replace(look, dpi=dpi) if is_print else scaled_look(look, scale)
     look = replace(look, singularity_size=float(np.clip(look.singularity_size * scale, 1, 256)))
     if colors_values(look):
         return replace(look, color_range=value_ends(look, value_ranges(instances)))

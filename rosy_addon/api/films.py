@@ -344,7 +344,7 @@ def _mean_turn(first: Field, second: Field) -> float:
 
 def _steady_between(turn: float, look: Look) -> int:
     """Return how many pictures between two fields keep streaks steady; `turn` is their angle in radians."""
-    if look.unit_size:
+    if look.unit == "scene":
         return 0
     steady = STEADY_TURN * look.line_width / look.length
     return min(max(int(np.ceil(turn / steady - 1e-9)) - 1, 0), MAX_BETWEEN)

@@ -154,8 +154,8 @@ def texture(
         color map; see `render`. Hatching cannot show them.
     **settings
         Settings of the look, after the preset: ``line_width=3, seed=3``. In these, a pixel is 1/1024 of the
-        square root of the area of the surface, for any size of the texture. With ``unit_size=0.002``, a
-        pixel is 0.002 units of length of the mesh.
+        square root of the area of the surface, for any size of the texture. With ``unit="scene"`` and
+        ``unit_size=0.002``, a length of 1 is 0.002 units of length of the mesh.
 
     Returns
     -------

@@ -128,8 +128,7 @@ def _ink(applies: Callable[[Any], bool] = is_hatched) -> dict[str, Any]:
 class Look:
     """All settings that determine how a field is drawn, as in presets and panels.
 
-    Lengths are in pixels of the finished picture or, if `unit_size` is not 0, in multiples of
-    `unit_size` Blender units.
+    Lengths are in pixels of the finished picture, or in another `unit`.
 
     To add a setting that both renderers draw with, edit three files: add a field here, use it in
     this package, and declare and use the uniform of that name in the shader. All other code (panels, files,
@@ -183,15 +182,51 @@ class Look:
         panel_before="method",
         stage=Stage.GBUFFER,
     )
+    line_width: float = _pixel_length(
+        1.5,
+        256.0,
+        "Width of the streaks in pixels, which is the size of a cell of the noise",
+        low=0.5,
+        preview_low=0.75,
+    )
+    line_distance: float = _pixel_length(
+        3.0,
+        512.0,
+        "Distance between even lines in pixels. At half coverage, lines are half as wide",
+        low=1.0,
+        preview_low=1.5,
+        applies=is_even,
+    )
+    unit: str = choice(
+        "pixels",
+        "Unit of the lengths of this look",
+        {
+            "pixels": "Pixels of the picture, whatever its size and the distance of the meshes",
+            "percent": "Percent of the width of the picture: the drawing is the same at all sizes",
+            "millimeters": "Millimeters on paper, at the resolution of the print",
+            "scene": "Blender units: lines belong to the object, as if engraved, and are wider when near",
+        },
+        option_labels={"percent": "Percent of Width", "scene": "Scene Units"},
+        panel="streaks",
+    )
     unit_size: float = number(
         0.0,
         0.0,
         1e6,
-        "Blender units that replace one pixel in lengths: lines belong to the object, as if engraved, and are "
-        "wider when near. 0: lengths are in pixels of the picture, whatever the distance",
-        unit="length",
+        "What a length of 1 stands for, in percent, millimeters or Blender units. 0: the size of a pixel in a "
+        "picture that is 1920 pixels wide, in a print of 300 dpi, or in a picture where the meshes are 1024 "
+        "pixels wide",
         panel="streaks",
-        panel_label="Pixel Size",
+        applies=lambda look: look.unit != "pixels",
+    )
+    dpi: float = number(
+        300.0,
+        1.0,
+        1e5,
+        "Pixels of the picture per inch of paper",
+        label="Dots per Inch",
+        panel="streaks",
+        applies=lambda look: look.unit == "millimeters",
     )
     length: int = _pixel_length(
         40,
@@ -228,21 +263,6 @@ class Look:
         "of even degree drift toward the guiding angle, or both ways if they are perpendicular to it. 0: no "
         "drift",
         applies=_can_flow,
-    )
-    line_width: float = _pixel_length(
-        1.5,
-        256.0,
-        "Width of the streaks in pixels, which is the size of a cell of the noise",
-        low=0.5,
-        preview_low=0.75,
-    )
-    line_distance: float = _pixel_length(
-        3.0,
-        512.0,
-        "Distance between even lines in pixels. At half coverage, lines are half as wide",
-        low=1.0,
-        preview_low=1.5,
-        applies=is_even,
     )
     density: float = number(
         0.1,

@@ -25,6 +25,19 @@ STEPS_PER_OCTAVE = 32
 #: pixels, so that lines do not change while the camera moves a little.
 SPACING_STEPS_PER_OCTAVE = 8
 
+#: Width of the picture in pixels, and resolution of the print in dpi, for which the automatic size of the unit of
+#: a look is a pixel.
+REFERENCE_WIDTH, REFERENCE_DPI = 1920, 300
+
+#: Width, in pixels, of a picture that a mesh fills, for lengths on surfaces that no camera sees.
+MESH_PIXELS = 1024
+
+#: Units of looks whose lengths do not change with the number of pixels of the picture.
+SCALE_FREE_UNITS = ("percent", "scene")
+
+#: Millimeters per inch.
+INCH = 25.4
+
 #: Minimum distance from the camera to the center of the meshes, as a fraction of their size. It
 #: applies when the camera is among them.
 MIN_DISTANCE_FACTOR = 0.25
@@ -49,8 +62,8 @@ class PixelLook:
     supersampling : int
         Pixels of the frame along a side of a pixel of the picture.
     pixel_size : float
-        If `look` has lengths in Blender units (`unit_size`): the Blender units that one pixel of the frame
-        stands for. Otherwise 0.
+        If `look` has lengths in Blender units: the Blender units that one pixel of the frame stands for.
+        Otherwise 0.
     color_range : (float, float)
         The setting `Look.color_range`, or the `magnitude_ends` of a field (see `with_magnitude_range`).
     kernel : {"box", "taper", "ramp"}
@@ -165,7 +178,7 @@ def pixel_look(
     ----------
     look : Look
     camera : Camera, optional
-        The camera of the frame. Needed if there are meshes.
+        The camera of the frame. Needed unless lengths are in pixels.
     instances : sequence of MeshInstance
         All meshes in the scene. Only those with a field affect the scale.
     supersampling : int
@@ -175,13 +188,16 @@ def pixel_look(
     is_antialiased : bool
         Whether streaks are drawn more accurately, because pixels have several samples.
     """
+    scale, unit_size = 1.0, 0.0
     bounds = [instance.world_bounds() for instance in with_field(instances)]
-    scale = 1.0
-    if look.unit_size and bounds:
-        pixel = pixel_world_size(np.concatenate(bounds), camera)
-        exact_scale = look.unit_size / (pixel * supersampling)
+    if look.unit == "scene" and bounds:
+        points = np.concatenate(bounds)
+        unit_size = look.unit_size or float(np.linalg.norm(np.ptp(points, axis=0))) / MESH_PIXELS
+        exact_scale = unit_size / (pixel_world_size(points, camera) * supersampling)
         scale = 2 ** (np.rint(np.log2(exact_scale) * STEPS_PER_OCTAVE) / STEPS_PER_OCTAVE)
-    in_picture = _scaled_pixel_look(look, scale, look.unit_size, drift)
+    elif camera is not None:
+        scale = unit_in_pixels(look, camera.width * camera.picture_share / supersampling)
+    in_picture = _scaled_pixel_look(look, scale, unit_size, drift)
     return replace(in_picture.in_samples(supersampling), is_antialiased=is_antialiased)
 
 
@@ -197,19 +213,43 @@ def surface_pixel_look(look: Look, step: float, pixel: float, drift: Drift = NO_
     step : float
         Length of a step of streamlines, in Blender units.
     pixel : float
-        Blender units that stand for a pixel, if the lengths of the look are in pixels.
+        Blender units that stand for a pixel. A picture is `MESH_PIXELS` wide.
     drift : Drift
         How far the streaks have drifted.
     """
-    unit_size = look.unit_size or pixel
+    unit_size = pixel * unit_in_pixels(look, MESH_PIXELS)
+    if look.unit == "scene":
+        unit_size = look.unit_size or pixel
     look = replace(look, method="sheets", anchor="surface", guiding_angle=0.0, supersampling=1)
-    return replace(_scaled_pixel_look(look, unit_size / step, unit_size, drift), is_on_surface=True)
+    scale = max(
+        unit_size / step, min(1.0 / look.line_width, 1.0)
+    )  # cells of noise are at least one step
+    return replace(_scaled_pixel_look(look, scale, unit_size, drift), is_on_surface=True)
+
+
+def unit_in_pixels(look: Look, width: float) -> float:
+    """Return the pixels of a picture, `width` pixels wide, that a length of 1 of a look stands for.
+
+    It is 1 if lengths are in Blender units.
+    """
+    if look.unit == "percent":
+        return (look.unit_size or 100 / REFERENCE_WIDTH) / 100 * width
+    if look.unit == "millimeters":
+        return (look.unit_size or INCH / REFERENCE_DPI) * look.dpi / INCH
+    return 1.0
+
+
+def in_percent(look: Look, width: int) -> Look:
+    """Return a look in percent of the width of a picture, `width` pixels wide, if it is in millimeters."""
+    if look.unit != "millimeters":
+        return look
+    return replace(look, unit="percent", unit_size=100 * unit_in_pixels(look, width) / width)
 
 
 def _scaled_pixel_look(look: Look, scale: float, unit_size: float, drift: Drift) -> PixelLook:
     """Return the `PixelLook` whose lengths are `scale` times the lengths of `look`.
 
-    The lengths of `look` are in multiples of `unit_size` Blender units, or in pixels if `unit_size` is 0.
+    A length of 1 of `look` is `unit_size` Blender units; 0 if its lengths do not depend on Blender units.
     """
     scale = _possible_scale(look, scale)
     if not has_flow(look):
@@ -228,20 +268,26 @@ def _scaled_pixel_look(look: Look, scale: float, unit_size: float, drift: Drift)
 
 
 def scaled_look(look: Look, scale: float) -> Look:
-    """Return the look with all lengths multiplied by `scale`, as far as the ranges of settings allow."""
+    """Return the look with all lengths multiplied by `scale`, as far as the ranges of settings allow.
+
+    Lengths in Blender units or in percent of the picture stay the same.
+    """
+    if look.unit in SCALE_FREE_UNITS:
+        return look
     scale = _possible_scale(look, scale)
     lengths = {item.name: _scaled_length(look, item, scale) for item in pixel_lengths(Look)}
-    return replace(look, **lengths, unit_size=look.unit_size / scale)
+    return replace(look, **lengths)
 
 
 def _possible_scale(look: Look, scale: float) -> float:
     """Return the scale nearest to `scale` with which all lengths of a look are in their allowed ranges.
 
-    Noise cells stay at least as large as a pixel, as smaller ones are not visible.
+    Noise cells stay at least as large as `Look.line_width` may be in pixels.
     """
     lengths = pixel_lengths(Look)
     max_scale = min(item.high / max(getattr(look, item.name), 1e-9) for item in lengths)
-    return float(np.clip(scale, min(1.0 / look.line_width, 1.0), max(max_scale, 1.0)))
+    min_scale = settings_of(Look)["line_width"].low / look.line_width
+    return float(np.clip(scale, min(min_scale, 1.0), max(max_scale, 1.0)))
 
 
 def _scaled_length(look: Look, setting: Number, scale: float) -> Any:
@@ -260,7 +306,7 @@ def preview_look(look: Look, downscale: int) -> Look:
         Pixels of the view along each side of a pixel of the preview.
     """
     settings: dict[str, Any] = {"supersampling": 1}
-    if not look.unit_size:
+    if look.unit not in SCALE_FREE_UNITS:
         for setting in pixel_lengths(Look):
             value = getattr(look, setting.name)
             value = value // downscale if setting.is_integer else value / downscale

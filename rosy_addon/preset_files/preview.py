@@ -61,7 +61,7 @@ def _fast_look(look: Look) -> Look:
         {
             "method": "sheets" if look.method == "brute" else look.method,
             "supersampling": 1 if look.method == "members" else 2,
-            "unit_size": 0.0,
+            "unit": "pixels",
             "tone": "light",
             "color_range": (0.0, 0.0) if colors_values(look) else look.color_range,
             "length": min(look.length, PREVIEW_SIZE // 2),

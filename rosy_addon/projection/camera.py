@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -58,6 +58,9 @@ class Camera:
         Size of the picture in pixels.
     name : str
         Used in messages and in the names of baked pictures.
+    picture_share : float
+        Width of the finished picture as a fraction of `width`. It is not 1 in 3D views that show more or less
+        than the frame of a camera.
 
     Raises
     ------
@@ -71,6 +74,7 @@ class Camera:
     width: int
     height: int
     name: str = "camera"
+    picture_share: float = 1.0
 
     def __post_init__(self) -> None:
         width, height = check_size(self.width, self.height)
@@ -81,7 +85,7 @@ class Camera:
     @property
     def key(self) -> Hashable:
         """Key for caches: equal for two cameras that differ only in their names."""
-        return self.view.tobytes(), self.projection.tobytes(), self.width, self.height
+        return self.view.tobytes(), self.projection.tobytes(), *self.size, self.picture_share
 
     @property
     def size(self) -> tuple[int, int]:
@@ -129,7 +133,7 @@ class Camera:
 
         It shows the same part of the scene. If the ratio of the sides changes, pixels are not square.
         """
-        return Camera(self.view, self.projection, width, height, self.name)
+        return replace(self, width=width, height=height)
 
     def scaled(self, factor: int) -> Camera:
         """Return the same camera with `factor` times the width and height in pixels."""

@@ -20,7 +20,7 @@ from ..compositor.look import (
     is_hatched,
     undefined_drawing,
 )
-from ..compositor.look_units import PixelLook, surface_pixel_look
+from ..compositor.look_units import MESH_PIXELS, PixelLook, surface_pixel_look
 from ..compositor.pixel_field import PixelField
 from ..compositor.shading import Light
 from ..core.cache import BAKE_CACHE, Cache
@@ -53,11 +53,6 @@ from .texels import (
     texture_frame,
 )
 
-#: Lengths of a look in pixels are converted to lengths on the surface: this number of pixels is the side of a
-#: square with the area of the surface. Lines are then about as wide as in a picture of 1000 pixels that the
-#: mesh fills.
-SURFACE_PIXELS = 1024
-
 #: Fraction of the texels, those that are smallest on the surface, that may be smaller than a step of a
 #: streamline.
 FINE_FRACTION = 0.05
@@ -67,7 +62,7 @@ MIN_STEP = 0.25
 
 #: Names of the settings of a look that affect a texture. All other settings have no effect.
 TEXTURE_SETTINGS = (
-    *("ink", "display", "unit_size", "length", "fade", "flow"),
+    *("ink", "display", "unit", "unit_size", "dpi", "length", "fade", "flow"),
     *("line_width", "line_distance", "density"),
     *("high_pass", "hue", "seed", "gain", "crease_angle"),
     *("magnitude_length", "color_range", "color_map", "undefined"),
@@ -166,7 +161,7 @@ def draw_texture(
         u and v at the corners of the surface.
     look : Look
         Settings of light and camera have no effect. A length in pixels becomes a length on the surface:
-        `SURFACE_PIXELS` (1024) pixels are the side of a square with the area of the surface.
+        `MESH_PIXELS` (1024) pixels are the side of a square with the area of the surface.
     size : int
         Texels on each side of the texture, or of a tile of it.
     margin : int
@@ -284,7 +279,8 @@ def _look_pixels(on: TexelSurface, field: PixelField, look: Look, drift: Drift) 
     `look` has the settings of the user, `drift` is how far its streaks have drifted.
     """
     is_ink = is_hatched(look)
-    pixel = float(np.sqrt(on.mesh.area.sum())) / SURFACE_PIXELS
+    # Lines are about as wide as in a picture that the mesh fills.
+    pixel = float(np.sqrt(on.mesh.area.sum())) / MESH_PIXELS
     step_look = surface_pixel_look(sharp_look(look) if is_ink else look, on.step, pixel, drift)
     step_look = step_look.for_symmetry(field.symmetry)
     if is_ink:

@@ -14,13 +14,14 @@ from bpy.types import Area, Context, SpaceView3D
 from ..annotation.singularity_settings import shows_singularities
 from ..compositor.flow import NO_DRIFT
 from ..compositor.look import Look, has_flow
+from ..compositor.look_units import in_percent
 from ..core.cache import Cache
 from ..core.errors import REPORTED_ERRORS, DeviceError, RosyError, counted, error_text
 from ..gpu.background import draw_background
 from ..gpu.select import look_in_view, select_viewport_renderer
 from ..rendering.view_input import ViewInput
 from ..scene.app_handlers import add_handlers, remove_handlers
-from ..scene.cameras import camera_of_view
+from ..scene.cameras import camera_of_view, render_size
 from ..scene.look_inputs import check_sources, read_request
 from ..scene.look_properties import drift_in_scene, read_look
 from ..worker.helper import Helper
@@ -300,6 +301,11 @@ class ViewportSession:
             self._schedule_redraw(0.0)
             return None
         camera = camera_of_view(context.region, context.region_data)
+        frame = view3d.camera_frame(context, camera)
+        if frame is not None and look.unit != "pixels":
+            # The finished picture is what the camera shows.
+            camera = replace(camera, picture_share=(frame[1][0] - frame[0][0]) / 2)
+            look = in_percent(look, render_size(context.scene, context.scene.rosy.percentage)[0])
         visible = [
             entry
             for entry in layer.instances

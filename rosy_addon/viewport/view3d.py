@@ -109,17 +109,28 @@ def view_background(context: Context, camera: Camera, look: Look) -> Background 
     paper = backdrop_color(context.scene, look)
     if paper is None:
         return None
-    color = tuple(paper.tolist())
+    color, frame = tuple(paper.tolist()), camera_frame(context, camera)
+    return Background(color) if frame is None else Background(color, *frame)
+
+
+def camera_frame(
+    context: Context, camera: Camera
+) -> tuple[tuple[float, float], tuple[float, float]] | None:
+    """Return the lower left and the upper right corner of the frame of the camera in a camera view.
+
+    They are in normalized device coordinates, -1 to 1. The result is None if the view is no camera view.
+    `camera` is the camera of the view.
+    """
     if context.region_data.view_perspective != "CAMERA":
-        return Background(color)
+        return None
     space = context.space_data
     camera_object = space.camera if space.use_local_camera else context.scene.camera
     try:
         frame = camera_of_object(context.scene, context.evaluated_depsgraph_get(), camera_object)
     except RosyError:
-        return Background(color)  # a light, for example, has no frame
+        return None  # a light, for example, has no frame
     corners = np.concatenate([frame_corners(frame, 1.0), np.ones((4, 1))], axis=1)
     clip = corners @ (camera.projection @ camera.view @ np.linalg.inv(frame.view)).T
     position = clip[:, :2] / clip[:, 3:]
     low, high = position.min(axis=0).tolist(), position.max(axis=0).tolist()
-    return Background(color, tuple(low), tuple(high))
+    return tuple(low), tuple(high)

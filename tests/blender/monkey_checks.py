@@ -36,7 +36,9 @@ def expect_none(found: list[str], text: str) -> None:
 
 
 def is_owned(datablock: bpy.types.ID) -> bool:
-    """Return whether RoSy made a datablock."""
+    """Return whether RoSy made a datablock, or the mesh or curves whose shape keys it has."""
+    if isinstance(datablock, bpy.types.Key):
+        datablock = datablock.user
     return bool(datablock.get("rosy_made"))
 
 

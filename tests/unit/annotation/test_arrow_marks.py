@@ -224,7 +224,7 @@ def test_an_arrowhead_has_its_shape_and_its_outline():
 @pytest.mark.parametrize("distance", [65536.0, 1.0, 50.0])
 def test_any_distance_and_any_unit_can_be_drawn(distance):
     instance = instance_of(icosphere(2), 3)
-    for unit_size in (0.0, 0.01):
-        look = Look(length=4, unit_size=unit_size, arrows=distance)
+    for unit in ("pixels", "scene"):
+        look = Look(length=4, unit=unit, unit_size=0.01, arrows=distance)
         picture = draw_picture(ViewInput((instance,), CAMERA.resized(60, 50), look))
         assert np.isfinite(picture.rgba).all()

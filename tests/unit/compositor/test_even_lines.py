@@ -79,7 +79,7 @@ def test_the_distance_between_lines(distance, supersampling):
 
 
 def test_distances_in_blender_units_are_exact():
-    look = replace(LOOK, unit_size=0.037, line_distance=5.0)
+    look = replace(LOOK, unit="scene", unit_size=0.037, line_distance=5.0)
     lines, _ = lines_at_pixels(wall_instance(), camera_above(8.0), look)
     pixels_per_unit = SIZE / 8
     np.testing.assert_allclose(lines.period, 5.0 * 0.037 * pixels_per_unit, rtol=1e-4)
@@ -202,4 +202,7 @@ def test_lines_grow_between_lines_that_are_too_far_apart():
     assert lines.period[0, near].min() > 3.6 and lines.period[0, near].max() < 8.4
     coverage = lines.coverage(0, np.full(len(depth), 0.4, np.float32), look)
     assert coverage[near].mean() == pytest.approx(0.4, abs=0.05)
-    assert lines_at_pixels(instance, camera, replace(look, unit_size=0.2))[0].growth is None
+    assert (
+        lines_at_pixels(instance, camera, replace(look, unit="scene", unit_size=0.2))[0].growth
+        is None
+    )

@@ -60,7 +60,10 @@ MOVED = {
     "hatch": (STEADY, {"zoom": 1.1}),
     "uneven": (replace(STEADY, wobble=1.0, breaks=0.3), {"other_bend": 0.05}),
     # At distances in pixels, a zoom needs other lines.
-    "even": (replace(STEADY, ink="even", unit_size=0.006), {"other_bend": 0.81, "bend": 0.8}),
+    "even": (
+        replace(STEADY, ink="even", unit="scene", unit_size=0.006),
+        {"other_bend": 0.81, "bend": 0.8},
+    ),
 }
 
 
@@ -83,18 +86,23 @@ def line_width(picture):
 
 
 @pytest.mark.parametrize(
-    ("unit_size", "zooms"), [(0, [1, 1.23, 1.62, 6.7]), (8 / 384, [1.62, 2.8, 6.7])]
+    ("unit", "zooms"), [("pixels", [1, 1.23, 1.62, 6.7]), ("scene", [1.62, 2.8, 6.7])]
 )
-def test_widths_of_lines_through_a_zoom(unit_size, zooms):
+def test_widths_of_lines_through_a_zoom(unit, zooms):
     """They are constant in pixels, or proportional to the zoom; in between, lines of two widths mix."""
     look = replace(
-        INK, shading=0.0, tone_levels=(0.0, 1 / 0.6, 1.0), unit_size=unit_size, supersampling=1
+        INK,
+        shading=0.0,
+        tone_levels=(0.0, 1 / 0.6, 1.0),
+        unit=unit,
+        unit_size=8 / 384,
+        supersampling=1,
     )
     widths = []
     for zoom in zooms:
         camera = camera_before_wall(8 / zoom, 0.3, 0.2).resized(384, 384)
         rgba = render(make_wall(), camera, look)
-        widths.append(line_width(rgba[..., 0]) / (zoom if unit_size else 1))
+        widths.append(line_width(rgba[..., 0]) / (zoom if unit == "scene" else 1))
     assert max(widths) / min(widths) < 1.15
 
 

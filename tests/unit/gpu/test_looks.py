@@ -44,7 +44,7 @@ HATCH = {"ink": "hatch", "shading": 0.9, "line_width": 2.5}
 LIGHT_INK = HATCH | {"ink_color": "#ffd060", "paper_color": "#101020"}
 EVEN = {"ink": "even", "shading": 0.9, "line_width": 3.0, "line_distance": 6.0}
 UNEVEN = {"wobble": 0.7, "breaks": 0.4, "paper_grain": 0.5}
-UNEVEN_IN_UNITS = ON_SURFACE | UNEVEN | {"unit_size": 0.012, "overshoot": 5.0}
+UNEVEN_IN_UNITS = ON_SURFACE | UNEVEN | {"unit": "scene", "unit_size": 0.012, "overshoot": 5.0}
 #: Streaks that drift, at a phase at which no kernel is where it is at rest.
 DRIFTING = {"flow": 2.0, "drift": Drift(0.2)}
 
@@ -60,7 +60,7 @@ LOOKS = {
     "shaded": {"shading": 0.7},
     "on the surface, supersampled": ON_SURFACE | {"supersampling": 2, "seed": 3},
     "on the surface, color noise": ON_SURFACE | {"hue": "noise", "high_pass": 0.0},
-    "in Blender units": ON_SURFACE | {"unit_size": 0.007},
+    "in Blender units": ON_SURFACE | {"unit": "scene", "unit_size": 0.007},
     "fine on small features": ON_SURFACE | {"detail": 0.7, "line_width": 2.5},
     "hatched": {"ink": "hatch", "shading": 1.0, "line_width": 3.0},
     "hatched, oriented": HATCH | {"fade": "tail", "degree": 5, "breaks": 0.4},

@@ -7,13 +7,14 @@ from shapes import cube, instance_of, plane, torus
 from uv_maps import colors_at, patches_uv, surface_points, torus_uv
 
 from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look_units import MESH_PIXELS
 from rosy_addon.compositor.shading import Light
 from rosy_addon.field.generate import generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.surface_lines import cached_surface_lines
 from rosy_addon.surface_texture import hatching
-from rosy_addon.surface_texture.draw import SURFACE_PIXELS, draw_texture
+from rosy_addon.surface_texture.draw import draw_texture
 
 #: Lines that are wide enough for a small texture to show them well.
 WIDE = Look(length=20, line_width=10.0, line_distance=20.0, high_pass=40.0)
@@ -79,7 +80,7 @@ def test_stretched_charts_show_the_same_lines():
 
 
 #: A pixel of a look: a 1024th of the side of a square as large as the torus.
-PIXEL = float(np.sqrt(4 * np.pi**2 * 0.4)) / SURFACE_PIXELS
+PIXEL = float(np.sqrt(4 * np.pi**2 * 0.4)) / MESH_PIXELS
 
 
 @pytest.mark.slow
@@ -87,7 +88,7 @@ PIXEL = float(np.sqrt(4 * np.pi**2 * 0.4)) / SURFACE_PIXELS
     ("look", "size", "offset"),
     [
         (WIDER, 1024, (0, 0)),
-        (WIDER.with_settings({"unit_size": PIXEL}), 512, (0, 0)),
+        (WIDER.with_settings({"unit": "scene", "unit_size": PIXEL}), 512, (0, 0)),
         (WIDER, 512, (3, -2)),
         (WIDER, 512, (0.5, 0.8)),
     ],

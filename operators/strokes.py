@@ -8,9 +8,9 @@ from ..rosy_addon.core.errors import counted
 from ..rosy_addon.jobs.draw_strokes import StrokeResult, draw_strokes
 from ..rosy_addon.line_drawing.polyline_files import DRAWING_SUFFIXES
 from ..rosy_addon.scene import stroke_objects
-from ..rosy_addon.scene.cameras import CameraSource, render_camera
+from ..rosy_addon.scene.cameras import CameraSource
 from ..rosy_addon.ui.properties import STROKE_CAMERA_ITEMS, STROKE_KIND_ITEMS
-from ..rosy_addon.ui.property_makers import choice, file_filter, text, toggle
+from ..rosy_addon.ui.property_makers import choice, file_filter, text
 from ..rosy_addon.worker.job import Steps
 from .bake import view_camera
 from .base import IDLE, OBJECT_MODE, VISIBLE_FIELD, Condition, RosyOperator, sync_suffix
@@ -38,37 +38,17 @@ class ROSY_OT_strokes(ModalJobMixin, bpy.types.Operator):
     )
     filter_glob: file_filter(*DRAWING_SUFFIXES)
     check_existing: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
-    replace: toggle(
-        "Replace Edited",
-        "Do not ask before strokes are replaced that were edited",
-        options={"HIDDEN", "SKIP_SAVE"},
-    )
 
     def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
-        """Ask for the path if strokes go to a file.
-
-        Ask for a confirmation if edited strokes would be replaced. Return the result of the operator; None
-        if nothing is asked.
-        """
-        if self._kind(context) == "FILE":
-            if self.properties.is_property_set("filepath"):
-                return None
-            self.filepath = bpy.path.abspath(context.scene.rosy.strokes.filepath)
-            context.window_manager.fileselect_add(self)
-            return {"RUNNING_MODAL"}
-        camera = self._camera(context) or render_camera(context.scene)
-        obj = stroke_objects.edited_strokes(context.scene, self._kind(context), camera.name)
-        if obj is None or self.replace:
+        """Ask for the path if strokes go to a file. Return the result of the operator; None if nothing is asked."""
+        if self._kind(context) != "FILE" or self.properties.is_property_set("filepath"):
             return None
-        question = f"Replace the strokes of '{obj.name}'?"
-        message = "They were edited. Duplicate the object to keep them"
-        return self.ask_to_confirm(context, event, question, message, "Replace")
+        self.filepath = bpy.path.abspath(context.scene.rosy.strokes.filepath)
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
 
     def take_answer(self, context: bpy.types.Context) -> None:
-        if self._kind(context) == "FILE":
-            context.scene.rosy.strokes.filepath = self.filepath
-        else:
-            self.replace = True
+        context.scene.rosy.strokes.filepath = self.filepath
 
     def check(self, context: bpy.types.Context) -> bool:
         """Give the file name the suffix .svg, unless it ends with .svg, .ply, .obj or .csv.

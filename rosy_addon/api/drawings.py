@@ -2,22 +2,25 @@
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..compositor.look_units import pixel_look
 from ..compositor.shading import lights_of
 from ..core.file_io import write_bytes
 from ..field.field import Field
 from ..field.surface import Surface
+from ..line_drawing.from_look import strokes_of_look
 from ..line_drawing.pipeline import StrokeDrawing, draw_instances
 from ..line_drawing.polyline_files import check_drawing_suffix, polyline_file
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen, svg_text
 from ..projection.camera import Camera, check_size, orbit_camera
-from .pictures import DEFAULT_SIZE, DEFAULT_VIEW, upright_instance
+from .pictures import DEFAULT_SIZE, DEFAULT_VIEW, preset_look, upright_instance
 
 
 class Drawing:
@@ -103,9 +106,10 @@ def strokes(
     view: tuple[float, float] = DEFAULT_VIEW,
     size: tuple[int, int] = DEFAULT_SIZE,
     orthographic: bool = False,
-    width: float = Pen.width,
-    colors: Sequence[str] = ("#000000",),
-    paper: str | None = Pen.paper,
+    preset: str | os.PathLike[str] | None = None,
+    width: float | None = None,
+    colors: Sequence[str] | None = None,
+    paper: str | None = "",
     millimeters: float | None = None,
     plotter: bool = False,
     **style: Any,
@@ -126,18 +130,22 @@ def strokes(
         to it.
     orthographic : bool
         Orthographic projection instead of perspective.
-    width : float
-        Full width of a stroke in pixels.
-    colors : sequence of str
-        SVG colors, used for the families of strokes in turn, such as ``"#204060"`` or ``"navy"``.
+    preset : str or path-like, optional
+        A preset of a look, or a file. The strokes then have its spacing, widths, light, outline, ends, colors
+        and marks, as far as they are not given.
+    width : float, optional
+        Full width of a stroke in pixels; by default 1.2.
+    colors : sequence of str, optional
+        SVG colors, used for the families of strokes in turn, such as ``"#204060"`` or ``"navy"``; by default
+        black.
     paper : str or None
-        Color of the background. With None, there is no background.
+        Color of the background, by default white. With None, there is no background.
     millimeters : float, optional
         Width of the page in millimeters; by default the page is in pixels.
     plotter : bool
         Draw strokes of constant width, in an order that keeps the travel of the pen short.
     **style
-        Settings of `line_drawing.style.StrokeStyle`: ``spacing=6, light="lamp", outline=True``.
+        Settings of `line_drawing.style.StrokeStyle`: ``spacing=6, light="lamp", outline=1.5``.
         `spacing` is in pixels; `distance` is the spacing in units of the mesh.
 
     Returns
@@ -158,10 +166,21 @@ def strokes(
     >>> drawing.svg.startswith("<?xml") and len(drawing) > 4
     True
     """
-    stroke_style = StrokeStyle().with_settings(style)
-    pen = Pen(width, tuple(colors), None if plotter else paper, millimeters, plotter)
+    stroke_style, pen = StrokeStyle().with_settings(style), Pen(millimeters=millimeters)
     instance = upright_instance(surface, field)
     points, frame = instance.face_points(), (*view, *check_size(*size))
     camera = orbit_camera(points, *frame, perspective=not orthographic)
+    if preset is not None:
+        look = pixel_look(preset_look(preset), camera, [instance])
+        stroke_style, pen = strokes_of_look(look, StrokeStyle(), pen)
+        stroke_style = stroke_style.with_settings(style)
+    paper = pen.paper if paper == "" else paper
+    pen = replace(
+        pen,
+        width=pen.width if width is None else width,
+        colors=pen.colors if colors is None else tuple(colors),
+        paper=None if plotter else paper,
+        plotter=plotter,
+    )
     drawing = draw_instances([instance], camera, stroke_style, lights=lights_of(stroke_style, ()))
     return Drawing(drawing, camera, pen, surface.up)

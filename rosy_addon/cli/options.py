@@ -154,9 +154,14 @@ class CommandParser(argparse.ArgumentParser):
 
     def add_look_options(self) -> None:
         """Add the options --preset and --set."""
-        text = f"preset of the look: {', '.join(preset_keys())}, one of your own, or a .json file; `presets` lists them"
-        self.add_value("--preset", "NAME", text)
+        self.add_preset_option("preset of the look")
         self.add_set_option(Look, "one setting of the look, after the preset")
+
+    def add_preset_option(self, text: str) -> None:
+        """Add the option --preset. `text` says what it is for."""
+        names = ", ".join(preset_keys())
+        text = f"{text}: {names}, one of your own, or a .json file; `presets` lists them"
+        self.add_value("--preset", "NAME", text)
 
     def add_degree_option(self, text: str) -> None:
         """Add the option --degree, the degree of a field, with a help text."""

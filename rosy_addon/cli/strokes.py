@@ -40,6 +40,7 @@ def add_strokes_command(subparsers: Any) -> None:
         parser.add_toggle("--join", JOIN_TEXT)
         add_field_options(parser)
         parser.add_direction_options()
+        parser.add_preset_option("preset whose look the strokes follow")
     text = "file of strokes: a picture as .svg, or polylines in space as .ply, .obj or .csv"
     parser.add_output_option("OUT", text)
     parser.add_size_option()
@@ -76,12 +77,13 @@ def run_strokes(options: Options) -> None:
         _draw_scene_strokes(options)
         return
     options.check_only_for(SCENES, options.mesh)
-    pen = pen_of(options, Pen())
     size = check_size(*(options.size or DEFAULT_SIZE))
     arguments = {"view": options.view, "size": size, "orthographic": bool(options.orthographic)}
-    arguments |= {name: getattr(pen, name) for name in PEN_ARGUMENTS}
+    arguments |= {"preset": options.preset}
+    pen, settings = pen_of(options, Pen()), options.requested_settings()
+    arguments |= {name: getattr(pen, name) for name in PEN_ARGUMENTS if name in vars(options)}
     surface, field = load_mesh_and_field(options)
-    api.strokes(surface, field, **arguments, **options.requested_settings()).save(options.output)
+    api.strokes(surface, field, **arguments, **settings).save(options.output)
 
 
 def _draw_scene_strokes(options: Options) -> None:
@@ -120,17 +122,18 @@ def _draw_frame_strokes(options: Options, scene: Any, path: Path) -> None:
     import bpy
 
     from ..jobs.draw_strokes import draw_strokes
-    from ..scene.stroke_objects import read_pen, read_stroke_style, target_objects
+    from ..scene.stroke_objects import target_objects
 
     camera = None if options.camera is None else find_camera(scene, options.camera)
-    settings, layer = scene.rosy.strokes, bpy.context.view_layer
-    objects = requested_objects(options) or target_objects(scene, layer)
-    style = read_stroke_style(settings).with_settings(options.requested_settings())
-    pen = pen_of(options, read_pen(settings))
+    objects = requested_objects(options) or target_objects(scene, bpy.context.view_layer)
+
+    def adjust(style: StrokeStyle, pen: Pen) -> tuple[StrokeStyle, Pen]:
+        return style.with_settings(options.requested_settings()), pen_of(options, pen)
+
     # Names with the number of a frame are not those that the user has given, so links are not followed.
     output = {"kind": "FILE", "path": path.absolute(), "follow_links": path == options.output}
     output |= {"size": options.size}
-    result = draw_strokes(scene, objects=objects, camera=camera, style=style, pen=pen, **output)
+    result = draw_strokes(scene, objects=objects, camera=camera, adjust=adjust, **output)
     print_warnings(result.notes)
     print_line(f"{result.camera}: {result.path}")
 

@@ -1,27 +1,36 @@
 """The job of strokes: draw strokes along the fields of a scene, and store them as an object or a file."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
 
+from ..compositor.look_units import pixel_look
 from ..compositor.shading import lights_of
 from ..core.cache import BAKE_CACHE
 from ..core.errors import RosyError
 from ..core.file_io import check_writable, write_bytes
 from ..line_drawing.drawing_outputs import StrokeInput, drawing_curves, drawing_file
+from ..line_drawing.from_look import strokes_of_look
 from ..line_drawing.pipeline import StrokeDrawing
 from ..line_drawing.polyline_files import check_drawing_suffix
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen
+from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..scene.cameras import CameraSource, render_camera, render_size, resolve_camera
 from ..scene.files import absolute_path
 from ..scene.look_inputs import ReadRequest, nonfinite_policy
+from ..scene.look_properties import read_look
 from ..scene.read_view import lights_for, scene_depsgraph
 from ..scene.scene_reader import SceneData, read_scene
-from ..scene.stroke_objects import read_pen, read_stroke_style, store_strokes
+from ..scene.stroke_objects import (
+    edited_strokes,
+    read_pen,
+    read_stroke_style,
+    store_strokes,
+)
 from ..worker.job import Call, Step, Steps, job
 
 
@@ -60,6 +69,7 @@ def draw_strokes(
     collection: bpy.types.Collection | None = None,
     style: StrokeStyle | None = None,
     pen: Pen | None = None,
+    adjust: Callable[[StrokeStyle, Pen], tuple[StrokeStyle, Pen]] | None = None,
     size: tuple[int, int] | None = None,
     follow_links: bool = True,
 ) -> Steps[StrokeResult]:
@@ -85,9 +95,12 @@ def draw_strokes(
     collection : bpy.types.Collection, optional
         The collection to which a new object is added. By default the collection of the scene.
     style : StrokeStyle, optional
-        How strokes are placed. By default the settings of the scene.
+        How strokes are placed. By default the settings of the scene, and those of its look if
+        ``scene.rosy.strokes.from_look`` is on; see `strokes_of_look`.
     pen : Pen, optional
-        Width and colors of strokes. By default the settings of the scene.
+        Width and colors of strokes. By default as for `style`.
+    adjust : callable, optional
+        Is called with the settings of the scene and its look, and returns those to use.
     size : (int, int), optional
         Width and height in pixels of the picture to which lengths in pixels refer. By default the render
         resolution of the scene.
@@ -107,8 +120,6 @@ def draw_strokes(
     """
     settings = scene.rosy.strokes
     kind = settings.kind if kind is None else kind
-    style = read_stroke_style(settings) if style is None else style
-    pen = read_pen(settings) if pen is None else pen
     if kind == "FILE":
         follow_links = follow_links and path is not None
         path = absolute_path(str(settings.filepath if path is None else path))
@@ -119,23 +130,43 @@ def draw_strokes(
     view = resolve_camera(scene, depsgraph, source, render_size(scene) if size is None else size)
     scene_data = read_scene(depsgraph, objects, ReadRequest(nonfinite_policy(scene)), BAKE_CACHE)
     BAKE_CACHE.evict_over_limit()
+    notes = [*scene_data.warnings]
+    if style is None and settings.from_look and read_look(scene.rosy).tone != "light":
+        notes.append("strokes follow the light, not the tone of the look")
     is_following = kind == "CURVES" and settings.follow
     followed = _followed_instance(scene_data) if is_following else None
+    made = _styled(scene, view, scene_data.instances)
+    made = made if adjust is None else adjust(*made)
+    style, pen = (given or default for given, default in zip((style, pen), made, strict=True))
     lights = lights_for(scene, depsgraph, style, scene_data.instances)
     lights = lights_of(style, [light.transformed(view.view) for light in lights])
     inputs = StrokeInput(scene_data.instances, view, style, pen, lights)
     if kind == "FILE":
         drawing, contents = yield Call(drawing_file, (suffix, inputs))
         write_bytes(path, contents, follow_links=follow_links)
-        return StrokeResult(view.name, drawing, path=path, notes=scene_data.warnings)
+        return StrokeResult(view.name, drawing, path=path, notes=tuple(notes))
     drawing, curves = yield Call(drawing_curves, (inputs, followed), 0.0, 0.97)
     yield Step(0.97, "storing the strokes")
     # The strokes move with the drawn object, if there is only one.
     parent = scene_data.objects[0] if len(scene_data.objects) == 1 else None
     vertex_count = 0 if followed is None else len(followed.surface.vertices)
+    edited = edited_strokes(scene, kind, view.name)
     obj = store_strokes(scene, kind, curves, view.name, parent, collection, vertex_count)
-    notes = (*scene_data.warnings, *_notes(scene, obj, style))
-    return StrokeResult(view.name, drawing, obj, notes=notes)
+    notes += _notes(scene, obj, style)
+    if edited is not None:
+        notes.append(f"'{edited.name}' was edited and stays: the new strokes are '{obj.name}'")
+    return StrokeResult(view.name, drawing, obj, notes=tuple(notes))
+
+
+def _styled(
+    scene: bpy.types.Scene, camera: Camera, instances: Sequence[MeshInstance]
+) -> tuple[StrokeStyle, Pen]:
+    """Return the style and the pen that the settings of a scene, and its look, describe."""
+    settings = scene.rosy.strokes
+    style, pen = read_stroke_style(settings), read_pen(settings)
+    if not settings.from_look:
+        return style, pen
+    return strokes_of_look(pixel_look(read_look(scene.rosy), camera, instances), style, pen)
 
 
 def _followed_instance(scene_data: SceneData) -> MeshInstance:

@@ -295,9 +295,12 @@ def _outline(instance: MeshInstance, index: int, view: _View) -> Strokes:
 
     `index` is the index of the instance in the depth buffer.
     """
-    if not view.clips:
-        return outline_strokes(instance, view.camera)
-    return smooth(visible_outline(instance, index, view.camera, view.depth_buffer), view.camera)
+    if view.clips:
+        outline = visible_outline(instance, index, view.camera, view.depth_buffer)
+        outline = smooth(outline, view.camera)
+    else:
+        outline = outline_strokes(instance, view.camera)
+    return replace(outline, width=outline.width * view.style.outline)
 
 
 def _overshoot(strokes: Strokes, view: _View) -> Strokes:

@@ -110,7 +110,13 @@ class StrokeStyle:
         panel="ends",
         panel_before="gaps",
     )
-    outline: bool = switch(False, "Draw silhouettes, creases and borders as well")
+    outline: float = number(
+        0.0,
+        0.0,
+        100.0,
+        "Width of silhouettes, creases and borders, as a multiple of the width of strokes. 0: none",
+        unit="widths",
+    )
     hidden: bool = switch(False, "Keep strokes that the camera does not see", label="Keep Hidden")
     singularity_dots: str = singularity_dots_choice(panel="singularities")
     singularity_size: float = singularity_size_number(panel="singularities")

@@ -240,7 +240,7 @@ def _stroke_paths(pixels: np.ndarray, strokes: Strokes, width: float, color: str
     `pixels`, (n, 2), holds the points of the strokes in coordinates of the SVG document, and `width` is the
     full width of a stroke in pixels.
     """
-    radius = np.clip(strokes.width, 0, 1) * width / 2
+    radius = np.maximum(strokes.width, 0) * width / 2
     with progress(0.1, 0.5):
         features = np.column_stack([pixels, radius])
         kept = simplify_mask(features, strokes.start, SIMPLIFY_TOLERANCE_PX)
@@ -258,7 +258,7 @@ def _stroke_paths(pixels: np.ndarray, strokes: Strokes, width: float, color: str
             continue
         if max_radius[stroke] - min_radius[stroke] <= WIDTH_TOLERANCE * width / 2:
             width_px = 2 * max_radius[stroke]
-            is_full = width_px > (1 - WIDTH_TOLERANCE) * width
+            is_full = abs(width_px - width) < WIDTH_TOLERANCE * width
             attribute = "" if is_full else f' stroke-width="{width_px:.3g}"'
             paths.append(f'<path{attribute} d="{_line_path(points[span], closed)}"/>')
         else:

@@ -2,7 +2,8 @@
 
 For each camera there is at most one Grease Pencil object and one Curves object. Records in
 ``scene.rosy.strokes`` identify them. An object that the user has copied has no record and is never changed.
-When strokes are drawn again, the object gets new data, and keeps its modifiers, name and collections.
+When strokes are drawn again, the object gets new data, and keeps its modifiers, name and collections. If the
+user has edited its strokes, it is left as it is, loses its record, and the new strokes go into a new object.
 """
 
 from typing import Any
@@ -88,7 +89,7 @@ def store_strokes(
 ) -> Object:
     """Store strokes in an object. They replace the strokes of the same kind from the same camera.
 
-    If an error is raised, the scene is not changed.
+    Strokes that the user has edited are not replaced; see `edited_strokes`. If an error is raised, the scene is not changed.
 
     Parameters
     ----------
@@ -123,6 +124,8 @@ def store_strokes(
         data = DATA_BUILDERS[kind](name, geometry, first_frame, register)
         record = _find_record(scene, kind, camera)
         obj = None if record is None else record.thing
+        if edited_strokes(scene, kind, camera) is not None:
+            obj = None
         if obj is None:
             obj = track(bpy.data.objects.new(name, data))
             is_usable = collection is not None and is_editable(collection)
@@ -164,10 +167,7 @@ def remove_strokes(scene: Scene) -> int:
 
 
 def edited_strokes(scene: Scene, kind: str, camera: str) -> Object | None:
-    """Return the object whose strokes `store_strokes` would replace, if the user has edited the strokes.
-
-    None is returned if there is no such object, or its strokes were not edited since they were drawn.
-    """
+    """Return the object with strokes of a kind from a camera if the user has edited them since they were drawn."""
     record = _find_record(scene, kind, camera)
     if record is None or not record.digest or record.digest == _digest(record.thing.data):
         return None

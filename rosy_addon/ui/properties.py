@@ -138,6 +138,11 @@ class RosyStrokes(bpy.types.PropertyGroup):
     __annotations__ = setting_properties(StrokeStyle) | {
         "kind": choice("Make", "Type of object or file made from the strokes", STROKE_KIND_ITEMS),
         "camera": choice("Camera", "Viewpoint of the strokes", STROKE_CAMERA_ITEMS),
+        "from_look": toggle(
+            "From Look",
+            "Take spacing, widths, light, outline, ends, ink and marks from the look",
+            default=True,
+        ),
         "selected": toggle(
             "Selected Only", "Draw only on selected objects. Others still hide what is behind them"
         ),

@@ -18,6 +18,13 @@ STROKE_PANELS = {
 }
 
 
+#: Settings of the subpanels that strokes take from the look if *From Look* is on.
+OF_LOOK = {
+    *("light", "layering", "swell", "overshoot", "arrows"),
+    *("singularity_dots", "singularity_size", "ink_color", "outline_color"),
+}
+
+
 class VIEW3D_PT_rosy_strokes(SidebarPanel, Panel):
     """Draw lines along the field, as scene objects or as a file."""
 
@@ -33,10 +40,14 @@ class VIEW3D_PT_rosy_strokes(SidebarPanel, Panel):
         if settings.kind == "CURVES":
             column.prop(settings, "follow")
         column.separator()
-        spacing = "spacing" if settings.unit == "pixels" else "distance"
-        draw_settings(column, settings, "unit", spacing, "width", "outline", "hidden")
+        draw_settings(column, settings, "from_look", "hidden")
+        if not settings.from_look:
+            spacing = "spacing" if settings.unit == "pixels" else "distance"
+            draw_settings(column, settings, "unit", spacing, "width", "outline")
         for title, names in STROKE_PANELS.items():
-            if title == "Singularities" and settings.kind != "FILE":
+            if settings.from_look:
+                names = tuple(name for name in names if name not in OF_LOOK)
+            if not names or (title == "Singularities" and settings.kind != "FILE"):
                 continue
             body = closed_panel(layout, f"strokes_{title.lower()}", title)
             if body is not None:

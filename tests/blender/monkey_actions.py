@@ -367,7 +367,7 @@ def strokes(monkey: Monkey) -> None:
     if bpy.context.scene.rosy.strokes.spacing < 4:
         bpy.context.scene.rosy.strokes.spacing = 9.0
     path, kind = str(monkey.folder / "a.svg"), monkey.pick(["PENCIL", "CURVES", "FILE"])
-    settings = {"kind": kind, "camera": "SCENE", "filepath": path, "replace": True}
+    settings = {"kind": kind, "camera": "SCENE", "filepath": path}
     monkey.rosy("strokes", **settings)
 
 

@@ -36,7 +36,7 @@ MAX_GROWTH = 150.0
 #: Operators whose results can be removed, with settings.
 MADE = {
     "bake": {"camera": "ALL"}, "bake_texture": {"unwrap": False}, "singularities": {"show": "BOTH"},
-    "strokes": {"kind": "PENCIL", "camera": "SCENE", "replace": True},
+    "strokes": {"kind": "PENCIL", "camera": "SCENE"},
 }  # fmt: skip
 
 #: Seconds after which a step counts as hanging: its Python stack is printed, and Blender ends.

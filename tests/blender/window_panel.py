@@ -254,34 +254,6 @@ def test_animation_asks_for_a_folder():
     assert Path(scene.rosy.directory) == folder
 
 
-def test_edited_strokes_are_replaced_on_request():
-    """Draw Strokes asks first; without an edit it does not."""
-    yield from scene_with_field()
-    bpy.context.scene.rosy.strokes.spacing = 30.0
-
-    def draw():
-        call_in_view(bpy.ops.rosy.strokes, "INVOKE_DEFAULT", True)
-
-    draw()
-    yield from wait_until(lambda: bpy.context.scene.rosy.strokes.made and status().current is None)
-    obj = bpy.context.scene.rosy.strokes.made[0].thing
-    assert bpy.data.objects["Suzanne"].users_collection == obj.users_collection
-    first = obj.data
-    draw()
-    yield from wait_until(lambda: obj.data != first and status().current is None)
-    edited = obj.data
-    drawings = [layer.frames[0].drawing for layer in edited.layers]
-    drawing = next(drawing for drawing in drawings if len(drawing.strokes))
-    drawing.attributes["position"].data[0].vector.x += 1
-    draw()
-    yield 0.5
-    assert obj.data == edited and status().current is None
-    yield from save_screenshot("edited-strokes")
-    press("RET")
-    yield from wait_until(lambda: obj.data != edited and status().current is None)
-    yield from job_ends()
-
-
 def test_bake_the_current_view():
     yield from scene_with_field()
     call_in_view(bpy.ops.rosy.bake, "EXEC_DEFAULT", True, camera="VIEW")

@@ -126,7 +126,7 @@ STROKE_ERRORS = [
     (["--field-mesh", "a.obj"], "suzanne.blend: --field-mesh applies only to mesh files"),
     (["--view", "0,90"], "suzanne.blend: --view applies only to mesh files"),
     (["--frames", "1-3"], "out.svg: several frames need #"),
-    (["--frames", "9", "--set", "spacing=9999", "--set", "outline=off"], "frame 9: no stroke fits"),
+    (["--frames", "9", "--set", "spacing=9999", "--set", "outline=0"], "frame 9: no stroke fits"),
 ]
 
 
@@ -154,8 +154,8 @@ def test_missing_and_invalid_files(tmp_path, rosy):
 def with_stroke_settings(saved):
     """The same file, with stroke settings that differ from those of the command line."""
     settings = bpy.context.scene.rosy.strokes
-    settings.spacing, settings.width, settings.light = 16.0, 1.7, "lamp"
-    settings.inks, settings.outline, settings.overshoot = "FAMILIES", True, 6.0
+    settings.from_look, settings.spacing, settings.width, settings.light = False, 16.0, 1.7, "lamp"
+    settings.inks, settings.outline, settings.overshoot = "FAMILIES", 1.0, 6.0
     bpy.ops.wm.save_mainfile()
     return saved
 

@@ -21,7 +21,7 @@ from scenes import contents, depsgraph, each_step, render, reopen
 from test_bad_input import assert_refused
 from test_up_to_date import put
 
-PLAIN = StrokeStyle(spacing=12, outline=True)
+PLAIN = StrokeStyle(spacing=12, outline=1.0)
 WIDE = StrokeStyle(spacing=20)
 BLACK = Pen(width=1.5)
 
@@ -138,7 +138,7 @@ def test_strokes_are_replaced_and_removed(wall, camera, scene, kind):
         noise = "GREASE_PENCIL_NOISE" if has_grease_pencil_drawings() else "GP_NOISE"
         pencil_modifiers(first).new("Noise", noise)
     first.location.x = 5.0
-    again = draw_strokes(scene, kind=kind, style=StrokeStyle(spacing=16, outline=True)).obj
+    again = draw_strokes(scene, kind=kind, style=StrokeStyle(spacing=16, outline=1.0)).obj
     assert again == first and again.name == "Mine"
     assert kind == "CURVES" or pencil_modifiers(again)[0].name == "Noise"
     assert np.allclose(again.matrix_basis, np.eye(4))
@@ -219,7 +219,7 @@ def test_settings_of_the_scene_are_those_of_the_function(wall, camera, scene, tm
     settings.light, settings.outline = "lamp", True
     settings.inks, settings.outline_color = "FAMILIES", (1.0, 0.0, 0.0)
     assert draw_strokes(scene).path == tmp_path / "a.svg"
-    style = StrokeStyle(spacing=9.3, taper=0.4, light="lamp", outline=True)
+    style = StrokeStyle(spacing=9.3, taper=0.4, light="lamp", outline=1.0)
     pen = Pen(width=0.7, colors=["#db8021", "#4594eb"], outline="#ff0000")
     draw_strokes(scene, kind="FILE", path=tmp_path / "b.svg", style=style, pen=pen)
     text = (tmp_path / "a.svg").read_text()
@@ -230,7 +230,7 @@ def test_settings_of_the_scene_are_those_of_the_function(wall, camera, scene, tm
 def test_polylines_lie_on_the_object_when_imported(monkey, camera, scene, tmp_path, suffix):
     """Blender's importers read the files that RoSy writes."""
     path = tmp_path / f"lines{suffix}"
-    style = StrokeStyle(spacing=12, hidden=True, outline=True)
+    style = StrokeStyle(spacing=12, hidden=True, outline=1.0)
     strokes = draw_strokes(scene, kind="FILE", path=path, style=style, pen=BLACK).drawing.strokes
     assert strokes.closed.any()
     importer = bpy.ops.wm.ply_import if suffix == ".ply" else bpy.ops.wm.obj_import
@@ -304,7 +304,7 @@ def recolor(data):
 
 @pytest.mark.parametrize("edit", [move_a_point, recolor])
 @pytest.mark.parametrize("kind", ["PENCIL", "CURVES"])
-def test_edited_strokes_are_recognized(wall, camera, scene, tmp_path, kind, edit):
+def test_edited_strokes_are_recognized_and_kept(wall, camera, scene, tmp_path, kind, edit):
     name = draw_strokes(scene, kind=kind, style=WIDE).obj.name
     assert edited_strokes(scene, kind, "Camera") is None
     scene = reopen(tmp_path / "strokes.blend")
@@ -315,8 +315,13 @@ def test_edited_strokes_are_recognized(wall, camera, scene, tmp_path, kind, edit
     edit(obj.data)
     assert edited_strokes(scene, kind, "Camera") == obj
     assert edited_strokes(scene, kind, "Other") is None
-    draw_strokes(scene, kind=kind, style=WIDE)
+    kept = contents()
+    result = draw_strokes(scene, kind=kind, style=WIDE)
+    assert result.obj != obj and obj.name in scene.objects
+    assert f"'{obj.name}' was edited and stays" in result.notes[-1]
     assert edited_strokes(scene, kind, "Camera") is None
+    assert remove_strokes(scene) == 1
+    assert contents() == kept
 
 
 def test_new_strokes_are_put_into_a_collection(wall, camera, scene):

@@ -322,7 +322,7 @@ TABLE = {
     "look": (put("rosy.look.seed", 7), None, "the look was changed"),
     "light without shading": (put("rosy.look.light", "scene"), put("rosy.look.shading", 0.0), ""),
     "gain with hatching": (put("rosy.look.gain", 1.0), hatched, ""),
-    "unit": (put("rosy.look.unit", "PERCENT"), None, "the look was changed"),
+    "unit": (put("rosy.look.unit", "percent"), None, "the look was changed"),
     "shadows of a headlight": (put("rosy.look.shadows", True), None, ""),
     "tone attribute": (lambda scene: add_tone(0.2), tone, "field of 'Plain' was changed"),
     "colored attribute": (lambda scene: add_tone(0.2), colors, "field of 'Plain' was changed"),

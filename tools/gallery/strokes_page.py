@@ -24,8 +24,8 @@ WIDTH = 1.3
 
 #: Styles of the strokes on Suzanne, by the label of the picture.
 STYLES = {
-    "evenly spaced, with an outline": StrokeStyle(spacing=6, outline=True),
-    "by tone, of a lamp": StrokeStyle(spacing=4, outline=True, light="lamp"),
+    "evenly spaced, with an outline": StrokeStyle(spacing=6, outline=1.0),
+    "by tone, of a lamp": StrokeStyle(spacing=4, outline=1.0, light="lamp"),
 }
 
 

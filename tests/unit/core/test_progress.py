@@ -101,7 +101,7 @@ CONVERSION = Conversion(
     2, rotation=0.1, smoothing_length=0.05, pair_distance=0.2, magnitude="curvature"
 )
 VIEW = ViewInput((INSTANCE,), CAMERA, Look(), (SUN,))
-STYLE = StrokeStyle(spacing=40.0, arrows=30.0, overshoot=4.0, outline=True)
+STYLE = StrokeStyle(spacing=40.0, arrows=30.0, overshoot=4.0, outline=1.0)
 
 #: Long functions, their arguments, and the least part of the work at which the last report comes.
 LONG = {

@@ -34,7 +34,7 @@ def drawn(surface, field, **settings):
 @pytest.mark.parametrize(
     ("shape", "degree", "settings"),
     [
-        (icosphere(3), 3, {"light": "headlight", "gaps": 0.3, "outline": True, "overshoot": 6.0}),
+        (icosphere(3), 3, {"light": "headlight", "gaps": 0.3, "outline": 1.0, "overshoot": 6.0}),
         (torus(48, 24), 1, {"hidden": True, "cross_creases": True}),
     ],
     ids=["with tones", "with hidden strokes"],

@@ -22,7 +22,7 @@ MIN_MARK_PX = 6.0
 def outlines_of(surface, camera):
     """Return the outlines of a drawing."""
     instance = instance_of(surface, 4, (0.1, 0.2, 1))
-    strokes = draw_instances([instance], camera, StrokeStyle(spacing=40, outline=True)).strokes
+    strokes = draw_instances([instance], camera, StrokeStyle(spacing=40, outline=1.0)).strokes
     kinds = [strokes.names.index(kind) for kind in OUTLINE_KINDS]
     return strokes.select(np.isin(strokes.family, kinds))
 
@@ -75,7 +75,7 @@ def test_walls_seen_almost_edge_on_have_outlines():
     corners = [[0, 0, 0], [0, 0, 2.5], [0, 1.3, 2.5], [0, 1.3, 0]]
     wall = rf.Surface(corners, [[0, 1, 2], [0, 2, 3]], name="wall", up="y")
     field = rf.along_axis(wall, (0, 1, 0.3), 2)
-    rf.strokes(wall, field, view=(-3.5e-160, 0), size=(15, 28), outline=True)
+    rf.strokes(wall, field, view=(-3.5e-160, 0), size=(15, 28), outline=1.0)
 
 
 @pytest.mark.slow

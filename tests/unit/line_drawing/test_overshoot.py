@@ -127,7 +127,7 @@ def test_ends_at_gaps_and_at_neighbors_are_not_extended():
 
 def test_closed_strokes_and_outlines_are_not_extended():
     circles, occluder = latitudes(icosphere(3)), MeshInstance(plane(), moved(x=1.8, z=1.7))
-    plain, extended = draw_both([circles, occluder], TOP_CAMERA, spacing=15.0, outline=True)
+    plain, extended = draw_both([circles, occluder], TOP_CAMERA, spacing=15.0, outline=1.0)
     closed = plain.closed & extended.closed
     assert closed.sum() >= 4
     assert np.array_equal(plain.select(closed).points, extended.select(closed).points)

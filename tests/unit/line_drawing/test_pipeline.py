@@ -37,7 +37,7 @@ ORTHOGRAPHIC = orthographic_camera(look_at((0.5, -4, 1), (0, 0, 0)), 240, 200, s
 def test_families_of_several_instances_are_merged_by_name():
     degree_6 = instance_of(icosphere(3), 6, matrix=moved(x=0.9))
     occluder = MeshInstance(plane(), moved(z=-1.0))
-    style = StrokeStyle(spacing=16, outline=True)
+    style = StrokeStyle(spacing=16, outline=1.0)
     drawing = draw_instances([occluder, SPHERE, degree_6], CAMERA, style)
     strokes = drawing.strokes
     assert strokes.names == ("family 1", "family 2", "family 3", *OUTLINE_KINDS)
@@ -133,7 +133,7 @@ def test_seeding_ends_where_shading_normals_are_steep(tilt):
 
 @pytest.mark.slow
 def test_blocks_do_not_change_strokes(monkeypatch):
-    style = StrokeStyle(spacing=16, outline=True)
+    style = StrokeStyle(spacing=16, outline=1.0)
     expected = draw_instances([SPHERE], CAMERA, style).strokes
     for module, name in (
         (separation, "BLOCK_POINTS"),

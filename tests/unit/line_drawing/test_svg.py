@@ -124,7 +124,7 @@ def test_command_line(tmp_path, capsys, monkeypatch):
     mesh, out = write_off(tmp_path / "ball.off", icosphere(3)), tmp_path / "ball.svg"
     words = "--generate smoothest --set spacing=12 -o"
     command = ["strokes", str(mesh), *words.split(), str(out)]
-    options = "--size 150x100 --set outline=on --set gaps=0.3 --set light=lamp"
+    options = "--size 150x100 --set outline=1 --set gaps=0.3 --set light=lamp"
     assert main([*command, *options.split()]) == 0
     root = ElementTree.fromstring(out.read_bytes())
     assert len(root.findall("{http://www.w3.org/2000/svg}g")) == 4

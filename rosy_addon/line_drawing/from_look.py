@@ -1,0 +1,57 @@
+"""Strokes like the lines of a look: its spacing, widths, light, outline, ends, colors and marks."""
+
+from dataclasses import replace
+from typing import Any
+
+from ..core.color import alpha_from_hex
+from .style import StrokeStyle
+from .svg import Pen
+
+#: Distance of even strokes in widths of the pen. Where it is darkest, they leave a third of the paper.
+EVEN_DISTANCE = 1.5
+
+#: Distance of other strokes in widths of the pen: lines and gaps are equally wide, as the cells of noise.
+HATCH_DISTANCE = 2.0
+
+
+def strokes_of_look(look: Any, style: StrokeStyle, pen: Pen) -> tuple[StrokeStyle, Pen]:
+    """Return the style and the pen of strokes that look like the lines of a look.
+
+    Parameters
+    ----------
+    look : PixelLook
+        A look in pixels of the picture. Soft streaks set neither the spacing nor the pen.
+    style : StrokeStyle
+        Its other settings stay: curvature, gaps, taper and hidden strokes.
+    pen : Pen
+        Its page stays, and its colors if there are several: one for each family.
+
+    Returns
+    -------
+    style : StrokeStyle
+    pen : Pen
+    """
+    is_even, is_hatched = look.ink == "even", look.ink != "soft"
+    spacing, width, paper = style.spacing, pen.width, pen.paper
+    if is_hatched:
+        spacing = look.line_distance if is_even else HATCH_DISTANCE * look.line_width
+        width = spacing / (EVEN_DISTANCE if is_even else HATCH_DISTANCE)
+        is_clear = alpha_from_hex(look.paper_color) == 0
+        paper = None if paper is None or is_clear else look.paper_color[:7]
+    pen = replace(pen, width=width, paper=paper)
+    if is_hatched and len(pen.colors) == 1:
+        pen = replace(pen, colors=[look.ink_color[:7]], outline=look.ink_color[:7])
+    settings = {
+        "spacing": min(spacing, 1e4),
+        "light": look.light if look.shading > 0 else "none",
+        "layering": look.layering,
+        "swell": float(is_even),
+        "overshoot": look.overshoot,
+        "outline": look.outline / width if is_hatched else 1.0,
+        "arrows": look.arrows / spacing,
+        "singularity_dots": look.singularity_dots,
+        "singularity_size": look.singularity_size,
+    }
+    if is_hatched and look.pixel_size:
+        settings |= {"unit": "world", "distance": spacing * look.pixel_size}
+    return replace(style, **settings), pen

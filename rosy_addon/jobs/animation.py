@@ -239,6 +239,7 @@ def _frame_steps(
         scene, depsgraph, sources, look, objects=objects, size=size, cache=cache
     )
     cache.evict_unused()
+    device = "cpu" if views[0].looks else device
     scene_state = SceneState(scene, depsgraph, scene_data.mesh_states)
     states = [scene_state.picture_state(scene, depsgraph, source, True) for source in sources]
     drawn = []
@@ -284,7 +285,7 @@ def _own_bytes(path: Path) -> bytes:
 def _input_hash(view: ViewInput, device: str, settings: pictures.OutputSettings) -> bytes:
     """Return a hash of everything that a picture is drawn from."""
     camera, reference = view.camera, view.reference
-    parts: list = [view.look, *view.drift, camera.view, camera.projection]
+    parts: list = [view.look, *view.looks, *view.drift, camera.view, camera.projection]
     parts += [camera.width, camera.height, settings.as_float]
     if device == "gpu":
         parts.append("by the graphics card")

@@ -8,6 +8,7 @@ from bpy.types import Object, Scene
 from ..compositor.ink_thresholds import unlit_look
 from ..compositor.look import Look, is_hatched
 from ..core.cache import BAKE_CACHE
+from ..core.errors import RosyError
 from ..gpu.select import image_steps, select_device
 from ..scene import pictures
 from ..scene.cameras import CameraSource, render_camera
@@ -75,11 +76,15 @@ def bake(
         scene, depsgraph, sources, look, objects=objects, size=size, cache=BAKE_CACHE
     )
     BAKE_CACHE.evict_over_limit()
+    if draws_thresholds and views[0].looks:
+        raise RosyError(
+            "objects have looks of their own, and Relight draws one: switch Relight off"
+        )
     pictures.check_targets(scene_data.objects, settings)
     pictures.check_files(settings, [view.camera.name for view in views])
     scene_state = SceneState(scene, depsgraph, scene_data.mesh_states)
     states = [scene_state.picture_state(scene, depsgraph, source) for source in sources]
-    device = select_device(settings.device, look)
+    device = "cpu" if views[0].looks else select_device(settings.device, look)
     drawings = []
     for (view, source, state), start, stop in shares(
         zip(views, sources, states, strict=True), 0.97

@@ -7,7 +7,7 @@ from bpy.types import Image, Object, Scene
 
 from ..core.errors import RosyError
 from ..scene.look_inputs import color_attribute_of
-from ..scene.look_properties import drift_in_scene, read_look
+from ..scene.look_properties import drift_in_scene, own_presets, read_look
 from ..scene.meshes import uv_map_name
 from ..scene.picture_state import bakes_light, read_texture_state
 from ..scene.pictures import (
@@ -93,7 +93,11 @@ def bake_texture(scene: Scene, objects: Sequence[Object]) -> Steps[list[TextureR
         drawn.append((obj, uv_map, texture, state))
     yield Step(0.98, "applying the textures")
     results = []
+    presets = own_presets(scene, [obj for obj, *_ in drawn])
+    other_look = (
+        ("textures have the look of the scene, not those of objects",) if any(presets) else ()
+    )
     for obj, uv_map, texture, state in drawn:
         image = apply_texture(scene, obj, uv_map, texture, state, look, texture_settings, settings)
-        results.append(TextureResult(obj, image, (texture.note,) if texture.note else ()))
+        results.append(TextureResult(obj, image, (*filter(None, [texture.note]), *other_look)))
     return results

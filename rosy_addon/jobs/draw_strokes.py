@@ -22,7 +22,7 @@ from ..projection.gbuffer import MeshInstance
 from ..scene.cameras import CameraSource, render_camera, render_size, resolve_camera
 from ..scene.files import absolute_path
 from ..scene.look_inputs import ReadRequest, nonfinite_policy
-from ..scene.look_properties import read_look
+from ..scene.look_properties import own_presets, read_look
 from ..scene.read_view import lights_for, scene_depsgraph
 from ..scene.scene_reader import SceneData, read_scene
 from ..scene.stroke_objects import (
@@ -133,6 +133,8 @@ def draw_strokes(
     notes = [*scene_data.warnings]
     if style is None and settings.from_look and read_look(scene.rosy).tone != "light":
         notes.append("strokes follow the light, not the tone of the look")
+    if style is None and settings.from_look and any(own_presets(scene, scene_data.objects)):
+        notes.append("strokes follow the look of the scene, not those of objects")
     is_following = kind == "CURVES" and settings.follow
     followed = _followed_instance(scene_data) if is_following else None
     made = _styled(scene, view, scene_data.instances)

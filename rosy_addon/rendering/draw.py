@@ -4,6 +4,7 @@ A large picture is divided into strips of rows, which several processes draw.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -64,10 +65,47 @@ def draw_picture(
     NothingInViewError
         If no mesh with a field is visible.
     """
-    with progress(0.0, 0.97):
-        picture = _draw_fields(view, cache, cache if keep_gbuffers else None, workers)
-    with progress(0.97, 1.0):
-        return with_marks(picture, view, cache)
+    views, pictures = view.by_look(), []
+    for index, one in enumerate(views):
+        start, stop = index / len(views), (index + 1) / len(views)
+        try:
+            with progress(start, start + 0.97 * (stop - start)):
+                picture = _draw_fields(one, cache, cache if keep_gbuffers else None, workers)
+        except NothingInViewError:
+            if index + 1 == len(views) and not pictures:
+                raise
+            continue
+        with progress(start + 0.97 * (stop - start), stop):
+            pictures.append(with_marks(picture, one, cache))
+    return joined_pictures(pictures)
+
+
+def joined_pictures(pictures: Sequence[Picture]) -> Picture:
+    """Return one picture of several, each of which shows other meshes of the same scene.
+
+    Where a pixel shows several, its color is their mean, weighted by opacity. The color range and the marks
+    are those of the first picture that has some.
+    """
+    if len(pictures) == 1:
+        return pictures[0]
+    rgba = pictures[0].rgba.copy()
+    for picture in pictures[1:]:
+        alpha = picture.rgba[..., 3:]
+        total = rgba[..., 3:] + alpha
+        share = np.divide(alpha, total, out=np.zeros_like(total), where=total > 0)
+        rgba[..., :3] += share * (picture.rgba[..., :3] - rgba[..., :3])
+        rgba[..., 3:] = np.minimum(total, 1)
+        is_alone = share[..., 0] == 1
+        rgba[is_alone] = picture.rgba[is_alone]
+    ranges = (picture.color_range for picture in pictures)
+    marks = (picture.marks for picture in pictures)
+    return replace(
+        pictures[0],
+        rgba=rgba,
+        color_range=next((found for found in ranges if found is not None), None),
+        marks=next((found for found in marks if found is not None), None),
+        line_count=max(picture.line_count for picture in pictures),
+    )
 
 
 def bake_picture(view: ViewInput, keep_gbuffers: bool = True, workers: int = 0) -> Picture:

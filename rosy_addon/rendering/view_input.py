@@ -1,6 +1,6 @@
 """`ViewInput`: everything that a renderer needs to draw one picture."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -43,6 +43,9 @@ class ViewInput:
         The camera. Its size is the size of the finished picture.
     look : Look
         Settings of the drawing.
+    looks : tuple of Look
+        The look of each instance, if they differ; those of instances without a field are not used. Empty if
+        `look` is the look of all.
     lights : tuple of Light
         In camera space. Only used if `Look.light` is "scene".
     reference : ReferenceRender or None
@@ -64,6 +67,26 @@ class ViewInput:
     clip_planes: np.ndarray | None = None
     drift: Drift = NO_DRIFT
     draws_thresholds: bool = False
+    looks: tuple[Look, ...] = ()
+
+    def by_look(self) -> list["ViewInput"]:
+        """Return a view for each look. In it, the meshes with other looks have no field: they only hide others."""
+        if not self.looks:
+            return [self]
+        entries = list(zip(self.instances, self.looks, strict=True))
+        looks = dict.fromkeys(look for instance, look in entries if instance.field is not None)
+        return [
+            replace(
+                self,
+                look=look,
+                looks=(),
+                instances=tuple(
+                    instance if own == look else replace(instance, field=None)
+                    for instance, own in entries
+                ),
+            )
+            for look in looks
+        ]
 
     @property
     def sample_camera(self) -> Camera:

@@ -1,16 +1,21 @@
 """Conversion between a `Look` and Blender's properties."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import bpy
 import numpy as np
+from bpy.types import Collection, Object
 
 from ..compositor.flow import Drift, drift_at
-from ..compositor.look import Look, has_clear_paper, is_hatched
+from ..compositor.look import Look, colors_values, has_clear_paper, is_hatched
 from ..core.color import alpha_from_hex, from_hex, to_hex, to_linear
+from ..core.errors import RosyError
 from ..core.settings import Color, Number, Numbers, Setting, settings_of
+from ..preset_files.store import load_preset
+from .files import user_presets_folder
 
 
 def read_look(settings: Any) -> Look:
@@ -25,6 +30,61 @@ def read_look(settings: Any) -> Look:
     if getattr(settings, "over_material", False) and is_hatched(look):
         return replace(look, paper_color=to_hex((*from_hex(look.paper_color), 0.0)))
     return look
+
+
+def object_looks(scene: bpy.types.Scene, objects: Sequence[Object], look: Look) -> list[Look]:
+    """Return the look of each object: that of its own preset, of a collection that it is in, or `look`.
+
+    The innermost collection with a preset counts. The light, the tone and the paper of the scene are one for all: they
+    are those of `look`.
+
+    Raises
+    ------
+    RosyError
+        If a preset cannot be read.
+    """
+    looks, keys = {"": look}, own_presets(scene, objects)
+    for obj, key in zip(objects, keys, strict=True):
+        if key not in looks:
+            try:
+                looks[key] = _in_light_of(load_preset(key, user_presets_folder()).look, look)
+            except RosyError as error:
+                raise RosyError(f"look of object '{obj.name}': {error}") from None
+    return [looks[key] for key in keys]
+
+
+def own_presets(scene: bpy.types.Scene, objects: Sequence[Object]) -> list[str]:
+    """Return the key of the preset of each object; empty if it has the look of the scene."""
+    collections: dict[Object, str] = {}
+    _collect_presets(scene.collection, "", collections)
+    return [obj.rosy.preset or collections.get(obj, "") for obj in objects]
+
+
+def _collect_presets(collection: Collection, preset: str, found: dict[Object, str]) -> None:
+    """Add the preset of each object in a collection, whose parent has `preset`. Inner collections come last."""
+    preset = collection.rosy.preset or preset
+    if preset:
+        found |= dict.fromkeys(collection.objects, preset)
+    for child in collection.children:
+        _collect_presets(child, preset, found)
+
+
+def _in_light_of(look: Look, scene_look: Look) -> Look:
+    """Return a look with the light, the tone, the paper and the unit of the look of a scene.
+
+    Raises
+    ------
+    RosyError
+        If it shows color values, but the look of the scene shows none, so that they have no source.
+    """
+    if colors_values(look) and not colors_values(scene_look):
+        raise RosyError("its colors show values: let the look of the scene show them, too")
+    names = ["light", "shadows", "tone", "tone_lit"]
+    if look.unit == "pixels":
+        names += ["unit", "unit_size", "dpi"]
+    if is_hatched(scene_look):
+        names.append("paper_color")
+    return replace(look, **{name: getattr(scene_look, name) for name in names})
 
 
 def backdrop_color(scene: bpy.types.Scene, look: Look) -> np.ndarray | None:

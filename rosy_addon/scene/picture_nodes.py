@@ -322,15 +322,17 @@ def remove_applied_picture(data: ID | None) -> None:
 def _applied_attributes(data: ID | None) -> list[str]:
     """Return the names of the attributes that are left on a mesh if the user has applied RoSy's modifier.
 
-    The list is empty if `data` is not a mesh that can be edited.
+    The list is empty if `data` is not a mesh that can be edited. A name that two attributes have is left out:
+    Blender 4.3 allows this, and then may remove the other one.
     """
     if not isinstance(data, Mesh) or not is_editable(data):
         return []
+    found = [(each.name, each.data_type, each.domain) for each in data.attributes]
+    names = [name for name, *_ in found]
     return [
         name
         for name, kind in _ATTRIBUTE_TYPES.items()
-        if (attribute := data.attributes.get(name))
-        and (attribute.data_type, attribute.domain) == kind
+        if (name, *kind) in found and names.count(name) == 1
     ]
 
 

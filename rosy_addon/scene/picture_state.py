@@ -6,7 +6,7 @@ Reading does not change anything in the file, so it is possible while Blender dr
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from itertools import product, starmap
@@ -26,7 +26,7 @@ from .cameras import CameraSource, camera_of_object, render_camera, resolve_came
 from .datablocks import field_mesh
 from .field_attributes import attribute_name, field_degree
 from .look_inputs import color_values_digest, read_request, reference_path
-from .look_properties import read_look
+from .look_properties import object_looks, own_presets, read_look
 from .mesh_states import MeshStates, digest, field_parts, mesh_state_key, read_mesh_state
 from .meshes import evaluated_mesh, polygon_arrays, read_uvs, shape_digest
 from .read_view import rendered_lights
@@ -137,6 +137,7 @@ class SceneState:
         self._texture_states: dict[tuple, PictureState] = {}
         look = read_look(scene.rosy)
         request, targets = read_request(scene, look), drawn_objects(depsgraph)
+        self._own_looks = _own_look_digests(scene, targets, look)
         self._lights = _light_digests(depsgraph) if look.light == "scene" else {}
         for instance, draws_field in rendered_instances(depsgraph, targets):
             obj, owner = instance.object, instance.object.original
@@ -180,7 +181,7 @@ class SceneState:
         occluders = self._used_occluders(camera, bool(settings.get("shadows") or lights))
         has_reference = settings["tone"] == "picture"
         return PictureState(
-            look=settings,
+            look=settings | ({"own": self._own_looks} if self._own_looks else {}),
             size=[] if camera is None else [camera.width, camera.height],
             camera="" if camera is None else digest(camera.view + 0.0, camera.projection + 0.0),
             output=output,
@@ -225,6 +226,16 @@ class SceneState:
         """Return the boxes of instances in a picture (`_picture_box`), without those outside it."""
         boxes = (_picture_box(camera, corners) for obj in objects for corners in obj.corners)
         return [box for box in boxes if box is not None]
+
+
+def _own_look_digests(scene: Scene, objects: Sequence[Object], look: Look) -> dict[str, str]:
+    """Return digests of the looks of objects that differ from the look of the scene, by names of objects."""
+    try:
+        looks = object_looks(scene, objects, look)
+    except RosyError as error:
+        return {"error": str(error)}
+    entries = zip(objects, looks, strict=True)
+    return {obj.name_full: digest(repr(own)) for obj, own in entries if own != look}
 
 
 def _light_digests(depsgraph: Depsgraph) -> dict[str, list[str]]:
@@ -294,13 +305,14 @@ def _used_output(settings: PropertyGroup, names: Iterable[str]) -> dict:
 def settings_key(scene: Scene, view_layer: ViewLayer) -> tuple:
     """Return the settings on which a `SceneState` depends. Blender does not report all changes of them."""
     look = read_look(scene.rosy)
-    objects = []
-    for obj in field_objects(view_layer):
+    drawn, objects = field_objects(view_layer), []
+    for obj in drawn:
         image, mesh = obj.rosy.tone_image, field_mesh(obj)
         image_key = image and (image.session_uid, *image.size, image.is_dirty)
         tone_key = image_key, obj.rosy.tone_uv_map
         objects.append((obj.session_uid, attribute_name(mesh), field_degree(mesh), tone_key))
-    return read_request(scene, look), look.light, tuple(objects)
+    presets = tuple(own_presets(scene, drawn))
+    return read_request(scene, look), look.light, tuple(objects), presets
 
 
 def applied_settings(look: Look, lacks_tone: bool = False) -> dict:

@@ -15,7 +15,7 @@ from ..projection.gbuffer import MeshInstance
 from ..rendering.view_input import ViewInput
 from .cameras import CameraSource, render_camera, resolve_camera
 from .look_inputs import ReadRequest, load_reference, nonfinite_policy, read_request
-from .look_properties import drift_in_scene
+from .look_properties import drift_in_scene, object_looks
 from .meshes import evaluated_mesh, read_uvs
 from .scene_reader import SceneData, read_scene
 
@@ -77,9 +77,14 @@ def read_views(
     instances = tuple(scene_data.instances)
     drift = drift_in_scene(scene, look, scene.frame_current_final)
     lights, views = lights_for(scene, depsgraph, look, instances), []
+    looks = object_looks(scene, scene_data.objects, look)
+    is_mixed = any(one != look for one in looks)
+    looks = (*looks, *[look] * (len(instances) - len(looks))) if is_mixed else ()
     for camera in resolved_cameras:
         in_view = tuple(light.transformed(camera.view) for light in lights)
-        views.append(ViewInput(instances, camera, look, in_view, reference, drift=drift))
+        views.append(
+            ViewInput(instances, camera, look, in_view, reference, drift=drift, looks=looks)
+        )
     return tuple(views), scene_data
 
 

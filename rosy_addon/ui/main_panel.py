@@ -61,6 +61,7 @@ def _draw_existing_field(layout: UILayout, context: Context, obj: Object) -> Non
     row = box.row()
     row.label(text=obj.name, icon="OUTLINER_OB_MESH")
     row.prop(obj.rosy, "include", text="Draw")
+    box.prop(obj.rosy, "preset", icon="PRESET")
     has_attribute = mesh.rosy.attribute in mesh.attributes
     name = f"'{mesh.rosy.attribute}'" if has_attribute else "dir0 ..."
     faces = counted(len(mesh.polygons), "face")
@@ -261,4 +262,18 @@ def _draw_view_transform_warning(layout: UILayout, scene: Scene) -> None:
         button.data_path, button.value = "scene.view_settings.view_transform", "Standard"
 
 
-CLASSES = (VIEW3D_PT_rosy,)
+class COLLECTION_PT_rosy(Panel):
+    """The preset of the objects in a collection."""
+
+    bl_label = "RoSy"
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "collection"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: Context) -> None:
+        sidebar.use_property_columns(self.layout)
+        self.layout.prop(context.collection.rosy, "preset", icon="PRESET")
+
+
+CLASSES = (VIEW3D_PT_rosy, COLLECTION_PT_rosy)

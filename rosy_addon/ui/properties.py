@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+from typing import Any
 
 import bpy
 
@@ -397,8 +398,22 @@ class RosyMesh(bpy.types.PropertyGroup):
     )
 
 
+def _own_preset(description: str) -> Any:
+    """Return the property for the preset of an object or a collection."""
+    search = preset_library.search_presets
+    return text("Own Look", description, search=search, search_options={"SUGGESTION"})
+
+
+class RosyCollection(bpy.types.PropertyGroup):
+    """Settings of a collection: the preset of its objects."""
+
+    preset: _own_preset("Preset of the objects in this collection. Empty: the look of the scene")
+
+
 class RosyObject(bpy.types.PropertyGroup):
-    """Settings of an object with a field: whether it is drawn, its tone image, and its UV maps."""
+    """Settings of an object with a field: whether and how it is drawn, its tone image, and its UV maps."""
+
+    preset: _own_preset("Preset of this object. Empty: the look of its collection or of the scene")
 
     include: toggle(
         "Draw the Field",
@@ -429,6 +444,7 @@ POINTER_PROPERTIES = (
     (bpy.types.Scene, RosyScene),
     (bpy.types.Mesh, RosyMesh),
     (bpy.types.Object, RosyObject),
+    (bpy.types.Collection, RosyCollection),
     (bpy.types.NodeTree, RosyNodeTree),
 )
 

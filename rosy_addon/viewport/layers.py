@@ -18,6 +18,7 @@ from ..core.file_io import file_stamp
 from ..scene import look_inputs
 from ..scene.cameras import render_camera
 from ..scene.datablocks import field_mesh
+from ..scene.look_properties import own_presets
 from ..scene.read_view import lights_for
 from ..scene.scene_reader import SceneInstance, SceneReader
 from ..scene.visible_objects import shown_instances
@@ -90,6 +91,10 @@ class LayerStates:
             )
             instances = [entry.instance for entry in layer.instances]
             layer.lights = lights_for(scene, depsgraph, look, instances)
+            with_field = [entry for entry in layer.instances if entry.instance.field is not None]
+            if any(own_presets(scene, [entry.owner for entry in with_field])):
+                note = "objects have looks of their own: bake to see them"
+                layer.reader.notes["own looks"] = note
             layer.request = request if layer.reader.is_complete else None
             layer.is_starting &= not layer.reader.is_complete
         return layer

@@ -250,10 +250,12 @@ def leftovers() -> list[str]:
         left += [f"a modifier of '{obj.name}'" for g in groups if g is not None and is_owned(g)]
     for mesh in bpy.data.meshes:
         if mesh.library is None and mesh.override_library is None:
+            names = [attribute.name for attribute in mesh.attributes]
             left += [
                 f"'{attribute.name}' of '{mesh.name}'"
                 for attribute in mesh.attributes
                 if APPLIED.get(attribute.name) == (attribute.data_type, attribute.domain)
+                and names.count(attribute.name) == 1  # else Blender 4.3 may remove the other one
             ]
     return left
 

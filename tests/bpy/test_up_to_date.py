@@ -323,6 +323,7 @@ TABLE = {
     "light without shading": (put("rosy.look.light", "scene"), put("rosy.look.shading", 0.0), ""),
     "gain with hatching": (put("rosy.look.gain", 1.0), hatched, ""),
     "unit": (put("rosy.look.unit", "percent"), None, "the look was changed"),
+    "own look": (put("Plain:rosy.preset", "engraving"), None, "the look was changed"),
     "shadows of a headlight": (put("rosy.look.shadows", True), None, ""),
     "tone attribute": (lambda scene: add_tone(0.2), tone, "field of 'Plain' was changed"),
     "colored attribute": (lambda scene: add_tone(0.2), colors, "field of 'Plain' was changed"),
